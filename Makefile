@@ -1,0 +1,138 @@
+# drivebridge: everything that is done around the code. `make help` lists it.
+#
+# PYTHON=...  the interpreter for .venv     (default: the first Python >= 3.11 found)
+# LAB=0       leave out the tests that need a CAN interface, and the Debian packages they need
+# APT=0       install no Debian packages, only say which are missing
+# ARGS=...    further arguments, e.g. make unit ARGS='-k watchdog -x'
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+MAKEFLAGS += --no-builtin-rules
+
+LAB ?= 1
+export APT ?= 1
+export PYTHON
+ARGS ?=
+
+VENV := .venv
+IN := $(VENV)/bin/python
+# Modules, not the scripts in bin/: those carry the path at which the venv was made.
+PIP := $(IN) -m pip --disable-pip-version-check
+PYTEST := $(IN) -m pytest
+QUIETLY := tools/quietly $(VENV)/install.log
+
+# The lab runs on one slow CPU as root: it leaves no caches behind and gets a time limit.
+LAB_SECONDS := 420
+VCAN := PYTHON=$(IN) PYTHONDONTWRITEBYTECODE=1 tests/lab/vcan-run -n 2 -t $(LAB_SECONDS) --
+PACKAGES := iproute2:ip kmod:insmod can-utils:cansend mbpoll:mbpoll
+
+##@ Run
+demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, until Ctrl-C
+	@exec $(IN) -m bridge demo $(ARGS)
+
+##@ Test
+test: unit wire lab ## all tests: unit, wire, lab
+
+unit: $(VENV)/dev.stamp ## tests of the code alone
+	@echo "== unit tests"
+	@$(PYTEST) tests/unit $(ARGS)
+
+wire: $(VENV)/dev.stamp packages ## tests with real protocol clients on loopback
+	@echo "== wire tests"
+	@$(PYTEST) -rs tests/wire $(ARGS)
+
+ifeq ($(LAB),0)
+lab:
+	@echo "== LAB=0: the lab tests, on real SocketCAN, were NOT run"
+
+packages:
+	@echo "LAB=0: no Debian packages are installed; wire tests that need one skip themselves"
+else
+lab: $(VENV)/dev.stamp packages ## tests on real SocketCAN: vcan, or a user-mode kernel that has it
+	@echo "== lab tests ($$(PYTHON=$(IN) tests/lab/vcan-run -w | sed 's/here/on vcan of this kernel/;s/uml/in a user-mode kernel: this one has no vcan/'))"
+	@$(VCAN) $(PYTEST) -rs -p no:cacheprovider --timeout=120 tests/lab $(ARGS)
+
+packages: $(VENV)/dev.stamp ## install the Debian packages that the tests need
+	@tools/need-packages "the tests (LAB=0 leaves those on a CAN bus out)" $(PACKAGES)
+	@[ "$$(PYTHON=$(IN) tests/lab/vcan-run -w)" = here ] || \
+	  tools/need-packages "the lab tests: this kernel has no vcan (LAB=0 leaves them out)" user-mode-linux:linux.uml
+endif
+
+bench: $(VENV)/dev.stamp packages ## print the measured figures
+	@echo "== figures: this machine"
+	@$(PYTEST) -s -p no:cacheprovider -o python_files='bench_*.py' --ignore=tests/bench/lab tests/bench $(ARGS)
+ifneq ($(LAB),0)
+	@echo "== figures: SocketCAN"
+	@$(VCAN) $(PYTEST) -s -p no:cacheprovider -o python_files='bench_*.py' tests/bench/lab $(ARGS)
+endif
+
+##@ Check
+check: check-style check-format check-types check-imports ## style, format, types, import rules (-k: all of them even if one fails)
+
+check-style: $(VENV)/dev.stamp
+	@echo "== ruff check"
+	@$(IN) -m ruff check
+
+check-format: $(VENV)/dev.stamp
+	@echo "== ruff format --check"
+	@$(IN) -m ruff format --check
+
+check-types: $(VENV)/dev.stamp
+	@echo "== pyright, strict"
+	@$(IN) -m pyright
+
+check-imports: $(VENV)/dev.stamp
+	@echo "== import rules"
+	@$(IN) -c 'from importlinter.cli import lint_imports_command as main; main()' --no-cache --no-logo
+
+format: $(VENV)/dev.stamp ## put the code into the format that check asks for
+	@$(IN) -m ruff check --fix
+	@$(IN) -m ruff format
+
+##@ Set up and build
+setup: $(VENV)/dev.stamp ## make .venv with everything for demo, test and check
+
+$(VENV)/made.stamp: tools/make-venv
+	@tools/make-venv $(VENV) requirements.lock
+	@touch $@
+
+$(VENV)/demo.stamp: $(VENV)/made.stamp pyproject.toml requirements.lock
+	@echo "Installing drivebridge into $(VENV)"
+	@$(QUIETLY) $(PIP) install --no-build-isolation -c requirements.lock -e .
+	@touch $@
+
+$(VENV)/dev.stamp: $(VENV)/made.stamp pyproject.toml requirements.lock
+	@echo "Installing drivebridge and the tools for its tests into $(VENV)"
+	@$(QUIETLY) $(PIP) install --no-build-isolation -c requirements.lock -e '.[dev]'
+	@touch $@ $(VENV)/demo.stamp
+
+lock: ## write requirements.lock anew with today's versions
+	@folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; new=$$folder/venv/bin/python; \
+	  tools/make-venv "$$folder/venv"; \
+	  echo "Resolving today's versions"; \
+	  tools/quietly "$$folder/log" "$$new" -m pip install --no-build-isolation -e '.[dev]'; \
+	  { echo "# Every package of .venv, for pip's -c. Written by \`make lock\` with $$("$$new" --version)."; \
+	    "$$new" -m pip freeze --exclude-editable; } >"$$folder/lock"; \
+	  ! grep -n '@\|file:' "$$folder/lock"; \
+	  cp "$$folder/lock" requirements.lock
+	@echo "requirements.lock: $$(grep -c == requirements.lock) packages"
+
+wheel: $(VENV)/dev.stamp ## build the wheel and the source archive into dist/
+	@echo "Building dist/"
+	@$(QUIETLY) $(IN) -m build --no-isolation
+	@ls -1 dist
+
+clean: ## remove .venv and everything that was built
+	@echo "Removing .venv, dist and caches"
+	@rm -rf $(VENV) dist build .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	@find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
+
+help: ## this list
+	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
+	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
+
+.PHONY: demo test unit wire lab packages bench check check-style check-format check-types check-imports \
+  format setup lock wheel clean help

@@ -1,0 +1,41 @@
+"""The command line: one file per group of commands, errors turned into exit codes here."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from bridge import __version__
+from bridge.cli import export, project, serve
+from bridge.errors import BridgeError
+
+app = typer.Typer(
+    name="drivebridge",
+    help="CANopen master for industrial drives, served as OPC UA, Modbus TCP and zenoh.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command()(serve.demo)
+app.command()(serve.run)
+app.command()(serve.simulate)
+app.command(hidden=True)(serve.demo_controller)
+app.command()(project.check)
+app.command("hash-password")(project.hash_password)
+app.add_typer(export.app, name="export")
+
+
+@app.command()
+def version() -> None:
+    """Print the version."""
+    print(__version__)
+
+
+def run_app() -> None:
+    """Run the command line. Exit codes: 0 done, 1 failed, 2 bad usage or file, 3 bus or port."""
+    try:
+        app()
+    except BridgeError as error:
+        print(error, file=sys.stderr)
+        raise SystemExit(error.exit_code) from None

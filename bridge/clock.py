@@ -1,0 +1,15 @@
+"""The clocks of the service. Everything is timed by the monotonic one; only what leaves is dated."""
+
+from __future__ import annotations
+
+import time
+
+
+def now() -> float:
+    """Monotonic seconds, the same clock as the event loop's and the time stamps of frames."""
+    return time.monotonic()
+
+
+def epoch_ns(at: float) -> int:
+    """A monotonic time as nanoseconds since 1970 by the wall clock as it is set now."""
+    return time.time_ns() - time.monotonic_ns() + round(at * 1e9)

@@ -1,0 +1,22 @@
+"""Who may command which drive, what is sent to it, and what happens when the controller falls silent."""
+
+from bridge.command.event import Event, Kind
+from bridge.command.plant import Drive, Identification, Node, Plant
+from bridge.command.request import Action, Code, Identity, Outcome, Reply, Request, Role, Source
+
+__all__ = [
+    "Action",
+    "Code",
+    "Drive",
+    "Event",
+    "Identification",
+    "Identity",
+    "Kind",
+    "Node",
+    "Outcome",
+    "Plant",
+    "Reply",
+    "Request",
+    "Role",
+    "Source",
+]

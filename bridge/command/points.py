@@ -1,0 +1,226 @@
+"""Every point there is, made from the site file and the mappings: the one place where a user's view
+is defined. Names: ``docs/reference/points.md``."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.command import watchdog
+from bridge.command.request import Source
+from bridge.config import BusTable, NodeTable
+from bridge.drive import STATES, LinearScale
+from bridge.image import DataType, Point
+from bridge.mapping.model import Family, Poll, ScaledValue
+
+OWNERS: Final = tuple((source.value, source.label) for source in Source)
+NMT_STATES: Final = (
+    (0, "initialising"),
+    (4, "stopped"),
+    (5, "operational"),
+    (127, "pre_operational"),
+    (255, "unknown"),
+)
+CONTROLLER_STATES: Final = ((0, "ok"), (1, "warning"), (2, "passive"), (3, "bus_off"), (4, "down"))
+
+
+def _word(name: str, description: str, **more: object) -> Point:
+    return Point(name=name, data_type=DataType.UINT16, description=description, **more)  # pyright: ignore[reportArgumentType]
+
+
+def drive_points(name: str, family: Family, scales: dict[str, LinearScale]) -> list[Point]:
+    """The points of the drive called ``<node>/<drive>``.
+
+    ``scales`` holds the scales that are known already, by parameter name, for the ranges.
+    """
+    return [
+        *_command_points(name, family, scales),
+        *_status_points(name, family),
+        *_actual_points(name, family, scales),
+        *_supervision_points(name),
+        *_identity_points(name),
+    ]
+
+
+def _command_points(name: str, family: Family, scales: dict[str, LinearScale]) -> list[Point]:
+    points = [
+        Point(
+            name=f"{name}/command/control_word",
+            data_type=DataType.UINT16,
+            writable=True,
+            description="control word as the owner wrote it",
+            bits=tuple(family.control_word.bits),
+        )
+    ]
+    points += [
+        Point(
+            name=f"{name}/command/{word}",
+            data_type=DataType.UINT16,
+            writable=True,
+            description="setpoint word as the owner wrote it",
+        )
+        for word in family.process.rpdo[1:]
+    ]
+    points += [_scaled(name, value, scales) for value in family.value if value.group == "command"]
+    return points
+
+
+def _status_points(name: str, family: Family) -> list[Point]:
+    bits = tuple(family.status_word.bits)
+    return [
+        Point(
+            name=f"{name}/status/status_word",
+            data_type=DataType.UINT16,
+            description="status word; shows fault while the watchdog has tripped",
+            bits=bits,
+        ),
+        Point(
+            name=f"{name}/status/drive_status_word",
+            data_type=DataType.UINT16,
+            description="status word as the drive sent it",
+            bits=bits,
+        ),
+        Point(
+            name=f"{name}/status/state", data_type=DataType.UINT8, states=STATES, description="drive state"
+        ),
+        Point(name=f"{name}/status/fault_text", data_type=DataType.STRING, description="present fault"),
+        _word(f"{name}/status/emcy_code", "code of the last emergency message, DS-301 §7.2.7"),
+    ]
+
+
+def _actual_points(name: str, family: Family, scales: dict[str, LinearScale]) -> list[Point]:
+    points = [
+        _word(f"{name}/actual/{word}", "actual value word as the drive sent it")
+        for word in family.process.tpdo[1:]
+    ]
+    points += [_scaled(name, value, scales) for value in family.value if value.group == "actual"]
+    return points
+
+
+def _scaled(name: str, value: ScaledValue, scales: dict[str, LinearScale]) -> Point:
+    scale = scales.get(value.scale.full)
+    return Point(
+        name=f"{name}/{value.group}/{value.name}",
+        data_type=DataType.FLOAT,
+        unit=value.unit,
+        low=scale.low if scale else None,
+        high=scale.high if scale else None,
+        writable=value.group == "command",
+        description=value.description,
+    )
+
+
+def _supervision_points(name: str) -> list[Point]:
+    top = f"{name}/supervision"
+    u32, ms = DataType.UINT32, "ms"
+    return [
+        Point(name=f"{top}/owner", data_type=DataType.STRING, description="who commands the drive"),
+        Point(
+            name=f"{top}/watchdog_state",
+            data_type=DataType.UINT8,
+            states=watchdog.STATES,
+            description="controller leg of the watchdog",
+        ),
+        Point(name=f"{top}/watchdog_left_ms", data_type=u32, unit=ms, description="time until the trip"),
+        Point(
+            name=f"{top}/fieldbus_timeout_ms", data_type=u32, unit=ms, description="twin of P151; 0 is off"
+        ),
+        Point(
+            name=f"{top}/telegram_downtime_s",
+            data_type=DataType.FLOAT,
+            unit="s",
+            description="twin of P513; 0 is off, -0.1 ignores all communication errors",
+        ),
+        Point(name=f"{top}/last_fault", data_type=DataType.FLOAT, description="such as 10.3 for E010/10.3"),
+        Point(name=f"{top}/current_fault", data_type=DataType.FLOAT, description="0 where there is none"),
+        Point(name=f"{top}/trips", data_type=u32, description="watchdog trips since start"),
+        Point(
+            name=f"{top}/worst_case_stop_ms",
+            data_type=u32,
+            unit=ms,
+            description="longest time from the controller's last telegram to the reaction on the bus",
+        ),
+        Point(name=f"{top}/pdo_age_ms", data_type=u32, unit=ms, description="age of the last TPDO"),
+        _word(f"{top}/sent_control_word", "control word that the bridge sends to the drive"),
+        Point(
+            name=f"{top}/restart_interlock",
+            data_type=DataType.BOOL,
+            description="true until the owner has sent a control word that does not enable",
+        ),
+        Point(name=f"{top}/refused_writes", data_type=u32, description="refused requests since start"),
+    ]
+
+
+def _identity_points(name: str) -> list[Point]:
+    top = f"{name}/identity"
+    return [
+        Point(name=f"{top}/vendor", data_type=DataType.UINT32, description="1018h:1"),
+        Point(name=f"{top}/product", data_type=DataType.UINT32, description="1018h:2"),
+        Point(name=f"{top}/revision", data_type=DataType.UINT32, description="1018h:3"),
+        Point(name=f"{top}/serial", data_type=DataType.UINT32, description="1018h:4"),
+        Point(name=f"{top}/device_name", data_type=DataType.STRING, description="1008h"),
+    ]
+
+
+def node_points(node: NodeTable, polls: list[Poll]) -> list[Point]:
+    top = f"{node.name}/node"
+    return [
+        Point(
+            name=f"{top}/nmt_state",
+            data_type=DataType.UINT8,
+            states=NMT_STATES,
+            description="NMT state as the node reports it",
+        ),
+        Point(
+            name=f"{top}/supervision_state", data_type=DataType.STRING, description="heartbeat or guarding"
+        ),
+        Point(name=f"{top}/boot_status", data_type=DataType.STRING, description="boot-up step or result"),
+        Point(
+            name=f"{top}/current_fault",
+            data_type=DataType.FLOAT,
+            description="fault of the bridge's leg to the controller, as P170[-01]",
+        ),
+        Point(name=f"{top}/last_fault", data_type=DataType.FLOAT, description="as P170[-02]"),
+        Point(
+            name=f"{top}/rejected_frames", data_type=DataType.UINT32, description="frames that fit nothing"
+        ),
+        *(
+            Point(
+                name=f"{top}/{poll.name}",
+                data_type=poll.data_type,
+                description=poll.description,
+                bits=tuple(poll.bits),
+            )
+            for poll in polls
+        ),
+    ]
+
+
+def bus_points(bus: BusTable) -> list[Point]:
+    top = f"bus/{bus.name}"
+    u32 = DataType.UINT32
+    return [
+        Point(
+            name=f"{top}/state",
+            data_type=DataType.UINT8,
+            states=CONTROLLER_STATES,
+            description="CAN controller",
+        ),
+        Point(
+            name=f"{top}/load", data_type=DataType.FLOAT, unit="%", low=0, high=100, description="bus load"
+        ),
+        Point(name=f"{top}/tx_errors", data_type=u32, description="transmit error counter"),
+        Point(name=f"{top}/rx_errors", data_type=u32, description="receive error counter"),
+        Point(
+            name=f"{top}/frames_lost", data_type=u32, description="frames the kernel or the buffer dropped"
+        ),
+    ]
+
+
+def bridge_points() -> list[Point]:
+    u32 = DataType.UINT32
+    return [
+        Point(name="bridge/version", data_type=DataType.STRING, description="version of drivebridge"),
+        Point(name="bridge/drives_configured", data_type=u32, description="drives in the site file"),
+        Point(name="bridge/drives_good", data_type=u32, description="drives with good data"),
+        Point(name="bridge/refused_writes", data_type=u32, description="refused requests since start"),
+    ]

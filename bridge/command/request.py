@@ -1,0 +1,130 @@
+"""A request to command a drive or a node, and its one outcome."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum, StrEnum
+
+from bridge.image import Value
+
+
+class Source(IntEnum):
+    """Where a command comes from, numbered as Modbus serves the owner (input register 20)."""
+
+    NONE = 0
+    OPCUA = 1
+    MODBUS = 2
+    ZENOH = 3
+    LOCAL = 4
+
+    @property
+    def label(self) -> str:
+        return self.name.lower()
+
+
+class Role(IntEnum):
+    """What an identity may do; a higher role may all that a lower one may."""
+
+    OBSERVER = 0
+    OPERATOR = 1
+    ENGINEER = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Who asks. Two requests come from the same controller exactly if ``source`` and ``user`` agree.
+
+    ``user`` is the session's user on OPC UA, the client's IP address on Modbus, the controller's name
+    on zenoh. ``address`` is for the log only.
+    """
+
+    source: Source
+    user: str
+    role: Role = Role.OPERATOR
+    address: str = ""
+
+    def is_same(self, other: Identity | None) -> bool:
+        return other is not None and self.source is other.source and self.user == other.user
+
+    def __str__(self) -> str:
+        return f"{self.source.label}:{self.user}"
+
+
+class Action(StrEnum):
+    # on a drive
+    WRITE = "write"
+    KEEP_ALIVE = "keep_alive"
+    RESET_FAULT = "reset_fault"
+    START = "start"
+    STOP = "stop"
+    QUICK_STOP = "quick_stop"
+    DISABLE_VOLTAGE = "disable_voltage"
+    TAKE_CONTROL = "take_control"
+    RELEASE_CONTROL = "release_control"
+    SET_TIMEOUT = "set_timeout"
+    # on a node
+    RESET = "reset"
+    RESET_COMMUNICATION = "reset_communication"
+    ENABLE = "enable"
+    DISABLE = "disable"
+
+
+NODE_ACTIONS = frozenset((Action.RESET, Action.RESET_COMMUNICATION, Action.ENABLE, Action.DISABLE))
+STOP_ACTIONS = frozenset((Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE))
+
+
+class Code(StrEnum):
+    """How a request ended."""
+
+    OK = "ok"
+    UNKNOWN_TARGET = "unknown_target"
+    UNKNOWN_POINT = "unknown_point"
+    READ_ONLY = "read_only"
+    OUT_OF_RANGE = "out_of_range"
+    NOT_VALID = "not_valid"
+    NOT_ALLOWED = "not_allowed"
+    ACKNOWLEDGE_FIRST = "acknowledge_first"
+    NOT_READY = "not_ready"
+    NOT_CONFIGURED = "not_configured"
+    TIMED_OUT = "timed_out"
+    CANCELLED = "cancelled"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The end of a request. ``forwarded`` is False where a write was taken but not sent to the drive
+    (while tripped or interlocked); ``message`` is one sentence for a human."""
+
+    code: Code
+    message: str = ""
+    forwarded: bool = True
+
+    @property
+    def ok(self) -> bool:
+        return self.code is Code.OK
+
+
+DONE = Outcome(Code.OK)
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One command.
+
+    ``target`` is ``<node>/<drive>`` or ``<node>``. ``values`` (WRITE) maps names of the command group
+    to values: ``{"control_word": 0x047F, "setpoint_1": 0x2000}`` is one telegram. ``ttl_ms``
+    (TAKE_CONTROL) is the lease's length, ``direction`` (START) is 1 forward, -1 reverse, 0 as the
+    drive's own setting, ``timeout_ms`` goes with SET_TIMEOUT.
+    """
+
+    identity: Identity
+    target: str
+    action: Action
+    values: Mapping[str, Value] = field(default_factory=dict[str, Value])
+    ttl_ms: int = 0
+    direction: int = 0
+    timeout_ms: int = 0
+
+
+Reply = Callable[[Outcome], None]

@@ -1,0 +1,141 @@
+"""The controller leg of the watchdog: the twin of P151 (BU 2500 §7.1.1), as a table and one timer."""
+
+from __future__ import annotations
+
+from enum import Enum, IntEnum
+from typing import Final
+
+
+class WatchdogState(IntEnum):
+    """Numbered as Modbus serves it (input register 14)."""
+
+    OFF = 0
+    IDLE = 1
+    RUNNING = 2
+    TRIPPED = 3
+
+    @property
+    def label(self) -> str:
+        return self.name.lower()
+
+
+STATES: Final = tuple((state.value, state.label) for state in WatchdogState)
+
+
+class Stimulus(Enum):
+    TELEGRAM = "valid telegram"
+    INVALID = "invalid telegram"
+    EXPIRED = "timer expires"
+    ACKNOWLEDGED = "acknowledge"
+    RELEASED = "owner releases"
+    OWNER_CHANGED = "owner changes"
+    STARTED = "bridge starts"
+
+
+class Effect(Enum):
+    NOTHING = "nothing"
+    FORWARD = "forward the telegram"
+    TAKE = "take the telegram, do not forward it"
+    REFUSE = "refuse the telegram"
+    REACT = "reaction, fault"
+    CLEAR = "clear the drive's fault, keep it stopped"
+    STOP = "stop the drive"
+
+
+_OFF, _IDLE, _RUN, _TRIP = WatchdogState
+
+TABLE: Final[dict[tuple[WatchdogState, Stimulus], tuple[WatchdogState, Effect]]] = {
+    (_OFF, Stimulus.TELEGRAM): (_OFF, Effect.FORWARD),
+    (_OFF, Stimulus.INVALID): (_OFF, Effect.REFUSE),
+    (_OFF, Stimulus.EXPIRED): (_OFF, Effect.NOTHING),
+    (_OFF, Stimulus.ACKNOWLEDGED): (_OFF, Effect.CLEAR),
+    (_OFF, Stimulus.RELEASED): (_OFF, Effect.STOP),
+    (_OFF, Stimulus.OWNER_CHANGED): (_OFF, Effect.STOP),
+    (_OFF, Stimulus.STARTED): (_OFF, Effect.STOP),
+    (_IDLE, Stimulus.TELEGRAM): (_RUN, Effect.FORWARD),
+    (_IDLE, Stimulus.INVALID): (_IDLE, Effect.REFUSE),
+    (_IDLE, Stimulus.EXPIRED): (_IDLE, Effect.NOTHING),
+    (_IDLE, Stimulus.ACKNOWLEDGED): (_RUN, Effect.CLEAR),
+    (_IDLE, Stimulus.RELEASED): (_IDLE, Effect.STOP),
+    (_IDLE, Stimulus.OWNER_CHANGED): (_IDLE, Effect.STOP),
+    (_IDLE, Stimulus.STARTED): (_IDLE, Effect.STOP),
+    (_RUN, Stimulus.TELEGRAM): (_RUN, Effect.FORWARD),
+    (_RUN, Stimulus.INVALID): (_RUN, Effect.REFUSE),
+    (_RUN, Stimulus.EXPIRED): (_TRIP, Effect.REACT),
+    (_RUN, Stimulus.ACKNOWLEDGED): (_RUN, Effect.CLEAR),
+    (_RUN, Stimulus.RELEASED): (_IDLE, Effect.STOP),
+    (_RUN, Stimulus.OWNER_CHANGED): (_IDLE, Effect.STOP),
+    (_RUN, Stimulus.STARTED): (_IDLE, Effect.STOP),
+    (_TRIP, Stimulus.TELEGRAM): (_TRIP, Effect.TAKE),
+    (_TRIP, Stimulus.INVALID): (_TRIP, Effect.REFUSE),
+    (_TRIP, Stimulus.EXPIRED): (_TRIP, Effect.NOTHING),
+    (_TRIP, Stimulus.ACKNOWLEDGED): (_RUN, Effect.CLEAR),
+    # Who gives control back or takes it over does not take the fault away with it.
+    (_TRIP, Stimulus.RELEASED): (_TRIP, Effect.NOTHING),
+    (_TRIP, Stimulus.OWNER_CHANGED): (_TRIP, Effect.NOTHING),
+    (_TRIP, Stimulus.STARTED): (_IDLE, Effect.STOP),
+}
+
+
+class Watchdog:
+    """One drive's controller leg.
+
+    ``timeout_ms`` is ``fieldbus_timeout_ms`` (0 is off). With ``report_only`` (telegram downtime
+    -0.1) the state stays OFF and an expiry is told once by ``on_time`` and does nothing else.
+    """
+
+    __slots__ = ("_deadline", "_report_only", "_silent", "_timeout_s", "state")
+
+    def __init__(self, timeout_ms: int, *, report_only: bool = False) -> None:
+        self._timeout_s = timeout_ms / 1000
+        self._report_only = report_only
+        self._deadline: float | None = None
+        self._silent = False
+        self.state = WatchdogState.OFF if report_only or not timeout_ms else WatchdogState.IDLE
+
+    @property
+    def timeout_ms(self) -> int:
+        return round(self._timeout_s * 1000)
+
+    @property
+    def controller_is_silent(self) -> bool:
+        """No valid telegram for longer than the time-out, after there had been one."""
+        return self._silent
+
+    def set_timeout(self, timeout_ms: int, now: float) -> None:
+        """A new time, from the next telegram on; a trip stays a trip."""
+        self._timeout_s = timeout_ms / 1000
+        if self.state is not WatchdogState.TRIPPED and not self._report_only:
+            running = self.state is WatchdogState.RUNNING
+            self.state = WatchdogState.OFF
+            if timeout_ms:
+                self.state = WatchdogState.RUNNING if running else WatchdogState.IDLE
+        self._deadline = now + self._timeout_s if timeout_ms and self._deadline is not None else None
+
+    def left_ms(self, now: float) -> int:
+        """Time until the trip; 0 when the timer does not run."""
+        if self._deadline is None or self.state is not WatchdogState.RUNNING:
+            return 0
+        return max(0, round((self._deadline - now) * 1000))
+
+    def next_deadline(self) -> float | None:
+        return self._deadline
+
+    def apply(self, stimulus: Stimulus, now: float) -> Effect:
+        """Let ``stimulus`` happen at ``now`` and say what is to be done about it."""
+        self.state, effect = TABLE[self.state, stimulus]
+        if stimulus in (Stimulus.TELEGRAM, Stimulus.ACKNOWLEDGED):
+            self._silent = False
+            self._deadline = now + self._timeout_s if self._timeout_s else None
+        elif stimulus in (Stimulus.RELEASED, Stimulus.OWNER_CHANGED, Stimulus.STARTED):
+            self._silent = False
+            self._deadline = None
+        return effect
+
+    def on_time(self, now: float) -> Effect | None:
+        """The effect of the timer if it has expired by ``now``, told once per silence, or None."""
+        if self._deadline is None or now < self._deadline:
+            return None
+        self._deadline = None
+        self._silent = True
+        return self.apply(Stimulus.EXPIRED, now)

@@ -1,0 +1,1 @@
+"""The demo site: `drivebridge demo` serves it on simulated drives."""

@@ -1,0 +1,108 @@
+"""A point: one value that a user can see, defined in one place."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+Value = bool | int | float | str
+
+
+class DataType(StrEnum):
+    BOOL = "bool"
+    UINT8 = "uint8"
+    UINT16 = "uint16"
+    UINT32 = "uint32"
+    INT16 = "int16"
+    INT32 = "int32"
+    FLOAT = "float"
+    STRING = "string"
+
+    @property
+    def is_integer(self) -> bool:
+        return self in INTEGER_RANGE
+
+    @property
+    def zero(self) -> Value:
+        """The value of a point that has never had one."""
+        if self is DataType.STRING:
+            return ""
+        if self is DataType.BOOL:
+            return False
+        return 0.0 if self is DataType.FLOAT else 0
+
+
+INTEGER_RANGE: Final = {
+    DataType.UINT8: (0, 0xFF),
+    DataType.UINT16: (0, 0xFFFF),
+    DataType.UINT32: (0, 0xFFFF_FFFF),
+    DataType.INT16: (-0x8000, 0x7FFF),
+    DataType.INT32: (-0x8000_0000, 0x7FFF_FFFF),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Point:
+    """Name and nature of one value; the value itself is in the image.
+
+    ``name`` is the full name, ``<node>/<drive>/<group>/<leaf>`` for what belongs to a drive. ``low``
+    and ``high`` are in ``unit``. ``states`` are the codes of an enumeration with their text, ``bits``
+    the names of a word's bits from bit 0 on ("" where a bit has no meaning).
+    """
+
+    name: str
+    data_type: DataType
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    writable: bool = False
+    description: str = ""
+    states: tuple[tuple[int, str], ...] = ()
+    bits: tuple[str, ...] = ()
+
+    @property
+    def path(self) -> tuple[str, ...]:
+        return tuple(self.name.split("/"))
+
+    @property
+    def leaf(self) -> str:
+        return self.name.rpartition("/")[2]
+
+    def check(self, value: object) -> Value:
+        """``value`` as this point's type, or ValueError with the sentence that says what is allowed.
+
+        Integers are taken for float points; NaN and infinities are never taken. A 16-bit word may be
+        written as its signed number, because control programs hold setpoint words in INT variables.
+        """
+        kind = self.data_type
+        if kind is DataType.STRING:
+            if isinstance(value, str):
+                return value
+            raise ValueError(f"{self.name} takes a text")
+        if kind is DataType.BOOL:
+            if isinstance(value, bool):
+                return value
+            raise ValueError(f"{self.name} takes true or false")
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ValueError(f"{self.name} takes a number")
+        if kind is DataType.FLOAT:
+            if not math.isfinite(value):
+                raise ValueError(f"{self.name} takes a finite number")
+            return self._in_range(float(value))
+        if isinstance(value, float) and not value.is_integer():
+            raise ValueError(f"{self.name} takes a whole number")
+        number = int(value)
+        if kind is DataType.UINT16 and -0x8000 <= number < 0:
+            number &= 0xFFFF
+        low, high = INTEGER_RANGE[kind]
+        if not low <= number <= high:
+            raise ValueError(f"{self.name} takes {low}…{high}, not {number}")
+        return self._in_range(number)
+
+    def _in_range(self, number: int | float) -> int | float:
+        if (self.low is not None and number < self.low) or (self.high is not None and number > self.high):
+            unit = f" {self.unit}" if self.unit else ""
+            raise ValueError(f"{self.name} takes {self.low:g}…{self.high:g}{unit}, not {number:g}")
+        return number

@@ -1,0 +1,228 @@
+"""What a drive family is: the content of a file below ``mappings/``.
+
+The models are the schema (``mappings/schema.json`` is made from them); everything the service knows
+of a vendor's drive is in such a file.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Final, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+
+from bridge.image import DataType
+
+_OBJECT: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})")
+_PATTERN: Final = re.compile(r"[01X]{1,16}")
+
+
+class Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class ObjectRef(Table):
+    """An entry of the object dictionary."""
+
+    index: int
+    sub: int
+
+    def __str__(self) -> str:
+        return f"{self.index:04X}:{self.sub:02X}"
+
+
+def _object(text: object) -> object:
+    if isinstance(text, ObjectRef):
+        return text
+    match = _OBJECT.fullmatch(text) if isinstance(text, str) else None
+    if not match:
+        raise ValueError('must be an object as "3002:01", index and sub-index in hexadecimal')
+    return ObjectRef(index=int(match[1], 16), sub=int(match[2], 16))
+
+
+def _pattern(text: str) -> str:
+    text = text.replace(" ", "")
+    if not _PATTERN.fullmatch(text):
+        raise ValueError("must be written with 0, 1 and X (do not care), highest bit first")
+    return text
+
+
+Ref = Annotated[ObjectRef, BeforeValidator(_object)]
+Pattern = Annotated[str, AfterValidator(_pattern)]
+Word = Annotated[int, Field(ge=0, le=0xFFFF)]
+Bit = Annotated[int, Field(ge=0, le=15)]
+Kind = Annotated[DataType, Field(strict=False)]
+
+
+def pattern_bits(pattern: str) -> tuple[int, int]:
+    """``"0XX1000"`` as (mask, value): the word matches where ``word & mask == value``."""
+    mask = int("".join("0" if c == "X" else "1" for c in pattern), 2)
+    value = int(pattern.replace("X", "0"), 2)
+    return mask, value
+
+
+class FamilyTable(Table):
+    name: str
+    vendor: str
+    source: str = Field(description="the manual that the facts of this file are taken from")
+    node_id_low: int = Field(1, ge=1, le=127)
+    node_id_high: int = Field(127, ge=1, le=127)
+
+
+class IdentityRule(Table):
+    """What 1000h and 1018h must hold; what is absent is not compared."""
+
+    device_type: int | None = None
+    vendor_id: int | None = None
+    product_code: int | None = None
+
+
+class Pdo(Table):
+    """One PDO of a slot. ``objects`` gives for each word the objects that may stand for it, the
+    factory's first; the order is that of ``process.rpdo`` or ``process.tpdo``."""
+
+    number: int = Field(ge=1, le=512)
+    cob_id: int = Field(ge=0, le=0x7FF, description="without the node id, such as 0x200")
+    objects: list[list[Ref]]
+
+
+class Slot(Table):
+    """One drive of the node."""
+
+    name: str
+    rpdo: Pdo
+    tpdo: Pdo
+    emcy_drive: int | None = Field(None, description="the value of the EMCY drive byte for this drive")
+    parameters_by_sdo: bool = Field(
+        False, description="true where this drive's parameters are reached by the default SDO channel"
+    )
+
+
+class Process(Table):
+    """Names of the words in the order they stand in the PDOs."""
+
+    rpdo: list[str]
+    tpdo: list[str]
+    exact_length: bool = Field(False, description="true where a PDO of any other length is not evaluated")
+
+
+class Scale(Table):
+    """value = word × full / at, with ``full`` a parameter of the drive such as P105."""
+
+    full: str
+    at: int = Field(gt=0)
+    limit: float = Field(2.0, gt=0, description="largest magnitude as a multiple of full")
+
+
+class ScaledValue(Table):
+    """A value with a unit beside the raw word it is made from."""
+
+    name: str
+    group: Literal["command", "actual"]
+    word: str
+    scale: Scale
+    unit: str
+    description: str = ""
+
+
+class Command(Table):
+    """Bits that a command sets in the control word: ``word & ~mask | value``."""
+
+    mask: Word
+    value: Word
+
+
+class ControlWord(Table):
+    bits: list[str]
+    valid_bit: Bit | None = Field(None, description="must be 1 or the drive ignores the telegram")
+    acknowledge_bit: Bit
+    enabling: Command = Field(description="a word with these bits makes the drive move")
+    stopped: Word = Field(description="valid, and moves nothing: what the bridge starts with")
+    ready: Word = Field(description="leads from switch-on inhibited to ready")
+    run: Word = Field(description="leads from ready to operation enabled")
+    forward: Word = 0
+    reverse: Word = 0
+    stop: Command
+    quick_stop: Command
+    disable_voltage: Command
+
+
+class State(Table):
+    name: Literal[
+        "not_ready",
+        "switch_on_inhibited",
+        "ready",
+        "switched_on",
+        "operation_enabled",
+        "quick_stop_active",
+        "fault_reaction_active",
+        "fault",
+    ]
+    pattern: Pattern
+
+
+class StatusWord(Table):
+    bits: list[str]
+    state: list[State]
+
+
+class Parameter(Table):
+    """A parameter that the bridge itself needs: value = wire × factor."""
+
+    name: str
+    title: str
+    object: Ref
+    data_type: Kind
+    factor: float = 1.0
+    unit: str = ""
+    read: bool = Field(True, description="false where it can only be given in the site file")
+
+
+class Poll(Table):
+    """An object of the node that is read again and again and shown as a point of the node."""
+
+    name: str
+    object: Ref
+    data_type: Kind
+    every_ms: int = Field(ge=100)
+    description: str = ""
+    bits: list[str] = Field(default_factory=list[str])
+
+
+class EmcyTable(Table):
+    drive_byte: int | None = Field(None, ge=2, le=7, description="byte that says which drive it is about")
+    codes: dict[str, str] = Field(description="EMCY code in hexadecimal to text; xx matches any")
+
+
+class FaultNumbers(Table):
+    """Numbers that the bridge reports in the family's own words."""
+
+    controller_silent: float
+    bridge_timeout: float = Field(description="the bus interface's own fault for the same event")
+    telegram_downtime: float
+    node_missing: float
+    prefix: str = ""
+    texts: dict[str, str]
+
+
+class Family(Table):
+    """One mapping file."""
+
+    family: FamilyTable
+    identity: IdentityRule = IdentityRule()
+    process: Process
+    slot: list[Slot] = Field(min_length=1)
+    value: list[ScaledValue] = Field(default_factory=list[ScaledValue])
+    control_word: ControlWord
+    status_word: StatusWord
+    parameter: list[Parameter] = Field(default_factory=list[Parameter])
+    poll: list[Poll] = Field(default_factory=list[Poll])
+    emcy: EmcyTable
+    faults: FaultNumbers
+
+    def slot_named(self, name: str) -> Slot:
+        """Raises KeyError where the family has no such slot."""
+        for slot in self.slot:
+            if slot.name == name:
+                return slot
+        raise KeyError(name)

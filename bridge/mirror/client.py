@@ -1,0 +1,212 @@
+"""A front's end of the link: an image that follows that of the bus process."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from typing import Final
+
+from bridge.command import Code, Event, Outcome, Request
+from bridge.errors import OperationFailed
+from bridge.image import Image, Quality
+from bridge.mirror import protocol
+from bridge.mirror.protocol import Asked, Changed, Delta, Malformed, Snapshot
+from bridge.zenohlink import Message, ZenohLink, zenoh_config
+
+_log = logging.getLogger(__name__)
+
+SILENCE_S: Final = 1.0
+"""Without a delta for so long, the bus process counts as gone."""
+_LOOK_EVERY_S: Final = 0.1
+_SNAPSHOT_TIMEOUT_S: Final = 2.0
+_MOST_PENDING: Final = 2000
+"""Deltas kept while a snapshot is on its way."""
+UNREACHABLE: Final = "bus process not reachable"
+
+
+class PointsChanged(OperationFailed):
+    """The bus process runs another site now: this front has to start anew."""
+
+
+class MirrorClient:
+    """The plant as a front sees it; satisfies ``bridge.northbound.view.View``.
+
+    Times in the image and in events are seconds since 1970 UTC; ``clock`` is the machine's monotonic
+    clock.
+    """
+
+    def __init__(self, endpoint: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self.gaps = 0
+        """Deltas that were missed."""
+        self.malformed = 0
+        self._clock = clock
+        self._link = ZenohLink(zenoh_config(connect=[endpoint]), "mirror")
+        self._image: Image | None = None
+        self._instance = 0
+        self._sequence = 0
+        self._in_step = False
+        self._pending: list[Delta] = []
+        self._last_sign = float("-inf")
+        self._is_dead = False
+        self._points_changed = False
+        self._listeners: list[Callable[[Event], None]] = []
+
+    # what a northbound sees
+
+    @property
+    def image(self) -> Image:
+        """Raises RuntimeError before ``open`` has returned."""
+        if self._image is None:
+            raise RuntimeError("there is no image before the first snapshot")
+        return self._image
+
+    @property
+    def is_connected(self) -> bool:
+        """The image follows the bus process."""
+        return self._in_step and not self._is_dead
+
+    def epoch_ns(self, time: float) -> int:
+        """``Reading.time`` is already wall clock here; a double is good for a quarter of a µs."""
+        return round(time * 1e9)
+
+    def on_event(self, listener: Callable[[Event], None]) -> None:
+        self._listeners.append(listener)
+
+    async def request(self, request: Request, timeout_s: float = 5.0) -> Outcome:
+        """Have ``request`` carried out by the bus process; any number may be under way at once."""
+        asked = Asked(self._clock() + timeout_s, request)
+        answers = await self._link.get(protocol.REQUEST, protocol.encode(asked), timeout_s=timeout_s)
+        for answer in answers:
+            if answer.ok:
+                try:
+                    return protocol.decode_outcome(answer.message.payload)
+                except Malformed as error:
+                    self._count_malformed(error)
+        return Outcome(Code.TIMED_OUT, "the bus process did not answer", forwarded=False)
+
+    # life
+
+    async def open(self) -> None:
+        """Connect and wait for the first snapshot, however long the bus process takes."""
+        await self._link.open()
+        self._link.declare_subscriber(protocol.DELTA, self._on_delta)
+        self._link.declare_subscriber(protocol.EVENT, self._on_event)
+        self._link.follow_liveliness(protocol.TOKEN, self._on_token)
+        while not self._in_step:
+            await self._take_snapshot()
+            if not self._in_step:
+                await asyncio.sleep(_LOOK_EVERY_S)
+
+    async def run(self) -> None:
+        """Keep the image in step, or every point dead, until cancelled.
+
+        Raises PointsChanged where the bus process came back with other points.
+        """
+        async with asyncio.TaskGroup() as tasks:
+            watching = tasks.create_task(self._watch_silence())
+            while not self._points_changed:
+                if not self._in_step:
+                    await self._take_snapshot()
+                await asyncio.sleep(_LOOK_EVERY_S)
+            watching.cancel()
+        raise PointsChanged("the bus process runs another site now; this process has to start anew")
+
+    async def _watch_silence(self) -> None:
+        while True:
+            if self._clock() - self._last_sign > SILENCE_S:
+                self._mark_dead()
+            await asyncio.sleep(_LOOK_EVERY_S)
+
+    async def close(self) -> None:
+        await self._link.close()
+
+    # in step with the publisher
+
+    async def _take_snapshot(self) -> None:
+        for answer in await self._link.get(protocol.SNAPSHOT, timeout_s=_SNAPSHOT_TIMEOUT_S):
+            if not answer.ok:
+                continue
+            try:
+                self._apply_snapshot(protocol.decode_snapshot(answer.message.payload))
+            except Malformed as error:
+                self._count_malformed(error)
+
+    def _apply_snapshot(self, snapshot: Snapshot) -> None:
+        if self._image is None:
+            self._image = Image(snapshot.points)
+        elif self._image.points != snapshot.points:
+            self._points_changed = True
+            return
+        self._last_sign = self._clock()
+        self._is_dead = False
+        self._instance, self._sequence = snapshot.instance, snapshot.sequence
+        self._apply(snapshot.readings)
+        self._in_step = True
+        pending, self._pending = self._pending, []
+        for delta in pending:
+            if delta.instance == self._instance:
+                self._follow(delta)
+
+    def _on_delta(self, message: Message) -> None:
+        count = 0 if self._image is None else len(self._image.points)
+        if not count:
+            return
+        try:
+            delta = protocol.decode_delta(message.payload, count)
+        except Malformed as error:
+            # Also how another site's deltas look; the snapshot will tell.
+            self._count_malformed(error)
+            self._in_step = False
+            return
+        self._last_sign = self._clock()
+        if self._in_step:
+            self._follow(delta)
+        elif len(self._pending) < _MOST_PENDING:
+            self._pending.append(delta)
+
+    def _follow(self, delta: Delta) -> None:
+        """Apply ``delta`` if it is the next one; after a gap a new snapshot is due."""
+        if delta.instance == self._instance and delta.sequence <= self._sequence:
+            return  # the snapshot already had it
+        if delta.instance != self._instance or delta.sequence != self._sequence + 1:
+            self.gaps += 1
+            self._in_step = False
+            return
+        self._sequence = delta.sequence
+        self._apply(delta.readings)
+
+    def _apply(self, readings: tuple[Changed, ...]) -> None:
+        image = self.image
+        for changed in readings:
+            image.set(changed.index, changed.value, changed.time_ns / 1e9, changed.quality, changed.reason)
+
+    def _mark_dead(self) -> None:
+        """The bus process is gone: no value may look like a present one."""
+        if self._is_dead:
+            return
+        self._is_dead = True
+        self._in_step = False
+        self._pending.clear()
+        _log.warning("mirror: %s", UNREACHABLE)
+        everything = range(len(self.image.points))
+        self.image.judge(everything, Quality.DEAD, time.time(), UNREACHABLE)
+
+    def _on_token(self, _: str, is_alive: bool) -> None:
+        if not is_alive and self._image is not None:
+            self._mark_dead()
+
+    def _on_event(self, message: Message) -> None:
+        try:
+            event = protocol.decode_event(message.payload)
+        except Malformed as error:
+            self._count_malformed(error)
+            return
+        for listener in self._listeners:
+            listener(event)
+
+    def _count_malformed(self, error: Malformed) -> None:
+        self.malformed += 1
+        if self.malformed == 1:
+            _log.warning("mirror: a message that is none of ours: %s", error)

@@ -1,0 +1,133 @@
+"""What goes over the link between the bus process and its fronts, in MessagePack. Pure.
+
+Times are ns since 1970 UTC, except a request's deadline, which is in seconds of the monotonic clock:
+both ends run on one machine, and a stepped wall clock must not make a request old.
+"""
+
+from __future__ import annotations
+
+from typing import Final, TypeVar
+
+import msgspec
+
+from bridge.command import Event, Kind, Outcome, Request
+from bridge.image import Point, Quality, Reading, Value
+
+SNAPSHOT: Final = "mirror/snapshot"
+DELTA: Final = "mirror/delta"
+EVENT: Final = "mirror/event"
+REQUEST: Final = "mirror/request"
+TOKEN: Final = "mirror/@/bus"
+
+_Model = TypeVar("_Model")
+
+
+class Malformed(ValueError):
+    """A message that is not what its key says."""
+
+
+class Changed(msgspec.Struct, array_like=True, frozen=True):
+    """The reading of the point with this index."""
+
+    index: int
+    value: Value
+    quality: Quality
+    time_ns: int
+    reason: str
+
+    @classmethod
+    def of(cls, index: int, reading: Reading, time_ns: int) -> Changed:
+        return cls(index, reading.value, reading.quality, time_ns, reading.reason)
+
+
+class Snapshot(msgspec.Struct, array_like=True, frozen=True):
+    """Everything: the points with their nature, and their readings as of delta ``sequence``."""
+
+    instance: int
+    """Another number each time the bus process starts."""
+    sequence: int
+    points: tuple[Point, ...]
+    readings: tuple[Changed, ...]
+
+
+class Delta(msgspec.Struct, array_like=True, frozen=True):
+    """What has changed since delta ``sequence - 1``; empty ones say that the bus process lives."""
+
+    instance: int
+    sequence: int
+    readings: tuple[Changed, ...]
+
+
+class Told(msgspec.Struct, array_like=True, frozen=True):
+    """An event."""
+
+    time_ns: int
+    kind: Kind
+    source: str
+    severity: int
+    message: str
+
+    @classmethod
+    def of(cls, event: Event, time_ns: int) -> Told:
+        return cls(time_ns, event.kind, event.source, event.severity, event.message)
+
+    def event(self) -> Event:
+        """The event with its time in seconds since 1970 UTC."""
+        return Event(self.time_ns / 1e9, self.kind, self.source, self.severity, self.message)
+
+
+class Asked(msgspec.Struct, array_like=True, frozen=True):
+    """A request that is worth something until ``deadline_s`` of the monotonic clock."""
+
+    deadline_s: float
+    request: Request
+
+
+_encoder = msgspec.msgpack.Encoder()
+_snapshot = msgspec.msgpack.Decoder(Snapshot)
+_delta = msgspec.msgpack.Decoder(Delta)
+_told = msgspec.msgpack.Decoder(Told)
+_asked = msgspec.msgpack.Decoder(Asked)
+_outcome = msgspec.msgpack.Decoder(Outcome)
+
+
+def encode(message: Snapshot | Delta | Told | Asked | Outcome) -> bytes:
+    return _encoder.encode(message)
+
+
+def decode_snapshot(data: bytes) -> Snapshot:
+    """Raises Malformed, as all of these do."""
+    snapshot = _decode(_snapshot, data)
+    _check_indices(snapshot.readings, len(snapshot.points))
+    return snapshot
+
+
+def decode_delta(data: bytes, count: int) -> Delta:
+    """``count`` is the number of points there are."""
+    delta = _decode(_delta, data)
+    _check_indices(delta.readings, count)
+    return delta
+
+
+def decode_event(data: bytes) -> Event:
+    return _decode(_told, data).event()
+
+
+def decode_request(data: bytes) -> Asked:
+    return _decode(_asked, data)
+
+
+def decode_outcome(data: bytes) -> Outcome:
+    return _decode(_outcome, data)
+
+
+def _decode(decoder: msgspec.msgpack.Decoder[_Model], data: bytes) -> _Model:
+    try:
+        return decoder.decode(data)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        raise Malformed(str(error)) from None
+
+
+def _check_indices(readings: tuple[Changed, ...], count: int) -> None:
+    if any(not 0 <= changed.index < count for changed in readings):
+        raise Malformed(f"an index that is none of {count} points")

@@ -1,0 +1,145 @@
+"""The bus process's end of the link to its fronts."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import random
+from collections.abc import Callable
+from typing import Final
+
+from bridge.command import Code, Event, Outcome, Plant
+from bridge.command.request import STOP_ACTIONS
+from bridge.errors import Unavailable
+from bridge.mirror import protocol
+from bridge.mirror.endpoint import close_to_others, prepare_folder
+from bridge.mirror.protocol import Changed, Delta, Malformed, Snapshot, Told
+from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
+
+_log = logging.getLogger(__name__)
+
+_POINTS_PER_DELTA: Final = 500
+_HEARTBEAT_S: Final = 0.25
+"""Longest time without a delta."""
+
+
+class MirrorPublisher:
+    """Shows the plant to the fronts and takes their requests.
+
+    ``clock`` is the machine's monotonic clock in seconds (a front's requests carry deadlines in it),
+    ``epoch`` turns such a time into ns since 1970 UTC.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        endpoint: str,
+        clock: Callable[[], float],
+        epoch: Callable[[float], int],
+        *,
+        period_s: float = 0.01,
+    ) -> None:
+        self.malformed = 0
+        """Requests that could not be read."""
+        self._plant = plant
+        self._endpoint = endpoint
+        self._clock = clock
+        self._epoch = epoch
+        self._period_s = period_s
+        self._link = ZenohLink(zenoh_config(listen=[endpoint]), "mirror")
+        self._feed = plant.image.feed()
+        self._instance = random.getrandbits(63)
+        self._sequence = 0
+        self._last_delta = float("-inf")
+        self._snapshots: set[asyncio.Task[None]] = set()
+        self._timer: asyncio.TimerHandle | None = None
+
+    async def start(self) -> None:
+        """Raises Unavailable where the socket cannot be opened."""
+        prepare_folder(self._endpoint)
+        try:
+            await self._link.open()
+        except Unavailable as error:
+            raise Unavailable(f"{error} (is this site already being run?)") from None
+        close_to_others(self._endpoint)
+        self._link.declare_queryable(protocol.SNAPSHOT, self._on_snapshot)
+        self._link.declare_queryable(protocol.REQUEST, self._on_request)
+        self._link.declare_token(protocol.TOKEN)
+        self._plant.on_event(self._on_event)
+        self._tick()
+
+    async def close(self) -> None:
+        if self._timer:
+            self._timer.cancel()
+        for task in tuple(self._snapshots):
+            task.cancel()
+        self._plant.image.drop_feed(self._feed)
+        await self._link.close()
+
+    # out
+
+    def _tick(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._timer = loop.call_later(self._period_s, self._tick)
+        if self._feed or loop.time() - self._last_delta >= _HEARTBEAT_S:
+            self._last_delta = loop.time()
+            self._publish_delta()
+
+    def _publish_delta(self) -> None:
+        self._sequence += 1
+        readings = tuple(self._changed(index) for index in self._feed.take(_POINTS_PER_DELTA))
+        # Where a front or the worker cannot follow, a delta is lost; the gap makes the front ask for
+        # a new snapshot.
+        self._send(protocol.DELTA, Delta(self._instance, self._sequence, readings))
+
+    def _changed(self, index: int) -> Changed:
+        reading = self._plant.image[index]
+        return Changed.of(index, reading, self._epoch(reading.time))
+
+    def _on_event(self, event: Event) -> None:
+        self._send(protocol.EVENT, Told.of(event, self._epoch(event.time)))
+
+    def _send(self, key: str, message: Delta | Told) -> None:
+        self._link.send(Message(key, protocol.encode(message)))
+
+    # in
+
+    def _on_snapshot(self, asked: Asked) -> None:
+        task = asyncio.get_running_loop().create_task(self._answer_snapshot(asked))
+        self._snapshots.add(task)
+        task.add_done_callback(self._snapshots.discard)
+
+    async def _answer_snapshot(self, asked: Asked) -> None:
+        """Everything, read a portion at a time: a large image must not hold up the bus.
+
+        A reading that is newer than ``sequence`` does no harm: the deltas that follow lead to it again.
+        """
+        sequence = self._sequence
+        points = self._plant.image.points
+        readings: list[Changed] = []
+        for index in range(len(points)):
+            readings.append(self._changed(index))
+            if index % _POINTS_PER_DELTA == 0:
+                await asyncio.sleep(0)
+        snapshot = Snapshot(self._instance, sequence, points, tuple(readings))
+        asked.send([Message(protocol.SNAPSHOT, protocol.encode(snapshot))])
+        asked.finish()
+
+    def _on_request(self, asked: Asked) -> None:
+        def reply(outcome: Outcome) -> None:
+            asked.send([Message(protocol.REQUEST, protocol.encode(outcome))])
+            asked.finish()
+
+        try:
+            message = protocol.decode_request(asked.payload or b"")
+        except Malformed as error:
+            self.malformed += 1
+            asked.fail(str(error).encode(), "text/plain")
+            return
+        request, now = message.request, self._clock()
+        # While this process hung, the request waited and its asker was told that it failed. Nothing
+        # may start moving after that; stopping is right at any time.
+        if now > message.deadline_s and request.action not in STOP_ACTIONS:
+            reply(Outcome(Code.TIMED_OUT, "the request came too late to be carried out", forwarded=False))
+            return
+        self._plant.submit(request, now, reply)

@@ -1,0 +1,151 @@
+"""One request PDU in, one answer PDU out: units, exceptions and the way to the plant."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from bridge.command import Code, Identity, Outcome, Plant, Request
+from bridge.config import WordOrder
+from bridge.northbound.modbus.drive_unit import DriveUnit
+from bridge.northbound.modbus.pdu import (
+    ExceptionCode,
+    Function,
+    Identify,
+    Loopback,
+    MaskWrite,
+    ReadBits,
+    ReadWords,
+    ReadWrite,
+    Refused,
+    WriteBits,
+    WriteWords,
+    bits_answer,
+    identification_answer,
+    parse,
+    refusal,
+    words_answer,
+)
+from bridge.northbound.modbus.registers import BRIDGE_UNITS, Table, Words32
+from bridge.northbound.modbus.unit import BridgeUnit, Unit
+
+Answer = Callable[[bytes], None]
+
+_TABLES: Final = {
+    Function.READ_COILS: Table.COIL,
+    Function.READ_DISCRETE_INPUTS: Table.DISCRETE_INPUT,
+    Function.READ_HOLDING_REGISTERS: Table.HOLDING_REGISTER,
+    Function.READ_INPUT_REGISTERS: Table.INPUT_REGISTER,
+}
+
+EXCEPTIONS: Final = {
+    Code.UNKNOWN_TARGET: ExceptionCode.PATH_UNAVAILABLE,
+    Code.UNKNOWN_POINT: ExceptionCode.ILLEGAL_ADDRESS,
+    Code.READ_ONLY: ExceptionCode.ILLEGAL_ADDRESS,
+    Code.OUT_OF_RANGE: ExceptionCode.ILLEGAL_VALUE,
+    Code.NOT_VALID: ExceptionCode.ILLEGAL_VALUE,
+    Code.NOT_ALLOWED: ExceptionCode.ILLEGAL_FUNCTION,
+    Code.ACKNOWLEDGE_FIRST: ExceptionCode.DEVICE_FAILURE,
+    Code.NOT_READY: ExceptionCode.NOT_RESPONDING,
+    Code.NOT_CONFIGURED: ExceptionCode.PATH_UNAVAILABLE,
+    Code.TIMED_OUT: ExceptionCode.DEVICE_FAILURE,
+    Code.CANCELLED: ExceptionCode.DEVICE_FAILURE,
+}
+"""How a request that did not succeed is told."""
+
+_Write = WriteBits | WriteWords | MaskWrite | ReadWrite
+_TEXT_MOST: Final = 240  # an object of FC43/14 must fit into one PDU
+
+
+class Dispatcher:
+    """All units of a plant. ``clock`` gives monotonic seconds."""
+
+    def __init__(self, plant: Plant, word_order: WordOrder, clock: Callable[[], float]) -> None:
+        self._plant = plant
+        self._clock = clock
+        words32 = Words32(word_order)
+        self._units: dict[int, Unit] = {
+            unit_id: DriveUnit(drive, plant.image, words32) for unit_id, drive in plant.by_unit.items()
+        }
+        for unit_id in BRIDGE_UNITS:
+            self._units[unit_id] = BridgeUnit(plant)
+
+    def handle(self, unit_id: int, pdu: bytes, caller: Identity, answer: Answer) -> None:
+        """Do what ``pdu`` (at least one byte) asks. ``answer`` is called exactly once, now or later."""
+        try:
+            unit = self._units.get(unit_id)
+            if unit is None:
+                raise Refused(ExceptionCode.PATH_UNAVAILABLE)
+            request = parse(pdu)
+            if isinstance(request, _Write):
+                self._write(unit, request, pdu[0], caller, answer)
+                return
+            given = self._read(unit, request, caller)
+        except Refused as error:
+            given = refusal(pdu[0], error.code)
+        answer(given)
+
+    def _read(
+        self, unit: Unit, request: ReadWords | ReadBits | Identify | Loopback, caller: Identity
+    ) -> bytes:
+        match request:
+            case ReadWords(function, start, count):
+                words = unit.read_words(_TABLES[function], start, count, caller, self._clock())
+                return words_answer(function, words)
+            case ReadBits(function, start, count):
+                return bits_answer(function, unit.read_bits(_TABLES[function], start, count, self._clock()))
+            case Identify():
+                objects = {number: _ascii(text) for number, text in unit.identify().items()}
+                return identification_answer(request, objects)
+            case Loopback(echo):
+                return echo
+
+    def _write(self, unit: Unit, request: _Write, function: int, caller: Identity, answer: Answer) -> None:
+        """Plan the whole write, then submit it. Raises ``Refused`` before anything is submitted."""
+        match request:
+            case WriteWords(start, words):
+                plan = unit.plan_words(start, words, caller)
+            case WriteBits(start, bits):
+                plan = unit.plan_bits(start, bits, caller)
+            case MaskWrite():
+                plan = unit.plan_mask(request, caller)
+            case ReadWrite(start, words):
+                plan = unit.plan_words(start, words, caller)
+                self._read_back(unit, request, caller)  # a read that cannot be answered writes nothing
+
+        def conclude(outcome: Outcome) -> None:
+            if not outcome.ok:
+                answer(refusal(function, EXCEPTIONS[outcome.code]))
+            elif not isinstance(request, ReadWrite):
+                answer(request.echo)
+            else:
+                try:
+                    given = self._read_back(unit, request, caller)
+                except Refused as error:
+                    given = refusal(function, error.code)
+                answer(given)
+
+        self._submit(plan, conclude)
+
+    def _read_back(self, unit: Unit, request: ReadWrite, caller: Identity) -> bytes:
+        start, count = request.read_start, request.read_count
+        words = unit.read_words(Table.HOLDING_REGISTER, start, count, caller, self._clock())
+        return words_answer(Function.READ_WRITE, words)
+
+    def _submit(self, plan: Sequence[Request], conclude: Callable[[Outcome], None]) -> None:
+        """Submit one request after the other; the first that fails, or the last, is the outcome."""
+        first, *rest = plan
+
+        def on_outcome(outcome: Outcome) -> None:
+            if outcome.ok and rest:
+                self._submit(rest, conclude)
+            else:
+                conclude(outcome)
+
+        self._plant.submit(first, self._clock(), on_outcome)
+
+
+def _ascii(text: str) -> bytes:
+    """Identification objects are ASCII (§6.21): an umlaut loses its dots."""
+    return unicodedata.normalize("NFKD", text).encode("ascii", "ignore")[:_TEXT_MOST]

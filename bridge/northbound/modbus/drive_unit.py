@@ -1,0 +1,254 @@
+"""One drive as a Modbus unit: its registers read, and its writes as requests.
+
+Which quality is served how: input registers 0 … 9, the scaled actual values and the discrete inputs of
+the status word are the drive's data. While the drive's quality is waiting, dead or disabled a read that
+touches one of them is answered 0Bh, with config_error 0Ah (for a scaled value whose scale alone is not
+known, only where it is touched). Registers 10 … 31 and the discrete inputs of the quality are what the
+bridge knows: a read wholly within them always succeeds, so that a control program can see *why*. A read
+of 0 … 31 therefore fails while there is no data, a read of 10 … 31 does not. Values from register 32 on
+that are not the drive's actual values (supervision, identity) follow their own quality.
+
+Ranges: 02h where a range leaves the map, begins or ends within a 32-bit value (read or write), or a
+write touches what is not writable. Gaps inside the first 32 registers read as 0. Setpoint words the
+drive does not have, and register 9 within a longer write, take 0; anything else is 03h.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from bridge.command import Action, Drive, Identity, Request
+from bridge.image import Image, Quality, Value
+from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, Refused
+from bridge.northbound.modbus.registers import (
+    ACKNOWLEDGE,
+    DIAGNOSTICS,
+    KEEP_ALIVE,
+    PROCESS_WORDS,
+    QUALITY_BITS,
+    TIMEOUT,
+    VALUES,
+    DriveMap,
+    Row,
+    Table,
+    Words32,
+)
+from bridge.northbound.modbus.unit import refuse_quality, state_code
+
+_WORD_BITS: Final = 16
+_RESERVED: Final = 9  # between the setpoints and the keep-alive, so that one write can reach both
+_TIMEOUT_MOST_MS: Final = 32767  # P151, BU 2500 §7.1.1
+
+
+class DriveUnit:
+    """One drive's unit id."""
+
+    __slots__ = ("_drive", "_halves", "_image", "_inputs", "_map", "_setpoints", "_words32")
+
+    def __init__(self, drive: Drive, image: Image, words32: Words32) -> None:
+        self._drive = drive
+        self._image = image
+        self._words32 = words32
+        self._map = drive_map = DriveMap(drive)
+        self._inputs: Final = [(row, image.index[f"{drive.name}/{row.name}"]) for row in drive_map.inputs]
+        self._setpoints: Final = [(r, image.index[f"{drive.name}/{r.name}"]) for r in drive_map.setpoints]
+        self._halves: Final = {table: drive_map.second_halves(table) for table in Table}
+
+    # reading
+
+    def read_bits(self, table: Table, start: int, count: int, now: float) -> Sequence[bool]:
+        channel = self._drive.channel
+        quality = channel.link.quality(now)
+        if table is Table.COIL:
+            bits = _bits(channel.control_word)
+        else:
+            bits = _bits(channel.status_word) + [quality is each for each in Quality]
+        if start + count > len(bits):
+            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+        if table is Table.DISCRETE_INPUT and start < QUALITY_BITS:
+            refuse_quality(quality)
+        return bits[start : start + count]
+
+    def read_words(self, table: Table, start: int, count: int, caller: Identity, now: float) -> Sequence[int]:
+        is_input = table is Table.INPUT_REGISTER
+        end = start + count
+        self._check_range(table, start, end, self._map.input_end if is_input else self._map.holding_end)
+        if is_input:
+            quality = self._drive.channel.link.quality(now)
+            words = self._input_words(start, end, quality, now)
+            if end > VALUES:
+                words += self._values(self._inputs, start, end, quality)
+        else:
+            words = self._holding_words(caller)[start:end] if start < VALUES else []
+            if end > VALUES:
+                words += self._values(self._setpoints, start, end, Quality.GOOD)
+        return words
+
+    def _check_range(self, table: Table, start: int, end: int, most: int) -> None:
+        halves = self._halves[table]
+        if end > most or start in halves or end in halves:
+            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+
+    def _input_words(self, start: int, end: int, quality: Quality, now: float) -> list[int]:
+        """Those of input registers 0 … 31 that are in the range."""
+        words: list[int] = []
+        if start < DIAGNOSTICS:
+            refuse_quality(quality)
+            words = self._data()[start:end]
+        if start < VALUES and end > DIAGNOSTICS:
+            words += self._diagnostics(quality, now)[max(start - DIAGNOSTICS, 0) : end - DIAGNOSTICS]
+        return words
+
+    def _data(self) -> list[int]:
+        """Input registers 0 … 9."""
+        channel = self._drive.channel
+        values = self._drive.words[1 : PROCESS_WORDS + 1]
+        gap = [0] * (PROCESS_WORDS - len(values))
+        return [channel.status_word, *values, *gap, channel.drive_status_word]
+
+    def _diagnostics(self, quality: Quality, now: float) -> list[int]:
+        """Input registers 10 … 31."""
+        channel = self._drive.channel
+        from_int = self._words32.from_int
+        owner = channel.owner
+        words = [
+            state_code(self._drive, quality),
+            quality,
+            channel.emcy_code,
+            min(round(channel.last_fault * 10), 0xFFFF),
+            channel.watchdog.state,
+            channel.watchdog.left_ms(now),
+            *from_int(max(channel.link.age_ms(now), 0)),
+            *from_int(self._drive.sdo_abort_code),
+            owner.source if owner else 0,
+        ]
+        return words + [0] * (VALUES - DIAGNOSTICS - len(words))
+
+    def _values(self, values: list[tuple[Row, int]], start: int, end: int, quality: Quality) -> list[int]:
+        """The 32-bit values in the range, which begins and ends between values."""
+        words: list[int] = []
+        for row, index in values[max(start - VALUES, 0) // 2 : (end - VALUES) // 2]:
+            if row.name.startswith("actual/"):
+                # Judged now: the image learns of an expired deadline only when its timer has run.
+                refuse_quality(quality)
+            reading = self._image[index]
+            refuse_quality(reading.quality)
+            if row.type == "float32":
+                words += self._words32.from_float(float(reading.value))
+            else:
+                words += self._words32.from_int(int(reading.value))
+        return words
+
+    def _holding_words(self, caller: Identity) -> list[int]:
+        """Holding registers 0 … 31: what the owner wrote."""
+        channel = self._drive.channel
+        words = [0] * VALUES
+        setpoints = channel.setpoints[:PROCESS_WORDS]
+        words[0] = channel.control_word
+        words[1 : len(setpoints) + 1] = setpoints
+        words[KEEP_ALIVE] = int(caller.is_same(channel.owner))
+        words[TIMEOUT] = channel.watchdog.timeout_ms
+        return words
+
+    # writing
+
+    def plan_bits(self, start: int, bits: Sequence[bool], caller: Identity) -> list[Request]:
+        if start + len(bits) > _WORD_BITS:
+            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+        word = self._drive.channel.control_word
+        for position, bit in enumerate(bits, start):
+            word = word | 1 << position if bit else word & ~(1 << position)
+        return [self._write({"control_word": word}, caller)]
+
+    def plan_mask(self, write: MaskWrite, caller: Identity) -> list[Request]:
+        if write.address > PROCESS_WORDS:
+            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+        now_there = self._holding_words(caller)[write.address]
+        word = now_there & write.and_mask | write.or_mask & ~write.and_mask
+        return self.plan_words(write.address, (word,), caller)
+
+    def plan_words(self, start: int, words: Sequence[int], caller: Identity) -> list[Request]:
+        """One WRITE for all process words or setpoints, then acknowledge, time, keep-alive or release.
+
+        Who may not command the drive is refused at the first request. Beyond that only the WRITE can be
+        refused for what it holds, so it goes first; a time that will be refused is submitted alone: its
+        refusal is the answer, and is counted, and nothing else is done. Values written together with a
+        release (keep-alive 0) are taken first, then the drive is stopped and free.
+        """
+        end = start + len(words)
+        self._check_range(Table.HOLDING_REGISTER, start, end, self._map.holding_end)
+        self._check_writable(start, end)
+        target = self._drive.name
+        block = dict(enumerate(words, start))
+        if block.get(_RESERVED) or block.get(ACKNOWLEDGE, 0) > 1:
+            raise Refused(ExceptionCode.ILLEGAL_VALUE)
+        requests: list[Request] = []
+        if start <= PROCESS_WORDS:
+            requests.append(self._write(self._process_values(block), caller))
+        elif start >= VALUES:
+            requests.append(self._write(self._setpoint_values(start, words), caller))
+        if block.get(ACKNOWLEDGE):
+            requests.append(Request(caller, target, Action.RESET_FAULT))
+        if TIMEOUT in block:
+            timeout_ms = block[TIMEOUT]
+            request = Request(caller, target, Action.SET_TIMEOUT, timeout_ms=timeout_ms)
+            allowed = self._drive.channel.settings.fieldbus_timeout_writable
+            if not allowed or timeout_ms > _TIMEOUT_MOST_MS:
+                return [request]
+            requests.append(request)
+        if KEEP_ALIVE in block:
+            action = Action.KEEP_ALIVE if block[KEEP_ALIVE] else Action.RELEASE_CONTROL
+            requests.append(Request(caller, target, action))
+        # A 0 written to the acknowledge register alone: nothing to do, and still a telegram.
+        return requests or [Request(caller, target, Action.KEEP_ALIVE)]
+
+    def _check_writable(self, start: int, end: int) -> None:
+        only_reserved = start == _RESERVED and end == KEEP_ALIVE
+        if only_reserved or (start < VALUES and end > TIMEOUT + 1):
+            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+
+    def _process_values(self, block: dict[int, int]) -> dict[str, Value]:
+        """Registers 0 … 8 of a write as values of the command group."""
+        names = self._drive.family.process.rpdo[: PROCESS_WORDS + 1]
+        values: dict[str, Value] = {}
+        for address, word in block.items():
+            if address < len(names):
+                values[names[address]] = word
+            elif address <= PROCESS_WORDS and word:
+                raise Refused(ExceptionCode.ILLEGAL_VALUE)
+        return values
+
+    def _setpoint_values(self, start: int, words: Sequence[int]) -> dict[str, Value]:
+        first = (start - VALUES) // 2
+        pairs = zip(words[::2], words[1::2], strict=True)
+        rows = self._map.setpoints[first : first + len(words) // 2]
+        return {
+            row.name.removeprefix("command/"): self._words32.to_float(*pair)
+            for row, pair in zip(rows, pairs, strict=True)
+        }
+
+    def _write(self, values: Mapping[str, Value], caller: Identity) -> Request:
+        return Request(caller, self._drive.name, Action.WRITE, values)
+
+    # identification
+
+    def identify(self) -> Mapping[int, str]:
+        """The drive's family, and from 80h on the numbers of 1018h as the node gives them."""
+        family, known = self._drive.family.family, self._drive.identification
+        return {
+            0x00: family.vendor,
+            0x01: family.name,
+            0x02: f"{known.revision >> 16}.{known.revision & 0xFFFF}",
+            0x04: known.device_name or family.name,
+            0x05: self._drive.slot.name,
+            0x06: self._drive.name,
+            0x80: f"{known.vendor:08X}",
+            0x81: f"{known.product:08X}",
+            0x82: f"{known.revision:08X}",
+            0x83: f"{known.serial:08X}",
+        }
+
+
+def _bits(word: int) -> list[bool]:
+    return [bool(word >> position & 1) for position in range(_WORD_BITS)]

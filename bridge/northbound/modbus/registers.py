@@ -1,0 +1,254 @@
+"""The register map: what stands at which address of which unit.
+
+Pure layout, used by the server and by ``drivebridge export modbus``. Addresses are 0-based PDU
+addresses. Reference for users: ``docs/reference/modbus.md``.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from bridge.command import Drive, Plant
+from bridge.config import WordOrder
+from bridge.image import DataType, Point, Quality
+
+BRIDGE_UNITS: Final = (255, 0)
+"""Unit ids of the bridge itself; the first is the one to show."""
+
+PROCESS_WORDS: Final = 8
+"""Setpoint and actual words that have a register, whether the drive has them or not."""
+
+# Holding registers of a drive.
+KEEP_ALIVE: Final = 10
+ACKNOWLEDGE: Final = 11
+TIMEOUT: Final = 12
+# Input registers of a drive: 0 … 9 are the drive's data, 10 … 31 what the bridge knows about it.
+DIAGNOSTICS: Final = 10
+VALUES: Final = 32
+"""First register of the 32-bit values, input and holding alike."""
+QUALITY_BITS: Final = 16
+"""First discrete input of the quality."""
+BRIDGE_DRIVES: Final = 5
+"""First input register of the bridge's one word per drive."""
+
+
+class Table(StrEnum):
+    COIL = "coil"
+    DISCRETE_INPUT = "discrete input"
+    INPUT_REGISTER = "input register"
+    HOLDING_REGISTER = "holding register"
+
+
+_REFERENCE: Final = {
+    Table.COIL: 0,
+    Table.DISCRETE_INPUT: 1,
+    Table.INPUT_REGISTER: 3,
+    Table.HOLDING_REGISTER: 4,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One value: a bit, a register, or two registers for 32 bits.
+
+    ``type`` is bool, uint16, uint32, int32 or float32; ``access`` r, w or rw; ``name`` the point's name
+    below its drive where there is one.
+    """
+
+    table: Table
+    address: int
+    name: str
+    type: str
+    access: str
+    unit: str = ""
+    description: str = ""
+
+    @property
+    def size(self) -> int:
+        return 2 if self.type.endswith("32") else 1
+
+    @property
+    def reference(self) -> str:
+        """The 1-based number of the older manuals, such as 30033 or 40001."""
+        return f"{_REFERENCE[self.table]}{self.address + 1:04d}"
+
+
+class DriveMap:
+    """The map of one drive. ``inputs`` and ``setpoints`` are the 32-bit values from register 32 on."""
+
+    __slots__ = ("drive_name", "holding_end", "input_end", "inputs", "rows", "setpoints", "unit_id")
+
+    def __init__(self, drive: Drive) -> None:
+        self.drive_name = drive.name
+        self.unit_id = drive.unit_id
+        points = {point.name[len(drive.name) + 1 :]: point for point in drive.points}
+        fixed = (*_input_rows(drive), *_holding_rows(drive))
+        scaled = [value.name for value in drive.family.value if value.group == "actual"]
+        taken = {row.name for row in fixed}
+        more = [
+            leaf
+            for leaf, point in points.items()
+            if point.data_type is not DataType.STRING
+            and not leaf.startswith("command/")
+            and leaf not in taken
+        ]
+        first = [f"actual/{name}" for name in scaled]
+        chosen = first + [leaf for leaf in more if leaf not in first]
+        self.inputs = _value_rows(Table.INPUT_REGISTER, chosen, points, "r")
+        commands = [f"command/{value.name}" for value in drive.family.value if value.group == "command"]
+        self.setpoints = _value_rows(Table.HOLDING_REGISTER, commands, points, "rw")
+        self.input_end = VALUES + 2 * len(self.inputs)
+        self.holding_end = VALUES + 2 * len(self.setpoints)
+        self.rows: tuple[Row, ...] = (
+            *(row for row in fixed if row.table is Table.INPUT_REGISTER),
+            *self.inputs,
+            *(row for row in fixed if row.table is Table.HOLDING_REGISTER),
+            *self.setpoints,
+            *_bit_rows(drive),
+        )
+
+    def second_halves(self, table: Table) -> frozenset[int]:
+        """Addresses at which no read and no write may begin or end, lest a value be torn."""
+        return frozenset(row.address + 1 for row in self.rows if row.table is table and row.size == 2)
+
+
+def drive_maps(plant: Plant) -> tuple[DriveMap, ...]:
+    """The maps of all drives, by unit id."""
+    return tuple(DriveMap(drive) for _, drive in sorted(plant.by_unit.items()))
+
+
+def bridge_rows(plant: Plant) -> tuple[Row, ...]:
+    """The map of the bridge's own unit."""
+    row = _row_maker(Table.INPUT_REGISTER, "r")
+    drives = enumerate(plant.drives.values(), BRIDGE_DRIVES)
+    return (
+        row(0, "module_state", "uint16", "", _MODULE_STATE),
+        row(1, "load", "uint16", "0.1 %", "bus load of the first bus"),
+        row(2, "state", "uint16", "", "CAN controller: 0 ok, 1 warning, 2 passive, 3 bus-off, 4 down"),
+        row(3, "drives_configured", "uint16", "", "drives in the site file"),
+        row(4, "drives_good", "uint16", "", "drives with good data"),
+        *(
+            row(address, drive.name, "uint16", "", f"unit {drive.unit_id}: quality + 256 × state")
+            for address, drive in drives
+        ),
+    )
+
+
+_MODULE_STATE: Final = (
+    "bits as NORD P173: 0 pre-operational, 1 operational, 2 a node lost, 3 a watchdog tripped, "
+    "4 CAN warning, 5 bus-off"
+)
+
+
+def _row_maker(table: Table, access: str) -> Callable[[int, str, str, str, str], Row]:
+    def make(address: int, name: str, kind: str, unit: str, description: str) -> Row:
+        return Row(table, address, name, kind, access, unit, description)
+
+    return make
+
+
+def _input_rows(drive: Drive) -> list[Row]:
+    row = _row_maker(Table.INPUT_REGISTER, "r")
+    words = drive.family.process.tpdo[1 : PROCESS_WORDS + 1]
+    qualities = ", ".join(f"{quality.value} {quality.label}" for quality in Quality)
+    states = "0 not ready, 1 switch-on inhibited, 2 ready, 3 switched on, 4 operation enabled, \
+5 quick stop active, 6 fault reaction active, 7 fault, 255 unknown"
+    return [
+        row(0, "status/status_word", "uint16", "", "status word; shows fault while tripped"),
+        *(row(i, f"actual/{name}", "uint16", "", "actual value, raw") for i, name in enumerate(words, 1)),
+        row(9, "status/drive_status_word", "uint16", "", "status word as the drive sent it"),
+        row(10, "status/state", "uint16", "", states),
+        row(11, "quality", "uint16", "", qualities),
+        row(12, "status/emcy_code", "uint16", "", "last emergency code"),
+        row(13, "supervision/last_fault", "uint16", "0.1", "last fault × 10: 103 is 10.3"),
+        row(14, "supervision/watchdog_state", "uint16", "", "0 off, 1 idle, 2 running, 3 tripped"),
+        row(15, "supervision/watchdog_left_ms", "uint16", "ms", "time left on the watchdog"),
+        row(16, "supervision/pdo_age_ms", "uint32", "ms", "age of the last PDO; FFFFFFFFh: none yet"),
+        row(18, "sdo_abort_code", "uint32", "", "last SDO abort code"),
+        row(20, "supervision/owner", "uint16", "", "0 none, 1 opcua, 2 modbus, 3 zenoh, 4 local"),
+    ]
+
+
+def _holding_rows(drive: Drive) -> list[Row]:
+    row = _row_maker(Table.HOLDING_REGISTER, "rw")
+    words = drive.family.process.rpdo[1 : PROCESS_WORDS + 1]
+    timeout_access = "rw" if drive.channel.settings.fieldbus_timeout_writable else "r"
+    name, text = "supervision/fieldbus_timeout_ms", "watchdog time, twin of P151; 0 is off"
+    return [
+        row(0, "command/control_word", "uint16", "", "control word"),
+        *(row(i, f"command/{leaf}", "uint16", "", "setpoint, raw") for i, leaf in enumerate(words, 1)),
+        row(KEEP_ALIVE, "keep_alive", "uint16", "", "not 0: a telegram; 0: release; reads 1 for the owner"),
+        row(ACKNOWLEDGE, "acknowledge", "uint16", "", "write 1 to acknowledge a fault; reads 0"),
+        Row(Table.HOLDING_REGISTER, TIMEOUT, name, "uint16", timeout_access, "ms", text),
+    ]
+
+
+def _value_rows(
+    table: Table, leaves: Iterable[str], points: dict[str, Point], access: str
+) -> tuple[Row, ...]:
+    """Two registers for each of ``leaves``; an integer stays one, so that no digit of it is lost."""
+    rows: list[Row] = []
+    for position, leaf in enumerate(leaves):
+        point = points[leaf]
+        kind = "uint32"
+        if point.data_type is DataType.FLOAT:
+            kind = "float32"
+        elif point.data_type in (DataType.INT16, DataType.INT32):
+            kind = "int32"
+        rows.append(Row(table, VALUES + 2 * position, leaf, kind, access, point.unit, point.description))
+    return tuple(rows)
+
+
+def _bit_rows(drive: Drive) -> list[Row]:
+    status, control = drive.family.status_word.bits, drive.family.control_word.bits
+    return [
+        *(Row(Table.DISCRETE_INPUT, i, f"status/{name or i}", "bool", "r") for i, name in enumerate(status)),
+        *(
+            Row(Table.DISCRETE_INPUT, QUALITY_BITS + quality, f"quality/{quality.label}", "bool", "r")
+            for quality in Quality
+        ),
+        *(Row(Table.COIL, i, f"command/{name or i}", "bool", "rw") for i, name in enumerate(control)),
+    ]
+
+
+class Words32:
+    """32-bit values as two registers in the site's word order, and back.
+
+    ABCD is the high word first, each with its high byte first; A is the highest byte.
+    """
+
+    __slots__ = ("_swap_bytes", "_swap_words")
+
+    def __init__(self, order: WordOrder) -> None:
+        self._swap_words = order in ("CDAB", "DCBA")
+        self._swap_bytes = order in ("BADC", "DCBA")
+
+    def from_int(self, value: int) -> tuple[int, int]:
+        """Two registers of an integer; a negative one as its two's complement."""
+        high, low = value >> 16 & 0xFFFF, value & 0xFFFF
+        if self._swap_bytes:
+            high, low = _swapped(high), _swapped(low)
+        return (low, high) if self._swap_words else (high, low)
+
+    def from_float(self, value: float) -> tuple[int, int]:
+        """Two registers of an IEEE 754 single; what is too large for one is infinite."""
+        try:
+            packed = struct.pack(">f", value)
+        except OverflowError:
+            packed = struct.pack(">f", math.copysign(math.inf, value))
+        return self.from_int(int.from_bytes(packed, "big"))
+
+    def to_float(self, first: int, second: int) -> float:
+        high, low = (second, first) if self._swap_words else (first, second)
+        if self._swap_bytes:
+            high, low = _swapped(high), _swapped(low)
+        return struct.unpack(">f", struct.pack(">HH", high, low))[0]
+
+
+def _swapped(word: int) -> int:
+    return (word & 0xFF) << 8 | word >> 8

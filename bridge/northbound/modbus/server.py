@@ -1,0 +1,139 @@
+"""The Modbus TCP server: the listening socket, who may connect, and the list of sessions."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import ipaddress
+import logging
+import os
+import socket
+from collections.abc import Callable
+from typing import Final
+
+from bridge.command import Identity, Plant, Role, Source
+from bridge.config import ModbusTable
+from bridge.errors import Unavailable
+from bridge.northbound.modbus.dispatch import Dispatcher
+from bridge.northbound.modbus.session import Session
+
+_log = logging.getLogger(__name__)
+
+_LOG_PAUSE_S: Final = 60.0
+_BACKLOG: Final = 64
+
+IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
+
+
+class ModbusServer:
+    """Serves ``plant`` as ``settings`` say. ``clock`` gives monotonic seconds, the plant's time."""
+
+    def __init__(self, plant: Plant, settings: ModbusTable, clock: Callable[[], float]) -> None:
+        self._settings = settings
+        self._dispatcher = Dispatcher(plant, settings.word_order, clock)
+        self._allowed = [ipaddress.ip_network(network) for network in settings.allow]
+        self._clock = clock
+        self._sessions: set[Session] = set()
+        self._server: asyncio.Server | None = None
+        self._logged: dict[str, float] = {}
+        self.refused_connections = 0
+        self.broken_connections = 0
+        """Connections that we ended: not Modbus, or a client that did not read its answers."""
+
+    @property
+    def port(self) -> int:
+        """The port that is listened on. Raises RuntimeError before ``start``."""
+        if self._server is None:
+            raise RuntimeError("the server is not started")
+        return self._server.sockets[0].getsockname()[1]
+
+    @property
+    def sessions(self) -> int:
+        return len(self._sessions)
+
+    async def start(self) -> None:
+        """Listen. Raises ``Unavailable`` with the sentence that helps where that cannot be."""
+        sock = _listen(self._settings.listen)
+        loop = asyncio.get_running_loop()
+        self._server = await loop.create_server(
+            lambda: Session(self._dispatcher, self), sock=sock, backlog=_BACKLOG
+        )
+        _log.info("Modbus TCP on %s", self._settings.listen)
+
+    async def close(self) -> None:
+        """Stop listening and end every session."""
+        server, self._server = self._server, None
+        if server is None:
+            return
+        server.close()
+        for session in tuple(self._sessions):
+            session.close()
+        await server.wait_closed()
+
+    # what sessions ask and tell
+
+    def admit(self, session: Session, host: str, port: int) -> Identity | None:
+        """The identity of a client, or None where its address may not connect or there are too many."""
+        address = _normalised(host)
+        why = ""
+        if not any(address in network for network in self._allowed):
+            why = "it is in none of the networks of modbus.allow"
+        elif len(self._sessions) >= self._settings.max_connections:
+            why = f"there are {self._settings.max_connections} connections already"
+        if why:
+            self.refused_connections += 1
+            self._warn("connection of %s refused: %s", str(address), why)
+            return None
+        self._sessions.add(session)
+        shown = f"[{address}]" if address.version == 6 else str(address)
+        return Identity(Source.MODBUS, str(address), Role.OPERATOR, f"{shown}:{port}")
+
+    def leave(self, session: Session) -> None:
+        self._sessions.discard(session)
+
+    def on_fault(self, session: Session, fault: str) -> None:
+        self.broken_connections += 1
+        self._warn("connection of %s closed: %s", session.address, fault)
+
+    def _warn(self, message: str, *details: str) -> None:
+        """Log at most once a minute per message: what a stranger sends must not fill a disk."""
+        now = self._clock()
+        if now - self._logged.get(message, -_LOG_PAUSE_S) >= _LOG_PAUSE_S:
+            self._logged[message] = now
+            _log.warning(message, *details)
+
+
+def _normalised(host: str) -> IpAddress:
+    """An IPv4 client of an IPv6 socket is the IPv4 client it is."""
+    address = ipaddress.ip_address(host)
+    if isinstance(address, ipaddress.IPv6Address) and address.ipv4_mapped:
+        return address.ipv4_mapped
+    return address
+
+
+def _listen(endpoint: str) -> socket.socket:
+    host, _, port = endpoint.rpartition(":")
+    host = host.strip("[]")
+    is_v6 = ":" in host
+    try:
+        return socket.create_server(
+            (host, int(port)),
+            family=socket.AF_INET6 if is_v6 else socket.AF_INET,
+            backlog=_BACKLOG,
+            dualstack_ipv6=host == "::" and socket.has_dualstack_ipv6(),
+        )
+    except OSError as error:
+        raise Unavailable(f"modbus.listen = {endpoint!r}: {_advice(error, host, port)}") from error
+
+
+def _advice(error: OSError, host: str, port: str) -> str:
+    match error.errno:
+        case errno.EADDRINUSE:
+            return f"port {port} is taken by another program; `ss -ltnp` shows which, or choose another port"
+        case errno.EACCES:
+            where = "start it as drivebridge.service, or choose a port from 1024 on"
+            return f"port {port} needs CAP_NET_BIND_SERVICE: {where}"
+        case errno.EADDRNOTAVAIL:
+            return f"no interface of this machine has the address {host}"
+        case _:
+            return os.strerror(error.errno) if error.errno else str(error)

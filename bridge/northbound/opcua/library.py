@@ -1,0 +1,74 @@
+"""asyncua as the rest of this package sees it: names with types, where asyncua's own are partial.
+
+asyncua's generated classes ask for ``UInt32`` and ``DateTime`` where they take ``int`` and
+``datetime``, and ``asyncua.ua`` re-exports without saying so. That is put right here and only here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final, TypeVar
+
+from asyncua import ua
+from asyncua.common.utils import ServiceError
+from asyncua.crypto import uacrypto
+from asyncua.ua.attribute_ids import AttributeIds
+from asyncua.ua.object_ids import ObjectIds
+from asyncua.ua.status_codes import StatusCodes
+from asyncua.ua.uaerrors import UaError, UaStatusCodeError
+from cryptography import x509
+
+__all__ = [
+    "GOOD",
+    "AttributeIds",
+    "ObjectIds",
+    "ServiceError",
+    "StatusCodes",
+    "UaError",
+    "UaStatusCodeError",
+    "data_value",
+    "first_certificate",
+    "get",
+    "make",
+    "node_id",
+    "status",
+    "text",
+    "ua",
+    "variant",
+]
+
+status: Callable[[int], ua.StatusCode] = ua.StatusCode  # pyright: ignore[reportAssignmentType]
+"""A status code from its number."""
+
+variant: Callable[..., ua.Variant] = ua.Variant
+data_value: Callable[..., ua.DataValue] = ua.DataValue
+"""(value, status, source time, server time)"""
+
+node_id: Callable[..., ua.NodeId] = ua.NodeId
+"""(identifier, namespace index)"""
+
+GOOD: Final = status(StatusCodes.Good)
+
+_T = TypeVar("_T")
+
+
+def make(structure: Callable[..., _T], **fields: object) -> _T:
+    """One of asyncua's structures with these fields set."""
+    made = structure()
+    for name, value in fields.items():
+        setattr(made, name, value)
+    return made
+
+
+def get(structure: object, name: str) -> Any:
+    """A field whose type asyncua does not tell."""
+    return getattr(structure, name)
+
+
+def first_certificate(content: bytes | None) -> x509.Certificate | None:
+    """The first certificate of a chain in DER, None for nothing. Raises ValueError for anything else."""
+    return get(uacrypto, "x509_from_der")(content)
+
+
+def text(words: str) -> ua.LocalizedText:
+    return ua.LocalizedText(words, "en") if words else ua.LocalizedText()

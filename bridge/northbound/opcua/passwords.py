@@ -1,0 +1,41 @@
+"""Passwords as Argon2id hashes: made by `drivebridge hash-password`, checked at each login."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from argon2 import PasswordHasher, extract_parameters
+from argon2.exceptions import InvalidHashError, VerificationError
+
+_HASHER = PasswordHasher()
+
+
+def hash_password(password: str) -> str:
+    """The line for ``password_hash`` in the site file (Argon2id, RFC 9106; its own salt each time)."""
+    return _HASHER.hash(password)
+
+
+def is_password_hash(line: str) -> bool:
+    try:
+        extract_parameters(line)
+    except InvalidHashError:
+        return False
+    return True
+
+
+def verify_password(password_hash: str | None, password: str) -> bool:
+    """Whether ``password`` is the one behind the hash; takes tens of ms and 64 MiB.
+
+    None stands for a user that does not exist: it takes as long and is never right, so that nobody
+    learns from the time which users there are.
+    """
+    try:
+        matches = _HASHER.verify(password_hash or _nobody(), password)
+    except (VerificationError, InvalidHashError):
+        return False
+    return matches and password_hash is not None
+
+
+@cache
+def _nobody() -> str:
+    return hash_password("nobody")

@@ -1,0 +1,138 @@
+"""Who may come in: endpoint policy, trust in channels, users and their roles."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, Final
+
+from bridge.command.request import Identity, Role, Source
+from bridge.config import OpcUaTable, UserTable
+from bridge.errors import Fault, FileFaults
+from bridge.northbound.opcua.certificates import TrustedCertificates, fingerprint
+from bridge.northbound.opcua.library import ServiceError, StatusCodes, first_certificate, ua
+from bridge.northbound.opcua.passwords import hash_password, is_password_hash, verify_password
+
+__all__ = ["CheckedPolicy", "Users", "hash_password", "security_policies", "verify_password"]
+
+_log = logging.getLogger(__name__)
+
+ANONYMOUS: Final = "anonymous"
+_LONGEST_PASSWORD: Final = 1024
+
+
+def security_policies(settings: OpcUaTable) -> list[ua.SecurityPolicyType]:
+    """The endpoints to offer, the safest first. Signing alone is not offered: passwords and commands
+    would cross the network for everyone to read."""
+    policies = [
+        ua.SecurityPolicyType.Aes256Sha256RsaPss_SignAndEncrypt,
+        ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt,
+    ]
+    if settings.no_security:
+        policies.append(ua.SecurityPolicyType.NoSecurity)
+    return policies
+
+
+class CheckedPolicy:
+    """A security policy of asyncua that opens no channel to a certificate without trust.
+
+    asyncua looks at the certificate in CreateSession, which anyone can copy; here it is the one
+    whose key the client proves to have.
+    """
+
+    def __init__(self, policy: Any, trusted: TrustedCertificates | None) -> None:
+        self._policy = policy
+        self._trusted = trusted
+
+    def matches(self, uri: str, mode: ua.MessageSecurityMode | None = None) -> bool:
+        return self._policy.matches(uri, mode)
+
+    def create(self, peer_certificate: bytes | None) -> Any:
+        """Raises ServiceError for a certificate that is missing, unreadable or not trusted."""
+        if self._policy.mode is not ua.MessageSecurityMode.None_:
+            self._check(peer_certificate)
+        return self._policy.create(peer_certificate)
+
+    def _check(self, content: bytes | None) -> None:
+        try:
+            certificate = first_certificate(content)
+        except (ValueError, IndexError):
+            certificate = None
+        if certificate is None:
+            raise ServiceError(StatusCodes.BadCertificateInvalid)
+        why = self._trusted.refusal(certificate) if self._trusted else None
+        if why:
+            name = certificate.subject.rfc4514_string()
+            _log.warning("refused the certificate of %s, SHA-256 %s: %s", name, fingerprint(certificate), why)
+            # Part 4 §6.1.3: the client is not told more than this.
+            raise ServiceError(StatusCodes.BadSecurityChecksFailed)
+
+
+@dataclass(frozen=True, slots=True)
+class _Account:
+    role: Role
+    password_hash: str
+
+
+_ROLES: Final = {"observer": Role.OBSERVER, "operator": Role.OPERATOR, "engineer": Role.ENGINEER}
+
+
+class Users:
+    """The users of the site file. Nobody is an administrator: the address space is the site's."""
+
+    def __init__(self, settings: OpcUaTable) -> None:
+        _check_users(settings.user)
+        self._accounts = {
+            user.name: _Account(_ROLES[user.role], user.password_hash) for user in settings.user
+        }
+        self._anonymous = _ROLES.get(settings.anonymous)
+        # One at a time: each check takes 64 MiB, and guessing must not take all cores.
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="password")
+
+    def close(self) -> None:
+        self._worker.shutdown(wait=False, cancel_futures=True)
+
+    @property
+    def tokens(self) -> list[type]:
+        """The kinds of identity tokens to offer. Without users and anonymous, nobody gets in."""
+        tokens: list[type] = [ua.UserNameIdentityToken] if self._accounts else []
+        if self._anonymous is not None:
+            tokens.append(ua.AnonymousIdentityToken)
+        return tokens or [ua.UserNameIdentityToken]
+
+    def anonymous(self, address: str) -> Identity:
+        """Raises ServiceError where the site file wants everyone to have a name."""
+        if self._anonymous is None:
+            raise ServiceError(StatusCodes.BadIdentityTokenRejected)
+        return Identity(Source.OPCUA, ANONYMOUS, self._anonymous, address)
+
+    async def login(self, name: str, password: str, address: str) -> Identity:
+        """Raises ServiceError where name and password do not belong together."""
+        account = self._accounts.get(name)
+        known = account.password_hash if account else None
+        loop = asyncio.get_running_loop()
+        right = len(password) <= _LONGEST_PASSWORD and await loop.run_in_executor(
+            self._worker, verify_password, known, password
+        )
+        if account is None or not right:
+            _log.warning("refused the login of %r from %s", name[:64], address)
+            raise ServiceError(StatusCodes.BadUserAccessDenied)
+        return Identity(Source.OPCUA, name, account.role, address)
+
+
+def _check_users(users: Sequence[UserTable]) -> None:
+    faults: list[Fault] = []
+    seen: set[str] = set()
+    for position, user in enumerate(users):
+        key = f"opcua.user[{position}]"
+        if user.name in seen or user.name == ANONYMOUS:
+            faults.append(Fault("site file", 0, f"{key}.name", f"the name {user.name!r} is taken"))
+        seen.add(user.name)
+        if not is_password_hash(user.password_hash):
+            hint = "the line that `drivebridge hash-password` prints"
+            faults.append(Fault("site file", 0, f"{key}.password_hash", "is not an Argon2 hash", hint))
+    if faults:
+        raise FileFaults(faults)

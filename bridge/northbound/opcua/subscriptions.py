@@ -1,0 +1,154 @@
+"""asyncua's subscriptions with limits, an owner, and without a deep copy for each value.
+
+Corrected here (``tests/wire/test_opcua_subscriptions.py``): the publishing interval had no floor, a
+session could change and delete another's subscriptions, ten thousand items held the loop for a
+second to make and for longer to delete.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterable
+from typing import Any, Final
+
+from asyncua.server.address_space import AddressSpace
+from asyncua.server.internal_server import InternalServer
+from asyncua.server.internal_subscription import InternalSubscription
+from asyncua.server.monitored_item_service import (
+    MonitoredItemData,
+    MonitoredItemService,
+    MonitoredItemValues,
+)
+from asyncua.server.subscription_service import SubscriptionService
+
+from bridge.northbound.opcua.library import AttributeIds, ServiceError, StatusCodes, get, make, status, ua
+
+LEAST_INTERVAL_MS: Final = 50.0
+MOST_INTERVAL_MS: Final = 3_600_000.0
+MOST_ITEMS: Final = 100_000
+"""Monitored items of all clients together."""
+
+MOST_SUBSCRIPTIONS: Final = 200
+_EVENT_QUEUE: Final = 200
+_VALUE_QUEUE: Final = 100
+_UNACKNOWLEDGED: Final = 30
+_BATCH: Final = 50
+
+
+class _SharedValues(MonitoredItemValues):
+    """The last value without a copy of it: a DataValue is never changed once it is made."""
+
+    def set_current_datavalue(self, cur_val: ua.DataValue) -> None:
+        self.old_dvalue = self.current_dvalue
+        self.current_dvalue = cur_val
+
+
+class _Items(MonitoredItemService):
+    """The monitored items of one subscription."""
+
+    def __len__(self) -> int:
+        return len(self._monitored_items)
+
+    def _make_monitored_item_common(
+        self, params: ua.MonitoredItemCreateRequest
+    ) -> tuple[ua.MonitoredItemCreateResult, MonitoredItemData]:
+        result, data = super()._make_monitored_item_common(params)
+        item = get(params, "ItemToMonitor")
+        if get(item, "AttributeId") == AttributeIds.EventNotifier:
+            most, default = _EVENT_QUEUE, _EVENT_QUEUE
+        else:
+            # Part 4 §7.21: 0 asks for the newest value only.
+            most, default = _VALUE_QUEUE, 1
+        asked: int = get(get(params, "RequestedParameters"), "QueueSize")
+        data.queue_size = min(asked, most) or default
+        data.mvalue = _SharedValues()
+        return make(lambda: result, RevisedQueueSize=data.queue_size), data
+
+    def _modify_monitored_item(self, params: ua.MonitoredItemModifyRequest) -> ua.MonitoredItemModifyResult:
+        data = self._monitored_items.get(get(params, "MonitoredItemId"))
+        if data is None:
+            return make(
+                ua.MonitoredItemModifyResult, StatusCode=status(StatusCodes.BadMonitoredItemIdInvalid)
+            )
+        asked = get(params, "RequestedParameters")
+        data.client_handle = get(asked, "ClientHandle")
+        data.queue_size = min(max(get(asked, "QueueSize"), 1), _EVENT_QUEUE)
+        if get(asked, "Filter") is not None:
+            data.filter = get(asked, "Filter")
+        return make(
+            ua.MonitoredItemModifyResult,
+            RevisedSamplingInterval=get(self.isub.data, "RevisedPublishingInterval"),
+            RevisedQueueSize=data.queue_size,
+        )
+
+    def _delete_monitored_items(self, mid: int) -> ua.StatusCode:
+        data = self._monitored_items.pop(mid, None)
+        if data is None:
+            return status(StatusCodes.BadMonitoredItemIdInvalid)
+        if data.callback_handle is not None:
+            self.aspace.delete_datachange_callback(data.callback_handle)
+            self._monitored_datachange.pop(data.callback_handle, None)
+            return status(StatusCodes.Good)
+        for node, items in list(self._monitored_events.items()):
+            if mid in items:
+                items.remove(mid)
+            if not items:
+                del self._monitored_events[node]
+        return status(StatusCodes.Good)
+
+
+class Subscriptions(SubscriptionService):
+    """The subscriptions of all clients."""
+
+    def __init__(self, aspace: AddressSpace, iserver: InternalServer) -> None:
+        super().__init__(aspace, iserver)
+        iserver.max_subscriptions = MOST_SUBSCRIPTIONS
+        iserver.max_unacked_messages_per_subscription = _UNACKNOWLEDGED
+
+    async def create_subscription(
+        self,
+        params: ua.CreateSubscriptionParameters,
+        callback: Callable[..., Any],
+        session_id: ua.NodeId,
+        request_callback: Callable[..., Any] | None = None,
+    ) -> ua.CreateSubscriptionResult:
+        asked: float = get(params, "RequestedPublishingInterval")
+        # `not >=` puts NaN where the least is, too.
+        interval = min(asked, MOST_INTERVAL_MS) if asked >= LEAST_INTERVAL_MS else LEAST_INTERVAL_MS
+        make(lambda: params, RequestedPublishingInterval=interval)
+        result = await super().create_subscription(params, callback, session_id, request_callback)
+        subscription = self.subscriptions[get(result, "SubscriptionId")]
+        subscription.monitored_item_srv = _Items(subscription, self.aspace)
+        return result
+
+    def check_owner(self, session_id: ua.NodeId, ids: Iterable[int]) -> None:
+        """Raises ServiceError where one of these subscriptions is another session's or nobody's."""
+        for number in ids:
+            found = self.subscriptions.get(number)
+            if found is None or found.session_id != session_id:
+                raise ServiceError(StatusCodes.BadSubscriptionIdInvalid)
+
+    def of(self, session_id: ua.NodeId) -> set[int]:
+        return {number for number, found in self.subscriptions.items() if found.session_id == session_id}
+
+    async def create_monitored_items(
+        self, params: ua.CreateMonitoredItemsParameters
+    ) -> list[ua.MonitoredItemCreateResult]:
+        wanted: list[ua.MonitoredItemCreateRequest] = get(params, "ItemsToCreate")
+        there = sum(_count(subscription) for subscription in self.subscriptions.values())
+        results: list[ua.MonitoredItemCreateResult] = []
+        for start in range(0, len(wanted), _BATCH):
+            batch = wanted[start : start + _BATCH]
+            if there + start + len(batch) > MOST_ITEMS:
+                code = status(StatusCodes.BadTooManyMonitoredItems)
+                results += [make(ua.MonitoredItemCreateResult, StatusCode=code) for _ in batch]
+                continue
+            make(lambda: params, ItemsToCreate=batch)
+            results += await super().create_monitored_items(params)
+            await asyncio.sleep(0)
+        return results
+
+
+def _count(subscription: InternalSubscription) -> int:
+    items = subscription.monitored_item_srv
+    return len(items) if isinstance(items, _Items) else 0

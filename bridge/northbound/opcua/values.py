@@ -1,0 +1,118 @@
+"""Readings as DataValues, values of clients as values of points, outcomes as status codes."""
+
+from __future__ import annotations
+
+import math
+from datetime import UTC, datetime
+from typing import Final
+
+from bridge.command.request import Code, Outcome
+from bridge.image import DataType, Point, Quality, Reading, Value
+from bridge.northbound.opcua.library import GOOD, StatusCodes, data_value, status, ua, variant
+
+# The contract's table. A Bad status has no value in OPC UA; the Uncertain ones keep the last one.
+QUALITY_STATUS: Final = {
+    Quality.WAITING: status(StatusCodes.BadWaitingForInitialData),
+    Quality.GOOD: GOOD,
+    Quality.STALE: status(StatusCodes.UncertainLastUsableValue),
+    Quality.LOST: status(StatusCodes.UncertainNoCommunicationLastUsableValue),
+    Quality.DEAD: status(StatusCodes.BadNoCommunication),
+    Quality.DEVICE_FAULT: status(StatusCodes.BadDeviceFailure),
+    Quality.DISABLED: status(StatusCodes.BadOutOfService),
+    Quality.CONFIG_ERROR: status(StatusCodes.BadConfigurationError),
+}
+
+OUTCOME_STATUS: Final = {
+    Code.OK: StatusCodes.Good,
+    Code.UNKNOWN_TARGET: StatusCodes.BadNodeIdUnknown,
+    Code.UNKNOWN_POINT: StatusCodes.BadNodeIdUnknown,
+    Code.READ_ONLY: StatusCodes.BadNotWritable,
+    Code.OUT_OF_RANGE: StatusCodes.BadOutOfRange,
+    Code.NOT_VALID: StatusCodes.BadOutOfRange,
+    Code.NOT_ALLOWED: StatusCodes.BadUserAccessDenied,
+    Code.ACKNOWLEDGE_FIRST: StatusCodes.BadInvalidState,
+    Code.NOT_READY: StatusCodes.BadNoCommunication,
+    Code.NOT_CONFIGURED: StatusCodes.BadConfigurationError,
+    Code.TIMED_OUT: StatusCodes.BadTimeout,
+    Code.CANCELLED: StatusCodes.BadRequestCancelledByRequest,
+}
+
+VARIANT_TYPE: Final = {
+    DataType.BOOL: ua.VariantType.Boolean,
+    DataType.UINT8: ua.VariantType.Byte,
+    DataType.UINT16: ua.VariantType.UInt16,
+    DataType.UINT32: ua.VariantType.UInt32,
+    DataType.INT16: ua.VariantType.Int16,
+    DataType.INT32: ua.VariantType.Int32,
+    # Double: fault numbers such as 10.3 would read 10.300000190734863 as Float.
+    DataType.FLOAT: ua.VariantType.Double,
+    DataType.STRING: ua.VariantType.String,
+}
+
+INTEGER_TYPES: Final = frozenset(
+    (
+        ua.VariantType.SByte,
+        ua.VariantType.Byte,
+        ua.VariantType.Int16,
+        ua.VariantType.UInt16,
+        ua.VariantType.Int32,
+        ua.VariantType.UInt32,
+        ua.VariantType.Int64,
+        ua.VariantType.UInt64,
+    )
+)
+_NUMBER_TYPES: Final = INTEGER_TYPES | {ua.VariantType.Float, ua.VariantType.Double}
+_NO_VALUE: Final = variant(None, ua.VariantType.Null)
+_BITS: Final = (
+    variant(False, ua.VariantType.Boolean),
+    variant(True, ua.VariantType.Boolean),
+)
+
+
+def outcome_status(outcome: Outcome) -> ua.StatusCode:
+    return status(OUTCOME_STATUS[outcome.code])
+
+
+def source_time(epoch_ns: int) -> datetime:
+    """A time in ns since 1970 as OPC UA's DateTime, to the microsecond."""
+    return datetime.fromtimestamp(epoch_ns / 1e9, UTC)
+
+
+def reading_value(
+    reading: Reading, variant_type: ua.VariantType, epoch_ns: int, bit: int | None = None
+) -> ua.DataValue:
+    """``reading`` for a client, or with ``bit`` that bit of it. The server's time is now."""
+    quality = reading.quality
+    code = QUALITY_STATUS[quality]
+    if code.is_bad():
+        value = _NO_VALUE
+    elif bit is None:
+        value = variant(reading.value, variant_type)
+    else:
+        value = _BITS[int(reading.value) >> bit & 1]
+    # A point that has never had a value has no source time either.
+    stamp = None if quality is Quality.WAITING else source_time(epoch_ns)
+    return data_value(value, code, stamp, datetime.now(UTC))
+
+
+def point_value(point: Point, written: ua.Variant) -> Value:
+    """What a client wrote, as a value to ask for. Raises ValueError for a type that does not fit.
+
+    Any integer type is taken for an integer point and any number for a float point; whether the
+    number is in range is for the drive's channel to say.
+    """
+    kind = written.VariantType
+    value = written.Value
+    if written.is_array or written.Dimensions or value is None:
+        raise ValueError(f"{point.name} takes a single value")
+    if point.data_type is DataType.STRING:
+        fits = kind is ua.VariantType.String
+    elif point.data_type is DataType.BOOL:
+        fits = kind is ua.VariantType.Boolean
+    elif point.data_type is DataType.FLOAT:
+        fits = kind in _NUMBER_TYPES and math.isfinite(value)
+    else:
+        fits = kind in INTEGER_TYPES
+    if not fits:
+        raise ValueError(f"{point.name} does not take {kind.name} {value}")
+    return value

@@ -1,0 +1,132 @@
+"""The Write service: what clients write becomes telegrams, outcomes become status codes.
+
+All command points of one drive in one Write call are one telegram, so that a control word and its
+setpoint reach the drive together, and each of them gets the telegram's outcome.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+from asyncua.server.address_space import AddressSpace
+
+from bridge.command.request import Action, Identity, Outcome, Request
+from bridge.image import Value
+from bridge.northbound.opcua.library import GOOD, AttributeIds, StatusCodes, get, status, ua
+from bridge.northbound.opcua.nodes import VariableNode
+from bridge.northbound.opcua.values import outcome_status, point_value
+from bridge.northbound.view import View
+
+_log = logging.getLogger(__name__)
+
+ANSWER_LIMIT_S: Final = 10.0
+"""No request takes longer (a start takes 3 s); after this the way to the bus is taken for broken."""
+
+
+@dataclass(slots=True)
+class _Telegram:
+    """What one drive is told. ``places`` are the positions in the call that it answers."""
+
+    target: str
+    values: dict[str, Value] = field(default_factory=dict[str, Value])
+    places: list[int] = field(default_factory=list[int])
+    fault: int = StatusCodes.Good
+
+
+async def ask(view: View, request: Request) -> ua.StatusCode:
+    """Make a request and give its outcome as a status code."""
+    try:
+        async with asyncio.timeout(ANSWER_LIMIT_S):
+            outcome: Outcome = await view.request(request)
+    except TimeoutError:
+        _log.warning("%s on %s: no outcome within %g s", request.action, request.target, ANSWER_LIMIT_S)
+        return status(StatusCodes.BadTimeout)
+    return outcome_status(outcome)
+
+
+class Writer:
+    """Carries out Write calls. ``writable`` are the command points by NodeId."""
+
+    def __init__(self, view: View, space: AddressSpace, writable: Mapping[ua.NodeId, VariableNode]) -> None:
+        self._view = view
+        self._space = space
+        self._writable = writable
+
+    async def write(self, identity: Identity, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
+        """One status code for each of ``writes``, in their order."""
+        results = [GOOD] * len(writes)
+        telegrams: list[_Telegram] = []
+        latest: dict[str, _Telegram] = {}
+        for place, write in enumerate(writes):
+            node = self._writable.get(get(write, "NodeId"))
+            if node is None or get(write, "AttributeId") != AttributeIds.Value:
+                results[place] = status(self._refusal(write))
+                continue
+            target, _, leaf = node.point.name.rpartition("/command/")
+            telegram = latest.get(target)
+            # The same point twice is two telegrams: the edge from one value to the other may count.
+            if telegram is None or leaf in telegram.values:
+                telegram = latest[target] = _Telegram(target)
+                telegrams.append(telegram)
+            telegram.places.append(place)
+            value = _value(node, write)
+            if isinstance(value, _Refusal):
+                telegram.fault = telegram.fault or value.code
+            else:
+                telegram.values[leaf] = value
+        by_drive: dict[str, list[_Telegram]] = {}
+        for telegram in telegrams:
+            by_drive.setdefault(telegram.target, []).append(telegram)
+        await asyncio.gather(*(self._send(identity, queue, results) for queue in by_drive.values()))
+        return results
+
+    async def _send(
+        self, identity: Identity, telegrams: Sequence[_Telegram], results: list[ua.StatusCode]
+    ) -> None:
+        """The telegrams of one drive, one after the other."""
+        for telegram in telegrams:
+            # One value that does not fit takes the others with it: half a telegram is none.
+            code = status(telegram.fault)
+            if code.is_good():
+                request = Request(identity, telegram.target, Action.WRITE, telegram.values)
+                code = await ask(self._view, request)
+            for place in telegram.places:
+                results[place] = code
+
+    def _refusal(self, write: ua.WriteValue) -> int:
+        """Why this cannot be written by anyone."""
+        node = self._space.get(get(write, "NodeId"))
+        if node is None:
+            return StatusCodes.BadNodeIdUnknown
+        if get(write, "AttributeId") not in node.attributes:
+            return StatusCodes.BadAttributeIdInvalid
+        return StatusCodes.BadNotWritable
+
+
+@dataclass(frozen=True, slots=True)
+class _Refusal:
+    code: int
+
+
+def _value(node: VariableNode, write: ua.WriteValue) -> Value | _Refusal:
+    """The value to ask for.
+
+    A client's source time is let go: it is not stored, and asyncua's own client sends one with every
+    plain write. A status other than Good and a server time are refused (Part 4 §5.11.4).
+    """
+    written: ua.DataValue = get(write, "Value")
+    code = written.StatusCode
+    if get(write, "IndexRange") or written.ServerTimestamp or written.ServerPicoseconds:
+        return _Refusal(StatusCodes.BadWriteNotSupported)
+    if code is not None and code.value != StatusCodes.Good:
+        return _Refusal(StatusCodes.BadWriteNotSupported)
+    if written.Value is None:
+        return _Refusal(StatusCodes.BadTypeMismatch)
+    try:
+        return point_value(node.point, written.Value)
+    except ValueError:
+        return _Refusal(StatusCodes.BadTypeMismatch)

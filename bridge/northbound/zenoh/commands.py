@@ -1,0 +1,188 @@
+"""A query with a payload as a request to the plant. Pure."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Final
+
+import msgspec
+
+from bridge.command import Action, Code, Identity, Request, Source
+from bridge.image import Point, Value
+
+METHODS: Final = (
+    Action.START,
+    Action.STOP,
+    Action.QUICK_STOP,
+    Action.DISABLE_VOLTAGE,
+    Action.RESET_FAULT,
+    Action.TAKE_CONTROL,
+    Action.RELEASE_CONTROL,
+    Action.KEEP_ALIVE,
+)
+NODE_METHODS: Final = (Action.RESET, Action.RESET_COMMUNICATION, Action.ENABLE, Action.DISABLE)
+
+MALFORMED: Final = "malformed"
+ANONYMOUS: Final = "anonymous"
+
+_LONGEST: Final = 4096
+_NAME: Final = re.compile(r"[A-Za-z0-9_.\-]{1,64}")
+_HEXADECIMAL: Final = re.compile(r"0[xX][0-9A-Fa-f]{1,8}")
+
+
+class BadCommand(Exception):
+    """The query is no command. ``code`` is that of an outcome, or ``malformed``."""
+
+    def __init__(self, code: str, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+        self.message = message
+
+
+class _One(msgspec.Struct, forbid_unknown_fields=True):
+    v: Value
+
+
+class _Options(msgspec.Struct, forbid_unknown_fields=True):
+    ttl_ms: int | msgspec.UnsetType = msgspec.UNSET
+    direction: int | msgspec.UnsetType = msgspec.UNSET
+
+
+class _Controller(msgspec.Struct):
+    controller: str = ANONYMOUS
+
+
+_one_or_bare = msgspec.json.Decoder(_One | bool | int | float | str)
+_telegram = msgspec.json.Decoder(dict[str, Value])
+_options = msgspec.json.Decoder(_Options)
+_controller = msgspec.json.Decoder(_Controller)
+
+
+def identity_of(attachment: bytes | None) -> Identity:
+    """Who asks: ``{"controller": "<name>"}`` in the attachment. Raises BadCommand.
+
+    The name is what the asker says; without users and TLS nobody checks it.
+    """
+    if not attachment:
+        return Identity(Source.ZENOH, ANONYMOUS)
+    wanted = 'the attachment must be {"controller": "<name>"}'
+    if len(attachment) > _LONGEST:
+        raise BadCommand(MALFORMED, wanted)
+    try:
+        name = _controller.decode(attachment).controller
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise BadCommand(MALFORMED, f"{wanted}: {error}") from None
+    if not _NAME.fullmatch(name):
+        raise BadCommand(MALFORMED, "a controller's name has 1…64 letters, digits and _ . -")
+    return Identity(Source.ZENOH, name)
+
+
+class Commands:
+    """What can be commanded on a site, read off its points."""
+
+    def __init__(self, points: Iterable[Point]) -> None:
+        self._points = {point.name: point for point in points}
+        self._drives = _owners(self._points, "/command/control_word")
+        self._nodes = _owners(self._points, "/node/nmt_state")
+
+    def is_method(self, tail: str) -> bool:
+        """Whether the key stands for something to do and not for a value."""
+        owner, _, leaf = tail.rpartition("/")
+        target, _, group = owner.rpartition("/")
+        if group == "command" and target in self._drives:
+            return leaf in METHODS
+        return group == "node" and target in self._nodes and leaf in NODE_METHODS
+
+    def request(self, tail: str, payload: bytes, identity: Identity) -> Request:
+        """The request for a payload on ``tail``, a key without prefix and site. Raises BadCommand."""
+        if len(payload) > _LONGEST:
+            raise BadCommand(MALFORMED, f"a command has at most {_LONGEST} bytes")
+        owner, _, leaf = tail.rpartition("/")
+        target, _, group = owner.rpartition("/")
+        if leaf == "command" and owner in self._drives:
+            return Request(identity, owner, Action.WRITE, _decode_telegram(owner, payload))
+        if self.is_method(tail):
+            return _call(identity, target, Action(leaf), payload)
+        point = self._points.get(tail)
+        if point is None:
+            raise self._unknown(tail, target, group)
+        if group != "command" or not point.writable:
+            raise BadCommand(Code.READ_ONLY, f"{tail} is read-only; {self._how(target)}")
+        return Request(identity, target, Action.WRITE, {leaf: _decode_value(point, payload)})
+
+    def _unknown(self, tail: str, target: str, group: str) -> BadCommand:
+        if group == "command" and target in self._drives:
+            leaves = [
+                name.rpartition("/")[2] for name in self._points if name.startswith(f"{target}/command/")
+            ]
+            known = ", ".join((*leaves, *METHODS))
+            return BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}; {target}/command has {known}")
+        if group == "node" and target in self._nodes:
+            known = ", ".join(NODE_METHODS)
+            return BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}; a node takes {known}")
+        if group == "command":
+            drives = ", ".join(sorted(self._drives))
+            return BadCommand(Code.UNKNOWN_TARGET, f"there is no drive {target!r}; there are {drives}")
+        return BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}; {self._how(target)}")
+
+    def _how(self, target: str) -> str:
+        drive = target if target in self._drives else "<node>/<drive>"
+        return f"commands go to {drive}/command/…"
+
+
+def _owners(points: Iterable[str], ending: str) -> frozenset[str]:
+    return frozenset(name.removesuffix(ending) for name in points if name.endswith(ending))
+
+
+def _decode_value(point: Point, payload: bytes) -> Value:
+    bare = payload.strip()
+    try:
+        if point.data_type.is_integer and _HEXADECIMAL.fullmatch(bare.decode()):
+            return int(bare, 16)
+        decoded = _one_or_bare.decode(bare)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise BadCommand(
+            MALFORMED, f'{point.name} takes a number or {{"v": <number>}} in JSON: {error}'
+        ) from None
+    return _bounded(point.name, decoded.v if isinstance(decoded, _One) else decoded)
+
+
+def _decode_telegram(drive: str, payload: bytes) -> dict[str, Value]:
+    try:
+        values = _telegram.decode(payload)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise BadCommand(
+            MALFORMED, f'{drive}/command takes an object such as {{"control_word": 1151}}: {error}'
+        ) from None
+    if not values:
+        raise BadCommand(MALFORMED, f"the object for {drive}/command names no point")
+    return {leaf: _bounded(leaf, value) for leaf, value in values.items()}
+
+
+def _bounded(name: str, value: Value) -> Value:
+    """JSON knows no largest integer; no point has more than 32 bits."""
+    if isinstance(value, int) and abs(value) >= 2**63:
+        raise BadCommand(Code.OUT_OF_RANGE, f"{name}: the number is too large")
+    return value
+
+
+def _call(identity: Identity, target: str, action: Action, payload: bytes) -> Request:
+    try:
+        options = _options.decode(payload) if payload.strip() else _Options()
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise BadCommand(MALFORMED, f"{action} takes an object of options: {error}") from None
+    ttl_ms, direction = options.ttl_ms, options.direction
+    if ttl_ms is not msgspec.UNSET and action is not Action.TAKE_CONTROL:
+        raise BadCommand(MALFORMED, f"{action} takes no ttl_ms")
+    if direction is not msgspec.UNSET and action is not Action.START:
+        raise BadCommand(MALFORMED, f"{action} takes no direction")
+    if direction not in (msgspec.UNSET, -1, 0, 1):
+        raise BadCommand(Code.OUT_OF_RANGE, "direction takes 1 (forward), -1 (reverse) or 0")
+    return Request(
+        identity,
+        target,
+        action,
+        ttl_ms=0 if ttl_ms is msgspec.UNSET else ttl_ms,
+        direction=0 if direction is msgspec.UNSET else direction,
+    )

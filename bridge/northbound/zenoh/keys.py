@@ -1,0 +1,134 @@
+"""Which zenoh key stands for what, and how values, events and outcomes are written under it. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import msgspec
+
+from bridge.command import Event, Outcome
+from bridge.image import DataType, Point, Quality, Reading, Value
+
+JSON: Final = "application/json"
+TEXT: Final = "text/plain"
+
+_encode = msgspec.json.Encoder().encode
+
+
+class _Shown(msgspec.Struct):
+    """A reading. ``v`` is null where there is no value, ``t`` where there never was one."""
+
+    v: Value | None
+    q: str
+    t: float | None
+    s: str | msgspec.UnsetType = msgspec.UNSET
+    r: str | msgspec.UnsetType = msgspec.UNSET
+
+
+class _Beside(msgspec.Struct):
+    """What goes into the attachment of a bare value."""
+
+    q: str
+    t: float | None
+    s: str | msgspec.UnsetType = msgspec.UNSET
+    r: str | msgspec.UnsetType = msgspec.UNSET
+
+
+class _Told(msgspec.Struct):
+    t: float
+    kind: str
+    source: str
+    severity: int
+    message: str
+
+
+class _Done(msgspec.Struct):
+    ok: bool
+    forwarded: bool
+    message: str | msgspec.UnsetType = msgspec.UNSET
+
+
+class _Refused(msgspec.Struct):
+    ok: bool
+    code: str
+    message: str
+
+
+class KeySpace:
+    """The keys of one site: ``<prefix>/<site>/<point name>``.
+
+    Chunks that begin with ``@`` are not found by ``*`` and ``**``: who asks for all values gets values
+    only.
+    """
+
+    def __init__(self, prefix: str, site: str, points: Sequence[Point]) -> None:
+        self.top = f"{prefix}/{site}"
+        self.points = points
+        self.keys: tuple[str, ...] = tuple(f"{self.top}/{point.name}" for point in points)
+        self.index: dict[str, int] = {key: i for i, key in enumerate(self.keys)}
+        self.everything = f"{self.top}/**"
+        self.commands = f"{self.top}/*/*/command/**"
+        self.bridge_token = f"{self.top}/@/bridge"
+        self._states = tuple(dict(point.states) for point in points)
+
+    def node_token(self, node: str) -> str:
+        return f"{self.top}/@/{node}"
+
+    def event_key(self, event: Event) -> str:
+        return f"{self.top}/@/event/{event.kind}"
+
+    def tail(self, key: str) -> str:
+        """``key`` without prefix and site."""
+        return key[len(self.top) + 1 :]
+
+    def as_json(self, index: int, reading: Reading, epoch_ns: int) -> bytes:
+        """``{"v": …, "q": "good", "t": seconds since 1970}``; ``s`` names the state of an enumeration,
+        ``r`` the reason of a quality that is not good."""
+        return _encode(_Shown(_value(reading), *self._circumstances(index, reading, epoch_ns)))
+
+    def as_bare(self, index: int, reading: Reading, epoch_ns: int) -> tuple[bytes, bytes]:
+        """The value as text, and the attachment with everything else. No value is no text."""
+        value = _value(reading)
+        if value is None:
+            text = b""
+        elif self.points[index].data_type is DataType.STRING:
+            text = str(value).encode()
+        else:
+            text = _encode(value)
+        return text, _encode(_Beside(*self._circumstances(index, reading, epoch_ns)))
+
+    def _circumstances(
+        self, index: int, reading: Reading, epoch_ns: int
+    ) -> tuple[str, float | None, str | msgspec.UnsetType, str | msgspec.UnsetType]:
+        quality = reading.quality
+        time = None if quality is Quality.WAITING else seconds(epoch_ns)
+        state = None
+        if self._states[index] and quality.has_value and isinstance(reading.value, int):
+            state = self._states[index].get(reading.value)
+        return quality.label, time, state or msgspec.UNSET, reading.reason or msgspec.UNSET
+
+
+def seconds(epoch_ns: int) -> float:
+    """Seconds since 1970 UTC with six digits behind the point."""
+    return round(epoch_ns / 1e9, 6)
+
+
+def event_json(event: Event, epoch_ns: int) -> bytes:
+    return _encode(_Told(seconds(epoch_ns), event.kind, event.source, event.severity, event.message))
+
+
+def outcome_json(outcome: Outcome) -> bytes:
+    """``{"ok": true, "forwarded": true}``, or ``{"ok": false, "code": …, "message": …}``."""
+    if outcome.ok:
+        return _encode(_Done(True, outcome.forwarded, outcome.message or msgspec.UNSET))
+    return refusal_json(outcome.code, outcome.message)
+
+
+def refusal_json(code: str, message: str) -> bytes:
+    return _encode(_Refused(False, code, message))
+
+
+def _value(reading: Reading) -> Value | None:
+    """A value that is gone is not shown: a reader that looks at nothing else must not take it."""
+    return reading.value if reading.quality.has_value else None

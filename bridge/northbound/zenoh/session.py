@@ -1,0 +1,196 @@
+"""The zenoh server: values and events out, gets and commands in."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final
+
+import zenoh
+
+from bridge.command import Code, Event, Outcome, Plant
+from bridge.command.link import NodeState
+from bridge.config import ZenohTable
+from bridge.errors import Unavailable
+from bridge.northbound.zenoh import keys
+from bridge.northbound.zenoh.commands import MALFORMED, BadCommand, Commands, identity_of
+from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
+
+_log = logging.getLogger(__name__)
+
+_POINTS_PER_TICK: Final = 500
+_REPLIES_AT_ONCE: Final = 200
+_GETS_AT_ONCE: Final = 16
+"""Gets with wildcards that are answered side by side; further ones are told to come again."""
+
+
+class ZenohServer:
+    """Serves one plant under zenoh keys.
+
+    ``clock`` is monotonic seconds; ``epoch`` turns such a time into ns since 1970 UTC.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        settings: ZenohTable,
+        site_name: str,
+        clock: Callable[[], float],
+        epoch: Callable[[float], int],
+    ) -> None:
+        self._plant = plant
+        self._settings = settings
+        self._clock = clock
+        self._epoch = epoch
+        self._keys = keys.KeySpace(settings.prefix, site_name, plant.image.points)
+        self._commands = Commands(plant.image.points)
+        self._link = ZenohLink(_config(settings), "zenoh")
+        self._feed = plant.image.feed()
+        self._present: set[str] = set()
+        self._gets: set[asyncio.Task[None]] = set()
+        self._tick_timer: asyncio.TimerHandle | None = None
+
+    async def start(self) -> None:
+        """Raises Unavailable where zenoh cannot listen."""
+        try:
+            if not await self._link.open():
+                _log.warning("zenoh: nobody answers at %s yet", ", ".join(self._settings.connect))
+        except Unavailable as error:
+            listen = ", ".join(self._settings.listen)
+            raise Unavailable(f"{error} (is another bridge running? [zenoh] listen = {listen})") from None
+        self._link.declare_queryable(self._keys.everything, self._on_query)
+        if self._settings.accept_put:
+            self._link.declare_subscriber(self._keys.commands, self._on_put, from_others=True)
+        self._link.declare_token(self._keys.bridge_token)
+        self._plant.on_event(self._on_event)
+        self._tick()
+
+    async def close(self) -> None:
+        if self._tick_timer:
+            self._tick_timer.cancel()
+        for task in tuple(self._gets):
+            task.cancel()
+        self._plant.image.drop_feed(self._feed)
+        await self._link.close()
+
+    # out
+
+    def _tick(self) -> None:
+        self._tick_timer = asyncio.get_running_loop().call_later(self._settings.period_ms / 1000, self._tick)
+        for index in self._feed.take(_POINTS_PER_TICK):
+            self._link.put(self._render(index))
+        for node in self._plant.nodes.values():
+            self._follow_node(node.name, node.drives[0].channel.link.node is NodeState.OPERATIONAL)
+
+    def _follow_node(self, name: str, is_operational: bool) -> None:
+        """A node's token is there while the node is operational."""
+        if is_operational and name not in self._present:
+            self._present.add(name)
+            self._link.declare_token(self._keys.node_token(name))
+        elif not is_operational and name in self._present:
+            self._present.discard(name)
+            self._link.drop_token(self._keys.node_token(name))
+
+    def _render(self, index: int) -> Message:
+        reading = self._plant.image[index]
+        key = self._keys.keys[index]
+        epoch_ns = self._epoch(reading.time)
+        if self._settings.encoding == "json":
+            return Message(key, self._keys.as_json(index, reading, epoch_ns), keys.JSON)
+        value, attachment = self._keys.as_bare(index, reading, epoch_ns)
+        return Message(key, value, keys.TEXT, attachment)
+
+    def _on_event(self, event: Event) -> None:
+        payload = keys.event_json(event, self._epoch(event.time))
+        self._link.send(Message(self._keys.event_key(event), payload, keys.JSON))
+
+    # in
+
+    def _on_query(self, asked: Asked) -> None:
+        is_pattern = "*" in asked.key
+        tail = "" if is_pattern else self._keys.tail(asked.key)
+        if is_pattern and asked.payload is not None:
+            _refuse(asked, BadCommand(MALFORMED, "a command goes to one key, without wildcards"))
+        elif asked.payload is not None or self._commands.is_method(tail):
+            self._command(asked, tail)
+        elif asked.key in self._keys.index:
+            asked.send([self._render(self._keys.index[asked.key])])
+            asked.finish()
+        elif not is_pattern:
+            _refuse(asked, BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}"))
+        elif len(self._gets) >= _GETS_AT_ONCE:
+            _refuse(asked, BadCommand("busy", "too many gets with wildcards at once; ask again"))
+        else:
+            task = asyncio.get_running_loop().create_task(self._answer_get(asked))
+            self._gets.add(task)
+            task.add_done_callback(self._gets.discard)
+
+    async def _answer_get(self, asked: Asked) -> None:
+        """The present values of all points that match, a portion at a time."""
+        try:
+            for portion in self._matching(zenoh.KeyExpr(asked.key)):
+                asked.send([self._render(index) for index in portion])
+                await self._link.settle()
+        finally:
+            asked.finish()
+
+    def _matching(self, wanted: zenoh.KeyExpr) -> Iterator[list[int]]:
+        for start in range(0, len(self._keys.keys), _REPLIES_AT_ONCE):
+            some = self._keys.keys[start : start + _REPLIES_AT_ONCE]
+            yield [start + i for i, key in enumerate(some) if wanted.intersects(key)]
+
+    def _command(self, asked: Asked, tail: str) -> None:
+        def reply(outcome: Outcome) -> None:
+            payload = keys.outcome_json(outcome)
+            if outcome.ok:
+                asked.send([Message(asked.key, payload, keys.JSON)])
+                asked.finish()
+            else:
+                asked.fail(payload, keys.JSON)
+
+        try:
+            request = self._commands.request(tail, asked.payload or b"", identity_of(asked.attachment))
+        except BadCommand as bad:
+            _refuse(asked, bad)
+            return
+        self._plant.submit(request, self._clock(), reply)
+
+    def _on_put(self, message: Message) -> None:
+        """A plain put on a command key, where the site takes them. Nobody is there to be told."""
+        try:
+            identity = identity_of(message.attachment)
+            request = self._commands.request(self._keys.tail(message.key), message.payload, identity)
+        except BadCommand as bad:
+            _log.info("zenoh: a put on %s is no command: %s", message.key, bad.message)
+            return
+        self._plant.submit(request, self._clock(), lambda _: None)
+
+
+def _refuse(asked: Asked, bad: BadCommand) -> None:
+    asked.fail(keys.refusal_json(bad.code, bad.message), keys.JSON)
+
+
+def _config(settings: ZenohTable) -> zenoh.Config:
+    return zenoh_config(
+        mode=settings.mode,
+        listen=settings.listen if settings.mode == "peer" else (),
+        connect=settings.connect,
+        users=_users(settings),
+    )
+
+
+def _users(settings: ZenohTable) -> tuple[str, str, str] | None:
+    """Our own user with its password, and the file with everybody's. Raises Unavailable."""
+    if settings.user is None or settings.password_file is None:
+        return None
+    try:
+        lines = Path(settings.password_file).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise Unavailable(f"zenoh: password_file cannot be read: {error}") from None
+    for line in lines:
+        user, colon, password = line.partition(":")
+        if colon and user == settings.user:
+            return user, password, settings.password_file
+    raise Unavailable(f"zenoh: {settings.password_file} has no line {settings.user}:<password>")

@@ -1,0 +1,136 @@
+"""Composition root of the bus process: the only place where everything meets."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import logging
+from collections.abc import Callable
+from contextlib import AsyncExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from bridge import __version__, clock
+from bridge.command import Plant
+from bridge.command.plant import check_against_mappings
+from bridge.config import BusTable, Site, load_site, warnings
+from bridge.errors import BridgeError, Fault, FileFaults
+from bridge.eventlog import EventLog
+from bridge.fronts import Front
+from bridge.mapping import Family, load_family
+from bridge.mirror.publisher import MirrorPublisher
+from bridge.northbound.modbus.server import ModbusServer
+from bridge.northbound.zenoh.session import ZenohServer
+from bridge.notify import Notifier
+from bridge.southbound.bus import Bus, open_bus
+from bridge.southbound.master import Master
+from bridge.southbound.network import Network
+
+_log = logging.getLogger(__name__)
+
+_STOP_DRIVES_S = 0.1
+"""How long stopped words are sent before the bursts end, when the service is stopped."""
+
+MakeBus = Callable[[BusTable], Bus]
+
+
+@dataclass(frozen=True, slots=True)
+class Project:
+    """A checked site with the families it uses, and the file it came from."""
+
+    path: Path
+    site: Site
+    families: dict[str, Family]
+
+
+def load_project(path: Path) -> Project:
+    """Read a site file and every mapping it names. Raises ``FileFaults`` with all faults of all files."""
+    faults: list[Fault] = []
+    site = load_site(path)
+    families: dict[str, Family] = {}
+    for b, bus in enumerate(site.bus):
+        for n, node in enumerate(bus.node):
+            if node.mapping in families:
+                continue
+            try:
+                families[node.mapping] = load_family(node.mapping)
+            except FileFaults as error:
+                where = f"bus[{b}].node[{n}].mapping"
+                faults += [
+                    f if f.line else Fault(str(path), 0, where, f.message, f.hint) for f in error.faults
+                ]
+    faults += check_against_mappings(site, families, str(path))
+    if faults:
+        raise FileFaults(faults)
+    return Project(path, site, families)
+
+
+def make_bus(table: BusTable) -> Bus:
+    """The bus of a site file. Raises ``BridgeError`` for a virtual one, which only a demo can have."""
+    if table.interface == "virtual":
+        raise BridgeError(
+            f"bus {table.name} is virtual: it exists only inside one process; use `drivebridge demo`"
+        )
+    return open_bus(table.name, table.interface, table.channel or "", table.bitrate)
+
+
+class Service:
+    """The bus process of one site.
+
+    ``make_bus`` opens the buses; ``front_arguments`` is how a front process of this site is started.
+    """
+
+    def __init__(self, project: Project, make_bus: MakeBus = make_bus, *, fronts: bool = True) -> None:
+        self.project = project
+        site = project.site
+        self.plant = Plant(site, project.families, __version__)
+        self.plant.on_event(EventLog())
+        self.notifier = Notifier()
+        networks = [(make_bus(table), Network(table, self.plant)) for table in site.bus]
+        self.master = Master(networks, self.plant, clock.now, self.notifier.alive)
+        self.modbus = ModbusServer(self.plant, site.modbus, clock.now) if site.modbus else None
+        self.zenoh = (
+            ZenohServer(self.plant, site.zenoh, site.site.name, clock.now, clock.epoch_ns)
+            if site.zenoh
+            else None
+        )
+        self.mirror = MirrorPublisher(self.plant, Path(site.site.runtime_dir), clock.now, clock.epoch_ns)
+        self.fronts: list[Front] = []
+        if fronts and site.opcua:
+            self.fronts.append(Front("opcua", ["run", str(project.path), "--role", "opcua"]))
+
+    async def run(self, ready: Callable[[], None] = lambda: None) -> None:
+        """Serve until cancelled. Raises ``Unavailable`` where a bus or a port cannot be opened."""
+        for warning in warnings(self.project.site):
+            _log.warning("%s", warning)
+        async with AsyncExitStack() as stack:
+            # Ports first: a service that cannot be reached has no business on the bus.
+            if self.modbus:
+                await self.modbus.start()
+                stack.push_async_callback(self.modbus.close)
+            if self.zenoh:
+                await self.zenoh.start()
+                stack.push_async_callback(self.zenoh.close)
+            if self.fronts:
+                await self.mirror.start()
+                stack.push_async_callback(self.mirror.close)
+            await self.master.start()
+            stack.push_async_callback(self._stop_drives)
+            # What is there now stays: the collector need not look at it again and again.
+            gc.collect()
+            gc.freeze()
+            self.notifier.ready(f"{len(self.plant.drives)} drives on {len(self.project.site.bus)} buses")
+            ready()
+            async with asyncio.TaskGroup() as tasks:
+                for front in self.fronts:
+                    tasks.create_task(front.run(), name=f"front-{front.role}")
+                tasks.create_task(asyncio.Event().wait(), name="until cancelled")
+
+    async def _stop_drives(self) -> None:
+        self.notifier.stopping()
+        now = clock.now()
+        for drive in self.plant.drives.values():
+            drive.channel.on_bridge_gap(now)
+        self.master.pump()
+        await asyncio.sleep(_STOP_DRIVES_S)
+        await self.master.close()

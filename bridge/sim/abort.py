@@ -1,0 +1,34 @@
+"""Abort codes of an SDO transfer (BU 2500 §8.3.2, CiA 301 §7.2.4.3.17)."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class AbortCode(IntEnum):
+    """Why an SDO transfer ended, as the device says it in bytes 4…7."""
+
+    TOGGLE_BIT = 0x0503_0000
+    COMMAND_UNKNOWN = 0x0504_0001
+    UNSUPPORTED_ACCESS = 0x0601_0000
+    WRITE_ONLY = 0x0601_0001
+    READ_ONLY = 0x0601_0002
+    OBJECT_MISSING = 0x0602_0000
+    NOT_MAPPABLE = 0x0604_0041
+    PDO_TOO_LONG = 0x0604_0042
+    HARDWARE_FAULT = 0x0606_0000
+    LENGTH_MISMATCH = 0x0607_0010
+    LENGTH_TOO_HIGH = 0x0607_0012
+    LENGTH_TOO_LOW = 0x0607_0013
+    SUBINDEX_MISSING = 0x0609_0011
+    VALUE_RANGE = 0x0609_0030
+    CANNOT_STORE = 0x0800_0020
+    WRONG_STATE = 0x0800_0022
+
+
+class SdoAbort(Exception):
+    """A request for an object that the dictionary refuses."""
+
+    def __init__(self, code: AbortCode) -> None:
+        super().__init__(f"{code.name} {code:08X}h")
+        self.code = code

@@ -1,0 +1,247 @@
+"""A CANopen slave without its application: NMT, SDO, PDO, SYNC, EMCY and error control (CiA 301).
+
+A device is built from one of these, an object dictionary and an ``Application``.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Final, Protocol
+
+from bridge.sim.dictionary import Dictionary
+from bridge.sim.emcy_producer import EmcyProducer
+from bridge.sim.nmt_slave import COMMANDED_STATE, ErrorControl, NmtCommand, NmtState, nmt_command_for
+from bridge.sim.pdo import Rpdo, Tpdo, pack, unpack
+from bridge.sim.sdo_server import SdoServer
+from bridge.sim.settings import CommunicationSettings, PdoSettings
+from bridge.sim.store import Store
+from bridge.southbound.bus.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
+
+_ERROR_CONTROL: Final = 0x700
+_OUTBOX_MAX: Final = 256
+"""A real controller's queue is shorter; a shell that never fetches must not cost memory."""
+
+
+class Application(Protocol):
+    """What the device makes of its communication."""
+
+    def nmt_changed(self, state: NmtState) -> None:
+        """The NMT state is another one."""
+        ...
+
+    def restarted(self, command: NmtCommand) -> None:
+        """Reset node or reset communication, before the boot-up message; settings are those of power-on."""
+        ...
+
+    def accepts_rpdo(self, number: int, length: int) -> bool:
+        """Whether an RPDO (numbered from 0) of ``length`` bytes is evaluated at all."""
+        ...
+
+    def rpdo_applied(self, number: int) -> None:
+        """The objects mapped in this RPDO have their new values."""
+        ...
+
+    def master_lost(self) -> None:
+        """The life time of node guarding has run out."""
+        ...
+
+    def master_back(self) -> None:
+        """The first guard request after that."""
+        ...
+
+
+class CanopenSlave:
+    """Frames and time in, frames out. The owner calls ``poll`` after it has changed anything."""
+
+    def __init__(
+        self,
+        node_id: int,
+        store: Store[CommunicationSettings],
+        dictionary: Dictionary,
+        servers: Sequence[SdoServer],
+        emcy: EmcyProducer,
+        application: Application,
+    ) -> None:
+        self.node_id = node_id
+        self.emcy = emcy
+        self.state = NmtState.INITIALISING
+        self.silent = False
+        self.frames_dropped = 0
+        self.rpdos_ignored = 0
+        self._store = store
+        self._dictionary = dictionary
+        self._servers = tuple(servers)
+        self._application = application
+        self._error_control = ErrorControl(store)
+        self._tpdos = tuple(Tpdo() for _ in store.current.tpdo)
+        self._rpdos = tuple(Rpdo() for _ in store.current.rpdo)
+        self._outbox: deque[Frame] = deque()
+
+    @property
+    def master_is_lost(self) -> bool:
+        return self._error_control.master_lost
+
+    def boot(self) -> None:
+        """Initialisation done: boot-up message, then Pre-Operational."""
+        for server in self._servers:
+            server.reset()
+        for rpdo in self._rpdos:
+            rpdo.reset()
+        self.emcy.reset()
+        self._error_control.boot()
+        self.state = NmtState.INITIALISING
+        self._send(_ERROR_CONTROL + self.node_id, b"\0")
+        self._enter(NmtState.PRE_OPERATIONAL)
+
+    def power_off(self) -> None:
+        self.state = NmtState.INITIALISING
+        self._outbox.clear()
+
+    def on_frame(self, frame: Frame, now: float) -> None:
+        """Take one frame from the bus; a frame for somebody else is ignored."""
+        if self.state is NmtState.INITIALISING or frame.can_id & (EXTENDED | ERROR):
+            return
+        cob_id = frame.can_id & STANDARD_MASK
+        if frame.can_id & REMOTE:
+            # A PDO is not sent on request: bit 30 of its COB-ID reads 1 (BU 2500 §6.5.5).
+            if cob_id == _ERROR_CONTROL + self.node_id:
+                self._on_guard_request(now)
+        elif cob_id == 0:
+            self._on_nmt(frame.data)
+        elif self.state is not NmtState.STOPPED:
+            self._on_object(cob_id, frame.data, now)
+
+    def poll(self, now: float) -> None:
+        """Do what has become due: life guarding, heartbeat, EMCY, event-driven TPDOs."""
+        if self.state is NmtState.INITIALISING:
+            return
+        if self._error_control.life_time_expired(now):
+            self._application.master_lost()
+            # CiA 301 §7.5.2.32: a heartbeat or guarding event leads from Operational to Pre-Operational.
+            if self.state is NmtState.OPERATIONAL:
+                self._enter(NmtState.PRE_OPERATIONAL)
+        if self._error_control.heartbeat_due(now):
+            self._send(_ERROR_CONTROL + self.node_id, bytes([self.state]))
+        if self.state is not NmtState.STOPPED:
+            for data in self.emcy.due(now):
+                self._send(self._store.current.emcy_cob_id, data)
+        if self.state is NmtState.OPERATIONAL:
+            self._send_due_tpdos(now)
+
+    def next_deadline(self) -> float | None:
+        """When ``poll`` has to be called next if nothing else happens."""
+        if self.state is NmtState.INITIALISING:
+            return None
+        deadlines = [self._error_control.next_deadline()]
+        if self.state is not NmtState.STOPPED:
+            deadlines.append(self.emcy.next_deadline())
+        if self.state is NmtState.OPERATIONAL:
+            for tpdo, settings in self._active_tpdos():
+                deadlines.append(tpdo.next_deadline(settings))
+        return min((deadline for deadline in deadlines if deadline is not None), default=None)
+
+    def hears(self) -> frozenset[int]:
+        """The identifiers that can concern this node as it is set up now."""
+        settings = self._store.current
+        own = {0, _ERROR_CONTROL + self.node_id, settings.sync_cob_id}
+        own.update(channel.receive_cob_id for channel in settings.sdo)
+        own.update(pdo.cob_id for pdo in settings.rpdo)
+        return frozenset(own)
+
+    def take_frames(self) -> list[Frame]:
+        frames = list(self._outbox)
+        self._outbox.clear()
+        return frames
+
+    def _on_guard_request(self, now: float) -> None:
+        was_lost = self._error_control.master_lost
+        answer = self._error_control.on_guard_request(self.state, now)
+        if answer is None:
+            return
+        self._send(_ERROR_CONTROL + self.node_id, answer)
+        if was_lost:
+            self._application.master_back()
+
+    def _on_nmt(self, data: bytes) -> None:
+        command = nmt_command_for(self.node_id, data)
+        if command is None:
+            return
+        state = COMMANDED_STATE.get(command)
+        if state is not None:
+            self._enter(state)
+            return
+        self._store.power_on()
+        self._application.restarted(command)
+        self.boot()
+
+    def _on_object(self, cob_id: int, data: bytes, now: float) -> None:
+        settings = self._store.current
+        for server, channel in zip(self._servers, settings.sdo, strict=True):
+            if channel.enabled and cob_id == channel.receive_cob_id:
+                answer = server.on_request(data)
+                if answer is not None:
+                    self._send(channel.send_cob_id, answer)
+                return
+        if self.state is not NmtState.OPERATIONAL:
+            return
+        if settings.sync_on and cob_id == settings.sync_cob_id:
+            self._on_sync(now)
+            return
+        for number, pdo in enumerate(settings.rpdo):
+            if pdo.enabled and cob_id == pdo.cob_id:
+                self._on_rpdo(number, pdo, data)
+
+    def _on_rpdo(self, number: int, pdo: PdoSettings, data: bytes) -> None:
+        too_short = not pdo.count or len(data) * 8 < pdo.mapped_bits
+        if too_short or not self._application.accepts_rpdo(number, len(data)):
+            self.rpdos_ignored += 1
+            return
+        effective = self._rpdos[number].on_data(pdo, data)
+        if effective is not None:
+            self._apply(number, pdo, effective)
+
+    def _on_sync(self, now: float) -> None:
+        # TPDOs are sampled before RPDOs act: both mean the moment of the SYNC (CiA 301 §7.2.2.2).
+        for tpdo, settings in self._active_tpdos():
+            payload = pack(self._dictionary, settings)
+            if tpdo.on_sync(settings, payload):
+                self._send(settings.cob_id, payload)
+                tpdo.sent(payload, now)
+        for number, rpdo in enumerate(self._rpdos):
+            data = rpdo.on_sync()
+            if data is not None:
+                self._apply(number, self._store.current.rpdo[number], data)
+
+    def _apply(self, number: int, pdo: PdoSettings, data: bytes) -> None:
+        self.rpdos_ignored += unpack(self._dictionary, pdo, data)
+        self._application.rpdo_applied(number)
+
+    def _enter(self, state: NmtState) -> None:
+        if state is self.state:
+            return
+        self.state = state
+        for rpdo in self._rpdos:
+            rpdo.reset()
+        for tpdo in self._tpdos:
+            tpdo.start()
+        self._application.nmt_changed(state)
+
+    def _active_tpdos(self) -> list[tuple[Tpdo, PdoSettings]]:
+        pairs = zip(self._tpdos, self._store.current.tpdo, strict=True)
+        return [(tpdo, settings) for tpdo, settings in pairs if settings.enabled and settings.count]
+
+    def _send_due_tpdos(self, now: float) -> None:
+        for tpdo, settings in self._active_tpdos():
+            payload = pack(self._dictionary, settings)
+            if tpdo.is_due(settings, payload, now):
+                self._send(settings.cob_id, payload)
+                tpdo.sent(payload, now)
+
+    def _send(self, cob_id: int, data: bytes) -> None:
+        if self.silent:
+            return
+        if len(self._outbox) >= _OUTBOX_MAX:
+            self._outbox.popleft()
+            self.frames_dropped += 1
+        self._outbox.append(Frame(cob_id, data))

@@ -1,0 +1,167 @@
+"""The object dictionary of a simulated node.
+
+An entry owns no value: it reads and writes through functions, so that one value may appear under
+several indices (as NORD's P161 and 1400h:1 do) and cannot disagree with itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Final, Protocol
+
+from bridge.sim.abort import AbortCode, SdoAbort
+
+DUMMY_BITS: Final = {2: 8, 3: 16, 4: 32, 5: 8, 6: 16, 7: 32}
+"""Objects 0002h…0007h may fill a gap in an RPDO; value: their length in bits (CiA 301 §7.4.7)."""
+
+
+class DataType(Enum):
+    """Integer types with their length in bytes and sign."""
+
+    UNSIGNED8 = (1, False)
+    UNSIGNED16 = (2, False)
+    UNSIGNED32 = (4, False)
+    INTEGER8 = (1, True)
+    INTEGER16 = (2, True)
+    INTEGER32 = (4, True)
+
+    @property
+    def size(self) -> int:
+        return self.value[0]
+
+    @property
+    def signed(self) -> bool:
+        return self.value[1]
+
+    def encode(self, value: int) -> bytes:
+        """``value`` as little-endian bytes; a value beyond the type wraps as it would in a register."""
+        return (value & ((1 << 8 * self.size) - 1)).to_bytes(self.size, "little")
+
+    def decode(self, data: bytes) -> int:
+        return int.from_bytes(data, "little", signed=self.signed)
+
+
+@dataclass(slots=True)
+class Cell:
+    """A plain variable behind an entry."""
+
+    value: int = 0
+
+    def get(self) -> int:
+        return self.value
+
+    def set(self, value: int) -> None:
+        self.value = value
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """An integer object. No ``read`` makes it write-only, no ``write`` read-only.
+
+    ``write`` raises ``SdoAbort`` to refuse a value; nothing may have changed then.
+    """
+
+    data_type: DataType
+    read: Callable[[], int] | None
+    write: Callable[[int], None] | None = None
+    low: int | None = None
+    high: int | None = None
+    in_rpdo: bool = False
+    in_tpdo: bool = False
+
+    @property
+    def max_size(self) -> int:
+        return self.data_type.size
+
+    def upload(self) -> bytes:
+        if self.read is None:
+            raise SdoAbort(AbortCode.WRITE_ONLY)
+        return self.data_type.encode(self.read())
+
+    def check_writable(self) -> None:
+        if self.write is None:
+            raise SdoAbort(AbortCode.READ_ONLY)
+
+    def download(self, data: bytes) -> None:
+        if self.write is None:
+            raise SdoAbort(AbortCode.READ_ONLY)
+        if len(data) > self.data_type.size:
+            raise SdoAbort(AbortCode.LENGTH_TOO_HIGH)
+        if len(data) < self.data_type.size:
+            raise SdoAbort(AbortCode.LENGTH_TOO_LOW)
+        value = self.data_type.decode(data)
+        if (self.low is not None and value < self.low) or (self.high is not None and value > self.high):
+            raise SdoAbort(AbortCode.VALUE_RANGE)
+        self.write(value)
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A VISIBLE_STRING, read-only. It maps into no PDO."""
+
+    text: str
+    in_rpdo: bool = field(default=False, init=False)
+    in_tpdo: bool = field(default=False, init=False)
+
+    @property
+    def max_size(self) -> int:
+        return 0
+
+    def upload(self) -> bytes:
+        return self.text.encode("ascii")
+
+    def check_writable(self) -> None:
+        raise SdoAbort(AbortCode.READ_ONLY)
+
+    def download(self, data: bytes) -> None:
+        del data
+        self.check_writable()
+
+
+Entry = Number | Text
+
+
+class ObjectAccess(Protocol):
+    """What an SDO server asks for."""
+
+    def has_object(self, index: int) -> bool: ...
+
+    def find(self, index: int, sub: int) -> Entry: ...
+
+
+class Dictionary:
+    """Objects by index and sub-index."""
+
+    def __init__(self) -> None:
+        self._objects: dict[int, dict[int, Entry]] = {}
+
+    def add(self, index: int, sub: int, entry: Entry) -> None:
+        self._objects.setdefault(index, {})[sub] = entry
+
+    def add_array(self, index: int, entries: Iterable[Entry]) -> None:
+        """Sub 0 says how many; the entries follow from sub 1."""
+        count = 0
+        for sub, entry in enumerate(entries, start=1):
+            self.add(index, sub, entry)
+            count = sub
+        self.add(index, 0, constant(DataType.UNSIGNED8, count))
+
+    def has_object(self, index: int) -> bool:
+        return index in self._objects
+
+    def find(self, index: int, sub: int) -> Entry:
+        """The entry, or ``SdoAbort`` saying whether the object or only the sub-index is missing."""
+        subs = self._objects.get(index)
+        if subs is None:
+            raise SdoAbort(AbortCode.OBJECT_MISSING)
+        entry = subs.get(sub)
+        if entry is None:
+            raise SdoAbort(AbortCode.SUBINDEX_MISSING)
+        return entry
+
+
+def constant(data_type: DataType, value: int) -> Number:
+    """A read-only number that never changes."""
+    return Number(data_type, lambda: value)

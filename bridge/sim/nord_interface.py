@@ -1,0 +1,187 @@
+"""Object dictionary of a bus interface SK TU4-CAO, and what each SDO channel reaches (BU 2500 §6.7, §7.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+from bridge.sim.abort import AbortCode, SdoAbort
+from bridge.sim.communication_objects import (
+    Identity,
+    Memory,
+    add_errors,
+    add_identity,
+    add_memory,
+    add_protocols,
+    add_sdo_servers,
+)
+from bridge.sim.dictionary import DataType as Type
+from bridge.sim.dictionary import Dictionary, Entry, Number, ObjectAccess
+from bridge.sim.emcy_producer import EmcyProducer
+from bridge.sim.nord_can_parameters import CanParameters
+from bridge.sim.nord_drive import NordDrive
+from bridge.sim.nord_image import ProcessImage, add_parameter, display, fixed
+from bridge.sim.nord_settings import DRIVES, InterfaceSettings
+from bridge.sim.nord_supervision import FaultDisplay
+from bridge.sim.pdo_objects import PdoObjects
+from bridge.sim.sdo_server import SdoServer
+from bridge.sim.settings import CommunicationSettings
+from bridge.sim.store import Store
+
+IDENTITY: Final = Identity(
+    device_type=0x0001_0192,  # DS-402, frequency converter
+    vendor_id=0,  # the manual prints none of the numbers of 1018h, and an invented one would be believed
+    product_code=0,
+    revision=0,
+    serial=0,
+    device_name="SK TU4-CAO",
+    hardware_version="SIM",
+    software_version="1.2 R0",
+)
+_SOFTWARE: Final = (12, 0, 0)
+"""P171: version 1.2, revision 0, no special version."""
+_TU4: Final = 1
+_BAUD_250: Final = 1
+
+
+@dataclass(frozen=True, slots=True)
+class InterfaceParts:
+    """What the dictionary shows and changes."""
+
+    node_id: int
+    communication: Store[CommunicationSettings]
+    interface: Store[InterfaceSettings]
+    image: ProcessImage
+    faults: FaultDisplay
+    emcy: EmcyProducer
+    module_state: Callable[[], int]
+    to_factory: Callable[[], None]
+
+
+def build_dictionary(dictionary: Dictionary, parts: InterfaceParts, pdos: PdoObjects) -> None:
+    """Fill ``dictionary``, which ``pdos`` already uses to check mappings."""
+
+    def save() -> None:
+        parts.communication.save()
+        parts.interface.save()
+
+    def load() -> None:
+        parts.communication.forget()
+        parts.interface.forget()
+
+    add_identity(dictionary, IDENTITY, parts.module_state)
+    add_errors(dictionary, parts.emcy)
+    add_memory(dictionary, Memory(save, load))
+    add_protocols(dictionary, parts.communication)
+    add_sdo_servers(dictionary, parts.communication)
+    parts.image.add_to(dictionary)
+    pdos.add()
+    _add_standard_parameters(dictionary, parts)
+    CanParameters(parts.communication, pdos).add_to(dictionary)
+    _add_displays(dictionary, parts)
+
+
+def _add_standard_parameters(dictionary: Dictionary, parts: InterfaceParts) -> None:
+    """P150…P154 and P168 (§7.1.1, §7.1.2)."""
+    store = parts.interface
+
+    def set_relays(value: int) -> None:
+        store.current.relays = value
+
+    def set_p151(value: int) -> None:
+        store.current.p151_ms = value
+
+    def set_p152(value: int) -> None:
+        if value:
+            parts.to_factory()  # and P152 reads 0 again
+
+    def element(values: Callable[[], list[int]], place: int, high: int) -> Number:
+        def write(value: int) -> None:
+            values()[place] = value
+
+        return Number(Type.UNSIGNED16, lambda: values()[place], write, low=0, high=high)
+
+    u16 = Type.UNSIGNED16
+    add_parameter(dictionary, 150, [Number(u16, lambda: store.current.relays, set_relays, 0, 4)])
+    add_parameter(dictionary, 151, [Number(u16, lambda: store.current.p151_ms, set_p151, 0, 32767)])
+    add_parameter(dictionary, 152, [Number(u16, lambda: 0, set_p152, 0, 1)])
+    cycles = [element(lambda: store.current.system_bus_cycle_ms, place, 250) for place in range(2)]
+    add_parameter(dictionary, 153, cycles)
+    add_parameter(dictionary, 154, [element(lambda: store.current.io_access, place, 5) for place in range(2)])
+    profile = [element(lambda: store.current.profile, place, 16383) for place in range(17)]
+    add_parameter(dictionary, 168, profile)
+
+
+def _add_displays(dictionary: Dictionary, parts: InterfaceParts) -> None:
+    """P170…P181 (§7.1.3, §7.1.4)."""
+    image, faults = parts.image, parts.faults
+
+    def bus_in(element: int) -> Number:
+        return Number(Type.INTEGER16, lambda: image.bus_in(element))
+
+    def bus_out(element: int) -> Number:
+        return Number(Type.INTEGER16, lambda: image.bus_out(element))
+
+    def relays() -> int:
+        setting = parts.interface.current.relays
+        return image.outputs & 3 if setting == 0 else setting - 1
+
+    elements = range(1, 2 + 4 * DRIVES)
+    add_parameter(dictionary, 170, [display(lambda: faults.present), display(lambda: faults.last)])
+    add_parameter(dictionary, 171, [fixed(number) for number in _SOFTWARE])
+    add_parameter(dictionary, 172, [fixed(_TU4)])
+    add_parameter(dictionary, 173, [display(parts.module_state)])
+    add_parameter(dictionary, 174, [display(lambda: image.inputs & 0x0F)])
+    add_parameter(dictionary, 175, [display(relays)])
+    add_parameter(dictionary, 176, [bus_in(element) for element in elements])
+    add_parameter(dictionary, 177, [bus_out(element) for element in elements])
+    add_parameter(dictionary, 180, [fixed(parts.node_id)])
+    add_parameter(dictionary, 181, [fixed(_BAUD_250)])
+
+
+def build_servers(
+    dictionary: Dictionary, drives: Sequence[NordDrive], online: Callable[[int], bool]
+) -> list[SdoServer]:
+    """SDO1 for the interface and FU1, SDO2…4 for FU2…4 (§6.4)."""
+    channels: list[DriveAccess] = []
+    for place, drive in enumerate(drives):
+        parameters = Dictionary()
+        drive.add_to(parameters)
+        channels.append(DriveAccess(parameters, partial(online, place)))
+    first = SdoServer(FirstChannel([dictionary, channels[0]]))
+    return [first, *(SdoServer(channel) for channel in channels[1:])]
+
+
+class DriveAccess:
+    """An SDO channel into a drive over the system bus: its parameters and nothing else."""
+
+    def __init__(self, parameters: Dictionary, online: Callable[[], bool]) -> None:
+        self._parameters = parameters
+        self._online = online
+
+    def has_object(self, index: int) -> bool:
+        return self._parameters.has_object(index)
+
+    def find(self, index: int, sub: int) -> Entry:
+        entry = self._parameters.find(index, sub)
+        if not self._online():
+            raise SdoAbort(AbortCode.HARDWARE_FAULT)
+        return entry
+
+
+class FirstChannel:
+    """SDO1: the interface's own objects and FU1 (§6.4)."""
+
+    def __init__(self, members: Sequence[ObjectAccess]) -> None:
+        self._members = tuple(members)
+
+    def has_object(self, index: int) -> bool:
+        return any(member.has_object(index) for member in self._members)
+
+    def find(self, index: int, sub: int) -> Entry:
+        for member in self._members:
+            if member.has_object(index):
+                return member.find(index, sub)
+        raise SdoAbort(AbortCode.OBJECT_MISSING)

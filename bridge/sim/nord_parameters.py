@@ -1,0 +1,140 @@
+"""Parameters of one NORD inverter and their sub-indices (BU 2500 §6.6)."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.sim.dictionary import DataType, Dictionary, Number
+
+PARAMETER_BASE: Final = 0x2000
+SETS: Final = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A settable parameter. ``defaults`` has one raw value per array element; ``unit`` is one raw step.
+
+    ``per_set``: the parameter has a value for each of the four parameter sets.
+    """
+
+    number: int
+    defaults: tuple[int, ...]
+    low: int
+    high: int
+    unit: float = 1.0
+    per_set: bool = False
+
+    @property
+    def is_plain(self) -> bool:
+        """Neither array nor set: its sub-index is 0."""
+        return len(self.defaults) == 1 and not self.per_set
+
+
+PARAMETERS: Final = (
+    Parameter(102, (200,), 0, 32000, unit=0.01, per_set=True),  # acceleration time, s
+    Parameter(103, (200,), 0, 32000, unit=0.01, per_set=True),  # deceleration time, s
+    Parameter(105, (500,), 1, 4000, unit=0.1, per_set=True),  # maximum frequency, Hz
+    Parameter(112, (100,), 1, 32767, unit=0.1, per_set=True),  # torque current limit, A (see NordDrive)
+    Parameter(120, (1, 1, 1, 1), 0, 2),  # option supervision
+    Parameter(426, (10,), 0, 32000, unit=0.01, per_set=True),  # quick stop time, s
+    Parameter(509, (3,), 0, 10),  # source of the control word; 3 = system bus (§7.2)
+    Parameter(510, (0, 0), 0, 10),  # source of the setpoints; 0 = as P509
+    Parameter(513, (10,), -1, 1000, unit=0.1),  # telegram downtime, s; -0.1 = ignore
+    Parameter(543, (1, 4, 5, 0, 0), 0, 57, per_set=True),  # meaning of the actual values
+    Parameter(546, (1, 0, 0, 0, 0), 0, 57, per_set=True),  # meaning of the setpoints
+    Parameter(560, (1,), 0, 2),  # 0 = changes go to RAM only, 1 = to the EEPROM too
+)
+
+_BY_NUMBER: Final = {parameter.number: parameter for parameter in PARAMETERS}
+_SAVE_TO_EEPROM: Final = 560
+
+Values = dict[tuple[int, int, int], int]
+"""Raw values by number, element and set, the last two counted from 1."""
+
+
+def sub_index(element: int, parameter_set: int) -> int:
+    """Sub-index of an array element in a parameter set, both from 1 (BU 2500 §6.6.1)."""
+    return 4 * (element - 1) + parameter_set
+
+
+class DriveParameters:
+    """RAM and EEPROM of a drive's parameters."""
+
+    def __init__(self) -> None:
+        self._eeprom: Values = {}
+        for parameter in PARAMETERS:
+            for element, default in enumerate(parameter.defaults, start=1):
+                for parameter_set in range(1, SETS + 1):
+                    self._eeprom[parameter.number, element, parameter_set] = default
+        self._ram = copy.copy(self._eeprom)
+        self.eeprom_writes = 0
+
+    def power_on(self) -> None:
+        self._ram = copy.copy(self._eeprom)
+
+    def raw(self, number: int, element: int = 1, parameter_set: int = 1) -> int:
+        return self._ram[number, element, parameter_set]
+
+    def value(self, number: int, parameter_set: int = 1) -> float:
+        """Element 1 in engineering units."""
+        return self.raw(number, 1, parameter_set) * _BY_NUMBER[number].unit
+
+    def commission(self, number: int, value: float) -> None:
+        """Set all sets and elements, as a technician did before the drive came onto the bus.
+
+        Raises ``KeyError`` for a parameter the simulation does not have and ``ValueError`` out of range.
+        """
+        parameter = _BY_NUMBER[number]
+        raw = round(value / parameter.unit)
+        if not parameter.low <= raw <= parameter.high:
+            low, high = parameter.low * parameter.unit, parameter.high * parameter.unit
+            raise ValueError(f"P{number} = {value:g} is outside {low:g} … {high:g}")
+        for element in range(1, len(parameter.defaults) + 1):
+            for parameter_set in range(1, SETS + 1):
+                self._eeprom[number, element, parameter_set] = raw
+                self._ram[number, element, parameter_set] = raw
+
+    def write(self, parameter: Parameter, element: int, parameter_set: int, raw: int) -> None:
+        """A write over the bus: to the EEPROM too, unless P560 says RAM only (§6.6: 100 000 cycles)."""
+        sets = (parameter_set,) if parameter.per_set else range(1, SETS + 1)
+        to_eeprom = self.raw(_SAVE_TO_EEPROM) == 1 or parameter.number == _SAVE_TO_EEPROM
+        for one in sets:
+            self._ram[parameter.number, element, one] = raw
+            if to_eeprom:
+                self._eeprom[parameter.number, element, one] = raw
+        self.eeprom_writes += to_eeprom
+
+    def add_to(self, dictionary: Dictionary) -> None:
+        """Put every parameter into ``dictionary`` at 2000h + number."""
+        for parameter in PARAMETERS:
+            index = PARAMETER_BASE + parameter.number
+            if parameter.is_plain:
+                dictionary.add(index, 0, self._entry(parameter, 1, 1))
+                continue
+            for element in range(1, len(parameter.defaults) + 1):
+                for parameter_set in range(1, SETS + 1):
+                    entry = self._entry(parameter, element, parameter_set)
+                    dictionary.add(index, sub_index(element, parameter_set), entry)
+
+    def _entry(self, parameter: Parameter, element: int, parameter_set: int) -> Number:
+        return Number(
+            DataType.INTEGER16,
+            lambda: self.raw(parameter.number, element, parameter_set),
+            lambda raw: self.write(parameter, element, parameter_set, raw),
+            low=parameter.low,
+            high=parameter.high,
+        )
+
+
+def add_display(dictionary: Dictionary, number: int, elements: int, read: Callable[[int], int]) -> None:
+    """A display parameter: ``read`` gets the element from 1. It is the same in every parameter set."""
+
+    def entry(element: int) -> Number:
+        return Number(DataType.INTEGER16, lambda: read(element))
+
+    for element in range(1, elements + 1):
+        for parameter_set in range(1, SETS + 1):
+            dictionary.add(PARAMETER_BASE + number, sub_index(element, parameter_set), entry(element))

@@ -1,0 +1,121 @@
+"""What the bus interface watches and reports: P151, P170, P173 (BU 2500 §7.1.1, §7.1.3, §8.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from enum import IntEnum
+
+from bridge.sim.emcy_producer import EmcyProducer
+from bridge.sim.nmt_slave import NmtState
+from bridge.sim.nord_faults import emcy_code, register_bits
+
+
+class Presence(IntEnum):
+    """A drive on the system bus: its two bits in P173."""
+
+    OFFLINE = 0
+    UNKNOWN = 1
+    ONLINE = 2
+    LOST = 3
+
+
+def module_state(nmt: NmtState, master_lost: bool, p151_tripped: bool, drives: Sequence[Presence]) -> int:
+    """P173: NMT state, time-outs, two bits per drive. The bus bits 4…7 stay 0: a simulated bus is well."""
+    state = 1 if nmt is NmtState.PRE_OPERATIONAL else 0
+    state |= 2 if nmt is NmtState.OPERATIONAL else 0
+    state |= 4 if master_lost else 0
+    state |= 8 if p151_tripped else 0
+    for place, presence in enumerate(drives):
+        state |= presence << (8 + 2 * place)
+    return state
+
+
+class ExternalBusTimeout:
+    """P151: from the first valid telegram on, the next must come within this time."""
+
+    def __init__(self, time_ms: Callable[[], int]) -> None:
+        self._time_ms = time_ms
+        self._telegram_at: float | None = None
+        self.tripped = False
+
+    def disarm(self) -> None:
+        self._telegram_at, self.tripped = None, False
+
+    def on_telegram(self, now: float) -> None:
+        """A valid telegram for any drive; it also ends a trip. With P151 = 0 nothing is watched."""
+        self._telegram_at = now if self._time_ms() else None
+        self.tripped = False
+
+    def expired(self, now: float) -> bool:
+        """True once when the time has run out."""
+        deadline = self.next_deadline()
+        if deadline is None or now < deadline:
+            return False
+        self._telegram_at, self.tripped = None, True
+        return True
+
+    def next_deadline(self) -> float | None:
+        time_ms = self._time_ms()
+        if self._telegram_at is None or not time_ms:
+            return None
+        return self._telegram_at + time_ms / 1000
+
+
+class FaultDisplay:
+    """P170: the present fault of the interface, and the last one that has gone (§8.2)."""
+
+    def __init__(self) -> None:
+        self._present: list[int] = []
+        self.last = 0
+
+    @property
+    def present(self) -> int:
+        return self._present[-1] if self._present else 0
+
+    def report(self, fault_tenths: int) -> None:
+        if fault_tenths not in self._present:
+            self._present.append(fault_tenths)
+
+    def clear(self, fault_tenths: int) -> None:
+        """The cause has gone: the fault clears by itself and is kept as the last one."""
+        if fault_tenths in self._present:
+            self._present.remove(fault_tenths)
+            self.last = fault_tenths
+
+    def power_off(self) -> None:
+        """A fault that is still present is lost, not archived (§8.2)."""
+        self._present.clear()
+        self.last = 0
+
+
+class DriveFaultReporter:
+    """EMCY for every drive fault that has come or gone, with the drive's id 0…3 in byte 3 (§8.3)."""
+
+    def __init__(self, emcy: EmcyProducer, drives: int) -> None:
+        self._emcy = emcy
+        self._reported = [0] * drives
+
+    def reset(self) -> None:
+        self._reported = [0] * len(self._reported)
+        self._emcy.error_register = 0
+
+    def report(self, faults_tenths: Sequence[int | None]) -> bool:
+        """Compare with the present fault of each drive; 0 is none, None is a drive off the system bus.
+
+        Returns whether there is anything new.
+        """
+        changed = False
+        for place, fault in enumerate(faults_tenths):
+            if fault is None or fault == self._reported[place]:
+                continue
+            self._reported[place] = fault
+            code = emcy_code(fault) if fault else 0
+            self._emcy.report(code, self._error_register(), bytes([place]))
+            changed = True
+        return changed
+
+    def _error_register(self) -> int:
+        register = 0
+        for fault in self._reported:
+            register |= register_bits(emcy_code(fault)) if fault else 0
+        return register

@@ -1,0 +1,81 @@
+"""Everything of a node that the communication objects set: what ``save`` keeps and ``load`` restores."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridge.sim.abort import AbortCode
+
+DISABLED: Final = 0x8000_0000
+"""Bit 31 of a COB-ID object: this PDO or SDO does not exist."""
+COB_ID_MASK: Final = 0x7FF
+
+
+@dataclass(frozen=True, slots=True)
+class SlaveRules:
+    """Where devices differ in what CiA 301 leaves open or they do their own way."""
+
+    wrong_state: AbortCode = AbortCode.WRONG_STATE
+    """Answer to a write that is allowed in Pre-Operational only."""
+    remap_needs_disabled: bool = True
+    """A mapping may be changed only while the PDO's bit 31 is set (CiA 301 §7.5.2.36)."""
+    cob_id_change_needs_disabled: bool = True
+    """An enabled PDO must be disabled before it gets another COB-ID (CiA 301 §7.5.2.35)."""
+    cob_id_fixed_bits: int = 0
+    """Bits of a PDO's COB-ID object that always read 1."""
+    emcy_inhibit_unit_s: float = 1e-4
+    """Unit of 1015h; CiA 301 has 100 µs."""
+    map_entries: int = 8
+
+
+@dataclass(slots=True)
+class PdoSettings:
+    """One PDO, either direction. ``entries`` are mapping words ``IIIISSLLh``."""
+
+    cob_id: int
+    enabled: bool = True
+    transmission_type: int = 255
+    inhibit_100us: int = 0
+    event_timer_ms: int = 0
+    entries: list[int] = field(default_factory=list[int])
+    count: int = 0
+
+    @property
+    def mapping(self) -> list[int]:
+        return self.entries[: self.count]
+
+    @property
+    def mapped_bits(self) -> int:
+        return sum(entry & 0xFF for entry in self.mapping)
+
+
+@dataclass(slots=True)
+class SdoSettings:
+    """One SDO server channel, named as the device sees it: it receives requests and sends answers."""
+
+    receive_cob_id: int
+    send_cob_id: int
+    receive_on: bool = True
+    send_on: bool = True
+
+    @property
+    def enabled(self) -> bool:
+        return self.receive_on and self.send_on
+
+
+@dataclass(slots=True)
+class CommunicationSettings:
+    """Objects 1005h…1A1Fh of one node."""
+
+    emcy_cob_id: int
+    sdo: list[SdoSettings]
+    rpdo: list[PdoSettings] = field(default_factory=list[PdoSettings])
+    tpdo: list[PdoSettings] = field(default_factory=list[PdoSettings])
+    sync_cob_id: int = 0x80
+    sync_on: bool = True
+    emcy_on: bool = True
+    emcy_inhibit: int = 0
+    guard_time_ms: int = 0
+    life_time_factor: int = 0
+    heartbeat_ms: int = 0

@@ -1,0 +1,124 @@
+"""Runs a node's boot-up generator: carries its questions to the SDO channel, brings the answers back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from bridge.command.plant import Node
+from bridge.southbound import boot
+from bridge.southbound.canopen.nmt import NmtState
+from bridge.southbound.canopen.sdo import Result, SdoChannel, SdoError
+
+
+class Host(Protocol):
+    """The node that is booted."""
+
+    def carry_out(self, action: boot.Action, now: float) -> None:
+        """A step that needs no answer."""
+        ...
+
+    def begin_await(self, state: NmtState) -> bool:
+        """Whether there is anything to wait for: a node without supervision never says its state."""
+        ...
+
+    def boot_ended(self, result: boot.BootResult | Exception, now: float) -> None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class _Awaited:
+    state: NmtState
+    deadline: float
+
+
+class Booting:
+    """One boot-up at a time. Answers are kept until ``pump``: the generator never runs inside the
+    channel's own bookkeeping."""
+
+    def __init__(self, host: Host, node: Node, sdo: SdoChannel) -> None:
+        self._host = host
+        self._node = node
+        self._sdo = sdo
+        self._boot: boot.Boot | None = None
+        self._awaited: _Awaited | None = None
+        self._answers: list[Result] = []
+
+    @property
+    def is_running(self) -> bool:
+        return self._boot is not None
+
+    def begin(self, now: float) -> None:
+        self.cancel(now)
+        self._boot = boot.boot(self._node)
+        self._go_on(None, now)
+
+    def cancel(self, now: float) -> None:
+        """End the boot-up, if there is one, and everything that waits on the SDO channel."""
+        if self._boot:
+            self._boot.close()
+            self._boot = None
+        self._awaited = None
+        self._sdo.flush(now)
+        self._answers.clear()
+
+    def pump(self, now: float) -> None:
+        """Give the boot-up the answers that have come since the last call."""
+        while self._answers:
+            self._go_on(self._answers.pop(0), now)
+
+    def on_nmt_state(self, state: NmtState, now: float) -> None:
+        """The node has reported its state."""
+        if self._awaited and state is self._awaited.state:
+            self._awaited = None
+            self._go_on(None, now)
+
+    def on_time(self, now: float, state: NmtState) -> None:
+        if self._awaited and now >= self._awaited.deadline:
+            self._awaited = None
+            self._end(boot.BootError(f"the node stays {state.label.replace('_', ' ')}"), now)
+
+    def next_deadline(self) -> float | None:
+        return self._awaited.deadline if self._awaited else None
+
+    def _go_on(self, answer: Result | None, now: float) -> None:
+        """Run until the boot-up waits for something."""
+        while self._boot is not None:
+            try:
+                action = _resume(self._boot, answer)
+            except StopIteration as end:
+                self._end(end.value, now)
+                return
+            except (SdoError, boot.BootError) as error:
+                self._end(error, now)
+                return
+            answer = None
+            if self._waits(action, now):
+                return
+
+    def _waits(self, action: boot.Action, now: float) -> bool:
+        """Do one step; True where its answer comes later."""
+        match action:
+            case boot.Read(index, sub):
+                self._sdo.read(index, sub, now, self._answers.append)
+                return True
+            case boot.Write(index, sub, data):
+                self._sdo.write(index, sub, data, now, self._answers.append)
+                return True
+            case boot.Await(state, timeout_s):
+                if not self._host.begin_await(state):
+                    return False
+                self._awaited = _Awaited(state, now + timeout_s)
+                return True
+            case _:
+                self._host.carry_out(action, now)
+                return False
+
+    def _end(self, result: boot.BootResult | Exception, now: float) -> None:
+        self._boot = None
+        self._host.boot_ended(result, now)
+
+
+def _resume(generator: boot.Boot, answer: Result | None) -> boot.Action:
+    if isinstance(answer, SdoError):
+        return generator.throw(answer)
+    return generator.send(answer)

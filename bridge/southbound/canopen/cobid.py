@@ -1,0 +1,16 @@
+"""COB-IDs of the pre-defined connection set (CiA 301 §7.3.3)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+NMT: Final = 0x000
+SYNC: Final = 0x080
+EMCY: Final = 0x080  # + node id
+SDO_REPLY: Final = 0x580  # server to client, + node id
+SDO_REQUEST: Final = 0x600  # client to server, + node id
+ERROR_CONTROL: Final = 0x700  # boot-up, heartbeat, node guarding, + node id
+
+PDO_DISABLED: Final = 0x8000_0000
+"""Bit 31 of a PDO's COB-ID entry: the PDO does not exist (CiA 301 §7.5.2.35)."""
+COB_ID_MASK: Final = 0x7FF

@@ -1,0 +1,43 @@
+"""Network management (CiA 301 §7.2.8): commands of the master, states of the nodes."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from bridge.southbound.bus.frame import Frame
+from bridge.southbound.canopen import cobid
+
+
+class NmtCommand(IntEnum):
+    START = 0x01
+    STOP = 0x02
+    ENTER_PRE_OPERATIONAL = 0x80
+    RESET_NODE = 0x81
+    RESET_COMMUNICATION = 0x82
+
+
+class NmtState(IntEnum):
+    """As heartbeats and guarding answers report it."""
+
+    INITIALISING = 0x00
+    STOPPED = 0x04
+    OPERATIONAL = 0x05
+    PRE_OPERATIONAL = 0x7F
+    UNKNOWN = 0xFF
+
+    @property
+    def label(self) -> str:
+        return self.name.lower()
+
+
+def command(what: NmtCommand, node_id: int) -> Frame:
+    """The NMT frame for one node, or for all with ``node_id`` 0."""
+    return Frame(cobid.NMT, bytes((what, node_id)))
+
+
+def state_of(octet: int) -> NmtState:
+    """The NMT state in an error control message; bit 7 is the toggle bit of guarding."""
+    try:
+        return NmtState(octet & 0x7F)
+    except ValueError:
+        return NmtState.UNKNOWN

@@ -1,0 +1,197 @@
+"""The shell of the southbound side: drains the buses, runs every timer, keeps the bursts alive.
+
+All of that happens in ``pump`` and nowhere else, and only ``pump`` says that the service is alive:
+"process alive" and "drives supervised" cannot come apart (``docs/explanation/dead-man-chain.md``).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from bridge.command import Event, Kind, Plant
+from bridge.southbound.bus.frame import Frame
+from bridge.southbound.bus.interface import Bus, ControllerState
+from bridge.southbound.canopen.sync import burst_length
+from bridge.southbound.network import Network
+from bridge.southbound.timer import LoopTimer
+
+_log = logging.getLogger(__name__)
+
+_REFRESH_S = 0.1
+_SEND_LIMIT_S = 0.1
+"""A frame that could not be sent for this long is stale and is dropped."""
+_RENEWALS = 3
+"""How often a burst is renewed within its dead-man time."""
+
+
+@dataclass(slots=True)
+class _Line:
+    """One bus with its network, and what the bus has been told to repeat."""
+
+    bus: Bus
+    network: Network
+    beating: dict[int, Frame] = field(default_factory=dict[int, Frame])
+    renew_at: float = 0.0
+    was_up: bool = True
+
+
+class Master:
+    """Runs any number of networks on their buses in one event loop.
+
+    ``clock`` gives monotonic seconds; ``alive`` is called at the end of every complete round.
+    """
+
+    def __init__(
+        self,
+        lines: list[tuple[Bus, Network]],
+        plant: Plant,
+        clock: Callable[[], float],
+        alive: Callable[[float], None] = lambda now: None,
+    ) -> None:
+        self._lines = [_Line(bus, network) for bus, network in lines]
+        self._plant = plant
+        self._clock = clock
+        self._alive = alive
+        self._timer: LoopTimer | None = None
+        self._set_timer: Callable[[float], None] = lambda at: None
+        self._refresh_at = 0.0
+        self._last_round: float | None = None
+        self._running = False
+        self.gaps = 0
+
+    async def start(self) -> None:
+        """Open the buses. Raises ``Unavailable`` where one cannot be opened; none stays open then."""
+        try:
+            for line in self._lines:
+                line.bus.open(self._wake)
+        except BaseException:
+            self._close_buses()
+            raise
+        self._timer = LoopTimer(asyncio.get_running_loop(), self._clock, self._wake)
+        self.attach(self._timer.arm)
+        self._wake()
+
+    def attach(self, set_timer: Callable[[float], None]) -> None:
+        """Run by whoever calls ``pump`` at the times given to ``set_timer``."""
+        self._set_timer = set_timer
+        self._plant.outputs_changed = self._flush_now
+        self._running = True
+
+    async def close(self) -> None:
+        """Stop every drive's process data and close the buses."""
+        self._running = False
+        self._plant.outputs_changed = lambda: None
+        if self._timer:
+            self._timer.close()
+        for line in self._lines:
+            for can_id in line.beating:
+                line.bus.silence(can_id)
+        self._close_buses()
+
+    def _close_buses(self) -> None:
+        for line in self._lines:
+            line.bus.close()
+
+    def _wake(self) -> None:
+        if self._running:
+            self.pump()
+
+    def pump(self) -> None:
+        """One round: drain, judge, send, renew."""
+        now = self._clock()
+        self._check_gap(now)
+        for line in self._lines:
+            frames = line.bus.drain(now)
+            if frames:
+                line.network.on_frames(frames, now)
+        self._plant.on_time(now)
+        for line in self._lines:
+            line.network.on_time(now)
+            self._watch_bus(line, now)
+        if now >= self._refresh_at:
+            self._refresh_at = now + _REFRESH_S
+            self._plant.refresh(now)
+            for line in self._lines:
+                line.network.refresh(line.bus.status, now)
+        for line in self._lines:
+            self._flush(line, now)
+            line.bus.on_time(now)
+        self._last_round = now
+        self._alive(now)
+        self._arm(now)
+
+    def _check_gap(self, now: float) -> None:
+        """The process was not there for longer than the dead-man time: its bursts have ended meanwhile,
+        and nothing that was moving goes on by itself."""
+        if self._last_round is None:
+            return
+        pause_s = now - self._last_round
+        hung = [line for line in self._lines if pause_s * 1000 > line.network.bus.deadman_ms]
+        if not hung:
+            return
+        self.gaps += 1
+        message = f"the bridge hung for {pause_s * 1000:.0f} ms; all drives were left without commands"
+        _log.error(message)
+        for line in hung:
+            self._plant.report(Event(now, Kind.BUS, line.bus.name, 900, message))
+            for node in line.network.nodes:
+                for drive in node.node.drives:
+                    drive.channel.on_bridge_gap(now)
+                    drive.refresh(now)
+
+    def _watch_bus(self, line: _Line, now: float) -> None:
+        is_up = line.bus.status.state not in (ControllerState.DOWN, ControllerState.BUS_OFF)
+        if is_up == line.was_up:
+            return
+        line.was_up = is_up
+        line.beating.clear()
+        line.renew_at = now
+        state = line.bus.status.state.name.lower().replace("_", "-")
+        severity = 300 if is_up else 900
+        self._plant.report(Event(now, Kind.BUS, line.bus.name, severity, f"bus {line.bus.name} is {state}"))
+        if not is_up:
+            line.network.bus_is_gone(now)
+
+    def _flush_now(self) -> None:
+        """Something about an output changed: it goes out at once, not with the next round."""
+        now = self._clock()
+        for line in self._lines:
+            self._flush(line, now)
+        self._arm(now)
+
+    def _flush(self, line: _Line, now: float) -> None:
+        bus, network = line.bus, line.network
+        routes = network.take_routes()
+        if routes is not None:
+            bus.accept(routes)
+        for frame in network.take_frames():
+            bus.send(frame, now, now + _SEND_LIMIT_S)
+        if not line.was_up:
+            return
+        renew = now >= line.renew_at
+        if renew:
+            line.renew_at = now + network.bus.deadman_ms / 1000 / _RENEWALS
+        beats = network.beats()
+        for can_id in [can_id for can_id in line.beating if can_id not in beats]:
+            bus.silence(can_id)
+            del line.beating[can_id]
+        for can_id, (frame, period_s) in beats.items():
+            changed = line.beating.get(can_id) != frame
+            if changed or renew:
+                count = burst_length(period_s, network.bus.deadman_ms)
+                bus.beat(frame, now, period_s, count, at_once=changed)
+                line.beating[can_id] = frame
+
+    def _arm(self, now: float) -> None:
+        times = [self._refresh_at]
+        plant = self._plant.next_deadline(now)
+        if plant is not None:
+            times.append(plant)
+        for line in self._lines:
+            # Also with the bus down: a round that comes too late means that the process hung.
+            times.append(max(line.renew_at, now) if line.was_up else now + _REFRESH_S / _RENEWALS)
+            times += [t for t in (line.network.next_deadline(), line.bus.next_deadline()) if t is not None]
+        self._set_timer(min(times))

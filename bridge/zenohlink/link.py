@@ -1,0 +1,283 @@
+"""The event loop's side of a zenoh session."""
+
+# pyright: reportUnknownMemberType=false, reportUnknownLambdaType=false
+# zenoh's stubs leave out the return types of what returns nothing.
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+from typing import Final, TypeVar
+
+import zenoh
+
+from bridge.errors import Unavailable
+from bridge.zenohlink.inbox import Inbox
+from bridge.zenohlink.message import (
+    Answer,
+    Message,
+    publish,
+    reply,
+    reply_error,
+    sentence,
+    to_answer,
+    to_bytes,
+    to_message,
+)
+from bridge.zenohlink.worker import ZENOH_ERRORS, Worker
+
+Result = TypeVar("Result")
+
+_log = logging.getLogger(__name__)
+
+_QUEUE_LIMIT: Final = 10_000
+"""Most messages that wait for the worker; what comes on top is dropped and counted."""
+_PUTS_AT_ONCE: Final = 100
+"""Puts between two other jobs of the worker: with a stalled subscriber each takes up to 1 ms."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A query, to be answered from the loop: any number of ``send``, then ``finish`` or ``fail``.
+
+    One that is not finished keeps its asker waiting until the asker's time is up.
+    """
+
+    key: str
+    payload: bytes | None
+    attachment: bytes | None
+    _query: zenoh.Query
+    _submit: Callable[[Callable[[zenoh.Session], None]], bool]
+
+    def send(self, messages: Sequence[Message]) -> None:
+        self._submit(lambda _: reply(self._query, messages))
+
+    def finish(self) -> None:
+        """There are no more replies."""
+        self._submit(lambda _: self._query.drop())
+
+    def fail(self, payload: bytes, encoding: str) -> None:
+        """Answer with an error, and finish."""
+        self._submit(lambda _: reply_error(self._query, payload, encoding))
+
+
+class ZenohLink:
+    """A zenoh session on a worker thread. All methods are called from the event loop.
+
+    ``name`` stands in messages to the user. Handlers are called in the loop. Declarations and messages
+    keep their order, except that of several ``put`` on one key only the newest may be sent.
+    """
+
+    def __init__(self, config: zenoh.Config, name: str) -> None:
+        self.name = name
+        self._dropped = 0
+        self._worker = Worker(config, name, self._on_opened, self._on_closed)
+        self._latest: dict[str, Message] = {}
+        self._batch_is_out = False
+
+    @property
+    def errors(self) -> int:
+        """Calls that zenoh refused."""
+        return self._worker.errors
+
+    @property
+    def dropped(self) -> int:
+        """Messages, queries and samples that found no room."""
+        return self._dropped + self._inbox.refused
+
+    # life
+
+    async def open(self, patience_s: float = 2.0) -> bool:
+        """Open the session. False: nobody has answered yet (client mode); it goes on trying, and what
+        is declared and sent meanwhile waits.
+
+        Raises Unavailable where zenoh refuses, with the reason.
+        """
+        self._loop = asyncio.get_running_loop()
+        self._inbox = Inbox()
+        self._opened: asyncio.Future[Exception | None] = self._loop.create_future()
+        self._closed: asyncio.Future[None] = self._loop.create_future()
+        self._worker.start()
+        try:
+            error = await asyncio.wait_for(asyncio.shield(self._opened), patience_s)
+        except TimeoutError:
+            return False
+        if error is not None:
+            raise Unavailable(f"{self.name}: {sentence(error)}")
+        return True
+
+    async def close(self, timeout_s: float = 2.0) -> bool:
+        """Close the session. False: zenoh did not come to an end in time and was left behind."""
+        if self._worker.is_stopping or not self._worker.is_alive:
+            return True
+        self._latest.clear()
+        self._inbox.is_closed = True
+        self._worker.stop()
+        await asyncio.wait((self._closed,), timeout=timeout_s)
+        if not self._closed.done():
+            _log.warning("%s: the zenoh session did not close within %g s", self.name, timeout_s)
+        return self._closed.done()
+
+    def _on_opened(self, error: Exception | None) -> None:
+        self._inbox.tell(_resolve, self._opened, error)
+
+    def _on_closed(self) -> None:
+        self._inbox.tell(_resolve, self._closed, None)
+
+    # sending
+
+    def put(self, message: Message) -> None:
+        """Publish; where the worker is behind, a newer value takes the place of an older one."""
+        if self._worker.is_stopping:
+            return
+        if len(self._latest) >= _QUEUE_LIMIT and message.key not in self._latest:
+            self._dropped += 1
+            return
+        self._latest[message.key] = message
+        if not self._batch_is_out:
+            self._batch_is_out = True
+            self._loop.call_soon(self._hand_over)
+
+    def send(self, message: Message) -> bool:
+        """Publish each message in order. False: there was no room, the message is dropped."""
+        return self.submit(lambda session: publish(session, message))
+
+    def submit(self, job: Callable[[zenoh.Session], None]) -> bool:
+        """Let the worker do ``job``. False: there was no room."""
+        if self._worker.is_stopping or self._worker.waiting >= _QUEUE_LIMIT:
+            self._dropped += 1
+            return False
+        self._worker.do(job)
+        return True
+
+    async def settle(self) -> None:
+        """Wait until the worker has done what it was given so far."""
+        done: asyncio.Future[None] = self._loop.create_future()
+        if self.submit(lambda _: self._inbox.tell(_resolve, done, None)):
+            await asyncio.wait((done, self._closed), return_when=asyncio.FIRST_COMPLETED)
+
+    def _hand_over(self) -> None:
+        batch = [self._latest.pop(key) for key in list(islice(self._latest, _PUTS_AT_ONCE))]
+        self._batch_is_out = bool(batch)
+        if batch:
+            self._worker.do(partial(self._put_batch, batch))
+
+    def _put_batch(self, batch: list[Message], session: zenoh.Session) -> None:
+        for message in batch:
+            try:
+                publish(session, message)
+            except ZENOH_ERRORS as error:
+                self._worker.complain(error)
+        self._inbox.tell(self._hand_over)
+
+    # asking
+
+    async def get(
+        self,
+        key: str,
+        payload: bytes | None = None,
+        *,
+        timeout_s: float = 2.0,
+        attachment: bytes | None = None,
+    ) -> list[Answer]:
+        """The replies to a query; none where nobody answers within ``timeout_s``."""
+        answers: list[Answer] = []
+        done: asyncio.Future[None] = self._loop.create_future()
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            answers.append(to_answer(reply))
+
+        def on_end() -> None:
+            self._inbox.tell(_resolve, done, None)
+
+        def ask(session: zenoh.Session) -> None:
+            try:
+                session.get(
+                    key,
+                    zenoh.handlers.Callback(on_reply, on_end, indirect=False),
+                    payload=payload,
+                    attachment=attachment,
+                    timeout=timeout_s,
+                    consolidation=zenoh.ConsolidationMode.NONE,
+                    congestion_control=zenoh.CongestionControl.BLOCK,
+                    express=True,
+                )
+            except ZENOH_ERRORS:
+                on_end()
+                raise
+
+        if self.submit(ask):
+            # zenoh keeps the time; this bound is for a worker that does not get to it.
+            waiting = (done, self._closed)
+            await asyncio.wait(waiting, timeout=timeout_s + 0.1, return_when=asyncio.FIRST_COMPLETED)
+        return list(answers)
+
+    # declaring
+
+    def declare_queryable(self, key: str, handler: Callable[[Asked], None]) -> None:
+        """Answer queries on ``key``. A flood of them ends before it reaches the loop."""
+
+        def on_query(query: zenoh.Query) -> None:
+            payload, attachment = to_bytes(query.payload), to_bytes(query.attachment)
+            asked = Asked(str(query.key_expr), payload, attachment, query, self.submit)
+            if not self._inbox.take_in(partial(handler, asked)):
+                query.drop()
+
+        # Complete: whoever stores these keys must not be asked in our place.
+        callback = zenoh.handlers.Callback(on_query, indirect=False)
+        declared = self._worker.declared
+        self.submit(lambda session: declared.append(session.declare_queryable(key, callback, complete=True)))
+
+    def declare_subscriber(
+        self, key: str, handler: Callable[[Message], None], *, from_others: bool = False
+    ) -> None:
+        """Follow ``key``; ``from_others`` leaves out what this session itself publishes."""
+        origin = zenoh.Locality.REMOTE if from_others else zenoh.Locality.ANY
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            if sample.kind is zenoh.SampleKind.PUT:
+                self._inbox.take_in(partial(handler, to_message(sample)))
+
+        def declare(session: zenoh.Session) -> None:
+            callback = zenoh.handlers.Callback(on_sample, indirect=False)
+            self._worker.declared.append(session.declare_subscriber(key, callback, allowed_origin=origin))
+
+        self.submit(declare)
+
+    def follow_liveliness(self, key: str, handler: Callable[[str, bool], None]) -> None:
+        """``handler(key, is_alive)`` for each token there is and each that comes or goes."""
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            self._inbox.take_in(partial(handler, str(sample.key_expr), sample.kind is zenoh.SampleKind.PUT))
+
+        def declare(session: zenoh.Session) -> None:
+            callback = zenoh.handlers.Callback(on_sample, indirect=False)
+            self._worker.declared.append(session.liveliness().declare_subscriber(key, callback, history=True))
+
+        self.submit(declare)
+
+    def declare_token(self, key: str) -> None:
+        """Hold a liveliness token until ``drop_token``."""
+
+        def declare(session: zenoh.Session) -> None:
+            if key not in self._worker.tokens:
+                self._worker.tokens[key] = session.liveliness().declare_token(key)
+
+        self.submit(declare)
+
+    def drop_token(self, key: str) -> None:
+        def undeclare(_: zenoh.Session) -> None:
+            token = self._worker.tokens.pop(key, None)
+            if token:
+                token.undeclare()
+
+        self.submit(undeclare)
+
+
+def _resolve(future: asyncio.Future[Result], result: Result) -> None:
+    if not future.done():
+        future.set_result(result)

@@ -1,0 +1,80 @@
+"""What goes through a link, in our own types."""
+
+# pyright: reportUnknownMemberType=false
+# zenoh's stubs leave out the return types of what returns nothing.
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import zenoh
+
+_SOURCE_PLACE: Final = re.compile(r"\s+at /\S+?\.rs:\d+\.?")
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A payload under its key, as it is sent or was received. ``encoding`` is zenoh's name of it."""
+
+    key: str
+    payload: bytes
+    encoding: str = ""
+    attachment: bytes | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """One reply to a ``get``; where ``ok`` is False the payload says why."""
+
+    ok: bool
+    message: Message
+
+
+def publish(session: zenoh.Session, message: Message) -> None:
+    """Never waits for a peer that does not read; that peer loses the message."""
+    session.put(
+        message.key,
+        message.payload,
+        encoding=message.encoding or None,
+        attachment=message.attachment,
+        congestion_control=zenoh.CongestionControl.DROP,
+    )
+
+
+def reply(query: zenoh.Query, messages: Sequence[Message]) -> None:
+    for message in messages:
+        query.reply(
+            message.key, message.payload, encoding=message.encoding or None, attachment=message.attachment
+        )
+
+
+def reply_error(query: zenoh.Query, payload: bytes, encoding: str) -> None:
+    """Answer with an error and finish the query."""
+    try:
+        query.reply_err(payload, encoding=encoding)
+    finally:
+        query.drop()
+
+
+def to_answer(reply: zenoh.Reply) -> Answer:
+    result = reply.result
+    if isinstance(result, zenoh.Sample):
+        return Answer(True, to_message(result))
+    return Answer(False, Message("", result.payload.to_bytes(), str(result.encoding)))
+
+
+def to_message(sample: zenoh.Sample) -> Message:
+    attachment = to_bytes(sample.attachment)
+    return Message(str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding), attachment)
+
+
+def to_bytes(data: zenoh.ZBytes | None) -> bytes | None:
+    return None if data is None else data.to_bytes()
+
+
+def sentence(error: Exception) -> str:
+    """zenoh's message without the places in its own source."""
+    return _SOURCE_PLACE.sub("", str(error)).strip()

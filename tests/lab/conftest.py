@@ -1,0 +1,55 @@
+"""Rules of the lab: it needs real SocketCAN, and nothing in it is ever skipped.
+
+``make lab`` runs these tests through ``vcan-run``, which provides the buses. A lab test that skips
+itself would look like a proof that was never made, so here a skip is a failure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+NEEDS_VCAN = "The lab needs the CAN interface vcan0: run `make lab`, or tests/lab/vcan-run -- COMMAND."
+
+
+def vcan_is_missing() -> bool:
+    return not Path("/sys/class/net/vcan0").exists()
+
+
+def pytest_sessionstart() -> None:
+    """End a run of the lab alone with one sentence. (A run that came here from elsewhere is past this.)"""
+    if vcan_is_missing():
+        pytest.exit(NEEDS_VCAN, returncode=1)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _vcan() -> None:
+    if vcan_is_missing():
+        pytest.fail(NEEDS_VCAN, pytrace=False)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Skipped and expected-to-fail tests fail."""
+    report = yield
+    if report.skipped:
+        fail(report)
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """So does a module that skips itself while it is being collected."""
+    report = yield
+    if report.skipped:
+        fail(report)
+    return report
+
+
+def fail(report: Any) -> None:
+    reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
+    report.outcome = "failed"
+    report.longrepr = f"A lab test must not be skipped. {reason}"

@@ -1,0 +1,199 @@
+"""A whole southbound side on a virtual clock: master, networks, simulated nodes, one wire.
+
+Time passes only by ``run``; a lost frame is a line in a test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Source
+from bridge.config import Site, load_site
+from bridge.mapping import load_family
+from bridge.sim.nord_tu4 import NordTu4
+from bridge.southbound.bus.frame import Frame
+from bridge.southbound.bus.interface import BusStatus, ControllerState
+from bridge.southbound.bus.softbeat import SoftBeat
+from bridge.southbound.master import Master
+from bridge.southbound.network import Network
+
+SITE = """
+[site]
+name = "bench"
+[[bus]]
+name = "can0"
+interface = "virtual"
+{bus}
+[[bus.node]]
+name = "conveyor"
+id = 5
+mapping = "nord/sk-tu4-cao"
+{node}
+[[bus.node.drive]]
+slot = "fu1"
+control = "modbus"
+fieldbus_timeout_ms = 200
+parameters = {{ P105 = 50.0, P112 = 10.0 }}
+{drive}
+[[bus.node.drive]]
+slot = "fu2"
+control = "zenoh"
+fieldbus_timeout_ms = 200
+parameters = {{ P105 = 50.0, P112 = 10.0 }}
+[modbus]
+[zenoh]
+"""
+
+PLC = Identity(Source.MODBUS, "192.168.1.10")
+
+
+def write_site(folder: Path, *, bus: str = "", node: str = "", drive: str = "") -> Site:
+    path = folder / "site.toml"
+    path.write_text(SITE.format(bus=bus, node=node, drive=drive), encoding="utf-8")
+    return load_site(path)
+
+
+class ClockBus:
+    """A bus on the bench's clock: what is sent arrives at once."""
+
+    def __init__(self, deliver: Callable[[Frame], None]) -> None:
+        self.name = "can0"
+        self.status = BusStatus()
+        self.inbox: list[Frame] = []
+        self.accepted: frozenset[int] = frozenset()
+        self._deliver = deliver
+        self._beats = SoftBeat()
+
+    def open(self, wake: Callable[[], None]) -> None: ...
+
+    def accept(self, can_ids: list[int]) -> None:
+        self.accepted = frozenset(can_ids)
+
+    def drain(self, now: float) -> list[Frame]:
+        frames, self.inbox = self.inbox, []
+        return frames
+
+    def send(self, frame: Frame, now: float, deadline: float) -> None:
+        if self.status.state is not ControllerState.DOWN:
+            self._deliver(frame._replace(time=now))
+
+    def beat(self, frame: Frame, now: float, period_s: float, count: int, *, at_once: bool = False) -> None:
+        if self._beats.beat(frame, now, period_s, count, at_once=at_once):
+            self.send(frame, now, now)
+
+    def silence(self, can_id: int) -> None:
+        self._beats.silence(can_id)
+
+    def next_deadline(self) -> float | None:
+        return self._beats.next_deadline()
+
+    def on_time(self, now: float) -> None:
+        for frame in self._beats.due(now):
+            self.send(frame, now, now)
+
+    def clear(self) -> None:
+        self._beats.clear()
+
+    def close(self) -> None:
+        self.clear()
+
+
+class Bench:
+    """``log`` has every frame of the wire in order; ``cut`` keeps the node's frames from the master."""
+
+    def __init__(self, site: Site, *, present: bool = True) -> None:
+        self.now = 1000.0
+        self.log: list[Frame] = []
+        self.events: list[Event] = []
+        self.cut = False
+        self.plant = Plant(site, {"nord/sk-tu4-cao": load_family("nord/sk-tu4-cao")}, "0")
+        self.plant.on_event(self.events.append)
+        self.bus = ClockBus(self._from_master)
+        self.network = Network(site.bus[0], self.plant)
+        self.master = Master([(self.bus, self.network)], self.plant, lambda: self.now)
+        self._wake_at = self.now
+        self.master.attach(self._set_timer)
+        self.node = NordTu4(5)
+        self.powered = False
+        if present:
+            self.power_on()
+
+    def power_on(self) -> None:
+        self.powered = True
+        self.node.start(self.now)
+
+    def _set_timer(self, at: float) -> None:
+        self._wake_at = at
+
+    def _from_master(self, frame: Frame) -> None:
+        self.log.append(frame)
+        if self.powered and not self.cut:
+            self.node.on_frame(frame, self.now)
+
+    def _from_node(self) -> bool:
+        frames = [frame._replace(time=self.now) for frame in self.node.take_frames()] if self.powered else []
+        self.log += frames
+        if not self.cut:
+            self.receive(*frames)
+        return bool(frames) and not self.cut
+
+    def receive(self, *frames: Frame) -> None:
+        """Frames for the master, whoever sent them."""
+        for frame in frames:
+            if frame.can_id in self.bus.accepted:
+                self.bus.inbox.append(frame._replace(time=self.now))
+
+    def run(self, seconds: float) -> None:
+        """Let time pass; everything happens at its own moment."""
+        end = self.now + seconds
+        while True:
+            node_at = self.node.next_deadline() if self.powered else None
+            self.now = min(end, max(self.now, min(self._wake_at, node_at if node_at is not None else end)))
+            if self.powered:
+                self.node.on_time(self.now)
+            self.master.pump()
+            while self._from_node():
+                self.master.pump()
+            if self.now >= end:
+                return
+
+    def hang(self, seconds: float) -> None:
+        """The bridge's process stands still; the bus and the node go on."""
+        end = self.now + seconds
+        while self.now < end:
+            times = [self.bus.next_deadline(), self.node.next_deadline()]
+            self.now = min([end, *(t for t in times if t is not None and t > self.now)])
+            self.bus.on_time(self.now)
+            self.node.on_time(self.now)
+            self._from_node()
+
+    def write(self, drive: str = "conveyor/fu1", identity: Identity = PLC, **values: int | float) -> Outcome:
+        return self.ask(Action.WRITE, drive, identity, values=values)
+
+    def ask(
+        self, action: Action, target: str = "conveyor/fu1", identity: Identity = PLC, **more: Any
+    ) -> Outcome:
+        outcomes: list[Outcome] = []
+        request = Request(identity, target, action, **more)
+        self.plant.submit(request, self.now, outcomes.append)
+        assert len(outcomes) == 1, "one request, one outcome"
+        return outcomes[0]
+
+    def keep_writing(self, seconds: float, **values: int | float) -> None:
+        """Write every 50 ms, as a controller does."""
+        for _ in range(round(seconds / 0.05)):
+            self.write(**values)
+            self.run(0.05)
+
+    def sent(self, can_id: int) -> list[Frame]:
+        return [frame for frame in self.log if frame.can_id == can_id]
+
+    def value(self, name: str) -> object:
+        return self.plant.image.read(name).value
+
+    def number(self, name: str) -> int:
+        value = self.value(name)
+        assert isinstance(value, int)
+        return value

@@ -1,0 +1,267 @@
+"""Commanding a drive over Modbus: one write is one telegram, done whole or not at all."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+
+from bridge.command import Code, Event, Kind, Outcome, Plant, Reply, Request
+from tests.unit.northbound.modbus_site import (
+    ENABLED,
+    OTHER_PLC,
+    READY,
+    SWITCH_ON_INHIBITED,
+    Rig,
+    float_words,
+)
+
+OK, NOT_ALLOWED, NO_ADDRESS, BAD_VALUE, NOT_CONFIGURED = 0, 1, 2, 3, 0x0A
+
+
+@pytest.fixture
+def rig() -> Rig:
+    rig = Rig()
+    rig.runs(SWITCH_ON_INHIBITED)
+    return rig
+
+
+def requests_of(rig: Rig) -> list[Request]:
+    """Every request that reaches the plant from now on."""
+    seen: list[Request] = []
+    submit = rig.plant.submit
+
+    def spy(request: Request, now: float, reply: Reply) -> None:
+        seen.append(request)
+        submit(request, now, reply)
+
+    rig.plant.submit = spy  # pyright: ignore[reportAttributeAccessIssue]
+    return seen
+
+
+def test_the_example_of_bu_2500_6_8(rig: Rig):
+    """P105 = 50 Hz: 047E → ready, 047F/2000h → 25 Hz, 047E → stop."""
+    assert rig.write(0, 0x047E, 0) == OK
+    assert rig.sent == (0x047E, 0, 0, 0)
+    rig.runs(READY)
+    assert rig.read(4, 0, 1)[0] & 0xFF == 0x31
+    assert rig.write(0, 0x047F, 0x2000) == OK
+    assert rig.sent == (0x047F, 0x2000, 0, 0)
+    rig.runs(ENABLED, 0x2000)
+    assert rig.read(4, 0, 2) == [ENABLED, 0x2000]
+    assert rig.read(4, 32, 2) == list(float_words(25.0))
+    assert rig.write(0, 0x047E) == OK
+    assert rig.sent[0] == 0x047E
+
+
+def test_a_block_is_one_telegram(rig: Rig):
+    seen = requests_of(rig)
+    assert rig.write(0, 0x047E, 1, 2, 3) == OK
+    assert [(r.action, dict(r.values)) for r in seen] == [
+        ("write", {"control_word": 0x047E, "setpoint_1": 1, "setpoint_2": 2, "setpoint_3": 3})
+    ]
+
+
+def test_a_longer_block_is_values_acknowledge_then_keep_alive(rig: Rig):
+    seen = requests_of(rig)
+    assert rig.write(0, 0x047E, *[0] * 9, 1, 1) == OK
+    assert [r.action for r in seen] == ["write", "reset_fault", "keep_alive"]
+    seen.clear()
+    assert rig.write(1, 7, *[0] * 8, 0) == OK
+    assert [r.action for r in seen] == ["write", "release_control"]
+    assert rig.fu1.channel.owner is None
+
+
+def test_single_registers(rig: Rig):
+    seen = requests_of(rig)
+    for address, word, action in (
+        (0, 0x047E, "write"),
+        (3, 9, "write"),
+        (8, 0, "write"),
+        (10, 77, "keep_alive"),
+        (11, 1, "reset_fault"),
+        (11, 0, "keep_alive"),
+        (10, 0, "release_control"),
+    ):
+        pdu = struct.pack(">BHH", 6, address, word)
+        assert rig.ask(pdu) == pdu
+        assert seen[-1].action == action
+
+
+@pytest.mark.parametrize(
+    ("start", "words", "code"),
+    [
+        (4, [1], BAD_VALUE),  # a setpoint the drive does not have
+        (0, [0x047E, 0, 0, 0, 1], BAD_VALUE),
+        (9, [0], NO_ADDRESS),
+        (9, [0, 1], OK),
+        (9, [1, 1], BAD_VALUE),
+        (0, [0x047E, *[0] * 8, 1], BAD_VALUE),
+        (11, [2], BAD_VALUE),
+        (0, [0x047E, *[0] * 10, 2], BAD_VALUE),
+        (12, [500], NOT_ALLOWED),
+        (0, [0x047E, *[0] * 11, 500], NOT_ALLOWED),
+        (13, [0], NO_ADDRESS),
+        (12, [200, 0], NO_ADDRESS),
+        (31, [0], NO_ADDRESS),
+        (30, [0, 0, 0, 0], NO_ADDRESS),
+        (32, [0], NO_ADDRESS),
+        (33, [0], NO_ADDRESS),
+        (32, [0, 0, 0], NO_ADDRESS),
+        (34, [0, 0], NO_ADDRESS),
+        (65535, [0, 0], NO_ADDRESS),
+        (0, [0x007E], BAD_VALUE),  # control data valid is 0
+        (0, [0x007E, 5, *[0] * 8, 1], BAD_VALUE),
+        (32, float_words(100.5), BAD_VALUE),
+        (32, float_words(float("nan")), BAD_VALUE),
+        (32, float_words(float("-inf")), BAD_VALUE),
+    ],
+)
+def test_what_is_refused_changes_nothing(rig: Rig, start: int, words: list[int], code: int):
+    channel = rig.fu1.channel
+    before = (channel.control_word, channel.setpoints, channel.owner, channel.watchdog.state, rig.sent)
+    assert rig.write(start, *words) == code
+    after = (channel.control_word, channel.setpoints, channel.owner, channel.watchdog.state, rig.sent)
+    assert (after == before) is (code != OK)
+
+
+def test_what_is_refused_is_no_telegram(rig: Rig):
+    rig.write(0, 0x047E)
+    rig.pass_time(0.150)
+    assert rig.write(0, 0x007E) == BAD_VALUE
+    assert rig.write(32, *float_words(500.0)) == BAD_VALUE
+    assert rig.write(32, 0) == NO_ADDRESS
+    rig.pass_time(0.051)
+    assert rig.fu1.channel.is_tripped
+
+
+def test_a_float_setpoint_is_written_whole(rig: Rig):
+    assert rig.write(0, 0x047E) == OK
+    assert rig.write(32, *float_words(-12.5)) == OK
+    assert rig.sent == (0x047E, 0xF000, 0, 0)
+    assert rig.write(32, *float_words(1.0), unit=9) == NOT_CONFIGURED
+
+
+def test_someone_elses_drive_is_not_commanded(rig: Rig):
+    assert rig.write(0, 0x047E, unit=2) == NOT_ALLOWED
+    assert rig.write(10, 1, unit=2) == NOT_ALLOWED
+    assert rig.write(0, 0x047E) == OK
+    assert rig.write(0, 0x047F, caller=OTHER_PLC) == NOT_ALLOWED
+    assert rig.write(10, 0, caller=OTHER_PLC) == NOT_ALLOWED
+    assert rig.write(11, 0, caller=OTHER_PLC) == NOT_ALLOWED
+    assert rig.read(4, 20, 1, caller=OTHER_PLC) == [2]
+    assert rig.write(10, 0) == OK
+    assert rig.read(4, 20, 1) == [0]
+    assert rig.write(0, 0x047E, caller=OTHER_PLC) == OK
+
+
+def test_refusals_by_the_drives_channel_are_told(rig: Rig):
+    events: list[Event] = []
+    rig.plant.on_event(events.append)
+    rig.write(0, 0x047E, *[0] * 11, 500)
+    assert [event.kind for event in events] == [Kind.REFUSED]
+
+
+def test_keep_alive_feeds_the_watchdog_and_zero_releases(rig: Rig):
+    rig.write(0, 0x047E)
+    for _ in range(5):
+        rig.pass_time(0.150)
+        assert rig.write(10, 1) == OK
+    assert not rig.fu1.channel.is_tripped
+    assert rig.write(10, 0) == OK
+    rig.pass_time(1.0)
+    assert not rig.fu1.channel.is_tripped
+
+
+def test_acknowledge_after_a_trip_leaves_the_drive_stopped(rig: Rig):
+    rig.write(0, 0x047E)
+    rig.runs(ENABLED)
+    rig.write(0, 0x047E)
+    rig.write(0, 0x047F, 0x2000)
+    rig.pass_time(0.201)
+    assert rig.write(0, 0x047F, 0x2000) == OK  # taken, not forwarded
+    assert rig.sent[0] & 0x000F != 0x000F
+    assert rig.write(11, 1) == OK
+    assert rig.read(4, 14, 1) == [2]
+    assert rig.sent[0] & 0x000F != 0x000F
+    assert rig.sent[1] == 0
+
+
+def test_the_watchdog_time_where_the_site_file_allows(rig: Rig):
+    assert rig.write(12, 500, unit=9) == OK
+    assert rig.read(3, 12, 1, unit=9) == [500]
+    assert rig.write(12, 32768, unit=9) == BAD_VALUE
+    assert rig.write(0, 0x047E, *[0] * 9, 1, 0, 40000, unit=9) == BAD_VALUE
+    assert rig.drive("fu3").channel.control_word == 0x0400
+    assert rig.write(0, 0x047E, *[0] * 9, 1, 0, 300, unit=9) == OK
+    assert rig.read(3, 12, 1, unit=9) == [300]
+    assert rig.drive("fu3").channel.control_word == 0x047E
+
+
+def test_mask_write(rig: Rig):
+    rig.write(0, 0x047E, 0x1234)
+    request = bytes.fromhex("16 0000 FFFE 0001")
+    assert rig.ask(request) == request
+    assert rig.fu1.channel.control_word == 0x047F
+    rig.ask("16 0001 00F2 0025")  # §6.16's example: 12h becomes 17h, here with 34h: 30h | 05h
+    assert rig.fu1.channel.setpoints[0] == 0x1234 & 0x00F2 | 0x0025 & 0xFF0D
+    assert rig.ask("16 0009 0000 0000") == b"\x96\x02"
+    assert rig.ask("16 000A 0000 0001") == b"\x96\x02"
+    assert rig.ask("16 0005 FFFF 0000") == bytes.fromhex("16 0005 FFFF 0000")
+    assert rig.ask("16 0005 0000 0001") == b"\x96\x03"
+
+
+def test_read_write_writes_first(rig: Rig):
+    answer = rig.ask("17 0000 0002 0000 0002 04 047E 2000")
+    assert answer == bytes.fromhex("17 04 047E 2000")
+    assert rig.fu1.channel.control_word == 0x047E
+
+
+@pytest.mark.parametrize(
+    ("pdu", "code"),
+    [
+        ("17 0022 0001 0000 0001 02 047E", NO_ADDRESS),  # the read leaves the map
+        ("17 0021 0001 0000 0001 02 047E", NO_ADDRESS),  # the read is half a value
+        ("17 0000 0001 0000 0001 02 007E", BAD_VALUE),
+        ("17 0000 0001 0020 0001 02 0000", NO_ADDRESS),
+    ],
+)
+def test_read_write_does_all_or_nothing(rig: Rig, pdu: str, code: int):
+    assert rig.ask(pdu) == bytes((0x97, code))
+    assert rig.fu1.channel.control_word == 0x0400
+    assert rig.fu1.channel.owner is None
+
+
+def test_coils_are_bits_of_the_control_word(rig: Rig):
+    seen = requests_of(rig)
+    rig.write(0, 0x047E)
+    assert rig.ask("05 0000 FF00") == bytes.fromhex("05 0000 FF00")
+    assert rig.fu1.channel.control_word == 0x047F
+    rig.ask("05 0000 0000")
+    assert rig.fu1.channel.control_word == 0x047E
+    seen.clear()
+    assert rig.ask("0F 0000 0010 02 7F0C") == bytes.fromhex("0F 0000 0010")  # 0C7F: run, right
+    assert rig.fu1.channel.control_word == 0x0C7F
+    assert len(seen) == 1
+    assert rig.ask("05 000A 0000") == b"\x85\x03"  # control data valid must stay 1
+    assert rig.ask("05 0010 FF00") == b"\x85\x02"
+    assert rig.ask("0F 000F 0002 01 00") == b"\x8f\x02"
+    assert rig.fu1.channel.control_word == 0x0C7F
+
+
+def test_a_late_outcome_is_answered_when_it_comes(rig: Rig, monkeypatch: pytest.MonkeyPatch):
+    waiting: list[Reply] = []
+
+    def submit(self: Plant, request: Request, now: float, reply: Reply) -> None:
+        waiting.append(reply)
+
+    monkeypatch.setattr(Plant, "submit", submit)
+    answers: list[bytes] = []
+    pdu = struct.pack(">BHHB11H", 16, 0, 11, 22, 0x047E, *[0] * 9, 1)
+    rig.dispatcher.handle(1, pdu, OTHER_PLC, answers.append)
+    assert len(waiting) == 1
+    assert answers == []
+    waiting[0](Outcome(Code.OK))
+    assert len(waiting) == 2  # the keep-alive follows when the write is done
+    waiting[1](Outcome(Code.TIMED_OUT))
+    assert answers == [b"\x90\x04"]

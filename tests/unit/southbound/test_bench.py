@@ -1,0 +1,244 @@
+"""The southbound side with a simulated SK TU4-CAO, on a virtual clock."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bridge.command import Action, Code
+from bridge.image import Quality
+from bridge.southbound.bus.frame import Frame
+from bridge.southbound.bus.interface import ControllerState
+from bridge.southbound.canopen.nmt import NmtState
+from tests.support.bench import PLC, Bench, write_site
+
+RPDO1 = 0x205
+TPDO1 = 0x185
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    bench = Bench(write_site(tmp_path))
+    bench.run(1.0)
+    return bench
+
+
+def low_byte(bench: Bench) -> int:
+    return bench.number("conveyor/fu1/status/status_word") & 0xFF
+
+
+def test_a_node_that_is_there_is_booted_and_its_drives_are_good(bench: Bench) -> None:
+    assert bench.value("conveyor/node/boot_status") == "ok; 1017h was 0, is 66 now"
+    assert bench.value("conveyor/node/nmt_state") == NmtState.OPERATIONAL
+    assert bench.plant.drives["conveyor/fu1"].quality is Quality.GOOD
+    assert bench.value("conveyor/fu1/identity/device_name") == "SK TU4-CAO"
+
+
+def test_the_first_rpdo_is_a_stopped_one_and_has_four_words(bench: Bench) -> None:
+    rpdos = bench.sent(RPDO1)
+    assert rpdos[0].data == bytes.fromhex("0004000000000000")
+    assert {len(frame.data) for frame in rpdos} == {8}
+
+
+def test_the_manuals_example(bench: Bench) -> None:
+    """BU 2500 §6.8."""
+    assert low_byte(bench) == 0x40
+    bench.write(control_word=0x047E, setpoint_1=0)
+    bench.run(0.05)
+    assert low_byte(bench) == 0x31
+    bench.keep_writing(4.0, control_word=0x047F, setpoint_1=0x2000)
+    assert low_byte(bench) == 0x37
+    assert bench.value("conveyor/fu1/actual/value_1") == 0x2000
+    assert bench.value("conveyor/fu1/actual/frequency") == 25.0
+    bench.keep_writing(4.0, control_word=0x047E, setpoint_1=0x2000)
+    assert low_byte(bench) == 0x31
+    assert bench.value("conveyor/fu1/actual/value_1") == 0
+    bench.keep_writing(4.0, control_word=0x047F, setpoint_1=0x1000)
+    assert low_byte(bench) == 0x37
+    assert bench.value("conveyor/fu1/actual/frequency") == 12.5
+
+
+def running(bench: Bench) -> None:
+    bench.write(control_word=0x047E)
+    bench.keep_writing(3.0, control_word=0x047F, setpoint_1=0x2000)
+    assert bench.value("conveyor/fu1/actual/frequency") == 25.0
+
+
+def test_a_silent_controller_stops_the_drive_within_the_published_time(bench: Bench) -> None:
+    running(bench)
+    last_telegram = bench.now
+    bench.write(control_word=0x047F)
+    bench.log.clear()
+    bench.run(1.0)
+    stopped = next(frame for frame in bench.sent(RPDO1) if not frame.data[0] & 2)
+    published_s = bench.number("conveyor/fu1/supervision/worst_case_stop_ms") / 1000
+    assert 0.2 <= stopped.time - last_telegram <= published_s
+    assert stopped.data[2:] == bytes(6)
+    assert bench.value("conveyor/fu1/supervision/last_fault") == 10.3
+    assert low_byte(bench) & 0x4F == 0x08, "the owner sees fault"
+    assert bench.value("conveyor/fu1/status/fault_text") != ""
+    assert bench.value("conveyor/node/current_fault") == 102.0
+
+
+def test_nothing_restarts_a_tripped_drive_without_acknowledge_and_fresh_enable(bench: Bench) -> None:
+    running(bench)
+    bench.run(1.0)
+    bench.log.clear()
+    bench.keep_writing(1.0, control_word=0x047F, setpoint_1=0x2000)
+    assert all(frame.data[0] & 0x0F != 0x0F for frame in bench.sent(RPDO1))
+    bench.write(control_word=0x04FE)
+    bench.keep_writing(0.5, control_word=0x047F, setpoint_1=0x2000)
+    assert all(frame.data[0] & 0x0F != 0x0F for frame in bench.sent(RPDO1))
+    bench.write(control_word=0x047E)
+    bench.keep_writing(3.0, control_word=0x047F, setpoint_1=0x2000)
+    assert bench.value("conveyor/fu1/actual/frequency") == 25.0
+
+
+def test_the_other_drives_of_the_node_are_not_touched_by_a_trip(bench: Bench) -> None:
+    running(bench)
+    bench.run(1.0)
+    assert bench.value("conveyor/fu2/supervision/trips") == 0
+    assert bench.value("conveyor/fu2/status/state") != 7
+
+
+def test_a_lost_node_goes_lost_then_dead_and_comes_back_stopped(bench: Bench) -> None:
+    running(bench)
+    bench.cut = True
+    bench.keep_writing(0.5, control_word=0x047F)
+    drive = bench.plant.drives["conveyor/fu1"]
+    assert drive.quality is Quality.LOST
+    assert bench.value("conveyor/fu1/supervision/current_fault") == 10.9
+    assert any(event.kind == "node_lost" for event in bench.events)
+    bench.keep_writing(2.0, control_word=0x047F)
+    assert drive.quality is Quality.DEAD
+    bench.cut = False
+    bench.log.clear()
+    bench.keep_writing(3.0, control_word=0x047F, setpoint_1=0x2000)
+    assert drive.quality is Quality.GOOD
+    assert all(frame.data[0] & 0x0F != 0x0F for frame in bench.sent(RPDO1)), "restart interlock"
+    bench.write(control_word=0x047E)
+    bench.keep_writing(3.0, control_word=0x047F, setpoint_1=0x2000)
+    assert bench.value("conveyor/fu1/actual/frequency") == 25.0
+
+
+def test_a_node_that_restarts_is_booted_again(bench: Bench) -> None:
+    running(bench)
+    bench.node.power_cycle()
+    bench.keep_writing(2.0, control_word=0x047F, setpoint_1=0x2000)
+    assert bench.plant.drives["conveyor/fu1"].quality is Quality.GOOD
+    assert bench.value("conveyor/fu1/actual/value_1") == 0
+
+
+def test_a_node_that_appears_later_is_booted_then(tmp_path: Path) -> None:
+    bench = Bench(write_site(tmp_path), present=False)
+    bench.run(3.0)
+    assert bench.plant.drives["conveyor/fu1"].quality is Quality.WAITING
+    assert bench.value("conveyor/node/boot_status") == "no answer"
+    bench.power_on()
+    bench.run(1.0)
+    assert bench.plant.drives["conveyor/fu1"].quality is Quality.GOOD
+
+
+def test_another_device_at_the_address_is_left_alone(tmp_path: Path) -> None:
+    site = write_site(tmp_path, node="[bus.node.identity]\nvendor_id = 0x12345678")
+    bench = Bench(site)
+    bench.run(1.0)
+    assert "another device: vendor id is" in str(bench.value("conveyor/node/boot_status"))
+    assert bench.plant.drives["conveyor/fu1"].quality is Quality.CONFIG_ERROR
+    assert Frame(0, b"\x01\x05") not in [frame._replace(time=0.0) for frame in bench.log]
+
+
+def test_a_hung_bridge_falls_silent_within_the_dead_man_time(bench: Bench) -> None:
+    running(bench)
+    hung_at = bench.now
+    bench.log.clear()
+    bench.hang(1.0)
+    for can_id in (0x080, RPDO1, 0x77F):
+        assert max(frame.time for frame in bench.sent(can_id)) <= hung_at + 0.1
+    bench.log.clear()
+    bench.run(0.5)
+    assert bench.master.gaps == 1
+    assert all(frame.data[0] & 0x0F != 0x0F for frame in bench.sent(RPDO1))
+
+
+def test_a_telegram_from_before_the_hang_saves_no_drive(bench: Bench) -> None:
+    running(bench)
+    bench.hang(0.5)
+    outcome = bench.write(control_word=0x047F, setpoint_1=0x2000)
+    assert not outcome.forwarded
+    assert bench.value("conveyor/fu1/supervision/trips") == 1
+
+
+def test_the_bus_going_down_loses_all_and_brings_back_stopped_drives(bench: Bench) -> None:
+    running(bench)
+    bench.bus.status.state = ControllerState.DOWN
+    bench.bus.clear()
+    bench.keep_writing(0.5, control_word=0x047F, setpoint_1=0x2000)
+    assert bench.plant.drives["conveyor/fu1"].quality is Quality.LOST
+    assert bench.value("bus/can0/state") == 4
+    bench.bus.status.state = ControllerState.OK
+    bench.log.clear()
+    bench.keep_writing(3.0, control_word=0x047F, setpoint_1=0x2000)
+    assert bench.plant.drives["conveyor/fu1"].quality is Quality.GOOD
+    assert all(frame.data[0] & 0x0F != 0x0F for frame in bench.sent(RPDO1))
+
+
+def test_a_frame_that_does_not_fit_changes_nothing_and_is_counted(bench: Bench) -> None:
+    before = bench.plant.image.read("conveyor/fu1/status/status_word")
+    bench.receive(Frame(TPDO1, b"\x08\x00"), Frame(0x085, b"\x00"), Frame(0x705, b""), Frame(0x585, b"\x60"))
+    bench.run(0.2)
+    assert bench.plant.image.read("conveyor/fu1/status/status_word") == before
+    assert bench.value("conveyor/node/rejected_frames") == 3
+
+
+def test_silence_as_reaction_ends_the_rpdos_of_this_drive_alone(tmp_path: Path) -> None:
+    bench = Bench(write_site(tmp_path, drive='on_expiry = "silence"'))
+    bench.run(1.0)
+    running(bench)
+    bench.run(0.5)
+    bench.log.clear()
+    bench.run(0.5)
+    assert not bench.sent(RPDO1)
+    assert bench.sent(0x305)
+
+
+def test_the_drives_own_p151_trips_when_the_bridge_is_gone(bench: Bench) -> None:
+    running(bench)
+    p151_500_ms = Frame(0x605, bytes.fromhex("2B972001F4010000"))
+    bench.node.on_frame(p151_500_ms, bench.now)
+    bench.hang(2.0)
+    bench.run(0.3)
+    assert bench.number("conveyor/fu1/status/drive_status_word") & 0x4F == 0x08
+    assert bench.value("conveyor/fu1/status/emcy_code") == 0x8100
+
+
+def test_a_reset_of_the_node_is_refused_to_who_does_not_control_its_drives(bench: Bench) -> None:
+    running(bench)
+    other = type(PLC)(PLC.source, "192.168.1.99")
+    assert bench.ask(Action.RESET, "conveyor", other).code is Code.NOT_ALLOWED
+    assert bench.ask(Action.RESET, "conveyor").ok
+    bench.run(3.0)
+    assert bench.plant.drives["conveyor/fu1"].quality is Quality.GOOD
+
+
+def test_a_disabled_node_is_stopped_and_stays_disabled_until_enabled(bench: Bench) -> None:
+    running(bench)
+    assert bench.ask(Action.DISABLE, "conveyor").ok
+    bench.log.clear()
+    bench.keep_writing(1.0, control_word=0x047F, setpoint_1=0x2000)
+    assert bench.plant.drives["conveyor/fu1"].quality is Quality.DISABLED
+    assert all(frame.data[0] & 0x0F != 0x0F for frame in bench.sent(RPDO1))
+    assert bench.ask(Action.ENABLE, "conveyor").ok
+    bench.run(2.0)
+    assert bench.plant.drives["conveyor/fu1"].quality is Quality.GOOD
+
+
+def test_guarding_supervises_by_remote_frames(tmp_path: Path) -> None:
+    bench = Bench(write_site(tmp_path, node='supervision = "guarding"'))
+    bench.run(3.0)
+    assert bench.plant.drives["conveyor/fu1"].quality is Quality.GOOD
+    assert bench.sent(0x4000_0705)
+    bench.cut = True
+    bench.run(1.0)
+    assert bench.plant.drives["conveyor/fu1"].quality is Quality.LOST

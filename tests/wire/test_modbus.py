@@ -1,0 +1,364 @@
+"""The Modbus server on a real socket, with clients that we did not write."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import shutil
+import struct
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from pymodbus.client import AsyncModbusTcpClient
+
+from bridge.command import Code, Identification, Outcome, Plant, Reply, Request
+from bridge.command.link import NodeState
+from bridge.config import ModbusTable
+from bridge.errors import Unavailable
+from bridge.northbound.modbus import session
+from bridge.northbound.modbus.server import ModbusServer
+from tests.unit.northbound.modbus_site import ENABLED, READY, SWITCH_ON_INHIBITED, float_words, make_plant
+
+HOST = "127.0.0.1"
+
+
+def drive_says(plant: Plant, *words: int) -> None:
+    now = time.monotonic()
+    plant.on_node(plant.nodes["conveyor"], NodeState.OPERATIONAL, now)
+    plant.drives["conveyor/fu1"].on_process_data([*words, 0, 0, 0][:4], now)
+
+
+def on_the_bus(plant: Plant) -> tuple[int, ...]:
+    return plant.drives["conveyor/fu1"].channel.output.words
+
+
+@asynccontextmanager
+async def serving(plant: Plant, **settings: object) -> AsyncIterator[ModbusServer]:
+    table = ModbusTable.model_validate({"listen": f"{HOST}:0", **settings})
+    server = ModbusServer(plant, table, time.monotonic)
+    await server.start()
+    try:
+        yield server
+    finally:
+        await server.close()
+
+
+@pytest.fixture
+def plant() -> Plant:
+    plant = make_plant()
+    drive_says(plant, SWITCH_ON_INHIBITED)
+    return plant
+
+
+@pytest.fixture
+async def server(plant: Plant) -> AsyncIterator[ModbusServer]:
+    async with serving(plant) as server:
+        yield server
+
+
+@asynccontextmanager
+async def pymodbus(server: ModbusServer, address: str = HOST) -> AsyncIterator[AsyncModbusTcpClient]:
+    client = AsyncModbusTcpClient(
+        HOST, port=server.port, source_address=(address, 0), timeout=2, retries=0, reconnect_delay=0
+    )
+    assert await client.connect()
+    try:
+        yield client
+    finally:
+        client.close()
+
+
+async def mbpoll(server: ModbusServer, *arguments: str) -> tuple[int, str]:
+    """Exit status and output of one ``mbpoll`` run with 0-based addresses."""
+    program = shutil.which("mbpoll", path="/usr/bin:/usr/local/bin")
+    if program is None:
+        pytest.fail("mbpoll is missing: apt-get install mbpoll", pytrace=False)
+    before, values = arguments, ()
+    if "--" in arguments:
+        at = arguments.index("--")
+        before, values = arguments[:at], arguments[at:]
+    process = await asyncio.create_subprocess_exec(
+        program,
+        *("-m", "tcp", "-p", str(server.port), "-0", "-1", "-o", "2"),
+        *before,
+        HOST,
+        *values,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.STDOUT,
+    )
+    output, _ = await asyncio.wait_for(process.communicate(), 10)
+    return process.returncode or 0, output.decode()
+
+
+def polled(output: str) -> dict[int, str]:
+    """The values that mbpoll printed, by address."""
+    return {int(a): v for a, v in re.findall(r"^\[(\d+)\]:\s+(\S+)", output, re.MULTILINE)}
+
+
+def adu(transaction: int, unit: int, pdu: bytes) -> bytes:
+    return struct.pack(">HHHB", transaction, 0, len(pdu) + 1, unit) + pdu
+
+
+async def one_answer(reader: asyncio.StreamReader) -> tuple[int, int, bytes]:
+    head = await asyncio.wait_for(reader.readexactly(7), 5)
+    transaction, protocol, length, unit = struct.unpack(">HHHB", head)
+    assert protocol == 0
+    return transaction, unit, await asyncio.wait_for(reader.readexactly(length - 1), 5)
+
+
+# mbpoll
+
+
+async def test_the_example_of_bu_2500_6_8_with_mbpoll(plant: Plant, server: ModbusServer):
+    """047E → ready, 047F/2000h → 25 Hz at P105 = 50 Hz, 047E → stop."""
+    status, output = await mbpoll(server, "-a", "1", "-r", "0", "-t", "4", "--", str(0x047E), "0")
+    assert status == 0, output
+    assert on_the_bus(plant) == (0x047E, 0, 0, 0)
+    drive_says(plant, READY)
+    status, output = await mbpoll(server, "-a", "1", "-r", "0", "-t", "4", "--", str(0x047F), str(0x2000))
+    assert status == 0, output
+    assert on_the_bus(plant) == (0x047F, 0x2000, 0, 0)
+    drive_says(plant, ENABLED, 0x2000)
+    _, output = await mbpoll(server, "-a", "1", "-r", "0", "-c", "2", "-t", "3:hex")
+    assert polled(output) == {0: "0x0237", 1: "0x2000"}
+    _, output = await mbpoll(server, "-a", "1", "-r", "32", "-c", "1", "-t", "3:float", "-B")
+    assert polled(output) == {32: "25"}
+    status, output = await mbpoll(server, "-a", "1", "-r", "0", "-t", "4", "--", str(0x047E))
+    assert status == 0, output
+    assert on_the_bus(plant)[0] == 0x047E
+
+
+async def test_mbpoll_sees_bits_and_exceptions(plant: Plant, server: ModbusServer):
+    _, output = await mbpoll(server, "-a", "1", "-r", "0", "-c", "16", "-t", "1")
+    bits = [int(value) for _, value in sorted(polled(output).items())]
+    assert sum(bit << position for position, bit in enumerate(bits)) == SWITCH_ON_INHIBITED
+    _, output = await mbpoll(server, "-a", "77", "-r", "0", "-t", "3")
+    assert "gateway path unavailable" in output.lower()
+    _, output = await mbpoll(server, "-a", "1", "-r", "40", "-t", "4")
+    assert "illegal data address" in output.lower()
+    _, output = await mbpoll(server, "-a", "2", "-r", "0", "-t", "4", "--", "1150")
+    assert "illegal function" in output.lower()
+    _, output = await mbpoll(server, "-a", "9", "-r", "0", "-c", "1", "-t", "3")
+    assert "target device failed to respond" in output.lower()
+
+
+# pymodbus
+
+
+async def test_every_function_with_pymodbus(plant: Plant, server: ModbusServer):
+    async with pymodbus(server) as client:
+        answer = await client.write_registers(0, [0x047E, 0x2000, 1, 2], device_id=1)
+        assert not answer.isError()
+        answer = await client.read_holding_registers(0, count=13, device_id=1)
+        assert answer.registers == [0x047E, 0x2000, 1, 2, *[0] * 6, 1, 0, 200]
+        answer = await client.read_input_registers(0, count=2, device_id=1)
+        assert answer.registers == [SWITCH_ON_INHIBITED, 0]
+        answer = await client.read_discrete_inputs(0, count=24, device_id=1)
+        assert answer.bits == [bool(SWITCH_ON_INHIBITED >> i & 1) for i in range(16)] + [
+            i == 1 for i in range(8)
+        ]
+        assert not (await client.write_register(1, 5, device_id=1)).isError()
+        assert not (await client.write_coil(11, True, device_id=1)).isError()
+        answer = await client.read_coils(8, count=8, device_id=1)
+        assert answer.bits[:8] == [False, False, True, True, False, False, False, False]
+        assert not (await client.write_coils(11, [False, True], device_id=1)).isError()
+        answer = await client.mask_write_register(address=0, and_mask=0xFFFE, or_mask=0, device_id=1)
+        assert not answer.isError()
+        answer = await client.readwrite_registers(
+            read_address=0, read_count=2, write_address=1, values=[7], device_id=1
+        )
+        assert answer.registers == [0x147E, 7]
+        answer = await client.read_input_registers(0, count=8, device_id=255)
+        assert answer.registers[3:5] == [3, 1]
+        answer = await client.diag_query_data(b"\x12\x34", device_id=1)
+        assert not answer.isError()
+
+
+async def test_identification_with_pymodbus(plant: Plant, server: ModbusServer):
+    plant.drives["conveyor/fu1"].on_identification(Identification(1, 2, 0x0003_0004, 5, "TU4"), 0.0)
+    async with pymodbus(server) as client:
+        answer = await client.read_device_information(read_code=3, device_id=1)
+        assert answer.information[0] == b"Getriebebau NORD"
+        assert answer.information[2] == b"3.4"
+        assert answer.information[6] == b"conveyor/fu1"
+        assert answer.information[0x83] == b"00000005"
+        answer = await client.read_device_information(read_code=4, object_id=6, device_id=9)
+        assert answer.information == {6: b"conveyor/fu3"}
+
+
+async def test_exceptions_with_pymodbus(server: ModbusServer):
+    async with pymodbus(server) as client:
+        for unit, address, values, code in (
+            (33, 0, [0x047E], 0x0A),
+            (2, 0, [0x047E], 0x01),
+            (1, 40, [0], 0x02),
+            (1, 32, [0], 0x02),
+            (1, 0, [0x007E], 0x03),
+            (1, 32, list(float_words(500.0)), 0x03),
+            (9, 32, list(float_words(1.0)), 0x0A),
+        ):
+            answer = await client.write_registers(address, values, device_id=unit)
+            assert (answer.function_code, answer.exception_code) == (0x90, code)
+        answer = await client.read_input_registers(0, count=1, device_id=9)
+        assert answer.exception_code == 0x0B
+
+
+async def test_a_second_controller_is_refused(plant: Plant, server: ModbusServer):
+    async with pymodbus(server) as owner, pymodbus(server, "127.0.0.2") as other:
+        assert not (await owner.write_registers(0, [0x047E, 0], device_id=1)).isError()
+        answer = await other.write_registers(0, [0x047F, 0x2000], device_id=1)
+        assert (answer.function_code, answer.exception_code) == (0x90, 0x01)
+        assert on_the_bus(plant)[0] == 0x047E
+        assert (await other.read_input_registers(20, count=1, device_id=1)).registers == [2]
+        assert (await other.read_holding_registers(10, count=1, device_id=1)).registers == [0]
+        assert not (await owner.write_register(10, 0, device_id=1)).isError()
+        assert not (await other.write_registers(0, [0x047E, 0], device_id=1)).isError()
+
+
+async def test_a_second_connection_from_the_same_address_is_the_same_controller(server: ModbusServer):
+    async with pymodbus(server) as first, pymodbus(server) as second:
+        assert not (await first.write_register(0, 0x047E, device_id=1)).isError()
+        assert not (await second.write_register(10, 1, device_id=1)).isError()
+
+
+# raw sockets
+
+
+async def test_sixteen_requests_in_one_segment_are_answered_in_order(server: ModbusServer):
+    reader, writer = await asyncio.open_connection(HOST, server.port)
+    units = [1, 2, 33, 255] * 4
+    writer.write(b"".join(adu(i, unit, bytes.fromhex("04 0000 0002")) for i, unit in enumerate(units)))
+    answers = [await one_answer(reader) for _ in units]
+    assert [(t, u) for t, u, _ in answers] == list(enumerate(units))
+    assert [pdu[0] for _, _, pdu in answers] == [4, 0x84, 0x84, 4] * 4
+    writer.close()
+
+
+async def test_an_outcome_that_comes_later_keeps_its_place(
+    server: ModbusServer, monkeypatch: pytest.MonkeyPatch
+):
+    def submit_later(self: Plant, request: Request, now: float, reply: Reply) -> None:
+        asyncio.get_running_loop().call_later(0.01, reply, Outcome(Code.TIMED_OUT))
+
+    monkeypatch.setattr(Plant, "submit", submit_later)
+    reader, writer = await asyncio.open_connection(HOST, server.port)
+    pair = (bytes.fromhex("06 0000 047E"), bytes.fromhex("03 0000 0001"))
+    writer.write(b"".join(adu(i, 1, pair[i % 2]) for i in range(200)))
+    answers = [await one_answer(reader) for _ in range(200)]
+    assert [(t, pdu[0]) for t, _, pdu in answers] == [(i, (0x86, 0x03)[i % 2]) for i in range(200)]
+    writer.close()
+
+
+async def test_a_frame_in_single_bytes(server: ModbusServer):
+    reader, writer = await asyncio.open_connection(HOST, server.port)
+    for byte in adu(7, 1, bytes.fromhex("03 0000 0001")):
+        writer.write(bytes((byte,)))
+        await writer.drain()
+        await asyncio.sleep(0)
+    assert await one_answer(reader) == (7, 1, bytes.fromhex("03 02 0400"))
+    writer.close()
+
+
+async def test_a_wrong_protocol_id_ends_the_connection(server: ModbusServer):
+    reader, writer = await asyncio.open_connection(HOST, server.port)
+    writer.write(adu(1, 1, bytes.fromhex("03 0000 0001")) + bytes.fromhex("0002 0001 0002 01 03"))
+    assert (await one_answer(reader))[0] == 1
+    assert await asyncio.wait_for(reader.read(), 5) == b""
+    assert server.broken_connections == 1
+    assert server.sessions == 0
+    writer.close()
+
+
+async def test_strangers_and_too_many_are_turned_away(plant: Plant, caplog: pytest.LogCaptureFixture):
+    async with serving(plant, allow=["127.0.0.1/32"], max_connections=1) as server:
+        for _ in range(3):
+            reader, writer = await asyncio.open_connection(HOST, server.port, local_addr=("127.0.0.2", 0))
+            assert await closed_by_the_other_side(reader)
+            writer.close()
+        async with pymodbus(server) as client:
+            reader, writer = await asyncio.open_connection(HOST, server.port)
+            assert await closed_by_the_other_side(reader)
+            writer.close()
+            assert (await client.read_holding_registers(0, count=1, device_id=1)).registers == [0x0400]
+        assert server.refused_connections == 4
+        assert sum("refused" in record.message for record in caplog.records) == 1  # once a minute
+
+
+async def closed_by_the_other_side(reader: asyncio.StreamReader) -> bool:
+    try:
+        return await asyncio.wait_for(reader.read(), 5) == b""
+    except ConnectionResetError:
+        return True
+
+
+async def test_a_client_that_reads_nothing_is_dropped_and_harms_no_other(
+    server: ModbusServer, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(session, "STALL_LIMIT_S", 0.3)
+    _, writer = await asyncio.open_connection(HOST, server.port)
+    request = adu(1, 1, bytes.fromhex("03 0000 0020")) * 1000
+    flood = asyncio.create_task(pour(writer, request))
+    async with pymodbus(server) as client:
+        slowest = 0.0
+        while server.sessions == 2:
+            begin = time.monotonic()
+            assert not (await client.read_holding_registers(0, count=1, device_id=1)).isError()
+            slowest = max(slowest, time.monotonic() - begin)
+        assert slowest < 0.5
+    await flood
+    assert server.broken_connections == 1
+
+
+async def pour(writer: asyncio.StreamWriter, data: bytes) -> None:
+    try:
+        while True:
+            writer.write(data)
+            await writer.drain()
+    except ConnectionError:
+        writer.close()
+
+
+# starting
+
+
+async def test_a_taken_port_is_said_in_one_sentence(plant: Plant, server: ModbusServer):
+    with pytest.raises(Unavailable, match=rf"modbus.listen = '127.0.0.1:{server.port}': port .* is taken"):
+        async with serving(plant, listen=f"{HOST}:{server.port}"):
+            pass
+    with pytest.raises(Unavailable, match=r"no interface of this machine has the address 192\.0\.2\.1"):
+        async with serving(plant, listen="192.0.2.1:0"):
+            pass
+
+
+async def test_a_port_without_privilege_is_said_in_one_sentence(
+    plant: Plant, monkeypatch: pytest.MonkeyPatch
+):
+    def denied(*arguments: object, **more: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("socket.create_server", denied)
+    with pytest.raises(Unavailable, match="port 502 needs CAP_NET_BIND_SERVICE: "):
+        async with serving(plant, listen="127.0.0.1:502"):
+            pass
+
+
+@pytest.mark.skipif(not Path("/proc/net/if_inet6").exists(), reason="this machine has no IPv6")
+async def test_an_ipv4_client_of_an_ipv6_socket_is_an_ipv4_client(plant: Plant):
+    async with serving(plant, listen="[::]:0", allow=["127.0.0.0/8"]) as server, pymodbus(server) as client:
+        assert not (await client.write_register(0, 0x047E, device_id=1)).isError()
+        assert str(plant.drives["conveyor/fu1"].channel.owner) == "modbus:127.0.0.1"
+
+
+async def test_close_ends_every_session(plant: Plant):
+    async with serving(plant) as server:
+        reader, writer = await asyncio.open_connection(HOST, server.port)
+        writer.write(adu(1, 1, bytes.fromhex("03 0000 0001")))
+        await one_answer(reader)
+        assert server.sessions == 1
+        await server.close()
+        assert await closed_by_the_other_side(reader)
+        writer.close()
+    assert server.sessions == 0

@@ -27,7 +27,8 @@ QUIETLY := tools/quietly $(VENV)/install.log
 # The lab runs on one slow CPU as root: it leaves no caches behind and gets a time limit.
 LAB_SECONDS := 420
 VCAN := PYTHON=$(IN) PYTHONDONTWRITEBYTECODE=1 tests/lab/vcan-run -n 2 -t $(LAB_SECONDS) --
-PACKAGES := iproute2:ip kmod:insmod can-utils:cansend mbpoll:mbpoll
+PACKAGES := iproute2:ip kmod:insmod can-utils:cansend mbpoll:mbpoll nodejs:node npm:npm
+CLIENTS := tests/wire/node
 
 ##@ Run
 demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, until Ctrl-C
@@ -40,7 +41,7 @@ unit: $(VENV)/dev.stamp ## tests of the code alone
 	@echo "== unit tests"
 	@$(PYTEST) tests/unit $(ARGS)
 
-wire: $(VENV)/dev.stamp packages ## tests with real protocol clients on loopback
+wire: $(VENV)/dev.stamp packages clients ## tests with real protocol clients on loopback
 	@echo "== wire tests"
 	@$(PYTEST) -rs tests/wire $(ARGS)
 
@@ -48,8 +49,8 @@ ifeq ($(LAB),0)
 lab:
 	@echo "== LAB=0: the lab tests, on real SocketCAN, were NOT run"
 
-packages:
-	@echo "LAB=0: no Debian packages are installed; wire tests that need one skip themselves"
+packages clients:
+	@echo "LAB=0: nothing is installed for $@; wire tests that need it skip themselves"
 else
 lab: $(VENV)/dev.stamp packages ## tests on real SocketCAN: vcan, or a user-mode kernel that has it
 	@echo "== lab tests ($$(PYTHON=$(IN) tests/lab/vcan-run -w | sed 's/here/on vcan of this kernel/;s/uml/in a user-mode kernel: this one has no vcan/'))"
@@ -59,6 +60,13 @@ packages: $(VENV)/dev.stamp ## install the Debian packages that the tests need
 	@tools/need-packages "the tests (LAB=0 leaves those on a CAN bus out)" $(PACKAGES)
 	@[ "$$(PYTHON=$(IN) tests/lab/vcan-run -w)" = here ] || \
 	  tools/need-packages "the lab tests: this kernel has no vcan (LAB=0 leaves them out)" user-mode-linux:linux.uml
+
+clients: $(CLIENTS)/node_modules/made.stamp
+
+$(CLIENTS)/node_modules/made.stamp: $(CLIENTS)/package-lock.json | packages
+	@echo "Installing the clients of the wire tests that come from npm"
+	@$(QUIETLY) npm --prefix $(CLIENTS) ci --no-audit --no-fund
+	@touch $@
 endif
 
 bench: $(VENV)/dev.stamp packages ## print the measured figures
@@ -134,5 +142,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test unit wire lab packages bench check check-style check-format check-types check-imports \
+.PHONY: demo test unit wire lab packages clients bench check check-style check-format check-types check-imports \
   format setup lock wheel clean help

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-import asyncio
 import gc
+from contextlib import AsyncExitStack
 from pathlib import Path
 
+from bridge import clock
 from bridge.config import Site
 from bridge.errors import OperationFailed
 from bridge.mirror.client import MirrorClient
+from bridge.mirror.endpoint import socket_endpoint
 from bridge.northbound.opcua.server import OpcUaServer
 
 
 async def run_opcua(site: Site) -> None:
-    """Serve until cancelled, or until the bus process comes back with another set of points."""
+    """Serve until cancelled.
+
+    Raises ``PointsChanged`` where the bus process comes back with other points: this front has to
+    start anew then.
+    """
     if site.opcua is None:
         raise OperationFailed("the site file has no [opcua] table")
-    async with MirrorClient(Path(site.site.runtime_dir)) as mirror:
+    async with AsyncExitStack() as stack:
+        mirror = MirrorClient(socket_endpoint(Path(site.site.runtime_dir), site.site.name), clock.now)
+        await mirror.open()
+        stack.push_async_callback(mirror.close)
         server = OpcUaServer(mirror, site.opcua, Path(site.site.state_dir), site.site.name)
         await server.start()
+        stack.push_async_callback(server.close)
         gc.collect()
         gc.freeze()
-        try:
-            await mirror.until_changed()
-        finally:
-            await server.close()
-        await asyncio.sleep(0)
+        await mirror.run()

@@ -18,6 +18,7 @@ from bridge.errors import BridgeError, Fault, FileFaults
 from bridge.eventlog import EventLog
 from bridge.fronts import Front
 from bridge.mapping import Family, load_family
+from bridge.mirror.endpoint import socket_endpoint
 from bridge.mirror.publisher import MirrorPublisher
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.zenoh.session import ZenohServer
@@ -77,7 +78,8 @@ def make_bus(table: BusTable) -> Bus:
 class Service:
     """The bus process of one site.
 
-    ``make_bus`` opens the buses; ``front_arguments`` is how a front process of this site is started.
+    ``make_bus`` gives the buses; without ``fronts`` this process serves Modbus and zenoh alone, and
+    whoever started it looks after the fronts.
     """
 
     def __init__(self, project: Project, make_bus: MakeBus = make_bus, *, fronts: bool = True) -> None:
@@ -94,7 +96,8 @@ class Service:
             if site.zenoh
             else None
         )
-        self.mirror = MirrorPublisher(self.plant, Path(site.site.runtime_dir), clock.now, clock.epoch_ns)
+        endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
+        self.mirror = MirrorPublisher(self.plant, endpoint, clock.now, clock.epoch_ns)
         self.fronts: list[Front] = []
         if fronts and site.opcua:
             self.fronts.append(Front("opcua", ["run", str(project.path), "--role", "opcua"]))
@@ -111,9 +114,8 @@ class Service:
             if self.zenoh:
                 await self.zenoh.start()
                 stack.push_async_callback(self.zenoh.close)
-            if self.fronts:
-                await self.mirror.start()
-                stack.push_async_callback(self.mirror.close)
+            await self.mirror.start()
+            stack.push_async_callback(self.mirror.close)
             await self.master.start()
             stack.push_async_callback(self._stop_drives)
             # What is there now stays: the collector need not look at it again and again.

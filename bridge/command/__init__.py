@@ -1,7 +1,8 @@
 """Who may command which drive, what is sent to it, and what happens when the controller falls silent."""
 
+from bridge.command.drive import Drive, Identification
 from bridge.command.event import Event, Kind
-from bridge.command.plant import Drive, Identification, Node, Plant
+from bridge.command.plant import Node, Plant
 from bridge.command.request import Action, Code, Identity, Outcome, Reply, Request, Role, Source
 
 __all__ = [

@@ -33,6 +33,7 @@ class Link:
         "_downtime_s",
         "_expired_at",
         "_hold_s",
+        "_judged_at",
         "_since",
         "last_pdo",
         "node",
@@ -45,8 +46,9 @@ class Link:
         self.node = NodeState.ABSENT
         self.pdo_deadline_s: float | None = None
         self.last_pdo: float | None = None
-        self._since: float | None = None  # since when TPDOs may be expected
+        self._since = float("-inf")  # since when TPDOs may be expected
         self._expired_at: float | None = None
+        self._judged_at = float("-inf")
 
     @property
     def ignores_errors(self) -> bool:
@@ -54,7 +56,7 @@ class Link:
 
     @property
     def is_expired(self) -> bool:
-        """The telegram downtime has passed without a TPDO."""
+        """The telegram downtime has passed without a TPDO, or the node is lost."""
         return self._expired_at is not None
 
     @property
@@ -62,28 +64,45 @@ class Link:
         """Whether enabling commands may go to the drive."""
         if self.ignores_errors:
             return self.node in (NodeState.OPERATIONAL, NodeState.LOST)
-        return self.node is NodeState.OPERATIONAL and not self.is_expired
+        return self.node is NodeState.OPERATIONAL and self._expired_at is None
 
-    def on_pdo(self, now: float) -> None:
+    def on_pdo(self, now: float) -> bool:
+        """A TPDO arrived; True where that ends an expiry."""
         self.last_pdo = now
-        if self.node is not NodeState.LOST:
-            self._expired_at = None
+        if self._expired_at is None or self.node is NodeState.LOST:
+            return False
+        self._expired_at = None
+        return True
 
     def on_node(self, state: NodeState, now: float) -> None:
-        if state is NodeState.OPERATIONAL and self.node is not NodeState.OPERATIONAL:
-            self._since = now
-            self._expired_at = None
-        if state is NodeState.LOST and self.node is not NodeState.LOST:
-            self._expired_at = now if self._expired_at is None else self._expired_at
-        self.node = state
+        before, self.node = self.node, state
+        if state is before:
+            return
+        match state:
+            case NodeState.OPERATIONAL:
+                self._since = now
+                self._expired_at = None
+            case NodeState.LOST:
+                self._expired_at = now if self._expired_at is None else self._expired_at
+            case NodeState.DISABLED:  # what it said before says nothing about when it is back
+                self.last_pdo = None
+                self._expired_at = None
+            case _:
+                pass
 
     def on_time(self, now: float) -> bool:
         """Judge the telegram downtime; True at the moment it expires."""
+        self._judged_at = max(now, self._judged_at)
         limit = self._downtime_deadline()
-        if limit is None or now < limit or self.is_expired:
+        if limit is None or now < limit or self._expired_at is not None:
             return False
         self._expired_at = now
         return True
+
+    def _stale_deadline(self) -> float | None:
+        if self.node is not NodeState.OPERATIONAL or self.pdo_deadline_s is None:
+            return None
+        return self._last_sign() + self.pdo_deadline_s
 
     def _downtime_deadline(self) -> float | None:
         if self.node is not NodeState.OPERATIONAL or self.pdo_deadline_s is None or self._downtime_s == 0:
@@ -93,40 +112,44 @@ class Link:
         return self._last_sign() + max(downtime_s, self.pdo_deadline_s)
 
     def _last_sign(self) -> float:
-        return max(self.last_pdo or 0.0, self._since or 0.0)
+        return self._since if self.last_pdo is None else max(self.last_pdo, self._since)
 
     def quality(self, now: float) -> Quality:
-        match self.node:
-            case NodeState.DISABLED:
-                return Quality.DISABLED
-            case NodeState.CONFIG_ERROR:
-                return Quality.CONFIG_ERROR
-            case _:
-                pass
-        if self.last_pdo is None:
+        """The quality that the drive's data have at ``now``."""
+        node, last_pdo = self.node, self.last_pdo
+        if node is NodeState.DISABLED:
+            return Quality.DISABLED
+        if node is NodeState.CONFIG_ERROR:
+            return Quality.CONFIG_ERROR
+        if last_pdo is None:
             return Quality.WAITING
         if self._expired_at is not None:
             return Quality.DEAD if now >= self._expired_at + self._hold_s else Quality.LOST
-        if self.node is not NodeState.OPERATIONAL or self.last_pdo < (self._since or 0.0):
+        if node is not NodeState.OPERATIONAL or last_pdo < self._since:
             return Quality.STALE
-        if self.pdo_deadline_s is not None and now >= self._last_sign() + self.pdo_deadline_s:
+        if self.pdo_deadline_s is not None and now >= last_pdo + self.pdo_deadline_s:
             return Quality.STALE
         return Quality.GOOD
 
-    def next_deadline(self, now: float) -> float | None:
-        """When the quality or the expiry changes by itself, or None."""
+    def reason(self, quality: Quality) -> str:
+        """Why the data have this quality, in a few words; empty where they are good."""
+        if quality is Quality.GOOD:
+            return ""
+        if self.node is not NodeState.OPERATIONAL:
+            return f"node {self.node.value}"
+        return "no process data from the drive"
+
+    def next_deadline(self) -> float | None:
+        """When the quality or the expiry changes by itself, beyond what ``on_time`` has judged."""
         if self._expired_at is not None:
-            dead = self._expired_at + self._hold_s
-            return dead if now < dead else None
-        candidates: list[float] = []
-        if self.node is NodeState.OPERATIONAL and self.pdo_deadline_s is not None:
-            candidates.append(self._last_sign() + self.pdo_deadline_s)
-        downtime = self._downtime_deadline()
-        if downtime is not None:
-            candidates.append(downtime)
-        later = [deadline for deadline in candidates if deadline > now]
-        return min(later) if later else None
+            times = (self._expired_at + self._hold_s,)
+        else:
+            times = (self._stale_deadline(), self._downtime_deadline())
+        ahead = [time for time in times if time is not None and time > self._judged_at]
+        return min(ahead) if ahead else None
 
     def age_ms(self, now: float) -> int:
         """Age of the last TPDO; 0xFFFFFFFF where there was none."""
-        return 0xFFFF_FFFF if self.last_pdo is None else min(round((now - self.last_pdo) * 1000), 0xFFFF_FFFE)
+        if self.last_pdo is None:
+            return 0xFFFF_FFFF
+        return min(max(0, round((now - self.last_pdo) * 1000)), 0xFFFF_FFFE)

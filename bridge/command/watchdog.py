@@ -70,9 +70,9 @@ TABLE: Final[dict[tuple[WatchdogState, Stimulus], tuple[WatchdogState, Effect]]]
     (_TRIP, Stimulus.INVALID): (_TRIP, Effect.REFUSE),
     (_TRIP, Stimulus.EXPIRED): (_TRIP, Effect.NOTHING),
     (_TRIP, Stimulus.ACKNOWLEDGED): (_RUN, Effect.CLEAR),
-    # Who gives control back or takes it over does not take the fault away with it.
-    (_TRIP, Stimulus.RELEASED): (_TRIP, Effect.NOTHING),
-    (_TRIP, Stimulus.OWNER_CHANGED): (_TRIP, Effect.NOTHING),
+    # Who gives control back or takes it over does not take the fault away with it (docs/adr/0009).
+    (_TRIP, Stimulus.RELEASED): (_TRIP, Effect.STOP),
+    (_TRIP, Stimulus.OWNER_CHANGED): (_TRIP, Effect.STOP),
     (_TRIP, Stimulus.STARTED): (_IDLE, Effect.STOP),
 }
 
@@ -84,33 +84,41 @@ class Watchdog:
     -0.1) the state stays OFF and an expiry is told once by ``on_time`` and does nothing else.
     """
 
-    __slots__ = ("_deadline", "_report_only", "_silent", "_timeout_s", "state")
+    __slots__ = ("_deadline", "_report_only", "_silent", "state", "timeout_ms")
 
     def __init__(self, timeout_ms: int, *, report_only: bool = False) -> None:
-        self._timeout_s = timeout_ms / 1000
+        self.timeout_ms = timeout_ms
         self._report_only = report_only
         self._deadline: float | None = None
         self._silent = False
-        self.state = WatchdogState.OFF if report_only or not timeout_ms else WatchdogState.IDLE
+        self.state = WatchdogState.IDLE if self._can_trip else WatchdogState.OFF
 
     @property
-    def timeout_ms(self) -> int:
-        return round(self._timeout_s * 1000)
+    def _can_trip(self) -> bool:
+        return self.timeout_ms > 0 and not self._report_only
 
     @property
     def controller_is_silent(self) -> bool:
         """No valid telegram for longer than the time-out, after there had been one."""
         return self._silent
 
-    def set_timeout(self, timeout_ms: int, now: float) -> None:
-        """A new time, from the next telegram on; a trip stays a trip."""
-        self._timeout_s = timeout_ms / 1000
-        if self.state is not WatchdogState.TRIPPED and not self._report_only:
-            running = self.state is WatchdogState.RUNNING
+    def set_timeout(self, timeout_ms: int) -> None:
+        """Another time, counted from the owner's last telegram: setting it is none. A trip stays a trip."""
+        if self._deadline is not None:
+            self._deadline += (timeout_ms - self.timeout_ms) / 1000
+        self.timeout_ms = timeout_ms
+        if not timeout_ms:
+            self._deadline = None
+        self._settle()
+
+    def _settle(self) -> None:
+        """What cannot trip is OFF, what can is not."""
+        if self.state is WatchdogState.TRIPPED:
+            return
+        if not self._can_trip:
             self.state = WatchdogState.OFF
-            if timeout_ms:
-                self.state = WatchdogState.RUNNING if running else WatchdogState.IDLE
-        self._deadline = now + self._timeout_s if timeout_ms and self._deadline is not None else None
+        elif self.state is WatchdogState.OFF:
+            self.state = WatchdogState.IDLE
 
     def left_ms(self, now: float) -> int:
         """Time until the trip; 0 when the timer does not run."""
@@ -126,10 +134,11 @@ class Watchdog:
         self.state, effect = TABLE[self.state, stimulus]
         if stimulus in (Stimulus.TELEGRAM, Stimulus.ACKNOWLEDGED):
             self._silent = False
-            self._deadline = now + self._timeout_s if self._timeout_s else None
+            self._deadline = now + self.timeout_ms / 1000 if self.timeout_ms else None
         elif stimulus in (Stimulus.RELEASED, Stimulus.OWNER_CHANGED, Stimulus.STARTED):
             self._silent = False
             self._deadline = None
+        self._settle()
         return effect
 
     def on_time(self, now: float) -> Effect | None:

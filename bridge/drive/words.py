@@ -41,63 +41,71 @@ class ControlWords:
     """What a control word of this family means and how one is changed. Words are 16-bit integers."""
 
     __slots__ = (
+        "_disable_voltage",
+        "_enable_mask",
+        "_enable_value",
+        "_quick_stop",
+        "_stop",
+        "_valid_mask",
         "acknowledge_mask",
-        "disable_voltage_",
-        "enable_mask",
-        "enable_value",
         "forward",
-        "quick_stop_",
         "ready",
         "reverse",
         "run",
-        "stop_",
         "stopped",
-        "valid_mask",
     )
 
     def __init__(self, model: ControlWord) -> None:
-        self.enable_mask = model.enabling.mask
-        self.enable_value = model.enabling.value
-        self.valid_mask = 0 if model.valid_bit is None else 1 << model.valid_bit
+        self._enable_mask = model.enabling.mask
+        self._enable_value = model.enabling.value
+        self._valid_mask = 0 if model.valid_bit is None else 1 << model.valid_bit
         self.acknowledge_mask = 1 << model.acknowledge_bit
         self.stopped = model.stopped
         self.ready = model.ready
         self.run = model.run
         self.forward = model.forward
         self.reverse = model.reverse
-        self.stop_ = model.stop
-        self.quick_stop_ = model.quick_stop
-        self.disable_voltage_ = model.disable_voltage
+        self._stop = self._bits(model.stop)
+        self._quick_stop = self._bits(model.quick_stop)
+        self._disable_voltage = self._bits(model.disable_voltage)
+
+    def _bits(self, command: Command) -> tuple[int, int]:
+        """Mask and value of a command, without the bits that it would bring to where enabling needs
+        them: a stop lifts no stronger stop that is in force already."""
+        towards = self._enable_mask & ~(command.value ^ self._enable_value)
+        mask = command.mask & ~towards
+        return mask, command.value & mask
 
     def enables(self, word: int) -> bool:
-        return word & self.enable_mask == self.enable_value
+        return word & self._enable_mask == self._enable_value
 
     def is_valid(self, word: int) -> bool:
-        return word & self.valid_mask == self.valid_mask
+        return word & self._valid_mask == self._valid_mask
 
     def acknowledges(self, before: int, after: int) -> bool:
         """Whether the acknowledge bit rises from one word to the next."""
         return bool(after & ~before & self.acknowledge_mask)
 
     def stop(self, word: int) -> int:
-        return self._apply(self.stop_, word)
+        return self._changed(word, self._stop)
 
     def quick_stop(self, word: int) -> int:
-        return self._apply(self.quick_stop_, word)
+        return self._changed(word, self._quick_stop)
 
     def disable_voltage(self, word: int) -> int:
-        return self._apply(self.disable_voltage_, word)
+        return self._changed(word, self._disable_voltage)
 
-    def _apply(self, command: Command, word: int) -> int:
-        """``word`` with the command's bits. What is not about moving stays (parameter set, functions),
-        but the acknowledge bit falls: a stop must not acknowledge anything."""
-        return (word & ~command.mask | command.value) & ~self.acknowledge_mask & 0xFFFF | self.valid_mask
+    def _changed(self, word: int, bits: tuple[int, int]) -> int:
+        """``word`` with these bits. What is not about moving stays (parameter set, functions), but the
+        acknowledge bit falls: a stop must not acknowledge anything."""
+        mask, value = bits
+        return (word & ~mask | value) & ~self.acknowledge_mask & 0xFFFF | self._valid_mask
 
 
 class StatusWords:
     """Decodes status words of this family."""
 
-    __slots__ = ("_fault_mask", "_fault_value", "_states")
+    __slots__ = ("_decoded", "_fault_mask", "_fault_value", "_relevant", "_states")
 
     def __init__(self, model: StatusWord) -> None:
         self._states = tuple(
@@ -106,10 +114,22 @@ class StatusWords:
         self._fault_mask, self._fault_value = next(
             (mask, value) for mask, value, state in self._states if state is DriveState.FAULT
         )
+        self._relevant = 0
+        for mask, _, _ in self._states:
+            self._relevant |= mask
+        self._decoded: dict[int, DriveState] = {}
 
     def state(self, word: int) -> DriveState:
+        """The first state whose pattern ``word`` matches. Each combination is looked up once."""
+        bits = word & self._relevant
+        state = self._decoded.get(bits)
+        if state is None:
+            state = self._decoded[bits] = self._look_up(bits)
+        return state
+
+    def _look_up(self, bits: int) -> DriveState:
         for mask, value, state in self._states:
-            if word & mask == value:
+            if bits & mask == value:
                 return state
         return DriveState.UNKNOWN
 

@@ -29,6 +29,10 @@ class Feed:
     def mark(self, index: int) -> None:
         self._dirty[index] = None
 
+    def mark_all(self, indices: dict[int, None]) -> None:
+        """Mark the keys of ``indices``; one that is waiting already keeps its place."""
+        self._dirty.update(indices)
+
     def take(self, most: int) -> list[int]:
         """Up to ``most`` changed points, longest waiting first; they count as seen from now on."""
         if len(self._dirty) <= most:
@@ -48,6 +52,7 @@ class Image:
     """Values by point index. Writers ``set``, readers read or follow a ``Feed``.
 
     The list of points never changes while the image lives: a drive that is lost keeps its points.
+    Kept as columns, because a PDO changes many values and few qualities.
     """
 
     def __init__(self, points: Iterable[Point]) -> None:
@@ -55,7 +60,11 @@ class Image:
         self.index: dict[str, int] = {point.name: i for i, point in enumerate(self.points)}
         if len(self.index) != len(self.points):
             raise ValueError("two points have the same name")
-        self._readings = [Reading(point.data_type.zero, Quality.WAITING, 0.0, "") for point in self.points]
+        count = len(self.points)
+        self._values: list[Value] = [point.data_type.zero for point in self.points]
+        self._qualities = [Quality.WAITING] * count
+        self._times = [0.0] * count
+        self._reasons = [""] * count
         self._feeds: list[Feed] = []
 
     def feed(self) -> Feed:
@@ -68,24 +77,43 @@ class Image:
         self._feeds.remove(feed)
 
     def __getitem__(self, index: int) -> Reading:
-        return self._readings[index]
+        return Reading(self._values[index], self._qualities[index], self._times[index], self._reasons[index])
 
     def read(self, name: str) -> Reading:
         """The present state of the named point. Raises KeyError where there is none."""
-        return self._readings[self.index[name]]
+        return self[self.index[name]]
 
     def set(
         self, index: int, value: Value, now: float, quality: Quality = Quality.GOOD, reason: str = ""
     ) -> None:
         """Store a value with its source time. Storing what is there already changes nothing."""
-        old = self._readings[index]
-        if old.value == value and old.quality is quality and old.reason == reason:
+        if (
+            self._values[index] == value
+            and self._qualities[index] is quality
+            and self._reasons[index] == reason
+        ):
             return
-        self._readings[index] = Reading(value, quality, now, reason)
+        self._values[index] = value
+        self._qualities[index] = quality
+        self._times[index] = now
+        self._reasons[index] = reason
         for feed in self._feeds:
             feed.mark(index)
+
+    def set_values(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:
+        """Store values of points whose quality stays as it is; ``indices`` and ``values`` go together."""
+        held, times = self._values, self._times
+        changed: dict[int, None] = {}
+        for index, value in zip(indices, values, strict=True):
+            if held[index] != value:
+                held[index] = value
+                times[index] = now
+                changed[index] = None
+        if changed:
+            for feed in self._feeds:
+                feed.mark_all(changed)
 
     def judge(self, indices: Sequence[int], quality: Quality, now: float, reason: str = "") -> None:
         """Give these points another quality and keep their values."""
         for index in indices:
-            self.set(index, self._readings[index].value, now, quality, reason)
+            self.set(index, self._values[index], now, quality, reason)

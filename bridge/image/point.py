@@ -88,9 +88,7 @@ class Point:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise ValueError(f"{self.name} takes a number")
         if kind is DataType.FLOAT:
-            if not math.isfinite(value):
-                raise ValueError(f"{self.name} takes a finite number")
-            return self._in_range(float(value))
+            return self._in_range(self._finite(value))
         if isinstance(value, float) and not value.is_integer():
             raise ValueError(f"{self.name} takes a whole number")
         number = int(value)
@@ -98,11 +96,22 @@ class Point:
             number &= 0xFFFF
         low, high = INTEGER_RANGE[kind]
         if not low <= number <= high:
-            raise ValueError(f"{self.name} takes {low}…{high}, not {number}")
+            raise ValueError(f"{self.name} takes {low}…{high}")
         return self._in_range(number)
 
+    def _finite(self, value: int | float) -> float:
+        try:
+            number = float(value)
+        except OverflowError:  # an integer of more than 308 digits
+            number = math.inf
+        if not math.isfinite(number):
+            raise ValueError(f"{self.name} takes a finite number")
+        return number
+
     def _in_range(self, number: int | float) -> int | float:
-        if (self.low is not None and number < self.low) or (self.high is not None and number > self.high):
+        low = -math.inf if self.low is None else self.low
+        high = math.inf if self.high is None else self.high
+        if not low <= number <= high:
             unit = f" {self.unit}" if self.unit else ""
-            raise ValueError(f"{self.name} takes {self.low:g}…{self.high:g}{unit}, not {number:g}")
+            raise ValueError(f"{self.name} takes {low:g}…{high:g}{unit}, not {number:g}")
         return number

@@ -11,10 +11,13 @@ from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
+from bridge.config.model import Name
 from bridge.image import DataType
 
 _OBJECT: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})")
 _PATTERN: Final = re.compile(r"[01X]{1,16}")
+_CODE: Final = re.compile(r"[0-9A-F]{4}|[0-9A-F]{2}xx")
+_NUMBER: Final = re.compile(r"\d+\.\d")
 
 
 class Table(BaseModel):
@@ -47,11 +50,26 @@ def _pattern(text: str) -> str:
     return text
 
 
+def _code(text: str) -> str:
+    if not _CODE.fullmatch(text):
+        raise ValueError("must be four hexadecimal digits in capitals, or two and xx for the group")
+    return text
+
+
+def _number(text: str) -> str:
+    if not _NUMBER.fullmatch(text):
+        raise ValueError('must be a fault number with one decimal, such as "10.3"')
+    return text
+
+
 Ref = Annotated[ObjectRef, BeforeValidator(_object)]
 Pattern = Annotated[str, AfterValidator(_pattern)]
 Word = Annotated[int, Field(ge=0, le=0xFFFF)]
 Bit = Annotated[int, Field(ge=0, le=15)]
+Bits = Annotated[list[str], Field(max_length=16, description="names of the bits from bit 0 on")]
 Kind = Annotated[DataType, Field(strict=False)]
+EmcyCode = Annotated[str, AfterValidator(_code)]
+FaultNumber = Annotated[str, AfterValidator(_number)]
 
 
 def pattern_bits(pattern: str) -> tuple[int, int]:
@@ -83,13 +101,13 @@ class Pdo(Table):
 
     number: int = Field(ge=1, le=512)
     cob_id: int = Field(ge=0, le=0x7FF, description="without the node id, such as 0x200")
-    objects: list[list[Ref]]
+    objects: list[Annotated[list[Ref], Field(min_length=1)]]
 
 
 class Slot(Table):
     """One drive of the node."""
 
-    name: str
+    name: Name
     rpdo: Pdo
     tpdo: Pdo
     emcy_drive: int | None = Field(None, description="the value of the EMCY drive byte for this drive")
@@ -101,8 +119,8 @@ class Slot(Table):
 class Process(Table):
     """Names of the words in the order they stand in the PDOs."""
 
-    rpdo: list[str]
-    tpdo: list[str]
+    rpdo: list[Name] = Field(min_length=1, description="control_word, then the setpoint words")
+    tpdo: list[Name] = Field(min_length=1, description="status_word, then the words of actual values")
     exact_length: bool = Field(False, description="true where a PDO of any other length is not evaluated")
 
 
@@ -117,12 +135,17 @@ class Scale(Table):
 class ScaledValue(Table):
     """A value with a unit beside the raw word it is made from."""
 
-    name: str
+    name: Name
     group: Literal["command", "actual"]
     word: str
     scale: Scale
     unit: str
     description: str = ""
+
+    @property
+    def leaf(self) -> str:
+        """Its name below the drive, such as ``actual/frequency``."""
+        return f"{self.group}/{self.name}"
 
 
 class Command(Table):
@@ -133,7 +156,7 @@ class Command(Table):
 
 
 class ControlWord(Table):
-    bits: list[str]
+    bits: Bits
     valid_bit: Bit | None = Field(None, description="must be 1 or the drive ignores the telegram")
     acknowledge_bit: Bit
     enabling: Command = Field(description="a word with these bits makes the drive move")
@@ -162,7 +185,7 @@ class State(Table):
 
 
 class StatusWord(Table):
-    bits: list[str]
+    bits: Bits
     state: list[State]
 
 
@@ -181,7 +204,7 @@ class Parameter(Table):
 class Poll(Table):
     """An object of the node that is read again and again and shown as a point of the node."""
 
-    name: str
+    name: Name
     object: Ref
     data_type: Kind
     every_ms: int = Field(ge=100)
@@ -191,7 +214,12 @@ class Poll(Table):
 
 class EmcyTable(Table):
     drive_byte: int | None = Field(None, ge=2, le=7, description="byte that says which drive it is about")
-    codes: dict[str, str] = Field(description="EMCY code in hexadecimal to text; xx matches any")
+    codes: dict[EmcyCode, str] = Field(description="EMCY code in hexadecimal to text; xx matches any")
+
+    def text(self, code: int) -> str:
+        """The text of an EMCY code, or of its group."""
+        name = f"{code:04X}"
+        return self.codes.get(name) or self.codes.get(f"{name[:2]}xx") or "unknown code"
 
 
 class FaultNumbers(Table):
@@ -202,7 +230,7 @@ class FaultNumbers(Table):
     telegram_downtime: float
     node_missing: float
     prefix: str = ""
-    texts: dict[str, str]
+    texts: dict[FaultNumber, str]
 
 
 class Family(Table):

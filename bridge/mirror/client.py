@@ -90,6 +90,13 @@ class MirrorClient:
 
     async def open(self) -> None:
         """Connect and wait for the first snapshot, however long the bus process takes."""
+        try:
+            await self._connect()
+        except BaseException:
+            await self._link.close()
+            raise
+
+    async def _connect(self) -> None:
         await self._link.open()
         self._link.declare_subscriber(protocol.DELTA, self._on_delta)
         self._link.declare_subscriber(protocol.EVENT, self._on_event)

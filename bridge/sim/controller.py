@@ -78,10 +78,12 @@ class Controller:
 
 def run_controller(endpoint: str, drive_key: str, frequency_hz: float) -> None:
     """Connect to the bridge at ``endpoint`` (``tcp/127.0.0.1:7447``) and move the drive until killed."""
-    config = zenoh.Config()
-    config.insert_json5("mode", '"client"')
-    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
-    config.insert_json5("scouting/multicast/enabled", "false")
+    settings = {
+        "mode": "client",
+        "connect": {"endpoints": [endpoint]},
+        "scouting": {"multicast": {"enabled": False}},
+    }
+    config = zenoh.Config.from_json5(json.dumps(settings))
     while True:
         try:
             with zenoh.open(config) as session:

@@ -190,13 +190,15 @@ def _error_control(table: NodeTable, result: BootResult) -> Generator[Action, by
     wanted.sort(key=lambda item: any(item[1]))
     for index, data in wanted:
         have = yield from _optional(index)
-        if have is None:
-            if any(data):
-                raise BootError(f"the node has no {index:04X}h: {table.supervision} is not possible")
+        if have == data or (have is None and not any(data)):
             continue
-        if have != data:
+        try:
             yield Write(index, 0, data)
-            result.notes.append(f"{index:04X}h was {_number(have)}, is {_number(data)} now")
+        except SdoError as error:
+            if not error.by_server:
+                raise
+            raise BootError(f"{table.supervision} is not possible: {error}") from None
+        result.notes.append(f"{index:04X}h was {_number(have)}, is {_number(data)} now")
 
 
 def _read_plan(node: Node, drive: Drive, result: BootResult) -> Generator[Action, bytes | None, DrivePlan]:

@@ -239,7 +239,7 @@ class ZenohLink:
         origin = zenoh.Locality.REMOTE if from_others else zenoh.Locality.ANY
 
         def on_sample(sample: zenoh.Sample) -> None:
-            if sample.kind is zenoh.SampleKind.PUT:
+            if sample.kind == zenoh.SampleKind.PUT:
                 self._inbox.take_in(partial(handler, to_message(sample)))
 
         def declare(session: zenoh.Session) -> None:
@@ -252,7 +252,7 @@ class ZenohLink:
         """``handler(key, is_alive)`` for each token there is and each that comes or goes."""
 
         def on_sample(sample: zenoh.Sample) -> None:
-            self._inbox.take_in(partial(handler, str(sample.key_expr), sample.kind is zenoh.SampleKind.PUT))
+            self._inbox.take_in(partial(handler, str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
 
         def declare(session: zenoh.Session) -> None:
             callback = zenoh.handlers.Callback(on_sample, indirect=False)

@@ -82,7 +82,7 @@ class Session(asyncio.Protocol):
         self._go_on()
 
     def pause_writing(self) -> None:
-        pass
+        self._stalled = asyncio.get_running_loop().call_later(STALL_LIMIT_S, self._drop_stalled)
 
     def resume_writing(self) -> None:
         if self._stalled:

@@ -16,16 +16,22 @@ from asyncua.ua.attribute_ids import AttributeIds
 from asyncua.ua.object_ids import ObjectIds
 from asyncua.ua.status_codes import StatusCodes
 from asyncua.ua.uaerrors import UaError, UaStatusCodeError
+
+# Not `ua.DataChangeFilter`, which is a subclass that nothing decoded is an instance of.
+from asyncua.ua.uaprotocol_auto import DataChangeFilter
 from cryptography import x509
 
 __all__ = [
     "GOOD",
     "AttributeIds",
+    "DataChangeFilter",
+    "InvalidSignature",
     "ObjectIds",
     "ServiceError",
     "StatusCodes",
     "UaError",
     "UaStatusCodeError",
+    "change",
     "data_value",
     "first_certificate",
     "get",
@@ -53,11 +59,15 @@ _T = TypeVar("_T")
 
 
 def make(structure: Callable[..., _T], **fields: object) -> _T:
-    """One of asyncua's structures with these fields set."""
-    made = structure()
+    """A new one of asyncua's structures with these fields set."""
+    return change(structure(), **fields)
+
+
+def change(structure: _T, **fields: object) -> _T:
+    """The same structure with these fields set."""
     for name, value in fields.items():
-        setattr(made, name, value)
-    return made
+        setattr(structure, name, value)
+    return structure
 
 
 def get(structure: object, name: str) -> Any:
@@ -68,6 +78,9 @@ def get(structure: object, name: str) -> Any:
 def first_certificate(content: bytes | None) -> x509.Certificate | None:
     """The first certificate of a chain in DER, None for nothing. Raises ValueError for anything else."""
     return get(uacrypto, "x509_from_der")(content)
+
+
+InvalidSignature: type[Exception] = get(uacrypto, "InvalidSignature")
 
 
 def text(words: str) -> ua.LocalizedText:

@@ -4,32 +4,47 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import struct
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Final
 
+from cryptography.hazmat.primitives.asymmetric.padding import MGF1, OAEP
+from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
+from cryptography.hazmat.primitives.hashes import SHA1, SHA256
+
 from bridge.command.request import Identity, Role, Source
 from bridge.config import OpcUaTable, UserTable
 from bridge.errors import Fault, FileFaults
 from bridge.northbound.opcua.certificates import TrustedCertificates, fingerprint
-from bridge.northbound.opcua.library import ServiceError, StatusCodes, first_certificate, ua
+from bridge.northbound.opcua.library import ServiceError, StatusCodes, first_certificate, get, ua
 from bridge.northbound.opcua.passwords import hash_password, is_password_hash, verify_password
 
-__all__ = ["CheckedPolicy", "Users", "hash_password", "security_policies", "verify_password"]
+__all__ = [
+    "CheckedPolicy",
+    "Users",
+    "hash_password",
+    "read_password",
+    "security_policies",
+    "verify_password",
+]
 
 _log = logging.getLogger(__name__)
 
 ANONYMOUS: Final = "anonymous"
 _LONGEST_PASSWORD: Final = 1024
+_MOST_BLOCKS: Final = 8
+"""A password of that length, encrypted, with room for the nonce."""
 
 
 def security_policies(settings: OpcUaTable) -> list[ua.SecurityPolicyType]:
-    """The endpoints to offer, the safest first. Signing alone is not offered: passwords and commands
+    """The endpoints to offer; the first is also the one that passwords on an open channel are
+    encrypted by, and the one every client knows. Signing alone is not offered: passwords and commands
     would cross the network for everyone to read."""
     policies = [
-        ua.SecurityPolicyType.Aes256Sha256RsaPss_SignAndEncrypt,
         ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt,
+        ua.SecurityPolicyType.Aes256Sha256RsaPss_SignAndEncrypt,
     ]
     if settings.no_security:
         policies.append(ua.SecurityPolicyType.NoSecurity)
@@ -69,6 +84,51 @@ class CheckedPolicy:
             _log.warning("refused the certificate of %s, SHA-256 %s: %s", name, fingerprint(certificate), why)
             # Part 4 §6.1.3: the client is not told more than this.
             raise ServiceError(StatusCodes.BadSecurityChecksFailed)
+
+
+_OAEP: Final = {
+    "http://www.w3.org/2001/04/xmlenc#rsa-oaep": SHA1,
+    "http://opcfoundation.org/UA/security/rsa-oaep-sha2-256": SHA256,
+}
+"""How a password may be encrypted. RSA 1.5 is not among them: its padding tells on the key's owner."""
+
+_LENGTH: Final = struct.Struct("<I")
+
+
+def read_password(token: object, nonce: bytes, key: RSAPrivateKey, *, encrypted: bool) -> str:
+    """The password of a UserNameIdentityToken (Part 4 §7.40.2.2).
+
+    ``nonce`` is the server's last one to this session: a password heard once cannot be sent again.
+    ``encrypted`` says whether the channel is; in clear text it is not taken on one that is not.
+    Raises ServiceError.
+    """
+    content: bytes = get(token, "Password") or b""
+    algorithm: str | None = get(token, "EncryptionAlgorithm")
+    if algorithm:
+        if algorithm not in _OAEP:
+            raise ServiceError(StatusCodes.BadIdentityTokenRejected)
+        content = _decrypt(content, key, _OAEP[algorithm]())
+        (length,) = _LENGTH.unpack_from(content.ljust(_LENGTH.size, b"\0"))
+        content = content[_LENGTH.size : _LENGTH.size + length]
+        if not nonce or not content.endswith(nonce):
+            raise ServiceError(StatusCodes.BadIdentityTokenInvalid)
+        content = content[: -len(nonce)]
+    elif not encrypted:
+        raise ServiceError(StatusCodes.BadIdentityTokenRejected)
+    try:
+        return content.decode()
+    except UnicodeDecodeError:
+        raise ServiceError(StatusCodes.BadIdentityTokenInvalid) from None
+
+
+def _decrypt(content: bytes, key: RSAPrivateKey, digest: SHA1 | SHA256) -> bytes:
+    size = key.key_size // 8
+    scheme = OAEP(mgf=MGF1(digest), algorithm=digest, label=None)
+    try:
+        blocks = [content[at : at + size] for at in range(0, len(content), size)]
+        return b"".join(key.decrypt(block, scheme) for block in blocks[:_MOST_BLOCKS])
+    except ValueError:
+        raise ServiceError(StatusCodes.BadIdentityTokenInvalid) from None
 
 
 @dataclass(frozen=True, slots=True)

@@ -195,8 +195,9 @@ class Server(InternalServer):
 
     services: Services
 
-    def __init__(self) -> None:
+    def __init__(self, *, no_security: bool) -> None:
         super().__init__()
+        self.no_security = no_security
         # asyncua's own lets `admin` in with any password, as Admin. Logins are checked in the processor.
         self.user_manager = None  # pyright: ignore[reportAttributeAccessIssue]
         self.allow_remote_admin = False

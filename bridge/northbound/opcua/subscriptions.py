@@ -2,7 +2,7 @@
 
 Corrected here (``tests/wire/test_opcua_subscriptions.py``): the publishing interval had no floor, a
 session could change and delete another's subscriptions, ten thousand items held the loop for a
-second to make and for longer to delete.
+second to make and for longer to delete, the absolute deadband lost values and statuses.
 """
 
 from __future__ import annotations
@@ -17,11 +17,20 @@ from asyncua.server.internal_subscription import InternalSubscription
 from asyncua.server.monitored_item_service import (
     MonitoredItemData,
     MonitoredItemService,
-    MonitoredItemValues,
 )
 from asyncua.server.subscription_service import SubscriptionService
 
-from bridge.northbound.opcua.library import AttributeIds, ServiceError, StatusCodes, get, make, status, ua
+from bridge.northbound.opcua.library import (
+    AttributeIds,
+    DataChangeFilter,
+    ServiceError,
+    StatusCodes,
+    change,
+    get,
+    make,
+    status,
+    ua,
+)
 
 LEAST_INTERVAL_MS: Final = 50.0
 MOST_INTERVAL_MS: Final = 3_600_000.0
@@ -33,14 +42,6 @@ _EVENT_QUEUE: Final = 200
 _VALUE_QUEUE: Final = 100
 _UNACKNOWLEDGED: Final = 30
 _BATCH: Final = 50
-
-
-class _SharedValues(MonitoredItemValues):
-    """The last value without a copy of it: a DataValue is never changed once it is made."""
-
-    def set_current_datavalue(self, cur_val: ua.DataValue) -> None:
-        self.old_dvalue = self.current_dvalue
-        self.current_dvalue = cur_val
 
 
 class _Items(MonitoredItemService):
@@ -61,8 +62,7 @@ class _Items(MonitoredItemService):
             most, default = _VALUE_QUEUE, 1
         asked: int = get(get(params, "RequestedParameters"), "QueueSize")
         data.queue_size = min(asked, most) or default
-        data.mvalue = _SharedValues()
-        return make(lambda: result, RevisedQueueSize=data.queue_size), data
+        return change(result, RevisedQueueSize=data.queue_size), data
 
     def _modify_monitored_item(self, params: ua.MonitoredItemModifyRequest) -> ua.MonitoredItemModifyResult:
         data = self._monitored_items.get(get(params, "MonitoredItemId"))
@@ -81,6 +81,29 @@ class _Items(MonitoredItemService):
             RevisedQueueSize=data.queue_size,
         )
 
+    async def datachange_callback(
+        self, handle: int, value: ua.DataValue, error: ua.StatusCode | None = None
+    ) -> None:
+        """A monitored value may have changed.
+
+        asyncua keeps a deep copy of each value and compares with the one before; this keeps the last
+        *reported* one as it is (a DataValue is never changed once it is made), so that a slow drift
+        is reported and no status is swallowed.
+        """
+        if error:
+            await super().datachange_callback(handle, value, error)
+            return
+        number = self._monitored_datachange[handle]
+        data = self._monitored_items[number]
+        if data.mode == ua.MonitoringMode.Disabled:
+            return
+        wanted = data.filter if isinstance(data.filter, DataChangeFilter) else None
+        if not is_reported(data.mvalue.current_dvalue, value, wanted):
+            return
+        data.mvalue.current_dvalue = value
+        notification = make(ua.MonitoredItemNotification, ClientHandle=data.client_handle, Value=value)
+        await self.isub.enqueue_datachange_event(number, notification, data.queue_size)
+
     def _delete_monitored_items(self, mid: int) -> ua.StatusCode:
         data = self._monitored_items.pop(mid, None)
         if data is None:
@@ -95,6 +118,26 @@ class _Items(MonitoredItemService):
             if not items:
                 del self._monitored_events[node]
         return status(StatusCodes.Good)
+
+
+def is_reported(last: ua.DataValue | None, now: ua.DataValue, wanted: DataChangeFilter | None) -> bool:
+    """Whether ``now`` is to be told to a client that was last told ``last`` (Part 4 §7.22.2)."""
+    if last is None or last.StatusCode != now.StatusCode:
+        return True
+    trigger = get(wanted, "Trigger") if wanted else ua.DataChangeTrigger.StatusValue
+    if trigger == ua.DataChangeTrigger.Status:
+        return False
+    if trigger == ua.DataChangeTrigger.StatusValueTimestamp and last.SourceTimestamp != now.SourceTimestamp:
+        return True
+    if last.Value == now.Value:
+        return False
+    if wanted is None or get(wanted, "DeadbandType") != ua.DeadbandType.Absolute:
+        return True
+    before = last.Value.Value if last.Value else None
+    after = now.Value.Value if now.Value else None
+    if not isinstance(before, int | float) or not isinstance(after, int | float):
+        return True
+    return abs(after - before) > get(wanted, "DeadbandValue")
 
 
 class Subscriptions(SubscriptionService):
@@ -115,7 +158,7 @@ class Subscriptions(SubscriptionService):
         asked: float = get(params, "RequestedPublishingInterval")
         # `not >=` puts NaN where the least is, too.
         interval = min(asked, MOST_INTERVAL_MS) if asked >= LEAST_INTERVAL_MS else LEAST_INTERVAL_MS
-        make(lambda: params, RequestedPublishingInterval=interval)
+        change(params, RequestedPublishingInterval=interval)
         result = await super().create_subscription(params, callback, session_id, request_callback)
         subscription = self.subscriptions[get(result, "SubscriptionId")]
         subscription.monitored_item_srv = _Items(subscription, self.aspace)
@@ -143,7 +186,7 @@ class Subscriptions(SubscriptionService):
                 code = status(StatusCodes.BadTooManyMonitoredItems)
                 results += [make(ua.MonitoredItemCreateResult, StatusCode=code) for _ in batch]
                 continue
-            make(lambda: params, ItemsToCreate=batch)
+            change(params, ItemsToCreate=batch)
             results += await super().create_monitored_items(params)
             await asyncio.sleep(0)
         return results

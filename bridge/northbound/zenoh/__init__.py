@@ -1,4 +1,4 @@
-"""The plant under zenoh keys, for everybody: ``docs/reference/zenoh.md``."""
+"""The plant under zenoh keys, for everybody."""
 
 from bridge.northbound.zenoh.session import ZenohServer
 

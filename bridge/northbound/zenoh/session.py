@@ -1,4 +1,8 @@
-"""The zenoh server: values and events out, gets and commands in."""
+"""The zenoh server: values and events out, gets and commands in.
+
+A controller is who it says it is (the query's attachment): without ``user`` and ``password_file``
+whoever reaches the port may command, which is why it listens on loopback unless told otherwise.
+"""
 
 from __future__ import annotations
 
@@ -183,8 +187,10 @@ def _config(settings: ZenohTable) -> zenoh.Config:
 
 def _users(settings: ZenohTable) -> tuple[str, str, str] | None:
     """Our own user with its password, and the file with everybody's. Raises Unavailable."""
-    if settings.user is None or settings.password_file is None:
+    if settings.user is None and settings.password_file is None:
         return None
+    if settings.user is None or settings.password_file is None:
+        raise Unavailable("zenoh: user and password_file belong together; give both or neither")
     try:
         lines = Path(settings.password_file).read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:

@@ -1,18 +1,12 @@
-"""The site file: which buses, nodes and drives there are, and who may see and command them.
-
-Reference for users: ``docs/reference/site-file.md``. Times are in ms unless the name says otherwise.
-"""
+"""What stands in a site file. Times are in ms unless the name says otherwise."""
 
 from __future__ import annotations
 
 import ipaddress
 import re
-from pathlib import Path
 from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
-
-from bridge.tomlfile import Key, TomlFile
 
 Control = Literal["modbus", "opcua", "zenoh", "lease", "none"]
 Reaction = Literal["disable_voltage", "quick_stop", "stop", "silence", "hold"]
@@ -23,7 +17,7 @@ IGNORE_ALL_S: Final = -0.1
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 _PREFIX: Final = re.compile(r"[\w.-]+(/[\w.-]+)*", re.ASCII)
-_RESERVED_NODES: Final = ("bus", "bridge")
+_LOCATOR: Final = re.compile(r"[a-z][a-z0-9-]*/.+")
 
 
 def _name(text: str) -> str:
@@ -63,9 +57,17 @@ def _downtime(seconds: float) -> float:
     raise ValueError("must be -0.1 (ignore), 0 (off) or 0.1…100.0")
 
 
+def _locator(text: str) -> str:
+    if not _LOCATOR.fullmatch(text):
+        raise ValueError("must be a protocol and an address such as tcp/192.168.1.10:7447")
+    return text
+
+
 Name = Annotated[str, AfterValidator(_name)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Network = Annotated[str, AfterValidator(_network)]
+Locator = Annotated[str, AfterValidator(_locator)]
+Full = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class Table(BaseModel):
@@ -92,7 +94,9 @@ class DriveTable(Table):
         "disable_voltage", description="disable_voltage, quick_stop, stop, silence or hold"
     )
     then_silence_ms: int = Field(0, ge=0, le=600_000, description="0 (never) or a time in ms")
-    parameters: dict[str, float] = Field(default_factory=dict[str, float])
+    parameters: dict[str, Full] = Field(
+        default_factory=dict[str, float], description="scaling, where it is not read from the drive"
+    )
 
 
 class IdentityTable(Table):
@@ -164,8 +168,8 @@ class OpcUaTable(Table):
 
 class ZenohTable(Table):
     mode: Literal["peer", "client"] = Field("peer", description="peer or client")
-    listen: list[str] = Field(default_factory=lambda: ["tcp/127.0.0.1:7447"])
-    connect: list[str] = Field(default_factory=list[str])
+    listen: list[Locator] = Field(default_factory=lambda: ["tcp/127.0.0.1:7447"])
+    connect: list[Locator] = Field(default_factory=list[str])
     prefix: Annotated[str, AfterValidator(_prefix)] = "drives"
     encoding: Literal["json", "bare"] = "json"
     accept_put: bool = Field(False, description="true takes a plain put on a command key as a command")
@@ -182,109 +186,3 @@ class Site(Table):
     modbus: ModbusTable | None = None
     opcua: OpcUaTable | None = None
     zenoh: ZenohTable | None = None
-
-
-def load_site(path: Path) -> Site:
-    """Read and check a site file. Raises ``FileFaults`` with every fault in it."""
-    file = TomlFile(path)
-    site = file.validate(Site)
-    if site is not None:
-        _check_names(site, file)
-        _check_buses(site, file)
-        _check_drives(site, file)
-        if site.zenoh and (site.zenoh.user is None) != (site.zenoh.password_file is None):
-            file.fault(("zenoh",), "user and password_file belong together", "give both or neither")
-    file.finish()
-    if site is None:
-        raise AssertionError("a site file without a model always has faults")
-    return site
-
-
-def _check_names(site: Site, file: TomlFile) -> None:
-    """Node names are the first word of every point, so they are unique over all buses."""
-    seen: dict[str, Key] = {}
-    for b, bus in enumerate(site.bus):
-        _unique(seen, f"bus {bus.name}", ("bus", b, "name"), f"bus name {bus.name!r}", file)
-        for n, node in enumerate(bus.node):
-            key: Key = ("bus", b, "node", n, "name")
-            _unique(seen, node.name, key, f"node name {node.name!r}", file)
-            if node.name in _RESERVED_NODES:
-                file.fault(key, f"{node.name!r} is reserved", "choose another name")
-
-
-def _unique(seen: dict[str, Key], name: str, key: Key, what: str, file: TomlFile) -> None:
-    if name in seen:
-        file.fault(key, f"{what} is used twice", f"first used in line {file.line(seen[name])}")
-    else:
-        seen[name] = key
-
-
-def _check_buses(site: Site, file: TomlFile) -> None:
-    for b, bus in enumerate(site.bus):
-        if bus.interface != "virtual" and bus.channel is None:
-            file.fault(("bus", b), f"interface {bus.interface!r} needs a channel", 'such as channel = "can0"')
-        period_ms = bus.rpdo_period_s * 1000
-        if bus.deadman_ms < 2 * period_ms:
-            file.fault(
-                ("bus", b, "deadman_ms"),
-                f"{bus.deadman_ms} ms is too short for process data every {period_ms:g} ms",
-                f"at least {2 * period_ms:g}: the dead-man burst must outlive one lost cycle",
-            )
-        seen: dict[str, Key] = {}
-        for n, node in enumerate(bus.node):
-            key: Key = ("bus", b, "node", n, "id")
-            _unique(seen, str(node.id), key, f"node id {node.id}", file)
-            if node.id == bus.master_node_id and bus.heartbeat_ms:
-                file.fault(key, f"node id {node.id} is the bridge's own", "change it or master_node_id")
-
-
-def _check_drives(site: Site, file: TomlFile) -> None:
-    units: dict[str, Key] = {}
-    for b, bus in enumerate(site.bus):
-        for n, node in enumerate(bus.node):
-            names: dict[str, Key] = {}
-            slots: dict[str, Key] = {}
-            for d, drive in enumerate(node.drive):
-                key: Key = ("bus", b, "node", n, "drive", d)
-                name = drive.name or drive.slot
-                _unique(names, name, (*key, "name"), f"drive name {name!r}", file)
-                _unique(slots, drive.slot, (*key, "slot"), f"slot {drive.slot!r}", file)
-                if name == "node":
-                    file.fault((*key, "name"), "'node' is reserved", "choose another name")
-                if drive.unit_id is not None:
-                    what = f"unit id {drive.unit_id}"
-                    _unique(units, str(drive.unit_id), (*key, "unit_id"), what, file)
-                _check_control(site, drive, key, file)
-
-
-def _check_control(site: Site, drive: DriveTable, key: Key, file: TomlFile) -> None:
-    if drive.control != "none" and drive.fieldbus_timeout_ms is None:
-        file.fault(
-            (*key, "fieldbus_timeout_ms"),
-            "is missing: a drive that can be commanded states how long its controller may be silent",
-            "1…32767 ms, or 0 for no supervision, which is a decision",
-        )
-    if drive.control in ("modbus", "opcua", "zenoh") and getattr(site, drive.control) is None:
-        file.fault(
-            (*key, "control"),
-            f"the drive is controlled by {drive.control}, which this site does not serve",
-            f"add a [{drive.control}] table",
-        )
-
-
-def warnings(site: Site) -> list[str]:
-    """What is allowed and still worth repeating, one sentence each."""
-    found: list[str] = []
-    for bus in site.bus:
-        for node in bus.node:
-            for drive in node.drive:
-                name = f"{node.name}/{drive.name or drive.slot}"
-                if drive.control != "none" and drive.fieldbus_timeout_ms == 0:
-                    found.append(f"{name}: fieldbus_timeout_ms = 0: a silent controller will not stop it")
-                if drive.telegram_downtime_s == IGNORE_ALL_S:
-                    found.append(f"{name}: telegram_downtime_s = -0.1: no communication error will stop it")
-                if drive.on_expiry == "hold" and drive.control != "none":
-                    found.append(f'{name}: on_expiry = "hold": a silent controller is only reported')
-    if site.opcua and site.opcua.no_security:
-        found.append("opcua: no_security = true: anyone who reaches the port reads everything in clear text")
-    return found

@@ -1,0 +1,87 @@
+"""``export``: the interface of a site as a table for those who program against it."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridge import __version__
+from bridge.command import Plant
+from bridge.errors import OperationFailed
+from bridge.image import Point
+from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row, bridge_rows, drive_maps
+from bridge.northbound.zenoh.keys import KeySpace
+from bridge.service import load_project
+
+app = typer.Typer(
+    help="Print what a site serves, for PLC, SCADA and fleet programmers.", no_args_is_help=True
+)
+
+SiteArgument = Annotated[Path, typer.Argument(metavar="SITE", help="the site file")]
+AsJson = Annotated[bool, typer.Option("--json", help="machine-readable")]
+
+_NAMESPACE = "urn:drivebridge:points"
+_POINT = ("type", "unit", "access", "description")
+_MODBUS = ("unit_id", "drive", "table", "address", "reference", "name", *_POINT)
+
+
+@app.command()
+def modbus(site: SiteArgument, as_json: AsJson = False) -> None:
+    """Every register: unit, table, 0-based address, 1-based reference, name, type, access, unit."""
+    plant = _plant(site)
+    rows = [
+        (drive_map.unit_id, drive_map.drive_name, *_register(row))
+        for drive_map in drive_maps(plant)
+        for row in drive_map.rows
+    ]
+    rows += [(BRIDGE_UNITS[0], "bridge", *_register(row)) for row in bridge_rows(plant)]
+    _print(_MODBUS, rows, as_json)
+
+
+def _register(row: Row) -> tuple[object, ...]:
+    place = (row.table.value, row.address, row.reference)
+    return (*place, row.name, row.type, row.access, row.unit, row.description)
+
+
+@app.command()
+def opcua(site: SiteArgument, as_json: AsJson = False) -> None:
+    """Every variable: NodeId, data type, unit, access, description."""
+    rows = [(f"nsu={_NAMESPACE};s={point.name}", *_point(point)) for point in _plant(site).image.points]
+    _print(("node_id", *_POINT), rows, as_json)
+
+
+@app.command()
+def zenoh(site: SiteArgument, as_json: AsJson = False) -> None:
+    """Every key: data type, unit, access, description."""
+    project = load_project(site)
+    if project.site.zenoh is None:
+        raise OperationFailed(f"{site} has no [zenoh] table")
+    points = _plant(site).image.points
+    space = KeySpace(project.site.zenoh.prefix, project.site.site.name, points)
+    rows = [(key, *_point(point)) for key, point in zip(space.keys, points, strict=True)]
+    _print(("key", *_POINT), rows, as_json)
+
+
+def _point(point: Point) -> tuple[object, ...]:
+    return (point.data_type.value, point.unit, "rw" if point.writable else "r", point.description)
+
+
+def _plant(site: Path) -> Plant:
+    project = load_project(site)
+    return Plant(project.site, project.families, __version__)
+
+
+def _print(columns: Sequence[str], rows: Iterable[Sequence[object]], as_json: bool) -> None:
+    """CSV for spreadsheets, or a JSON list of objects."""
+    if as_json:
+        print(json.dumps([dict(zip(columns, row, strict=True)) for row in rows], indent=2))
+        return
+    writer = csv.writer(sys.stdout, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(rows)

@@ -1,0 +1,263 @@
+"""The controller leg of one drive: who commands it, what is asked, and whether the one who asks is there.
+
+Brings authority, watchdog, gate and start together. Requests and time in, outcomes and words out;
+``DriveChannel`` shows the result to others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from bridge.command.authority import Authority
+from bridge.command.event import Kind
+from bridge.command.link import Link
+from bridge.command.output import Gate
+from bridge.command.request import DONE, STOP_ACTIONS, Action, Code, Identity, Outcome, Reply, Request, Role
+from bridge.command.start import StartSequence
+from bridge.command.status import DriveStatus
+from bridge.command.telegram import Refusal, TelegramDecoder
+from bridge.command.watchdog import Effect, Stimulus, Watchdog, WatchdogState
+from bridge.config import DriveTable
+from bridge.drive import FAULTED, ControlWords, LinearScale
+from bridge.image import Quality
+from bridge.mapping.model import Family
+
+_LEASE_MS: Final = (100, 600_000)
+_TIMEOUT_MS: Final = (0, 32767)
+
+Tell = Callable[[float, Kind, int, str], None]
+"""Reports an event: time, kind, severity, sentence."""
+
+
+class ControllerLeg:
+    """``link`` and ``status`` are the drive's, read here; ``outcomes`` waits to be told by the channel."""
+
+    def __init__(
+        self,
+        name: str,
+        family: Family,
+        settings: DriveTable,
+        link: Link,
+        status: DriveStatus,
+        scales: dict[str, LinearScale],
+        tell: Tell,
+    ) -> None:
+        self._settings = settings
+        self._link = link
+        self._status = status
+        self._tell = tell
+        self.authority = Authority(settings.control)
+        self.watchdog = Watchdog(settings.fieldbus_timeout_ms or 0, report_only=link.ignores_errors)
+        self.words = ControlWords(family.control_word)
+        setpoints = len(family.process.rpdo) - 1
+        self.gate = Gate(self.words, setpoints, settings.on_expiry, settings.then_silence_ms)
+        self.outcomes: list[tuple[Reply, Outcome]] = []
+        self.start = StartSequence(self.words, self.gate, self.outcomes)
+        self._decoder = TelegramDecoder(name, family, scales)
+        self.trips = 0
+        self.refused_writes = 0
+
+    @property
+    def owner(self) -> Identity | None:
+        return self.authority.owner
+
+    @property
+    def is_tripped(self) -> bool:
+        return self.watchdog.state is WatchdogState.TRIPPED
+
+    # time
+
+    def judge(self, now: float) -> None:
+        """Is the controller still there?"""
+        effect = self.watchdog.on_time(now)
+        if effect is Effect.REACT:
+            self._trip(now)
+        elif effect is not None and self._link.ignores_errors:
+            self._status.last_fault = self._status.faults.controller_silent
+            self._tell(now, Kind.WATCHDOG, 500, "the controller is silent; ignored (telegram_downtime_s)")
+        if self.authority.lease_is_over(now):
+            self._tell(now, Kind.OWNER, 300, f"the lease of {self.owner} ran out")
+            self.leave(Stimulus.OWNER_CHANGED, now)
+
+    def next_deadlines(self) -> tuple[float | None, ...]:
+        return (
+            self.watchdog.next_deadline(),
+            self.authority.next_deadline(),
+            self.gate.next_deadline(),
+            self.start.next_deadline(),
+        )
+
+    def _trip(self, now: float) -> None:
+        fault = self._status.faults.controller_silent
+        self.gate.trip(now)
+        self.trips += 1
+        self._status.last_fault = fault
+        self.start.end(Outcome(Code.CANCELLED, "the watchdog tripped"))
+        message = (
+            f"{self.owner} was silent for {self.watchdog.timeout_ms} ms: {self._settings.on_expiry}, "
+            f"{self._status.fault_text(fault)}"
+        )
+        self._tell(now, Kind.WATCHDOG, 900, message)
+
+    # requests
+
+    def handle(self, request: Request, now: float, reply: Reply) -> None:
+        """Do what ``request`` asks; exactly one outcome goes to ``outcomes``, now or later."""
+        self.judge(now)
+        try:
+            self._check_authority(request)
+            if request.action is Action.START:
+                self._begin_start(request, now, reply)
+            else:
+                self.outcomes.append((reply, self._carry_out(request, now)))
+        except Refusal as refusal:
+            self.refused_writes += 1
+            message = f"{request.action} by {request.identity} refused: {refusal.message}"
+            self._tell(now, Kind.REFUSED, 300, message)
+            self.outcomes.append((reply, Outcome(refusal.code, refusal.message, forwarded=False)))
+
+    def _check_authority(self, request: Request) -> None:
+        """Raises ``Refusal`` where somebody else controls the drive. Stopping it is every operator's."""
+        identity = request.identity
+        if request.action in STOP_ACTIONS and identity.role >= Role.OPERATOR:
+            return
+        takes = request.action is Action.TAKE_CONTROL
+        judge = self.authority.take_refusal if takes else self.authority.refusal
+        why = judge(identity, owner_is_silent=self.watchdog.controller_is_silent)
+        if why:
+            raise Refusal(Code.NOT_ALLOWED, why)
+
+    def _carry_out(self, request: Request, now: float) -> Outcome:
+        """What is done at once. Raises ``Refusal`` before anything has changed."""
+        match request.action:
+            case Action.WRITE:
+                return self._write(request, now)
+            case Action.KEEP_ALIVE:
+                self._own(request.identity, now)
+                self.watchdog.apply(Stimulus.TELEGRAM, now)
+            case Action.RESET_FAULT:
+                self._own(request.identity, now)
+                self._acknowledge(now, pulse=True)
+            case Action.STOP | Action.QUICK_STOP | Action.DISABLE_VOLTAGE:
+                self._stop(request, now)
+            case Action.TAKE_CONTROL:
+                self._take_control(request, now)
+            case Action.RELEASE_CONTROL:
+                return self._release(request, now)
+            case Action.SET_TIMEOUT:
+                self._set_timeout(request, now)
+            case _:
+                raise Refusal(Code.UNKNOWN_POINT, f"a drive knows no {request.action}")
+        return DONE
+
+    def _write(self, request: Request, now: float) -> Outcome:
+        is_owner = request.identity.is_same(self.owner)
+        # A new owner inherits no setpoints.
+        kept = self.gate.setpoints if is_owner else (0,) * len(self.gate.setpoints)
+        telegram = self._decoder.decode(request.values, kept)
+        word = telegram.control_word
+        if word is not None and not self.words.is_valid(word):
+            self.watchdog.apply(Stimulus.INVALID, now)
+            raise Refusal(Code.NOT_VALID, f"control word {word:04X}h: the bit 'control data valid' is 0")
+        self._own(request.identity, now)
+        if word is not None:
+            self.start.end(Outcome(Code.CANCELLED, "a control word was written meanwhile"))
+            if self.is_tripped and self.words.acknowledges(self.gate.control_word, word):
+                self._acknowledge(now, pulse=False)
+                # The edge itself goes on to the drive; whatever else the word asks has to be asked anew.
+                self.gate.control_word |= self.words.acknowledge_mask
+                return Outcome(Code.OK, "acknowledged; the drive stays stopped", forwarded=False)
+        self.watchdog.apply(Stimulus.TELEGRAM, now)
+        if self.gate.take(word, telegram.setpoints, may_enable=self._link.may_enable):
+            return DONE
+        return Outcome(Code.OK, self.why_blocked(), forwarded=False)
+
+    def why_blocked(self) -> str:
+        if self.is_tripped:
+            return "tripped: acknowledge first"
+        if self._link.is_expired:
+            return self._link.reason(Quality.LOST)
+        if not self._link.may_enable:
+            return f"the drive's node is {self._link.node.value}"
+        return "restart interlock: send a control word that does not enable first"
+
+    def _own(self, identity: Identity, now: float) -> None:
+        """A valid telegram of ``identity``: it owns the drive from now on."""
+        if not identity.is_same(self.owner):
+            self._hand_over(identity, now)
+        self.authority.renew(now)
+
+    def _hand_over(self, identity: Identity, now: float, lease_s: float | None = None) -> None:
+        """Another owner, or a lease taken anew; the drive is stopped where the owner changes."""
+        changes = not identity.is_same(self.owner)
+        if changes and self.owner is not None:
+            self.leave(Stimulus.OWNER_CHANGED, now)
+        self.authority.take(identity, now, lease_s)
+        if changes:
+            self._tell(now, Kind.OWNER, 200, f"controlled by {identity}")
+
+    def _acknowledge(self, now: float, *, pulse: bool) -> None:
+        was_tripped = self.is_tripped
+        self.watchdog.apply(Stimulus.ACKNOWLEDGED, now)
+        self.gate.clear(now, pulse=pulse)
+        if was_tripped:
+            self._tell(now, Kind.WATCHDOG, 200, f"acknowledged by {self.owner}; the drive stays stopped")
+
+    def _take_control(self, request: Request, now: float) -> None:
+        low, high = _LEASE_MS
+        if self.authority.control == "lease" and not low <= request.ttl_ms <= high:
+            raise Refusal(Code.OUT_OF_RANGE, f"ttl_ms takes {low}…{high}")
+        self._hand_over(request.identity, now, request.ttl_ms / 1000)
+
+    def _release(self, request: Request, now: float) -> Outcome:
+        if not request.identity.is_same(self.owner):
+            return Outcome(Code.OK, "not in control")
+        self._tell(now, Kind.OWNER, 200, f"released by {self.owner}")
+        self.leave(Stimulus.RELEASED, now)
+        return DONE
+
+    def leave(self, stimulus: Stimulus, now: float) -> None:
+        """The owner goes; the drive is stopped first."""
+        self.watchdog.apply(stimulus, now)
+        self.gate.stop(self.words.stop(self.gate.sent.words[0]))
+        self.authority.release()
+        self.start.end(Outcome(Code.CANCELLED, "control of the drive has changed"))
+
+    def _set_timeout(self, request: Request, now: float) -> None:
+        if not self._settings.fieldbus_timeout_writable:
+            raise Refusal(Code.NOT_ALLOWED, "the site file does not allow to change fieldbus_timeout_ms")
+        low, high = _TIMEOUT_MS
+        if not low <= request.timeout_ms <= high:
+            raise Refusal(Code.OUT_OF_RANGE, f"fieldbus_timeout_ms takes {low}…{high}")
+        self._own(request.identity, now)
+        self.watchdog.set_timeout(request.timeout_ms)
+        message = f"fieldbus_timeout_ms = {request.timeout_ms}, by {request.identity}"
+        self._tell(now, Kind.CONFIGURATION, 400, message)
+
+    def _stop(self, request: Request, now: float) -> None:
+        """Stop, by whoever asks. The owner's telegrams go on counting, its old enable does not."""
+        if request.identity.is_same(self.owner):
+            self._own(request.identity, now)
+            self.watchdog.apply(Stimulus.TELEGRAM, now)
+        else:
+            self._tell(now, Kind.OWNER, 400, f"{request.action} by {request.identity}")
+        change = {
+            Action.STOP: self.words.stop,
+            Action.QUICK_STOP: self.words.quick_stop,
+            Action.DISABLE_VOLTAGE: self.words.disable_voltage,
+        }[request.action]
+        self.gate.stop(change(self.gate.sent.words[0]))
+        self.start.end(Outcome(Code.CANCELLED, f"{request.action} by {request.identity}"))
+
+    def _begin_start(self, request: Request, now: float, reply: Reply) -> None:
+        bits = {0: 0, 1: self.words.forward, -1: self.words.reverse}.get(request.direction)
+        if bits is None or (request.direction and not bits):
+            raise Refusal(Code.OUT_OF_RANGE, "direction takes 1, -1 (where the drive has it) or 0")
+        if self.is_tripped or self._status.state in FAULTED:
+            raise Refusal(Code.ACKNOWLEDGE_FIRST, "acknowledge first")
+        if not self._link.may_enable:
+            raise Refusal(Code.NOT_READY, self.why_blocked())
+        self._own(request.identity, now)
+        self.watchdog.apply(Stimulus.TELEGRAM, now)
+        self.start.begin(bits, self._status.state, now, reply)

@@ -1,0 +1,42 @@
+"""The site file: which buses, nodes and drives there are, and who may see and command them.
+
+Reference for users: ``docs/reference/site-file.md``.
+"""
+
+from bridge.config.load import load_site, read_site, warnings
+from bridge.config.model import (
+    IGNORE_ALL_S,
+    BusTable,
+    Control,
+    DriveTable,
+    IdentityTable,
+    ModbusTable,
+    NodeTable,
+    OpcUaTable,
+    Reaction,
+    Site,
+    SiteTable,
+    UserTable,
+    WordOrder,
+    ZenohTable,
+)
+
+__all__ = [
+    "IGNORE_ALL_S",
+    "BusTable",
+    "Control",
+    "DriveTable",
+    "IdentityTable",
+    "ModbusTable",
+    "NodeTable",
+    "OpcUaTable",
+    "Reaction",
+    "Site",
+    "SiteTable",
+    "UserTable",
+    "WordOrder",
+    "ZenohTable",
+    "load_site",
+    "read_site",
+    "warnings",
+]

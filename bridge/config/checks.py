@@ -1,0 +1,131 @@
+"""What the keys of a site file say together.
+
+Judged on the raw file, so that these faults are found beside those of single values.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridge.config.model import BusTable
+from bridge.tomlfile import Key, RawTable, TomlFile
+
+_RESERVED_NODES: Final = ("bus", "bridge")
+_PROTOCOLS: Final = ("modbus", "opcua", "zenoh")
+_BUS: Final = BusTable.model_construct()
+"""The defaults."""
+
+
+def check(file: TomlFile) -> None:
+    """Note in ``file`` what does not go together."""
+    nodes, units, channels, names = _Unique(file), _Unique(file), _Unique(file), _Unique(file)
+    for bus in file.root.tables("bus"):
+        names.add(bus, "name", "bus name")
+        _check_bus(bus, channels, file)
+        ids = _Unique(file)
+        for node in bus.tables("node"):
+            nodes.add(node, "name", "node name")
+            ids.add(node, "id", "node id")
+            _check_node(bus, node, file)
+            _check_drives(node, units, file)
+    _check_users(file)
+    _check_ports(file)
+
+
+@dataclass(slots=True)
+class _Unique:
+    """Values that may stand in the file once."""
+
+    file: TomlFile
+    seen: dict[str | int, Key] = field(default_factory=dict[str | int, Key])
+
+    def add(self, table: RawTable, name: str, what: str) -> None:
+        value = table.text(name) if table.text(name) is not None else table.whole(name)
+        if value is not None:
+            self.add_value(value, (*table.key, name), f"{what} {value!r}")
+
+    def add_value(self, value: str | int, key: Key, what: str) -> None:
+        first = self.seen.setdefault(value, key)
+        if first != key:
+            self.file.fault(key, f"{what} is used twice", f"first used in line {self.file.line(first)}")
+
+
+def _check_bus(bus: RawTable, channels: _Unique, file: TomlFile) -> None:
+    interface, channel = bus.text("interface"), bus.text("channel")
+    if interface and interface != "virtual":
+        if "channel" not in bus.content:
+            file.fault(bus.key, f"interface {interface!r} needs a channel", 'such as channel = "can0"')
+        elif channel:
+            key = (*bus.key, "channel")
+            channels.add_value(f"{interface} {channel}", key, f"{interface} channel {channel!r}")
+    sync_ms = _given(bus, "sync_period_ms", _BUS.sync_period_ms)
+    period_s = BusTable.model_construct(
+        sync_period_ms=sync_ms, rpdo_period_ms=bus.whole("rpdo_period_ms")
+    ).rpdo_period_s
+    deadman_ms = _given(bus, "deadman_ms", _BUS.deadman_ms)
+    if deadman_ms < 2000 * period_s:
+        file.fault(
+            (*bus.key, "deadman_ms"),
+            f"{deadman_ms} ms is too short for process data every {1000 * period_s:g} ms",
+            f"at least {2000 * period_s:g}: the dead-man burst must outlive one lost cycle",
+        )
+
+
+def _given(table: RawTable, name: str, default: int) -> int:
+    value = table.whole(name)
+    return default if value is None else value
+
+
+def _check_node(bus: RawTable, node: RawTable, file: TomlFile) -> None:
+    """Node names are the first word of every point."""
+    name, node_id = node.text("name"), node.whole("id")
+    if name in _RESERVED_NODES:
+        file.fault((*node.key, "name"), f"{name!r} is reserved", "choose another name")
+    master = _given(bus, "master_node_id", _BUS.master_node_id)
+    if node_id == master and _given(bus, "heartbeat_ms", _BUS.heartbeat_ms):
+        file.fault((*node.key, "id"), f"node id {node_id} is the bridge's own", "change it or master_node_id")
+
+
+def _check_drives(node: RawTable, units: _Unique, file: TomlFile) -> None:
+    names, slots = _Unique(file), _Unique(file)
+    for drive in node.tables("drive"):
+        slots.add(drive, "slot", "slot")
+        units.add(drive, "unit_id", "unit id")
+        name = drive.text("name") or drive.text("slot")
+        key = (*drive.key, "name")
+        if name == "node":
+            file.fault(key, "'node' is reserved", "choose another name")
+        if name and "name" in drive.content:
+            names.add_value(name, key, f"drive name {name!r}")
+        elif name:
+            names.seen.setdefault(name, key)
+        _check_control(drive, file)
+
+
+def _check_control(drive: RawTable, file: TomlFile) -> None:
+    control = drive.text("control")
+    if control in (*_PROTOCOLS, "lease") and "fieldbus_timeout_ms" not in drive.content:
+        file.fault(
+            (*drive.key, "fieldbus_timeout_ms"),
+            "is missing: a drive that can be commanded states how long its controller may be silent",
+            "1…32767 ms, or 0 for no supervision, which is a decision",
+        )
+    if control in _PROTOCOLS and control not in file.data:
+        file.fault(
+            (*drive.key, "control"),
+            f"the drive is controlled by {control}, which this site does not serve",
+            f"add a [{control}] table",
+        )
+
+
+def _check_users(file: TomlFile) -> None:
+    users = _Unique(file)
+    for user in file.root.table("opcua").tables("user"):
+        users.add(user, "name", "user")
+
+
+def _check_ports(file: TomlFile) -> None:
+    ports = _Unique(file)
+    for name in ("modbus", "opcua"):
+        ports.add(file.root.table(name), "listen", "address")

@@ -1,0 +1,119 @@
+"""Events of the plant as OPC UA events, from the Server object and from the object they are about."""
+
+from __future__ import annotations
+
+import uuid
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Final
+
+from asyncua.common.event_objects import BaseEvent
+
+from bridge.command import Event, Kind
+from bridge.northbound.opcua.library import ObjectIds, make, node_id, text, ua
+from bridge.northbound.opcua.nodes import pascal_case
+from bridge.northbound.opcua.subscriptions import Subscriptions
+from bridge.northbound.opcua.values import source_time
+
+BASE_TYPE: Final = "DriveEventType"
+_BURST: Final = 20
+_PER_SECOND: Final = 10.0
+_WAITING: Final = 200
+
+
+def type_name(kind: Kind) -> str:
+    return f"{pascal_case(kind.value)}EventType"
+
+
+class Bound:
+    """How many events of one kind may go out: a burst, then so many a second.
+
+    Each kind has its own, so that somebody who has writes refused all day hides no watchdog trip.
+    """
+
+    __slots__ = ("_left", "_since", "held_back")
+
+    def __init__(self) -> None:
+        self._left = float(_BURST)
+        self._since: float | None = None
+        self.held_back = 0
+
+    def take(self, now: float) -> bool:
+        """Whether one more may go at ``now`` (monotonic seconds)."""
+        if self._since is not None:
+            self._left = min(float(_BURST), self._left + (now - self._since) * _PER_SECOND)
+        self._since = now
+        if self._left < 1:
+            self.held_back += 1
+            return False
+        self._left -= 1
+        return True
+
+
+@dataclass(frozen=True, slots=True)
+class _Told:
+    event: Event
+    held_back: int
+
+
+class EventSender:
+    """Takes events from the plant at any time and sends them when the publisher has its turn."""
+
+    def __init__(
+        self,
+        epoch_ns: Callable[[float], int],
+        subscriptions: Subscriptions,
+        objects: Mapping[str, ua.NodeId],
+        types: Mapping[Kind, ua.NodeId],
+    ) -> None:
+        self._epoch_ns = epoch_ns
+        self._subscriptions = subscriptions
+        self._objects = objects
+        self._types = types
+        self._bounds: dict[Kind, Bound] = {}
+        self._queue: deque[_Told] = deque(maxlen=_WAITING)
+
+    def on_event(self, event: Event) -> None:
+        bound = self._bounds.setdefault(event.kind, Bound())
+        if bound.take(event.time):
+            self._queue.append(_Told(event, bound.held_back))
+            bound.held_back = 0
+
+    async def send_waiting(self) -> None:
+        while self._queue:
+            told = self._queue.popleft()
+            if self._subscriptions.subscriptions:
+                await self._send(told)
+
+    async def _send(self, told: _Told) -> None:
+        event = told.event
+        source = self._source(event.source)
+        more = f" ({told.held_back} more like it before were left out)" if told.held_back else ""
+        made = make(
+            BaseEvent,
+            EventId=uuid.uuid4().bytes,
+            EventType=self._types[event.kind],
+            SourceNode=source,
+            SourceName=event.source,
+            Time=source_time(self._epoch_ns(event.time)),
+            ReceiveTime=datetime.now(UTC),
+            Message=text(event.message + more),
+            Severity=event.severity,
+        )
+        for emitter in self._emitters(event.source):
+            made.emitting_node = emitter
+            for subscription in list(self._subscriptions.subscriptions.values()):
+                await subscription.monitored_item_srv.trigger_event(made)
+
+    def _source(self, name: str) -> ua.NodeId:
+        """The object that an event is about: a drive, a node, a bus, or else the bridge itself."""
+        objects = self._objects
+        return objects.get(name) or objects.get(f"bus/{name}") or objects["bridge"]
+
+    def _emitters(self, name: str) -> list[ua.NodeId]:
+        """An event of a drive is heard at the drive, at its node and at the server."""
+        above = self._objects.get(name.partition("/")[0]) if "/" in name else None
+        found = [node_id(ObjectIds.Server), self._source(name)]
+        return [*found, above] if above else found

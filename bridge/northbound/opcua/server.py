@@ -1,0 +1,218 @@
+"""The OPC UA server: brings layout, security and asyncua together."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import logging
+import socket
+from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from asyncua.common.connection import TransportLimits
+from asyncua.server.server import Server as LibraryServer
+
+import bridge
+from bridge.command import Kind
+from bridge.config import OpcUaTable
+from bridge.errors import Fault, FileFaults, Unavailable
+from bridge.northbound.opcua.address_space import Bindings, Builder
+from bridge.northbound.opcua.certificates import OwnCertificate, TrustedCertificates, load_own, own_or_new
+from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
+from bridge.northbound.opcua.library import ObjectIds, node_id, ua, variant
+from bridge.northbound.opcua.methods import Caller
+from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.publisher import Publisher
+from bridge.northbound.opcua.security import CheckedPolicy, Users, security_policies
+from bridge.northbound.opcua.session import MOST_CALLS, Server, Services
+from bridge.northbound.opcua.transport import Listener
+from bridge.northbound.opcua.writes import Writer
+from bridge.northbound.view import View
+
+NAMESPACE: Final = "urn:drivebridge:points"
+_PRODUCT: Final = "urn:drivebridge"
+_CHUNK: Final = 65535
+_MOST_CHUNKS: Final = 256
+
+_log = logging.getLogger(__name__)
+
+
+def application_uri() -> str:
+    return f"urn:{socket.gethostname()}:drivebridge"
+
+
+class _Outer(LibraryServer):
+    """asyncua's server on a socket that is bound already, with checked channels."""
+
+    def __init__(self, inner: Server, bound: socket.socket, trusted: TrustedCertificates | None) -> None:
+        super().__init__(iserver=inner)
+        self._inner = inner
+        self._bound = bound
+        self._trusted = trusted
+        self.limits = TransportLimits(_CHUNK, _CHUNK, _MOST_CHUNKS, _CHUNK * _MOST_CHUNKS)
+
+    async def start(self) -> None:
+        await self._setup_server_nodes()
+        policies = [CheckedPolicy(policy, self._trusted) for policy in self._policies]
+        await self._inner.start()
+        self.bserver = Listener(self._inner, self._bound, self.limits)
+        self.bserver.set_policies(policies)
+        await self.bserver.start()
+
+
+class OpcUaServer:
+    """Serves ``view`` as the contract's OPC UA section says.
+
+    ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``.
+    """
+
+    def __init__(self, view: View, settings: OpcUaTable, state_dir: Path, site_name: str) -> None:
+        self._view = view
+        self._settings = settings
+        self._folder = state_dir / "opcua"
+        self._site_name = site_name
+        self._users: Users | None = None
+        self._server: _Outer | None = None
+        self._socket: socket.socket | None = None
+        self._publisher: asyncio.Task[None] | None = None
+        host, _, port = settings.listen.rpartition(":")
+        self._host = host.strip("[]")
+        self._port = int(port)
+
+    @property
+    def port(self) -> int:
+        """The port that is listened on; after ``start`` never 0."""
+        return self._port
+
+    @property
+    def endpoint_url(self) -> str:
+        host = socket.gethostname() if self._host in ("0.0.0.0", "::") else self._host
+        return f"opc.tcp://{f'[{host}]' if ':' in host else host}:{self._port}/drivebridge"
+
+    async def start(self) -> None:
+        """Open the endpoints.
+
+        Raises ``FileFaults`` for a user, certificate or key that cannot be used, and ``Unavailable``
+        where the port cannot be opened.
+        """
+        self._users = Users(self._settings)
+        own = await asyncio.to_thread(self._own_certificate)
+        trusted_dir = self._settings.trusted_dir
+        trusted = TrustedCertificates(Path(trusted_dir)) if trusted_dir else None
+        bound = self._socket = self._bind()
+        try:
+            await self._serve(bound, own, trusted, self._users)
+        except BaseException:
+            await self.close()
+            raise
+        self._tell()
+
+    async def close(self) -> None:
+        """Close every session and the port. May be called at any time, also twice."""
+        task, self._publisher = self._publisher, None
+        if task:
+            task.cancel()
+            with suppress(asyncio.CancelledError):
+                await task
+        server, self._server = self._server, None
+        if server:
+            await server.stop()
+        if self._socket:
+            self._socket.close()
+        if self._users:
+            self._users.close()
+
+    # steps of start
+
+    def _own_certificate(self) -> OwnCertificate:
+        certificate, key = self._settings.certificate, self._settings.private_key
+        if certificate and key:
+            return load_own(Path(certificate), Path(key))
+        if certificate or key:
+            missing = "private_key" if certificate else "certificate"
+            fault = Fault("site file", 0, f"opcua.{missing}", "is missing", "certificate and key go together")
+            raise FileFaults([fault])
+        return own_or_new(self._folder, application_uri())
+
+    def _bind(self) -> socket.socket:
+        family = socket.AF_INET6 if ":" in self._host else socket.AF_INET
+        bound = socket.socket(family, socket.SOCK_STREAM)
+        try:
+            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            bound.bind((self._host, self._port))
+            # At once, because two processes may bind one port as long as neither listens.
+            bound.listen()
+            bound.setblocking(False)
+        except OSError as error:
+            bound.close()
+            reason = error.strerror or str(error)
+            raise Unavailable(
+                f"cannot serve OPC UA on {self._settings.listen}: {reason.lower()}; "
+                "stop what uses the port, or give another under [opcua] listen"
+            ) from error
+        self._port = bound.getsockname()[1]
+        return bound
+
+    async def _serve(
+        self, bound: socket.socket, own: OwnCertificate, trusted: TrustedCertificates | None, users: Users
+    ) -> None:
+        library_log = logging.getLogger("asyncua")
+        if library_log.level == logging.NOTSET:
+            # It tells every request at INFO.
+            library_log.setLevel(logging.WARNING)
+        inner = Server(no_security=self._settings.no_security)
+        inner.certificate, inner.private_key = own.certificate, own.private_key
+        server = _Outer(inner, bound, trusted)
+        await self._describe(server, users)
+        namespace = await server.register_namespace(NAMESPACE)
+        builder = Builder(inner.aspace, namespace, self._view.image, self._view.epoch_ns)
+        bindings = builder.build(layout(self._view.image.points))
+        inner.services = Services(
+            users,
+            Writer(self._view, inner.aspace, bindings.writable),
+            Caller(self._view, inner.aspace, bindings.methods),
+        )
+        events = self._events(inner, builder, bindings)
+        self._server = server
+        await server.start()
+        publisher = Publisher(self._view.image, bindings.variables, events)
+        self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
+        # The tree lives as long as the process; a full collection of it takes a quarter of a second.
+        gc.freeze()
+
+    async def _describe(self, server: _Outer, users: Users) -> None:
+        server.set_endpoint(self.endpoint_url)
+        server.name = f"drivebridge {self._site_name}"
+        server.application_type = ua.ApplicationType.Server
+        server.product_uri = _PRODUCT
+        server.manufacturer_name = "drivebridge"
+        await server.init()
+        await server.set_application_uri(application_uri())
+        version = bridge.__version__
+        now = datetime.now(UTC)
+        await server.set_build_info(_PRODUCT, "drivebridge", "drivebridge", version, version, now)
+        server.set_security_policy(security_policies(self._settings))
+        server.set_identity_tokens(users.tokens)
+        limit = node_id(ObjectIds.Server_ServerCapabilities_OperationLimits_MaxNodesPerMethodCall)
+        await server.get_node(limit).write_value(variant(MOST_CALLS, ua.VariantType.UInt32))
+
+    def _events(self, inner: Server, builder: Builder, bindings: Bindings) -> EventSender:
+        base = builder.object_type(BASE_TYPE, node_id(ObjectIds.BaseEventType))
+        types = {kind: builder.object_type(type_name(kind), base) for kind in Kind}
+        events = EventSender(self._view.epoch_ns, inner.subscriptions, bindings.notifiers, types)
+        self._view.on_event(events.on_event)
+        return events
+
+    def _tell(self) -> None:
+        settings = self._settings
+        _log.info("OPC UA on %s", self.endpoint_url)
+        if settings.no_security:
+            _log.warning(
+                "OPC UA on %s is open: no security, anonymous clients may %s",
+                self.endpoint_url,
+                {"none": "not enter", "observer": "read", "operator": "read and command"}[settings.anonymous],
+            )
+        if settings.anonymous == "none" and not settings.user:
+            _log.warning('OPC UA: nobody can log in: no [[opcua.user]] and anonymous = "none"')

@@ -1,0 +1,146 @@
+"""TOML files that people write: read, checked against a model, every fault with its line."""
+
+from __future__ import annotations
+
+import codecs
+import re
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, TypeVar, cast
+
+from pydantic import BaseModel, ValidationError
+
+from bridge.errors import Fault, FileFaults
+from bridge.tomlfile.lines import Key, key_lines
+from bridge.tomlfile.messages import explain
+
+Model = TypeVar("Model", bound=BaseModel)
+
+_SYNTAX_PLACE: Final = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)")
+
+
+@dataclass(frozen=True, slots=True)
+class RawTable:
+    """A table as it stands in the file, not checked: what does not fit is as if it were not there."""
+
+    key: Key
+    content: dict[str, Any]
+
+    def text(self, name: str) -> str | None:
+        value = self.content.get(name)
+        return value if isinstance(value, str) else None
+
+    def whole(self, name: str) -> int | None:
+        value = self.content.get(name)
+        return value if isinstance(value, int) and not isinstance(value, bool) else None
+
+    def table(self, name: str) -> RawTable:
+        """The table ``name``; empty where it is not there."""
+        value = self.content.get(name)
+        content = cast("dict[str, Any]", value) if isinstance(value, dict) else {}
+        return RawTable((*self.key, name), content)
+
+    def tables(self, name: str) -> Iterator[RawTable]:
+        """The tables of the list ``name``."""
+        items = self.content.get(name)
+        if not isinstance(items, list):
+            return
+        for position, item in enumerate(cast("list[object]", items)):
+            if isinstance(item, dict):
+                yield RawTable((*self.key, name, position), cast("dict[str, Any]", item))
+
+
+class TomlFile:
+    """A parsed TOML file that knows on which line each of its keys stands."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises ``FileFaults`` where the file cannot be read or is not TOML."""
+        self.path = path
+        self.faults: list[Fault] = []
+        text = self._read()
+        try:
+            self.data: dict[str, Any] = tomllib.loads(text)
+            self._lines = key_lines(text)
+        except tomllib.TOMLDecodeError as error:
+            place = _SYNTAX_PLACE.search(str(error))
+            line = int(place[1]) if place and place[1] else text.rstrip("\n").count("\n") + 1
+            message = _SYNTAX_PLACE.sub("", str(error))
+            raise self._unreadable(line, f"is not TOML: {message}") from error
+        except RecursionError as error:
+            raise self._unreadable(0, "is nested too deeply") from error
+        except ValueError as error:  # a number of more digits than Python reads
+            raise self._unreadable(0, f"cannot be read: {error}") from error
+
+    def _read(self) -> str:
+        try:
+            content = self.path.read_bytes()
+        except OSError as error:
+            raise self._unreadable(0, f"cannot be read: {error.strerror}") from error
+        try:
+            content = content.removeprefix(codecs.BOM_UTF8)
+            return content.decode().replace("\r\n", "\n")
+        except UnicodeDecodeError as error:
+            line = content[: error.start].count(b"\n") + 1
+            raise self._unreadable(line, "is not UTF-8", "save it as UTF-8") from error
+
+    def _unreadable(self, line: int, message: str, hint: str = "") -> FileFaults:
+        return FileFaults([Fault(str(self.path), line, "", message, hint)])
+
+    @property
+    def root(self) -> RawTable:
+        return RawTable((), self.data)
+
+    def line(self, key: Sequence[int | str]) -> int:
+        """The line of ``key``, or of the nearest table around it; 0 where nothing of it is written."""
+        for length in range(len(key), 0, -1):
+            line = self._lines.get(tuple(key[:length]))
+            if line:
+                return line
+        return 0
+
+    def fault(self, key: Sequence[int | str], message: str, hint: str = "") -> None:
+        """Note a fault; ``finish`` raises them all."""
+        self.faults.append(Fault(str(self.path), self.line(key), dotted(key), message, hint))
+
+    def validate(self, model: type[Model]) -> Model | None:
+        """The file's content as ``model``, or None with every fault noted."""
+        try:
+            return model.model_validate(self.data)
+        except ValidationError as error:
+            for detail in error.errors(include_url=False):
+                self.fault(_real_key(self.data, detail["loc"]), *explain(model, detail))
+            return None
+
+    def finish(self) -> None:
+        """Raise ``FileFaults`` if any fault was noted."""
+        if self.faults:
+            raise FileFaults(sorted(self.faults, key=lambda fault: fault.line))
+
+
+def dotted(key: Sequence[int | str]) -> str:
+    """``("bus", 0, "node", 1, "id")`` as ``bus[0].node[1].id``."""
+    text = ""
+    for part in key:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def _real_key(data: Any, location: Sequence[int | str]) -> Key:
+    """``location`` without the tags pydantic adds for unions: only what stands in the file."""
+    key: list[int | str] = []
+    here = data
+    for position, part in enumerate(location):
+        last = position == len(location) - 1
+        if isinstance(here, dict):
+            table = cast("dict[str, Any]", here)
+            if part not in table and not last:
+                continue
+            key.append(part)
+            here = table.get(str(part))
+        elif isinstance(here, list) and isinstance(part, int):
+            items = cast("list[Any]", here)
+            key.append(part)
+            here = items[part] if part < len(items) else None
+    return tuple(key)

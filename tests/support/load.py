@@ -1,0 +1,139 @@
+"""A bus process under load, and what it made of it. Used by a wire test and by ``make bench``."""
+
+from __future__ import annotations
+
+import asyncio
+import struct
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bridge.command import Action, Identity, Kind, Request, Source
+from bridge.service import Service, load_project
+from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.shell import Simulation
+from bridge.southbound.bus.frame import Frame
+from bridge.southbound.bus.virtual import VirtualBus, VirtualWire
+from tests.support.process import free_port
+
+SYNC, RPDO1, TPDO2 = 0x080, 0x205, 0x285
+TIMEOUT_S = 0.2
+SYNC_PERIOD_S = 0.01
+_PLC = Identity(Source.MODBUS, "127.0.0.1")
+
+_SITE = """
+[site]
+name = "load"
+state_dir = "{folder}/state"
+runtime_dir = "{folder}/run"
+[[bus]]
+name = "can0"
+interface = "virtual"
+deadman_ms = 500
+[[bus.node]]
+name = "conveyor"
+id = 5
+mapping = "nord/sk-tu4-cao"
+supervision_ms = 1000
+{drives}
+[modbus]
+listen = "127.0.0.1:{modbus}"
+[opcua]
+listen = "127.0.0.1:{opcua}"
+no_security = true
+anonymous = "operator"
+"""
+_DRIVE = """
+[[bus.node.drive]]
+slot = "fu{n}"
+control = "modbus"
+fieldbus_timeout_ms = 200
+parameters = {{ P105 = 50.0, P112 = 10.0 }}
+"""
+
+
+@dataclass(slots=True)
+class Load:
+    """A running bus process with its OPC UA front, on a virtual wire."""
+
+    service: Service
+    end: VirtualBus
+    opcua_url: str
+    syncs: list[float] = field(default_factory=list[float])
+    reactions: list[float] = field(default_factory=list[float])
+    """When each reaction to a silent controller was on the bus, after its last telegram (s)."""
+
+    def sync_lateness_s(self) -> list[float]:
+        """How much longer than its period each pause between two SYNCs was."""
+        pairs = zip(self.syncs, self.syncs[1:], strict=False)
+        return [later - earlier - SYNC_PERIOD_S for earlier, later in pairs]
+
+    async def fire(self, frames_per_s: int, seconds: float) -> tuple[int, int]:
+        """Send TPDOs of fu2, each with its number; returns how many were sent and how many arrived."""
+        drive = self.service.plant.drives["conveyor/fu2"]
+        seen: set[int] = set()
+        deliver = drive.on_process_data
+
+        def count(words: object, now: float) -> None:
+            number = struct.unpack("<I", struct.pack("<HH", *words[1:3]))[0]  # type: ignore[index]
+            seen.add(number)
+            deliver(words, now)  # type: ignore[arg-type]
+
+        drive.on_process_data = count  # type: ignore[method-assign]
+        sent, begin = 0, time.monotonic()
+        while (elapsed := time.monotonic() - begin) < seconds:
+            for number in range(sent, round(elapsed * frames_per_s)):
+                words = struct.pack("<HIH", 0x0B31, number + 1, 0)
+                self.end.send(Frame(TPDO2, words), time.monotonic(), time.monotonic())
+                sent += 1
+            await asyncio.sleep(0.002)
+        await asyncio.sleep(0.2)
+        del drive.on_process_data
+        return sent, len(seen - {0})
+
+    async def trip(self, times: int) -> None:
+        """Let fu1's controller fall silent, again and again."""
+        for _ in range(times):
+            for word in (0x047E, 0x04FE, 0x047E, 0x047F):
+                request = Request(_PLC, "conveyor/fu1", Action.WRITE, {"control_word": word})
+                last = time.monotonic()
+                self.service.plant.submit(request, last, lambda outcome: None)
+            self._last_telegram = last
+            await asyncio.sleep(TIMEOUT_S + 0.2)
+
+    _last_telegram: float = 0.0
+
+    def on_frame(self, frame: Frame) -> None:
+        if frame.can_id == SYNC:
+            self.syncs.append(frame.time)
+        elif frame.can_id == RPDO1 and self._last_telegram and not frame.data[0] & 0x02:
+            self.reactions.append(frame.time - self._last_telegram)
+            self._last_telegram = 0.0
+
+
+@asynccontextmanager
+async def loaded(folder: Path) -> AsyncIterator[Load]:
+    """Start the bus process in this one, with a front of its own, and wait until the node is booted."""
+    opcua = free_port()
+    path = folder / "site.toml"
+    drives = "".join(_DRIVE.format(n=n) for n in (1, 2, 3, 4))
+    path.write_text(_SITE.format(folder=folder, drives=drives, modbus=free_port(), opcua=opcua), "utf-8")
+    wire = VirtualWire()
+    service = Service(load_project(path), lambda table: wire.end(table.name))
+    load = Load(service, wire.end("firehose"), f"opc.tcp://127.0.0.1:{opcua}")
+    load.end.open(lambda: load.end.drain(time.monotonic()))
+    wire.listeners.append(load.on_frame)
+    simulation = Simulation(wire.end("simulation"), [NordTu4(5)])
+    ready, booted = asyncio.Event(), asyncio.Event()
+    service.plant.on_event(lambda event: booted.set() if event.kind is Kind.NODE_BACK else None)
+    tasks = [asyncio.create_task(simulation.run()), asyncio.create_task(service.run(ready.set))]
+    try:
+        await asyncio.wait_for(ready.wait(), 30)
+        await asyncio.wait_for(booted.wait(), 30)
+        yield load
+    finally:
+        for task in reversed(tasks):
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)

@@ -1,0 +1,129 @@
+"""drivebridge as its user runs it: as processes, told to be ready by sd_notify, ended with the test."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+
+START_LIMIT_S = 60.0
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+def free_port() -> int:
+    """A port of loopback that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Process:
+    """A running command; its output is in ``log``."""
+
+    def __init__(self, command: Sequence[str], log: Path, notify: socket.socket | None) -> None:
+        self.log = log
+        self._notify = notify
+        environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+        environment.pop("NOTIFY_SOCKET", None)
+        if notify:
+            environment["NOTIFY_SOCKET"] = notify.getsockname()
+        with log.open("wb") as output:
+            # A folder that is not the repository: nothing may be found by accident.
+            self.popen = subprocess.Popen(
+                command, stdout=output, stderr=subprocess.STDOUT, env=environment, cwd=log.parent
+            )
+
+    @property
+    def pid(self) -> int:
+        return self.popen.pid
+
+    def output(self) -> str:
+        return self.log.read_text(encoding="utf-8", errors="replace")
+
+    def wait_ready(self, limit_s: float = START_LIMIT_S) -> None:
+        """Until the process says READY=1."""
+        assert self._notify is not None
+        self._notify.settimeout(0.2)
+        end = time.monotonic() + limit_s
+        while time.monotonic() < end:
+            assert self.popen.poll() is None, f"ended with {self.popen.returncode}:\n{self.output()}"
+            with contextlib.suppress(TimeoutError):
+                if b"READY=1" in self._notify.recv(4096):
+                    return
+        raise AssertionError(f"not ready within {limit_s} s:\n{self.output()}")
+
+    def wait_output(self, text: str, limit_s: float = START_LIMIT_S) -> None:
+        end = time.monotonic() + limit_s
+        while text not in self.output():
+            assert self.popen.poll() is None, f"ended with {self.popen.returncode}:\n{self.output()}"
+            assert time.monotonic() < end, f"no {text!r} within {limit_s} s:\n{self.output()}"
+            time.sleep(0.05)
+
+    def signal(self, number: int) -> None:
+        os.kill(self.pid, number)
+
+    def stop(self) -> None:
+        if self.popen.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                self.signal(signal.SIGCONT)
+                self.signal(signal.SIGTERM)
+            try:
+                self.popen.wait(15)
+            except subprocess.TimeoutExpired:
+                self.popen.kill()
+                self.popen.wait()
+
+
+@contextmanager
+def running(folder: Path, name: str, *command: str, notify: bool = False) -> Iterator[Process]:
+    """Run ``command`` with its output in ``folder``; with ``notify``, ``wait_ready`` can be used."""
+    with contextlib.ExitStack() as stack:
+        listener = None
+        if notify:
+            listener = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
+            listener.bind(f"\0drivebridge-test-{os.getpid()}-{name}-{time.monotonic_ns()}")
+            # getsockname gives the abstract name as bytes; systemd writes it with an @.
+        process = Process(list(command), folder / f"{name}.log", _Named(listener) if listener else None)
+        stack.callback(process.stop)
+        yield process
+
+
+class _Named:
+    """A listening socket whose name is written as systemd writes it."""
+
+    def __init__(self, listener: socket.socket) -> None:
+        self._listener = listener
+        self.settimeout = listener.settimeout
+        self.recv = listener.recv
+
+    def getsockname(self) -> str:
+        return "@" + self._listener.getsockname()[1:].decode()
+
+
+def drivebridge(
+    folder: Path, name: str, *arguments: str, notify: bool = False
+) -> AbstractContextManager[Process]:
+    """``drivebridge ARGUMENTS``, as this Python has it installed."""
+    return running(folder, name, sys.executable, "-m", "bridge", *arguments, notify=notify)
+
+
+def peer(folder: Path, name: str, *arguments: str) -> AbstractContextManager[Process]:
+    """A script of ``tests/peers``: a client of the bridge in a process of its own."""
+    script = REPOSITORY / "tests" / "peers" / f"{name}.py"
+    return running(folder, name, sys.executable, str(script), *arguments)
+
+
+def until(condition: object, limit_s: float, what: str, pause_s: float = 0.02) -> None:
+    """Wait until ``condition()`` is true; fails with ``what`` after ``limit_s``."""
+    assert callable(condition)
+    end = time.monotonic() + limit_s
+    while not condition():
+        assert time.monotonic() < end, f"not within {limit_s} s: {what}"
+        time.sleep(pause_s)

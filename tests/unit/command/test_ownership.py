@@ -1,0 +1,152 @@
+"""One controller commands a drive, everybody else is refused (docs/adr/0009)."""
+
+from __future__ import annotations
+
+import pytest
+
+from bridge.command import Action, Code, Identity, Kind, Role, Source
+from bridge.command.link import NodeState
+from tests.support.rig import (
+    ENABLE,
+    ENGINEER,
+    HALF_SPEED,
+    OBSERVER,
+    OPERATOR,
+    OTHER_PLC,
+    PLC,
+    SHUT_DOWN,
+    Rig,
+)
+
+BOB = Identity(Source.ZENOH, "bob")
+
+
+class TestFixedSource:
+    def test_the_first_valid_telegram_makes_its_sender_the_owner(self, rig: Rig):
+        rig.write(SHUT_DOWN)
+        assert rig.channel.owner == PLC
+        assert rig.told(Kind.OWNER) == ["controlled by modbus:192.168.1.10"]
+
+    def test_another_connection_of_the_same_address_is_the_same_owner(self, running: Rig):
+        again = Identity(Source.MODBUS, PLC.user, address="192.168.1.10:50123")
+        assert running.write(ENABLE, 0x1000, identity=again).forwarded
+        assert running.enables
+
+    @pytest.mark.parametrize("stranger", [OTHER_PLC, OPERATOR, ENGINEER, BOB])
+    def test_others_are_refused_and_counted(self, running: Rig, stranger: Identity):
+        outcome = running.write(SHUT_DOWN, identity=stranger)
+        assert outcome.code is Code.NOT_ALLOWED
+        assert not outcome.forwarded
+        assert running.enables
+        assert running.channel.refused_writes == 1
+        assert len(running.told(Kind.REFUSED)) == 1
+
+    def test_a_silent_owner_is_replaced_by_the_same_protocol_alone(self, running: Rig):
+        running.wait(0.2)
+        assert running.write(SHUT_DOWN, identity=OPERATOR).code is Code.NOT_ALLOWED
+        assert running.write(SHUT_DOWN, identity=OTHER_PLC).ok
+        assert running.channel.owner == OTHER_PLC
+
+    def test_a_released_drive_is_free(self, running: Rig):
+        running.ask(Action.RELEASE_CONTROL)
+        assert running.write(SHUT_DOWN, identity=OTHER_PLC).forwarded
+
+    def test_a_reader_commands_nothing(self, rig: Rig):
+        reader = Identity(Source.MODBUS, "192.168.1.99", Role.OBSERVER)
+        assert rig.write(SHUT_DOWN, identity=reader).code is Code.NOT_ALLOWED
+
+    def test_without_a_control_source_nobody_commands(self):
+        rig = Rig(control="none")
+        assert rig.write(SHUT_DOWN).code is Code.NOT_ALLOWED
+        assert rig.ask(Action.TAKE_CONTROL, ENGINEER).code is Code.NOT_ALLOWED
+
+    def test_a_new_owner_finds_the_drive_stopped_and_inherits_no_setpoints(self):
+        """With the watchdog reporting only, the drive still moves when its silent owner is replaced."""
+        rig = Rig(telegram_downtime_s=-0.1)
+        rig.run()
+        rig.wait(1)
+        assert rig.enables
+        assert not rig.write(ENABLE, identity=OTHER_PLC).forwarded
+        assert not rig.enables
+        rig.write(SHUT_DOWN, identity=OTHER_PLC)
+        rig.write(ENABLE, identity=OTHER_PLC)
+        assert rig.enables
+        assert rig.sent_setpoints == (0, 0, 0)
+
+
+class TestLease:
+    @pytest.fixture
+    def rig(self) -> Rig:
+        rig = Rig(control="lease", fieldbus_timeout_ms=0)
+        rig.node(NodeState.OPERATIONAL)
+        return rig
+
+    @pytest.fixture
+    def leased(self, rig: Rig) -> Rig:
+        assert rig.ask(Action.TAKE_CONTROL, OPERATOR, ttl_ms=1000).ok
+        rig.write(SHUT_DOWN, identity=OPERATOR)
+        rig.write(ENABLE, HALF_SPEED, identity=OPERATOR)
+        assert rig.enables
+        return rig
+
+    def test_nobody_writes_without_one(self, rig: Rig):
+        outcome = rig.write(SHUT_DOWN, identity=OPERATOR)
+        assert outcome.code is Code.NOT_ALLOWED
+        assert "take control" in outcome.message
+
+    @pytest.mark.parametrize("ttl_ms", [0, 99, 600_001, -1])
+    def test_a_ttl_has_limits(self, rig: Rig, ttl_ms: int):
+        assert rig.ask(Action.TAKE_CONTROL, OPERATOR, ttl_ms=ttl_ms).code is Code.OUT_OF_RANGE
+        assert rig.channel.owner is None
+
+    def test_any_protocol_may_take_it(self, rig: Rig):
+        assert rig.ask(Action.TAKE_CONTROL, BOB, ttl_ms=1000).ok
+        assert rig.channel.owner == BOB
+
+    def test_it_runs_out_and_the_drive_is_stopped(self, leased: Rig):
+        leased.wait(0.999)
+        assert leased.enables
+        leased.wait(0.001)
+        assert not leased.enables
+        assert leased.channel.owner is None
+        assert leased.channel.trips == 0
+        assert "the lease of opcua:ann ran out" in leased.told(Kind.OWNER)
+
+    @pytest.mark.parametrize("action", [Action.KEEP_ALIVE, Action.RESET_FAULT])
+    def test_it_is_kept_by_going_on(self, leased: Rig, action: Action):
+        for _ in range(5):
+            leased.wait(0.9)
+            assert leased.ask(action, OPERATOR).ok
+        assert leased.channel.owner == OPERATOR
+
+    def test_a_request_after_its_end_is_refused(self, leased: Rig):
+        leased.now += 1.0
+        assert leased.write(ENABLE, identity=OPERATOR).code is Code.NOT_ALLOWED
+        assert not leased.enables
+
+    def test_taken_again_it_gets_the_new_length_and_the_drive_goes_on(self, leased: Rig):
+        assert leased.ask(Action.TAKE_CONTROL, OPERATOR, ttl_ms=5000).ok
+        leased.wait(4)
+        assert leased.enables
+
+    def test_another_operator_waits(self, leased: Rig):
+        assert leased.ask(Action.TAKE_CONTROL, BOB, ttl_ms=1000).code is Code.NOT_ALLOWED
+        assert leased.enables
+
+    def test_an_engineer_breaks_it_and_the_drive_is_stopped_first(self, leased: Rig):
+        assert leased.ask(Action.TAKE_CONTROL, ENGINEER, ttl_ms=1000).ok
+        assert leased.channel.owner == ENGINEER
+        assert not leased.enables
+        assert leased.write(SHUT_DOWN, identity=OPERATOR).code is Code.NOT_ALLOWED
+        leased.write(SHUT_DOWN, identity=ENGINEER)
+        assert leased.sent_setpoints == (0, 0, 0)
+
+    def test_a_reader_gets_none(self, rig: Rig):
+        assert rig.ask(Action.TAKE_CONTROL, OBSERVER, ttl_ms=1000).code is Code.NOT_ALLOWED
+
+    def test_a_release_ends_it(self, leased: Rig):
+        leased.ask(Action.RELEASE_CONTROL, OPERATOR)
+        assert leased.channel.owner is None
+        assert not leased.enables
+        leased.wait(10)
+        assert not [message for message in leased.told(Kind.OWNER) if "ran out" in message]

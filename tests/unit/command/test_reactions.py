@@ -1,0 +1,173 @@
+"""What the bridge sends when the controller falls silent (shared design, watchdog, "Reactions")."""
+
+from __future__ import annotations
+
+import pytest
+
+from bridge.command import Action
+from bridge.command.link import NodeState
+from tests.support.rig import (
+    ACKNOWLEDGE,
+    ENABLE,
+    ENABLED,
+    HALF_SPEED,
+    INHIBITED,
+    OPERATOR,
+    QUICK_STOPPING,
+    READY,
+    SHUT_DOWN,
+    Rig,
+)
+
+
+def tripped(on_expiry: str, **settings: object) -> Rig:
+    rig = Rig(on_expiry=on_expiry, **settings)
+    rig.run()
+    rig.wait(0.2)
+    assert rig.watchdog == "tripped"
+    return rig
+
+
+def test_disable_voltage_clears_bit_1():
+    rig = tripped("disable_voltage")
+    assert rig.sent == 0x0474
+    assert not rig.silent
+
+
+def test_quick_stop_clears_bit_2_and_disables_voltage_when_the_drive_stands():
+    rig = tripped("quick_stop")
+    assert rig.sent == 0x047B
+    rig.drive_says(ENABLED)
+    rig.drive_says(QUICK_STOPPING)
+    assert rig.sent == 0x047B
+    rig.drive_says(INHIBITED)
+    assert rig.sent == 0x0470
+    rig.drive_says(READY)
+    assert rig.sent == 0x0470
+
+
+def test_a_quick_stop_of_a_drive_that_stands_already_ends_with_its_next_word():
+    rig = Rig(on_expiry="quick_stop")
+    rig.node(NodeState.OPERATIONAL)
+    rig.drive_says(READY)
+    rig.write(SHUT_DOWN)
+    rig.wait(0.2)
+    assert rig.sent == 0x047A
+    rig.drive_says(READY)
+    assert rig.sent == 0x0470
+
+
+def test_stop_clears_bit_0_alone():
+    assert tripped("stop").sent == SHUT_DOWN
+
+
+def test_silence_sends_nothing_from_the_same_moment_on():
+    rig = tripped("silence")
+    assert rig.silent
+    rig.write(SHUT_DOWN)
+    assert rig.silent
+    rig.write(ACKNOWLEDGE)
+    assert not rig.silent
+    assert not rig.enables
+
+
+def test_hold_goes_on_with_the_last_telegram_and_reports():
+    rig = tripped("hold")
+    assert rig.sent == ENABLE
+    assert rig.sent_setpoints[0] == HALF_SPEED
+    assert rig.channel.current_fault == 10.3
+
+
+@pytest.mark.parametrize("on_expiry", ["disable_voltage", "quick_stop", "stop", "silence"])
+def test_setpoints_go_to_zero(on_expiry: str):
+    rig = tripped(on_expiry)
+    assert rig.sent_setpoints == (0, 0, 0)
+    assert rig.channel.setpoints == (0, 0, 0)
+
+
+@pytest.mark.parametrize("on_expiry", ["disable_voltage", "quick_stop", "stop"])
+def test_then_silence_ends_the_sending_after_its_time(on_expiry: str):
+    rig = tripped(on_expiry, then_silence_ms=500)
+    rig.wait(0.499)
+    assert not rig.silent
+    rig.wait(0.001)
+    assert rig.silent
+
+
+def test_a_frame_with_an_older_time_stamp_does_not_end_the_silence():
+    rig = tripped("disable_voltage", then_silence_ms=500)
+    rig.wait(0.5)
+    rig.channel.on_status_word(INHIBITED, rig.now - 0.01)
+    assert rig.silent
+
+
+def test_then_silence_ends_with_the_acknowledge():
+    rig = tripped("stop", then_silence_ms=500)
+    rig.wait(1)
+    rig.ask(Action.RESET_FAULT)
+    assert not rig.silent
+
+
+def test_parameter_set_and_direction_stay_as_they_were():
+    rig = Rig()
+    rig.node(NodeState.OPERATIONAL)
+    rig.write(0x4C7E)
+    rig.write(0x4C7F)
+    rig.wait(0.2)
+    assert rig.sent == 0x4C74
+
+
+def test_an_acknowledge_bit_that_was_high_falls():
+    rig = Rig()
+    rig.node(NodeState.OPERATIONAL)
+    rig.write(ACKNOWLEDGE)
+    rig.wait(0.2)
+    assert not rig.sent & 0x0080
+
+
+@pytest.mark.parametrize(("on_expiry", "word"), [("stop", SHUT_DOWN), ("quick_stop", 0x047B)])
+def test_an_acknowledge_turns_no_ramp_into_coasting(on_expiry: str, word: int):
+    rig = tripped(on_expiry)
+    rig.ask(Action.RESET_FAULT)
+    rig.wait(0.1)
+    assert rig.sent == word
+
+
+class TestHold:
+    def test_new_telegrams_do_not_reach_the_drive(self):
+        rig = tripped("hold")
+        assert not rig.write(ENABLE, 0x3000).forwarded
+        assert rig.sent_setpoints[0] == HALF_SPEED
+
+    def test_a_stop_of_the_owner_does(self):
+        rig = tripped("hold")
+        assert rig.write(SHUT_DOWN).forwarded
+        assert rig.sent == SHUT_DOWN
+        assert not rig.write(ENABLE, HALF_SPEED).forwarded
+        assert not rig.enables
+
+    @pytest.mark.parametrize("action", [Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE])
+    def test_a_stop_of_any_operator_does(self, action: Action):
+        rig = tripped("hold")
+        assert rig.ask(action, OPERATOR).ok
+        assert not rig.enables
+        assert rig.sent_setpoints == (0, 0, 0)
+
+    def test_a_release_stops_the_drive(self):
+        rig = tripped("hold")
+        rig.write(ENABLE)
+        rig.ask(Action.RELEASE_CONTROL)
+        assert not rig.enables
+
+    def test_the_acknowledge_stops_the_drive_on_its_ramp(self):
+        rig = tripped("hold")
+        rig.write(0x04FF)
+        assert rig.sent == ACKNOWLEDGE
+        assert not rig.enables
+
+    def test_a_lost_node_comes_back_stopped(self):
+        rig = tripped("hold")
+        rig.node(NodeState.LOST)
+        assert not rig.enables
+        rig.node(NodeState.OPERATIONAL)
+        assert not rig.enables

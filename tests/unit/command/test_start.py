@@ -1,0 +1,206 @@
+"""``Start``: through the drive's states to operation enabled, with one outcome."""
+
+from __future__ import annotations
+
+import pytest
+
+from bridge.command import Action, Code, Outcome, Request
+from bridge.command.link import NodeState
+from tests.support.rig import (
+    ENABLED,
+    FAULT,
+    FAULT_REACTION,
+    INHIBITED,
+    OPERATOR,
+    OTHER_PLC,
+    PLC,
+    READY,
+    SHUT_DOWN,
+    SWITCHED_ON,
+    Rig,
+)
+
+
+@pytest.fixture
+def rig() -> Rig:
+    """An inhibited drive whose controller has time."""
+    rig = Rig(fieldbus_timeout_ms=10_000)
+    rig.node(NodeState.OPERATIONAL)
+    rig.drive_says(INHIBITED)
+    return rig
+
+
+def codes(outcomes: list[Outcome]) -> list[Code]:
+    return [outcome.code for outcome in outcomes]
+
+
+@pytest.mark.parametrize("steps", [(READY,), (READY, SWITCHED_ON), ()])
+@pytest.mark.parametrize(("direction", "word"), [(0, 0x047F), (1, 0x0C7F), (-1, 0x147F)])
+def test_leads_to_operation_enabled(rig: Rig, steps: tuple[int, ...], direction: int, word: int):
+    outcomes = rig.submit(Action.START, direction=direction)
+    assert rig.sent == SHUT_DOWN
+    for step in steps:
+        rig.drive_says(step)
+        assert rig.sent == word
+        assert outcomes == []
+    rig.drive_says(ENABLED)
+    assert rig.sent == word
+    assert codes(outcomes) == [Code.OK]
+    rig.wait(5)
+    assert len(outcomes) == 1
+
+
+def test_uses_the_setpoints_that_were_written_before(rig: Rig):
+    rig.write(SHUT_DOWN, 0x1000)
+    rig.submit(Action.START)
+    rig.drive_says(READY)
+    assert rig.sent_setpoints[0] == 0x1000
+
+
+def test_is_a_telegram_and_makes_its_sender_the_owner(rig: Rig):
+    rig.submit(Action.START)
+    assert rig.watchdog == "running"
+    assert rig.channel.owner is not None
+
+
+def test_of_a_running_drive_is_done_at_once_and_changes_its_direction():
+    rig = Rig(fieldbus_timeout_ms=10_000)
+    rig.run()
+    assert codes(rig.submit(Action.START, direction=-1)) == [Code.OK]
+    assert rig.sent == 0x147F
+
+
+def test_after_a_stop_is_a_fresh_enable(rig: Rig):
+    rig.submit(Action.START)
+    rig.drive_says(READY)
+    rig.drive_says(ENABLED)
+    rig.ask(Action.STOP, OPERATOR)
+    assert not rig.enables
+    rig.drive_says(READY)
+    rig.submit(Action.START)
+    assert rig.enables
+
+
+@pytest.mark.parametrize("direction", [2, -2])
+def test_knows_two_directions(rig: Rig, direction: int):
+    assert codes(rig.submit(Action.START, direction=direction)) == [Code.OUT_OF_RANGE]
+    assert rig.channel.owner is None
+
+
+def test_of_a_drive_in_fault_is_refused(rig: Rig):
+    rig.drive_says(FAULT)
+    assert codes(rig.submit(Action.START)) == [Code.ACKNOWLEDGE_FIRST]
+
+
+def test_without_the_node_is_refused(rig: Rig):
+    rig.node(NodeState.LOST)
+    outcomes = rig.submit(Action.START)
+    assert codes(outcomes) == [Code.NOT_READY]
+    assert "node lost" in outcomes[0].message
+
+
+def test_times_out_when_the_drive_does_not_follow(rig: Rig):
+    outcomes = rig.submit(Action.START)
+    rig.wait(2.999)
+    assert outcomes == []
+    rig.wait(0.001)
+    assert codes(outcomes) == [Code.TIMED_OUT]
+    assert "switch on inhibited" in outcomes[0].message
+    rig.drive_says(READY)
+    assert not rig.enables
+
+
+@pytest.mark.parametrize("word", [FAULT, FAULT_REACTION])
+def test_ends_when_the_drive_goes_into_fault(rig: Rig, word: int):
+    outcomes = rig.submit(Action.START)
+    rig.drive_says(READY)
+    rig.channel.on_emcy(0x2310, rig.now)
+    rig.drive_says(word)
+    assert codes(outcomes) == [Code.NOT_READY]
+    assert "overcurrent" in outcomes[0].message
+    assert not rig.enables
+
+
+@pytest.mark.parametrize("action", [Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE])
+def test_is_cancelled_by_a_stop(rig: Rig, action: Action):
+    outcomes = rig.submit(Action.START)
+    rig.ask(action, OPERATOR)
+    assert codes(outcomes) == [Code.CANCELLED]
+    rig.drive_says(READY)
+    assert not rig.enables
+
+
+def test_is_cancelled_by_a_trip():
+    rig = Rig()
+    rig.node(NodeState.OPERATIONAL)
+    rig.drive_says(INHIBITED)
+    outcomes = rig.submit(Action.START)
+    rig.wait(0.2)
+    assert codes(outcomes) == [Code.CANCELLED]
+
+
+def test_is_cancelled_by_a_release(rig: Rig):
+    outcomes = rig.submit(Action.START)
+    rig.ask(Action.RELEASE_CONTROL)
+    assert codes(outcomes) == [Code.CANCELLED]
+
+
+def test_is_cancelled_by_a_control_word_and_not_by_a_setpoint(rig: Rig):
+    outcomes = rig.submit(Action.START)
+    rig.write(None, 0x1000)
+    assert outcomes == []
+    rig.write(SHUT_DOWN)
+    assert codes(outcomes) == [Code.CANCELLED]
+
+
+def test_is_not_cancelled_by_a_refused_request(rig: Rig):
+    outcomes = rig.submit(Action.START)
+    rig.write(SHUT_DOWN, identity=OTHER_PLC)
+    rig.write(0x0000)
+    assert outcomes == []
+
+
+def test_is_cancelled_by_another_start(rig: Rig):
+    first = rig.submit(Action.START)
+    second = rig.submit(Action.START, direction=1)
+    assert codes(first) == [Code.CANCELLED]
+    rig.drive_says(READY)
+    rig.drive_says(ENABLED)
+    assert codes(second) == [Code.OK]
+    assert len(first) == 1
+
+
+def test_is_cancelled_by_a_gap_of_the_bridge(rig: Rig):
+    outcomes = rig.submit(Action.START)
+    rig.channel.on_bridge_gap(rig.now)
+    assert codes(outcomes) == [Code.CANCELLED]
+
+
+@pytest.mark.parametrize("state", [NodeState.LOST, NodeState.BOOTING, NodeState.DISABLED])
+def test_does_not_survive_the_node(rig: Rig, state: NodeState):
+    outcomes = rig.submit(Action.START)
+    rig.node(state)
+    assert codes(outcomes) == [Code.NOT_READY]
+    rig.node(NodeState.OPERATIONAL)
+    rig.drive_says(READY)
+    assert not rig.enables
+
+
+def test_ends_when_process_data_are_missing(rig: Rig):
+    rig.channel.link.pdo_deadline_s = 0.1
+    outcomes = rig.submit(Action.START)
+    rig.wait(0.6)
+    assert codes(outcomes) == [Code.NOT_READY]
+
+
+def test_who_asks_on_on_the_outcome_finds_everything_settled(rig: Rig):
+    """An outcome is told last: a request made from it meets no half-done change."""
+    seen: list[tuple[int, int]] = []
+
+    def on_outcome(outcome: Outcome) -> None:
+        seen.append((rig.sent, len(rig.submit(Action.KEEP_ALIVE))))
+
+    rig.channel.handle(Request(PLC, "conveyor/fu1", Action.START), rig.now, on_outcome)
+    rig.drive_says(READY)
+    rig.ask(Action.DISABLE_VOLTAGE, OPERATOR)
+    assert seen == [(0x0474, 1)]

@@ -1,0 +1,133 @@
+"""What may be written to a drive's command group, and that a refused write changes nothing."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.command import Code
+from bridge.command.link import NodeState
+from bridge.image import Value
+from tests.support.rig import ENABLE, HALF_SPEED, PLC, SHUT_DOWN, Rig
+
+
+@pytest.fixture
+def rig() -> Rig:
+    rig = Rig()
+    rig.node(NodeState.OPERATIONAL)
+    rig.write(SHUT_DOWN)
+    return rig
+
+
+def test_the_manuals_example(rig: Rig):
+    """BU 2500 §6.8 with P105 = 50 Hz: 2000h is 25 Hz, 1000h is 12.5 Hz."""
+    assert rig.write(ENABLE, frequency=25.0).forwarded
+    assert rig.channel.output.words == (0x047F, 0x2000, 0, 0)
+    rig.write(SHUT_DOWN)
+    assert rig.sent == 0x047E
+    rig.write(ENABLE, frequency=12.5)
+    assert rig.channel.output.words == (0x047F, 0x1000, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "word"),
+    [(50.0, 0x4000), (-50.0, 0xC000), (0, 0), (99.996, 0x7FFF), (-100.0, 0x8000), (0.0016, 1), (0.0015, 0)],
+)
+def test_a_frequency_is_a_share_of_p105(rig: Rig, frequency: float, word: int):
+    assert rig.write(frequency=frequency).ok
+    assert rig.channel.setpoints[0] == word
+
+
+@pytest.mark.parametrize("frequency", [100.0, -100.01, math.nan, math.inf, -math.inf, 10**400, "25", True])
+def test_a_frequency_has_a_range(rig: Rig, frequency: Value):
+    outcome = rig.write(frequency=frequency)
+    assert outcome.code is Code.OUT_OF_RANGE
+    assert outcome.message.startswith("frequency takes ")
+    assert rig.channel.setpoints == (0, 0, 0)
+
+
+def test_a_range_is_told_with_its_unit(rig: Rig):
+    assert rig.write(frequency=120).message == "frequency takes -100…99.9969, not 120 Hz"
+
+
+@pytest.mark.parametrize(("value", "word"), [(0xFFFF, 0xFFFF), (-1, 0xFFFF), (-0x8000, 0x8000), (5.0, 5)])
+def test_a_word_may_be_written_as_a_signed_number(rig: Rig, value: Value, word: int):
+    assert rig.write(setpoint_2=value).ok
+    assert rig.channel.setpoints[1] == word
+
+
+@pytest.mark.parametrize(
+    "value", [0x1_0000, -0x8001, 1.5, "1", True, math.nan, math.inf, 10**400, 1e300, [1], {}]
+)
+@pytest.mark.parametrize("leaf", ["control_word", "setpoint_1"])
+def test_a_word_is_16_bits_and_whole(rig: Rig, leaf: str, value: Value):
+    outcome = rig.write(**{leaf: value})
+    assert outcome.code is Code.OUT_OF_RANGE
+    assert outcome.message.startswith(f"{leaf} takes ")
+
+
+def test_what_is_not_there_is_told_with_what_is(rig: Rig):
+    outcome = rig.write(velocity=3)
+    assert outcome.code is Code.UNKNOWN_POINT
+    assert outcome.message == (
+        "conveyor/fu1/command has no 'velocity'; "
+        "it has control_word, setpoint_1, setpoint_2, setpoint_3, frequency"
+    )
+
+
+def test_a_scale_that_is_not_known_is_no_reason_to_guess(rig: Rig):
+    rig.channel.scales.clear()
+    outcome = rig.write(frequency=25)
+    assert outcome.code is Code.NOT_CONFIGURED
+    assert "P105" in outcome.message
+
+
+def test_a_setpoint_and_its_raw_word_must_agree(rig: Rig):
+    assert rig.write(SHUT_DOWN, 0x2000, frequency=25.0).ok
+    assert rig.write(SHUT_DOWN, 0x2000, frequency=26.0).code is Code.OUT_OF_RANGE
+
+
+def test_what_is_not_written_stays(rig: Rig):
+    rig.write(SHUT_DOWN, 1, 2, 3)
+    rig.write(None, 7)
+    assert rig.channel.setpoints == (7, 2, 3)
+    assert rig.channel.control_word == SHUT_DOWN
+
+
+_WRONG = st.fixed_dictionaries(
+    {},
+    optional={
+        "control_word": st.one_of(st.integers(), st.floats(), st.text(max_size=3)),
+        "setpoint_1": st.one_of(st.integers(), st.floats(), st.booleans()),
+        "frequency": st.one_of(st.floats(), st.integers(), st.text(max_size=3)),
+        "nothing": st.integers(),
+    },
+)
+
+
+@given(values=_WRONG)
+def test_a_refused_telegram_changes_nothing(values: dict[str, Value]):
+    rig = Rig()
+    rig.run()
+    rig.wait(0.1)
+    channel = rig.channel
+    before = (channel.output, channel.control_word, channel.setpoints, channel.owner)
+    outcome = rig.write(**values)
+    if not outcome.ok:
+        assert not outcome.forwarded
+        assert before == (channel.output, channel.control_word, channel.setpoints, PLC)
+        assert channel.watchdog.left_ms(rig.now) == 100
+        assert channel.refused_writes == 1
+    else:
+        assert channel.watchdog.left_ms(rig.now) == 200
+
+
+def test_half_a_telegram_is_not_applied(rig: Rig):
+    rig.run()
+    rig.write(ENABLE, HALF_SPEED, setpoint_2=99_999)
+    assert rig.write(SHUT_DOWN, 1, 70_000).code is Code.OUT_OF_RANGE
+    assert rig.sent == ENABLE
+    assert rig.sent_setpoints == (HALF_SPEED, 0, 0)

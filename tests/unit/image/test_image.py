@@ -1,0 +1,141 @@
+"""The image: present values, and who has not yet seen which change."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.image import DataType, Feed, Image, Point, Quality, Reading
+
+POINTS = [
+    Point(name="a/b/actual/frequency", data_type=DataType.FLOAT),
+    Point(name="a/b/status/state", data_type=DataType.UINT8),
+    Point(name="a/b/status/fault_text", data_type=DataType.STRING),
+    Point(name="a/b/supervision/restart_interlock", data_type=DataType.BOOL),
+]
+
+
+@pytest.fixture
+def image() -> Image:
+    return Image(POINTS)
+
+
+def seen(feed: Feed) -> list[int]:
+    return feed.take(100)
+
+
+def test_a_point_that_never_had_a_value_is_waiting_with_the_zero_of_its_type(image: Image):
+    assert [image[i] for i in range(4)] == [
+        Reading(value, Quality.WAITING, 0.0, "") for value in (0.0, 0, "", False)
+    ]
+
+
+def test_points_are_found_by_name(image: Image):
+    image.set(1, 4, 12.5)
+    assert image.read("a/b/status/state") == Reading(4, Quality.GOOD, 12.5, "")
+    with pytest.raises(KeyError):
+        image.read("a/b/status/nothing")
+
+
+def test_two_points_of_one_name_are_a_fault_of_the_program():
+    with pytest.raises(ValueError, match="same name"):
+        Image([POINTS[0], POINTS[0]])
+
+
+def test_storing_what_is_there_changes_nothing(image: Image):
+    image.set(0, 25.0, 1.0, Quality.STALE, "no data")
+    feed = image.feed()
+    seen(feed)
+    image.set(0, 25.0, 2.0, Quality.STALE, "no data")
+    image.set_values([0], [25.0], 2.0)
+    assert image[0].time == 1.0
+    assert not feed
+
+
+@pytest.mark.parametrize(
+    ("value", "quality", "reason"),
+    [(26.0, Quality.GOOD, ""), (25.0, Quality.STALE, ""), (25.0, Quality.GOOD, "because")],
+)
+def test_each_part_of_a_reading_is_a_change(image: Image, value: float, quality: Quality, reason: str):
+    image.set(0, 25.0, 1.0)
+    feed = image.feed()
+    seen(feed)
+    image.set(0, value, 2.0, quality, reason)
+    assert seen(feed) == [0]
+    assert image[0] == Reading(value, quality, 2.0, reason)
+
+
+def test_values_alone_keep_their_quality(image: Image):
+    image.set(0, 1.0, 1.0, Quality.DEVICE_FAULT, "why")
+    feed = image.feed()
+    seen(feed)
+    image.set_values([0, 1], [2.0, 0], 3.0)
+    assert image[0] == Reading(2.0, Quality.DEVICE_FAULT, 3.0, "why")
+    assert image[1].quality is Quality.WAITING
+    assert seen(feed) == [0]
+
+
+def test_a_judgement_keeps_the_value(image: Image):
+    image.set(0, 25.0, 1.0)
+    image.judge([0, 1], Quality.LOST, 2.0, "node lost")
+    assert image[0] == Reading(25.0, Quality.LOST, 2.0, "node lost")
+    assert image[1].quality is Quality.LOST
+
+
+class TestFeed:
+    def test_a_new_one_is_shown_every_point_once(self, image: Image):
+        feed = image.feed()
+        assert len(feed) == 4
+        assert seen(feed) == [0, 1, 2, 3]
+        assert seen(feed) == []
+
+    def test_the_newest_value_wins(self, image: Image):
+        feed = image.feed()
+        seen(feed)
+        image.set(0, 1.0, 1.0)
+        image.set(0, 2.0, 2.0)
+        assert seen(feed) == [0]
+
+    def test_chunks_come_longest_waiting_first_and_none_is_passed_over(self, image: Image):
+        feed = image.feed()
+        seen(feed)
+        for index in (3, 0, 2):
+            image.set(index, "x" if index == 2 else 1, 1.0)
+        assert feed.take(2) == [3, 0]
+        image.set_values([0, 1], [5.0, 5], 2.0)
+        assert feed.take(1) == [2]
+        assert feed.take(0) == []
+        assert feed.take(9) == [0, 1]
+
+    def test_a_slow_one_does_not_hold_up_another(self, image: Image):
+        slow, quick = image.feed(), image.feed()
+        image.set(0, 1.0, 1.0)
+        assert seen(quick) == [0, 1, 2, 3]
+        assert len(slow) == 4
+
+    def test_a_dropped_one_is_marked_no_more(self, image: Image):
+        feed = image.feed()
+        seen(feed)
+        image.drop_feed(feed)
+        image.set(0, 9.0, 1.0)
+        assert not feed
+
+    @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 5), st.integers(1, 4))))
+    def test_who_takes_all_has_seen_the_present_values(self, steps: list[tuple[int, int, int]]):
+        image = Image(Point(name=f"p{i}", data_type=DataType.UINT8) for i in range(4))
+        feed = image.feed()
+        known: dict[int, object] = {}
+        for index, value, most in steps:
+            image.set(index, value, 1.0)
+            known |= {taken: image[taken].value for taken in feed.take(most)}
+        known |= {taken: image[taken].value for taken in feed.take(100)}
+        assert known == {index: image[index].value for index in range(4)}
+
+
+def test_qualities_are_numbered_as_modbus_serves_them():
+    names = "waiting good stale lost dead device_fault disabled config_error"
+    assert [quality.label for quality in sorted(Quality)] == names.split()
+    assert list(Quality) == list(range(8))
+    served = [quality.label for quality in Quality if quality.has_value]
+    assert served == ["good", "stale", "lost", "device_fault"]

@@ -1,0 +1,127 @@
+"""What goes between the bus process and its fronts reads back as it was; what is wrong is named."""
+
+from __future__ import annotations
+
+import contextlib
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Request, Role, Source
+from bridge.errors import Unavailable
+from bridge.image import DataType, Point, Quality
+from bridge.mirror import protocol, socket_endpoint
+from bridge.mirror.endpoint import prepare_folder
+from bridge.mirror.protocol import Asked, Changed, Delta, Malformed, Snapshot, Told
+from tests.support.zenoh_site import make_plant
+
+values = st.booleans() | st.integers(-(2**31), 2**32 - 1) | st.floats(allow_nan=False) | st.text(max_size=20)
+times = st.integers(0, 2**63 - 1)
+changes = st.builds(Changed, st.integers(0, 9), values, st.sampled_from(Quality), times, st.text(max_size=10))
+identities = st.builds(
+    Identity, st.sampled_from(Source), st.text(max_size=10), st.sampled_from(Role), st.text()
+)
+requests = st.builds(
+    Request,
+    identities,
+    st.text(max_size=20),
+    st.sampled_from(Action),
+    st.dictionaries(st.text(max_size=10), values, max_size=4),
+    st.integers(0, 10**6),
+    st.sampled_from((-1, 0, 1)),
+    st.integers(0, 32767),
+)
+
+
+@given(st.lists(changes, max_size=20))
+def test_deltas_read_back(readings: list[Changed]) -> None:
+    delta = Delta(7, 3, tuple(readings))
+    back = protocol.decode_delta(protocol.encode(delta), 10)
+    assert back == delta
+    assert [type(changed.value) for changed in back.readings] == [type(c.value) for c in readings]
+    assert all(isinstance(changed.quality, Quality) for changed in back.readings)
+
+
+@given(requests, st.floats(0, 1e9))
+def test_requests_read_back_with_their_identity(request: Request, deadline: float) -> None:
+    assert protocol.decode_request(protocol.encode(Asked(deadline, request))) == Asked(deadline, request)
+
+
+@given(st.builds(Outcome, st.sampled_from(Code), st.text(), st.booleans()))
+def test_outcomes_read_back(outcome: Outcome) -> None:
+    assert protocol.decode_outcome(protocol.encode(outcome)) == outcome
+
+
+def test_a_snapshot_brings_the_nature_of_every_point() -> None:
+    points = make_plant().image.points
+    snapshot = Snapshot(1, 2, points, ())
+    assert protocol.decode_snapshot(protocol.encode(snapshot)).points == points
+    rich = Point(
+        name="a/b/c/d",
+        data_type=DataType.UINT16,
+        unit="Hz",
+        low=-100,
+        high=100.5,
+        writable=True,
+        states=((0, "off"), (1, "on")),
+        bits=("run", "", "fault"),
+    )
+    assert protocol.decode_snapshot(protocol.encode(Snapshot(1, 2, (rich,), ()))).points == (rich,)
+
+
+def test_an_event_arrives_with_wall_clock_time() -> None:
+    event = Event(5.0, Kind.NODE_LOST, "conveyor", 800, "node lost")
+    back = protocol.decode_event(protocol.encode(Told.of(event, 1_500_000_000)))
+    assert back == Event(1.5, Kind.NODE_LOST, "conveyor", 800, "node lost")
+
+
+DECODERS = (
+    protocol.decode_snapshot,
+    lambda data: protocol.decode_delta(data, 10),
+    protocol.decode_event,
+    protocol.decode_request,
+    protocol.decode_outcome,
+)
+
+
+@pytest.mark.parametrize("decode", DECODERS)
+@given(data=st.binary(max_size=64))
+def test_garbage_is_malformed_and_nothing_worse(decode: Callable[[bytes], object], data: bytes) -> None:
+    with contextlib.suppress(Malformed):
+        decode(data)
+
+
+@pytest.mark.parametrize("index", [-1, 10])
+def test_an_index_outside_the_image_is_malformed(index: int) -> None:
+    delta = Delta(1, 1, (Changed(index, 0, Quality.GOOD, 0, ""),))
+    with pytest.raises(Malformed, match="none of 10 points"):
+        protocol.decode_delta(protocol.encode(delta), 10)
+
+
+def test_deep_nesting_is_malformed() -> None:
+    with pytest.raises(Malformed):
+        protocol.decode_request(b"\x91" * 100_000)
+
+
+def test_the_runtime_folder_is_made_for_us_alone(tmp_path: Path) -> None:
+    endpoint = socket_endpoint(tmp_path / "run" / "drivebridge", "hall3")
+    assert endpoint == f"unixsock-stream/{tmp_path}/run/drivebridge/hall3.sock"
+    prepare_folder(endpoint)
+    assert stat.S_IMODE((tmp_path / "run" / "drivebridge").stat().st_mode) == 0o700
+
+
+def test_a_folder_others_may_write_to_is_refused(tmp_path: Path) -> None:
+    tmp_path.chmod(0o777)
+    with pytest.raises(Unavailable, match="chmod 700"):
+        prepare_folder(socket_endpoint(tmp_path, "hall3"))
+
+
+def test_a_path_that_is_no_socket_path_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(Unavailable, match="too long"):
+        socket_endpoint(tmp_path / ("x" * 100), "hall3")
+    with pytest.raises(Unavailable, match="must not contain"):
+        socket_endpoint(tmp_path / "a#b", "hall3")

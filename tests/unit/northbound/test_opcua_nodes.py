@@ -1,0 +1,160 @@
+"""The OPC UA layout: a list of points in, a tree of nodes out; no server."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from bridge.command import Action
+from bridge.image import Point
+from bridge.image.point import DataType
+from bridge.northbound.opcua.nodes import (
+    GROUPS,
+    ObjectNode,
+    VariableKind,
+    VariableNode,
+    enum_strings,
+    layout,
+    pascal_case,
+)
+from bridge.northbound.opcua.units import unit_id
+from tests.support.opcua_site import make_plant
+
+
+@pytest.fixture(scope="module")
+def points() -> tuple[Point, ...]:
+    return make_plant().image.points
+
+
+@pytest.fixture(scope="module")
+def trees(points: tuple[Point, ...]) -> tuple[ObjectNode, ...]:
+    return layout(points)
+
+
+def objects(node: ObjectNode) -> Iterator[ObjectNode]:
+    yield node
+    for child in node.objects:
+        yield from objects(child)
+
+
+def variables(trees: tuple[ObjectNode, ...]) -> list[VariableNode]:
+    found = [variable for tree in trees for node in objects(tree) for variable in node.variables]
+    return found + [bit for variable in found for bit in variable.bits]
+
+
+def ids(trees: tuple[ObjectNode, ...]) -> list[str]:
+    found = [node.id for tree in trees for node in objects(tree)]
+    found += [method.id for tree in trees for node in objects(tree) for method in node.methods]
+    return found + [variable.id for variable in variables(trees)]
+
+
+def find(trees: tuple[ObjectNode, ...], name: str) -> ObjectNode:
+    return next(node for tree in trees for node in objects(tree) if node.id == name)
+
+
+def test_every_point_has_its_node_and_no_id_is_there_twice(
+    points: tuple[Point, ...], trees: tuple[ObjectNode, ...]
+) -> None:
+    whole = [variable for variable in variables(trees) if variable.bit is None]
+    assert sorted(variable.id for variable in whole) == sorted(point.name for point in points)
+    assert all(points[variable.index] is variable.point for variable in whole)
+    assert len(ids(trees)) == len(set(ids(trees)))
+
+
+def test_a_drive_has_all_its_folders_even_without_points(trees: tuple[ObjectNode, ...]) -> None:
+    drive = find(trees, "conveyor/fu1")
+    assert [folder.id for folder in drive.objects] == [f"conveyor/fu1/{group}" for group in GROUPS]
+    assert drive.objects[0].browse_name == "Command"
+    assert find(trees, "conveyor/fu1/parameter").variables == ()
+
+
+def test_site_names_stay_as_they_are_written_and_others_are_pascal_case(
+    trees: tuple[ObjectNode, ...],
+) -> None:
+    assert find(trees, "conveyor").browse_name == "conveyor"
+    assert find(trees, "bus/can0").browse_name == "can0"
+    assert find(trees, "conveyor/node").browse_name == "Node"
+    assert pascal_case("worst_case_stop_ms") == "WorstCaseStopMs"
+    assert pascal_case("setpoint_1") == "Setpoint1"
+
+
+def test_drives_and_nodes_have_their_methods(trees: tuple[ObjectNode, ...]) -> None:
+    assert [method.browse_name for method in find(trees, "conveyor/fu1").methods] == [
+        "Start",
+        "Stop",
+        "QuickStop",
+        "DisableVoltage",
+        "ResetFault",
+        "TakeControl",
+        "ReleaseControl",
+        "KeepAlive",
+    ]
+    node = find(trees, "conveyor").methods
+    assert [(method.action, method.target) for method in node] == [
+        (Action.RESET, "conveyor"),
+        (Action.RESET_COMMUNICATION, "conveyor"),
+        (Action.ENABLE, "conveyor"),
+        (Action.DISABLE, "conveyor"),
+    ]
+
+
+def test_kinds_follow_from_the_points(trees: tuple[ObjectNode, ...]) -> None:
+    kinds = {variable.id: variable.kind for variable in variables(trees)}
+    assert kinds["conveyor/fu1/actual/frequency"] is VariableKind.ANALOG
+    assert kinds["conveyor/fu1/status/state"] is VariableKind.MULTI_STATE
+    assert kinds["conveyor/fu1/status/status_word"] is VariableKind.PLAIN
+    assert kinds["conveyor/fu1/status/status_word/fault"] is VariableKind.TWO_STATE
+
+
+def test_bits_without_a_meaning_are_left_out_and_none_is_writable(trees: tuple[ObjectNode, ...]) -> None:
+    word = next(v for v in variables(trees) if v.id == "conveyor/fu1/command/control_word")
+    assert word.writable
+    assert 13 not in [bit.bit for bit in word.bits]
+    assert not any(bit.writable for bit in word.bits)
+
+
+def test_only_command_points_are_writable(trees: tuple[ObjectNode, ...]) -> None:
+    assert {v.id.split("/")[2] for v in variables(trees) if v.writable} == {"command"}
+
+
+@pytest.mark.parametrize(
+    "name", ["alone", "bus/can0", "bridge", "conveyor/fu1", "conveyor/fu1/other/x", "conveyor/node"]
+)
+def test_a_point_without_a_place_is_an_error(name: str) -> None:
+    with pytest.raises(ValueError, match="no place"):
+        layout([Point(name=name, data_type=DataType.UINT8)])
+
+
+def test_two_bits_of_one_name_are_an_error() -> None:
+    word = Point(name="bridge/word", data_type=DataType.UINT16, bits=("a", "b", "a"))
+    with pytest.raises(ValueError, match="two bits"):
+        layout([word])
+
+
+def test_sparse_codes_stand_at_their_index() -> None:
+    strings = enum_strings([(0, "ok"), (2, "bad"), (255, "unknown")])
+    assert (len(strings), strings[0], strings[1], strings[2], strings[255]) == (
+        256,
+        "ok",
+        "",
+        "bad",
+        "unknown",
+    )
+
+
+# Part 8 §5.6.3: the characters of the UNECE common code, the first one highest.
+@pytest.mark.parametrize(
+    ("unit", "number"),
+    [
+        ("Hz", 4740186),
+        ("A", 4279632),
+        ("V", 5655636),
+        ("%", 20529),
+        ("ms", 4403766),
+        ("s", 5457219),
+        ("furlong", -1),
+    ],
+)
+def test_units_are_those_of_unece(unit: str, number: int) -> None:
+    assert unit_id(unit) == number

@@ -1,0 +1,131 @@
+"""Readings and outcomes in OPC UA's words, and what is told to whom; no server."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from asyncua import ua
+
+from bridge.command.request import Code, Outcome
+from bridge.image import DataType, Point, Quality, Reading
+from bridge.northbound.opcua.events import Bound
+from bridge.northbound.opcua.subscriptions import is_reported
+from bridge.northbound.opcua.values import (
+    OUTCOME_STATUS,
+    QUALITY_STATUS,
+    VARIANT_TYPE,
+    outcome_status,
+    point_value,
+    reading_value,
+)
+
+Codes, Kind = ua.StatusCodes, ua.VariantType
+WORD = Point(name="a/b/command/word", data_type=DataType.UINT16)
+NUMBER = Point(name="a/b/command/number", data_type=DataType.FLOAT)
+
+
+def test_every_quality_type_and_outcome_has_a_place() -> None:
+    assert set(QUALITY_STATUS) == set(Quality)
+    assert set(VARIANT_TYPE) == set(DataType)
+    assert set(OUTCOME_STATUS) == set(Code)
+
+
+def test_a_value_is_kept_exactly_where_the_status_is_not_bad() -> None:
+    for quality in Quality:
+        read = reading_value(Reading(7, quality, 1.0, ""), Kind.UInt16, 10**18)
+        assert (read.Value.Value is None) == read.StatusCode.is_bad()
+
+
+def test_what_has_never_had_a_value_has_no_source_time() -> None:
+    read = reading_value(Reading(0, Quality.WAITING, 0.0, ""), Kind.UInt16, 10**18)
+    assert (read.SourceTimestamp, read.ServerTimestamp is not None) == (None, True)
+
+
+def test_a_bit_is_taken_from_its_word() -> None:
+    for bit in range(16):
+        read = reading_value(Reading(0x8001, Quality.GOOD, 1.0, ""), Kind.Boolean, 0, bit)
+        assert read.Value.Value is (bit in (0, 15))
+
+
+@pytest.mark.parametrize(
+    ("code", "status"),
+    [
+        (Code.OK, Codes.Good),
+        (Code.NOT_ALLOWED, Codes.BadUserAccessDenied),
+        (Code.OUT_OF_RANGE, Codes.BadOutOfRange),
+        (Code.NOT_VALID, Codes.BadOutOfRange),
+        (Code.ACKNOWLEDGE_FIRST, Codes.BadInvalidState),
+        (Code.NOT_CONFIGURED, Codes.BadConfigurationError),
+        (Code.TIMED_OUT, Codes.BadTimeout),
+    ],
+)
+def test_outcomes_are_status_codes(code: Code, status: int) -> None:
+    assert outcome_status(Outcome(code)).value == status
+
+
+@pytest.mark.parametrize("kind", [k for k in Kind if "Int" in k.name or k.name in ("Byte", "SByte")])
+def test_any_integer_is_taken_for_a_word_and_for_a_number(kind: ua.VariantType) -> None:
+    assert point_value(WORD, ua.Variant(7, kind)) == 7
+    assert point_value(NUMBER, ua.Variant(7, kind)) == 7
+
+
+@pytest.mark.parametrize(
+    ("point", "written"),
+    [
+        (WORD, ua.Variant(7.0, Kind.Double)),
+        (WORD, ua.Variant(True, Kind.Boolean)),
+        (WORD, ua.Variant([7], Kind.UInt16)),
+        (WORD, ua.Variant(None, Kind.Null)),
+        (NUMBER, ua.Variant(math.nan, Kind.Double)),
+        (NUMBER, ua.Variant(-math.inf, Kind.Float)),
+        (NUMBER, ua.Variant("7", Kind.String)),
+        (NUMBER, ua.Variant([], Kind.Double, is_array=True)),
+        (Point(name="x", data_type=DataType.BOOL), ua.Variant(1, Kind.Byte)),
+        (Point(name="x", data_type=DataType.STRING), ua.Variant(b"x", Kind.ByteString)),
+    ],
+)
+def test_other_types_are_not(point: Point, written: ua.Variant) -> None:
+    with pytest.raises(ValueError, match="take"):
+        point_value(point, written)
+
+
+def value(number: float | None, status: int = Codes.Good) -> ua.DataValue:
+    held = ua.Variant(None, Kind.Null) if number is None else ua.Variant(number, Kind.Double)
+    return ua.DataValue(held, ua.StatusCode(status))
+
+
+def deadband(size: float) -> ua.DataChangeFilter:
+    return ua.DataChangeFilter(
+        Trigger=ua.DataChangeTrigger.StatusValue,
+        DeadbandType=ua.DeadbandType.Absolute,
+        DeadbandValue=size,
+    )
+
+
+def test_the_first_value_and_every_status_is_reported() -> None:
+    dead = value(None, Codes.BadNoCommunication)
+    assert is_reported(None, value(1.0), deadband(5))
+    assert is_reported(value(1.0), dead, deadband(5))
+    assert is_reported(dead, value(1.0), deadband(5))
+    assert is_reported(dead, value(None, Codes.BadDeviceFailure), deadband(5))
+
+
+def test_a_change_is_reported_beyond_the_deadband_only() -> None:
+    assert not is_reported(value(1.0), value(1.0), None)
+    assert is_reported(value(1.0), value(1.1), None)
+    assert not is_reported(value(1.0), value(1.5), deadband(0.5))
+    assert is_reported(value(1.0), value(1.6), deadband(0.5))
+
+
+def test_who_asks_for_the_status_alone_gets_no_values() -> None:
+    wanted = ua.DataChangeFilter(Trigger=ua.DataChangeTrigger.Status)
+    assert not is_reported(value(1.0), value(2.0), wanted)
+    assert is_reported(value(1.0), value(1.0, Codes.UncertainLastUsableValue), wanted)
+
+
+def test_events_are_bounded_to_a_burst_and_a_rate() -> None:
+    bound = Bound()
+    assert sum(bound.take(5.0) for _ in range(1000)) == 20
+    assert bound.held_back == 980
+    assert sum(bound.take(5.5) for _ in range(1000)) == 5

@@ -1,0 +1,122 @@
+"""Keys and what is written under them."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.command import Code, Event, Kind, Outcome
+from bridge.image import DataType, Point, Quality, Reading
+from bridge.northbound.zenoh.keys import KeySpace, event_json, outcome_json
+
+POINTS = (
+    Point(name="conveyor/fu1/status/state", data_type=DataType.UINT8, states=((4, "operation_enabled"),)),
+    Point(name="conveyor/fu1/actual/frequency", data_type=DataType.FLOAT, unit="Hz"),
+    Point(name="conveyor/fu1/status/fault_text", data_type=DataType.STRING),
+    Point(name="conveyor/fu1/supervision/restart_interlock", data_type=DataType.BOOL),
+)
+STATE, FREQUENCY, TEXT, INTERLOCK = range(4)
+KEYS = KeySpace("drives", "hall3", POINTS)
+NOW_NS = 1_700_000_000_123_456_789
+
+
+def good(value: bool | int | float | str) -> Reading:
+    return Reading(value, Quality.GOOD, 5.0, "")
+
+
+def test_a_key_is_prefix_site_and_point() -> None:
+    assert KEYS.keys[FREQUENCY] == "drives/hall3/conveyor/fu1/actual/frequency"
+    assert KEYS.tail(KEYS.keys[FREQUENCY]) == "conveyor/fu1/actual/frequency"
+    assert KEYS.node_token("conveyor") == "drives/hall3/@/conveyor"
+
+
+def test_a_value_comes_with_quality_and_time_in_microseconds() -> None:
+    assert KEYS.as_json(FREQUENCY, good(25.0), NOW_NS) == b'{"v":25.0,"q":"good","t":1700000000.123457}'
+
+
+def test_an_enumeration_names_its_state() -> None:
+    assert json.loads(KEYS.as_json(STATE, good(4), NOW_NS))["s"] == "operation_enabled"
+    assert "s" not in json.loads(KEYS.as_json(STATE, good(99), NOW_NS))
+
+
+def test_a_held_value_says_why_it_is_not_good() -> None:
+    shown = json.loads(KEYS.as_json(FREQUENCY, Reading(25.0, Quality.LOST, 5.0, "lost"), NOW_NS))
+    assert (shown["v"], shown["q"], shown["r"]) == (25.0, "lost", "lost")
+
+
+@pytest.mark.parametrize("quality", [quality for quality in Quality if not quality.has_value])
+def test_a_value_that_is_gone_is_not_shown(quality: Quality) -> None:
+    reading = Reading(4, quality, 5.0, "")
+    shown = json.loads(KEYS.as_json(STATE, reading, NOW_NS))
+    assert shown["v"] is None and "s" not in shown
+    assert KEYS.as_bare(STATE, reading, NOW_NS)[0] == b""
+
+
+def test_a_point_that_never_had_a_value_has_no_time() -> None:
+    shown = json.loads(KEYS.as_json(FREQUENCY, Reading(0.0, Quality.WAITING, 0.0, ""), NOW_NS))
+    assert shown == {"v": None, "q": "waiting", "t": None}
+
+
+@pytest.mark.parametrize(
+    ("index", "value", "text"),
+    [
+        (STATE, 4, b"4"),
+        (FREQUENCY, 25.0, b"25.0"),
+        (TEXT, "Überstrom", "Überstrom".encode()),
+        (INTERLOCK, True, b"true"),
+    ],
+)
+def test_a_bare_value_is_its_text_with_the_rest_in_the_attachment(
+    index: int, value: int | float | str, text: bytes
+) -> None:
+    payload, attachment = KEYS.as_bare(index, good(value), NOW_NS)
+    assert payload == text
+    assert json.loads(attachment)["q"] == "good"
+    assert json.loads(attachment)["t"] == 1700000000.123457
+
+
+@given(
+    value=st.booleans()
+    | st.integers(0, 2**32 - 1)
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(),
+    quality=st.sampled_from(Quality),
+    reason=st.text(max_size=40),
+    epoch_ns=st.integers(0, 4_000_000_000_000_000_000),
+)
+def test_whatever_is_shown_reads_back(
+    value: bool | int | float | str, quality: Quality, reason: str, epoch_ns: int
+) -> None:
+    shown = json.loads(KEYS.as_json(TEXT, Reading(value, quality, 1.0, reason), epoch_ns))
+    assert shown["v"] == (value if quality.has_value else None)
+    assert shown["q"] == quality.label
+    assert shown.get("r", "") == reason
+    if shown["t"] is not None:
+        assert abs(shown["t"] - epoch_ns / 1e9) <= 1e-6
+
+
+def test_outcomes() -> None:
+    assert outcome_json(Outcome(Code.OK)) == b'{"ok":true,"forwarded":true}'
+    tripped = outcome_json(Outcome(Code.OK, "tripped: acknowledge first", forwarded=False))
+    assert json.loads(tripped) == {"ok": True, "forwarded": False, "message": "tripped: acknowledge first"}
+    refused = outcome_json(Outcome(Code.NOT_ALLOWED, "the drive is controlled by modbus", forwarded=False))
+    assert json.loads(refused) == {
+        "ok": False,
+        "code": "not_allowed",
+        "message": "the drive is controlled by modbus",
+    }
+
+
+def test_events() -> None:
+    event = Event(5.0, Kind.WATCHDOG, "conveyor/fu1", 900, "silent")
+    assert KEYS.event_key(event) == "drives/hall3/@/event/watchdog"
+    assert json.loads(event_json(event, 1_500_000_000)) == {
+        "t": 1.5,
+        "kind": "watchdog",
+        "source": "conveyor/fu1",
+        "severity": 900,
+        "message": "silent",
+    }

@@ -1,0 +1,143 @@
+"""The command line as its user meets it: exit codes and the one sentence that helps."""
+
+from __future__ import annotations
+
+import json
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bridge import __version__
+from tests.support.process import drivebridge, free_port
+
+SITE = """
+[site]
+name = "cli"
+state_dir = "{folder}/state"
+runtime_dir = "{folder}/run"
+[[bus]]
+name = "can0"
+interface = "{interface}"
+channel = "nosuchcan"
+[[bus.node]]
+name = "conveyor"
+id = 5
+mapping = "nord/sk-tu4-cao"
+[[bus.node.drive]]
+slot = "fu1"
+control = "modbus"
+fieldbus_timeout_ms = 0
+parameters = {{ P105 = 50.0, P112 = 10.0 }}
+[modbus]
+listen = "127.0.0.1:{port}"
+"""
+
+
+def call(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "bridge", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, cwd="/")
+
+
+def write_site(folder: Path, interface: str = "virtual", port: int | None = None) -> Path:
+    path = folder / "site.toml"
+    path.write_text(SITE.format(folder=folder, interface=interface, port=port or free_port()), "utf-8")
+    return path
+
+
+def test_version() -> None:
+    done = call("version")
+    assert (done.returncode, done.stdout) == (0, f"{__version__}\n")
+
+
+def test_a_command_that_does_not_exist_is_bad_usage() -> None:
+    assert call("fly").returncode == 2
+
+
+def test_a_good_site_is_checked_and_its_decisions_repeated(tmp_path: Path) -> None:
+    done = call("check", str(write_site(tmp_path)))
+    assert done.returncode == 0
+    assert "1 drives on 1 buses, no faults" in done.stdout
+    assert "fieldbus_timeout_ms = 0" in done.stderr
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_a_bad_site_is_refused_with_all_its_faults(tmp_path: Path, command: str) -> None:
+    path = write_site(tmp_path)
+    text = path.read_text("utf-8").replace("id = 5", "id = 555").replace('slot = "fu1"', 'slot = "fu9"')
+    path.write_text(text.replace('"modbus"', '"modbos"'), "utf-8")
+    done = call(command, str(path))
+    assert done.returncode == 2
+    faults = done.stderr.splitlines()
+    assert any(":12: bus[0].node[0].id" in fault for fault in faults), faults
+    assert any(":16: bus[0].node[0].drive[0].control" in fault for fault in faults), faults
+
+
+def test_faults_of_site_and_mapping_are_readable_by_scripts(tmp_path: Path) -> None:
+    path = write_site(tmp_path)
+    path.write_text(path.read_text("utf-8").replace('slot = "fu1"', 'slot = "fu9"'), "utf-8")
+    done = call("check", str(path), "--json")
+    assert done.returncode == 2
+    [fault] = json.loads(done.stdout)["faults"]
+    assert fault["line"] == 15
+    assert "fu9" in fault["message"]
+    assert "fu1" in fault["hint"]
+
+
+def test_a_site_file_that_is_not_there(tmp_path: Path) -> None:
+    done = call("run", str(tmp_path / "none.toml"))
+    assert done.returncode == 2
+    assert "No such file" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_bus_that_is_missing_is_exit_3(tmp_path: Path) -> None:
+    done = call("run", str(write_site(tmp_path, interface="socketcan")))
+    assert done.returncode == 3
+    assert "can0" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_an_interface_nobody_knows_is_exit_3(tmp_path: Path) -> None:
+    done = call("run", str(write_site(tmp_path, interface="carrier_pigeon")))
+    assert done.returncode == 3
+    assert "carrier_pigeon" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_port_that_is_taken_is_exit_3(tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        done = call("run", str(write_site(tmp_path, port=port)))
+    assert done.returncode == 3
+    assert str(port) in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_run_serves_until_it_is_told_to_stop(tmp_path: Path) -> None:
+    with drivebridge(tmp_path, "run", "run", str(write_site(tmp_path)), notify=True) as bridge:
+        bridge.wait_ready()
+        bridge.wait_output("node operational")
+        bridge.popen.terminate()
+        assert bridge.popen.wait(15) == 0
+        assert "Traceback" not in bridge.output()
+
+
+@pytest.mark.parametrize("what", ["modbus", "opcua"])
+def test_exports_are_tables(tmp_path: Path, what: str) -> None:
+    path = str(write_site(tmp_path))
+    table = call("export", what, path)
+    assert table.returncode == 0
+    rows = json.loads(call("export", what, path, "--json").stdout)
+    assert len(rows) == len(table.stdout.splitlines()) - 1
+    assert table.stdout.splitlines()[0].split(",") == list(rows[0])
+
+
+def test_what_is_not_served_is_not_exported(tmp_path: Path) -> None:
+    done = call("export", "zenoh", str(write_site(tmp_path)))
+    assert done.returncode == 1
+    assert "[zenoh]" in done.stderr

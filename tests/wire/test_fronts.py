@@ -1,0 +1,130 @@
+"""The OPC UA front as a process of its own: it may die, and nothing else does."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from asyncua import Client
+from pymodbus.client import AsyncModbusTcpClient
+
+from tests.support.process import Process, drivebridge, free_port, until
+
+SITE = """
+[site]
+name = "fronts"
+state_dir = "{folder}/state"
+runtime_dir = "{folder}/run"
+[[bus]]
+name = "can0"
+interface = "virtual"
+deadman_ms = 500
+[[bus.node]]
+name = "conveyor"
+id = 5
+mapping = "nord/sk-tu4-cao"
+[[bus.node.drive]]
+slot = "fu1"
+unit_id = 1
+control = "modbus"
+fieldbus_timeout_ms = 2000
+parameters = {{ P105 = 50.0, P112 = 10.0 }}
+[modbus]
+listen = "127.0.0.1:{modbus}"
+[opcua]
+listen = "127.0.0.1:{opcua}"
+no_security = true
+anonymous = "operator"
+"""
+BACK_S = 5.0
+NOISE_S = 5.0
+"""A machine that is busy with other things."""
+TRIPS, KEEP_ALIVE, UNIT = 14, 10, 1
+
+
+def children(pid: int) -> list[int]:
+    found = subprocess.run(["pgrep", "-P", str(pid)], capture_output=True, text=True, check=False)
+    return [int(child) for child in found.stdout.split()]
+
+
+async def device_name(url: str) -> str:
+    async with Client(url, timeout=10) as client:
+        namespace = await client.get_namespace_index("urn:drivebridge:points")
+        return await client.get_node(f"ns={namespace};s=conveyor/fu1/identity/device_name").read_value()
+
+
+@pytest.fixture
+def ports() -> tuple[int, int]:
+    return free_port(), free_port()
+
+
+def start(folder: Path, ports: tuple[int, int]) -> Path:
+    path = folder / "site.toml"
+    path.write_text(SITE.format(folder=folder, modbus=ports[0], opcua=ports[1]), "utf-8")
+    return path
+
+
+def starts(bridge: Process) -> int:
+    """How often the front has started to serve."""
+    return bridge.output().count("INFO    OPC UA on")
+
+
+def wait_for_front(bridge: Process) -> None:
+    until(lambda: starts(bridge) == 1, 30.0, "the front serves")
+
+
+async def test_a_killed_front_is_back_and_the_drive_never_noticed(
+    tmp_path: Path, ports: tuple[int, int]
+) -> None:
+    path = start(tmp_path, ports)
+    with drivebridge(tmp_path, "run", "run", str(path), notify=True) as bridge:
+        bridge.wait_ready()
+        bridge.wait_output("node operational")
+        wait_for_front(bridge)
+        url = f"opc.tcp://127.0.0.1:{ports[1]}"
+        assert await device_name(url) == "SK TU4-CAO"
+        plc = AsyncModbusTcpClient("127.0.0.1", port=ports[0])
+        assert await plc.connect()
+        for words in ([0x047E, 0], [0x047F, 0x2000]):
+            assert not (await plc.write_registers(0, words, device_id=UNIT)).isError()
+        [front] = children(bridge.pid)
+        os.kill(front, signal.SIGKILL)
+        killed = time.monotonic()
+        while starts(bridge) < 2:
+            answer = await plc.write_register(KEEP_ALIVE, 1, device_id=UNIT)
+            assert not answer.isError(), "the controller goes on meanwhile"
+            assert time.monotonic() - killed <= BACK_S + NOISE_S, bridge.output()
+            time.sleep(0.05)  # noqa: ASYNC251 - nothing else runs in this loop
+        assert await device_name(url) == "SK TU4-CAO"
+        inputs = (await plc.read_input_registers(0, count=21, device_id=UNIT)).registers
+        assert inputs[0] & 0x6F == 0x27, "still running"
+        plc.close()
+        assert "hung" not in bridge.output()
+
+
+def test_a_front_does_not_outlive_the_bus_process(tmp_path: Path, ports: tuple[int, int]) -> None:
+    path = start(tmp_path, ports)
+    with drivebridge(tmp_path, "run", "run", str(path), notify=True) as bridge:
+        bridge.wait_ready()
+        wait_for_front(bridge)
+        [front] = children(bridge.pid)
+        bridge.signal(signal.SIGKILL)
+        bridge.popen.wait()
+        until(lambda: not Path(f"/proc/{front}").exists(), 10.0, "the front ends too")
+
+
+def test_the_demo_stops_without_leaving_anything_behind(tmp_path: Path) -> None:
+    with drivebridge(tmp_path, "demo", "demo", notify=True) as demo:
+        demo.wait_ready()
+        wait_for_front(demo)
+        demo.wait_output("conveyor/fu4: controlled by zenoh:demo")
+        started = children(demo.pid)
+        assert len(started) == 2
+        demo.popen.send_signal(signal.SIGINT)
+        assert demo.popen.wait(15) == 0
+        assert not any(Path(f"/proc/{child}").exists() for child in started)
+        assert "Traceback" not in demo.output()

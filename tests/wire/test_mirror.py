@@ -1,0 +1,281 @@
+"""The image of the bus process in another one, and requests back."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import signal
+import stat
+import sys
+import tempfile
+import time
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Plant, Request, Role, Source
+from bridge.command.link import NodeState
+from bridge.errors import Unavailable
+from bridge.image import Image, Quality, Value
+from bridge.mirror import MirrorClient, MirrorPublisher, PointsChanged, protocol, socket_endpoint
+from bridge.mirror.client import UNREACHABLE
+from bridge.mirror.endpoint import socket_path
+from bridge.northbound.view import View
+from bridge.zenohlink import Message, ZenohLink, zenoh_config
+from tests.support.zenoh_peer import until
+from tests.support.zenoh_site import ENABLED, READY, drive_says, epoch, make_plant, node_is
+
+BUS = Path(__file__).parent / "peers" / "mirror_bus.py"
+SCADA = Identity(Source.OPCUA, "ann", Role.OPERATOR, "10.0.0.7:5123")
+
+
+@pytest.fixture
+def endpoint() -> Iterator[str]:
+    # Not tmp_path: pytest's folders can be too deep for a socket.
+    with tempfile.TemporaryDirectory(prefix="db-") as folder:
+        yield socket_endpoint(Path(folder) / "run", "demo")
+
+
+@asynccontextmanager
+async def publishing(endpoint: str, plant: Plant) -> AsyncIterator[MirrorPublisher]:
+    publisher = MirrorPublisher(plant, endpoint, time.monotonic, epoch)
+    await publisher.start()
+    try:
+        yield publisher
+    finally:
+        await publisher.close()
+
+
+@asynccontextmanager
+async def front(endpoint: str) -> AsyncIterator[MirrorClient]:
+    client = MirrorClient(endpoint)
+    await asyncio.wait_for(client.open(), 20)
+    running = asyncio.create_task(client.run())
+    try:
+        yield client
+    finally:
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        await client.close()
+
+
+@asynccontextmanager
+async def bus_process(endpoint: str, *node: str) -> AsyncIterator[asyncio.subprocess.Process]:
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, str(BUS), endpoint, *node, stdout=asyncio.subprocess.PIPE
+    )
+    assert process.stdout
+    assert await asyncio.wait_for(process.stdout.readline(), 20) == b"ready\n"
+    try:
+        yield process
+    finally:
+        if process.returncode is None:
+            process.kill()
+        await process.wait()
+
+
+def shown(image: Image) -> list[tuple[Value, Quality, str]]:
+    return [(r.value, r.quality, r.reason) for r in (image[i] for i in range(len(image.points)))]
+
+
+async def test_the_front_sees_what_the_bus_process_sees(endpoint: str) -> None:
+    plant = make_plant()
+    node_is(plant, NodeState.OPERATIONAL)
+    async with publishing(endpoint, plant), front(endpoint) as client:
+        view: View = client
+        assert view.image.points == plant.image.points
+        assert shown(view.image) == shown(plant.image)
+        before = time.time()
+        drive_says(plant.drives["conveyor/fu1"], ENABLED, 0x2000)
+        await until(lambda: view.image.read("conveyor/fu1/actual/frequency").value == 25.0, "25 Hz")
+        reading = view.image.read("conveyor/fu1/actual/frequency")
+        assert reading.quality is Quality.GOOD
+        assert abs(reading.time - before) < 5
+        assert abs(view.epoch_ns(reading.time) / 1e9 - reading.time) < 1e-6
+
+
+def mode(path: Path) -> int:
+    return stat.S_IMODE(path.stat().st_mode)
+
+
+async def test_the_socket_is_for_us_alone(endpoint: str) -> None:
+    async with publishing(endpoint, make_plant()):
+        path = socket_path(endpoint)
+        assert mode(path) == 0o600
+        assert mode(path.parent) == 0o700
+
+
+async def test_ten_thousand_changes_lead_to_the_same_image(endpoint: str) -> None:
+    plant = make_plant()
+    chance = random.Random(7)
+    async with publishing(endpoint, plant), front(endpoint) as client, front(endpoint) as second:
+        followed = client.image.feed()
+        followed.take(10**6)
+        for count in range(10_000):
+            index = chance.randrange(len(plant.image.points))
+            zero = plant.image.points[index].data_type.zero
+            value = type(zero)(chance.randrange(2 if isinstance(zero, bool) else 200))
+            quality = chance.choice(list(Quality))
+            plant.image.set(index, value, time.monotonic(), quality, chance.choice(["", "because"]))
+            if count % 100 == 0:
+                await asyncio.sleep(0.001)
+        for other in (client, second):
+            await until(lambda other=other: shown(other.image) == shown(plant.image), "the same image")
+        assert client.gaps == 0 and client.malformed == 0
+        assert len(followed) > 50
+        times = [abs(client.image[i].time - time.time()) for i in range(len(plant.image.points))]
+        assert min(times) < 60
+
+
+async def test_a_request_carries_its_identity_and_brings_one_outcome(endpoint: str) -> None:
+    plant = make_plant()
+    node_is(plant, NodeState.OPERATIONAL)
+    drive_says(plant.drives["conveyor/fu4"], READY)
+    async with publishing(endpoint, plant), front(endpoint) as client:
+        take = Request(SCADA, "conveyor/fu4", Action.TAKE_CONTROL, ttl_ms=5000)
+        assert await client.request(take) == Outcome(Code.OK)
+        assert plant.drives["conveyor/fu4"].channel.owner == SCADA
+        write = Request(SCADA, "conveyor/fu4", Action.WRITE, {"control_word": 0x047E, "setpoint_1": 0x1000})
+        assert (await client.request(write)).ok
+        assert plant.drives["conveyor/fu4"].channel.output.words == (0x047E, 0x1000, 0, 0)
+        refused = await client.request(Request(SCADA, "conveyor/fu1", Action.WRITE, {"control_word": 0x047E}))
+        assert refused == Outcome(Code.NOT_ALLOWED, "the drive is controlled by modbus", forwarded=False)
+        engineer = Identity(Source.OPCUA, "eve", Role.ENGINEER)
+        assert (await client.request(Request(engineer, "conveyor/fu4", Action.TAKE_CONTROL, ttl_ms=500))).ok
+
+
+async def test_a_start_that_takes_its_time_holds_up_no_other_request(endpoint: str) -> None:
+    plant = make_plant()
+    node_is(plant, NodeState.OPERATIONAL)
+    fu4 = plant.drives["conveyor/fu4"]
+    drive_says(fu4, READY)
+    async with publishing(endpoint, plant), front(endpoint) as client:
+        assert (await client.request(Request(SCADA, "conveyor/fu4", Action.TAKE_CONTROL, ttl_ms=9000))).ok
+        start = asyncio.create_task(client.request(Request(SCADA, "conveyor/fu4", Action.START)))
+        keep = Request(SCADA, "conveyor/fu4", Action.KEEP_ALIVE)
+        begin = time.monotonic()
+        outcomes = await asyncio.gather(*(client.request(keep) for _ in range(300)))
+        assert all(outcome.ok for outcome in outcomes)
+        assert time.monotonic() - begin < 3
+        assert not start.done()
+        drive_says(fu4, ENABLED)
+        assert await start == Outcome(Code.OK)
+
+
+async def test_a_request_that_waited_too_long_moves_nothing_but_may_stop(endpoint: str) -> None:
+    plant = make_plant()
+    node_is(plant, NodeState.OPERATIONAL)
+    fu4 = plant.drives["conveyor/fu4"]
+    drive_says(fu4, READY)
+    async with publishing(endpoint, plant):
+        late = MirrorClient(endpoint, clock=lambda: time.monotonic() - 60)
+        await late.open()
+        outcome = await late.request(Request(SCADA, "conveyor/fu4", Action.TAKE_CONTROL, ttl_ms=5000))
+        assert outcome.code is Code.TIMED_OUT and fu4.channel.owner is None
+        assert (await late.request(Request(SCADA, "conveyor/fu4", Action.STOP))).ok
+        await late.close()
+
+
+async def test_events_arrive_with_wall_clock_time(endpoint: str) -> None:
+    plant = make_plant()
+    heard: list[Event] = []
+    async with publishing(endpoint, plant), front(endpoint) as client:
+        client.on_event(heard.append)
+        plant.report(Event(time.monotonic(), Kind.BUS, "can0", 900, "bus-off"))
+        await until(lambda: heard, "the event")
+        assert (heard[0].kind, heard[0].source, heard[0].message) == (Kind.BUS, "can0", "bus-off")
+        assert abs(heard[0].time - time.time()) < 5
+
+
+async def test_a_missed_delta_is_made_good_by_a_snapshot(endpoint: str) -> None:
+    plant = make_plant()
+    async with publishing(endpoint, plant) as publisher, front(endpoint) as client:
+        publisher._sequence += 1  # as if one had been dropped on the way
+        plant.set("bridge/drives_good", 2, time.monotonic())
+        await until(lambda: client.gaps == 1, "the gap is noticed")
+        await until(
+            lambda: client.is_connected and shown(client.image) == shown(plant.image), "in step again"
+        )
+
+
+async def test_garbage_on_the_link_does_no_harm(endpoint: str) -> None:
+    plant = make_plant()
+    async with publishing(endpoint, plant) as publisher, front(endpoint) as client:
+        other = ZenohLink(zenoh_config(connect=[endpoint]), "other")
+        await other.open()
+        (answer,) = await other.get(protocol.REQUEST, b"\x93\x01\x02")
+        assert not answer.ok
+        assert not (await other.get(protocol.REQUEST))[0].ok
+        assert publisher.malformed == 2
+        await other.close()
+        publisher._link.send(Message(protocol.DELTA, b"nonsense"))
+        publisher._link.send(Message(protocol.EVENT, b"\x91\xc1"))
+        await until(lambda: client.malformed == 2, "both are counted")
+        plant.set("bridge/drives_good", 1, time.monotonic())
+        await until(lambda: shown(client.image) == shown(plant.image), "the client goes on")
+
+
+async def test_a_second_publisher_is_told_that_the_site_is_run_already(endpoint: str) -> None:
+    async with publishing(endpoint, make_plant()):
+        second = MirrorPublisher(make_plant(), endpoint, time.monotonic, epoch)
+        with pytest.raises(Unavailable, match="already being run"):
+            await second.start()
+        await second.close()
+
+
+async def test_a_killed_bus_process_leaves_every_point_dead_until_it_is_back(endpoint: str) -> None:
+    async with bus_process(endpoint) as first, front(endpoint) as client:
+        frequency = "conveyor/fu1/actual/frequency"
+        await until(lambda: client.image.read(frequency).quality is Quality.GOOD, "values")
+        first.kill()
+        begin = time.monotonic()
+        await until(
+            lambda: all((r[1], r[2]) == (Quality.DEAD, UNREACHABLE) for r in shown(client.image)), "dead", 2.0
+        )
+        assert time.monotonic() - begin < 2
+        assert not client.is_connected
+        outcome = await client.request(Request(SCADA, "conveyor/fu1", Action.STOP), timeout_s=0.5)
+        assert outcome == Outcome(Code.TIMED_OUT, "the bus process did not answer", forwarded=False)
+        await first.wait()
+        # its socket is still there; the next one takes the place
+        async with bus_process(endpoint):
+            await until(lambda: client.image.read(frequency).quality is Quality.GOOD, "values again", 5)
+            assert client.is_connected
+            stop = Request(SCADA, "conveyor/fu1", Action.STOP)
+            assert (await client.request(stop)).ok
+
+
+async def test_a_hung_bus_process_counts_as_gone_after_a_second(endpoint: str) -> None:
+    async with bus_process(endpoint) as process, front(endpoint) as client:
+        frequency = "conveyor/fu1/actual/frequency"
+        await until(lambda: client.image.read(frequency).quality is Quality.GOOD, "values")
+        process.send_signal(signal.SIGSTOP)
+        await until(lambda: client.image.read(frequency).quality is Quality.DEAD, "dead", 2.5)
+        process.send_signal(signal.SIGCONT)
+        await until(lambda: client.image.read(frequency).quality is Quality.GOOD, "good again", 5)
+
+
+async def test_another_site_ends_the_front(endpoint: str) -> None:
+    async with bus_process(endpoint):
+        client = MirrorClient(endpoint)
+        await client.open()
+        running = asyncio.create_task(client.run())
+    async with bus_process(endpoint, "lift"):
+        with pytest.raises(PointsChanged):
+            await asyncio.wait_for(running, 10)
+    await client.close()
+
+
+async def test_a_front_waits_for_its_bus_process(endpoint: str) -> None:
+    client = MirrorClient(endpoint)
+    opening = asyncio.create_task(client.open())
+    await asyncio.sleep(1.0)
+    assert not opening.done()
+    with pytest.raises(RuntimeError):
+        _ = client.image
+    async with publishing(endpoint, make_plant()):
+        await asyncio.wait_for(opening, 5)
+        assert client.image.points
+    await client.close()

@@ -1,0 +1,372 @@
+"""Who gets in to the OPC UA server, as whom, and what they cannot do there."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+from asyncua import Client, ua
+from asyncua.crypto import security_policies
+from asyncua.crypto.cert_gen import (
+    dump_private_key_as_pem,
+    generate_private_key,
+    generate_self_signed_app_certificate,
+)
+from asyncua.crypto.uacrypto import CertProperties
+from asyncua.server.address_space import AttributeValue
+from cryptography import x509
+from cryptography.hazmat.primitives.serialization import Encoding
+from cryptography.x509.oid import ExtendedKeyUsageOID
+
+from bridge.config import OpcUaTable, UserTable
+from bridge.northbound.opcua.security import hash_password
+from bridge.northbound.opcua.server import OpcUaServer
+from tests.support.opcua_site import LocalView, connected, namespace, serving
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+Codes, Refused = ua.StatusCodes, ua.uaerrors.BadUserAccessDenied
+PASSWORD = "swordfish"
+POLICIES = [
+    security_policies.SecurityPolicyBasic256Sha256,
+    security_policies.SecurityPolicyAes256Sha256RsaPss,
+]
+
+
+@dataclass(frozen=True)
+class Peer:
+    """A client application with its own certificate."""
+
+    certificate: bytes
+    key: bytes
+
+    async def secure(
+        self, client: Client, policy: type = security_policies.SecurityPolicyBasic256Sha256
+    ) -> None:
+        await client.set_security(
+            policy, CertProperties(self.certificate, "der"), CertProperties(self.key, "pem")
+        )
+
+
+def make_peer(name: str) -> Peer:
+    key = generate_private_key()
+    names: list[x509.GeneralName] = [x509.UniformResourceIdentifier(f"urn:{name}"), x509.DNSName(name)]
+    made = generate_self_signed_app_certificate(key, name, {}, names, [ExtendedKeyUsageOID.CLIENT_AUTH])
+    return Peer(made.public_bytes(Encoding.DER), dump_private_key_as_pem(key))
+
+
+@pytest.fixture(scope="module")
+def scada() -> Peer:
+    return make_peer("scada")
+
+
+@pytest.fixture(scope="module")
+def stranger() -> Peer:
+    return make_peer("stranger")
+
+
+@pytest.fixture(scope="module")
+def users() -> list[UserTable]:
+    line = hash_password(PASSWORD)
+    return [
+        UserTable(name="anna", role="operator", password_hash=line),
+        UserTable(name="otto", role="observer", password_hash=line),
+    ]
+
+
+Served = tuple[OpcUaServer, LocalView]
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def strict(users: list[UserTable], tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Served]:
+    """As a site file that says nothing else: no open endpoint, nobody without a name."""
+    settings = OpcUaTable(listen="127.0.0.1:0", user=users)
+    async with serving(settings, tmp_path_factory.mktemp("strict")) as found:
+        yield found
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def open_(users: list[UserTable], tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Served]:
+    """With an open endpoint on which everyone may look."""
+    settings = OpcUaTable(listen="127.0.0.1:0", no_security=True, anonymous="observer", user=users)
+    async with serving(settings, tmp_path_factory.mktemp("open")) as found:
+        yield found
+
+
+@asynccontextmanager
+async def logged_in(
+    served: Served, peer: Peer | None, user: str = "", password: str = "", policy: type = POLICIES[0]
+) -> AsyncIterator[Client]:
+    client = Client(served[0].endpoint_url, timeout=10)
+    if peer:
+        await peer.secure(client, policy)
+    if user:
+        client.set_user(user)
+        client.set_password(password)
+    async with client:
+        yield client
+
+
+async def control_word(client: Client) -> int:
+    """Write a command point; the status code."""
+    point = client.get_node(ua.NodeId("conveyor/fu1/command/control_word", await namespace(client)))
+    value = ua.DataValue(ua.Variant(0x047E, ua.VariantType.UInt16))
+    wanted = ua.WriteValue(NodeId=point.nodeid, AttributeId=ua.AttributeIds.Value, Value=value)
+    (result,) = await client.uaclient.write(ua.WriteParameters(NodesToWrite=[wanted]))
+    return result.value
+
+
+class TestEncrypted:
+    @pytest.mark.parametrize("policy", POLICIES)
+    async def test_an_operator_with_a_password_commands(
+        self, strict: Served, scada: Peer, policy: type
+    ) -> None:
+        async with logged_in(strict, scada, "anna", PASSWORD, policy) as client:
+            assert await control_word(client) == Codes.Good
+            assert str(strict[1].requests[-1].identity) == "opcua:anna"
+            assert strict[1].requests[-1].identity.address == "127.0.0.1"
+
+    @pytest.mark.parametrize(
+        ("user", "password"),
+        [("anna", "wrong"), ("anna", ""), ("nobody", PASSWORD), ("admin", PASSWORD), ("Admin", "")],
+    )
+    async def test_a_wrong_password_or_name_does_not_get_in(
+        self, strict: Served, scada: Peer, user: str, password: str
+    ) -> None:
+        with pytest.raises(Refused):
+            async with logged_in(strict, scada, user, password):
+                pass
+
+    async def test_nobody_gets_in_without_a_name(self, strict: Served, scada: Peer) -> None:
+        client = Client(strict[0].endpoint_url, timeout=10)
+        await scada.secure(client)
+        await client.connect_socket()
+        try:
+            await client.send_hello()
+            await client.open_secure_channel()
+            await client.create_session()
+            # The client would not even try: no such token is offered.
+            token = ua.ActivateSessionParameters()
+            token.UserIdentityToken = ua.AnonymousIdentityToken()
+            token.UserIdentityToken.PolicyId = "anonymous"
+            challenge = client.security_policy.peer_certificate + client._server_nonce  # pyright: ignore[reportPrivateUsage]
+            token.ClientSignature.Algorithm = POLICIES[0].AsymmetricSignatureURI
+            token.ClientSignature.Signature = client.security_policy.asymmetric_cryptography.signature(
+                challenge
+            )
+            with pytest.raises(ua.uaerrors.BadIdentityTokenRejected):
+                await client.uaclient.activate_session(token)
+        finally:
+            client.disconnect_socket()
+
+    async def test_no_session_is_opened_without_security_that_is_not_offered(self, strict: Served) -> None:
+        """asyncua lets it, whatever its endpoints say."""
+        client = Client(strict[0].endpoint_url, timeout=10)
+        endpoints = await client.connect_and_get_server_endpoints()
+        assert {endpoint.SecurityMode for endpoint in endpoints} == {ua.MessageSecurityMode.SignAndEncrypt}
+        await client.connect_socket()
+        try:
+            await client.send_hello()
+            await client.open_secure_channel()
+            with pytest.raises(ua.uaerrors.BadSecurityPolicyRejected):
+                await client.create_session()
+        finally:
+            client.disconnect_socket()
+
+    async def test_the_certificate_of_the_session_is_that_of_the_channel(
+        self, strict: Served, scada: Peer, stranger: Peer
+    ) -> None:
+        client = Client(strict[0].endpoint_url, timeout=10)
+        await stranger.secure(client)
+        await client.connect_socket()
+        try:
+            await client.send_hello()
+            await client.open_secure_channel()
+            claimed = ua.CreateSessionParameters()
+            claimed.ClientNonce, claimed.ClientCertificate = bytes(32), scada.certificate
+            with pytest.raises(ua.uaerrors.BadSecurityChecksFailed):
+                await client.uaclient.create_session(claimed)
+        finally:
+            client.disconnect_socket()
+
+
+class TestTrust:
+    async def test_only_trusted_certificates_open_a_channel(
+        self, users: list[UserTable], scada: Peer, stranger: Peer, tmp_path: Path
+    ) -> None:
+        trusted = tmp_path / "trusted"
+        trusted.mkdir()
+        (trusted / "scada.der").write_bytes(scada.certificate)
+        settings = OpcUaTable(listen="127.0.0.1:0", user=users, trusted_dir=str(trusted))
+        async with serving(settings, tmp_path) as served:
+            async with logged_in(served, scada, "anna", PASSWORD) as client:
+                assert await control_word(client) == Codes.Good
+            with pytest.raises((ua.UaError, ConnectionError)):
+                async with logged_in(served, stranger, "anna", PASSWORD):
+                    pass
+            # A copied file is enough, without a restart.
+            (trusted / "stranger.der").write_bytes(stranger.certificate)
+            async with logged_in(served, stranger, "anna", PASSWORD) as client:
+                assert await control_word(client) == Codes.Good
+
+    async def test_the_own_certificate_stays_over_a_restart(
+        self, users: list[UserTable], scada: Peer, tmp_path: Path
+    ) -> None:
+        settings = OpcUaTable(listen="127.0.0.1:0", user=users)
+        seen: list[bytes] = []
+        for _ in range(2):
+            async with serving(settings, tmp_path) as served:
+                client = Client(served[0].endpoint_url, timeout=10)
+                (endpoint, *_) = await client.connect_and_get_server_endpoints()
+                seen.append(endpoint.ServerCertificate)
+        assert seen[0] == seen[1]
+        shutil.rmtree(tmp_path)
+
+
+class TestRoles:
+    async def test_an_observer_reads_and_commands_nothing(self, open_: Served) -> None:
+        async with connected(open_[0]) as client:
+            space = await namespace(client)
+            point = client.get_node(ua.NodeId("conveyor/fu1/command/control_word", space))
+            await point.read_value()
+            assert await control_word(client) == Codes.BadUserAccessDenied
+            drive = client.get_node(ua.NodeId("conveyor/fu1", space))
+            for method in ("Stop", "QuickStop", "DisableVoltage", "KeepAlive", "ResetFault"):
+                with pytest.raises(Refused):
+                    await drive.call_method(f"{space}:{method}")
+            with pytest.raises(Refused):
+                await client.get_node(ua.NodeId("conveyor", space)).call_method(f"{space}:Reset")
+
+    async def test_an_observer_with_a_name_commands_nothing_either(self, strict: Served, scada: Peer) -> None:
+        async with logged_in(strict, scada, "otto", PASSWORD) as client:
+            assert await control_word(client) == Codes.BadUserAccessDenied
+
+    async def test_the_attributes_tell_each_user_what_it_may(self, open_: Served) -> None:
+        async def told(client: Client) -> tuple[int, bool]:
+            space = await namespace(client)
+            point = client.get_node(ua.NodeId("conveyor/fu1/command/control_word", space))
+            method = client.get_node(ua.NodeId("conveyor/fu1/Start", space))
+            access = await point.read_attribute(ua.AttributeIds.UserAccessLevel)
+            executable = await method.read_attribute(ua.AttributeIds.UserExecutable)
+            return access.Value.Value, executable.Value.Value
+
+        async with connected(open_[0]) as client:
+            assert await told(client) == (1, False)
+        # On the open endpoint a password crosses encrypted.
+        async with logged_in(open_, None, "anna", PASSWORD) as client:
+            assert await told(client) == (3, True)
+            assert await control_word(client) == Codes.Good
+
+    async def test_a_password_in_clear_text_is_not_taken(self, open_: Served) -> None:
+        client = Client(open_[0].endpoint_url, timeout=10)
+        await client.connect_socket()
+        try:
+            await client.send_hello()
+            await client.open_secure_channel()
+            await client.create_session()
+            token = ua.ActivateSessionParameters()
+            token.UserIdentityToken = ua.UserNameIdentityToken()
+            token.UserIdentityToken.UserName = "anna"
+            token.UserIdentityToken.Password = PASSWORD.encode()
+            with pytest.raises(ua.uaerrors.BadIdentityTokenRejected):
+                await client.uaclient.activate_session(token)
+        finally:
+            client.disconnect_socket()
+
+    async def test_nobody_changes_the_address_space(self, open_: Served) -> None:
+        async with logged_in(open_, None, "anna", PASSWORD) as client:
+            space = await namespace(client)
+            with pytest.raises(Refused):
+                await client.nodes.objects.add_variable(ua.NodeId("mine", space), "mine", 1)
+            with pytest.raises(Refused):
+                await client.delete_nodes([client.get_node(ua.NodeId("conveyor/fu1", space))])
+            with pytest.raises(ua.uaerrors.BadServiceUnsupported):
+                await client.uaclient.register_server(ua.RegisteredServer())
+
+    async def test_what_is_not_executable_does_not_run_and_what_is_not_readable_is_not_read(
+        self, open_: Served
+    ) -> None:
+        async with logged_in(open_, None, "anna", PASSWORD) as client:
+            space = await namespace(client)
+            nodes = open_[0]._server.iserver.aspace  # pyright: ignore
+            stop = nodes[ua.NodeId("conveyor/fu2/Stop", space)].attributes
+            stop[ua.AttributeIds.Executable] = _constant(False, ua.VariantType.Boolean)
+            with pytest.raises(ua.uaerrors.BadNotExecutable):
+                await client.get_node(ua.NodeId("conveyor/fu2", space)).call_method(f"{space}:Stop")
+            load = nodes[ua.NodeId("bus/can0/load", space)].attributes
+            load[ua.AttributeIds.AccessLevel] = _constant(0, ua.VariantType.Byte)
+            with pytest.raises(ua.uaerrors.BadNotReadable):
+                await client.get_node(ua.NodeId("bus/can0/load", space)).read_value()
+
+
+def _constant(value: object, kind: ua.VariantType) -> AttributeValue:
+    return AttributeValue(ua.DataValue(ua.Variant(value, kind)))
+
+
+class TestSessions:
+    async def test_a_token_cannot_be_guessed(self, open_: Served) -> None:
+        async with connected(open_[0]) as first, connected(open_[0]) as second:
+            tokens = [client.uaclient.protocol.authentication_token for client in (first, second)]
+            assert tokens[0] != tokens[1]
+            assert all(
+                token.NodeIdType is ua.NodeIdType.ByteString and len(token.Identifier) == 32
+                for token in tokens
+            )
+
+    async def test_a_session_is_not_taken_over_from_a_channel_with_another_certificate(
+        self, strict: Served, scada: Peer, stranger: Peer
+    ) -> None:
+        async with logged_in(strict, scada, "anna", PASSWORD) as owner:
+            token = owner.uaclient.protocol.authentication_token
+            thief = Client(strict[0].endpoint_url, timeout=10)
+            await stranger.secure(thief)
+            await thief.connect_socket()
+            try:
+                await thief.send_hello()
+                await thief.open_secure_channel()
+                thief.uaclient.protocol.authentication_token = token
+                with pytest.raises(ua.uaerrors.BadSecurityChecksFailed):
+                    await thief.uaclient.activate_session(ua.ActivateSessionParameters())
+            finally:
+                thief.disconnect_socket()
+            assert await control_word(owner) == Codes.Good
+
+    async def test_a_request_with_another_sessions_token_is_refused(self, open_: Served) -> None:
+        async with connected(open_[0]) as first, connected(open_[0]) as second:
+            own = second.uaclient.protocol.authentication_token
+            second.uaclient.protocol.authentication_token = first.uaclient.protocol.authentication_token
+            with pytest.raises(ua.uaerrors.BadSessionIdInvalid):
+                await second.nodes.server_state.read_value()
+            second.uaclient.protocol.authentication_token = own
+
+    @pytest.mark.parametrize(
+        "content",
+        [
+            b"GET / HTTP/1.1\r\n\r\n",
+            b"HELF\x20\x00\x00\x00" + bytes(24),
+            b"OPNF\x30\x00\x00\x00" + b"\xff" * 40,
+            b"MSGF\x18\x00\x00\x00" + b"\xff" * 16,
+        ],
+    )
+    async def test_bytes_that_are_not_opc_ua_hurt_nobody(self, open_: Served, content: bytes) -> None:
+        reader, writer = await asyncio.open_connection("127.0.0.1", open_[0].port)
+        writer.write(content)
+        async with asyncio.timeout(3):
+            if content.startswith((b"OPN", b"MSG", b"HEL")):
+                await reader.read(1000)
+        writer.close()
+        async with connected(open_[0]) as client:
+            await client.nodes.server_state.read_value()
+
+    async def test_a_chunk_without_end_is_cut_off(self, open_: Served) -> None:
+        reader, writer = await asyncio.open_connection("127.0.0.1", open_[0].port)
+        writer.write(b"MSGF\xff\xff\xff\xff" + bytes(200_000))
+        async with asyncio.timeout(3):
+            with suppress(ConnectionError):
+                assert await reader.read(1000) == b""
+        writer.close()

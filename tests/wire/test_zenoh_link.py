@@ -1,0 +1,219 @@
+"""The zenoh session on its own thread: whatever zenoh does, the event loop goes on."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import pytest
+
+from bridge.errors import Unavailable
+from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
+from tests.support.zenoh_peer import free_port, until, zenoh_peer
+
+
+@asynccontextmanager
+async def link(endpoint: str | None = None, *, to: str | None = None) -> AsyncIterator[ZenohLink]:
+    """A session that listens at ``endpoint`` or connects ``to`` one."""
+    config = zenoh_config(listen=[endpoint] if endpoint else [], connect=[to] if to else [])
+    opened = ZenohLink(config, "test")
+    await opened.open()
+    try:
+        yield opened
+    finally:
+        await opened.close()
+
+
+@asynccontextmanager
+async def pair() -> AsyncIterator[tuple[ZenohLink, ZenohLink]]:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    async with link(endpoint) as server, link(to=endpoint) as client:
+        yield server, client
+
+
+async def longest_pause(stop: asyncio.Event) -> float:
+    """Longest time in seconds for which the loop did nothing else."""
+    worst, last = 0.0, time.monotonic()
+    while not stop.is_set():
+        await asyncio.sleep(0.001)
+        now = time.monotonic()
+        worst, last = max(worst, now - last), now
+    return worst
+
+
+async def test_a_taken_port_is_one_sentence() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    async with link(endpoint):
+        second = ZenohLink(zenoh_config(listen=[endpoint]), "zenoh")
+        with pytest.raises(Unavailable) as caught:
+            await second.open()
+        assert "Address already in use" in str(caught.value)
+        assert ".rs" not in str(caught.value)
+        assert await second.close()
+
+
+def test_what_is_no_endpoint_is_refused() -> None:
+    with pytest.raises(Unavailable, match="garbage"):
+        zenoh_config(listen=["garbage"])
+
+
+async def test_a_client_waits_for_its_router_and_can_be_closed_meanwhile() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    waiting = ZenohLink(zenoh_config(mode="client", connect=[endpoint]), "zenoh")
+    assert not await waiting.open(patience_s=0.2)
+    waiting.put(Message("a/b", b"early"))
+    got: list[Message] = []
+    async with link(endpoint) as server:
+        server.declare_subscriber("a/*", got.append)
+        await until(
+            lambda: any(m.payload == b"late" for m in got) or waiting.put(Message("a/b", b"late")), "late"
+        )
+    await waiting.close()
+    hopeless = ZenohLink(zenoh_config(mode="client", connect=[endpoint]), "zenoh")
+    assert not await hopeless.open(patience_s=0.1)
+    begin = time.monotonic()
+    assert not await hopeless.close(timeout_s=0.3)
+    assert time.monotonic() - begin < 1
+
+
+async def test_queries_are_answered_from_the_loop() -> None:
+    async with pair() as (server, client):
+
+        def answer(asked: Asked) -> None:
+            if asked.payload == b"bad":
+                asked.fail(b"no", "text/plain")
+            else:
+                asked.send([Message(asked.key, b"1"), Message(asked.key, b"2", "text/plain", b"beside")])
+                asked.finish()
+
+        server.declare_queryable("q/**", answer)
+        await server.settle()
+        await asyncio.sleep(0.1)
+        answers = await client.get("q/x", b"good")
+        assert [(a.ok, a.message.payload, a.message.attachment) for a in answers] == [
+            (True, b"1", None),
+            (True, b"2", b"beside"),
+        ]
+        assert [(a.ok, a.message.payload) for a in await client.get("q/x", b"bad")] == [(False, b"no")]
+        assert await client.get("nobody/x", timeout_s=0.3) == []
+        assert client.errors == server.errors == 0
+
+
+async def test_a_hundred_queries_wait_side_by_side() -> None:
+    async with pair() as (server, client):
+        held: list[Asked] = []
+        server.declare_queryable("q", held.append)
+        await server.settle()
+        await asyncio.sleep(0.1)
+        asking = [asyncio.create_task(client.get("q", str(i).encode())) for i in range(100)]
+        await until(lambda: len(held) == 100, "all have arrived")
+        for asked in reversed(held):
+            asked.send([Message("q", asked.payload or b"")])
+            asked.finish()
+        answers = await asyncio.gather(*asking)
+        assert [a[0].message.payload for a in answers] == [str(i).encode() for i in range(100)]
+
+
+async def test_a_handler_that_fails_takes_no_other_with_it() -> None:
+    seen: list[bytes] = []
+    errors: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: errors.append(context["exception"]))
+
+    def handler(message: Message) -> None:
+        if message.payload == b"1":
+            raise LookupError("ours")
+        seen.append(message.payload)
+
+    async with pair() as (server, client):
+        server.declare_subscriber("a", handler)
+        await server.settle()
+        await asyncio.sleep(0.1)
+        for i in range(5):
+            client.send(Message("a", str(i).encode()))
+        await until(lambda: len(seen) == 4, "the others arrive")
+        assert len(errors) == 1
+
+
+async def test_liveliness_comes_and_goes() -> None:
+    seen: list[tuple[str, bool]] = []
+    async with pair() as (server, client):
+        server.declare_token("x/@/one")
+        client.follow_liveliness("x/@/**", lambda key, alive: seen.append((key, alive)))
+        await until(lambda: seen == [("x/@/one", True)], "the token that was there")
+        server.drop_token("x/@/one")
+        await until(lambda: seen[1:] == [("x/@/one", False)], "its end")
+
+
+async def test_newest_value_wins_and_nothing_is_lost_at_the_end() -> None:
+    got: dict[str, bytes] = {}
+    async with pair() as (server, client):
+        client.declare_subscriber("v/*", lambda message: got.__setitem__(message.key, message.payload))
+        await client.settle()
+        await asyncio.sleep(0.1)
+        for value in range(50):
+            for point in range(200):
+                server.put(Message(f"v/{point}", str(value).encode()))
+            await asyncio.sleep(0)
+        await until(lambda: len(got) == 200 and set(got.values()) == {b"49"}, "the last value of each")
+
+
+async def test_a_stalled_subscriber_does_not_hold_up_the_loop() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    async with link(endpoint) as server, zenoh_peer(endpoint) as peer, zenoh_peer(endpoint) as other:
+        await peer.do("subscribe", "v/**")
+        await other.do("subscribe", "v/0")
+        await until(lambda: server.put(Message("v/0", b"0")) or peer.samples, "the peer hears")
+        peer.stop()
+        enough = asyncio.Event()
+        pause = asyncio.create_task(longest_pause(enough))
+        for value in range(200):
+            for point in range(200):
+                server.put(Message(f"v/{point}", f"{value:01000d}".encode()))
+            await asyncio.sleep(0.01)
+        server.put(Message("v/0", b"end"))
+        await until(
+            lambda: other.samples and other.samples[-1]["payload"] == "end", "the other one is served"
+        )
+        enough.set()
+        assert await pause < 0.25
+        begin = time.monotonic()
+        await server.close(timeout_s=1.0)
+        assert time.monotonic() - begin < 1.5
+
+
+async def test_a_flood_of_queries_leaves_the_loop_its_time() -> None:
+    handled = 0
+
+    def slow(asked: Asked) -> None:
+        nonlocal handled
+        handled += 1
+        time.sleep(0.001)
+        asked.finish()
+
+    async with pair() as (server, client):
+        server.declare_queryable("q", slow)
+        await server.settle()
+        await asyncio.sleep(0.1)
+        flood = [asyncio.create_task(client.get("q", timeout_s=5)) for _ in range(3000)]
+        await until(lambda: handled > 10, "it has begun")
+        late: list[float] = []
+        while handled < 500:
+            begin = time.monotonic()
+            await asyncio.sleep(0)
+            late.append(time.monotonic() - begin)
+        assert max(late) < 0.3
+        await asyncio.gather(*flood)
+
+
+async def test_nothing_raises_after_the_end() -> None:
+    async with pair() as (server, client):
+        await server.close()
+        server.put(Message("a", b"1"))
+        assert not server.send(Message("a", b"1"))
+        server.declare_token("a/@/b")
+        await server.settle()
+        assert await server.get("x") == []
+        assert await client.get("x") == []
+        assert await server.close()

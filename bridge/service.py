@@ -66,6 +66,12 @@ def load_project(path: Path) -> Project:
     return Project(path, site, families)
 
 
+def count(number: int, what: str) -> str:
+    """``1 bus``, ``2 buses``, ``4 drives``."""
+    ending = "" if number == 1 else "es" if what.endswith("s") else "s"
+    return f"{number} {what}{ending}"
+
+
 def make_bus(table: BusTable) -> Bus:
     """The bus of a site file. Raises ``BridgeError`` for a virtual one, which only a demo can have."""
     if table.interface == "virtual":
@@ -85,7 +91,7 @@ class Service:
     def __init__(self, project: Project, make_bus: MakeBus = make_bus, *, fronts: bool = True) -> None:
         self.project = project
         site = project.site
-        self.plant = Plant(site, project.families, __version__)
+        self.plant = Plant(site, project.families, __version__, clock.now())
         self.plant.on_event(EventLog())
         self.notifier = Notifier()
         networks = [(make_bus(table), Network(table, self.plant)) for table in site.bus]
@@ -121,7 +127,8 @@ class Service:
             # What is there now stays: the collector need not look at it again and again.
             gc.collect()
             gc.freeze()
-            self.notifier.ready(f"{len(self.plant.drives)} drives on {len(self.project.site.bus)} buses")
+            buses = count(len(self.project.site.bus), "bus")
+            self.notifier.ready(f"{count(len(self.plant.drives), 'drive')} on {buses}")
             ready()
             async with asyncio.TaskGroup() as tasks:
                 for front in self.fronts:

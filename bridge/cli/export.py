@@ -46,7 +46,7 @@ def modbus(site: SiteArgument, as_json: AsJson = False) -> None:
 
 def _register(row: Row) -> tuple[object, ...]:
     place = (row.table.value, row.address, row.reference)
-    return (*place, row.name, row.type, row.access, row.unit, row.description)
+    return (*place, row.name, row.type, row.unit, row.access, row.description)
 
 
 @app.command()

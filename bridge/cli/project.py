@@ -12,7 +12,7 @@ import typer
 
 from bridge.config import warnings
 from bridge.errors import FileFaults
-from bridge.service import load_project
+from bridge.service import count, load_project
 
 
 def check(
@@ -39,7 +39,7 @@ def check(
         return
     for warning in repeated:
         print(f"warning: {warning}", file=sys.stderr)
-    print(f"{site}: {len(drives)} drives on {len(project.site.bus)} buses, no faults")
+    print(f"{site}: {count(len(drives), 'drive')} on {count(len(project.site.bus), 'bus')}, no faults")
 
 
 def hash_password() -> None:

@@ -41,12 +41,14 @@ class Node:
 class Plant:
     """All drives of a site.
 
+    ``began`` is the monotonic time of what is known from the start, such as the version.
     ``outputs_changed`` is called when a channel's output may have changed and should go to the bus at
     once; ``on_event`` callbacks get every event.
     """
 
-    def __init__(self, site: Site, families: dict[str, Family], version: str) -> None:
+    def __init__(self, site: Site, families: dict[str, Family], version: str, began: float = 0.0) -> None:
         self.site = site
+        self.began = began
         self.nodes: dict[str, Node] = {}
         self.drives: dict[str, Drive] = {}
         self.by_unit: dict[int, Drive] = {}
@@ -76,13 +78,13 @@ class Plant:
             for name in self.nodes
         }
         for node in self.nodes.values():
-            self.image.set(self._node_faults[node.name][1], 0.0, 0.0)
+            self.image.set(self._node_faults[node.name][1], 0.0, began)
             for drive in node.drives:
                 drive.bind(self.image)
                 drive.channel.settled = partial(self._settled, node, drive)
-                self._settled(node, drive, 0.0)
-        self.set("bridge/version", version, 0.0)
-        self.set("bridge/drives_configured", len(self.drives), 0.0)
+                self._settled(node, drive, began)
+        self.set("bridge/version", version, began)
+        self.set("bridge/drives_configured", len(self.drives), began)
 
     def on_event(self, listener: Callable[[Event], None]) -> None:
         self._listeners.append(listener)
@@ -105,6 +107,7 @@ class Plant:
                 reply(Outcome(Code.UNKNOWN_TARGET, f"there is no node {request.target!r}"))
             else:
                 node.command(request, now, reply)
+                self.outputs_changed()
             return
         drive = self.drives.get(request.target)
         if drive is None:

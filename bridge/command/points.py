@@ -30,7 +30,7 @@ def _word(name: str, description: str, **more: object) -> Point:
 def drive_points(name: str, family: Family, scales: dict[str, LinearScale]) -> list[Point]:
     """The points of the drive called ``<node>/<drive>``.
 
-    ``scales`` holds the scales that are known already, by parameter name, for the ranges.
+    ``scales`` holds the scales that are known already, by the value's leaf, for the ranges.
     """
     return [
         *_command_points(name, family, scales),
@@ -97,7 +97,7 @@ def _actual_points(name: str, family: Family, scales: dict[str, LinearScale]) ->
 
 
 def _scaled(name: str, value: ScaledValue, scales: dict[str, LinearScale]) -> Point:
-    scale = scales.get(value.scale.full)
+    scale = scales.get(value.leaf)
     return Point(
         name=f"{name}/{value.group}/{value.name}",
         data_type=DataType.FLOAT,

@@ -40,15 +40,16 @@ class _Unique:
     file: TomlFile
     seen: dict[str | int, Key] = field(default_factory=dict[str | int, Key])
 
-    def add(self, table: RawTable, name: str, what: str) -> None:
+    def add(self, table: RawTable, name: str, what: str) -> bool:
+        """Whether the value of ``name`` is there for the first time."""
         value = table.text(name) if table.text(name) is not None else table.whole(name)
-        if value is not None:
-            self.add_value(value, (*table.key, name), f"{what} {value!r}")
+        return value is None or self.add_value(value, (*table.key, name), f"{what} {value!r}")
 
-    def add_value(self, value: str | int, key: Key, what: str) -> None:
+    def add_value(self, value: str | int, key: Key, what: str) -> bool:
         first = self.seen.setdefault(value, key)
         if first != key:
             self.file.fault(key, f"{what} is used twice", f"first used in line {self.file.line(first)}")
+        return first == key
 
 
 def _check_bus(bus: RawTable, channels: _Unique, file: TomlFile) -> None:
@@ -90,16 +91,13 @@ def _check_node(bus: RawTable, node: RawTable, file: TomlFile) -> None:
 def _check_drives(node: RawTable, units: _Unique, file: TomlFile) -> None:
     names, slots = _Unique(file), _Unique(file)
     for drive in node.tables("drive"):
-        slots.add(drive, "slot", "slot")
+        slot_is_new = slots.add(drive, "slot", "slot")
         units.add(drive, "unit_id", "unit id")
-        name = drive.text("name") or drive.text("slot")
-        key = (*drive.key, "name")
-        if name == "node":
-            file.fault(key, "'node' is reserved", "choose another name")
-        if name and "name" in drive.content:
-            names.add_value(name, key, f"drive name {name!r}")
-        elif name:
-            names.seen.setdefault(name, key)
+        given = "name" if "name" in drive.content else "slot"
+        if drive.text(given) == "node":
+            file.fault((*drive.key, given), "'node' is reserved", "choose another name")
+        if given == "name" or slot_is_new:
+            names.add(drive, given, "drive name")
         _check_control(drive, file)
 
 

@@ -15,7 +15,7 @@ from bridge.command import Drive, Identification
 from bridge.command.plant import Node
 from bridge.config import NodeTable
 from bridge.image import DataType
-from bridge.mapping.model import ObjectRef, Parameter, Pdo
+from bridge.mapping.model import IdentityRule, ObjectRef, Parameter, Pdo
 from bridge.southbound.canopen import cobid
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
 from bridge.southbound.canopen.pdo import Entry, MappingError, PdoCodec
@@ -120,11 +120,12 @@ def boot(node: Node) -> Boot:
     """
     result = BootResult()
     yield Step("looking for the node")
-    yield Read(0x1000)
+    device_type = _number((yield Read(0x1000)))
     yield SendStopped()
     yield Nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
     yield Step("reading the identity")
-    result.identification = yield from _identify(node.table)
+    result.identification = yield from _identify(node)
+    _check_family(node.family.identity, device_type, result.identification)
     yield Step("setting error control")
     yield from _error_control(node.table, result)
     for drive in node.drives:
@@ -153,14 +154,25 @@ def _number(data: bytes | None, default: int = 0) -> int:
     return default if data is None else int.from_bytes(data, "little")
 
 
-def _identify(table: NodeTable) -> Generator[Action, bytes | None, Identification]:
+def _check_family(rule: IdentityRule, device_type: int, found: Identification) -> None:
+    """Raises BootError where the node is no device of its mapping's family."""
+    for what, want, have in (
+        ("device type", rule.device_type, device_type),
+        ("vendor id", rule.vendor_id, found.vendor),
+        ("product code", rule.product_code, found.product),
+    ):
+        if want is not None and want != have:
+            raise BootError(f"another device: {what} is {have:08X}h, the mapping says {want:08X}h")
+
+
+def _identify(node: Node) -> Generator[Action, bytes | None, Identification]:
     vendor = _number((yield from _optional(0x1018, 1)))
     product = _number((yield from _optional(0x1018, 2)))
     revision = _number((yield from _optional(0x1018, 3)))
     serial = _number((yield from _optional(0x1018, 4)))
     name = (yield from _optional(0x1008)) or b""
     text = name.split(b"\0", 1)[0].decode("latin-1").strip()
-    expected = table.identity
+    expected = node.table.identity
     for what, want, have in (
         ("vendor id", expected.vendor_id, vendor),
         ("product code", expected.product_code, product),

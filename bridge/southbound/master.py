@@ -77,7 +77,8 @@ class Master:
     def attach(self, set_timer: Callable[[float], None]) -> None:
         """Run by whoever calls ``pump`` at the times given to ``set_timer``."""
         self._set_timer = set_timer
-        self._plant.outputs_changed = self._flush_now
+        # A changed output goes out at once, and like everything else in a complete round.
+        self._plant.outputs_changed = self._wake
         self._running = True
 
     async def close(self) -> None:
@@ -154,13 +155,6 @@ class Master:
         self._plant.report(Event(now, Kind.BUS, line.bus.name, severity, f"bus {line.bus.name} is {state}"))
         if not is_up:
             line.network.bus_is_gone(now)
-
-    def _flush_now(self) -> None:
-        """Something about an output changed: it goes out at once, not with the next round."""
-        now = self._clock()
-        for line in self._lines:
-            self._flush(line, now)
-        self._arm(now)
 
     def _flush(self, line: _Line, now: float) -> None:
         bus, network = line.bus, line.network

@@ -62,9 +62,9 @@ class NodeCore:
         node.command = self.command
         if not self._table.enabled:
             self._boot_at = None
-            self._set_state(NodeState.DISABLED, 0.0)
-        self._say("waiting", 0.0)
-        self._show(0.0)
+            self._set_state(NodeState.DISABLED, plant.began)
+        self._say("waiting", plant.began)
+        self._show(plant.began)
 
     # frames
 
@@ -305,6 +305,9 @@ class NodeCore:
 
     def refresh(self, now: float) -> None:
         self._plant.set(f"{self.node.name}/node/rejected_frames", self.rejected, now)
+        for drive in self.node.drives:
+            if drive.slot.parameters_by_sdo:
+                drive.sdo_abort_code = self.sdo.last_abort
 
     # commands on the node
 

@@ -31,8 +31,8 @@ _SENTENCES: Final = {
     "less_than_equal": "must be at most {le}",
     "greater_than": "must be more than {gt}",
     "less_than": "must be less than {lt}",
-    "too_short": "must have at least {min_length}",
-    "too_long": "must have at most {max_length}",
+    "too_short": "must have {min_length} or more entries",
+    "too_long": "must have {max_length} entries or fewer",
     "string_too_short": "must not be empty",
     "string_too_long": "must have at most {max_length} characters",
 }

@@ -11,7 +11,7 @@ from typing import Any
 
 from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Source
 from bridge.config import Site, load_site
-from bridge.mapping import load_family
+from bridge.mapping import Family, load_family
 from bridge.sim.nord_tu4 import NordTu4
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import BusStatus, ControllerState
@@ -46,6 +46,7 @@ parameters = {{ P105 = 50.0, P112 = 10.0 }}
 [zenoh]
 """
 
+NORD = load_family("nord/sk-tu4-cao")
 PLC = Identity(Source.MODBUS, "192.168.1.10")
 
 
@@ -103,12 +104,12 @@ class ClockBus:
 class Bench:
     """``log`` has every frame of the wire in order; ``cut`` keeps the node's frames from the master."""
 
-    def __init__(self, site: Site, *, present: bool = True) -> None:
+    def __init__(self, site: Site, *, present: bool = True, family: Family = NORD) -> None:
         self.now = 1000.0
         self.log: list[Frame] = []
         self.events: list[Event] = []
         self.cut = False
-        self.plant = Plant(site, {"nord/sk-tu4-cao": load_family("nord/sk-tu4-cao")}, "0")
+        self.plant = Plant(site, {"nord/sk-tu4-cao": family}, "0")
         self.plant.on_event(self.events.append)
         self.bus = ClockBus(self._from_master)
         self.network = Network(site.bus[0], self.plant)

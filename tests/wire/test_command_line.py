@@ -59,7 +59,7 @@ def test_a_command_that_does_not_exist_is_bad_usage() -> None:
 def test_a_good_site_is_checked_and_its_decisions_repeated(tmp_path: Path) -> None:
     done = call("check", str(write_site(tmp_path)))
     assert done.returncode == 0
-    assert "1 drives on 1 buses, no faults" in done.stdout
+    assert "1 drive on 1 bus, no faults" in done.stdout
     assert "fieldbus_timeout_ms = 0" in done.stderr
 
 

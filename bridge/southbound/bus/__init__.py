@@ -10,7 +10,7 @@ def open_bus(name: str, interface: str, channel: str, bitrate: int) -> Bus:
     if interface == "socketcan":
         from bridge.southbound.bus.socketcan import SocketCanBus
 
-        return SocketCanBus(name, channel)
+        return SocketCanBus(name, channel, bitrate)
     from bridge.southbound.bus.pythoncan import PythonCanBus
 
     return PythonCanBus(name, interface, channel, bitrate)

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import json
 import socket
 import struct
+import subprocess
 import time
 from collections import deque
 from collections.abc import Callable
@@ -61,8 +63,10 @@ _REOPEN_S: Final = (0.2, 5.0)
 class SocketCanBus:
     """One SocketCAN interface."""
 
-    def __init__(self, name: str, channel: str) -> None:
+    def __init__(self, name: str, channel: str, bitrate: int | None = None) -> None:
+        """``bitrate`` (bit/s) is compared with the interface's own, where it says one."""
         self._name = name
+        self._bitrate = bitrate
         self._channel = channel
         self._status = BusStatus()
         self._raw: socket.socket | None = None
@@ -95,6 +99,13 @@ class SocketCanBus:
         except OSError as error:
             self._close_sockets()
             raise Unavailable(f"bus {self._name}: {_explain(error, self._channel)}") from error
+        actual = interface_bitrate(self._channel)
+        if self._bitrate and actual and actual != self._bitrate:
+            self._close_sockets()
+            raise Unavailable(
+                f"bus {self._name}: {self._channel} runs at {actual} bit/s, the site file says "
+                f"{self._bitrate}: change one of them"
+            )
 
     def _open(self) -> None:
         raw = self._raw = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
@@ -317,6 +328,17 @@ def _is_up(channel: str) -> bool:
         request = struct.pack("16sH14x", channel.encode(), 0)
         flags = struct.unpack("16sH14x", fcntl.ioctl(query, 0x8913, request))[1]
     return bool(flags & 1)
+
+
+def interface_bitrate(channel: str) -> int | None:
+    """The interface's bit rate in bit/s; None where it has none (vcan) or iproute2 is not there."""
+    command = ["ip", "-json", "-details", "link", "show", "dev", channel]
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=2, check=True)
+        [link] = json.loads(done.stdout)
+        return int(link["linkinfo"]["info_data"]["bittiming"]["bitrate"])
+    except (OSError, subprocess.SubprocessError, ValueError, LookupError, TypeError):
+        return None
 
 
 def _explain(error: OSError, channel: str) -> str:

@@ -112,6 +112,8 @@ class SdoChannel:
         self.reply_id = reply_id
         self.timeout_s = timeout_s
         self.unmatched = 0
+        self.last_abort = 0
+        """Code of the last transfer that the server aborted or did not answer."""
         self._urgent: deque[_Job] = deque()
         self._patient: deque[_Job] = deque()
         self._job: _Job | None = None
@@ -215,6 +217,8 @@ class SdoChannel:
 
     def _end(self, result: Result, now: float) -> None:
         job, self._job, self._exchange, self._deadline = self._job, None, None, None
+        if isinstance(result, SdoError):
+            self.last_abort = result.code
         if job is not None:
             job.done(result)
         self._next(now)

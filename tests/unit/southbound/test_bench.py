@@ -8,10 +8,11 @@ import pytest
 
 from bridge.command import Action, Code
 from bridge.image import Quality
+from bridge.mapping.model import IdentityRule
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import ControllerState
 from bridge.southbound.canopen.nmt import NmtState
-from tests.support.bench import PLC, Bench, write_site
+from tests.support.bench import NORD, PLC, Bench, write_site
 
 RPDO1 = 0x205
 TPDO1 = 0x185
@@ -147,6 +148,22 @@ def test_another_device_at_the_address_is_left_alone(tmp_path: Path) -> None:
     assert "another device: vendor id is" in str(bench.value("conveyor/node/boot_status"))
     assert bench.plant.drives["conveyor/fu1"].quality is Quality.CONFIG_ERROR
     assert Frame(0, b"\x01\x05") not in [frame._replace(time=0.0) for frame in bench.log]
+
+
+def test_a_device_of_another_family_is_left_alone(tmp_path: Path) -> None:
+    family = NORD.model_copy(update={"identity": IdentityRule(vendor_id=0xB9)})
+    bench = Bench(write_site(tmp_path), family=family)
+    bench.run(1.0)
+    assert "vendor id is 00000000h, the mapping says 000000B9h" in str(
+        bench.value("conveyor/node/boot_status")
+    )
+    assert bench.plant.drives["conveyor/fu1"].quality is Quality.CONFIG_ERROR
+
+
+def test_a_command_on_a_node_goes_out_at_once(bench: Bench) -> None:
+    bench.log.clear()
+    bench.ask(Action.RESET_COMMUNICATION, "conveyor")
+    assert [frame.data for frame in bench.sent(0x000)] == [b"\x82\x05"]
 
 
 def test_a_hung_bridge_falls_silent_within_the_dead_man_time(bench: Bench) -> None:

@@ -98,6 +98,7 @@ def test_an_abort_carries_the_text_of_the_standard(client: Client) -> None:
     assert isinstance(client.result, SdoError)
     assert client.result.by_server
     assert "object does not exist in the object dictionary (06020000h)" in str(client.result)
+    assert client.channel.last_abort == 0x0602_0000
 
 
 def test_a_server_that_does_not_answer_is_told_and_the_next_transfer_begins(client: Client) -> None:

@@ -1,0 +1,275 @@
+"""Mapping files: every fault with its line, and what would be right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bridge.errors import FileFaults
+from bridge.mapping import load_family, read_family
+from bridge.mapping.loader import mappings_dir
+from bridge.mapping.model import pattern_bits
+from bridge.mapping.site import check_against_mappings, load_site_and_families
+
+FAMILY = """\
+[family]
+name = "Test"
+vendor = "Nobody"
+source = "none"
+[process]
+rpdo = ["control_word", "setpoint_1"]
+tpdo = ["status_word", "value_1"]
+[[slot]]
+name = "one"
+[slot.rpdo]
+number = 1
+cob_id = 0x200
+objects = [["6040:00"], ["6042:00"]]
+[slot.tpdo]
+number = 1
+cob_id = 0x180
+objects = [["6041:00"], ["6044:00"]]
+[[value]]
+name = "velocity"
+group = "command"
+word = "setpoint_1"
+scale = { full = "P1", at = 1000 }
+unit = "1/min"
+[[parameter]]
+name = "P1"
+title = "full speed"
+object = "2001:00"
+data_type = "uint16"
+[[poll]]
+name = "inputs"
+object = "60FD:00"
+data_type = "uint16"
+every_ms = 500
+[control_word]
+bits = []
+acknowledge_bit = 7
+enabling = { mask = 0x0F, value = 0x0F }
+stopped = 0
+ready = 6
+run = 15
+stop = { mask = 1, value = 0 }
+quick_stop = { mask = 4, value = 0 }
+disable_voltage = { mask = 2, value = 0 }
+[status_word]
+bits = []
+state = [
+  { name = "ready", pattern = "01X0001" },
+  { name = "fault", pattern = "0XX1000" },
+]
+[emcy.codes]
+0000 = "no fault"
+[faults]
+controller_silent = 1.0
+bridge_timeout = 2.0
+telegram_downtime = 3.0
+node_missing = 4.0
+[faults.texts]
+"1.0" = "silent"
+"""
+
+
+def told(folder: Path, text: str) -> list[str]:
+    path = folder / "family.toml"
+    path.write_text(text)
+    with pytest.raises(FileFaults) as caught:
+        read_family(path)
+    return [str(fault).removeprefix(f"{path}:") for fault in caught.value.faults]
+
+
+def test_the_sample_is_a_family(tmp_path: Path):
+    path = tmp_path / "family.toml"
+    path.write_text(FAMILY)
+    assert read_family(path).family.name == "Test"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        (
+            '"0XX1000"',
+            '"0XX1002"',
+            "48: status_word.state[1].pattern: must be written with 0, 1 and X (do not care), highest bit "
+            'first, not "0XX1002"',
+        ),
+        ('"0XX1000"', '"' + "0" * 17 + '"', "48: status_word.state[1].pattern: must be written"),
+        ('"60FD:00"', '"60FD"', '31: poll[0].object: must be an object as "3002:01", index and sub-index'),
+        ('["6042:00"]]', '["6042:0"]]', '13: slot[0].rpdo.objects[1][0]: must be an object as "3002:01"'),
+        ('["6042:00"]]', "[]]", "13: slot[0].rpdo.objects[1]: must have 1 or more entries"),
+        ('["6042:00"]]', "7]", "13: slot[0].rpdo.objects[1]: must be a list, not 7"),
+        (', ["6042:00"]]', "]", "13: slot[0].rpdo.objects: has 1 words and process.rpdo names 2"),
+        ("cob_id = 0x180", "cob_id = 0x7FF", "16: slot[0].tpdo.cob_id: 7FFh leaves no room for the node id"),
+        ('full = "P1"', 'full = "P2"', "22: value[0].scale.full: there is no parameter 'P2' (known: P1)"),
+        (
+            'word = "setpoint_1"',
+            'word = "setpoint_9"',
+            "21: value[0].word: there is no value word 'setpoint_9'",
+        ),
+        ('word = "setpoint_1"', 'word = "control_word"', "21: value[0].word: there is no value word"),
+        (
+            'name = "velocity"',
+            'name = "setpoint_1"',
+            "19: value[0].name: point 'command/setpoint_1' is there",
+        ),
+        ('name = "velocity"', 'name = "Speed!"', "19: value[0].name: must be lower_snake_case"),
+        ("at = 1000", "at = 0", "22: value[0].scale.at: must be more than 0, not 0"),
+        ('"control_word", "setpoint_1"', '"setpoint_1", "control_word"', "6: process.rpdo: must begin with"),
+        ('"status_word", "value_1"', '"value_1", "status_word"', "7: process.tpdo: must begin with"),
+        (
+            'rpdo = ["control_word", "setpoint_1"]',
+            "rpdo = []",
+            "6: process.rpdo: must have 1 or more entries",
+        ),
+        ('name = "one"', 'name = "FU 1"', "9: slot[0].name: must be lower_snake_case"),
+        ("[slot.tpdo]", "emcy_drive = 0\n[slot.tpdo]", "14: slot[0].rpdo.emcy_drive: is not a key"),
+        ('name = "inputs"', 'name = "nmt_state"', "30: poll[0].name: every node has 'nmt_state' of its own"),
+        (
+            'object = "2001:00"\ndata_type = "uint16"',
+            'object = "2001:00"\ndata_type = "float"',
+            "28: parameter[0].data_type: must be an integer type (uint8, uint16, uint32, int16 or int32)",
+        ),
+        (
+            'object = "2001:00"\ndata_type = "uint16"',
+            'object = "2001:00"\ndata_type = "unt16"',
+            '28: parameter[0].data_type: must be "bool", "uint8", "uint16", "uint32", "int16", "int32", '
+            '"float" or "string", not "unt16" (did you mean "uint16"?)',
+        ),
+        ("stopped = 0", "stopped = 15", "38: control_word.stopped: 000Fh would enable the drive"),
+        ("ready = 6", "ready = 0x86", "39: control_word.ready: 0086h acknowledges: bit 7 is 1"),
+        ("run = 15", "run = 7", "40: control_word.run: 0007h does not enable the drive"),
+        (
+            "acknowledge_bit = 7",
+            "acknowledge_bit = 16",
+            "36: control_word.acknowledge_bit: must be at most 15",
+        ),
+        (
+            "stop = { mask = 1, value = 0 }",
+            "stop = { mask = 16, value = 0 }",
+            "41: control_word.stop: leaves the drive enabled",
+        ),
+        (
+            "stop = { mask = 1, value = 0 }",
+            "stop = { mask = 1, value = 2 }",
+            "41: control_word.stop: value has bits outside its mask",
+        ),
+        ("run = 15", "run = 15\nforward = 1", "41: control_word.forward: has bits of enabling"),
+        ('"fault"', '"falt"', '48: status_word.state[1].name: must be "not_ready", '),
+        ('"fault"', '"not_ready"', '46: status_word.state: needs a state named "fault"'),
+        (
+            '"01X0001"',
+            '"XXX10XX"',
+            "47: status_word.state[0].pattern: ready takes words that are a fault too",
+        ),
+        ("0000 = ", "000 = ", "51: emcy.codes.000"),
+        ('"1.0" = "silent"', '"1" = "silent"', "58: faults.texts.1"),
+        ('vendor = "Nobody"\n', "", "1: family.vendor: is missing"),
+    ],
+)
+def test_a_fault_is_told_with_its_line(tmp_path: Path, old: str, new: str, fault: str):
+    assert old in FAMILY
+    found = told(tmp_path, FAMILY.replace(old, new, 1))
+    assert [line for line in found if line.startswith(fault)], found
+
+
+def test_a_valid_bit_belongs_into_every_word_the_bridge_sends(tmp_path: Path):
+    found = told(tmp_path, FAMILY.replace("acknowledge_bit = 7", "acknowledge_bit = 7\nvalid_bit = 10"))
+    assert [line.split(": ")[1] for line in found] == [
+        "control_word.stopped",
+        "control_word.ready",
+        "control_word.run",
+    ]
+
+
+def test_what_is_there_twice_is_told_with_where_it_is_first(tmp_path: Path):
+    parameter = FAMILY[FAMILY.index("[[parameter]]") : FAMILY.index("[[poll]]")]
+    poll = FAMILY[FAMILY.index("[[poll]]") : FAMILY.index("[control_word]")]
+    slot = FAMILY[FAMILY.index("[[slot]]") : FAMILY.index("[[value]]")]
+    value = FAMILY[FAMILY.index("[[value]]") : FAMILY.index("[[parameter]]")]
+    found = told(tmp_path, FAMILY + parameter + poll + slot + value)
+    assert [line.split(": ", 1)[1] for line in found] == [
+        "parameter[1].name: parameter 'P1' is there twice (first in line 25)",
+        "poll[1].name: poll 'inputs' is there twice (first in line 30)",
+        "slot[1].name: slot 'one' is there twice (first in line 9)",
+        "value[1].name: point 'command/velocity' is there twice (first in line 19)",
+    ]
+
+
+def test_several_faults_come_in_one_run(tmp_path: Path):
+    text = FAMILY.replace("cob_id = 0x200", "cob_id = 0x900").replace("at = 1000", "at = -1")
+    text = text.replace("every_ms = 500", "every_ms = 5").replace('"60FD:00"', '"inputs"')
+    assert len(told(tmp_path, text)) == 4
+
+
+@pytest.mark.parametrize("name", ["nord/nothing", "../mappings/nord/sk-tu4-cao", "/etc/passwd", ""])
+def test_a_family_is_one_of_those_below_mappings(name: str):
+    with pytest.raises(FileFaults, match=r"there is no mapping .* \(there are: .*nord/sk-tu4-cao"):
+        load_family(name)
+
+
+def test_a_pattern_is_a_mask_and_a_value():
+    assert pattern_bits("0XX1000") == (0b1001111, 0b0001000)
+    assert pattern_bits("1") == (1, 1)
+    assert pattern_bits("X") == (0, 0)
+
+
+def test_every_family_that_is_delivered_loads():
+    files = list(mappings_dir().rglob("*.toml"))
+    assert files
+    for file in files:
+        read_family(file)
+
+
+SITE = """\
+[site]
+name = "hall"
+[[bus]]
+name = "can0"
+interface = "virtual"
+[[bus.node]]
+name = "conveyor"
+id = 100
+mapping = "nord/sk-tu4-cao"
+[[bus.node.drive]]
+slot = "fu9"
+[[bus.node.drive]]
+slot = "fu2"
+parameters = { P105 = 50.0, P106 = 1.0 }
+[[bus.node]]
+name = "pump"
+id = 6
+mapping = "nord/sk-tu4-coa"
+hold_ms = "long"
+[[bus.node.drive]]
+slot = "fu1"
+"""
+
+
+class TestSiteAndMappings:
+    def test_all_faults_of_a_site_and_its_mappings_come_in_one_run(self, tmp_path: Path):
+        path = tmp_path / "site.toml"
+        path.write_text(SITE)
+        with pytest.raises(FileFaults) as caught:
+            load_site_and_families(path)
+        assert [str(fault).removeprefix(f"{path}:") for fault in caught.value.faults] == [
+            "8: bus[0].node[0].id: SK TU4-CAO has addresses 1…63, not 100",
+            "11: bus[0].node[0].drive[0].slot: SK TU4-CAO has no slot 'fu9' (it has fu1, fu2, fu3, fu4)",
+            "14: bus[0].node[0].drive[1].parameters.P106: SK TU4-CAO does not scale with 'P106' "
+            "(it scales with P105, P112)",
+            "18: bus[0].node[1].mapping: there is no mapping 'nord/sk-tu4-coa' "
+            '(did you mean "nord/sk-tu4-cao"?)',
+            '19: bus[0].node[1].hold_ms: must be a whole number, not "long"',
+        ]
+
+    def test_a_site_that_fits_comes_with_its_families(self, tmp_path: Path):
+        path = tmp_path / "site.toml"
+        text = SITE.replace("100", "5").replace("fu9", "fu1").replace(", P106 = 1.0", "")
+        path.write_text(text.replace("coa", "cao").replace('"long"', "1000"))
+        site, families = load_site_and_families(path)
+        assert [node.name for node in site.bus[0].node] == ["conveyor", "pump"]
+        assert list(families) == ["nord/sk-tu4-cao"]
+        assert check_against_mappings(site, families, str(path)) == []

@@ -1,0 +1,74 @@
+"""The NORD SK TU4-CAO family, against the manual's own figures (BU 2500 de-4319)."""
+
+from __future__ import annotations
+
+import pytest
+
+from bridge.mapping import family_names
+from bridge.mapping.model import ObjectRef
+from tests.support.rig import NORD
+
+SLOTS = ("fu1", "fu2", "fu3", "fu4")
+
+
+def test_is_found_by_its_name():
+    assert "nord/sk-tu4-cao" in family_names()
+
+
+def test_is_one_node_with_four_drives_at_addresses_1_to_63():
+    assert tuple(slot.name for slot in NORD.slot) == SLOTS
+    assert (NORD.family.node_id_low, NORD.family.node_id_high) == (1, 63)
+
+
+@pytest.mark.parametrize(
+    ("slot", "rpdo", "tpdo"),
+    [("fu1", 0x200, 0x180), ("fu2", 0x300, 0x280), ("fu3", 0x400, 0x380), ("fu4", 0x500, 0x480)],
+)
+def test_cob_ids_are_those_of_the_factory(slot: str, rpdo: int, tpdo: int):
+    """§6.4."""
+    it = NORD.slot_named(slot)
+    assert (it.rpdo.cob_id, it.tpdo.cob_id) == (rpdo, tpdo)
+    assert it.rpdo.number == it.tpdo.number == SLOTS.index(slot) + 1
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_both_layouts_of_setpoints_are_known(number: int):
+    """Three to a drive (§7.1.2, P165) and five to a drive (§6.7.5)."""
+    slot = NORD.slot[number]
+    for pdo, word, values in ((slot.rpdo, 0x3000, 0x3002), (slot.tpdo, 0x3001, 0x3003)):
+        (first, *others) = pdo.objects
+        assert first == [ObjectRef(index=word, sub=number + 1)]
+        for place, refs in enumerate(others, 1):
+            layouts = {3 * number + place, 5 * number + place}
+            assert {(ref.index, ref.sub) for ref in refs} == {(values, sub) for sub in layouts}
+            assert refs[0].sub == 3 * number + place  # the factory's first
+
+
+def test_process_data_are_always_four_words():
+    """§6.4, note."""
+    assert len(NORD.process.rpdo) == len(NORD.process.tpdo) == 4
+    assert NORD.process.exact_length
+
+
+def test_emergencies_say_which_drive_in_byte_3():
+    assert NORD.emcy.drive_byte == 3
+    assert [slot.emcy_drive for slot in NORD.slot] == [0, 1, 2, 3]
+
+
+def test_parameters_are_at_2000h_and_their_number():
+    """§6.6.1: P102 is 2066h; set 1 of the first element is sub-index 1."""
+    assert {p.name: str(p.object) for p in NORD.parameter} == {"P105": "2069:01", "P112": "2070:01"}
+
+
+def test_fault_numbers_are_those_of_the_interface():
+    """§8.4."""
+    faults = NORD.faults
+    assert (faults.controller_silent, faults.bridge_timeout) == (10.3, 102.0)
+    assert (faults.telegram_downtime, faults.node_missing) == (10.2, 10.9)
+    for number in ("10.2", "10.3", "10.9", "102.0"):
+        assert faults.texts[number]
+
+
+def test_a_slot_that_is_not_there_is_a_key_error():
+    with pytest.raises(KeyError):
+        NORD.slot_named("fu5")

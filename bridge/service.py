@@ -12,12 +12,12 @@ from pathlib import Path
 
 from bridge import __version__, clock
 from bridge.command import Plant
-from bridge.command.plant import check_against_mappings
-from bridge.config import BusTable, Site, load_site, warnings
-from bridge.errors import BridgeError, Fault, FileFaults
+from bridge.config import BusTable, Site, warnings
+from bridge.errors import BridgeError
 from bridge.eventlog import EventLog
 from bridge.fronts import Front
-from bridge.mapping import Family, load_family
+from bridge.mapping import Family
+from bridge.mapping.site import load_site_and_families
 from bridge.mirror.endpoint import socket_endpoint
 from bridge.mirror.publisher import MirrorPublisher
 from bridge.northbound.modbus.server import ModbusServer
@@ -28,9 +28,6 @@ from bridge.southbound.master import Master
 from bridge.southbound.network import Network
 
 _log = logging.getLogger(__name__)
-
-_STOP_DRIVES_S = 0.1
-"""How long stopped words are sent before the bursts end, when the service is stopped."""
 
 MakeBus = Callable[[BusTable], Bus]
 
@@ -46,23 +43,7 @@ class Project:
 
 def load_project(path: Path) -> Project:
     """Read a site file and every mapping it names. Raises ``FileFaults`` with all faults of all files."""
-    faults: list[Fault] = []
-    site = load_site(path)
-    families: dict[str, Family] = {}
-    for b, bus in enumerate(site.bus):
-        for n, node in enumerate(bus.node):
-            if node.mapping in families:
-                continue
-            try:
-                families[node.mapping] = load_family(node.mapping)
-            except FileFaults as error:
-                where = f"bus[{b}].node[{n}].mapping"
-                faults += [
-                    f if f.line else Fault(str(path), 0, where, f.message, f.hint) for f in error.faults
-                ]
-    faults += check_against_mappings(site, families, str(path))
-    if faults:
-        raise FileFaults(faults)
+    site, families = load_site_and_families(path)
     return Project(path, site, families)
 
 
@@ -123,7 +104,7 @@ class Service:
             await self.mirror.start()
             stack.push_async_callback(self.mirror.close)
             await self.master.start()
-            stack.push_async_callback(self._stop_drives)
+            stack.push_async_callback(self._stop)
             # What is there now stays: the collector need not look at it again and again.
             gc.collect()
             gc.freeze()
@@ -133,13 +114,10 @@ class Service:
             async with asyncio.TaskGroup() as tasks:
                 for front in self.fronts:
                     tasks.create_task(front.run(), name=f"front-{front.role}")
-                tasks.create_task(asyncio.Event().wait(), name="until cancelled")
+                # Waits until this task is cancelled, or tells that the master has failed.
+                tasks.create_task(self.master.failed(), name="master")
 
-    async def _stop_drives(self) -> None:
+    async def _stop(self) -> None:
         self.notifier.stopping()
-        now = clock.now()
-        for drive in self.plant.drives.values():
-            drive.channel.on_bridge_gap(now)
-        self.master.pump()
-        await asyncio.sleep(_STOP_DRIVES_S)
+        await self.master.stop_drives(clock.now())
         await self.master.close()

@@ -18,7 +18,6 @@ from bridge.config import BusTable, NodeTable, Site
 from bridge.errors import Fault, FileFaults
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Family
-from bridge.mapping.site import check_against_mappings as check_against_mappings
 
 NodeCommand = Callable[[Request, float, Reply], None]
 

@@ -23,8 +23,8 @@ NMT_STATES: Final = (
 CONTROLLER_STATES: Final = ((0, "ok"), (1, "warning"), (2, "passive"), (3, "bus_off"), (4, "down"))
 
 
-def _word(name: str, description: str, **more: object) -> Point:
-    return Point(name=name, data_type=DataType.UINT16, description=description, **more)  # pyright: ignore[reportArgumentType]
+def _word(name: str, description: str, bits: tuple[str, ...] = (), *, writable: bool = False) -> Point:
+    return Point(name=name, data_type=DataType.UINT16, writable=writable, description=description, bits=bits)
 
 
 def drive_points(name: str, family: Family, scales: dict[str, LinearScale]) -> list[Point]:
@@ -42,23 +42,13 @@ def drive_points(name: str, family: Family, scales: dict[str, LinearScale]) -> l
 
 
 def _command_points(name: str, family: Family, scales: dict[str, LinearScale]) -> list[Point]:
+    bits = tuple(family.control_word.bits)
     points = [
-        Point(
-            name=f"{name}/command/control_word",
-            data_type=DataType.UINT16,
-            writable=True,
-            description="control word as the owner wrote it",
-            bits=tuple(family.control_word.bits),
-        )
-    ]
-    points += [
-        Point(
-            name=f"{name}/command/{word}",
-            data_type=DataType.UINT16,
-            writable=True,
-            description="setpoint word as the owner wrote it",
-        )
-        for word in family.process.rpdo[1:]
+        _word(f"{name}/command/control_word", "control word as the owner wrote it", bits, writable=True),
+        *(
+            _word(f"{name}/command/{word}", "setpoint word as the owner wrote it", writable=True)
+            for word in family.process.rpdo[1:]
+        ),
     ]
     points += [_scaled(name, value, scales) for value in family.value if value.group == "command"]
     return points
@@ -67,18 +57,8 @@ def _command_points(name: str, family: Family, scales: dict[str, LinearScale]) -
 def _status_points(name: str, family: Family) -> list[Point]:
     bits = tuple(family.status_word.bits)
     return [
-        Point(
-            name=f"{name}/status/status_word",
-            data_type=DataType.UINT16,
-            description="status word; shows fault while the watchdog has tripped",
-            bits=bits,
-        ),
-        Point(
-            name=f"{name}/status/drive_status_word",
-            data_type=DataType.UINT16,
-            description="status word as the drive sent it",
-            bits=bits,
-        ),
+        _word(f"{name}/status/status_word", "status word; shows fault while the watchdog has tripped", bits),
+        _word(f"{name}/status/drive_status_word", "status word as the drive sent it", bits),
         Point(
             name=f"{name}/status/state", data_type=DataType.UINT8, states=STATES, description="drive state"
         ),

@@ -38,13 +38,6 @@ def load_site_and_families(path: Path) -> tuple[Site, dict[str, Family]]:
     return site, families
 
 
-def check_against_mappings(site: Site, families: dict[str, Family], path: str) -> list[Fault]:
-    """What the site file at ``path`` asks of a mapping that the mapping does not have."""
-    file = TomlFile(Path(path))
-    _check(file, families)
-    return sorted(file.faults, key=lambda fault: fault.line)
-
-
 def _nodes(file: TomlFile) -> list[RawTable]:
     return [node for bus in file.root.tables("bus") for node in bus.tables("node")]
 

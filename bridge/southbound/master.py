@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from bridge.command import Event, Kind, Plant
+from bridge.errors import OperationFailed
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import Bus, ControllerState
 from bridge.southbound.canopen.sync import burst_length
@@ -23,6 +24,8 @@ _log = logging.getLogger(__name__)
 _REFRESH_S = 0.1
 _SEND_LIMIT_S = 0.1
 """A frame that could not be sent for this long is stale and is dropped."""
+_STOP_DRIVES_S = 0.1
+"""How long stopped words are sent before the bursts end, when the service is stopped."""
 _RENEWALS = 3
 """How often a burst is renewed within its dead-man time."""
 
@@ -60,6 +63,7 @@ class Master:
         self._refresh_at = 0.0
         self._last_round: float | None = None
         self._running = False
+        self._failure: asyncio.Future[None] | None = None
         self.gaps = 0
 
     async def start(self) -> None:
@@ -70,6 +74,7 @@ class Master:
         except BaseException:
             self._close_buses()
             raise
+        self._failure = asyncio.get_running_loop().create_future()
         self._timer = LoopTimer(asyncio.get_running_loop(), self._clock, self._wake)
         self.attach(self._timer.arm)
         self._wake()
@@ -81,8 +86,17 @@ class Master:
         self._plant.outputs_changed = self._wake
         self._running = True
 
+    async def stop_drives(self, now: float) -> None:
+        """Send stopped words for a moment, unless the master has failed."""
+        if not self._running:
+            return
+        for drive in self._plant.drives.values():
+            drive.channel.on_bridge_gap(now)
+        self._wake()
+        await asyncio.sleep(_STOP_DRIVES_S)
+
     async def close(self) -> None:
-        """Stop every drive's process data and close the buses."""
+        """End every drive's process data and close the buses."""
         self._running = False
         self._plant.outputs_changed = lambda: None
         if self._timer:
@@ -97,8 +111,22 @@ class Master:
             line.bus.close()
 
     def _wake(self) -> None:
-        if self._running:
+        """A round, if we run. A fault of our own ends the running: no drive is left to a master that
+        does half of its work. The bursts end within the dead-man time, and ``failed`` says why."""
+        if not self._running:
+            return
+        try:
             self.pump()
+        except Exception as error:
+            self._running = False
+            if self._failure and not self._failure.done():
+                self._failure.set_exception(OperationFailed(f"the master has failed: {error!r}"))
+            raise
+
+    async def failed(self) -> None:
+        """Wait for ever, or raise ``OperationFailed`` when a fault of our own has ended the running."""
+        if self._failure:
+            await self._failure
 
     def pump(self) -> None:
         """One round: drain, judge, send, renew."""

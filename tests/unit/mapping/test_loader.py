@@ -10,7 +10,7 @@ from bridge.errors import FileFaults
 from bridge.mapping import load_family, read_family
 from bridge.mapping.loader import mappings_dir
 from bridge.mapping.model import pattern_bits
-from bridge.mapping.site import check_against_mappings, load_site_and_families
+from bridge.mapping.site import load_site_and_families
 
 FAMILY = """\
 [family]
@@ -272,4 +272,3 @@ class TestSiteAndMappings:
         site, families = load_site_and_families(path)
         assert [node.name for node in site.bus[0].node] == ["conveyor", "pump"]
         assert list(families) == ["nord/sk-tu4-cao"]
-        assert check_against_mappings(site, families, str(path)) == []

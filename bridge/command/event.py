@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Final
 
 
 class Kind(StrEnum):
@@ -27,3 +28,28 @@ class Event:
     source: str
     severity: int
     message: str
+
+
+_REPEATING: Final = frozenset((Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION))
+_MOST_A_SECOND: Final = 10
+
+
+class EventGate:
+    """Keeps whoever can cause events at will, such as a client that is refused or a babbling node, from
+    flooding those who follow them. What is left out is still counted where it happens."""
+
+    __slots__ = ("_told",)
+
+    def __init__(self) -> None:
+        self._told: dict[tuple[str, Kind], tuple[float, int]] = {}
+
+    def admits(self, event: Event) -> bool:
+        """Whether this event is told: of a kind that repeats, at most ten a second of each source."""
+        if event.kind not in _REPEATING:
+            return True
+        key = (event.source, event.kind)
+        begin, told = self._told.get(key, (event.time, 0))
+        if event.time - begin >= 1.0:
+            begin, told = event.time, 0
+        self._told[key] = (begin, told + 1)
+        return told < _MOST_A_SECOND

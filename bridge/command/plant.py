@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from bridge.command.drive import Drive
-from bridge.command.event import Event, Kind
+from bridge.command.event import Event, EventGate, Kind
 from bridge.command.link import NodeState
 from bridge.command.points import bridge_points, bus_points, node_points
 from bridge.command.request import NODE_ACTIONS, Code, Outcome, Reply, Request
@@ -42,7 +42,7 @@ class Plant:
 
     ``began`` is the monotonic time of what is known from the start, such as the version.
     ``outputs_changed`` is called when a channel's output may have changed and should go to the bus at
-    once; ``on_event`` callbacks get every event.
+    once; ``on_event`` callbacks get the events.
     """
 
     def __init__(self, site: Site, families: dict[str, Family], version: str, began: float = 0.0) -> None:
@@ -53,6 +53,7 @@ class Plant:
         self.by_unit: dict[int, Drive] = {}
         self.outputs_changed: Callable[[], None] = lambda: None
         self._listeners: list[Callable[[Event], None]] = []
+        self._gate = EventGate()
         points = bridge_points()
         units = _unit_ids(site)
         for bus in site.bus:
@@ -89,6 +90,8 @@ class Plant:
         self._listeners.append(listener)
 
     def report(self, event: Event) -> None:
+        if not self._gate.admits(event):
+            return
         for listener in self._listeners:
             listener(event)
 

@@ -1,0 +1,29 @@
+"""Events: all that matter, and no flood."""
+
+from __future__ import annotations
+
+from bridge.command import Event, Kind
+from bridge.command.event import EventGate
+
+
+def event(kind: Kind, time: float, source: str = "conveyor/fu1") -> Event:
+    return Event(time, kind, source, 300, "")
+
+
+def test_a_client_that_is_refused_a_thousand_times_is_told_of_ten_times_a_second():
+    gate = EventGate()
+    told = [gate.admits(event(Kind.REFUSED, n / 500)) for n in range(1000)]
+    assert sum(told) == 20
+
+
+def test_who_floods_hides_nobody_else():
+    gate = EventGate()
+    for _ in range(100):
+        gate.admits(event(Kind.REFUSED, 5.0))
+    assert gate.admits(event(Kind.REFUSED, 5.0, "conveyor/fu2"))
+    assert gate.admits(event(Kind.EMERGENCY, 5.0))
+
+
+def test_a_trip_is_always_told():
+    gate = EventGate()
+    assert all(gate.admits(event(Kind.WATCHDOG, 5.0)) for _ in range(100))

@@ -6,13 +6,12 @@ The command line turns each into its exit code; nothing below it decides how a p
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 
 class BridgeError(Exception):
     """Base of all errors that are told to the user in one sentence."""
 
-    exit_code: ClassVar[int] = 1
+    exit_code: int = 1
 
 
 class OperationFailed(BridgeError):

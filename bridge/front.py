@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
 from contextlib import AsyncExitStack
 from pathlib import Path
@@ -9,13 +10,14 @@ from pathlib import Path
 from bridge import clock
 from bridge.config import Site
 from bridge.errors import OperationFailed
+from bridge.fronts import give_signs
 from bridge.mirror.client import MirrorClient
 from bridge.mirror.endpoint import socket_endpoint
 from bridge.northbound.opcua.server import OpcUaServer
 
 
-async def run_opcua(site: Site) -> None:
-    """Serve until cancelled.
+async def run_opcua(site: Site, signs: int | None = None) -> None:
+    """Serve until cancelled, with signs of life on the pipe ``signs`` as soon as it serves.
 
     Raises ``PointsChanged`` where the bus process comes back with other points: this front has to
     start anew then.
@@ -31,4 +33,8 @@ async def run_opcua(site: Site) -> None:
         stack.push_async_callback(server.close)
         gc.collect()
         gc.freeze()
-        await mirror.run()
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(mirror.run(), name="mirror")
+            tasks.create_task(mirror.failed(), name="mirror link")
+            if signs is not None:
+                tasks.create_task(give_signs(signs), name="signs of life")

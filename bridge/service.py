@@ -87,13 +87,18 @@ class Service:
         self.mirror = MirrorPublisher(self.plant, endpoint, clock.now, clock.epoch_ns)
         self.fronts: list[Front] = []
         if fronts and site.opcua:
-            self.fronts.append(Front("opcua", ["run", str(project.path), "--role", "opcua"]))
+            self.fronts.append(Front("opcua", ["run", str(project.path), "--role", "opcua"], watched=True))
 
     async def run(self, ready: Callable[[], None] = lambda: None) -> None:
-        """Serve until cancelled. Raises ``Unavailable`` where a bus or a port cannot be opened."""
+        """Serve until cancelled.
+
+        Raises ``Unavailable`` where a bus or a port cannot be opened, ``FrontRefused`` where a front says
+        so, and ``OperationFailed`` when a part of the service has failed for good.
+        """
         for warning in warnings(self.project.site):
             _log.warning("%s", warning)
         async with AsyncExitStack() as stack:
+            stack.callback(_log.info, "stopped")
             # Ports first: a service that cannot be reached has no business on the bus.
             if self.modbus:
                 await self.modbus.start()
@@ -114,10 +119,14 @@ class Service:
             async with asyncio.TaskGroup() as tasks:
                 for front in self.fronts:
                     tasks.create_task(front.run(), name=f"front-{front.role}")
-                # Waits until this task is cancelled, or tells that the master has failed.
+                # Each waits until this task is cancelled, or tells that its part has failed.
                 tasks.create_task(self.master.failed(), name="master")
+                tasks.create_task(self.mirror.failed(), name="mirror")
+                if self.zenoh:
+                    tasks.create_task(self.zenoh.failed(), name="zenoh")
 
     async def _stop(self) -> None:
+        _log.info("stopping: all drives are stopped")
         self.notifier.stopping()
         await self.master.stop_drives(clock.now())
         await self.master.close()

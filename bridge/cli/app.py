@@ -37,5 +37,7 @@ def run_app() -> None:
     try:
         app()
     except BridgeError as error:
-        print(error, file=sys.stderr)
+        # Empty where a child has told it already.
+        if sentence := str(error):
+            print(sentence, file=sys.stderr)
         raise SystemExit(error.exit_code) from None

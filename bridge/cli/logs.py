@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
-from typing import Final
+import time
+from collections.abc import Callable
+from typing import Any, Final
 
+_log = logging.getLogger(__name__)
+
+_PAUSE_S: Final = 60.0
 _PRIORITY: Final = {
     logging.DEBUG: 7,
     logging.INFO: 6,
@@ -36,3 +42,39 @@ def set_up(*, verbose: bool) -> None:
     # Libraries tell their own users; ours need only what goes wrong.
     for name in ("asyncua", "asyncio", "pymodbus", "can"):
         logging.getLogger(name).setLevel(logging.ERROR)
+
+
+class LoopFaults:
+    """An event loop's exception handler: what nobody awaited or caught, told without a flood.
+
+    The first from each place is logged with its traceback, later ones at most once a minute.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._told: dict[tuple[str, int], tuple[float, int]] = {}
+
+    def __call__(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        error: BaseException | None = context.get("exception")
+        place = _place(error) or (str(context.get("message")), 0)
+        now = self._clock()
+        told_at, left_out = self._told.get(place, (None, 0))
+        if told_at is not None and now - told_at < _PAUSE_S:
+            self._told[place] = (told_at, left_out + 1)
+            return
+        self._told[place] = (now, 0)
+        message = f"unexpected: {context.get('message')}: {error!r}" if error else str(context.get("message"))
+        if told_at is None:
+            _log.error("%s", message, exc_info=error)
+        else:
+            _log.error("%s (%d more since)", message, left_out)
+
+
+def _place(error: BaseException | None) -> tuple[str, int] | None:
+    """File and line that raised it."""
+    trace = error.__traceback__ if error else None
+    if trace is None:
+        return None
+    while trace.tb_next:
+        trace = trace.tb_next
+    return trace.tb_frame.f_code.co_filename, trace.tb_lineno

@@ -35,6 +35,7 @@ def run(
         Literal["all", "bus", "opcua"], typer.Option(help="run one process alone: bus or opcua")
     ] = "all",
     parent: Annotated[int, typer.Option(hidden=True)] = 0,
+    signs: Annotated[int | None, typer.Option(hidden=True)] = None,
     verbose: Verbose = False,
 ) -> None:
     """Run the bridge for SITE. Nodes of a virtual bus are simulated in the same process."""
@@ -44,7 +45,7 @@ def run(
         from bridge.front import run_opcua
 
         become_front(parent)
-        until_stopped(run_opcua(project.site))
+        until_stopped(run_opcua(project.site, signs))
         return
     until_stopped(_serve(project, fronts=role == "all"))
 
@@ -166,6 +167,7 @@ def until_stopped(work: Coroutine[Any, Any, None]) -> None:
     async def supervised() -> None:
         task = asyncio.ensure_future(work)
         loop = asyncio.get_running_loop()
+        loop.set_exception_handler(logs.LoopFaults())
         stopped = False
 
         def stop() -> None:

@@ -40,9 +40,11 @@ class Authority:
         return f"the drive is controlled by {self.owner}"
 
     def take_refusal(self, identity: Identity, *, owner_is_silent: bool) -> str | None:
-        """Why ``identity`` may not take control now, or None if it may. An engineer may break a lease."""
+        """Why ``identity`` may not take control now, or None if it may. An engineer always may."""
         if self.control != "lease":
-            return self.refusal(identity, owner_is_silent=owner_is_silent)
+            why = self.refusal(identity, owner_is_silent=owner_is_silent)
+            may_break = identity.role >= Role.ENGINEER and identity.source.label == self.control
+            return None if may_break else why
         if identity.role < Role.OPERATOR:
             return f"{identity} may only read"
         free = self.owner is None or owner_is_silent or identity.is_same(self.owner)

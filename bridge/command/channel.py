@@ -193,8 +193,17 @@ class DriveChannel:
     def on_bridge_gap(self, now: float) -> None:
         """The bridge itself was not there for longer than the dead-man time: start as if anew."""
         self._leg.judge(now)
-        if not self.is_tripped:
+        if self.is_tripped:
+            # Still tripped; but a "hold" does not outlive the one who held.
+            self._gate.stop(self.words.stop(self._gate.sent.words[0]))
+        else:
             self._leg.leave(Stimulus.STARTED, now)
+        self._settle(now)
+
+    def on_bus_gone(self, now: float) -> None:
+        """The bus is down or off: whatever the drive was told does not count when it is back, not even
+        with errors ignored."""
+        self._gate.stop(self.words.stop(self._gate.sent.words[0]))
         self._settle(now)
 
     # requests

@@ -124,9 +124,16 @@ class ControllerLeg:
             return
         takes = request.action is Action.TAKE_CONTROL
         judge = self.authority.take_refusal if takes else self.authority.refusal
-        why = judge(identity, owner_is_silent=self.watchdog.controller_is_silent)
+        why = judge(identity, owner_is_silent=self._owner_is_silent)
         if why:
             raise Refusal(Code.NOT_ALLOWED, why)
+
+    @property
+    def _owner_is_silent(self) -> bool:
+        """Without a lease, an owner that has sent no telegram yet holds nobody up either."""
+        watchdog = self.watchdog
+        is_idle = watchdog.state is WatchdogState.IDLE and self.authority.control != "lease"
+        return watchdog.controller_is_silent or is_idle
 
     def _carry_out(self, request: Request, now: float) -> Outcome:
         """What is done at once. Raises ``Refusal`` before anything has changed."""
@@ -230,7 +237,6 @@ class ControllerLeg:
         low, high = _TIMEOUT_MS
         if not low <= request.timeout_ms <= high:
             raise Refusal(Code.OUT_OF_RANGE, f"fieldbus_timeout_ms takes {low}…{high}")
-        self._own(request.identity, now)
         self.watchdog.set_timeout(request.timeout_ms)
         message = f"fieldbus_timeout_ms = {request.timeout_ms}, by {request.identity}"
         self._tell(now, Kind.CONFIGURATION, 400, message)

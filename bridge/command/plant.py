@@ -13,7 +13,7 @@ from bridge.command.drive import Drive
 from bridge.command.event import Event, EventGate, Kind
 from bridge.command.link import NodeState
 from bridge.command.points import bridge_points, bus_points, node_points
-from bridge.command.request import NODE_ACTIONS, Code, Outcome, Reply, Request
+from bridge.command.request import NODE_ACTIONS, STOP_ACTIONS, Code, Outcome, Reply, Request
 from bridge.config import BusTable, NodeTable, Site
 from bridge.errors import Fault, FileFaults
 from bridge.image import Image, Quality, Value
@@ -54,6 +54,7 @@ class Plant:
         self.outputs_changed: Callable[[], None] = lambda: None
         self._listeners: list[Callable[[Event], None]] = []
         self._gate = EventGate()
+        self._is_closing = False
         points = bridge_points()
         units = _unit_ids(site)
         for bus in site.bus:
@@ -86,6 +87,12 @@ class Plant:
         self.set("bridge/version", version, began)
         self.set("bridge/drives_configured", len(self.drives), began)
 
+    def close(self, now: float) -> None:
+        """Stop every drive, and take no command any more but stops."""
+        self._is_closing = True
+        for drive in self.drives.values():
+            drive.channel.on_bridge_gap(now)
+
     def on_event(self, listener: Callable[[Event], None]) -> None:
         self._listeners.append(listener)
 
@@ -103,6 +110,9 @@ class Plant:
 
     def submit(self, request: Request, now: float, reply: Reply) -> None:
         """Carry out ``request``; ``reply`` is called exactly once, now or later."""
+        if self._is_closing and request.action not in STOP_ACTIONS:
+            reply(Outcome(Code.NOT_READY, "the bridge is being stopped", forwarded=False))
+            return
         if request.action in NODE_ACTIONS:
             node = self.nodes.get(request.target)
             if node is None or node.command is None:

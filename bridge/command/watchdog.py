@@ -84,12 +84,13 @@ class Watchdog:
     -0.1) the state stays OFF and an expiry is told once by ``on_time`` and does nothing else.
     """
 
-    __slots__ = ("_deadline", "_report_only", "_silent", "state", "timeout_ms")
+    __slots__ = ("_deadline", "_heard_at", "_report_only", "_silent", "state", "timeout_ms")
 
     def __init__(self, timeout_ms: int, *, report_only: bool = False) -> None:
         self.timeout_ms = timeout_ms
         self._report_only = report_only
         self._deadline: float | None = None
+        self._heard_at: float | None = None
         self._silent = False
         self.state = WatchdogState.IDLE if self._can_trip else WatchdogState.OFF
 
@@ -104,11 +105,11 @@ class Watchdog:
 
     def set_timeout(self, timeout_ms: int) -> None:
         """Another time, counted from the owner's last telegram: setting it is none. A trip stays a trip."""
-        if self._deadline is not None:
-            self._deadline += (timeout_ms - self.timeout_ms) / 1000
+        was_told = self._silent
         self.timeout_ms = timeout_ms
-        if not timeout_ms:
-            self._deadline = None
+        self._deadline = None
+        if timeout_ms and self._heard_at is not None and not was_told:
+            self._deadline = self._heard_at + timeout_ms / 1000
         self._settle()
 
     def _settle(self) -> None:
@@ -118,7 +119,8 @@ class Watchdog:
         if not self._can_trip:
             self.state = WatchdogState.OFF
         elif self.state is WatchdogState.OFF:
-            self.state = WatchdogState.IDLE
+            # Who commanded the drive while nobody watched is watched from now on.
+            self.state = WatchdogState.IDLE if self._heard_at is None else WatchdogState.RUNNING
 
     def left_ms(self, now: float) -> int:
         """Time until the trip; 0 when the timer does not run."""
@@ -134,9 +136,11 @@ class Watchdog:
         self.state, effect = TABLE[self.state, stimulus]
         if stimulus in (Stimulus.TELEGRAM, Stimulus.ACKNOWLEDGED):
             self._silent = False
+            self._heard_at = now
             self._deadline = now + self.timeout_ms / 1000 if self.timeout_ms else None
         elif stimulus in (Stimulus.RELEASED, Stimulus.OWNER_CHANGED, Stimulus.STARTED):
             self._silent = False
+            self._heard_at = None
             self._deadline = None
         self._settle()
         return effect

@@ -129,6 +129,10 @@ class MirrorClient:
     async def close(self) -> None:
         await self._link.close()
 
+    async def failed(self) -> None:
+        """Wait until closed, or raise ``OperationFailed`` when the link has ended by itself."""
+        await self._link.failed()
+
     # in step with the publisher
 
     async def _take_snapshot(self) -> None:

@@ -76,6 +76,10 @@ class MirrorPublisher:
         self._plant.image.drop_feed(self._feed)
         await self._link.close()
 
+    async def failed(self) -> None:
+        """Wait until closed, or raise ``OperationFailed`` when the link has ended by itself."""
+        await self._link.failed()
+
     # out
 
     def _tick(self) -> None:

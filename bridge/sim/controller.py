@@ -10,25 +10,36 @@ import json
 import logging
 import math
 import time
+from dataclasses import dataclass
 from typing import Final
 
 import zenoh
 
 _log = logging.getLogger(__name__)
 
-_CYCLE_S: Final = 0.25
 _TTL_MS: Final = 3000
 _ANSWER_S: Final = 2.0
 _WAVE_S: Final = 40.0
-_RUN_S: Final = 60.0
-_PAUSE_S: Final = 8.0
 _IDENTITY: Final = json.dumps({"controller": "demo"})
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """In seconds; ``cycle_s`` is the longest silence and shorter than the drive's watchdog time."""
+
+    cycle_s: float = 0.25
+    run_s: float = 60.0
+    pause_s: float = 8.0
+    retry_s: float = 1.0
 
 
 class Controller:
     """Moves one drive, ``<prefix>/<site>/<drive>``, up to ``frequency_hz``."""
 
-    def __init__(self, session: zenoh.Session, drive_key: str, frequency_hz: float) -> None:
+    def __init__(
+        self, session: zenoh.Session, drive_key: str, frequency_hz: float, times: Times | None = None
+    ) -> None:
+        self._times = times or Times()
         self._session = session
         self._key = drive_key
         self._frequency_hz = frequency_hz
@@ -48,32 +59,42 @@ class Controller:
         return {"ok": False, "code": "no_answer", "message": "nobody answered"}
 
     def run(self) -> None:
-        """For ever: take control, run, pause. Whatever fails is tried again."""
+        """For ever, round after round."""
         while True:
-            if not self.ask("take_control", ttl_ms=_TTL_MS).get("ok"):
-                time.sleep(1.0)
-                continue
-            self.ask("reset_fault")
-            self.ask("control_word", v=0x047E)
-            self._move()
-            time.sleep(1.0)
+            self.run_once()
 
-    def _move(self) -> None:
+    def run_once(self) -> bool:
+        """Take control, run, pause. False: something failed, and it is time for the next try."""
+        if not self.ask("take_control", ttl_ms=_TTL_MS).get("ok"):
+            time.sleep(self._times.retry_s)
+            return False
+        self.ask("reset_fault")
+        self.ask("control_word", v=0x047E)
+        return self._move() or self._hold(self._times.retry_s)
+
+    def _move(self) -> bool:
         started = self.ask("start", direction=1)
         if not started.get("ok"):
             _log.info("%s: not started: %s", self._key, started.get("message"))
-            return
+            return False
         begin = time.monotonic()
-        while (elapsed := time.monotonic() - begin) < _RUN_S:
+        while (elapsed := time.monotonic() - begin) < self._times.run_s:
             wave = 0.6 - 0.4 * math.cos(2 * math.pi * elapsed / _WAVE_S)
             if not self.ask("frequency", v=round(self._frequency_hz * wave, 2)).get("ok"):
-                return
-            time.sleep(_CYCLE_S)
+                return False
+            time.sleep(self._times.cycle_s)
         self.ask("stop")
-        for _ in range(round(_PAUSE_S / _CYCLE_S)):
+        return self._hold(self._times.pause_s)
+
+    def _hold(self, duration_s: float) -> bool:
+        """Let time go by as the drive's owner: one that falls silent trips its watchdog."""
+        end = time.monotonic() + duration_s
+        while time.monotonic() < end:
             if not self.ask("keep_alive").get("ok"):
-                return
-            time.sleep(_CYCLE_S)
+                time.sleep(self._times.retry_s)
+                return False
+            time.sleep(self._times.cycle_s)
+        return True
 
 
 def run_controller(endpoint: str, drive_key: str, frequency_hz: float) -> None:

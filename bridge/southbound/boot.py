@@ -26,6 +26,8 @@ _RPDO_MAPPING: Final = 0x1600
 _TPDO_PARAMETER: Final = 0x1800
 _TPDO_MAPPING: Final = 0x1A00
 _MOST_ENTRIES: Final = 64
+_LONGEST_NUMBER: Final = 8
+_LONGEST_NAME: Final = 64
 _GOES_OPERATIONAL_S: Final = 2.0
 
 
@@ -131,6 +133,7 @@ def boot(node: Node) -> Boot:
     for drive in node.drives:
         yield Step(f"reading the process data mapping of {drive.slot.name}")
         result.drives[drive.name] = yield from _read_plan(node, drive, result)
+    _refuse_doubles(result)
     for drive in node.drives:
         result.scales[drive.name] = yield from _read_scales(drive, result)
     yield Step("starting")
@@ -151,7 +154,12 @@ def _optional(index: int, sub: int = 0) -> Ask:
 
 
 def _number(data: bytes | None, default: int = 0) -> int:
-    return default if data is None else int.from_bytes(data, "little")
+    """The number in an answer. Raises BootError where it is longer than any number of CANopen."""
+    if data is None:
+        return default
+    if len(data) > _LONGEST_NUMBER:
+        raise BootError(f"the node answers with {len(data)} bytes where a number belongs")
+    return int.from_bytes(data, "little")
 
 
 def _check_family(rule: IdentityRule, device_type: int, found: Identification) -> None:
@@ -171,7 +179,7 @@ def _identify(node: Node) -> Generator[Action, bytes | None, Identification]:
     revision = _number((yield from _optional(0x1018, 3)))
     serial = _number((yield from _optional(0x1018, 4)))
     name = (yield from _optional(0x1008)) or b""
-    text = name.split(b"\0", 1)[0].decode("latin-1").strip()
+    text = name[:_LONGEST_NAME].split(b"\0", 1)[0].decode("latin-1").strip()
     expected = node.table.identity
     for what, want, have in (
         ("vendor id", expected.vendor_id, vendor),
@@ -235,6 +243,20 @@ def _read_plan(node: Node, drive: Drive, result: BootResult) -> Generator[Action
     return plan
 
 
+def _refuse_doubles(result: BootResult) -> None:
+    """Two drives behind one identifier would get each other's words: neither is served."""
+    users: dict[int, list[DrivePlan]] = {}
+    for plan in result.drives.values():
+        for pdo in (plan.rpdo, plan.tpdo):
+            if pdo is not None:
+                users.setdefault(pdo.cob_id, []).append(plan)
+    for cob_id, plans in users.items():
+        for plan in plans if len(plans) > 1 else ():
+            plan.problem = plan.problem or f"{cob_id:03X}h is the identifier of more than one PDO"
+            if plan.problem not in result.notes:
+                result.notes.append(plan.problem)
+
+
 def _read_pdo(
     node: Node, pdo: Pdo, parameter: int, mapping: int, result: BootResult
 ) -> Generator[Action, bytes | None, PdoPlan]:
@@ -245,6 +267,8 @@ def _read_pdo(
     cob_id = _number((yield from _optional(parameter, 1)), default_id)
     if cob_id & cobid.PDO_DISABLED:
         raise MappingError(f"{parameter:04X}h:01: the PDO is switched off in the node")
+    if cob_id & cobid.PDO_EXTENDED or not cobid.is_for_pdos(cob_id & cobid.COB_ID_MASK):
+        raise MappingError(f"{parameter:04X}h:01 is {cob_id:08X}h: no identifier for a PDO")
     kind = _number((yield from _optional(parameter, 2)), 255)
     event_ms = 0
     if parameter >= _TPDO_PARAMETER and kind >= 254:
@@ -306,8 +330,10 @@ def _read_scales(drive: Drive, result: BootResult) -> Generator[Action, bytes | 
 
 
 def number_from(data_type: DataType, data: bytes) -> int:
-    """The number in ``data``, little-endian, signed where its type is."""
-    return int.from_bytes(data, "little", signed=data_type in (DataType.INT16, DataType.INT32))
+    """The number in ``data``, little-endian, signed where its type is. Bytes beyond the type's are left
+    out: some servers answer every read with four."""
+    size = 4 if data_type.value.endswith("32") else 2 if data_type.value.endswith("16") else 1
+    return int.from_bytes(data[:size], "little", signed=data_type in (DataType.INT16, DataType.INT32))
 
 
 def parameter_value(parameter: Parameter, data: bytes) -> float:

@@ -39,6 +39,7 @@ class _Line:
     beating: dict[int, Frame] = field(default_factory=dict[int, Frame])
     renew_at: float = 0.0
     was_up: bool = True
+    outages: int = 0
 
 
 class Master:
@@ -63,6 +64,8 @@ class Master:
         self._refresh_at = 0.0
         self._last_round: float | None = None
         self._running = False
+        self._in_round = False
+        self._again = False
         self._failure: asyncio.Future[None] | None = None
         self.gaps = 0
 
@@ -87,11 +90,10 @@ class Master:
         self._running = True
 
     async def stop_drives(self, now: float) -> None:
-        """Send stopped words for a moment, unless the master has failed."""
+        """Take no more commands and send stopped words for a moment, unless the master has failed."""
+        self._plant.close(now)
         if not self._running:
             return
-        for drive in self._plant.drives.values():
-            drive.channel.on_bridge_gap(now)
         self._wake()
         await asyncio.sleep(_STOP_DRIVES_S)
 
@@ -115,13 +117,23 @@ class Master:
         does half of its work. The bursts end within the dead-man time, and ``failed`` says why."""
         if not self._running:
             return
+        if self._in_round:
+            # Asked for by something that this round has caused: there is one more, not one within.
+            self._again = True
+            return
+        self._in_round = True
         try:
             self.pump()
+            while self._again:
+                self._again = False
+                self.pump()
         except Exception as error:
             self._running = False
             if self._failure and not self._failure.done():
                 self._failure.set_exception(OperationFailed(f"the master has failed: {error!r}"))
             raise
+        finally:
+            self._in_round = False
 
     async def failed(self) -> None:
         """Wait for ever, or raise ``OperationFailed`` when a fault of our own has ended the running."""
@@ -163,7 +175,6 @@ class Master:
             return
         self.gaps += 1
         message = f"the bridge hung for {pause_s * 1000:.0f} ms; all drives were left without commands"
-        _log.error(message)
         for line in hung:
             self._plant.report(Event(now, Kind.BUS, line.bus.name, 900, message))
             for node in line.network.nodes:
@@ -172,7 +183,15 @@ class Master:
                     drive.refresh(now)
 
     def _watch_bus(self, line: _Line, now: float) -> None:
-        is_up = line.bus.status.state not in (ControllerState.DOWN, ControllerState.BUS_OFF)
+        status = line.bus.status
+        is_up = status.state not in (ControllerState.DOWN, ControllerState.BUS_OFF)
+        if status.outages != line.outages:
+            line.outages = status.outages
+            if is_up and line.was_up:
+                # It came and went between two rounds: its bursts are gone all the same.
+                line.beating.clear()
+                line.renew_at = now
+                line.network.bus_is_gone(now)
         if is_up == line.was_up:
             return
         line.was_up = is_up

@@ -5,6 +5,8 @@ Says which frames are to be sent once and which are to be repeated; whoever hold
 
 from __future__ import annotations
 
+from functools import partial
+
 from bridge.command import Plant
 from bridge.config import BusTable
 from bridge.southbound.bus.frame import Frame
@@ -31,11 +33,20 @@ class Network:
         self.bus = bus
         self._plant = plant
         self.nodes = [NodeCore(node, plant) for node in plant.nodes.values() if node.bus is bus]
+        for node in self.nodes:
+            node.is_taken = partial(self._is_taken, node)
         self.unrouted = 0
         self._routes: dict[int, Handler] = {}
         self._bits = 0
         self._measured_at: float | None = None
         self.beats_bits_per_s = 0.0
+
+    def _is_taken(self, by: NodeCore, cob_id: int) -> bool:
+        others = (node for node in self.nodes if node is not by)
+        return any(
+            cob_id in node.routes or cob_id in (pdos.cob_id for pdos in node.drives.values())
+            for node in others
+        )
 
     def on_frames(self, frames: list[Frame], now: float) -> None:
         """Everything received, in order. A frame nobody waits for is counted."""

@@ -43,6 +43,8 @@ class NodeCore:
         self.state = NodeState.ABSENT
         self.nmt_state = NmtState.UNKNOWN
         self.rejected = 0
+        self.is_taken: Callable[[int], bool] = lambda cob_id: False
+        """Whether another node of the bus has a PDO on this identifier."""
         self.drives: dict[str, DrivePdos] = {}
         self.routes: dict[int, Handler] = self._basic_routes()
         self.routes_changed = True
@@ -247,6 +249,9 @@ class NodeCore:
             plan = result.drives[drive.name]
             if plan.rpdo is None or plan.tpdo is None or plan.problem:
                 continue
+            if self.is_taken(plan.rpdo.cob_id) or self.is_taken(plan.tpdo.cob_id):
+                result.notes.append(f"{drive.slot.name}: another node has its PDO on the same identifier")
+                continue
             pdos = self.drives[drive.name] = DrivePdos(drive, plan.rpdo, plan.tpdo, self.reject)
             self.routes[plan.tpdo.cob_id] = pdos.on_tpdo
             drive.channel.link.pdo_deadline_s = tpdo_deadline_s(
@@ -276,6 +281,8 @@ class NodeCore:
     def bus_is_gone(self, now: float) -> None:
         """The bus is down: everything on it is lost at once."""
         self._leave_operation(now)
+        for drive in self.node.drives:
+            drive.channel.on_bus_gone(now)
         self.nmt_state = NmtState.UNKNOWN
         if self.state in (NodeState.OPERATIONAL, NodeState.BOOTING):
             self._say("lost: the bus is down", now)

@@ -15,7 +15,7 @@ from typing import Final, TypeVar
 
 import zenoh
 
-from bridge.errors import Unavailable
+from bridge.errors import OperationFailed, Unavailable
 from bridge.zenohlink.inbox import Inbox
 from bridge.zenohlink.message import (
     Answer,
@@ -28,7 +28,7 @@ from bridge.zenohlink.message import (
     to_bytes,
     to_message,
 )
-from bridge.zenohlink.worker import ZENOH_ERRORS, Worker
+from bridge.zenohlink.worker import Worker
 
 Result = TypeVar("Result")
 
@@ -122,6 +122,13 @@ class ZenohLink:
             _log.warning("%s: the zenoh session did not close within %g s", self.name, timeout_s)
         return self._closed.done()
 
+    async def failed(self) -> None:
+        """Wait until the link is closed. Raises ``OperationFailed`` where nobody has closed it: nothing
+        is sent or heard any more."""
+        await asyncio.shield(self._closed)
+        if not self._worker.is_stopping:
+            raise OperationFailed(f"{self.name}: the zenoh session has ended by itself")
+
     def _on_opened(self, error: Exception | None) -> None:
         self._inbox.tell(_resolve, self._opened, error)
 
@@ -170,7 +177,7 @@ class ZenohLink:
         for message in batch:
             try:
                 publish(session, message)
-            except ZENOH_ERRORS as error:
+            except Exception as error:  # noqa: BLE001 - nor may one value hold up the others
                 self._worker.complain(error)
         self._inbox.tell(self._hand_over)
 
@@ -206,7 +213,7 @@ class ZenohLink:
                     congestion_control=zenoh.CongestionControl.BLOCK,
                     express=True,
                 )
-            except ZENOH_ERRORS:
+            except Exception:
                 on_end()
                 raise
 

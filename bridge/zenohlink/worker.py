@@ -74,19 +74,26 @@ class Worker:
         self._jobs.put(lambda _: None)
 
     def complain(self, error: Exception) -> None:
-        """Count an error and log it at most once a minute."""
+        """Count an error and log it at most once a minute, with its place where it is none of zenoh's."""
         self.errors += 1
         now = time.monotonic()
         if now - self._last_complaint >= 60:
             self._last_complaint = now
-            _log.warning("%s: %s (%d so far)", self.name, sentence(error), self.errors)
+            ours = None if isinstance(error, ZENOH_ERRORS) else error
+            _log.warning("%s: %s (%d so far)", self.name, sentence(error), self.errors, exc_info=ours)
 
     def _work(self) -> None:
+        try:
+            self._serve()
+        finally:
+            # Also where the thread dies of something: the loop has to know.
+            self._closed()
+
+    def _serve(self) -> None:
         try:
             session = zenoh.open(self._config)
         except ZENOH_ERRORS as error:
             self._opened(error)
-            self._closed()
             return
         self._opened(None)
         try:
@@ -98,10 +105,9 @@ class Worker:
             for declared in (*self.tokens.values(), *self.declared):
                 self._try(declared.undeclare)
             self._try(session.close)
-            self._closed()
 
     def _try(self, call: Callable[[], object]) -> None:
         try:
             call()
-        except ZENOH_ERRORS as error:
+        except Exception as error:  # noqa: BLE001 - one bad job must not end all others
             self.complain(error)

@@ -97,6 +97,16 @@ def test_a_stopped_controller_stops_its_drive_in_time(lab: Lab) -> None:
     lab.bridge.wait_output("E010/10.3", 5.0)
 
 
+def test_everything_comes_at_its_period_for_longer_than_a_burst(lab: Lab) -> None:
+    begin = time.time() + 0.5
+    time.sleep(3.5)
+    for can_id, period_s in ((SYNC, 0.010), (RPDO1, 0.010), (0x77F, 0.100)):
+        times = [frame.time for frame in lab.bus.of(can_id, begin)]
+        pauses = [later - earlier for earlier, later in pairwise(times)]
+        assert len(times) >= 0.8 * 3.0 / period_s
+        assert max(pauses) <= period_s + NOISE_S
+
+
 def test_a_killed_bridge_sends_nothing_more_and_the_drive_trips_by_its_own_p151(lab: Lab) -> None:
     lab.bus.send(SDO, P151_500_MS)
     lab.run_drive()
@@ -118,6 +128,7 @@ def test_a_hung_bridge_is_silent_within_the_dead_man_time(lab: Lab) -> None:
     hung = time.time()
     time.sleep(1.0)
     for can_id in (SYNC, RPDO1, 0x77F):
+        assert lab.bus.of(can_id), "it was sent before"
         late = [frame.time - hung for frame in lab.bus.of(can_id, hung)]
         assert max(late, default=0.0) <= DEADMAN_S + CYCLE_S
     lab.bridge.signal(signal.SIGCONT)

@@ -125,6 +125,9 @@ def test_run_serves_until_it_is_told_to_stop(tmp_path: Path) -> None:
         bridge.popen.terminate()
         assert bridge.popen.wait(15) == 0
         assert "Traceback" not in bridge.output()
+        lines = bridge.output().splitlines()
+        assert lines[-1].endswith("INFO    stopped")
+        assert sum("INFO    stopping: all drives are stopped" in line for line in lines) == 1
 
 
 @pytest.mark.parametrize("what", ["modbus", "opcua"])

@@ -192,7 +192,7 @@ def calm(demo: Process) -> None:
     config.insert_json5("connect/endpoints", '["tcp/127.0.0.1:7447"]')
     with zenoh.open(config) as session:
         for leaf in ("reset_fault", "disable_voltage", "release_control"):
-            list(session.get(f"drives/demo/conveyor/fu3/command/{leaf}"))
+            list(session.get(f"drives/demo/conveyor/fu3/command/{leaf}", payload="{}"))
     time.sleep(0.3)  # the acknowledge edge is on the bus that long, and the drives answer
 
 

@@ -272,19 +272,47 @@ async def test_a_wrong_protocol_id_ends_the_connection(server: ModbusServer):
     writer.close()
 
 
-async def test_strangers_and_too_many_are_turned_away(plant: Plant, caplog: pytest.LogCaptureFixture):
-    async with serving(plant, allow=["127.0.0.1/32"], max_connections=1) as server:
+async def test_strangers_are_turned_away(plant: Plant, caplog: pytest.LogCaptureFixture):
+    async with serving(plant, allow=["127.0.0.1/32"]) as server:
         for _ in range(3):
             reader, writer = await asyncio.open_connection(HOST, server.port, local_addr=("127.0.0.2", 0))
             assert await closed_by_the_other_side(reader)
             writer.close()
         async with pymodbus(server) as client:
-            reader, writer = await asyncio.open_connection(HOST, server.port)
-            assert await closed_by_the_other_side(reader)
-            writer.close()
             assert (await client.read_holding_registers(0, count=1, device_id=1)).registers == [0x0400]
-        assert server.refused_connections == 4
+        assert server.refused_connections == 3
         assert sum("refused" in record.message for record in caplog.records) == 1  # once a minute
+
+
+async def test_idle_connections_make_room_and_the_owner_goes_last(
+    plant: Plant, caplog: pytest.LogCaptureFixture
+):
+    async with serving(plant, max_connections=3) as server, pymodbus(server) as plc:
+        assert not (await plc.write_registers(0, [0x047E, 0], device_id=1)).isError()
+        async with pymodbus(server, "127.0.0.2") as reader:
+            idle = [await asyncio.open_connection(HOST, server.port, local_addr=("127.0.0.3", 0))]
+            for _ in range(5):
+                assert not (await reader.read_holding_registers(0, count=1, device_id=1)).isError()
+                idle.append(await asyncio.open_connection(HOST, server.port, local_addr=("127.0.0.3", 0)))
+                assert await closed_by_the_other_side(idle[-2][0]), "who does nothing makes room"
+                assert server.sessions == 3
+            assert not (await reader.read_holding_registers(0, count=1, device_id=1)).isError()
+        for _ in range(5):
+            idle += [await asyncio.open_connection(HOST, server.port, local_addr=("127.0.0.3", 0))]
+        assert not (await plc.write_registers(0, [0x047F, 0], device_id=1)).isError(), "the owner stays"
+        assert sum("closed to make room" in record.message for record in caplog.records) == 1
+        for _, writer in idle:
+            writer.close()
+
+
+async def test_where_all_own_a_drive_the_idlest_makes_room(plant: Plant):
+    async with serving(plant, max_connections=2) as server, pymodbus(server) as old, pymodbus(server) as new:
+        assert not (await old.write_registers(0, [0x047E, 0], device_id=1)).isError()
+        assert not (await new.write_registers(0, [0x047E, 0], device_id=1)).isError()
+        async with pymodbus(server) as third:
+            assert not (await third.write_registers(0, [0x047E, 0], device_id=1)).isError()
+            assert not (await new.write_registers(0, [0x047E, 0], device_id=1)).isError()
+            assert server.sessions == 2
 
 
 async def closed_by_the_other_side(reader: asyncio.StreamReader) -> bool:

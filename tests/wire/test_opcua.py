@@ -225,8 +225,8 @@ class TestWrites:
             ("control_word", ua.Variant(None, ua.VariantType.Null), Codes.BadTypeMismatch),
             ("control_word", ua.Variant(70000, ua.VariantType.UInt32), Codes.BadOutOfRange),
             ("control_word", ua.Variant(0x007E, ua.VariantType.UInt16), Codes.BadOutOfRange),
-            ("frequency", ua.Variant(math.nan, ua.VariantType.Double), Codes.BadTypeMismatch),
-            ("frequency", ua.Variant(math.inf, ua.VariantType.Double), Codes.BadTypeMismatch),
+            ("frequency", ua.Variant(math.nan, ua.VariantType.Double), Codes.BadOutOfRange),
+            ("frequency", ua.Variant(math.inf, ua.VariantType.Double), Codes.BadOutOfRange),
             ("frequency", ua.Variant(100.5, ua.VariantType.Double), Codes.BadOutOfRange),
         ],
     )

@@ -61,7 +61,7 @@ async def test_methods() -> None:
         assert not started.done()
         drive_says(r.fu3, ENABLED)
         assert await started == {"ok": True, "forwarded": True}
-        assert (await r.peer.command(f"{FU3}/command/keep_alive", controller="plc"))["ok"]
+        assert (await r.peer.command(f"{FU3}/command/keep_alive", {}, controller="plc"))["ok"]
         assert (await r.peer.command(f"{FU3}/command/stop", "{}", controller="somebody"))["ok"]
         assert r.on_the_bus[0] & 0x000F != 0x000F
         taken = await r.peer.command(f"{TOP}/conveyor/fu4/command/take_control", {"ttl_ms": 500}, "a")
@@ -134,6 +134,9 @@ async def test_a_get_brings_present_values() -> None:
         assert nothing["values"] == [] and nothing["errors"] == []
         unknown = await r.peer.do("get", f"{FU3}/actual/nothing")
         assert json.loads(unknown["errors"][0])["code"] == "unknown_point"
+        for leaf in ("start", "reset_fault", "take_control", "keep_alive"):
+            said = await r.peer.do("get", f"{FU3}/command/{leaf}")
+            assert json.loads(said["errors"][0])["code"] == "malformed"
         assert r.fu3.channel.owner is None, "reading commands nothing"
 
 
@@ -194,9 +197,9 @@ async def test_a_trip_is_seen_and_has_to_be_acknowledged() -> None:
         await r.sees(f"{TOP}/@/event/watchdog", source="conveyor/fu3")
         answer = await r.peer.command(f"{FU3}/command/control_word", 0x047F)
         assert answer["ok"] and not answer["forwarded"] and "acknowledge" in answer["message"]
-        start = await r.peer.command(f"{FU3}/command/start")
+        start = await r.peer.command(f"{FU3}/command/start", {})
         assert start["code"] == "acknowledge_first"
-        assert (await r.peer.command(f"{FU3}/command/reset_fault"))["ok"]
+        assert (await r.peer.command(f"{FU3}/command/reset_fault", {}))["ok"]
 
 
 async def test_a_client_that_stalls_costs_the_loop_nothing() -> None:

@@ -6,12 +6,38 @@ import asyncio
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 
 import pytest
 
-from bridge.errors import Unavailable
+from bridge.errors import OperationFailed, Unavailable
+from bridge.service import Service, load_project
+from bridge.southbound.bus.virtual import VirtualWire
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
+from bridge.zenohlink import link as link_module
 from tests.support.zenoh_peer import free_port, until, zenoh_peer
+
+SITE = """
+[site]
+name = "link"
+state_dir = "{folder}/state"
+runtime_dir = "{folder}/run"
+[[bus]]
+name = "can0"
+interface = "virtual"
+[[bus.node]]
+name = "conveyor"
+id = 5
+mapping = "nord/sk-tu4-cao"
+[[bus.node.drive]]
+slot = "fu1"
+control = "zenoh"
+fieldbus_timeout_ms = 1000
+parameters = {{ P105 = 50.0, P112 = 10.0 }}
+[zenoh]
+listen = ["tcp/127.0.0.1:{port}"]
+"""
+DIES = pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 
 
 @asynccontextmanager
@@ -217,3 +243,55 @@ async def test_nothing_raises_after_the_end() -> None:
         assert await server.get("x") == []
         assert await client.get("x") == []
         assert await server.close()
+
+
+async def test_a_job_that_raises_costs_nothing_but_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    got: list[Message] = []
+    async with pair() as (server, client):
+        client.declare_subscriber("v/*", got.append)
+        await client.settle()
+        await asyncio.sleep(0.1)
+        with monkeypatch.context() as patched:
+            patched.setattr(link_module, "publish", broken)
+            server.put(Message("v/1", b"lost"))
+            server.send(Message("v/1", b"lost too"))
+            await until(lambda: server.errors == 2, "both are counted")
+        server.put(Message("v/1", b"later"))
+        await until(lambda: [message.payload for message in got] == [b"later"], "the later one")
+
+
+def broken(*_: object) -> None:
+    raise KeyError("a fault of our own")
+
+
+@DIES
+async def test_a_worker_that_dies_is_told() -> None:
+    async with pair() as (server, client):
+        watching = asyncio.create_task(server.failed())
+        client_watching = asyncio.create_task(client.failed())
+        server.submit(dies)
+        with pytest.raises(OperationFailed, match="test: "):
+            await asyncio.wait_for(watching, 5)
+        assert not client_watching.done()
+        await client.close()
+        await asyncio.wait_for(client_watching, 5)  # closed by its owner: no failure
+
+
+def dies(_: object) -> None:
+    raise SystemExit
+
+
+@DIES
+async def test_a_service_whose_link_is_dead_ends(tmp_path: Path) -> None:
+    for part in ("zenoh", "mirror"):
+        path = tmp_path / "site.toml"
+        path.write_text(SITE.format(folder=tmp_path, port=free_port()), "utf-8")
+        wire = VirtualWire()
+        service = Service(load_project(path), lambda table, wire=wire: wire.end(table.name))
+        ready = asyncio.Event()
+        running = asyncio.create_task(service.run(ready.set))
+        await asyncio.wait_for(ready.wait(), 10)
+        getattr(service, part)._link.submit(dies)
+        with pytest.raises(ExceptionGroup) as caught:
+            await asyncio.wait_for(running, 10)
+        assert caught.group_contains(OperationFailed, match=f"{part}: the zenoh session has ended")

@@ -30,6 +30,7 @@ class ModbusServer:
 
     def __init__(self, plant: Plant, settings: ModbusTable, clock: Callable[[], float]) -> None:
         self._settings = settings
+        self._plant = plant
         self._dispatcher = Dispatcher(plant, settings.word_order, clock)
         self._allowed = [ipaddress.ip_network(network) for network in settings.allow]
         self._clock = clock
@@ -38,7 +39,8 @@ class ModbusServer:
         self._logged: dict[str, float] = {}
         self.refused_connections = 0
         self.broken_connections = 0
-        """Connections that we ended: not Modbus, or a client that did not read its answers."""
+        """Connections that we ended: not Modbus, a client that did not read its answers, or one that made
+        room for another."""
 
     @property
     def port(self) -> int:
@@ -73,17 +75,15 @@ class ModbusServer:
     # what sessions ask and tell
 
     def admit(self, session: Session, host: str, port: int) -> Identity | None:
-        """The identity of a client, or None where its address may not connect or there are too many."""
+        """The identity of a client, or None where its address may not connect."""
         address = _normalised(host)
-        why = ""
         if not any(address in network for network in self._allowed):
-            why = "it is in none of the networks of modbus.allow"
-        elif len(self._sessions) >= self._settings.max_connections:
-            why = f"there are {self._settings.max_connections} connections already"
-        if why:
             self.refused_connections += 1
+            why = "it is in none of the networks of modbus.allow"
             self._warn("connection of %s refused: %s", str(address), why)
             return None
+        if len(self._sessions) >= self._settings.max_connections:
+            self._make_room()
         self._sessions.add(session)
         shown = f"[{address}]" if address.version == 6 else str(address)
         return Identity(Source.MODBUS, str(address), Role.OPERATOR, f"{shown}:{port}")
@@ -94,6 +94,24 @@ class ModbusServer:
     def on_fault(self, session: Session, fault: str) -> None:
         self.broken_connections += 1
         self._warn("connection of %s closed: %s", session.address, fault)
+
+    def _make_room(self) -> None:
+        """End the connection that is missed least: idle clients must not lock the PLC out."""
+        owners = [drive.channel.owner for drive in self._plant.drives.values()]
+
+        def is_missed(session: Session) -> tuple[bool, float]:
+            identity = session.identity
+            return identity is not None and any(map(identity.is_same, owners)), session.heard_at
+
+        idlest = min(self._sessions, key=is_missed)
+        self.broken_connections += 1
+        self._warn(
+            "connection of %s closed to make room: there are %s, and it was idle the longest",
+            idlest.address,
+            str(len(self._sessions)),
+        )
+        self._sessions.discard(idlest)
+        idlest.close()
 
     def _warn(self, message: str, *details: str) -> None:
         """Log at most once a minute per message: what a stranger sends must not fill a disk."""

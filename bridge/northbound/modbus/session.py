@@ -45,14 +45,17 @@ class Session(asyncio.Protocol):
         self._dispatcher = dispatcher
         self._hall = hall
         self._conversation = Conversation(self._handle, self._go_on)
-        self._identity: Identity | None = None
+        self.identity: Identity | None = None
+        """Who the hall says it is; None until it is admitted."""
+        self.heard_at = float("-inf")
+        """When the client last sent something, or connected; in the event loop's time."""
         self._transport: asyncio.Transport | None = None
         self._stalled: asyncio.TimerHandle | None = None
         self._scheduled = False
 
     @property
     def address(self) -> str:
-        return self._identity.address if self._identity else ""
+        return self.identity.address if self.identity else ""
 
     def close(self) -> None:
         """End the connection; answers that the client does not take are lost."""
@@ -69,15 +72,17 @@ class Session(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         stream = cast(asyncio.Transport, transport)
         self._transport = stream
+        self.heard_at = asyncio.get_running_loop().time()
         peer: Any = stream.get_extra_info("peername")
-        self._identity = self._hall.admit(self, peer[0], peer[1]) if peer else None
-        if self._identity is None:
+        self.identity = self._hall.admit(self, peer[0], peer[1]) if peer else None
+        if self.identity is None:
             stream.abort()
             return
         stream.set_write_buffer_limits(high=_UNREAD_MOST)
         _keep_alive(stream.get_extra_info("socket"))
 
     def data_received(self, data: bytes) -> None:
+        self.heard_at = asyncio.get_running_loop().time()
         self._conversation.receive(data)
         self._go_on()
 
@@ -95,14 +100,14 @@ class Session(asyncio.Protocol):
         if self._stalled:
             self._stalled.cancel()
             self._stalled = None
-        if self._identity is not None:
+        if self.identity is not None:
             self._hall.leave(self)
 
     # work
 
     def _handle(self, unit_id: int, pdu: bytes, answer: Answer) -> None:
-        if self._identity is not None:
-            self._dispatcher.handle(unit_id, pdu, self._identity, answer)
+        if self.identity is not None:
+            self._dispatcher.handle(unit_id, pdu, self.identity, answer)
 
     def _go_on(self) -> None:
         """There is something to do: now, unless a turn is coming anyway."""
@@ -113,7 +118,7 @@ class Session(asyncio.Protocol):
         """Handle some requests, send what may be sent, and see whether more can be taken in."""
         self._scheduled = False
         transport = self._transport
-        if transport is None or self._identity is None or self._stalled or transport.is_closing():
+        if transport is None or self.identity is None or self._stalled or transport.is_closing():
             return
         conversation = self._conversation
         try:

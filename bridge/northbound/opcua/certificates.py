@@ -27,7 +27,7 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
-from bridge.errors import Fault, FileFaults
+from bridge.errors import Fault, FileFaults, Unavailable
 
 _log = logging.getLogger(__name__)
 
@@ -68,7 +68,8 @@ def own_or_new(folder: Path, application_uri: str) -> OwnCertificate:
     """The bridge's own certificate in ``folder``, made where there is none that still fits.
 
     The key is made for this machine alone (mode 0600) and outlives a new certificate.
-    Raises ``FileFaults`` where the folder or a file in it cannot be read or written.
+    Raises ``Unavailable`` where the folder or a file in it cannot be read or written, ``FileFaults``
+    where the key in it is none.
     """
     certificate, key = folder / "own_certificate.der", folder / "own_key.pem"
     try:
@@ -88,7 +89,7 @@ def own_or_new(folder: Path, application_uri: str) -> OwnCertificate:
         return OwnCertificate(new, private_key)
     except OSError as error:
         hint = "the folder is state_dir of the site file and must be writable for the service"
-        raise FileFaults([Fault(str(error.filename or folder), 0, "", _reason(error), hint)]) from error
+        raise Unavailable(f"{error.filename or folder}: {_reason(error)} ({hint})") from error
     except (ValueError, TypeError) as error:
         hint = "delete it and a new one is made; clients must trust that one anew"
         raise FileFaults([Fault(str(key), 0, "", f"cannot be used: {error}", hint)]) from error

@@ -95,7 +95,7 @@ class OpcUaServer:
         """Open the endpoints.
 
         Raises ``FileFaults`` for a user, certificate or key that cannot be used, and ``Unavailable``
-        where the port cannot be opened.
+        where the port cannot be opened or the folder not be written.
         """
         self._users = Users(self._settings)
         own = await asyncio.to_thread(self._own_certificate)

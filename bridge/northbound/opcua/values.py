@@ -96,7 +96,9 @@ def reading_value(
 
 
 def point_value(point: Point, written: ua.Variant) -> Value:
-    """What a client wrote, as a value to ask for. Raises ValueError for a type that does not fit.
+    """What a client wrote, as a value to ask for.
+
+    Raises TypeError for a type that does not fit, ValueError for a number that is none (NaN, infinity).
 
     Any integer type is taken for an integer point and any number for a float point; whether the
     number is in range is for the drive's channel to say.
@@ -104,15 +106,17 @@ def point_value(point: Point, written: ua.Variant) -> Value:
     kind = written.VariantType
     value = written.Value
     if written.is_array or written.Dimensions or value is None:
-        raise ValueError(f"{point.name} takes a single value")
+        raise TypeError(f"{point.name} takes a single value")
     if point.data_type is DataType.STRING:
         fits = kind is ua.VariantType.String
     elif point.data_type is DataType.BOOL:
         fits = kind is ua.VariantType.Boolean
     elif point.data_type is DataType.FLOAT:
-        fits = kind in _NUMBER_TYPES and math.isfinite(value)
+        fits = kind in _NUMBER_TYPES
     else:
         fits = kind in INTEGER_TYPES
     if not fits:
-        raise ValueError(f"{point.name} does not take {kind.name} {value}")
+        raise TypeError(f"{point.name} does not take {kind.name} {value}")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"{point.name} does not take {value}")
     return value

@@ -128,5 +128,7 @@ def _value(node: VariableNode, write: ua.WriteValue) -> Value | _Refusal:
         return _Refusal(StatusCodes.BadTypeMismatch)
     try:
         return point_value(node.point, written.Value)
-    except ValueError:
+    except TypeError:
         return _Refusal(StatusCodes.BadTypeMismatch)
+    except ValueError:
+        return _Refusal(StatusCodes.BadOutOfRange)

@@ -21,6 +21,9 @@ METHODS: Final = (
     Action.RELEASE_CONTROL,
     Action.KEEP_ALIVE,
 )
+_WITHOUT_PAYLOAD: Final = (Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE, Action.RELEASE_CONTROL)
+"""A stop is taken as it comes. Everything else must be meant: whoever reads a key by a plain get must not
+start or acknowledge anything by it."""
 NODE_METHODS: Final = (Action.RESET, Action.RESET_COMMUNICATION, Action.ENABLE, Action.DISABLE)
 
 MALFORMED: Final = "malformed"
@@ -95,7 +98,10 @@ class Commands:
         return group == "node" and target in self._nodes and leaf in NODE_METHODS
 
     def request(self, tail: str, payload: bytes, identity: Identity) -> Request:
-        """The request for a payload on ``tail``, a key without prefix and site. Raises BadCommand."""
+        """The request for a payload on ``tail``, a key without prefix and site. Raises BadCommand.
+
+        No payload is an empty one.
+        """
         if len(payload) > _LONGEST:
             raise BadCommand(MALFORMED, f"a command has at most {_LONGEST} bytes")
         owner, _, leaf = tail.rpartition("/")
@@ -168,8 +174,11 @@ def _bounded(name: str, value: Value) -> Value:
 
 
 def _call(identity: Identity, target: str, action: Action, payload: bytes) -> Request:
+    has_payload = bool(payload.strip())
+    if not has_payload and action not in _WITHOUT_PAYLOAD:
+        raise BadCommand(MALFORMED, f"{action} needs a payload, and got a plain get; {{}} is enough")
     try:
-        options = _options.decode(payload) if payload.strip() else _Options()
+        options = _options.decode(payload) if has_payload else _Options()
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise BadCommand(MALFORMED, f"{action} takes an object of options: {error}") from None
     ttl_ms, direction = options.ttl_ms, options.direction

@@ -25,6 +25,8 @@ class BusStatus:
     """Condition and counters of one bus; the counters only grow."""
 
     state: ControllerState = ControllerState.OK
+    outages: int = 0
+    """How often everything that was to be sent has been dropped: bus-off, error-passive, down."""
     tx_errors: int = 0
     rx_errors: int = 0
     frames_lost: int = 0

@@ -57,7 +57,7 @@ class PythonCanBus:
         options: dict[str, Any] = {"bitrate": self._bitrate}
         try:
             self._bus = can.Bus(interface=self._interface, channel=self._channel, **options)
-        except (can.CanError, OSError, ValueError, ImportError) as error:
+        except (can.CanError, OSError, ValueError, ImportError, TypeError, AttributeError) as error:
             raise Unavailable(
                 f"bus {self._name}: interface {self._interface!r}, channel {self._channel!r}: {error}"
             ) from error

@@ -19,8 +19,9 @@ from collections.abc import Callable
 from typing import Final
 
 from bridge.errors import Unavailable
-from bridge.southbound.bus.frame import ERROR, Frame
+from bridge.southbound.bus.frame import ERROR, REMOTE, Frame
 from bridge.southbound.bus.interface import BusStatus, ControllerState
+from bridge.southbound.bus.softbeat import SoftBeat
 
 _FRAME: Final = struct.Struct("=IB3x8s")
 _FILTER: Final = struct.Struct("=II")
@@ -30,7 +31,6 @@ _BCM_HEAD: Final = struct.Struct("@IIIllllII0q")
 _SOL_CAN_RAW: Final = 101
 _CAN_RAW_FILTER: Final = 1
 _CAN_RAW_ERR_FILTER: Final = 2
-_CAN_RAW_RECV_OWN_MSGS: Final = 4
 _CAN_ERR_MASK: Final = 0x1FFF_FFFF
 _CAN_BCM: Final = 2
 _SO_TIMESTAMPNS: Final = 35
@@ -58,6 +58,8 @@ _EXACT: Final = 0xC000_07FF  # identifier, no extended frames, no remote frames
 _MOST_PER_ROUND: Final = 2000
 _MOST_WAITING: Final = 64
 _REOPEN_S: Final = (0.2, 5.0)
+_SHORTEST_BURST: Final = 4
+_SLOW_LIMIT_S: Final = 0.05
 
 
 class SocketCanBus:
@@ -74,7 +76,8 @@ class SocketCanBus:
         self._wake: Callable[[], None] = lambda: None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._filters: bytes | None = None
-        self._jobs: dict[int, tuple[float, float]] = {}  # can id: period, end of the burst
+        self._jobs: dict[int, tuple[float, float]] = {}  # can id: period, until when it surely runs
+        self._slow = SoftBeat()
         self._waiting: deque[tuple[Frame, float]] = deque()
         self._drops = 0
         self._last_drain = 0.0
@@ -141,6 +144,7 @@ class SocketCanBus:
     def _close_sockets(self) -> None:
         # Closing the socket of the broadcast manager removes its jobs.
         self._jobs.clear()
+        self._slow.clear()
         self._waiting.clear()
         if self._raw:
             if self._loop and self._raw.fileno() >= 0:
@@ -154,6 +158,7 @@ class SocketCanBus:
     def _break_down(self, now: float) -> None:
         """The interface is gone or down. Its bursts go first: they would outlive a short outage."""
         self._close_sockets()
+        self._status.outages += 1
         self._status.state = ControllerState.DOWN
         self._reopen_at = now + self._reopen_s
         self._reopen_s = min(self._reopen_s * 2, _REOPEN_S[1])
@@ -215,8 +220,9 @@ class SocketCanBus:
             status.state = ControllerState.OK
         elif can_id & _ERR_CONTROLLER:
             if payload[1] & _CRTL_PASSIVE:
+                if status.state is not ControllerState.PASSIVE:
+                    self._stop_all(now)
                 status.state = ControllerState.PASSIVE
-                self._waiting.clear()
             elif payload[1] & _CRTL_WARNING:
                 status.state = ControllerState.WARNING
             elif payload[1] & _CRTL_ACTIVE:
@@ -236,7 +242,7 @@ class SocketCanBus:
         if self._raw is None:
             return False
         try:
-            self._raw.send(_FRAME.pack(frame.can_id, len(frame.data), frame.data.ljust(8, b"\0")))
+            self._raw.send(_frame_bytes(frame))
         except (BlockingIOError, InterruptedError):
             return False
         except OSError as error:
@@ -258,11 +264,18 @@ class SocketCanBus:
                 self._waiting.popleft()
 
     def beat(self, frame: Frame, now: float, period_s: float, count: int, *, at_once: bool = False) -> None:
+        if count < _SHORTEST_BURST:
+            # The kernel counts the first frame of a burst, so one of a frame or two ends before it can be
+            # renewed. What is that slow needs no kernel: a round sends it.
+            if self._slow.beat(frame, now, period_s, count, at_once=at_once):
+                self.send(frame, now, now + period_s)
+            return
         job = self._jobs.get(frame.can_id)
-        # A burst that has run out needs a new start; one that runs keeps its phase.
+        # Refilling keeps the phase of a burst that runs and cannot wake one that has ended. Its last frame
+        # comes up to a period before its count of periods is over.
         runs = job is not None and job[0] == period_s and now < job[1]
         flags = _SETTIMER | (0 if runs else _STARTTIMER) | (_TX_ANNOUNCE if at_once else 0)
-        self._jobs[frame.can_id] = (period_s, now + count * period_s)
+        self._jobs[frame.can_id] = (period_s, now + (count - 2) * period_s)
         microseconds = round(period_s * 1e6)
         head = _BCM_HEAD.pack(
             _TX_SETUP,
@@ -275,15 +288,18 @@ class SocketCanBus:
             frame.can_id,
             1,
         )
-        body = _FRAME.pack(frame.can_id, len(frame.data), frame.data.ljust(8, b"\0"))
-        self._tell_bcm(head + body, now)
+        self._tell_bcm(head + _frame_bytes(frame), now)
 
     def silence(self, can_id: int) -> None:
+        self._slow.silence(can_id)
         if self._jobs.pop(can_id, None) is not None:
             self._tell_bcm(_BCM_HEAD.pack(_TX_DELETE, 0, 0, 0, 0, 0, 0, can_id, 0), self._last_drain)
 
     def _stop_all(self, now: float) -> None:
+        """Nothing that was to be sent is sent later."""
+        self._status.outages += 1
         self._waiting.clear()
+        self._slow.clear()
         for can_id in list(self._jobs):
             self.silence(can_id)
 
@@ -303,12 +319,17 @@ class SocketCanBus:
 
     def next_deadline(self) -> float | None:
         times = [deadline for _, deadline in self._waiting]
+        slow = self._slow.next_deadline()
+        if slow is not None:
+            times.append(slow)
         if self._reopen_at is not None:
             times.append(self._reopen_at)
         return min(times) if times else None
 
     def on_time(self, now: float) -> None:
         self._send_waiting(now)
+        for frame in self._slow.due(now):
+            self.send(frame, now, now + _SLOW_LIMIT_S)
         if self._reopen_at is None or now < self._reopen_at:
             return
         try:
@@ -318,6 +339,12 @@ class SocketCanBus:
         else:
             self._reopen_at = None
             self._reopen_s = _REOPEN_S[0]
+
+
+def _frame_bytes(frame: Frame) -> bytes:
+    """``struct can_frame``. A remote frame asks for one byte: the answer to node guarding."""
+    length = 1 if frame.can_id & REMOTE else len(frame.data)
+    return _FRAME.pack(frame.can_id, length, frame.data.ljust(8, b"\0"))
 
 
 def _is_up(channel: str) -> bool:

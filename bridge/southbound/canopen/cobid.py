@@ -13,4 +13,12 @@ ERROR_CONTROL: Final = 0x700  # boot-up, heartbeat, node guarding, + node id
 
 PDO_DISABLED: Final = 0x8000_0000
 """Bit 31 of a PDO's COB-ID entry: the PDO does not exist (CiA 301 §7.5.2.35)."""
+PDO_EXTENDED: Final = 0x2000_0000
+"""Bit 29: a 29-bit identifier."""
 COB_ID_MASK: Final = 0x7FF
+
+
+def is_for_pdos(can_id: int) -> bool:
+    """Whether a PDO may have this identifier: not one of those with a fixed or restricted use (CiA 301
+    §7.3.5, table 39)."""
+    return 0x181 <= can_id <= 0x57F or 0x680 <= can_id <= 0x6DF

@@ -99,7 +99,8 @@ class NodeGuard:
         if now >= self._due:
             self._frames.append(Frame(self._id | REMOTE))
             # A late loop asks once and goes on from now: a burst of remote frames would help nobody.
-            self._due = max(self._due + self.guard_time_s, now)
+            on_time = self._due + self.guard_time_s
+            self._due = on_time if on_time > now else now + self.guard_time_s
         return False
 
     def take_frames(self) -> list[Frame]:

@@ -387,9 +387,9 @@ class TestSetTimeout:
         assert writable.watchdog == "off"
         writable.wait(10)
         assert writable.enables
-        writable.ask(Action.SET_TIMEOUT, timeout_ms=100)
-        assert writable.watchdog == "idle"
         writable.write(ENABLE)
+        writable.ask(Action.SET_TIMEOUT, timeout_ms=100)
+        assert writable.watchdog == "running", "the drive runs: it is watched from its last telegram on"
         writable.wait(0.1)
         assert writable.watchdog == "tripped"
 

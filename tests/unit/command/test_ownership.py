@@ -47,6 +47,11 @@ class TestFixedSource:
         assert running.write(SHUT_DOWN, identity=OTHER_PLC).ok
         assert running.channel.owner == OTHER_PLC
 
+    def test_who_took_control_and_says_nothing_holds_nobody_up(self, rig: Rig):
+        assert rig.ask(Action.TAKE_CONTROL).ok
+        rig.wait(3600)
+        assert rig.write(SHUT_DOWN, identity=OTHER_PLC).ok
+
     def test_a_released_drive_is_free(self, running: Rig):
         running.ask(Action.RELEASE_CONTROL)
         assert running.write(SHUT_DOWN, identity=OTHER_PLC).forwarded

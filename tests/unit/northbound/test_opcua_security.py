@@ -14,7 +14,7 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 
 from bridge.command import Role
 from bridge.config import OpcUaTable, UserTable
-from bridge.errors import FileFaults
+from bridge.errors import FileFaults, Unavailable
 from bridge.northbound.opcua.certificates import OwnCertificate, TrustedCertificates, load_own, own_or_new
 from bridge.northbound.opcua.security import (
     Users,
@@ -161,7 +161,7 @@ class TestOwnCertificate:
 
     def test_a_state_folder_that_is_a_file_is_named(self, tmp_path: Path) -> None:
         (tmp_path / "state").write_text("")
-        with pytest.raises(FileFaults, match="state"):
+        with pytest.raises(Unavailable, match="state"):
             own_or_new(tmp_path / "state" / "opcua", URI)
 
     def test_a_torn_key_is_named(self, tmp_path: Path) -> None:

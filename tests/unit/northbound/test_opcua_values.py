@@ -77,8 +77,6 @@ def test_any_integer_is_taken_for_a_word_and_for_a_number(kind: ua.VariantType) 
         (WORD, ua.Variant(True, Kind.Boolean)),
         (WORD, ua.Variant([7], Kind.UInt16)),
         (WORD, ua.Variant(None, Kind.Null)),
-        (NUMBER, ua.Variant(math.nan, Kind.Double)),
-        (NUMBER, ua.Variant(-math.inf, Kind.Float)),
         (NUMBER, ua.Variant("7", Kind.String)),
         (NUMBER, ua.Variant([], Kind.Double, is_array=True)),
         (Point(name="x", data_type=DataType.BOOL), ua.Variant(1, Kind.Byte)),
@@ -86,8 +84,14 @@ def test_any_integer_is_taken_for_a_word_and_for_a_number(kind: ua.VariantType) 
     ],
 )
 def test_other_types_are_not(point: Point, written: ua.Variant) -> None:
-    with pytest.raises(ValueError, match="take"):
+    with pytest.raises(TypeError, match="take"):
         point_value(point, written)
+
+
+@pytest.mark.parametrize("number", [math.nan, -math.inf])
+def test_what_is_no_number_is_out_of_range(number: float) -> None:
+    with pytest.raises(ValueError, match="take"):
+        point_value(NUMBER, ua.Variant(number, Kind.Double))
 
 
 def value(number: float | None, status: int = Codes.Good) -> ua.DataValue:

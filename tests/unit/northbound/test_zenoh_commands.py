@@ -41,13 +41,28 @@ def test_an_object_is_one_telegram() -> None:
 
 
 def test_every_method_has_its_key() -> None:
-    for action in ("stop", "quick_stop", "disable_voltage", "reset_fault", "release_control", "keep_alive"):
+    for action in ("stop", "quick_stop", "disable_voltage", "release_control"):
         assert request(f"conveyor/fu3/command/{action}") == Request(PLC, "conveyor/fu3", Action(action))
+    for action in ("stop", "quick_stop", "disable_voltage", "reset_fault", "release_control", "keep_alive"):
         assert request(f"conveyor/fu3/command/{action}", "{}") == Request(PLC, "conveyor/fu3", Action(action))
     assert request("conveyor/fu3/command/start", '{"direction": -1}').direction == -1
     assert request("conveyor/fu3/command/take_control", '{"ttl_ms": 500}').ttl_ms == 500
     for action in ("reset", "reset_communication", "enable", "disable"):
-        assert request(f"conveyor/node/{action}") == Request(PLC, "conveyor", Action(action))
+        assert request(f"conveyor/node/{action}", "{}") == Request(PLC, "conveyor", Action(action))
+
+
+@pytest.mark.parametrize("payload", ["", " \n"])
+@pytest.mark.parametrize(
+    "tail",
+    [
+        *(f"conveyor/fu3/command/{leaf}" for leaf in ("start", "take_control", "reset_fault", "keep_alive")),
+        *(f"conveyor/node/{leaf}" for leaf in ("reset", "reset_communication", "enable", "disable")),
+    ],
+)
+def test_a_plain_get_starts_acknowledges_and_resets_nothing(tail: str, payload: str) -> None:
+    bad = refusal(tail, payload)
+    assert bad.code == MALFORMED
+    assert "{} is enough" in bad.message
 
 
 @pytest.mark.parametrize(
@@ -93,7 +108,7 @@ def test_what_is_no_command_is_told_what_is_right(
     assert words in bad.message
 
 
-def test_only_methods_are_called_without_a_payload() -> None:
+def test_methods_are_told_from_values() -> None:
     assert COMMANDS.is_method("conveyor/fu3/command/stop")
     assert COMMANDS.is_method("conveyor/node/reset")
     for tail in ("conveyor/fu3/command/control_word", "conveyor/node/nmt_state", "x/y/command/stop", "", "*"):

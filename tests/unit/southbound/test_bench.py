@@ -259,3 +259,51 @@ def test_guarding_supervises_by_remote_frames(tmp_path: Path) -> None:
     bench.cut = True
     bench.run(1.0)
     assert bench.plant.drives["conveyor/fu1"].quality is Quality.LOST
+
+
+def test_a_hold_ends_with_the_bridge_that_held(tmp_path: Path) -> None:
+    bench = Bench(write_site(tmp_path, drive='on_expiry = "hold"'))
+    bench.run(1.0)
+    running(bench)
+    bench.run(1.0)
+    assert bench.sent(RPDO1)[-1].data[0] & 0x0F == 0x0F, "held"
+    bench.hang(0.5)
+    bench.log.clear()
+    bench.run(0.5)
+    assert all(frame.data[0] & 0x0F != 0x0F for frame in bench.sent(RPDO1))
+
+
+@pytest.mark.parametrize("downtime", [-0.1, 0, 0.5])
+def test_after_an_outage_of_the_bus_the_first_rpdos_are_stopped_ones(tmp_path: Path, downtime: float) -> None:
+    bench = Bench(write_site(tmp_path, drive=f"telegram_downtime_s = {downtime}"))
+    bench.run(1.0)
+    running(bench)
+    bench.bus.status.state = ControllerState.BUS_OFF
+    bench.bus.clear()
+    bench.run(5.0)
+    bench.bus.status.state = ControllerState.OK
+    bench.log.clear()
+    bench.run(3.0)
+    assert bench.sent(RPDO1)
+    assert all(frame.data[0] & 0x0F != 0x0F for frame in bench.sent(RPDO1))
+
+
+def test_an_outage_between_two_rounds_is_no_secret(bench: Bench) -> None:
+    running(bench)
+    bench.bus.status.outages += 1
+    bench.bus.clear()
+    bench.log.clear()
+    bench.keep_writing(1.0, control_word=0x047F, setpoint_1=0x2000)
+    assert all(frame.data[0] & 0x0F != 0x0F for frame in bench.sent(RPDO1))
+
+
+def test_a_bridge_that_is_being_stopped_takes_no_command_but_stops(bench: Bench) -> None:
+    running(bench)
+    bench.plant.close(bench.now)
+    bench.log.clear()
+    for word in (0x047E, 0x047F):
+        assert bench.write(control_word=word).code is Code.NOT_READY
+        bench.run(0.02)
+    assert bench.ask(Action.QUICK_STOP).ok
+    assert bench.sent(RPDO1)
+    assert all(frame.data[0] & 0x0F != 0x0F for frame in bench.sent(RPDO1))

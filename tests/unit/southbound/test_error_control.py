@@ -70,6 +70,16 @@ def test_a_silent_node_is_lost_after_the_life_time() -> None:
     assert guard.next_deadline() is None
 
 
+def test_a_late_loop_asks_once() -> None:
+    guard = NodeGuard(5, 0.1, 10)
+    guard.expect(10.0)
+    asked = 0
+    for now in (10.0, 10.45, 10.4501, 10.5):
+        guard.on_time(now)
+        asked += len(guard.take_frames())
+    assert asked == 2
+
+
 def test_an_emergency_message_of_the_manual() -> None:
     """BU 2500 §8.3: code, register, drive id in byte 3."""
     emergency = emcy.decode(bytes.fromhex("0081 11 02 00000000".replace(" ", "")))

@@ -1,0 +1,63 @@
+"""The demo's controller on a real bridge."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import zenoh
+
+from bridge.sim.controller import Controller, Times
+from tests.support.process import drivebridge, free_port
+
+SITE = """
+[site]
+name = "demo"
+state_dir = "{folder}/state"
+runtime_dir = "{folder}/run"
+[[bus]]
+name = "can0"
+interface = "virtual"
+[[bus.node]]
+name = "conveyor"
+id = 5
+mapping = "nord/sk-tu4-cao"
+[[bus.node.drive]]
+slot = "fu4"
+control = "lease"
+fieldbus_timeout_ms = 800
+parameters = {{ P105 = 50.0, P112 = 10.0 }}
+[zenoh]
+listen = ["tcp/127.0.0.1:{port}"]
+"""
+TIMES = Times(cycle_s=0.05, run_s=0.5, pause_s=1.2, retry_s=1.2)
+
+
+def session_to(port: int) -> zenoh.Session:
+    settings = {
+        "mode": "client",
+        "connect": {"endpoints": [f"tcp/127.0.0.1:{port}"]},
+        "scouting": {"multicast": {"enabled": False}},
+    }
+    return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
+
+
+def test_the_demos_controller_never_trips_its_own_watchdog(tmp_path: Path) -> None:
+    port = free_port()
+    site = tmp_path / "site.toml"
+    site.write_text(SITE.format(folder=tmp_path, port=port), "utf-8")
+    with drivebridge(tmp_path, "run", "run", str(site), notify=True) as bridge:
+        bridge.wait_ready()
+        bridge.wait_output("node operational")
+        kinds: list[str] = []
+        with session_to(port) as session:
+            events = session.declare_subscriber(
+                "drives/demo/@/event/**",
+                lambda sample: kinds.append(str(sample.key_expr).rpartition("/")[2]),
+            )
+            controller = Controller(session, "drives/demo/conveyor/fu4", 40.0, TIMES)
+            rounds = [controller.run_once() for _ in range(3)]
+            events.undeclare()
+        assert rounds == [True] * 3, bridge.output()
+        assert "owner" in kinds
+        assert "watchdog" not in kinds

@@ -7,15 +7,18 @@ import gc
 import logging
 from collections.abc import Callable
 from contextlib import AsyncExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridge import __version__, clock
 from bridge.command import Plant
-from bridge.config import BusTable, Site, warnings
+from bridge.config import BusTable, Site
+from bridge.config.download import Download
+from bridge.eds import read_configurations
 from bridge.errors import BridgeError
 from bridge.eventlog import EventLog
 from bridge.fronts import Front
+from bridge.lint import Severity, lint
 from bridge.mapping import Family
 from bridge.mapping.site import load_site_and_families
 from bridge.mirror.endpoint import socket_endpoint
@@ -34,17 +37,20 @@ MakeBus = Callable[[BusTable], Bus]
 
 @dataclass(frozen=True, slots=True)
 class Project:
-    """A checked site with the families it uses, and the file it came from."""
+    """A checked site with the families it uses, and the file it came from. ``downloads`` has what
+    configuration files ask of their nodes, by the node's name."""
 
     path: Path
     site: Site
     families: dict[str, Family]
+    downloads: dict[str, tuple[Download, ...]] = field(default_factory=dict[str, tuple[Download, ...]])
 
 
 def load_project(path: Path) -> Project:
-    """Read a site file and every mapping it names. Raises ``FileFaults`` with all faults of all files."""
+    """Read a site file and every file it names. Raises ``FileFaults`` with all faults of the site file and
+    its mappings, or else of its configuration files."""
     site, families = load_site_and_families(path)
-    return Project(path, site, families)
+    return Project(path, site, families, read_configurations(site, path))
 
 
 def count(number: int, what: str) -> str:
@@ -75,7 +81,10 @@ class Service:
         self.plant = Plant(site, project.families, __version__, clock.now())
         self.plant.on_event(EventLog())
         self.notifier = Notifier()
-        networks = [(make_bus(table), Network(table, self.plant)) for table in site.bus]
+        networks = [
+            (make_bus(table), Network(table, self.plant, clock.epoch_ns, project.downloads))
+            for table in site.bus
+        ]
         self.master = Master(networks, self.plant, clock.now, self.notifier.alive)
         self.modbus = ModbusServer(self.plant, site.modbus, clock.now) if site.modbus else None
         self.zenoh = (
@@ -95,8 +104,7 @@ class Service:
         Raises ``Unavailable`` where a bus or a port cannot be opened, ``FrontRefused`` where a front says
         so, and ``OperationFailed`` when a part of the service has failed for good.
         """
-        for warning in warnings(self.project.site):
-            _log.warning("%s", warning)
+        self._say_what_is_doubtful()
         async with AsyncExitStack() as stack:
             stack.callback(_log.info, "stopped")
             # Ports first: a service that cannot be reached has no business on the bus.
@@ -124,6 +132,15 @@ class Service:
                 tasks.create_task(self.mirror.failed(), name="mirror")
                 if self.zenoh:
                     tasks.create_task(self.zenoh.failed(), name="zenoh")
+
+    def _say_what_is_doubtful(self) -> None:
+        """A site that cannot work well is run all the same: stopping a plant over a prediction is worse."""
+        verdict = lint(self.project.site, self.project.families, self.project.path, self.project.downloads)
+        for finding in verdict.findings:
+            level = logging.ERROR if finding.severity is Severity.ERROR else logging.WARNING
+            _log.log(level, "%s", finding.fault)
+        for load in verdict.loads:
+            _log.info("%s", load)
 
     async def _stop(self) -> None:
         _log.info("stopping: all drives are stopped")

@@ -7,7 +7,7 @@ import sys
 import typer
 
 from bridge import __version__
-from bridge.cli import export, project, serve
+from bridge.cli import eds, export, lss, monitor, nmt, project, scan, sdo, serve
 from bridge.errors import BridgeError
 
 app = typer.Typer(
@@ -22,7 +22,13 @@ app.command()(serve.run)
 app.command()(serve.simulate)
 app.command(hidden=True)(serve.demo_controller)
 app.command()(project.check)
+app.command()(eds.eds)
 app.command("hash-password")(project.hash_password)
+app.command()(scan.scan)
+app.command()(nmt.nmt)
+app.command()(monitor.monitor)
+app.add_typer(sdo.app, name="sdo")
+app.add_typer(lss.app, name="lss")
 app.add_typer(export.app, name="export")
 
 

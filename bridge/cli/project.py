@@ -6,40 +6,70 @@ import json
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from bridge.config import warnings
-from bridge.errors import FileFaults
-from bridge.service import count, load_project
+from bridge.errors import Fault, FileFaults
+from bridge.lint import Severity, Verdict, lint
+from bridge.service import Project, count, load_project
 
 
 def check(
     site: Annotated[Path, typer.Argument(metavar="SITE", help="the site file")],
     as_json: Annotated[bool, typer.Option("--json", help="machine-readable")] = False,
 ) -> None:
-    """Check SITE and the mappings it uses; every fault in one run."""
+    """Check SITE and the mappings it uses, and predict its bus load; every fault in one run."""
     try:
         project = load_project(site)
     except FileFaults as error:
         if as_json:
-            print(json.dumps({"ok": False, "faults": [asdict(fault) for fault in error.faults]}, indent=2))
+            faults = [_fault(fault, Severity.ERROR) for fault in error.faults]
+            print(json.dumps({"ok": False, "faults": faults}, indent=2))
             raise typer.Exit(error.exit_code) from None
         raise
-    repeated = warnings(project.site)
-    drives = [
+    verdict = lint(project.site, project.families, project.path, project.downloads)
+    errors = verdict.of(Severity.ERROR)
+    if as_json:
+        print(json.dumps(_as_json(project, verdict), indent=2))
+        if errors:
+            raise typer.Exit(FileFaults.exit_code)
+        return
+    for warning in verdict.of(Severity.WARNING):
+        print(warning, file=sys.stderr)
+    for load in verdict.loads:
+        print(load)
+    if errors:
+        raise FileFaults([finding.fault for finding in errors])
+    drives, buses = count(len(_drives(project)), "drive"), count(len(project.site.bus), "bus")
+    print(f"{site}: {drives} on {buses}, no faults")
+
+
+def _drives(project: Project) -> list[str]:
+    return [
         f"{node.name}/{drive.name or drive.slot}"
         for bus in project.site.bus
         for node in bus.node
         for drive in node.drive
     ]
-    if as_json:
-        print(json.dumps({"ok": True, "drives": drives, "warnings": repeated}, indent=2))
-        return
-    for warning in repeated:
-        print(f"warning: {warning}", file=sys.stderr)
-    print(f"{site}: {count(len(drives), 'drive')} on {count(len(project.site.bus), 'bus')}, no faults")
+
+
+def _as_json(project: Project, verdict: Verdict) -> dict[str, Any]:
+    found = {
+        severity: [_fault(finding.fault, severity) for finding in verdict.of(severity)]
+        for severity in Severity
+    }
+    return {
+        "ok": not found[Severity.ERROR],
+        "drives": _drives(project),
+        "buses": [asdict(load) for load in verdict.loads],
+        "faults": found[Severity.ERROR],
+        "warnings": found[Severity.WARNING],
+    }
+
+
+def _fault(fault: Fault, severity: Severity) -> dict[str, Any]:
+    return {"severity": severity.value, **asdict(fault)}
 
 
 def hash_password() -> None:

@@ -82,6 +82,7 @@ class Drive:
         self.identification = Identification()
         self.sdo_abort_code = 0
         self.rpdo_period_ms = round(bus.rpdo_period_s * 1000)
+        self.table = table
         self.given_parameters = table.parameters
         self._actual = [value for value in family.value if value.group == "actual"]
         self._commands = [value for value in family.value if value.group == "command"]

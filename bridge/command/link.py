@@ -18,6 +18,7 @@ class NodeState(Enum):
     BOOTING = "booting"
     OPERATIONAL = "operational"
     LOST = "lost"
+    STOPPED = "stopped by command"
     DISABLED = "disabled"
     CONFIG_ERROR = "configuration error"
 

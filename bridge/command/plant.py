@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Final
 
+from bridge.command.deadlines import Deadlines
 from bridge.command.drive import Drive
 from bridge.command.event import Event, EventGate, Kind
 from bridge.command.link import NodeState
@@ -18,6 +20,9 @@ from bridge.config import BusTable, NodeTable, Site
 from bridge.errors import Fault, FileFaults
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Family
+
+_LOOK_PER_DRIVE_S: Final = 50e-6
+"""Readings alone make us look at all timers this often at most, so that looking takes a tenth of the CPU."""
 
 NodeCommand = Callable[[Request, float, Reply], None]
 
@@ -51,7 +56,10 @@ class Plant:
         self.nodes: dict[str, Node] = {}
         self.drives: dict[str, Drive] = {}
         self.by_unit: dict[int, Drive] = {}
+        self.bus_commands: dict[str, NodeCommand] = {}
+        """Who carries out commands on all nodes of a bus, by ``bus/<name>``."""
         self.outputs_changed: Callable[[], None] = lambda: None
+        self._deadlines = Deadlines(self._next_of_drives)
         self._listeners: list[Callable[[Event], None]] = []
         self._gate = EventGate()
         self._is_closing = False
@@ -84,6 +92,7 @@ class Plant:
                 drive.bind(self.image)
                 drive.channel.settled = partial(self._settled, node, drive)
                 self._settled(node, drive, began)
+        self._deadlines.look_every_s = len(self.drives) * _LOOK_PER_DRIVE_S
         self.set("bridge/version", version, began)
         self.set("bridge/drives_configured", len(self.drives), began)
 
@@ -113,12 +122,14 @@ class Plant:
         if self._is_closing and request.action not in STOP_ACTIONS:
             reply(Outcome(Code.NOT_READY, "the bridge is being stopped", forwarded=False))
             return
+        self._deadlines.on_change()
         if request.action in NODE_ACTIONS:
             node = self.nodes.get(request.target)
-            if node is None or node.command is None:
+            command = node.command if node else self.bus_commands.get(request.target)
+            if command is None:
                 reply(Outcome(Code.UNKNOWN_TARGET, f"there is no node {request.target!r}"))
             else:
-                node.command(request, now, reply)
+                command(request, now, reply)
                 self.outputs_changed()
             return
         drive = self.drives.get(request.target)
@@ -134,6 +145,8 @@ class Plant:
 
     def on_time(self, now: float) -> None:
         """Let the timers of every channel run and bring the image up to date."""
+        if not self._deadlines.is_due(now):
+            return
         for drive in self.drives.values():
             deadline = drive.channel.next_deadline(now)
             if deadline is not None and deadline <= now:
@@ -154,6 +167,7 @@ class Plant:
         102.0 is there while a controller is silent; it clears by itself and is then the last fault, as
         P170 does.
         """
+        self._deadlines.on_change()
         drive.refresh(now)
         silent = any(
             drive.channel.is_tripped and drive.channel.watchdog.controller_is_silent for drive in node.drives
@@ -166,12 +180,19 @@ class Plant:
         self.image.set(current, fault, now)
 
     def next_deadline(self, now: float) -> float | None:
+        return self._deadlines.next(now)
+
+    def on_readings(self) -> None:
+        """The southbound side has taken in frames: timers of drives may have moved."""
+        self._deadlines.on_readings()
+
+    def _next_of_drives(self, now: float) -> float | None:
         times = [drive.channel.next_deadline(now) for drive in self.drives.values()]
-        known = [time for time in times if time is not None]
-        return min(known) if known else None
+        return min((time for time in times if time is not None), default=None)
 
     def on_node(self, node: Node, state: NodeState, now: float) -> None:
         """The southbound side says that a node is in another state."""
+        self._deadlines.on_change()
         for drive in node.drives:
             drive.channel.on_node(state, now)
         if state is NodeState.LOST:

@@ -153,6 +153,7 @@ def node_points(node: NodeTable, polls: list[Poll]) -> list[Point]:
         Point(
             name=f"{top}/supervision_state", data_type=DataType.STRING, description="heartbeat or guarding"
         ),
+        Point(name=f"{top}/software_version", data_type=DataType.STRING, description="100Ah"),
         Point(name=f"{top}/boot_status", data_type=DataType.STRING, description="boot-up step or result"),
         Point(
             name=f"{top}/current_fault",
@@ -162,6 +163,16 @@ def node_points(node: NodeTable, polls: list[Poll]) -> list[Point]:
         Point(name=f"{top}/last_fault", data_type=DataType.FLOAT, description="as P170[-02]"),
         Point(
             name=f"{top}/rejected_frames", data_type=DataType.UINT32, description="frames that fit nothing"
+        ),
+        Point(
+            name=f"{top}/emcy_history",
+            data_type=DataType.STRING,
+            description="the last eight emergency messages as JSON, newest first",
+        ),
+        Point(
+            name=f"{top}/emcy_suppressed",
+            data_type=DataType.UINT32,
+            description="emergency messages beyond the rate at which they are reported",
         ),
         *(
             Point(
@@ -188,10 +199,46 @@ def bus_points(bus: BusTable) -> list[Point]:
         Point(
             name=f"{top}/load", data_type=DataType.FLOAT, unit="%", low=0, high=100, description="bus load"
         ),
+        Point(
+            name=f"{top}/nmt_state",
+            data_type=DataType.UINT8,
+            states=NMT_STATES,
+            description="the bridge's own NMT state on this bus, as its heartbeat says it",
+        ),
+        Point(
+            name=f"{top}/held_by",
+            data_type=DataType.STRING,
+            description="nodes without which the others are not started",
+        ),
+        Point(
+            name=f"{top}/second_master",
+            data_type=DataType.BOOL,
+            description="an NMT command that is not ours came within the last minute",
+        ),
+        Point(
+            name=f"{top}/unexpected_nodes",
+            data_type=DataType.STRING,
+            description="nodes of the last minute that are not in the site file",
+        ),
+        Point(
+            name=f"{top}/duplicate_ids",
+            data_type=DataType.STRING,
+            description="node ids of the last minute that seem to be used twice",
+        ),
         Point(name=f"{top}/tx_errors", data_type=u32, description="transmit error counter"),
         Point(name=f"{top}/rx_errors", data_type=u32, description="receive error counter"),
         Point(
             name=f"{top}/frames_lost", data_type=u32, description="frames the kernel or the buffer dropped"
+        ),
+        Point(
+            name=f"{top}/frames_expired", data_type=u32, description="frames not sent within their deadline"
+        ),
+        Point(name=f"{top}/error_frames", data_type=u32, description="error frames of the controller"),
+        Point(name=f"{top}/last_error", data_type=DataType.STRING, description="the latest trouble in words"),
+        Point(
+            name=f"{top}/sync_window_misses",
+            data_type=u32,
+            description="synchronous TPDOs that came after the SYNC window",
         ),
     ]
 

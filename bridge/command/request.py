@@ -66,11 +66,24 @@ class Action(StrEnum):
     # on a node
     RESET = "reset"
     RESET_COMMUNICATION = "reset_communication"
+    START_NODE = "start_node"
+    STOP_NODE = "stop_node"
+    ENTER_PRE_OPERATIONAL = "enter_pre_operational"
     ENABLE = "enable"
     DISABLE = "disable"
 
 
-NODE_ACTIONS = frozenset((Action.RESET, Action.RESET_COMMUNICATION, Action.ENABLE, Action.DISABLE))
+NMT_ACTIONS = frozenset(
+    (
+        Action.RESET,
+        Action.RESET_COMMUNICATION,
+        Action.START_NODE,
+        Action.STOP_NODE,
+        Action.ENTER_PRE_OPERATIONAL,
+    )
+)
+"""The five commands of NMT (CiA 301 §7.2.8.2.1), on a node or on all nodes of a bus."""
+NODE_ACTIONS = NMT_ACTIONS | {Action.ENABLE, Action.DISABLE}
 STOP_ACTIONS = frozenset((Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE))
 
 
@@ -112,10 +125,10 @@ DONE = Outcome(Code.OK)
 class Request:
     """One command.
 
-    ``target`` is ``<node>/<drive>`` or ``<node>``. ``values`` (WRITE) maps names of the command group
-    to values: ``{"control_word": 0x047F, "setpoint_1": 0x2000}`` is one telegram. ``ttl_ms``
-    (TAKE_CONTROL) is the lease's length, ``direction`` (START) is 1 forward, -1 reverse, 0 as the
-    drive's own setting, ``timeout_ms`` goes with SET_TIMEOUT.
+    ``target`` is ``<node>/<drive>``, ``<node>`` or, for NMT, ``bus/<bus>``. ``values`` (WRITE) maps names
+    of the command group to values: ``{"control_word": 0x047F, "setpoint_1": 0x2000}`` is one telegram.
+    ``ttl_ms`` (TAKE_CONTROL) is the lease's length, ``direction`` (START) is 1 forward, -1 reverse, 0 as
+    the drive's own setting, ``timeout_ms`` goes with SET_TIMEOUT.
     """
 
     identity: Identity

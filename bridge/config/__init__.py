@@ -3,16 +3,18 @@
 Reference for users: ``docs/reference/site-file.md``.
 """
 
-from bridge.config.load import load_site, read_site, warnings
+from bridge.config.load import load_site, read_site
 from bridge.config.model import (
     IGNORE_ALL_S,
     BusTable,
+    ConfigureTable,
     Control,
     DriveTable,
     IdentityTable,
     ModbusTable,
     NodeTable,
     OpcUaTable,
+    PdoTable,
     Reaction,
     Site,
     SiteTable,
@@ -24,12 +26,14 @@ from bridge.config.model import (
 __all__ = [
     "IGNORE_ALL_S",
     "BusTable",
+    "ConfigureTable",
     "Control",
     "DriveTable",
     "IdentityTable",
     "ModbusTable",
     "NodeTable",
     "OpcUaTable",
+    "PdoTable",
     "Reaction",
     "Site",
     "SiteTable",
@@ -38,5 +42,4 @@ __all__ = [
     "ZenohTable",
     "load_site",
     "read_site",
-    "warnings",
 ]

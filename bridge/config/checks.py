@@ -64,6 +64,13 @@ def _check_bus(bus: RawTable, channels: _Unique, file: TomlFile) -> None:
     period_s = BusTable.model_construct(
         sync_period_ms=sync_ms, rpdo_period_ms=bus.whole("rpdo_period_ms")
     ).rpdo_period_s
+    window_us = _given(bus, "sync_window_us", _BUS.sync_window_us)
+    if window_us and window_us > 1000 * sync_ms:
+        file.fault(
+            (*bus.key, "sync_window_us"),
+            f"{window_us} µs is longer than the SYNC period",
+            f"at most {1000 * sync_ms} with sync_period_ms = {sync_ms}",
+        )
     deadman_ms = _given(bus, "deadman_ms", _BUS.deadman_ms)
     if deadman_ms < 2000 * period_s:
         file.fault(

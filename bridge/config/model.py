@@ -6,8 +6,16 @@ import ipaddress
 import re
 from typing import Annotated, Final, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from bridge.config.download import Download, encode
+
+ObjectType = Literal[
+    "bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64",
+    "real32", "real64", "string", "bytes",
+]  # fmt: skip
+OnLoss = Literal["restart", "stop_node", "stop_all", "nothing"]
+MandatoryMissing = Literal["go_on", "hold_all", "stop_all"]
 Control = Literal["modbus", "opcua", "zenoh", "lease", "none"]
 Reaction = Literal["disable_voltage", "quick_stop", "stop", "silence", "hold"]
 WordOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
@@ -17,6 +25,10 @@ IGNORE_ALL_S: Final = -0.1
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 _PREFIX: Final = re.compile(r"[\w.-]+(/[\w.-]+)*", re.ASCII)
+_OBJECT: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})")
+_MAPPED: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})/([0-9]{1,2})")
+_PDO_BITS: Final = 64
+_MOST_COUNTER: Final = 240
 _LOCATOR: Final = re.compile(r"[a-z][a-z0-9-]*/.+")
 
 
@@ -57,13 +69,26 @@ def _downtime(seconds: float) -> float:
     raise ValueError("must be -0.1 (ignore), 0 (off) or 0.1…100.0")
 
 
+def _counter(value: int) -> int:
+    if value == 0 or 2 <= value <= _MOST_COUNTER:
+        return value
+    raise ValueError("must be 0 (SYNC without a counter) or 2…240 (1019h)")
+
+
 def _locator(text: str) -> str:
     if not _LOCATOR.fullmatch(text):
         raise ValueError("must be a protocol and an address such as tcp/192.168.1.10:7447")
     return text
 
 
+def _object(text: str) -> str:
+    if not _OBJECT.fullmatch(text):
+        raise ValueError('must be an object as "2097:01", index and sub-index in hexadecimal')
+    return text
+
+
 Name = Annotated[str, AfterValidator(_name)]
+ObjectName = Annotated[str, AfterValidator(_object)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Network = Annotated[str, AfterValidator(_network)]
 Locator = Annotated[str, AfterValidator(_locator)]
@@ -78,6 +103,44 @@ class SiteTable(Table):
     name: Name = Field(description="a name for this site, lower_snake_case")
     state_dir: str = "/var/lib/drivebridge"
     runtime_dir: str = Field("/run/drivebridge", description="folder for the socket between our processes")
+
+
+class MappedObject(Table):
+    """An object in a PDO: index, sub-index, length in bits."""
+
+    index: int
+    sub: int
+    bits: int
+
+
+def _mapped(text: object) -> object:
+    if isinstance(text, MappedObject):
+        return text
+    match = _MAPPED.fullmatch(text) if isinstance(text, str) else None
+    if not match or not 1 <= int(match[3]) <= _PDO_BITS:
+        raise ValueError('must be an object and its length in bits as "3000:01/16"')
+    return MappedObject(index=int(match[1], 16), sub=int(match[2], 16), bits=int(match[3]))
+
+
+def _fits(objects: list[MappedObject]) -> list[MappedObject]:
+    bits = sum(mapped.bits for mapped in objects)
+    if bits > _PDO_BITS:
+        raise ValueError(f"has {bits} bits, a PDO has {_PDO_BITS}")
+    return objects
+
+
+Mapped = Annotated[MappedObject, BeforeValidator(_mapped)]
+
+
+class PdoTable(Table):
+    """How the bridge sets one PDO of the node; what is left out stays as the node has it."""
+
+    enable: bool = True
+    cob_id: int | None = Field(None, ge=0x181, le=0x6DF, description="385…1759 (181h…6DFh), with the node id")
+    transmission_type: int | None = Field(None, ge=0, le=255, description="0…255, as the device allows")
+    inhibit_ms: float | None = Field(None, ge=0, le=6553.5, description="0…6553.5 ms, in steps of 0.1")
+    event_ms: int | None = Field(None, ge=0, le=65535, description="0…65535 ms")
+    mapping: Annotated[list[Mapped], AfterValidator(_fits)] = Field(default_factory=list[MappedObject])
 
 
 class DriveTable(Table):
@@ -97,13 +160,40 @@ class DriveTable(Table):
     parameters: dict[str, Full] = Field(
         default_factory=dict[str, float], description="scaling, where it is not read from the drive"
     )
+    tpdo_deadline_ms: int | None = Field(None, ge=0, le=600_000, description="0 (never late) or a time in ms")
+    rtr_poll_ms: int = Field(100, ge=5, le=60_000, description="5…60000 ms")
+    rpdo: PdoTable | None = None
+    tpdo: PdoTable | None = None
 
 
 class IdentityTable(Table):
+    device_type: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
+    device_type_mask: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
     vendor_id: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
     product_code: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
+    product_code_mask: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
     revision: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
+    revision_mask: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
     serial: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
+
+
+class ConfigureTable(Table):
+    """One object that the node is to hold."""
+
+    object: ObjectName = Field(description='an object as "2097:01", index and sub-index in hexadecimal')
+    type: ObjectType = Field(description="the object's data type, such as uint16")
+    value: bool | int | float | str
+    read_back: bool = Field(True, description="false writes it blindly, as a command")
+
+    @model_validator(mode="after")
+    def _encodes(self) -> ConfigureTable:
+        encode(self.type, self.value)
+        return self
+
+    @property
+    def download(self) -> Download:
+        index, sub = self.object.split(":")
+        return Download(int(index, 16), int(sub, 16), encode(self.type, self.value), self.read_back)
 
 
 class NodeTable(Table):
@@ -116,10 +206,17 @@ class NodeTable(Table):
     supervision_ms: int = Field(200, ge=20, le=65535, description="20…65535 ms")
     life_time_factor: int = Field(3, ge=1, le=255)
     mandatory: bool = False
+    start_order: int = Field(0, ge=0, le=126, description="0…126, lower ones start first")
+    on_loss: OnLoss = Field("restart", description="restart, stop_node, stop_all or nothing")
     enabled: bool = True
     hold_ms: int = Field(2000, ge=0, le=3_600_000)
     sdo_timeout_ms: int = Field(500, ge=10, le=60_000)
+    sdo_retries: int = Field(1, ge=0, le=10, description="0…10")
+    sdo_channels: list[Annotated[int, Field(ge=2, le=128)]] = Field(default_factory=list[int])
     identity: IdentityTable = Field(default_factory=lambda: IdentityTable.model_validate({}))
+    configuration: str | None = None
+    configuration_store: bool = False
+    configure: list[ConfigureTable] = Field(default_factory=list[ConfigureTable])
     drive: list[DriveTable] = Field(min_length=1, description="a [[bus.node.drive]] table for each drive")
 
 
@@ -131,8 +228,15 @@ class BusTable(Table):
     master_node_id: int = Field(127, ge=1, le=127, description="1…127")
     heartbeat_ms: int = Field(100, ge=0, le=65535, description="0 (off) or a time in ms")
     sync_period_ms: int = Field(10, ge=0, le=1000, description="0 (off) or 1…1000 ms")
+    sync_counter: Annotated[int, AfterValidator(_counter)] = Field(0, description="0 (none) or 2…240")
+    sync_window_us: int = Field(0, ge=0, le=1_000_000, description="0 (not judged) or a time in µs")
+    time_period_s: int = Field(0, ge=0, le=86_400, description="0 (off) or 1…86400 s")
     rpdo_period_ms: int | None = Field(None, ge=1, le=1000, description="1…1000 ms")
     deadman_ms: int = Field(100, ge=10, le=10_000, description="10…10000 ms")
+    mandatory_missing: MandatoryMissing = Field("go_on", description="go_on, hold_all or stop_all")
+    reset_at_start: Literal["none", "communication", "node"] = Field(
+        "none", description="none, communication or node"
+    )
     node: list[NodeTable] = Field(default_factory=list[NodeTable])
 
     @property

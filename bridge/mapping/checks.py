@@ -13,6 +13,7 @@ _NODE_POINTS: Final = (
     "nmt_state",
     "supervision_state",
     "boot_status",
+    "software_version",
     "current_fault",
     "last_fault",
     "rejected_frames",
@@ -28,6 +29,7 @@ def check(family: Family, file: TomlFile) -> None:
         file.fault(("family", "node_id_low"), f"is above node_id_high, {facts.node_id_high}")
     _check_process(family, file)
     _check_slots(family, file)
+    _check_sdo(family, file)
     _check_values(family, file)
     _check_parameters(family, file)
     _check_polls(family, file)
@@ -63,13 +65,28 @@ def _check_slots(family: Family, file: TomlFile) -> None:
             file.fault(("slot", s, "emcy_drive"), "has no meaning without emcy.drive_byte")
 
 
+def _check_sdo(family: Family, file: TomlFile) -> None:
+    slots = [slot.name for slot in family.slot]
+    _twice(((f"{sdo.number}", ("sdo", s, "number")) for s, sdo in enumerate(family.sdo)), "SDO server", file)
+    for s, sdo in enumerate(family.sdo):
+        if sdo.slot is not None and sdo.slot not in slots:
+            hint = f"known: {', '.join(slots)}"
+            file.fault(("sdo", s, "slot"), f"there is no slot {sdo.slot!r}", hint)
+        for name, cob_id in (("request", sdo.request), ("reply", sdo.reply)):
+            _check_cob_id(cob_id, family, ("sdo", s, name), file)
+
+
 def _check_pdo(family: Family, pdo: Pdo, words: list[str], key: Key, file: TomlFile) -> None:
     if len(pdo.objects) != len(words):
         message = f"has {len(pdo.objects)} words and process.{key[-1]} names {len(words)}"
         file.fault((*key, "objects"), message)
+    _check_cob_id(pdo.cob_id, family, (*key, "cob_id"), file)
+
+
+def _check_cob_id(cob_id: int, family: Family, key: Key, file: TomlFile) -> None:
     most = _STANDARD_ID_MOST - family.family.node_id_high
-    if pdo.cob_id > most:
-        file.fault((*key, "cob_id"), f"{pdo.cob_id:X}h leaves no room for the node id", f"at most {most:X}h")
+    if cob_id > most:
+        file.fault(key, f"{cob_id:X}h leaves no room for the node id", f"at most {most:X}h")
 
 
 def _check_values(family: Family, file: TomlFile) -> None:

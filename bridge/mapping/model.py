@@ -62,6 +62,15 @@ def _number(text: str) -> str:
     return text
 
 
+def _device_name(text: str) -> str:
+    try:
+        re.compile(text)
+    except re.error as error:
+        raise ValueError(f"must be a regular expression: {error}") from None
+    return text
+
+
+DeviceName = Annotated[str, AfterValidator(_device_name)]
 Ref = Annotated[ObjectRef, BeforeValidator(_object)]
 Pattern = Annotated[str, AfterValidator(_pattern)]
 Word = Annotated[int, Field(ge=0, le=0xFFFF)]
@@ -91,8 +100,15 @@ class IdentityRule(Table):
     """What 1000h and 1018h must hold; what is absent is not compared."""
 
     device_type: int | None = None
+    device_type_mask: int | None = None
     vendor_id: int | None = None
     product_code: int | None = None
+    product_code_mask: int | None = None
+    revision: int | None = None
+    revision_mask: int | None = None
+    device_name: DeviceName | None = Field(
+        None, description="a regular expression found in 1008h; `scan` alone goes by it"
+    )
 
 
 class Pdo(Table):
@@ -102,6 +118,15 @@ class Pdo(Table):
     number: int = Field(ge=1, le=512)
     cob_id: int = Field(ge=0, le=0x7FF, description="without the node id, such as 0x200")
     objects: list[Annotated[list[Ref], Field(min_length=1)]]
+    signed: list[Ref] = Field(
+        default_factory=list[ObjectRef], description="objects shorter than a word that hold signed numbers"
+    )
+
+
+class NodeTpdo(Table):
+    """A TPDO that belongs to no drive: where the node has it switched on, it saves polling."""
+
+    number: int = Field(ge=1, le=512)
 
 
 class Slot(Table):
@@ -113,6 +138,18 @@ class Slot(Table):
     emcy_drive: int | None = Field(None, description="the value of the EMCY drive byte for this drive")
     parameters_by_sdo: bool = Field(
         False, description="true where this drive's parameters are reached by the default SDO channel"
+    )
+
+
+class SdoServer(Table):
+    """A further SDO server of the node, beside the first, which every node has at 600h and 580h."""
+
+    number: int = Field(ge=2, le=128, description="2 is object 1201h")
+    request: int = Field(ge=0, le=0x7FF, description="COB-ID to the node without the node id, such as 0x640")
+    reply: int = Field(ge=0, le=0x7FF, description="COB-ID from the node without the node id")
+    slot: Name | None = Field(None, description="the drive it reaches; left out: the same as the first")
+    after_stop: bool = Field(
+        False, description="true where a change counts only after Stopped and Pre-Operational"
     )
 
 
@@ -233,20 +270,30 @@ class FaultNumbers(Table):
     texts: dict[FaultNumber, str]
 
 
+class OwnTimeout(Table):
+    """The object by which the node itself watches the bridge's process data; 0 in it is off."""
+
+    object: Ref
+    unit_ms: float = Field(1.0, gt=0, description="what one step of it is, in ms")
+
+
 class Family(Table):
     """One mapping file."""
 
     family: FamilyTable
-    identity: IdentityRule = IdentityRule()
+    identity: IdentityRule = Field(default_factory=lambda: IdentityRule.model_validate({}))
     process: Process
+    sdo: list[SdoServer] = Field(default_factory=list[SdoServer])
     slot: list[Slot] = Field(min_length=1)
     value: list[ScaledValue] = Field(default_factory=list[ScaledValue])
     control_word: ControlWord
     status_word: StatusWord
     parameter: list[Parameter] = Field(default_factory=list[Parameter])
     poll: list[Poll] = Field(default_factory=list[Poll])
+    node_tpdo: list[NodeTpdo] = Field(default_factory=list[NodeTpdo])
     emcy: EmcyTable
     faults: FaultNumbers
+    own_timeout: OwnTimeout | None = None
 
     def slot_named(self, name: str) -> Slot:
         """Raises KeyError where the family has no such slot."""

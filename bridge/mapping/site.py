@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from pathlib import Path
+from typing import cast
 
 from bridge.config import Site, read_site
 from bridge.errors import Fault, FileFaults
@@ -57,6 +58,23 @@ def _check_node(node: RawTable, family: Family, file: TomlFile) -> None:
     if node_id is not None and not facts.node_id_low <= node_id <= facts.node_id_high:
         allowed = f"{facts.node_id_low}…{facts.node_id_high}"
         file.fault((*node.key, "id"), f"{facts.name} has addresses {allowed}, not {node_id}")
+    _check_sdo_channels(node, family, file)
+
+
+def _check_sdo_channels(node: RawTable, family: Family, file: TomlFile) -> None:
+    """The further SDO channels that are to be opened must be ones the family has."""
+    known = [server.number for server in family.sdo]
+    asked: object = node.content.get("sdo_channels")
+    if not isinstance(asked, list):
+        return
+    numbers = cast("list[object]", asked)
+    for place, number in enumerate(numbers):
+        if isinstance(number, int) and number >= 2 and number not in known:
+            hint = f"it has {', '.join(map(str, known))}" if known else "it has the first one only"
+            message = f"{family.family.name} has no SDO channel {number}"
+            file.fault((*node.key, "sdo_channels"), message, hint)
+        elif number in numbers[:place]:
+            file.fault((*node.key, "sdo_channels"), f"SDO channel {number} is there twice")
 
 
 def _check_drive(drive: RawTable, family: Family, file: TomlFile) -> None:

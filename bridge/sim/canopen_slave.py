@@ -179,8 +179,7 @@ class CanopenSlave:
         settings = self._store.current
         for server, channel in zip(self._servers, settings.sdo, strict=True):
             if channel.enabled and cob_id == channel.receive_cob_id:
-                answer = server.on_request(data)
-                if answer is not None:
+                for answer in server.on_request(data):
                     self._send(channel.send_cob_id, answer)
                 return
         if self.state is not NmtState.OPERATIONAL:

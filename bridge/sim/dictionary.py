@@ -120,7 +120,29 @@ class Text:
         self.check_writable()
 
 
-Entry = Number | Text
+@dataclass(frozen=True, slots=True)
+class Domain:
+    """A DOMAIN: bytes of any length up to ``max_size``. It maps into no PDO."""
+
+    max_size: int
+    read: Callable[[], bytes]
+    write: Callable[[bytes], None]
+    in_rpdo: bool = field(default=False, init=False)
+    in_tpdo: bool = field(default=False, init=False)
+
+    def upload(self) -> bytes:
+        return self.read()
+
+    def check_writable(self) -> None:
+        """It always is."""
+
+    def download(self, data: bytes) -> None:
+        if len(data) > self.max_size:
+            raise SdoAbort(AbortCode.LENGTH_TOO_HIGH)
+        self.write(data)
+
+
+Entry = Number | Text | Domain
 
 
 class ObjectAccess(Protocol):

@@ -23,7 +23,7 @@ from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.nord_can_parameters import CanParameters
 from bridge.sim.nord_drive import NordDrive
 from bridge.sim.nord_image import ProcessImage, add_parameter, display, fixed
-from bridge.sim.nord_settings import DRIVES, InterfaceSettings
+from bridge.sim.nord_settings import DRIVES, RULES, InterfaceSettings
 from bridge.sim.nord_supervision import FaultDisplay
 from bridge.sim.pdo_objects import PdoObjects
 from bridge.sim.sdo_server import SdoServer
@@ -150,8 +150,8 @@ def build_servers(
         parameters = Dictionary()
         drive.add_to(parameters)
         channels.append(DriveAccess(parameters, partial(online, place)))
-    first = SdoServer(FirstChannel([dictionary, channels[0]]))
-    return [first, *(SdoServer(channel) for channel in channels[1:])]
+    reaches = [FirstChannel([dictionary, channels[0]]), *channels[1:]]
+    return [SdoServer(objects, RULES.sdo_block_segments) for objects in reaches]
 
 
 class DriveAccess:

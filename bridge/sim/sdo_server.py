@@ -1,4 +1,4 @@
-"""One SDO server channel: expedited and segmented transfer (CiA 301 §7.2.4.3, BU 2500 §6.6)."""
+"""One SDO server channel: expedited, segmented and block transfer (CiA 301 §7.2.4.3, BU 2500 §6.6)."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ from typing import Final
 
 from bridge.sim.abort import AbortCode, SdoAbort
 from bridge.sim.dictionary import ObjectAccess
+from bridge.sim.sdo_block_server import BlockDownload, BlockUpload, checked_size
 
 _REQUEST_SIZE: Final = 8
 _SEGMENT_SIZE: Final = 7
 _TOGGLE: Final = 0x10
+_ABORT: Final = 0x80
+_CONTINUES: Final = {5: (1, 2, 3), 6: (1, 3)}
+"""Low bits of the block commands that carry no index."""
 
 
 @dataclass(slots=True)
@@ -32,47 +36,90 @@ class _Download:
 
 
 class SdoServer:
-    """Answers each request with one frame, or with none where CiA 301 wants none.
+    """Answers each request with the frames that CiA 301 wants, often one, in a block none or many.
 
-    Block transfer is not offered; its commands are answered as unknown.
+    With ``block_segments`` 0 block transfer is not offered; its commands are answered as unknown.
     """
 
-    def __init__(self, objects: ObjectAccess) -> None:
+    def __init__(self, objects: ObjectAccess, block_segments: int = 0) -> None:
         self._objects = objects
-        self._transfer: _Upload | _Download | None = None
+        self._block_segments = block_segments
+        self._transfer: _Upload | _Download | BlockUpload | BlockDownload | None = None
 
     def reset(self) -> None:
         self._transfer = None
 
-    def on_request(self, data: bytes) -> bytes | None:
+    def on_request(self, data: bytes) -> list[bytes]:
+        """The answers to ``data``; a transfer under way is given up by a new one."""
         if len(data) != _REQUEST_SIZE:
-            return None  # not an SDO (CiA 301: always eight bytes); a real server does not see it
-        command = data[0] >> 5
-        if command == 4:
-            self._transfer = None
-            return None
-        index, sub = int.from_bytes(data[1:3], "little"), data[3]
+            return []  # not an SDO (CiA 301: always eight bytes); a real server does not see it
         transfer = self._transfer
-        if command in (0, 3):  # a segment carries no index: the abort names that of the transfer
+        receives = isinstance(transfer, BlockDownload) and transfer.in_blocks
+        command = data[0] >> 5
+        if data[0] == _ABORT or (command == 4 and not receives):
+            self._transfer = None
+            return []
+        index, sub = int.from_bytes(data[1:3], "little"), data[3]
+        continues = command in (0, 3) or (command in (5, 6) and data[0] & 0x03 in _CONTINUES[command])
+        if receives or continues:  # these carry no index: the abort names that of the transfer
             index, sub = (transfer.index, transfer.sub) if transfer else (0, 0)
         try:
+            if isinstance(transfer, BlockDownload) and transfer.in_blocks:
+                return transfer.on_segment(data)
             return self._answer(command, data, index, sub)
         except SdoAbort as abort:
             self._transfer = None
-            return bytes([0x80]) + _multiplexor(index, sub) + abort.code.to_bytes(4, "little")
+            return [bytes([_ABORT]) + _multiplexor(index, sub) + abort.code.to_bytes(4, "little")]
 
-    def _answer(self, command: int, data: bytes, index: int, sub: int) -> bytes:
+    def _answer(self, command: int, data: bytes, index: int, sub: int) -> list[bytes]:
         match command:
             case 0:
-                return self._download_segment(data)
+                return [self._download_segment(data)]
             case 1:
-                return self._initiate_download(data, index, sub)
+                return [self._initiate_download(data, index, sub)]
             case 2:
-                return self._initiate_upload(index, sub)
+                return [self._initiate_upload(index, sub)]
             case 3:
-                return self._upload_segment(data)
+                return [self._upload_segment(data)]
+            case 5 if self._block_segments:
+                return self._block_upload(data, index, sub)
+            case 6 if self._block_segments:
+                return [self._block_download(data, index, sub)]
             case _:
                 raise SdoAbort(AbortCode.COMMAND_UNKNOWN)
+
+    def _block_upload(self, data: bytes, index: int, sub: int) -> list[bytes]:
+        if data[0] & 0x03:
+            transfer = self._transfer
+            if not isinstance(transfer, BlockUpload):
+                raise SdoAbort(AbortCode.COMMAND_UNKNOWN)
+            answers = transfer.answer(data)
+            if not answers:
+                self._transfer = None
+            return answers
+        size = checked_size(data[4])
+        value = self._objects.find(index, sub).upload()
+        if not value or len(value) <= data[5]:  # the client would rather have these by segments
+            return [self._initiate_upload(index, sub)]
+        self._transfer = BlockUpload(index, sub, value, size, bool(data[0] & 0x04))
+        return [b"\xc6" + _multiplexor(index, sub) + len(value).to_bytes(4, "little")]
+
+    def _block_download(self, data: bytes, index: int, sub: int) -> bytes:
+        if data[0] & 0x01:
+            transfer = self._transfer
+            if not isinstance(transfer, BlockDownload):
+                raise SdoAbort(AbortCode.COMMAND_UNKNOWN)
+            self._objects.find(transfer.index, transfer.sub).download(transfer.on_end(data))
+            self._transfer = None
+            return b"\xa1" + bytes(7)
+        entry = self._objects.find(index, sub)
+        entry.check_writable()
+        announced = int.from_bytes(data[4:8], "little") if data[0] & 0x02 else None
+        if announced is not None and announced > entry.max_size:
+            raise SdoAbort(AbortCode.LENGTH_TOO_HIGH)
+        segments, with_crc = self._block_segments, bool(data[0] & 0x04)
+        self._transfer = BlockDownload(index, sub, entry.max_size, announced, segments, with_crc)
+        return b"\xa4" + _multiplexor(index, sub) + bytes([segments, 0, 0, 0])
 
     def _initiate_upload(self, index: int, sub: int) -> bytes:
         value = self._objects.find(index, sub).upload()

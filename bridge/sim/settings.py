@@ -27,6 +27,8 @@ class SlaveRules:
     emcy_inhibit_unit_s: float = 1e-4
     """Unit of 1015h; CiA 301 has 100 µs."""
     map_entries: int = 8
+    sdo_block_segments: int = 0
+    """Segments in a block that the SDO servers take; 0: they know no block transfer."""
 
 
 @dataclass(slots=True)

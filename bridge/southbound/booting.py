@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from bridge.command.plant import Node
 from bridge.southbound import boot
 from bridge.southbound.canopen.nmt import NmtState
-from bridge.southbound.canopen.sdo import Result, SdoChannel, SdoError
+from bridge.southbound.canopen.sdo import Priority, Result, SdoError
+from bridge.southbound.sdo_channels import SdoChannels
 
 
 class Host(Protocol):
@@ -18,16 +19,20 @@ class Host(Protocol):
         """A step that needs no answer."""
         ...
 
-    def begin_await(self, state: NmtState) -> bool:
+    def begin_await(self, state: NmtState | None) -> bool:
         """Whether there is anything to wait for: a node without supervision never says its state."""
         ...
 
-    def boot_ended(self, result: boot.BootResult | Exception, now: float) -> None: ...
+    def may_start(self) -> bool:
+        """Whether start order and mandatory nodes let the node start now."""
+        ...
+
+    def boot_ended(self, result: boot.BootResult | boot.BootError, now: float) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
 class _Awaited:
-    state: NmtState
+    state: NmtState | None
     deadline: float
 
 
@@ -35,13 +40,15 @@ class Booting:
     """One boot-up at a time. Answers are kept until ``pump``: the generator never runs inside the
     channel's own bookkeeping."""
 
-    def __init__(self, host: Host, node: Node, sdo: SdoChannel) -> None:
+    def __init__(self, host: Host, make: Callable[[], boot.Boot], sdo: SdoChannels) -> None:
         self._host = host
-        self._node = node
+        self._make = make
         self._sdo = sdo
         self._boot: boot.Boot | None = None
         self._awaited: _Awaited | None = None
         self._answers: list[Result] = []
+        self._step = boot.Step("", "B")
+        self.is_held = False
 
     @property
     def is_running(self) -> bool:
@@ -49,7 +56,7 @@ class Booting:
 
     def begin(self, now: float) -> None:
         self.cancel(now)
-        self._boot = boot.boot(self._node)
+        self._boot = self._make()
         self._go_on(None, now)
 
     def cancel(self, now: float) -> None:
@@ -58,6 +65,7 @@ class Booting:
             self._boot.close()
             self._boot = None
         self._awaited = None
+        self.is_held = False
         self._sdo.flush(now)
         self._answers.clear()
 
@@ -65,17 +73,25 @@ class Booting:
         """Give the boot-up the answers that have come since the last call."""
         while self._answers:
             self._go_on(self._answers.pop(0), now)
+        if self.is_held and self._host.may_start():
+            self.is_held = False
+            self._go_on(None, now)
 
     def on_nmt_state(self, state: NmtState, now: float) -> None:
         """The node has reported its state."""
-        if self._awaited and state is self._awaited.state:
+        if self._awaited and self._awaited.state in (None, state):
             self._awaited = None
             self._go_on(None, now)
 
     def on_time(self, now: float, state: NmtState) -> None:
         if self._awaited and now >= self._awaited.deadline:
-            self._awaited = None
-            self._end(boot.BootError(f"the node stays {state.label.replace('_', ' ')}"), now)
+            awaited, self._awaited = self._awaited, None
+            if awaited.state is None:
+                error = boot.BootError(self._step.letter, f"nothing was heard while {self._step.text}")
+            else:
+                wants, stays = awaited.state.words, state.words
+                error = boot.BootError("J", f"the node stays {stays}, expected {wants}", absent=False)
+            self._end(error, now)
 
     def next_deadline(self) -> float | None:
         return self._awaited.deadline if self._awaited else None
@@ -88,7 +104,11 @@ class Booting:
             except StopIteration as end:
                 self._end(end.value, now)
                 return
-            except (SdoError, boot.BootError) as error:
+            except SdoError as error:
+                absent = not error.by_server
+                self._end(boot.BootError(self._step.letter, str(error), absent=absent), now)
+                return
+            except boot.BootError as error:
                 self._end(error, now)
                 return
             answer = None
@@ -98,22 +118,29 @@ class Booting:
     def _waits(self, action: boot.Action, now: float) -> bool:
         """Do one step; True where its answer comes later."""
         match action:
-            case boot.Read(index, sub):
-                self._sdo.read(index, sub, now, self._answers.append)
+            case boot.Read(index, sub, channel):
+                self._sdo[channel].read(index, sub, now, self._answers.append, priority=Priority.BOOT)
                 return True
             case boot.Write(index, sub, data):
-                self._sdo.write(index, sub, data, now, self._answers.append)
+                self._sdo.first.write(index, sub, data, now, self._answers.append, priority=Priority.BOOT)
                 return True
             case boot.Await(state, timeout_s):
                 if not self._host.begin_await(state):
                     return False
                 self._awaited = _Awaited(state, now + timeout_s)
                 return True
+            case boot.AwaitRelease():
+                self.is_held = not self._host.may_start()
+                return self.is_held
+            case boot.Step():
+                self._step = action
+                self._host.carry_out(action, now)
+                return False
             case _:
                 self._host.carry_out(action, now)
                 return False
 
-    def _end(self, result: boot.BootResult | Exception, now: float) -> None:
+    def _end(self, result: boot.BootResult | boot.BootError, now: float) -> None:
         self._boot = None
         self._host.boot_ended(result, now)
 

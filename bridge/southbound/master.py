@@ -17,6 +17,7 @@ from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import Bus, ControllerState
 from bridge.southbound.canopen.sync import burst_length
 from bridge.southbound.network import Network
+from bridge.southbound.ratelimit import RateLimit
 from bridge.southbound.timer import LoopTimer
 
 _log = logging.getLogger(__name__)
@@ -29,6 +30,16 @@ _STOP_DRIVES_S = 0.1
 _RENEWALS = 3
 """How often a burst is renewed within its dead-man time."""
 
+_BUS_EVENTS = 10
+_BUS_EVENT_EVERY_S = 5.0
+_SEVERITIES = {
+    ControllerState.OK: 300,
+    ControllerState.WARNING: 300,
+    ControllerState.PASSIVE: 600,
+    ControllerState.BUS_OFF: 900,
+    ControllerState.DOWN: 900,
+}
+
 
 @dataclass(slots=True)
 class _Line:
@@ -36,9 +47,11 @@ class _Line:
 
     bus: Bus
     network: Network
-    beating: dict[int, Frame] = field(default_factory=dict[int, Frame])
+    beating: dict[int, tuple[Frame, ...]] = field(default_factory=dict[int, tuple[Frame, ...]])
     renew_at: float = 0.0
     was_up: bool = True
+    shown: ControllerState = ControllerState.OK
+    limit: RateLimit = field(default_factory=lambda: RateLimit(_BUS_EVENTS, _BUS_EVENT_EVERY_S))
     outages: int = 0
 
 
@@ -98,7 +111,7 @@ class Master:
         await asyncio.sleep(_STOP_DRIVES_S)
 
     async def close(self) -> None:
-        """End every drive's process data and close the buses."""
+        """Stop every drive's process data and close the buses."""
         self._running = False
         self._plant.outputs_changed = lambda: None
         if self._timer:
@@ -148,6 +161,7 @@ class Master:
             frames = line.bus.drain(now)
             if frames:
                 line.network.on_frames(frames, now)
+                self._plant.on_readings()
         self._plant.on_time(now)
         for line in self._lines:
             line.network.on_time(now)
@@ -185,6 +199,7 @@ class Master:
     def _watch_bus(self, line: _Line, now: float) -> None:
         status = line.bus.status
         is_up = status.state not in (ControllerState.DOWN, ControllerState.BUS_OFF)
+        self._tell_state(line, now)
         if status.outages != line.outages:
             line.outages = status.outages
             if is_up and line.was_up:
@@ -197,11 +212,21 @@ class Master:
         line.was_up = is_up
         line.beating.clear()
         line.renew_at = now
-        state = line.bus.status.state.name.lower().replace("_", "-")
-        severity = 300 if is_up else 900
-        self._plant.report(Event(now, Kind.BUS, line.bus.name, severity, f"bus {line.bus.name} is {state}"))
         if not is_up:
             line.network.bus_is_gone(now)
+
+    def _tell_state(self, line: _Line, now: float) -> None:
+        """The controller is in another state. A loose plug changes it a hundred times a second: the last
+        one is told in any case, those before it no more often than the limit allows."""
+        status = line.bus.status
+        if status.state is line.shown or not line.limit.allows(now):
+            return
+        line.shown = status.state
+        state = status.state.name.lower().replace("_", "-")
+        message = f"bus {line.bus.name} is {state}"
+        if status.state is not ControllerState.OK and status.last_error:
+            message += f": {status.last_error}"
+        self._plant.report(Event(now, Kind.BUS, line.bus.name, _SEVERITIES[status.state], message))
 
     def _flush(self, line: _Line, now: float) -> None:
         bus, network = line.bus, line.network
@@ -219,12 +244,12 @@ class Master:
         for can_id in [can_id for can_id in line.beating if can_id not in beats]:
             bus.silence(can_id)
             del line.beating[can_id]
-        for can_id, (frame, period_s) in beats.items():
-            changed = line.beating.get(can_id) != frame
+        for can_id, (frames, period_s) in beats.items():
+            changed = line.beating.get(can_id) != frames
             if changed or renew:
                 count = burst_length(period_s, network.bus.deadman_ms)
-                bus.beat(frame, now, period_s, count, at_once=changed)
-                line.beating[can_id] = frame
+                bus.beat(frames, now, period_s, count, at_once=changed)
+                line.beating[can_id] = frames
 
     def _arm(self, now: float) -> None:
         times = [self._refresh_at]

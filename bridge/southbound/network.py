@@ -1,111 +1,248 @@
-"""One CANopen network: its nodes, its SYNC, our own heartbeat. Sans-IO.
+"""One CANopen network: its nodes, its SYNC and TIME, our own heartbeat. Sans-IO.
 
 Says which frames are to be sent once and which are to be repeated; whoever holds the bus does it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from types import MappingProxyType
+from typing import Final
 
-from bridge.command import Plant
+from bridge.command import Action, Event, Kind, Plant, Reply, Request
 from bridge.config import BusTable
+from bridge.config.download import Download
+from bridge.southbound import node_commands
 from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.interface import BusStatus, ControllerState
-from bridge.southbound.canopen import cobid
-from bridge.southbound.canopen.nmt import NmtState
-from bridge.southbound.canopen.sync import SYNC_FRAME
-from bridge.southbound.node import Handler, NodeCore
+from bridge.southbound.bus.interface import BusStatus
+from bridge.southbound.canopen import cobid, nmt
+from bridge.southbound.canopen.nmt import NmtCommand, NmtState
+from bridge.southbound.canopen.sync import SyncWindow, sync_frames
+from bridge.southbound.canopen.time_stamp import TimeProducer
+from bridge.southbound.neighbours import Neighbour
+from bridge.southbound.node import NodeCore
+from bridge.southbound.node_wire import Handler
+from bridge.southbound.ratelimit import RateLimit
+from bridge.southbound.schedule import Schedule
+from bridge.southbound.startup import StartGate
+from bridge.southbound.watch import BusWatch
 
-_OVERHEAD_BITS = 47
-"""Bits of a standard data frame without data and stuff bits, interframe space included."""
+_LOAD_PERIOD_S: Final = 1.0
+_ERRORS_EVERY_S: Final = 10.0
+"""A broken wire gives thousands of error frames a second: one line tells of all of them."""
 
+NOTHING: Final[Mapping[str, Sequence[Download]]] = MappingProxyType({})
 
-def frame_bits(length: int) -> int:
-    """Bits on the wire of a data frame with ``length`` bytes: worst-case stuffing counted half."""
-    payload = 8 * length
-    return _OVERHEAD_BITS + payload + (33 + payload) // 8
+Beats = dict[int, tuple[tuple[Frame, ...], float]]
+"""What is to be repeated and its period in seconds, by COB-ID."""
 
 
 class Network:
-    """All configured nodes of one bus."""
+    """All configured nodes of one bus.
 
-    def __init__(self, bus: BusTable, plant: Plant) -> None:
+    ``epoch_ns`` gives the wall clock at a monotonic time, for TIME; without it none is sent.
+    """
+
+    def __init__(
+        self,
+        bus: BusTable,
+        plant: Plant,
+        epoch_ns: Callable[[float], int] | None = None,
+        downloads: Mapping[str, Sequence[Download]] = NOTHING,
+    ) -> None:
+        """``downloads`` has the configuration of nodes that a file gives, by the node's name."""
         self.bus = bus
         self._plant = plant
-        self.nodes = [NodeCore(node, plant) for node in plant.nodes.values() if node.bus is bus]
+        self.nodes = [
+            NodeCore(node, plant, self, downloads.get(node.name, ()))
+            for node in plant.nodes.values()
+            if node.bus is bus
+        ]
         for node in self.nodes:
-            node.is_taken = partial(self._is_taken, node)
+            node.wire.is_taken = partial(_is_taken, [other for other in self.nodes if other is not node])
+        self._gate = StartGate(bus.mandatory_missing, self.nodes)
+        self._schedule = Schedule(self.nodes)
+        own_id = bus.master_node_id if bus.heartbeat_ms else None
+        known = {node.table.id: node.node.name for node in self.nodes}
+        self._watch = BusWatch(bus.name, own_id, known, plant)
+        self._has_booted = False
+        self._nmt_for_all: Frame | None = None
+        plant.bus_commands[f"bus/{bus.name}"] = self.command
         self.unrouted = 0
+        self._routes_changed = True
         self._routes: dict[int, Handler] = {}
-        self._bits = 0
-        self._measured_at: float | None = None
-        self.beats_bits_per_s = 0.0
-
-    def _is_taken(self, by: NodeCore, cob_id: int) -> bool:
-        others = (node for node in self.nodes if node is not by)
-        return any(
-            cob_id in node.routes or cob_id in (pdos.cob_id for pdos in node.drives.values())
-            for node in others
-        )
+        self._measured: tuple[float, int] | None = None
+        self._sync = sync_frames(bus.sync_counter)
+        self._window = SyncWindow(bus.sync_window_us / 1e6) if bus.sync_window_us else None
+        self._time = TimeProducer(bus.time_period_s, epoch_ns) if bus.time_period_s and epoch_ns else None
+        self._frames: list[Frame] = []
+        self._errors_told = 0
+        self._error_limit = RateLimit(1, _ERRORS_EVERY_S)
 
     def on_frames(self, frames: list[Frame], now: float) -> None:
         """Everything received, in order. A frame nobody waits for is counted."""
         routes = self._routes
         for frame in frames:
             handler = routes.get(frame.can_id)
-            self._bits += frame_bits(len(frame.data))
             if handler is None:
                 self.unrouted += 1
             else:
                 handler(frame)
-        for node in self.nodes:
-            node.pump(now)
+        self._pump(now)
+
+    def _pump(self, now: float) -> None:
+        """Let every boot-up go on to which something has happened, and start who may start."""
+        while touched := self._schedule.take_touched():
+            for node in touched:
+                node.booting.pump(now)
+            self._gate.judge()
+            for node in self.nodes:
+                if node.booting.is_held and self._gate.may_start(node):
+                    node.booting.pump(now)
+                    self._schedule.touch(node)
+            for node in touched:
+                self._frames += node.wire.take_frames()
+                self._routes_changed |= node.wire.routes_changed
+                self._schedule.plan(node)
 
     def on_time(self, now: float) -> None:
-        for node in self.nodes:
+        if not self._has_booted:
+            self._boot_up(now)
+        if self._time:
+            frame = self._time.on_time(now)
+            self._frames += [frame] if frame else []
+        for node in self._schedule.take_due(now):
             node.on_time(now)
-            node.pump(now)
+            self._schedule.touch(node)
+        self._pump(now)
 
     def next_deadline(self) -> float | None:
-        times = [time for node in self.nodes if (time := node.next_deadline()) is not None]
-        return min(times) if times else None
+        times = (self._schedule.next_deadline(), self._time.next_deadline() if self._time else None)
+        return min((time for time in times if time is not None), default=None)
+
+    # NMT
+
+    def _boot_up(self, now: float) -> None:
+        """The bus is there: say that we have started (CiA 301 §7.2.8.3.3), and reset who is to be reset."""
+        self._has_booted = True
+        if self.bus.heartbeat_ms:
+            self._frames.append(Frame(cobid.ERROR_CONTROL + self.bus.master_node_id, b"\0"))
+        if self.bus.reset_at_start == "none":
+            return
+        whole = self.bus.reset_at_start == "node"
+        action = Action.RESET if whole else Action.RESET_COMMUNICATION
+        for node in sorted(self.nodes, key=lambda node: node.table.start_order):
+            if node.table.enabled:
+                node.carry_out_command(action, "the bridge at its start", now, send=False)
+                self._frames.append(nmt.command(node_commands.NMT[action], node.table.id))
+
+    @property
+    def nmt_state(self) -> NmtState:
+        """Our own: pre-operational while a mandatory node keeps the others waiting (CiA 302-2)."""
+        if not self._has_booted:
+            return NmtState.INITIALISING
+        return NmtState.OPERATIONAL if self._gate.is_open else NmtState.PRE_OPERATIONAL
+
+    def command(self, request: Request, now: float, reply: Reply) -> None:
+        """NMT for every node of the bus."""
+        done = node_commands.answer(request, self.bus.name, self.nodes, self._plant, now, reply)
+        if done and request.action is not Action.START_NODE:
+            self._nmt_for_all = nmt.command(node_commands.NMT[request.action], 0)
+
+    # as its nodes see it
+
+    def touched(self, node: Neighbour) -> None:
+        self._schedule.touch(node)
+
+    def may_start(self, node: Neighbour) -> bool:
+        self._gate.judge()
+        return self._gate.may_start(node)
+
+    def stop_others(self, node: Neighbour, why: str, now: float) -> None:
+        """A node is lost without which the others must not go on."""
+        self._gate.stopped_by(node)
+        self._plant.report(Event(now, Kind.BUS, self.bus.name, 800, f"all nodes are stopped: {why}"))
+        for other in self.nodes:
+            if other is not node:
+                other.hold(why, now)
+                self._schedule.touch(other)
+        self._nmt_for_all = nmt.command(NmtCommand.STOP, 0)
+
+    def duplicate(self, node: Neighbour, sign: str, now: float) -> None:
+        self._watch.on_duplicate(node.table.id, sign, now)
+
+    # sending
+
+    @property
+    def waiting(self) -> int:
+        """Plans and frames that it holds: bounded, whatever comes."""
+        return len(self._schedule) + len(self._frames)
 
     def take_frames(self) -> list[Frame]:
         """Frames to be sent once, now."""
-        frames = [frame for node in self.nodes for frame in node.take_frames()]
-        self._bits += sum(frame_bits(len(frame.data)) for frame in frames)
+        frames, self._frames = self._frames, []
+        if self._nmt_for_all:
+            # Last: the stopped words of the drives go before it.
+            frames.append(self._nmt_for_all)
+            self._nmt_for_all = None
         return frames
 
     def take_routes(self) -> list[int] | None:
         """The identifiers to be received, if they have changed since the last call."""
-        if not any(node.routes_changed for node in self.nodes) and self._routes:
+        if not self._routes_changed:
             return None
-        self._routes = {}
+        self._routes_changed = False
+        self._routes = self._watch.routes()
         for node in self.nodes:
-            node.routes_changed = False
-            self._routes.update(node.routes)
+            node.wire.routes_changed = False
+            self._routes.update(node.wire.routes)
+        if self._window:
+            self._judge_by_window(self._window)
         return list(self._routes)
 
-    def beats(self) -> dict[int, tuple[Frame, float]]:
-        """The frames to be repeated and their periods in seconds, by COB-ID."""
-        beats: dict[int, tuple[Frame, float]] = {}
-        if self.bus.sync_period_ms:
-            beats[cobid.SYNC] = (SYNC_FRAME, self.bus.sync_period_ms / 1000)
+    def _judge_by_window(self, window: SyncWindow) -> None:
+        """SYNC comes back to us, and every synchronous TPDO is looked at before its drive gets it."""
+
+        def judged(handler: Handler) -> Handler:
+            def judge(frame: Frame) -> None:
+                window.on_tpdo(frame)
+                handler(frame)
+
+            return judge
+
+        self._routes[cobid.SYNC] = window.on_sync
+        for node in self.nodes:
+            for pdos in node.wire.drives.values():
+                if pdos.is_synchronous and pdos.tpdo_id in self._routes:
+                    self._routes[pdos.tpdo_id] = judged(self._routes[pdos.tpdo_id])
+
+    def beats(self) -> Beats:
+        """The frames to be repeated."""
+        beats: Beats = {}
         if self.bus.heartbeat_ms:
-            frame = Frame(cobid.ERROR_CONTROL + self.bus.master_node_id, bytes((NmtState.OPERATIONAL,)))
-            beats[frame.can_id] = (frame, self.bus.heartbeat_ms / 1000)
+            frame = Frame(cobid.ERROR_CONTROL + self.bus.master_node_id, bytes((self.nmt_state,)))
+            beats[frame.can_id] = ((frame,), self.bus.heartbeat_ms / 1000)
         period_s = self.bus.rpdo_period_s
         for node in self.nodes:
             if node.sends_process_data:
-                for pdos in node.drives.values():
+                for pdos in node.wire.drives.values():
                     if not pdos.is_silent:
-                        beats[pdos.cob_id] = (pdos.rpdo(), period_s)
-        self.beats_bits_per_s = sum(frame_bits(len(frame.data)) / period for frame, period in beats.values())
+                        beats[pdos.cob_id] = ((pdos.rpdo(),), period_s)
+        # SYNC last: what goes out together with it is taken over by it (CiA 301 §7.2.2.2).
+        if self.bus.sync_period_ms:
+            beats[cobid.SYNC] = (self._sync, self.bus.sync_period_ms / 1000)
         return beats
 
     def bus_is_gone(self, now: float) -> None:
+        self._frames.clear()
+        if self._window:
+            self._window.reset()
+        self._has_booted = False
+        self._nmt_for_all = None
         for node in self.nodes:
             node.bus_is_gone(now)
+            self._schedule.touch(node)
 
     def refresh(self, status: BusStatus, now: float) -> None:
         """Bring the points of the bus and its nodes up to date; a few times a second."""
@@ -114,13 +251,43 @@ class Network:
         self._plant.set(f"{top}/tx_errors", status.tx_errors, now)
         self._plant.set(f"{top}/rx_errors", status.rx_errors, now)
         self._plant.set(f"{top}/frames_lost", status.frames_lost, now)
-        if self._measured_at is None:
-            self._measured_at = now
-        elif now >= self._measured_at + 1.0:
-            beats = 0.0 if status.state is ControllerState.DOWN else self.beats_bits_per_s
-            bits_per_s = self._bits / (now - self._measured_at) + beats
-            self._plant.set(f"{top}/load", round(min(100.0, 100 * bits_per_s / self.bus.bitrate), 1), now)
-            self._bits = 0
-            self._measured_at = now
+        self._plant.set(f"{top}/frames_expired", status.frames_expired, now)
+        self._plant.set(f"{top}/error_frames", status.error_frames, now)
+        self._plant.set(f"{top}/last_error", status.last_error, now)
+        self._plant.set(f"{top}/sync_window_misses", self._window.misses if self._window else 0, now)
+        self._show_load(status, now)
+        self._tell_errors(status, now)
+        self._plant.set(f"{top}/nmt_state", int(self.nmt_state), now)
+        self._plant.set(f"{top}/held_by", ", ".join(self._gate.missing), now)
+        self._watch.refresh(now)
         for node in self.nodes:
-            node.refresh(now)
+            node.wire.refresh(now)
+            # Whoever has asked it for something meanwhile: its deadlines are looked at.
+            self._schedule.plan(node)
+
+    def _show_load(self, status: BusStatus, now: float) -> None:
+        bits = status.bits
+        if self._measured is None:
+            self._measured = now, bits
+            return
+        since, before = self._measured
+        if now >= since + _LOAD_PERIOD_S:
+            load = 100 * (bits - before) / (now - since) / self.bus.bitrate
+            self._plant.set(f"bus/{self.bus.name}/load", round(min(100.0, load), 1), now)
+            self._measured = now, bits
+
+    def _tell_errors(self, status: BusStatus, now: float) -> None:
+        """Error frames since the last time, in one event."""
+        number = status.error_frames - self._errors_told
+        if number and self._error_limit.allows(now):
+            self._errors_told = status.error_frames
+            what = "an error frame" if number == 1 else f"{number} error frames"
+            self._plant.report(Event(now, Kind.BUS, self.bus.name, 500, f"{what}: {status.last_error}"))
+
+
+def _is_taken(others: list[NodeCore], cob_id: int) -> bool:
+    """Whether one of the other nodes of the bus has a PDO, or anything else, on this identifier."""
+    return any(
+        cob_id in node.wire.routes or cob_id in (pdos.cob_id for pdos in node.wire.drives.values())
+        for node in others
+    )

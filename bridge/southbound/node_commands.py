@@ -1,10 +1,85 @@
-"""Commands on a node: who may give them."""
+"""Commands on nodes: who may give them, and what each does."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final, Protocol
 
-from bridge.command import Drive, Request, Role
+from bridge.command import Action, Code, Drive, Event, Kind, Outcome, Plant, Reply, Request, Role
+from bridge.command.link import NodeState
+from bridge.command.plant import Node, NodeCommand
+from bridge.southbound.canopen.nmt import NmtCommand
+from bridge.southbound.node_wire import NodeWire
+
+NMT: Final = {
+    Action.RESET: NmtCommand.RESET_NODE,
+    Action.RESET_COMMUNICATION: NmtCommand.RESET_COMMUNICATION,
+    Action.START_NODE: NmtCommand.START,
+    Action.STOP_NODE: NmtCommand.STOP,
+    Action.ENTER_PRE_OPERATIONAL: NmtCommand.ENTER_PRE_OPERATIONAL,
+}
+_AFTER_RESET_S: Final = 1.0
+"""A node that resets is asked again after this time if its boot-up message was not heard."""
+
+
+class Commanded(Protocol):
+    """The node as a command sees it."""
+
+    @property
+    def state(self) -> NodeState: ...
+
+    @property
+    def wire(self) -> NodeWire: ...
+
+    boot_at: float | None
+    told_to_stop: bool
+
+    def leave_operation(self, now: float) -> None: ...
+    def set_state(self, state: NodeState, now: float) -> None: ...
+    def say(self, text: str, now: float) -> None: ...
+
+
+class Commandable(Protocol):
+    """A node that takes commands."""
+
+    @property
+    def node(self) -> Node: ...
+
+    def carry_out_command(self, action: Action, who: str, now: float, *, send: bool = True) -> None: ...
+
+
+def taker(name: str, nodes: Sequence[Commandable], plant: Plant) -> NodeCommand:
+    """Takes every request for these nodes."""
+
+    def take(request: Request, now: float, reply: Reply) -> None:
+        answer(request, name, nodes, plant, now, reply)
+
+    return take
+
+
+def answer(
+    request: Request, name: str, nodes: Sequence[Commandable], plant: Plant, now: float, reply: Reply
+) -> bool:
+    """A request for these nodes, ``name`` in the log; True where it may be carried out and was.
+
+    For a whole bus all commands but Start go out as one frame, which the caller sends: an unchecked node
+    is not started.
+    """
+    is_bus = request.target.startswith("bus/")
+    why = refusal(request, [drive for one in nodes for drive in one.node.drives])
+    if is_bus and request.action not in NMT:
+        reply(Outcome(Code.UNKNOWN_TARGET, f"a bus has no {request.action}", forwarded=False))
+        return False
+    if why:
+        reply(Outcome(Code.NOT_ALLOWED, why, forwarded=False))
+        return False
+    who = str(request.identity)
+    plant.report(Event(now, Kind.OWNER, name, 400, f"{request.action} by {who}"))
+    each = not is_bus or request.action is Action.START_NODE
+    for one in nodes:
+        one.carry_out_command(request.action, who, now, send=each)
+    reply(Outcome(Code.OK))
+    return True
 
 
 def refusal(request: Request, drives: Sequence[Drive]) -> str | None:
@@ -22,3 +97,46 @@ def refusal(request: Request, drives: Sequence[Drive]) -> str | None:
         if owner is not None and not request.identity.is_same(owner):
             return f"{drive.name} is controlled by {owner}"
     return None
+
+
+def carry_out(node: Commanded, action: Action, who: str, now: float, *, send: bool = True) -> None:
+    """Do what ``action`` asks of a node. ``send`` is false where one frame tells all nodes."""
+    if action in NMT:
+        _nmt(node, NMT[action], who, now, send=send)
+    elif action is Action.DISABLE:
+        node.leave_operation(now)
+        node.boot_at = None
+        node.say("switched off by an operator", now)
+        node.set_state(NodeState.DISABLED, now)
+    elif action is Action.ENABLE and node.state is NodeState.DISABLED:
+        node.say("waiting", now)
+        node.set_state(NodeState.ABSENT, now)
+        node.boot_at = now
+
+
+def _nmt(node: Commanded, command: NmtCommand, who: str, now: float, *, send: bool) -> None:
+    """NMT on a node that is switched off goes on the bus and changes nothing here."""
+    if command is NmtCommand.START and node.state is not NodeState.OPERATIONAL:
+        # It is booted first, and started at the end of that: an unchecked node gets no process data.
+        if node.state is NodeState.DISABLED:
+            return
+        node.leave_operation(now)
+        node.set_state(NodeState.BOOTING, now)
+        node.boot_at = now
+        return
+    if command in (NmtCommand.STOP, NmtCommand.ENTER_PRE_OPERATIONAL):
+        node.wire.send_stopped()
+    if send:
+        node.wire.send_nmt(command)
+    if command is NmtCommand.START or node.state is NodeState.DISABLED:
+        return
+    node.leave_operation(now)
+    node.told_to_stop = command is NmtCommand.STOP
+    if command in (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION):
+        node.set_state(NodeState.LOST, now)
+        node.boot_at = now + _AFTER_RESET_S
+    else:
+        node.boot_at = None
+        verb = "stopped" if command is NmtCommand.STOP else "set to pre-operational"
+        node.say(f"{verb} by {who}", now)
+        node.set_state(NodeState.STOPPED, now)

@@ -1,13 +1,17 @@
-"""Reads objects of a node again and again, behind everything else that wants its SDO channel."""
+"""What has to be asked for again and again: objects, behind everything else that wants the SDO channel,
+and TPDOs that come on a remote frame only."""
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from bridge.mapping.model import Poll
 from bridge.southbound.boot import number_from
-from bridge.southbound.canopen.sdo import Result, SdoChannel, SdoError
+from bridge.southbound.bus.frame import Frame
+from bridge.southbound.canopen.sdo import Priority, Result, SdoChannel, SdoError
+from bridge.southbound.process_data import DrivePdos
+from bridge.southbound.remote_polling import RemotePolling
 
 
 class Polling:
@@ -19,24 +23,44 @@ class Polling:
         self._show = show
         self._due: list[tuple[float, int]] = []
         self._now = 0.0
+        self._spared: dict[str, float] = {}
+        self._remote = RemotePolling()
 
-    def start(self, now: float) -> None:
+    def start(self, drives: Iterable[DrivePdos], now: float) -> None:
+        """Begin; of ``drives``, whose TPDOs have to be asked for are asked."""
         self._due = [(now, number) for number in range(len(self._polls))]
+        self._remote.start(drives, now)
+
+    def on_pdo(self, name: str, value: int, now: float, until: float) -> None:
+        """A PDO has brought this value: it is not asked for before ``until``."""
+        self._spared[name] = until
+        self._show(name, value, now)
 
     def stop(self) -> None:
         self._due = []
+        self._spared.clear()
+        self._remote.stop()
 
     def next_deadline(self) -> float | None:
-        return self._due[0][0] if self._due else None
+        times = (self._due[0][0] if self._due else None, self._remote.next_deadline())
+        return min((time for time in times if time is not None), default=None)
+
+    def take_frames(self) -> list[Frame]:
+        return self._remote.take_frames()
 
     def on_time(self, now: float) -> None:
         self._now = now
+        self._remote.on_time(now)
         while self._due and self._due[0][0] <= now:
             _, number = heapq.heappop(self._due)
             poll = self._polls[number]
+            spared = self._spared.get(poll.name, now)
+            if spared > now:
+                heapq.heappush(self._due, (spared, number))
+                continue
             heapq.heappush(self._due, (now + poll.every_ms / 1000, number))
             done = self._done(number)
-            self._sdo.read(poll.object.index, poll.object.sub, now, done, urgent=False)
+            self._sdo.read(poll.object.index, poll.object.sub, now, done, priority=Priority.POLL)
 
     def _done(self, number: int) -> Callable[[Result], None]:
         poll = self._polls[number]

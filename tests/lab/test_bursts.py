@@ -43,7 +43,7 @@ async def renew(bus: SocketCanBus, period_s: float, count: int, seconds: float) 
     renew_at = 0.0
     while (now := time.monotonic()) < end:
         if now >= renew_at:
-            bus.beat(RPDO, now, period_s, count)
+            bus.beat((RPDO,), now, period_s, count)
             renew_at = now + DEADMAN_MS / 3000
         bus.on_time(now)
         await asyncio.sleep(0.003)

@@ -56,6 +56,15 @@ def write_site(folder: Path, *, bus: str = "", node: str = "", drive: str = "") 
     return load_site(path)
 
 
+BEGIN_S = 1000.0
+NOON_NS = 1_795_262_400_000_000_000
+"""2026-11-21 12:00 UTC: the wall clock when the bench begins."""
+
+
+def epoch_ns(at: float) -> int:
+    return NOON_NS + round((at - BEGIN_S) * 1e9)
+
+
 class ClockBus:
     """A bus on the bench's clock: what is sent arrives at once."""
 
@@ -80,9 +89,17 @@ class ClockBus:
         if self.status.state is not ControllerState.DOWN:
             self._deliver(frame._replace(time=now))
 
-    def beat(self, frame: Frame, now: float, period_s: float, count: int, *, at_once: bool = False) -> None:
-        if self._beats.beat(frame, now, period_s, count, at_once=at_once):
-            self.send(frame, now, now)
+    def beat(
+        self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool = False
+    ) -> None:
+        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once)
+        if frame is not None:
+            self._send_beat(frame, now)
+
+    def _send_beat(self, frame: Frame, now: float) -> None:
+        self.send(frame, now, now)
+        if frame.can_id in self.accepted:
+            self.inbox.append(frame._replace(time=now))
 
     def silence(self, can_id: int) -> None:
         self._beats.silence(can_id)
@@ -92,7 +109,7 @@ class ClockBus:
 
     def on_time(self, now: float) -> None:
         for frame in self._beats.due(now):
-            self.send(frame, now, now)
+            self._send_beat(frame, now)
 
     def clear(self) -> None:
         self._beats.clear()
@@ -102,17 +119,19 @@ class ClockBus:
 
 
 class Bench:
-    """``log`` has every frame of the wire in order; ``cut`` keeps the node's frames from the master."""
+    """``log`` has every frame of the wire in order; ``cut`` keeps the node's frames from the
+    master, ``deaf_to`` those with these identifiers."""
 
     def __init__(self, site: Site, *, present: bool = True, family: Family = NORD) -> None:
-        self.now = 1000.0
+        self.now = BEGIN_S
         self.log: list[Frame] = []
         self.events: list[Event] = []
         self.cut = False
+        self.deaf_to: frozenset[int] = frozenset()
         self.plant = Plant(site, {"nord/sk-tu4-cao": family}, "0")
         self.plant.on_event(self.events.append)
         self.bus = ClockBus(self._from_master)
-        self.network = Network(site.bus[0], self.plant)
+        self.network = Network(site.bus[0], self.plant, epoch_ns)
         self.master = Master([(self.bus, self.network)], self.plant, lambda: self.now)
         self._wake_at = self.now
         self.master.attach(self._set_timer)
@@ -143,7 +162,7 @@ class Bench:
     def receive(self, *frames: Frame) -> None:
         """Frames for the master, whoever sent them."""
         for frame in frames:
-            if frame.can_id in self.bus.accepted:
+            if frame.can_id in self.bus.accepted and frame.can_id not in self.deaf_to:
                 self.bus.inbox.append(frame._replace(time=self.now))
 
     def run(self, seconds: float) -> None:

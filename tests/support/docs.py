@@ -267,7 +267,8 @@ def _kinds(annotation: Any) -> tuple[str, str]:
         metadata = [m for a in arguments[1:] for m in (a.metadata if isinstance(a, FieldInfo) else [a])]
         return kind, _bounds(metadata) or allowed
     if origin in (Union, UnionType):
-        return _kinds(next(argument for argument in arguments if argument is not type(None)))
+        kinds = [_kinds(argument) for argument in arguments if argument is not type(None)]
+        return (" or ".join(kind for kind, _ in kinds), "") if len(kinds) > 1 else kinds[0]
     if origin is Literal:
         return "string", ", ".join(f'"{value}"' for value in arguments)
     if origin is list:

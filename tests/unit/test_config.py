@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.config import Site, load_site, warnings
+from bridge.config import Site, load_site
 from bridge.errors import FileFaults
 
 CONTRACT = """
@@ -111,7 +111,6 @@ class TestTheContractsExample:
         assert site.modbus.allow == ["127.0.0.0/8"]
         assert site.zenoh is not None
         assert site.zenoh.prefix == "drives"
-        assert warnings(site) == []
 
     @pytest.mark.parametrize(
         "change",
@@ -395,20 +394,3 @@ def test_an_endpoint_is_an_ip_address_and_a_port(tmp_path: Path, listen: str):
 @pytest.mark.parametrize("listen", ["0.0.0.0:502", "[::1]:502", "192.168.1.5:0"])
 def test_these_are_endpoints(tmp_path: Path, listen: str):
     load(tmp_path, f'{SMALL}[modbus]\nlisten = "{listen}"\n')
-
-
-def test_what_is_allowed_and_dangerous_is_repeated(tmp_path: Path):
-    text = f"""{SMALL}
-control = "lease"
-fieldbus_timeout_ms = 0
-telegram_downtime_s = -0.1
-on_expiry = "hold"
-[opcua]
-no_security = true
-"""
-    found = warnings(load(tmp_path, text))
-    assert [line.split(":")[0] for line in found] == ["conveyor/fu1"] * 3 + ["opcua"]
-    assert "fieldbus_timeout_ms = 0" in found[0]
-    assert "telegram_downtime_s = -0.1" in found[1]
-    assert 'on_expiry = "hold"' in found[2]
-    assert "no_security" in found[3]

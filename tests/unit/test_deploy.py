@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from bridge.config import load_site, warnings
+from bridge.lint import lint
+from bridge.service import load_project
 
 ROOT = Path(__file__).parents[2]
 UNIT = ROOT / "systemd" / "drivebridge.service"
@@ -82,8 +83,9 @@ def test_systemd_finds_no_fault_in_the_unit(tmp_path: Path) -> None:
 
 
 def test_the_example_site_is_valid_and_fits_the_network_files() -> None:
-    site = load_site(ROOT / "deploy" / "site.example.toml")
-    assert warnings(site) == []
+    project = load_project(ROOT / "deploy" / "site.example.toml")
+    site = project.site
+    assert not lint(site, project.families, project.path, {}).findings
     assert site.modbus
     assert site.opcua
     assert site.zenoh

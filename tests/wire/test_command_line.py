@@ -60,7 +60,8 @@ def test_a_good_site_is_checked_and_its_decisions_repeated(tmp_path: Path) -> No
     done = call("check", str(write_site(tmp_path)))
     assert done.returncode == 0
     assert "1 drive on 1 bus, no faults" in done.stdout
-    assert "fieldbus_timeout_ms = 0" in done.stderr
+    assert "can0: predicted load 10 %" in done.stdout
+    assert "drive[0].fieldbus_timeout_ms: is 0: a silent controller" in done.stderr
 
 
 @pytest.mark.parametrize("command", ["check", "run"])
@@ -84,6 +85,39 @@ def test_faults_of_site_and_mapping_are_readable_by_scripts(tmp_path: Path) -> N
     assert fault["line"] == 15
     assert "fu9" in fault["message"]
     assert "fu1" in fault["hint"]
+
+
+def test_what_cannot_work_together_is_bad_usage_too(tmp_path: Path) -> None:
+    path = write_site(tmp_path)
+    path.write_text(path.read_text("utf-8").replace("timeout_ms = 0", "timeout_ms = 15"), "utf-8")
+    done = call("check", str(path))
+    assert done.returncode == 2
+    assert ":17: bus[0].node[0].drive[0].fieldbus_timeout_ms: 15 ms is less than two RPDO" in done.stderr
+    assert "predicted load" in done.stdout
+    done = call("check", str(path), "--json")
+    assert done.returncode == 2
+    result = json.loads(done.stdout)
+    assert not result["ok"]
+    assert [(fault["severity"], fault["line"]) for fault in result["faults"]] == [("error", 17)]
+    assert result["buses"][0]["load_percent"] > 5
+
+
+def test_a_device_description_is_shown_with_what_is_odd_about_it(tmp_path: Path) -> None:
+    path = tmp_path / "odd.dcf"
+    text = "[DeviceComissioning]\nNodeID=5\n[2000]\nParameterName=Spindel für A\nDataType=6\nAccessType=rw\n"
+    path.write_bytes((text + "ParameterValue=07\nnonsense\n").encode("cp1252"))
+    concise = tmp_path / "odd.cdcf"
+    done = call("eds", str(path), "--concise", str(concise))
+    assert done.returncode == 0, done.stderr
+    assert "2000h:00 = 07 00" in done.stdout
+    assert "odd.dcf:8: error: is neither a section nor a key: nonsense" in done.stdout
+    assert concise.read_bytes().hex() == "01000000" + "002000" + "02000000" + "0700"
+
+
+def test_what_is_no_device_description_is_bad_usage(tmp_path: Path) -> None:
+    done = call("eds", str(write_site(tmp_path)))
+    assert done.returncode == 2
+    assert "is not a device description" in done.stderr
 
 
 def test_a_site_file_that_is_not_there(tmp_path: Path) -> None:

@@ -36,6 +36,7 @@ from bridge.command.request import Code
 from bridge.command.watchdog import STATES as WATCHDOG_STATES
 from bridge.command.watchdog import TABLE, Effect, Stimulus, WatchdogState
 from bridge.config import Reaction, Site, load_site
+from bridge.config.model import MappedObject
 from bridge.drive import STATES
 from bridge.image import Point, Quality
 from bridge.mapping.model import Family, ObjectRef
@@ -47,6 +48,7 @@ from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, layout
 from bridge.northbound.opcua.values import OUTCOME_STATUS, QUALITY_STATUS
 from bridge.northbound.zenoh.commands import MALFORMED, METHODS, NODE_METHODS
 from bridge.service import load_project
+from bridge.southbound.boot.status import TEXTS as BOOT_TEXTS
 from tests.support.docs import (
     Block,
     Command,
@@ -330,7 +332,10 @@ def test_what_a_page_does_can_be_done(page: Page, demo: Process, calm: None, rea
 
 @pytest.mark.parametrize(
     ("name", "model", "leaves"),
-    [("reference/site-file.md", Site, ()), ("reference/mapping-file.md", Family, (ObjectRef,))],
+    [
+        ("reference/site-file.md", Site, (MappedObject,)),
+        ("reference/mapping-file.md", Family, (ObjectRef,)),
+    ],
 )
 def test_every_key_of_a_file_is_described(name: str, model: Any, leaves: tuple[type, ...]) -> None:
     reference = page(name)
@@ -400,6 +405,11 @@ def test_every_point_is_described(plant: Plant) -> None:
 def test_states_have_their_numbers(heading: str, states: Iterable[tuple[int, str]]) -> None:
     rows = page("reference/points.md").table(heading)
     assert [(int(row["code"]), row["name"]) for row in rows] == list(states)
+
+
+def test_the_letters_of_the_boot_status_are_listed() -> None:
+    rows = page("reference/points.md").table("Boot status")
+    assert {row["letter"]: row["meaning"] for row in rows} == BOOT_TEXTS
 
 
 def test_the_bits_of_the_words_are_listed(plant: Plant) -> None:
@@ -508,7 +518,7 @@ def leaf_commands(command: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 def test_every_command_and_option_is_described() -> None:
     reference = page("reference/command-line.md")
     headings = {
-        re.sub(r" SITE.*", "", heading.strip("`").removeprefix("drivebridge ")): heading
+        re.sub(r" (\[?SITE|FILE).*", "", heading.strip("`").removeprefix("drivebridge ")): heading
         for heading in reference.headings
         if heading.startswith("`drivebridge ")
     }
@@ -516,7 +526,10 @@ def test_every_command_and_option_is_described() -> None:
     assert headings.keys() == expected.keys()
     for name, command in expected.items():
         shown = "\n".join(reference.section(headings[name]))
-        takes_site = any(parameter.name == "site" for parameter in command.params)
+        takes_site = any(
+            parameter.name == "site" or "[SITE]" in (getattr(parameter, "metavar", None) or "")
+            for parameter in command.params
+        )
         assert ("SITE" in headings[name]) == takes_site, name
         options = {
             option

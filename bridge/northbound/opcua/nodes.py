@@ -97,6 +97,9 @@ _DRIVE_METHODS: Final = (
 _NODE_METHODS: Final = (
     (Action.RESET, None, "NMT reset node"),
     (Action.RESET_COMMUNICATION, None, "NMT reset communication"),
+    (Action.START_NODE, None, "NMT start: the node is checked first"),
+    (Action.STOP_NODE, None, "NMT stop; the node stays stopped until it is started or starts again"),
+    (Action.ENTER_PRE_OPERATIONAL, None, "NMT enter pre-operational; the node stays there"),
     (Action.ENABLE, None, "put the node in service"),
     (Action.DISABLE, None, "take the node out of service"),
 )

@@ -9,6 +9,7 @@ from typing import Final
 import msgspec
 
 from bridge.command import Action, Code, Identity, Request, Source
+from bridge.command.request import NMT_ACTIONS
 from bridge.image import Point, Value
 
 METHODS: Final = (
@@ -24,7 +25,16 @@ METHODS: Final = (
 _WITHOUT_PAYLOAD: Final = (Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE, Action.RELEASE_CONTROL)
 """A stop is taken as it comes. Everything else must be meant: whoever reads a key by a plain get must not
 start or acknowledge anything by it."""
-NODE_METHODS: Final = (Action.RESET, Action.RESET_COMMUNICATION, Action.ENABLE, Action.DISABLE)
+NODE_METHODS: Final = (
+    Action.RESET,
+    Action.RESET_COMMUNICATION,
+    Action.START_NODE,
+    Action.STOP_NODE,
+    Action.ENTER_PRE_OPERATIONAL,
+    Action.ENABLE,
+    Action.DISABLE,
+)
+BUS_METHODS: Final = tuple(action for action in NODE_METHODS if action in NMT_ACTIONS)
 
 MALFORMED: Final = "malformed"
 ANONYMOUS: Final = "anonymous"
@@ -88,6 +98,7 @@ class Commands:
         self._points = {point.name: point for point in points}
         self._drives = _owners(self._points, "/command/control_word")
         self._nodes = _owners(self._points, "/node/nmt_state")
+        self._buses = _owners((name for name in self._points if name.startswith("bus/")), "/nmt_state")
 
     def is_method(self, tail: str) -> bool:
         """Whether the key stands for something to do and not for a value."""
@@ -95,6 +106,8 @@ class Commands:
         target, _, group = owner.rpartition("/")
         if group == "command" and target in self._drives:
             return leaf in METHODS
+        if owner in self._buses:
+            return leaf in BUS_METHODS
         return group == "node" and target in self._nodes and leaf in NODE_METHODS
 
     def request(self, tail: str, payload: bytes, identity: Identity) -> Request:
@@ -109,7 +122,7 @@ class Commands:
         if leaf == "command" and owner in self._drives:
             return Request(identity, owner, Action.WRITE, _decode_telegram(owner, payload))
         if self.is_method(tail):
-            return _call(identity, target, Action(leaf), payload)
+            return _call(identity, owner if owner in self._buses else target, Action(leaf), payload)
         point = self._points.get(tail)
         if point is None:
             raise self._unknown(tail, target, group)

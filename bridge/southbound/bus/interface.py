@@ -4,20 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Protocol
 
+from bridge.southbound.bus.errorframe import ControllerState as ControllerState
+from bridge.southbound.bus.errorframe import describe
 from bridge.southbound.bus.frame import Frame
-
-
-class ControllerState(IntEnum):
-    """Fault confinement state of the CAN controller (ISO 11898-1), numbered as the Modbus register."""
-
-    OK = 0
-    WARNING = 1
-    PASSIVE = 2
-    BUS_OFF = 3
-    DOWN = 4
 
 
 @dataclass(slots=True)
@@ -34,6 +25,19 @@ class BusStatus:
     frames_sent: int = 0
     frames_expired: int = 0
     bits: int = 0
+    """All bits that have passed on the bus, everybody's, as far as the bus can know."""
+    error_frames: int = 0
+    _last_error: tuple[int, bytes] | str = ""
+
+    def note_error(self, error: tuple[int, bytes] | str) -> None:
+        """The latest trouble: identifier and data of an error frame, or a sentence."""
+        self._last_error = error
+
+    @property
+    def last_error(self) -> str:
+        """The latest trouble in words, empty where there was none."""
+        # Put into words only when somebody looks: a broken wire gives thousands of them a second.
+        return self._last_error if isinstance(self._last_error, str) else describe(*self._last_error)
 
 
 class Bus(Protocol):
@@ -68,8 +72,13 @@ class Bus(Protocol):
         """Send ``frame`` now, or as soon as there is room, but never after ``deadline``."""
         ...
 
-    def beat(self, frame: Frame, now: float, period_s: float, count: int, *, at_once: bool = False) -> None:
-        """Send ``frame`` every ``period_s`` seconds, ``count`` more times.
+    def beat(
+        self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool = False
+    ) -> None:
+        """Send one of ``frames`` every ``period_s`` seconds, ``count`` more times.
+
+        They have one identifier and take turns: a SYNC with its counter is a burst of n frames. Where
+        the identifier is accepted, they come back by ``drain`` with the time at which they were sent.
 
         Calling it again for the same identifier replaces the data and refills the count without moving
         the phase; ``at_once`` sends the frame immediately as well. A burst that nobody renews ends by

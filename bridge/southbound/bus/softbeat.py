@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from bridge.southbound.bus.frame import Frame
+
+_SYNC: Final = 0x080
 
 
 @dataclass(slots=True)
 class _Job:
-    frame: Frame
+    frames: tuple[Frame, ...]
     period_s: float
     left: int
     due: float
+    place: int = 0
+
+    def take(self) -> Frame:
+        frame = self.frames[self.place]
+        self.place = (self.place + 1) % len(self.frames)
+        return frame
 
 
 class SoftBeat:
@@ -21,15 +30,19 @@ class SoftBeat:
     def __init__(self) -> None:
         self._jobs: dict[int, _Job] = {}
 
-    def beat(self, frame: Frame, now: float, period_s: float, count: int, *, at_once: bool) -> bool:
-        """Start or renew; True where the frame is to be sent right now."""
-        job = self._jobs.get(frame.can_id)
+    def beat(
+        self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool
+    ) -> Frame | None:
+        """Start or renew; gives the frame that is to be sent right now."""
+        job = self._jobs.get(frames[0].can_id)
         if job is None or job.period_s != period_s:
-            self._jobs[frame.can_id] = _Job(frame, period_s, count - 1, now + period_s)
-            return True
-        job.frame = frame
+            job = self._jobs[frames[0].can_id] = _Job(frames, period_s, count - 1, now + period_s)
+            return job.take()
+        if len(frames) != len(job.frames):
+            job.place = 0
+        job.frames = frames
         job.left = count
-        return at_once
+        return job.take() if at_once else None
 
     def silence(self, can_id: int) -> None:
         self._jobs.pop(can_id, None)
@@ -49,9 +62,11 @@ class SoftBeat:
             if job.left <= 0:
                 del self._jobs[can_id]
                 continue
-            frames.append(job.frame)
+            frames.append(job.take())
             job.left -= 1
             missed = int((now - job.due) / job.period_s)
             job.left -= missed
             job.due += (missed + 1) * job.period_s
+        # SYNC last: an RPDO that is due with it is taken over by it and not by the next one.
+        frames.sort(key=lambda frame: frame.can_id == _SYNC)
         return frames

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import BusStatus, ControllerState
 from bridge.southbound.bus.softbeat import SoftBeat
+from bridge.southbound.bus.wirebits import WireBits
 
 _MOST_WAITING = 1 << 16
 
@@ -40,6 +41,7 @@ class VirtualWire:
             return
         for end in self._ends:
             if end is not sender:
+                end.pass_by(frame)
                 end.deliver(frame, now)
 
 
@@ -51,6 +53,7 @@ class VirtualBus:
         self._wire = wire
         self._status = BusStatus()
         self._beats = SoftBeat()
+        self._bits = WireBits()
         self._waiting: deque[Frame] = deque()
         self._accepted: frozenset[int] | None = None
         self._wake: Callable[[], None] | None = None
@@ -63,6 +66,7 @@ class VirtualBus:
 
     @property
     def status(self) -> BusStatus:
+        self._status.bits = int(self._bits.total)
         return self._status
 
     def open(self, wake: Callable[[], None]) -> None:
@@ -71,6 +75,10 @@ class VirtualBus:
 
     def accept(self, can_ids: list[int]) -> None:
         self._accepted = frozenset(can_ids)
+
+    def pass_by(self, frame: Frame) -> None:
+        """Somebody else's frame is on the wire."""
+        self._bits.add(frame)
 
     def deliver(self, frame: Frame, now: float) -> None:
         """The wire brings a frame."""
@@ -111,11 +119,20 @@ class VirtualBus:
             self._status.frames_expired += 1
             return
         self._status.frames_sent += 1
+        self._bits.add(frame)
         self._wire.put(frame, self, now)
 
-    def beat(self, frame: Frame, now: float, period_s: float, count: int, *, at_once: bool = False) -> None:
-        if self._beats.beat(frame, now, period_s, count, at_once=at_once):
-            self.send(frame, now, now)
+    def beat(
+        self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool = False
+    ) -> None:
+        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once)
+        if frame is not None:
+            self._send_beat(frame, now)
+
+    def _send_beat(self, frame: Frame, now: float) -> None:
+        self.send(frame, now, now)
+        if self._accepted is not None and frame.can_id in self._accepted:
+            self.deliver(frame._replace(time=now), now)
 
     def silence(self, can_id: int) -> None:
         self._beats.silence(can_id)
@@ -125,11 +142,12 @@ class VirtualBus:
 
     def on_time(self, now: float) -> None:
         for frame in self._beats.due(now):
-            self.send(frame, now, now)
+            self._send_beat(frame, now)
 
     def break_down(self) -> None:
         """The interface goes away, as by ``ip link set down``."""
         self._status.state = ControllerState.DOWN
+        self._status.note_error("the interface is down")
         self._beats.clear()
         self._waiting.clear()
         if self._loop and self._wake:

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 from typing import Final
 
+TOGGLE: Final = 0x0503_0000
 TIMED_OUT: Final = 0x0504_0000
 UNKNOWN_COMMAND: Final = 0x0504_0001
-TOGGLE: Final = 0x0503_0000
+BLOCK_SIZE: Final = 0x0504_0002
+SEQUENCE: Final = 0x0504_0003
+CRC: Final = 0x0504_0004
 OUT_OF_MEMORY: Final = 0x0504_0005
 LENGTH_TOO_HIGH: Final = 0x0607_0012
+LENGTH_TOO_LOW: Final = 0x0607_0013
+BUSY: Final = 0x060A_0023
+GENERAL: Final = 0x0800_0000
+
+TRANSIENT: Final = frozenset((TOGGLE, TIMED_OUT, BLOCK_SIZE, SEQUENCE, CRC, LENGTH_TOO_HIGH, LENGTH_TOO_LOW))
+"""What a lost or a foreign frame can cause: the same transfer may succeed when it is tried again."""
 
 TEXTS: Final = {
     0x0503_0000: "toggle bit not alternated",

@@ -7,12 +7,15 @@ from typing import Final
 NMT: Final = 0x000
 SYNC: Final = 0x080
 EMCY: Final = 0x080  # + node id
+TIME: Final = 0x100
 SDO_REPLY: Final = 0x580  # server to client, + node id
 SDO_REQUEST: Final = 0x600  # client to server, + node id
 ERROR_CONTROL: Final = 0x700  # boot-up, heartbeat, node guarding, + node id
 
 PDO_DISABLED: Final = 0x8000_0000
 """Bit 31 of a PDO's COB-ID entry: the PDO does not exist (CiA 301 §7.5.2.35)."""
+NO_REMOTE: Final = 0x4000_0000
+"""Bit 30 of a TPDO's COB-ID entry: it is not sent on a remote frame (CiA 301 §7.5.2.37)."""
 PDO_EXTENDED: Final = 0x2000_0000
 """Bit 29: a 29-bit identifier."""
 COB_ID_MASK: Final = 0x7FF

@@ -1,14 +1,20 @@
-"""PDO codecs, compiled from a mapping (CiA 301 §7.5.2.36) into one ``struct.Struct``."""
+"""PDO codecs, compiled from a mapping (CiA 301 §7.5.2.36).
+
+Whole bytes, which is what drives map, become one ``struct.Struct``; anything else is taken apart with
+shifts: objects follow each other without gaps, the first at bit 0 of the first byte, little-endian.
+"""
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 _CODES: Final = {8: "B", 16: "H", 32: "I", 64: "Q"}
 _DUMMY_INDICES: Final = range(0x0001, 0x0020)
 MOST_BYTES: Final = 8
+MOST_BITS: Final = 8 * MOST_BYTES
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +35,7 @@ class Entry:
 
     @property
     def is_dummy(self) -> bool:
+        """It stands for a data type and fills a gap (CiA 301 §7.4.7): sent as 0, received by nobody."""
         return self.index in _DUMMY_INDICES
 
     def __str__(self) -> str:
@@ -40,25 +47,55 @@ class MappingError(ValueError):
 
 
 class PdoCodec:
-    """Packs and unpacks one PDO. Values are the raw unsigned integers of the entries, in order."""
+    """Packs and unpacks one PDO. Values are the integers of the entries, in order: unsigned, but for
+    the objects in ``signed``, which are (index, sub)."""
 
-    __slots__ = ("_struct", "entries", "length")
+    __slots__ = ("_fields", "_masks", "_pack", "_unpack", "entries", "has_signed", "length")
 
-    def __init__(self, entries: tuple[Entry, ...]) -> None:
-        """Raises MappingError where an entry's length is not 8, 16, 32 or 64 bits or the sum exceeds
-        eight bytes."""
+    def __init__(self, entries: tuple[Entry, ...], signed: Collection[tuple[int, int]] = ()) -> None:
+        """Raises MappingError where an entry has not 1…64 bits or the sum exceeds eight bytes."""
         for entry in entries:
-            if entry.bits not in _CODES:
-                raise MappingError(f"{entry}: only 8, 16, 32 and 64 bits can be mapped")
+            if not 1 <= entry.bits <= MOST_BITS:
+                raise MappingError(f"{entry}: 1…{MOST_BITS} bits can be mapped")
+        total = sum(entry.bits for entry in entries)
         self.entries = entries
-        self._struct = struct.Struct("<" + "".join(_CODES[entry.bits] for entry in entries))
-        self.length = self._struct.size
+        self.length = (total + 7) // 8
         if self.length > MOST_BYTES:
             raise MappingError(f"{self.length} bytes are mapped, a PDO has {MOST_BYTES}")
+        signs = [(entry.index, entry.sub) in signed for entry in entries]
+        self.has_signed = any(signs)
+        self._masks = tuple((1 << entry.bits) - 1 for entry in entries)
+        self._fields: tuple[tuple[int, int, int], ...] = ()
+        """Shift, mask and sign bit of each entry, where a Struct cannot do it."""
+        self._pack: struct.Struct | None = None
+        self._unpack: struct.Struct | None = None
+        if all(entry.bits in _CODES for entry in entries):
+            codes = [_CODES[entry.bits] for entry in entries]
+            self._pack = struct.Struct("<" + "".join(codes))
+            received = [c.lower() if sign else c for c, sign in zip(codes, signs, strict=True)]
+            self._unpack = struct.Struct("<" + "".join(received))
+        else:
+            shift = 0
+            fields: list[tuple[int, int, int]] = []
+            for entry, mask, sign in zip(entries, self._masks, signs, strict=True):
+                fields.append((shift, mask, (mask + 1) >> 1 if sign else 0))
+                shift += entry.bits
+            self._fields = tuple(fields)
 
     def unpack(self, data: bytes) -> tuple[int, ...]:
         """The values in ``data``, which must be exactly ``length`` bytes long."""
-        return self._struct.unpack(data)
+        if self._unpack:
+            return self._unpack.unpack(data)
+        number = int.from_bytes(data, "little")
+        # (x ^ sign) - sign extends the sign, and is x where there is none.
+        return tuple(((number >> shift & mask) ^ sign) - sign for shift, mask, sign in self._fields)
 
-    def pack(self, values: tuple[int, ...]) -> bytes:
-        return self._struct.pack(*values)
+    def pack(self, values: Sequence[int]) -> bytes:
+        """The frame's data; of a value its lowest bits count."""
+        masked = tuple(value & mask for value, mask in zip(values, self._masks, strict=True))
+        if self._pack:
+            return self._pack.pack(*masked)
+        number = 0
+        for value, (shift, _, _) in zip(masked, self._fields, strict=True):
+            number |= value << shift
+        return number.to_bytes(self.length, "little")

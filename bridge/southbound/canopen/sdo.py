@@ -1,135 +1,109 @@
-"""SDO client (CiA 301 §7.2.4): one channel to one server, transfers as generators.
+"""SDO client (CiA 301 §7.2.4): one channel to one server, its queue and its time-outs.
 
-A transfer yields requests and is sent the replies that belong to it. Everything else the server says
-— late, doubled, about another object — is counted and passed over, never taken for an answer.
+The transfers themselves are generators (``sdo_transfer``, ``sdo_block``). Everything the server says that
+is no answer to what was asked last — late, doubled, about another object — is counted and passed over,
+never taken for an answer.
 """
 
 from __future__ import annotations
 
-import struct
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeVar
 
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.canopen import abort
+from bridge.southbound.canopen.sdo_block import BlockUse, read_object, write_object
+from bridge.southbound.canopen.sdo_queue import Priority, SdoJob, SdoQueue
+from bridge.southbound.canopen.sdo_transfer import (
+    ABORT,
+    MUX,
+    U32,
+    Exchange,
+    Result,
+    SdoError,
+    Transfer,
+    abort_request,
+)
 
-_MUX: Final = struct.Struct("<BHB")
-_CODE: Final = struct.Struct("<I")
-_ABORT: Final = 0x80
-_SEGMENT: Final = 7
-MOST_BYTES: Final = 1 << 20
-"""Longest value taken from a server: longer ones are a fault of the server, not data."""
+__all__ = ["Priority", "Result", "SdoChannel", "SdoError", "SdoJob"]
 
+SEGMENTS_AT_ONCE: Final = 8
+"""So many frames of a block go out together: a block is up to 127, more than a driver's queue holds."""
+_COMMANDS: Final = frozenset((0x1010, 0x1011))
+"""Writing them does something each time (store and restore, CiA 301 §7.5.2.13–14): never repeated."""
 
-class SdoError(Exception):
-    """A transfer failed. ``code`` is the abort code, also for a time-out on our side."""
-
-    def __init__(self, index: int, sub: int, code: int, *, by_server: bool) -> None:
-        self.index, self.sub, self.code, self.by_server = index, sub, code, by_server
-        who = "the node aborted" if by_server else "no valid answer"
-        super().__init__(f"{index:04X}h:{sub:02X}: {who}: {abort.text(code)} ({code:08X}h)")
-
-
-@dataclass(frozen=True, slots=True)
-class Exchange:
-    """One request and the mark of its reply: ``reply[0] & mask == command`` and, where the reply
-    carries it, the multiplexer."""
-
-    request: bytes
-    mask: int
-    command: int
-    with_mux: bool
-
-
-Transfer = Generator[Exchange, bytes, bytes]
-Result = bytes | SdoError
-
-
-def upload(index: int, sub: int) -> Transfer:
-    """Read an object, expedited or segmented; returns its bytes."""
-    reply = yield Exchange(_MUX.pack(0x40, index, sub) + bytes(4), 0xE0, 0x40, True)
-    command = reply[0]
-    if command & 2:  # expedited
-        length = 4 - (command >> 2 & 3) if command & 1 else 4
-        return reply[4 : 4 + length]
-    announced = _CODE.unpack_from(reply, 4)[0] if command & 1 else None
-    if announced is not None and announced > MOST_BYTES:
-        raise SdoError(index, sub, abort.OUT_OF_MEMORY, by_server=False)
-    data = bytearray()
-    toggle = 0
-    while True:
-        reply = yield Exchange(bytes((0x60 | toggle,)) + bytes(7), 0xE0, 0x00, False)
-        if reply[0] & 0x10 != toggle:
-            raise SdoError(index, sub, abort.TOGGLE, by_server=False)
-        data += reply[1 : 8 - (reply[0] >> 1 & 7)]
-        if len(data) > MOST_BYTES:
-            raise SdoError(index, sub, abort.OUT_OF_MEMORY, by_server=False)
-        if reply[0] & 1:
-            break
-        toggle ^= 0x10
-    if announced is not None and len(data) != announced:
-        raise SdoError(index, sub, abort.LENGTH_TOO_HIGH, by_server=False)
-    return bytes(data)
-
-
-def download(index: int, sub: int, data: bytes) -> Transfer:
-    """Write an object: expedited up to four bytes, segmented above; returns nothing of interest."""
-    if 0 < len(data) <= 4:
-        command = 0x23 | (4 - len(data)) << 2
-        yield Exchange(_MUX.pack(command, index, sub) + data.ljust(4, b"\0"), 0xE0, 0x60, True)
-        return b""
-    yield Exchange(_MUX.pack(0x21, index, sub) + _CODE.pack(len(data)), 0xE0, 0x60, True)
-    toggle = 0
-    for start in range(0, max(len(data), 1), _SEGMENT):
-        part = data[start : start + _SEGMENT]
-        last = start + _SEGMENT >= len(data)
-        command = toggle | (_SEGMENT - len(part)) << 1 | last
-        reply = yield Exchange(bytes((command,)) + part.ljust(_SEGMENT, b"\0"), 0xE0, 0x20, False)
-        if reply[0] & 0x10 != toggle:
-            raise SdoError(index, sub, abort.TOGGLE, by_server=False)
-        toggle ^= 0x10
-    return b""
+T = TypeVar("T")
 
 
 @dataclass(slots=True)
-class _Job:
+class _Owed:
+    """An answer that may still come, after we have given up waiting for it or have asked again."""
+
     index: int
     sub: int
-    transfer: Transfer
-    done: Callable[[Result], None]
+    until: float
+
+    def is_about(self, job: SdoJob) -> bool:
+        return (self.index, self.sub) == (job.index, job.sub)
 
 
 class SdoChannel:
-    """One client channel. One transfer at a time; the others wait in order, commands before polls.
+    """One client channel. One transfer at a time; the others wait, by priority and then in order.
 
-    ``on_frame`` and ``on_time`` take monotonic seconds; ``take_frames`` gives what is to be sent.
+    ``on_frame`` and ``on_time`` take monotonic seconds; ``take_frames`` gives what is to be sent. A
+    transfer that fails by time-out or by a damaged answer is repeated ``retries`` times. ``done`` of each
+    transfer is called once, possibly before ``read`` or ``write`` returns. ``segment_s`` is the time to
+    leave to each frame of a block, so that it does not fill the bus and the driver's queue.
     """
 
-    def __init__(self, request_id: int, reply_id: int, timeout_s: float) -> None:
+    def __init__(
+        self, request_id: int, reply_id: int, timeout_s: float, *, retries: int = 0, segment_s: float = 0.001
+    ) -> None:
         self.request_id = request_id
         self.reply_id = reply_id
         self.timeout_s = timeout_s
+        self.retries = retries
         self.unmatched = 0
+        """Frames on the reply COB-ID that were no answer."""
         self.last_abort = 0
-        """Code of the last transfer that the server aborted or did not answer."""
-        self._urgent: deque[_Job] = deque()
-        self._patient: deque[_Job] = deque()
-        self._job: _Job | None = None
+        """Code of the last transfer that the server aborted or that we gave up."""
+        self._segment_s = segment_s
+        self._queue = SdoQueue()
+        self._block = BlockUse()
+        self._job: SdoJob | None = None
+        self._transfer: Transfer | None = None
         self._exchange: Exchange | None = None
         self._deadline: float | None = None
         self._frames: list[Frame] = []
+        self._unsent: deque[bytes] = deque()
+        self._send_at: float | None = None
+        self._owed: _Owed | None = None
+        self._hold_until: float | None = None
 
     @property
     def waiting(self) -> int:
         """Transfers that have not ended yet."""
-        return len(self._urgent) + len(self._patient) + (self._job is not None)
+        return len(self._queue) + (self._job is not None)
+
+    # asking
 
     def read(
-        self, index: int, sub: int, now: float, done: Callable[[Result], None], *, urgent: bool = True
-    ) -> None:
-        self._submit(_Job(index, sub, upload(index, sub), done), now, urgent)
+        self,
+        index: int,
+        sub: int,
+        now: float,
+        done: Callable[[Result], None],
+        *,
+        priority: Priority = Priority.COMMAND,
+    ) -> SdoJob:
+        """Read an object: expedited, segmented or by blocks, as the server offers it."""
+
+        def start(block: BlockUse) -> Transfer:
+            return read_object(index, sub, block)
+
+        return self._submit(SdoJob(index, sub, start, done, priority, self.retries), now)
 
     def write(
         self,
@@ -139,86 +113,175 @@ class SdoChannel:
         now: float,
         done: Callable[[Result], None],
         *,
-        urgent: bool = True,
-    ) -> None:
-        self._submit(_Job(index, sub, download(index, sub, data), done), now, urgent)
+        priority: Priority = Priority.COMMAND,
+        repeatable: bool = True,
+    ) -> SdoJob:
+        """Write an object. ``repeatable`` is false where writing the same twice does more than once."""
 
-    def _submit(self, job: _Job, now: float, urgent: bool) -> None:
-        (self._urgent if urgent else self._patient).append(job)
+        def start(block: BlockUse) -> Transfer:
+            return write_object(index, sub, data, block)
+
+        retries = self.retries if repeatable and index not in _COMMANDS else 0
+        return self._submit(SdoJob(index, sub, start, done, priority, retries), now)
+
+    def cancel(self, job: SdoJob, now: float) -> bool:
+        """End this transfer without calling its ``done``; False where it has ended already."""
+        if job is not self._job:
+            return self._queue.remove(job)
+        self._tell_abort(job, abort.GENERAL)
+        self._owe(job, now)
+        self._clear()
+        self._next(now)
+        return True
+
+    def flush(self, now: float) -> None:
+        """End everything that waits: the node or the bus is gone. Nothing more is sent."""
+        jobs = [self._job] if self._job else []
+        jobs += self._queue
+        self._queue.clear()
+        self._clear()
+        self._frames.clear()
+        self._hold_until = None
+        self._block = BlockUse()
+        for job in jobs:
+            job.done(SdoError(job.index, job.sub, abort.TIMED_OUT, by_server=False))
+
+    def _submit(self, job: SdoJob, now: float) -> SdoJob:
+        refused = self._queue.add(job)
         if self._job is None:
             self._next(now)
+        if refused:
+            refused.done(SdoError(refused.index, refused.sub, abort.BUSY, by_server=False))
+        return job
+
+    # frames and time
 
     def on_frame(self, frame: Frame) -> None:
         """A frame on the reply COB-ID."""
-        data, exchange, job = frame.data, self._exchange, self._job
-        if exchange is None or job is None or len(data) != 8:
-            self.unmatched += 1
-            return
-        _, index, sub = _MUX.unpack_from(data)
-        same = index == job.index and sub == job.sub
-        if data[0] == _ABORT:
-            if same:
-                code = _CODE.unpack_from(data, 4)[0]
-                self._end(SdoError(job.index, job.sub, code, by_server=True), frame.time)
+        data, exchange, job, transfer = frame.data, self._exchange, self._job, self._transfer
+        if len(data) != 8 or job is None or transfer is None or exchange is None or exchange.reply is None:
+            self._pass_over(data)
+        elif data[0] == ABORT:
+            if MUX.unpack_from(data, 1) == (job.index, job.sub):
+                code: int = U32.unpack_from(data, 4)[0]
+                error = SdoError(job.index, job.sub, code, by_server=True)
+                self._resume(transfer.throw, error, frame.time)
             else:
-                self.unmatched += 1
-            return
-        if data[0] & exchange.mask != exchange.command or (exchange.with_mux and not same):
-            self.unmatched += 1
-            return
-        self._advance(data, frame.time)
+                self._pass_over(data)
+        elif exchange.reply.fits(data, len(self._unsent)):
+            self._resume(transfer.send, data, frame.time)
+        else:
+            self._pass_over(data)
+
+    def _pass_over(self, data: bytes) -> None:
+        self.unmatched += 1
+        owed = self._owed
+        if owed and len(data) == 8 and MUX.unpack_from(data, 1) == (owed.index, owed.sub):
+            self._owed = None
 
     def on_time(self, now: float) -> None:
-        if self._deadline is not None and now >= self._deadline and self._job is not None:
-            self._fail_here(SdoError(self._job.index, self._job.sub, abort.TIMED_OUT, by_server=False), now)
+        if self._send_at is not None and now >= self._send_at:
+            self._send_some(now)
+        job, transfer = self._job, self._transfer
+        if job is None or transfer is None:
+            if self._hold_until is not None and (now >= self._hold_until or self._owed is None):
+                self._next(now)
+        elif self._deadline is not None and now >= self._deadline:
+            error = SdoError(job.index, job.sub, abort.TIMED_OUT, by_server=False)
+            self._resume(transfer.throw, error, now)
 
     def next_deadline(self) -> float | None:
-        return self._deadline
+        times = (self._send_at, self._hold_until, self._deadline)
+        return min((time for time in times if time is not None), default=None)
 
     def take_frames(self) -> list[Frame]:
         frames, self._frames = self._frames, []
         return frames
 
-    def flush(self, now: float) -> None:
-        """End everything that waits: the node or the bus is gone. Nothing more is sent."""
-        jobs = [job for job in (self._job, *self._urgent, *self._patient) if job is not None]
-        self._urgent.clear()
-        self._patient.clear()
-        self._job = self._exchange = self._deadline = None
-        self._frames.clear()
-        for job in jobs:
-            job.done(SdoError(job.index, job.sub, abort.TIMED_OUT, by_server=False))
+    # the transfer that runs
 
     def _next(self, now: float) -> None:
-        while self._job is None and (self._urgent or self._patient):
-            self._job = (self._urgent or self._patient).popleft()
-            self._advance(None, now)
+        """Begin the next transfer. One about an object that still owes us an answer has to wait: that
+        answer could be taken for its own."""
+        self._hold_until = None
+        owed = self._owed if self._owed and now < self._owed.until else None
+        for job in self._queue:
+            if owed is None or not owed.is_about(job):
+                self._queue.remove(job)
+                self._begin(job, now)
+                return
+        if owed and len(self._queue):
+            self._hold_until = owed.until
 
-    def _advance(self, reply: bytes | None, now: float) -> None:
-        job = self._job
-        if job is None:
+    def _begin(self, job: SdoJob, now: float) -> None:
+        self._job = job
+        transfer = self._transfer = job.start(self._block)
+        self._resume(next, transfer, now)
+
+    def _resume(self, step: Callable[[T], Exchange], argument: T, now: float) -> None:
+        """Let the transfer go on and send what it wants to be sent."""
+        transfer = self._transfer
+        if transfer is None:
             return
+        self._unsent.clear()
+        self._send_at = None
         try:
-            self._exchange = next(job.transfer) if reply is None else job.transfer.send(reply)
+            exchange = step(argument)
+            while exchange.reply is None:
+                self._frames += [Frame(self.request_id, request) for request in exchange.requests]
+                exchange = transfer.send(b"")
         except StopIteration as end:
             self._end(end.value, now)
         except SdoError as error:
-            self._fail_here(error, now)
+            self._fail(error, now)
         else:
-            self._frames.append(Frame(self.request_id, self._exchange.request))
-            self._deadline = now + self.timeout_s
+            self._exchange = exchange
+            self._unsent.extend(exchange.requests)
+            self._send_some(now)
 
-    def _fail_here(self, error: SdoError, now: float) -> None:
-        """We give up: tell the server, then the one who asked."""
-        self._frames.append(
-            Frame(self.request_id, _MUX.pack(_ABORT, error.index, error.sub) + _CODE.pack(error.code))
-        )
-        self._end(error, now)
+    def _send_some(self, now: float) -> None:
+        """Send the next frames of the exchange; the time for the answer begins with the last one."""
+        most = SEGMENTS_AT_ONCE if self._segment_s else len(self._unsent)
+        for _ in range(min(most, len(self._unsent))):
+            self._frames.append(Frame(self.request_id, self._unsent.popleft()))
+        self._send_at = now + SEGMENTS_AT_ONCE * self._segment_s if self._unsent else None
+        self._deadline = now + self.timeout_s
+
+    def _fail(self, error: SdoError, now: float) -> None:
+        """The transfer has failed: try it again, or tell the one who asked."""
+        job = self._job
+        if job is None:
+            return
+        if not error.by_server:
+            self._tell_abort(job, error.code)
+            self._owe(job, now)
+        if job.retries_left and error.code in abort.TRANSIENT:
+            job.retries_left -= 1
+            self._begin(job, now)
+        else:
+            self._end(error, now)
+
+    def _tell_abort(self, job: SdoJob, code: int) -> None:
+        self._frames.append(Frame(self.request_id, abort_request(job.index, job.sub, code)))
+
+    def _owe(self, job: SdoJob, now: float) -> None:
+        self._owed = _Owed(job.index, job.sub, now + self.timeout_s)
+
+    def _clear(self) -> None:
+        if self._transfer:
+            self._transfer.close()
+        self._job = self._transfer = self._exchange = self._deadline = self._send_at = None
+        self._unsent.clear()
 
     def _end(self, result: Result, now: float) -> None:
-        job, self._job, self._exchange, self._deadline = self._job, None, None, None
+        job = self._job
+        self._clear()
         if isinstance(result, SdoError):
             self.last_abort = result.code
+        elif job and self._owed and self._owed.is_about(job):
+            # It may have been the answer to the first attempt: the second's is still to come.
+            self._owe(job, now)
         if job is not None:
             job.done(result)
-        self._next(now)
+        if self._job is None:
+            self._next(now)

@@ -272,3 +272,25 @@ class TestSiteAndMappings:
         site, families = load_site_and_families(path)
         assert [node.name for node in site.bus[0].node] == ["conveyor", "pump"]
         assert list(families) == ["nord/sk-tu4-cao"]
+
+
+@pytest.mark.parametrize(
+    ("more", "fault"),
+    [
+        ('slot = "two"', "sdo[0].slot: there is no slot 'two' (known: one)"),
+        ("after_stop = 1", "sdo[0].after_stop: must be true or false, not 1"),
+        (
+            "[[sdo]]\nnumber = 2\nrequest = 0x640\nreply = 0x5C0",
+            "sdo[1].number: SDO server '2' is there twice",
+        ),
+    ],
+)
+def test_a_wrong_sdo_server_is_named(tmp_path: Path, more: str, fault: str):
+    server = f"[[sdo]]\nnumber = 2\nrequest = 0x340\nreply = 0x2C0\n{more}\n[control_word]"
+    assert fault in told(tmp_path, FAMILY.replace("[control_word]", server))[0]
+
+
+def test_an_sdo_server_leaves_room_for_the_node_id(tmp_path: Path):
+    server = "[[sdo]]\nnumber = 2\nrequest = 0x7FF\nreply = 0x2C0\n[control_word]"
+    [fault] = told(tmp_path, FAMILY.replace("[control_word]", server))
+    assert "sdo[0].request: 7FFh leaves no room for the node id" in fault

@@ -94,6 +94,9 @@ def test_drives_and_nodes_have_their_methods(trees: tuple[ObjectNode, ...]) -> N
     assert [(method.action, method.target) for method in node] == [
         (Action.RESET, "conveyor"),
         (Action.RESET_COMMUNICATION, "conveyor"),
+        (Action.START_NODE, "conveyor"),
+        (Action.STOP_NODE, "conveyor"),
+        (Action.ENTER_PRE_OPERATIONAL, "conveyor"),
         (Action.ENABLE, "conveyor"),
         (Action.DISABLE, "conveyor"),
     ]

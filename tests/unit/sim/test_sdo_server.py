@@ -9,8 +9,7 @@ from bridge.sim.sdo_server import SdoServer
 
 
 def ask(server: SdoServer, request: str) -> str:
-    answer = server.on_request(bytes.fromhex(request))
-    return "" if answer is None else answer.hex(" ").upper()
+    return " / ".join(answer.hex(" ").upper() for answer in server.on_request(bytes.fromhex(request)))
 
 
 def test_writing_p102_is_acknowledged_as_in_the_manual(bench):

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.canopen import abort
-from bridge.southbound.canopen.sdo import Result, SdoChannel, SdoError
+from bridge.southbound.canopen.sdo import Priority, Result, SdoChannel, SdoError, SdoJob
+from bridge.southbound.canopen.sdo_queue import MOST_WAITING
+from bridge.southbound.canopen.sdo_transfer import MOST_BYTES
 
 REQUEST, REPLY = 0x605, 0x585
 
@@ -18,16 +20,24 @@ REQUEST, REPLY = 0x605, 0x585
 class Client:
     """A channel on a virtual clock, its requests and its results."""
 
-    def __init__(self) -> None:
-        self.channel = SdoChannel(REQUEST, REPLY, 0.5)
+    def __init__(self, retries: int = 0) -> None:
+        self.channel = SdoChannel(REQUEST, REPLY, 0.5, retries=retries)
         self.now = 0.0
         self.results: list[Result] = []
 
-    def read(self, index: int, sub: int = 0, *, urgent: bool = True) -> None:
-        self.channel.read(index, sub, self.now, self.results.append, urgent=urgent)
+    def read(self, index: int, sub: int = 0, *, priority: Priority = Priority.COMMAND) -> SdoJob:
+        return self.channel.read(index, sub, self.now, self.results.append, priority=priority)
 
     def write(self, index: int, sub: int, data: bytes) -> None:
         self.channel.write(index, sub, data, self.now, self.results.append)
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass; the channel is called whenever it asked for it."""
+        end = self.now + seconds
+        while (deadline := self.channel.next_deadline()) is not None and deadline <= end:
+            self.now = max(self.now, deadline)
+            self.channel.on_time(self.now)
+        self.now = end
 
     def sent(self) -> list[str]:
         return [frame.data.hex(" ").upper() for frame in self.channel.take_frames()]
@@ -154,20 +164,178 @@ def test_a_wrong_toggle_bit_ends_the_transfer_on_both_sides(client: Client) -> N
     assert client.sent() == ["80 9C 5F 00 00 00 03 05"]
 
 
-def test_a_server_that_announces_a_megabyte_is_not_believed(client: Client) -> None:
+@pytest.mark.parametrize("size", [1 << 20, MOST_BYTES + 1, 0xFFFF_FFFF])
+def test_a_server_that_announces_a_megabyte_is_not_believed(client: Client, size: int) -> None:
     client.read(0x1008)
-    client.answer("41 08 10 00 00 00 00 7F")
+    client.sent()
+    client.answer(f"41 08 10 00 {struct.pack('<I', size).hex()}")
+    assert str(client.result) == "1008h:00: no valid answer: out of memory (05040005h)"
+    assert client.sent() == ["80 08 10 00 05 00 04 05"]
+
+
+def test_more_bytes_than_announced_are_not_taken(client: Client) -> None:
+    client.read(0x1008)
+    client.answer("41 08 10 00 05 00 00 00")
+    client.answer("00 31 32 33 34 35 36 37")
     assert isinstance(client.result, SdoError)
-    assert client.result.code == abort.OUT_OF_MEMORY
+    assert client.result.code == abort.LENGTH_TOO_HIGH
 
 
-def test_commands_go_before_polls(client: Client) -> None:
+def test_fewer_bytes_than_announced_are_not_taken_for_the_value(client: Client) -> None:
+    client.read(0x1008)
+    client.answer("41 08 10 00 08 00 00 00")
+    client.answer("01 31 32 33 34 35 36 37")
+    assert isinstance(client.result, SdoError)
+    assert client.result.code == abort.LENGTH_TOO_LOW
+
+
+def test_empty_segments_without_an_end_are_no_answer(client: Client) -> None:
+    client.read(0x1008)
+    client.answer("40 08 10 00 00 00 00 00")
+    client.answer("0E 00 00 00 00 00 00 00")
+    assert isinstance(client.result, SdoError)
+    assert client.result.code == abort.LENGTH_TOO_LOW
+
+
+def test_a_doubled_segment_is_passed_over(client: Client) -> None:
+    client.read(0x5F9C)
+    client.answer("41 9C 5F 00 0B 00 00 00")
+    client.answer("00 30 31 2E 30 30 2E 30")
+    client.answer("00 30 31 2E 30 30 2E 30")
+    assert client.channel.unmatched == 1
+    client.answer("17 30 2E 30 30 00 00 00")
+    assert client.result == b"01.00.00.00"
+
+
+def test_a_doubled_acknowledge_of_a_segment_is_passed_over(client: Client) -> None:
+    client.write(0x1008, 0, b"drivebridge")
+    client.answer("60 08 10 00 00 00 00 00")
+    client.answer("20 00 00 00 00 00 00 00")
+    client.answer("20 00 00 00 00 00 00 00")
+    assert (client.results, client.channel.unmatched) == ([], 1)
+    client.answer("30 00 00 00 00 00 00 00")
+    assert client.result == b""
+
+
+def test_a_lost_answer_is_asked_for_again_as_often_as_the_site_file_says() -> None:
+    client = Client(retries=1)
+    client.read(0x2066, 1)
+    client.wait(0.6)
+    assert client.sent() == ["40 66 20 01 00 00 00 00", "80 66 20 01 00 00 04 05", "40 66 20 01 00 00 00 00"]
+    client.answer("4B 66 20 01 67 00 00 00")
+    assert client.result == b"\x67\x00"
+
+
+def test_a_server_that_stays_silent_is_given_up_after_its_retries() -> None:
+    client = Client(retries=2)
+    client.read(0x2066, 1)
+    client.wait(1.4)
+    assert client.results == []
+    client.wait(0.2)
+    assert str(client.result) == "2066h:01: no valid answer: SDO protocol timed out (05040000h)"
+    assert client.channel.last_abort == abort.TIMED_OUT
+
+
+def test_what_the_server_refuses_is_not_asked_again() -> None:
+    client = Client(retries=3)
+    client.read(0x2999)
+    client.sent()
+    client.answer("80 99 29 00 00 00 02 06")
+    assert client.sent() == []
+    assert isinstance(client.result, SdoError)
+    assert client.channel.last_abort == 0x0602_0000
+
+
+@pytest.mark.parametrize("index", [0x1010, 0x1011])
+def test_store_and_restore_are_never_repeated(index: int) -> None:
+    client = Client(retries=3)
+    client.write(index, 1, b"save")
+    client.wait(0.6)
+    assert isinstance(client.result, SdoError)
+
+
+def test_after_a_retry_the_second_answer_is_not_taken_for_the_next_write() -> None:
+    """Both answers of a slow server come; the second must not pass for the answer to another value."""
+    client = Client(retries=1)
+    client.write(0x2066, 1, b"\x01\x00")
+    client.wait(0.55)
+    client.answer("60 66 20 01 00 00 00 00")
+    assert client.result == b""
+    client.sent()
+    client.write(0x2066, 1, b"\x02\x00")
+    assert client.sent() == [], "an answer about 2066h:01 is still owed"
+    client.answer("60 66 20 01 00 00 00 00")
+    assert len(client.results) == 1
+    client.wait(0.0)
+    client.channel.on_time(client.now)
+    assert client.sent() == ["2B 66 20 01 02 00 00 00"]
+    client.answer("80 66 20 01 30 00 09 06")
+    assert isinstance(client.results[1], SdoError)
+
+
+def test_an_owed_answer_that_never_comes_delays_only_its_own_object() -> None:
+    client = Client()
+    client.read(0x2066, 1)
+    client.wait(0.5)
+    client.sent()
+    client.read(0x2066, 1)
+    client.read(0x2067, 1)
+    assert client.sent() == ["40 67 20 01 00 00 00 00"]
+    client.answer("4B 67 20 01 01 00 00 00")
+    client.wait(0.5)
+    assert client.sent() == ["40 66 20 01 00 00 00 00"]
+
+
+def test_a_cancelled_transfer_is_ended_on_the_bus_and_the_next_begins(client: Client) -> None:
+    first = client.read(0x1008)
+    client.read(0x1009)
+    waiting = client.read(0x100A)
+    client.sent()
+    assert client.channel.cancel(first, client.now)
+    assert client.sent() == ["80 08 10 00 00 00 00 08", "40 09 10 00 00 00 00 00"]
+    assert client.channel.cancel(waiting, client.now)
+    client.answer("43 09 10 00 01 00 00 00")
+    assert client.results == [b"\x01\x00\x00\x00"]
+    assert client.channel.waiting == 0
+    assert not client.channel.cancel(first, client.now), "it has ended"
+
+
+def test_a_full_queue_refuses_polls_before_commands(client: Client) -> None:
     client.read(0x1000)
-    client.read(0x3005, urgent=False)
+    for number in range(MOST_WAITING):
+        client.read(0x3000 + number, priority=Priority.POLL)
+    client.read(0x3FFF, priority=Priority.POLL)
+    assert str(client.result).startswith("3FFFh:00: not asked, too many transfers are waiting")
+    client.read(0x2066, 1)
+    assert [result.index for result in client.results if isinstance(result, SdoError)] == [0x3FFF, 0x303F]
+    assert client.channel.waiting == MOST_WAITING + 1
+
+
+def test_transfers_to_different_nodes_run_side_by_side() -> None:
+    """Three servers that need 20 ms each answer all within 20 ms, not one after the other."""
+    results: list[tuple[int, Result]] = []
+    channels = [SdoChannel(0x600 + node, 0x580 + node, 0.5) for node in (1, 2, 3)]
+    for node, channel in enumerate(channels, 1):
+        channel.read(0x1000, 0, 0.0, lambda result, node=node: results.append((node, result)))
+    requests = [frame for channel in channels for frame in channel.take_frames()]
+    assert [frame.can_id for frame in requests] == [0x601, 0x602, 0x603]
+    for channel in channels:
+        channel.on_frame(Frame(channel.reply_id, bytes.fromhex("4300100092010200"), 0.02))
+    assert [node for node, _ in results] == [1, 2, 3]
+
+
+def test_commands_go_before_the_boot_up_and_that_before_polls(client: Client) -> None:
+    client.read(0x1000)
+    client.read(0x3005, priority=Priority.POLL)
+    client.read(0x1018, 1, priority=Priority.BOOT)
     client.read(0x2066, 1)
     client.sent()
     client.answer("43 00 10 00 00 00 00 00")
     assert client.sent() == ["40 66 20 01 00 00 00 00"]
+    client.answer("4B 66 20 01 67 00 00 00")
+    assert client.sent() == ["40 18 10 01 00 00 00 00"]
+    client.answer("43 18 10 01 00 00 00 00")
+    assert client.sent() == ["40 05 30 00 00 00 00 00"]
 
 
 def test_a_flush_ends_every_transfer_and_sends_nothing(client: Client) -> None:
@@ -186,7 +354,10 @@ def serve(data: bytes, client: Client) -> None:
     for request in client.channel.take_frames():
         pending = request.data
     while client.results == []:
-        if pending[0] == 0x40:
+        if pending[0] == 0xA4:  # block upload, which this server does not know
+            client.answer((b"\x80" + pending[1:4] + struct.pack("<I", 0x0504_0001)).hex())
+            rest = data
+        elif pending[0] == 0x40:
             client.answer((b"\x41" + pending[1:4] + struct.pack("<I", len(data))).hex())
         else:
             part, rest = rest[:7], rest[7:]
@@ -223,8 +394,6 @@ def test_no_server_can_raise_or_leave_a_transfer_without_an_end(events: list[byt
             client.channel.on_frame(Frame(REPLY, event, client.now))
         client.channel.on_time(client.now)
         client.channel.take_frames()
-    for _ in range(asked):
-        client.now += 1.0
-        client.channel.on_time(client.now)
+    client.wait(2.0 * asked + 1)
     assert len(client.results) == asked
     assert client.channel.waiting == 0

@@ -1,0 +1,184 @@
+"""What the commands that work on a bus share: which bus, and how an errand is run on it."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Protocol, TypeVar
+
+import typer
+
+from bridge import clock
+from bridge.cli.serve import until_stopped
+from bridge.config import BusTable
+from bridge.mapping import Family
+from bridge.service import load_project
+from bridge.southbound.bus import Bus, open_bus
+from bridge.southbound.bus.frame import Frame
+from bridge.southbound.bus.interface import ControllerState
+
+BusName = Annotated[str | None, typer.Option("--bus", help="the bus of SITE; not needed where it has one")]
+Interface = Annotated[str | None, typer.Option(help="without SITE: socketcan, or one of python-can's")]
+Channel = Annotated[str | None, typer.Option(help="without SITE: such as can0")]
+Bitrate = Annotated[
+    int | None,
+    typer.Option(min=10_000, max=1_000_000, help="without SITE: bit/s, stated, not set on SocketCAN"),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="machine-readable")]
+
+_SEND_WITHIN_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """The bus that a command works on. Without a site ``families`` is empty and ``is_of_site`` false.
+
+    A bit rate that nobody has stated is assumed, and not compared with that of the interface.
+    """
+
+    table: BusTable
+    families: dict[str, Family]
+    is_of_site: bool
+    states_bitrate: bool = True
+
+    @property
+    def sdo_timeout_s(self) -> float:
+        return max((node.sdo_timeout_ms for node in self.table.node), default=500) / 1000
+
+    @property
+    def own_id(self) -> int | None:
+        """The address of the site's bridge on this bus, where it makes itself heard."""
+        return self.table.master_node_id if self.is_of_site and self.table.heartbeat_ms else None
+
+    def node_id(self, text: str) -> int:
+        """The address in ``text``: a number 1…127, or the name of one of the site's nodes."""
+        for node in self.table.node:
+            if node.name == text:
+                return node.id
+        try:
+            node_id = int(text, 0)
+        except ValueError:
+            known = ", ".join(node.name for node in self.table.node)
+            hint = f" or one of {known}" if known else ""
+            raise typer.BadParameter(f"{text!r} is no node: an address 1…127{hint}") from None
+        if not 1 <= node_id <= 127:
+            raise typer.BadParameter(f"{text} is no node id: 1…127")
+        return node_id
+
+
+def choose_line(
+    site: Path | None, bus: str | None, interface: str | None, channel: str | None, bitrate: int | None
+) -> Line:
+    """The bus that the options mean. Raises ``BadParameter`` where they mean none or two."""
+    if site is None:
+        if bus is not None:
+            raise typer.BadParameter("--bus names a bus of SITE, and there is no SITE")
+        if interface is None or channel is None:
+            raise typer.BadParameter("which bus? Give SITE, or --interface and --channel")
+        content = {"name": "bus", "interface": interface, "channel": channel}
+        table = BusTable.model_validate(content | ({"bitrate": bitrate} if bitrate else {}))
+        return Line(_not_virtual(table), {}, is_of_site=False, states_bitrate=bitrate is not None)
+    if interface is not None or channel is not None or bitrate is not None:
+        raise typer.BadParameter("SITE says interface, channel and bit rate: leave the options out")
+    project = load_project(site)
+    tables = {table.name: table for table in project.site.bus}
+    if bus is None and len(tables) == 1:
+        bus = next(iter(tables))
+    if bus not in tables:
+        raise typer.BadParameter(f"which bus? Give --bus, one of {', '.join(tables)}")
+    return Line(_not_virtual(tables[bus]), project.families, is_of_site=True)
+
+
+def _not_virtual(table: BusTable) -> BusTable:
+    if table.interface == "virtual":
+        raise typer.BadParameter("a virtual bus exists only inside the process that serves it")
+    return table
+
+
+def split_site(words: list[str], count: int, usage: str) -> tuple[Path | None, list[str]]:
+    """SITE, where it is there, and the ``count`` words after it."""
+    if len(words) == count:
+        return None, words
+    if len(words) == count + 1:
+        return Path(words[0]), words[1:]
+    raise typer.BadParameter(f"usage: {usage}")
+
+
+class Errand(Protocol):
+    """Something to be done on a bus: frames and time in, frames out."""
+
+    def is_finished(self, now: float) -> bool: ...
+
+    def on_frame(self, frame: Frame) -> None: ...
+
+    def on_time(self, now: float) -> None: ...
+
+    def next_deadline(self) -> float | None: ...
+
+    def take_frames(self) -> list[Frame]: ...
+
+
+_E = TypeVar("_E", bound=Errand)
+
+
+async def run_errand(bus: Bus, errand: Errand, watch: Callable[[], None] = lambda: None) -> None:
+    """Run ``errand`` on ``bus`` until it is finished; ``watch`` is called after every round.
+
+    Raises ``Unavailable`` where the bus cannot be opened.
+    """
+    loop = asyncio.get_running_loop()
+    work = asyncio.Event()
+    bus.open(work.set)
+    try:
+        while True:
+            work.clear()
+            now = clock.now()
+            for frame in bus.drain(now):
+                errand.on_frame(frame)
+            errand.on_time(now)
+            for frame in errand.take_frames():
+                bus.send(frame, now, now + _SEND_WITHIN_S)
+            bus.on_time(now)
+            watch()
+            if errand.is_finished(now):
+                return
+            deadlines = [t for t in (errand.next_deadline(), bus.next_deadline()) if t is not None]
+            delay_s = max(0.0, min(deadlines) - clock.now()) if deadlines else None
+            timer = None if delay_s is None else loop.call_later(delay_s, work.set)
+            try:
+                await work.wait()
+            finally:
+                if timer:
+                    timer.cancel()
+    finally:
+        bus.close()
+
+
+def carry_out(
+    line: Line, make: Callable[[float], _E], watch: Callable[[_E], None] = lambda errand: None
+) -> _E:
+    """Make an errand of now and run it on the bus; returns it when it is finished or was interrupted."""
+    table = line.table
+    assumed = table.interface == "socketcan" and not line.states_bitrate
+    bus = open_bus(table.name, table.interface, table.channel or "", 0 if assumed else table.bitrate)
+    errand = make(clock.now())
+    until_stopped(run_errand(bus, errand, lambda: watch(errand)))
+    if bus.status.state is not ControllerState.OK:
+        state = bus.status.state.name.lower().replace("_", "-")
+        tell(f"warning: bus {table.channel} is {state}")
+    return errand
+
+
+def tell(text: str) -> None:
+    """A sentence beside the results."""
+    print(text, file=sys.stderr)
+
+
+def print_table(rows: Sequence[Sequence[str]]) -> None:
+    """Rows of cells, the first the heading, in columns as wide as they need."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())

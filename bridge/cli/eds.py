@@ -1,0 +1,157 @@
+"""``eds``: look at a device description, and what it configures, without a bus."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from bridge.config.download import Download, to_concise_dcf
+from bridge.eds import Description, Entry, Finding, Value, configuration, read_device_file
+from bridge.eds.model import Report
+from bridge.eds.pdos import PdoSummary, pdos
+from bridge.errors import OperationFailed
+
+
+def eds(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="an EDS, DCF, XDD or XDC")],
+    node_id: Annotated[
+        int | None, typer.Option(min=1, max=127, help="the node id that $NODEID stands for")
+    ] = None,
+    concise: Annotated[
+        Path | None, typer.Option(help="write what the file configures as a concise DCF (1F22h)")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="machine-readable")] = False,
+) -> None:
+    """Read FILE, whatever is odd about it, and say what it describes and what was odd."""
+    description = read_device_file(file)
+    node_id = node_id or description.commissioning.node_id
+    report = Report()
+    downloads = configuration(description, node_id, report)
+    findings = (*description.findings, *report.findings())
+    if concise:
+        _write(concise, to_concise_dcf(downloads))
+    if as_json:
+        print(json.dumps(_as_json(description, downloads, findings, node_id), indent=2))
+        return
+    for line in _lines(file, description, downloads, findings, node_id):
+        print(line)
+
+
+def _write(path: Path, content: bytes) -> None:
+    try:
+        path.write_bytes(content)
+    except OSError as error:
+        raise OperationFailed(f"{path} cannot be written: {error.strerror}") from error
+
+
+def _lines(
+    file: Path,
+    description: Description,
+    downloads: Sequence[Download],
+    findings: Sequence[Finding],
+    node_id: int | None,
+) -> list[str]:
+    device, commissioning = description.device, description.commissioning
+    named = " ".join(text for text in (device.vendor, device.product, device.order_code) if text)
+    entries = sum(len(one.entries) for one in description.objects)
+    lines = [
+        f"{file}: {description.format}, {named or 'a device without a name'}",
+        f"  vendor id {_hex(device.vendor_id)}, product code {_hex(device.product_code)}, "
+        f"revision {_hex(device.revision)}",
+        f"  {len(description.objects)} objects with {entries} entries",
+    ]
+    if device.bitrates:
+        rates = ", ".join(f"{rate // 1000}" for rate in device.bitrates)
+        lines.append(f"  bit rates {rates} kbit/s")
+    if commissioning.node_id is not None or commissioning.node_name:
+        name = f" {commissioning.node_name}" if commissioning.node_name else ""
+        lines.append(f"  for node {commissioning.node_id}{name}")
+    lines += [f"  {_pdo_line(pdo)}" for pdo in pdos(description, node_id)]
+    if downloads:
+        lines.append(f"  configures {len(downloads)} objects:")
+        lines += [f"    {one.name} = {one.data.hex(' ').upper()}" for one in downloads]
+    lines += [f"{file}:{one.line}: {one.severity}: {one.text}" for one in findings]
+    return lines
+
+
+def _pdo_line(pdo: PdoSummary) -> str:
+    cob_id = pdo.cob_id_text if pdo.cob_id is None else f"{pdo.cob_id:X}h"
+    state = "" if pdo.enabled else ", off"
+    mapped = ", ".join(
+        f"{one.index:04X}:{one.sub:02X}/{one.bits}" + (f" {one.name}" if one.name else "")
+        for one in pdo.mapped
+    )
+    kind = "?" if pdo.transmission_type is None else pdo.transmission_type
+    return f"{pdo.name} {cob_id}{state}, type {kind}: {mapped or 'nothing'}"
+
+
+def _hex(number: int | None) -> str:
+    return "not given" if number is None else f"{number:08X}h"
+
+
+def _as_json(
+    description: Description,
+    downloads: Sequence[Download],
+    findings: Sequence[Finding],
+    node_id: int | None,
+) -> dict[str, Any]:
+    device, commissioning = description.device, description.commissioning
+    return {
+        "format": description.format,
+        "device": {
+            "vendor": device.vendor,
+            "vendor_id": device.vendor_id,
+            "product": device.product,
+            "product_code": device.product_code,
+            "revision": device.revision,
+            "order_code": device.order_code,
+            "bitrates": list(device.bitrates),
+        },
+        "node_id": node_id,
+        "node_name": commissioning.node_name,
+        "objects": [_entry_json(entry) for one in description.objects for entry in one.entries],
+        "pdos": [_pdo_json(pdo) for pdo in pdos(description, node_id)],
+        "downloads": [{"index": one.index, "sub": one.sub, "data": one.data.hex()} for one in downloads],
+        "findings": [
+            {"line": one.line, "severity": one.severity.value, "text": one.text} for one in findings
+        ],
+    }
+
+
+def _entry_json(entry: Entry) -> dict[str, Any]:
+    return {
+        "index": entry.index,
+        "sub": entry.sub,
+        "name": entry.name,
+        "type": entry.data_type.name if entry.data_type else None,
+        "access": entry.access.value,
+        "default": _value(entry.default),
+        "value": _value(entry.parameter_value),
+        "low": _value(entry.low),
+        "high": _value(entry.high),
+        "pdo_mappable": entry.pdo_mappable,
+    }
+
+
+def _value(value: Value | None) -> int | float | str | None:
+    if value is None:
+        return None
+    return str(value) if value.plus_node_id or isinstance(value.plain, bytes) else value.plain
+
+
+def _pdo_json(pdo: PdoSummary) -> dict[str, Any]:
+    return {
+        "name": pdo.name,
+        "enabled": pdo.enabled,
+        "cob_id": pdo.cob_id,
+        "transmission_type": pdo.transmission_type,
+        "inhibit_ms": pdo.inhibit_100us / 10,
+        "event_ms": pdo.event_timer_ms,
+        "mapped": [
+            {"index": one.index, "sub": one.sub, "bits": one.bits, "name": one.name} for one in pdo.mapped
+        ],
+    }

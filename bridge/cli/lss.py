@@ -1,0 +1,212 @@
+"""``lss``: node ids and bit rates of devices, told apart by what they are (CiA 305)."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+import typer
+
+from bridge.cli.bus import (
+    AsJson,
+    Bitrate,
+    BusName,
+    Channel,
+    Interface,
+    Line,
+    carry_out,
+    choose_line,
+    print_table,
+)
+from bridge.errors import OperationFailed
+from bridge.southbound import lss_errand
+from bridge.southbound.canopen.lss import BIT_RATES, NO_NODE_ID, Identity, LssError, Service
+from bridge.southbound.lss_errand import LssErrand
+
+app = typer.Typer(help="Give devices node ids and bit rates (CiA 305).", no_args_is_help=True)
+
+_T = TypeVar("_T")
+_QUESTIONS = 133
+"""Of a fastscan that finds something."""
+_NUMBER = re.compile(r"(?:0x)?([0-9a-f]{1,8})h?", re.IGNORECASE)
+
+Site = Annotated[Path | None, typer.Argument(metavar="[SITE]")]
+Timeout = Annotated[int, typer.Option(min=5, max=10_000, help="wait so long for each answer")]
+Which = Annotated[
+    str | None,
+    typer.Option("--identity", help="the device: VENDOR:PRODUCT:REVISION:SERIAL, hexadecimal"),
+]
+Only = Annotated[bool, typer.Option("--only", help="it is the only device on the bus")]
+Keep = Annotated[bool, typer.Option("--store", help="store it in the device, too")]
+
+
+@app.command()
+def scan(
+    site: Site = None,
+    known: Annotated[
+        str | None, typer.Option(help="as for --identity, 0 where unknown: these numbers are not searched")
+    ] = None,
+    bus: BusName = None,
+    interface: Interface = None,
+    channel: Channel = None,
+    bitrate: Bitrate = None,
+    timeout_ms: Timeout = 100,
+    as_json: AsJson = False,
+) -> None:
+    """Find every device that has no node id (fastscan). Up to 14 seconds for each."""
+    line = choose_line(site, bus, interface, channel, bitrate)
+    found = _run(line, lss_errand.find_all(parse_identity(known) if known else None), timeout_ms)
+    if as_json:
+        print(json.dumps([identity._asdict() for identity in found], indent=2))
+        return
+    if not found:
+        print("no device without a node id")
+        return
+    print_table([("vendor", "product", "revision", "serial", "--identity"), *map(_row, found)])
+
+
+@app.command()
+def inquire(
+    site: Site = None,
+    identity: Which = None,
+    only: Only = False,
+    bus: BusName = None,
+    interface: Interface = None,
+    channel: Channel = None,
+    bitrate: Bitrate = None,
+    timeout_ms: Timeout = 500,
+    as_json: AsJson = False,
+) -> None:
+    """Ask a device for its identity and node id."""
+    line = choose_line(site, bus, interface, channel, bitrate)
+    found, node_id = _run(line, lss_errand.inquire(_which(identity, only)), timeout_ms)
+    if as_json:
+        print(json.dumps({"node_id": None if node_id == NO_NODE_ID else node_id} | found._asdict()))
+        return
+    print(f"{identity_text(found)}: {'no node id' if node_id == NO_NODE_ID else f'node id {node_id}'}")
+
+
+@app.command("set-id")
+def set_id(
+    node_id: Annotated[int, typer.Option("--id", min=1, max=255, help="1…127; 255 takes it away")],
+    site: Site = None,
+    identity: Which = None,
+    only: Only = False,
+    keep: Keep = False,
+    bus: BusName = None,
+    interface: Interface = None,
+    channel: Channel = None,
+    bitrate: Bitrate = None,
+    timeout_ms: Timeout = 500,
+    as_json: AsJson = False,
+) -> None:
+    """Give a device a node id. One that has another already takes it with its next reset."""
+    if 127 < node_id < NO_NODE_ID:
+        raise typer.BadParameter(f"{node_id} is no node id: 1…127, or 255 for none")
+    line = choose_line(site, bus, interface, channel, bitrate)
+    _run(line, lss_errand.set_node_id(_which(identity, only), node_id, keep=keep), timeout_ms)
+    _report({"ok": True, "node_id": node_id, "stored": keep}, f"node id {node_id}", keep, as_json)
+
+
+@app.command("set-bitrate")
+def set_bitrate(
+    new: Annotated[str, typer.Option(help="bit/s, or auto")],
+    site: Site = None,
+    identity: Which = None,
+    only: Only = False,
+    keep: Keep = False,
+    activate_ms: Annotated[
+        int | None, typer.Option(min=1, max=65_535, help="switch now, with this silence before and after")
+    ] = None,
+    bus: BusName = None,
+    interface: Interface = None,
+    channel: Channel = None,
+    bitrate: Bitrate = None,
+    timeout_ms: Timeout = 500,
+    as_json: AsJson = False,
+) -> None:
+    """Give a device a bit rate. Without --activate-ms it counts from the device's next start."""
+    rates = [rate for rate in BIT_RATES if rate]
+    rate = None if new == "auto" else int(new) if new.isdecimal() else 0
+    if rate is not None and rate not in rates:
+        raise typer.BadParameter(f"{new!r} is no bit rate of LSS: {', '.join(map(str, rates))} or auto")
+    line = choose_line(site, bus, interface, channel, bitrate)
+    service = lss_errand.set_bit_rate(_which(identity, only), rate, keep=keep, activate_ms=activate_ms)
+    _run(line, service, timeout_ms)
+    facts = {"ok": True, "bitrate": rate, "stored": keep, "active": activate_ms is not None}
+    _report(facts, f"{new} bit/s" if rate else "automatic bit rate", keep, as_json)
+
+
+@app.command()
+def store(
+    site: Site = None,
+    identity: Which = None,
+    only: Only = False,
+    bus: BusName = None,
+    interface: Interface = None,
+    channel: Channel = None,
+    bitrate: Bitrate = None,
+    timeout_ms: Timeout = 2000,
+    as_json: AsJson = False,
+) -> None:
+    """Have a device store its node id and bit rate."""
+    line = choose_line(site, bus, interface, channel, bitrate)
+    _run(line, lss_errand.keep_settings(_which(identity, only)), timeout_ms)
+    _report({"ok": True, "stored": True}, "node id and bit rate", True, as_json)
+
+
+def parse_identity(text: str) -> Identity:
+    """The four numbers of object 1018h, in hexadecimal with colons between them."""
+    matches = [_NUMBER.fullmatch(part) for part in text.split(":")]
+    if len(matches) != 4 or not all(matches):
+        raise typer.BadParameter(f"{text!r} is no identity: VENDOR:PRODUCT:REVISION:SERIAL in hexadecimal")
+    return Identity(*(int(match[1], 16) for match in matches if match))
+
+
+def identity_text(identity: Identity) -> str:
+    """As ``--identity`` takes it."""
+    return ":".join(f"{number:08X}" for number in identity)
+
+
+def _row(identity: Identity) -> tuple[str, ...]:
+    return (*(f"{number:08X}h" for number in identity), identity_text(identity))
+
+
+def _which(identity: str | None, only: bool) -> Identity | None:
+    """None is the only device there is. Raises BadParameter unless exactly one of the two is given."""
+    if only == (identity is not None):
+        raise typer.BadParameter("which device? Give --identity, or --only where there is no other")
+    return parse_identity(identity) if identity else None
+
+
+def _report(facts: Mapping[str, object], what: str, keep: bool, as_json: bool) -> None:
+    print(json.dumps(facts) if as_json else f"{what} {'stored' if keep else 'set, not stored'}")
+
+
+def _run(line: Line, service: Service[_T], timeout_ms: int) -> _T:
+    """Carry it out, with the present step on a terminal. Raises ``OperationFailed``."""
+
+    def make(now: float) -> LssErrand[_T]:
+        return LssErrand(service, now, timeout_ms / 1000)
+
+    if sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import Progress
+
+        with Progress(console=Console(stderr=True), transient=True) as progress:
+            task = progress.add_task("LSS", total=None)
+
+            def watch(errand: LssErrand[_T]) -> None:
+                progress.update(task, description=errand.step, completed=errand.steps % _QUESTIONS)
+
+            errand = carry_out(line, make, watch)
+    else:
+        errand = carry_out(line, make)
+    try:
+        return errand.result
+    except LssError as error:
+        raise OperationFailed(str(error)) from None

@@ -1,0 +1,183 @@
+"""``monitor``: what is said on a bus, in words. It listens and sends nothing."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, TextIO
+
+import typer
+
+from bridge import clock
+from bridge.cli.bus import (
+    AsJson,
+    Bitrate,
+    BusName,
+    Channel,
+    Interface,
+    carry_out,
+    choose_line,
+    print_table,
+    tell,
+)
+from bridge.southbound.bus.frame import EXTENDED, REMOTE, Frame
+from bridge.southbound.decode import Decoder, Kind, Meaning
+from bridge.southbound.statistics import Statistics
+
+_IDENTIFIER = 0x1FFF_FFFF
+
+
+class _Listener:
+    """An errand that only listens: decodes, filters, shows, and knows when it is enough."""
+
+    def __init__(
+        self,
+        decoder: Decoder,
+        wanted: Callable[[Meaning], bool],
+        show: Callable[[Frame, Meaning, float], None],
+        now: float,
+        count: int | None,
+        seconds: float | None,
+    ) -> None:
+        self.started = now
+        self.last = now
+        self._decoder = decoder
+        self._wanted = wanted
+        self._show = show
+        self._left = count
+        self._until = None if seconds is None else now + seconds
+
+    def is_finished(self, now: float) -> bool:
+        self.last = now
+        return self._left == 0 or (self._until is not None and now >= self._until)
+
+    def on_frame(self, frame: Frame) -> None:
+        # Also what is not shown is decoded: an answer needs the request before it.
+        meaning = self._decoder.decode(frame)
+        if self._left == 0 or not self._wanted(meaning):
+            return
+        self._show(frame, meaning, frame.time - self.started)
+        if self._left is not None:
+            self._left -= 1
+
+    def on_time(self, now: float) -> None:
+        """Nothing is due: the bus itself wakes us."""
+
+    def next_deadline(self) -> float | None:
+        return self._until
+
+    def take_frames(self) -> list[Frame]:
+        return []
+
+
+def monitor(
+    site: Annotated[Path | None, typer.Argument(metavar="[SITE]", help="the site file")] = None,
+    bus: BusName = None,
+    interface: Interface = None,
+    channel: Channel = None,
+    bitrate: Bitrate = None,
+    node: Annotated[list[str] | None, typer.Option(help="only this node; may be repeated")] = None,
+    kind: Annotated[list[Kind] | None, typer.Option(help="only this kind; may be repeated")] = None,
+    count: Annotated[int | None, typer.Option(min=1, help="end after so many frames")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.01, help="end after this time")] = None,
+    statistics: Annotated[bool, typer.Option("--statistics", help="count instead, by COB-ID")] = False,
+    log: Annotated[Path | None, typer.Option(help="write the frames to a file as candump -L does")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Decode what is said on a bus until Ctrl-C, --count or --seconds."""
+    line = choose_line(site, bus, interface, channel, bitrate)
+    ids = {line.node_id(text) for text in node or []}
+    kinds = set(kind or [])
+    decoder = Decoder(line.table.node, line.families, line.own_id)
+    tally = Statistics(line.table.bitrate)
+    record = log.open("w", encoding="ascii") if log else None
+
+    def wanted(meaning: Meaning) -> bool:
+        return (not ids or meaning.node in ids) and (not kinds or meaning.kind in kinds)
+
+    def show(frame: Frame, meaning: Meaning, at: float) -> None:
+        if record:
+            _write_candump(record, line.table.channel or "", frame)
+        if statistics:
+            tally.on_frame(frame, meaning.label)
+        elif as_json:
+            print(json.dumps(_for_scripts(frame, meaning, at)), flush=True)
+        else:
+            print(_for_people(frame, meaning, at), flush=True)
+
+    try:
+        listener = carry_out(line, lambda now: _Listener(decoder, wanted, show, now, count, seconds))
+    except BrokenPipeError:
+        sys.stderr.close()  # whoever read us has had enough, as `head` does
+        return
+    finally:
+        if record:
+            record.close()
+    if statistics:
+        _print_statistics(tally, listener.last - listener.started, as_json=as_json)
+
+
+def _cob_id(frame: Frame) -> str:
+    digits = 8 if frame.can_id & EXTENDED else 3
+    return f"{frame.can_id & _IDENTIFIER:0{digits}X}"
+
+
+def _for_people(frame: Frame, meaning: Meaning, at: float) -> str:
+    data = "remote" if frame.can_id & REMOTE else frame.data.hex(" ").upper()
+    return f"{at:12.6f}  {_cob_id(frame)}  {data:<23}  {meaning.label:<22}  {meaning.text}".rstrip()
+
+
+def _for_scripts(frame: Frame, meaning: Meaning, at: float) -> dict[str, object]:
+    return {
+        "time": round(at, 6),
+        "cob_id": _cob_id(frame),
+        "remote": bool(frame.can_id & REMOTE),
+        "data": frame.data.hex(),
+        "kind": meaning.kind,
+        "node": meaning.node or None,
+        "label": meaning.label,
+        "text": meaning.text,
+        "values": dict(meaning.values),
+    }
+
+
+def _write_candump(record: TextIO, channel: str, frame: Frame) -> None:
+    """One line of ``candump -L``: time since 1970, interface, frame."""
+    remote = bool(frame.can_id & REMOTE)
+    data = f"R{len(frame.data) or ''}" if remote else frame.data.hex().upper()
+    record.write(f"({clock.epoch_ns(frame.time) / 1e9:.6f}) {channel} {_cob_id(frame)}#{data}\n")
+
+
+def _print_statistics(tally: Statistics, seconds: float, *, as_json: bool) -> None:
+    counts = tally.counts()
+    if as_json:
+        rows = [
+            {
+                "cob_id": f"{count.can_id & _IDENTIFIER:03X}",
+                "remote": bool(count.can_id & REMOTE),
+                "label": count.label,
+                "frames": count.frames,
+                "frames_per_s": round(count.frames / seconds, 3) if seconds else 0,
+                "load_percent": round(tally.load_percent(count, seconds), 3),
+                "gap_ms": [round(1000 * gap, 3) for gap in (count.shortest_s, count.mean_s, count.longest_s)],
+            }
+            for count in counts
+        ]
+        print(json.dumps({"seconds": round(seconds, 3), "cob_ids": rows}, indent=2))
+        return
+    table: list[Sequence[str]] = [
+        ("COB-ID", "what", "frames", "frames/s", "load %", "gap ms: least", "mean", "most")
+    ]
+    for count in counts:
+        gaps = (f"{1000 * gap:.1f}" for gap in (count.shortest_s, count.mean_s, count.longest_s))
+        remote = " R" if count.can_id & REMOTE else ""
+        name = f"{count.can_id & _IDENTIFIER:03X}{remote}"
+        rate = count.frames / seconds if seconds else 0.0
+        load = tally.load_percent(count, seconds)
+        table.append((name, count.label, str(count.frames), f"{rate:.1f}", f"{load:.2f}", *gaps))
+    print_table(table)
+    total = sum(count.frames for count in counts)
+    load = sum(tally.load_percent(count, seconds) for count in counts)
+    tell(f"{total} frames in {seconds:.1f} s, {load:.1f} % of the bus")

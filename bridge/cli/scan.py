@@ -1,0 +1,123 @@
+"""``scan``: which nodes are on a bus."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridge.cli.bus import (
+    AsJson,
+    Bitrate,
+    BusName,
+    Channel,
+    Interface,
+    Line,
+    carry_out,
+    choose_line,
+    print_table,
+    tell,
+)
+from bridge.mapping import Family, family_names, load_family
+from bridge.mapping.match import Found, Match, best_match
+from bridge.southbound.scan import FoundNode, Scanner
+
+_PASSIVE_S = 3.0
+_ACTIVE_S = 0.5
+_COLUMNS = ("id", "name", "NMT state", "type", "vendor", "product", "revision", "serial", "mapping", "site")
+
+
+def scan(
+    site: Annotated[Path | None, typer.Argument(metavar="[SITE]", help="the site file")] = None,
+    bus: BusName = None,
+    interface: Interface = None,
+    channel: Channel = None,
+    bitrate: Bitrate = None,
+    passive: Annotated[bool, typer.Option("--passive", help="send nothing, only listen")] = False,
+    seconds: Annotated[
+        float | None, typer.Option(min=0.1, help="listen at least so long; 0.5, with --passive 3")
+    ] = None,
+    timeout_ms: Annotated[int, typer.Option(min=10, max=10_000, help="wait so long for each answer")] = 300,
+    as_json: AsJson = False,
+) -> None:
+    """List the nodes of a bus: by heartbeat, guarding and SDO."""
+    line = choose_line(site, bus, interface, channel, bitrate)
+    listen_s = seconds or (_PASSIVE_S if passive else _ACTIVE_S)
+    scanner = _run(line, passive=passive, listen_s=listen_s, timeout_s=timeout_ms / 1000)
+    families = {name: load_family(name) for name in family_names()}
+    found = [_row(node, line, families) for node in scanner.nodes() if node.id != line.own_id]
+    for phantom, owner in scanner.phantoms().items():
+        whose = "nobody confirms it" if owner is None else f"they are another SDO channel of node {owner}"
+        tell(f"answers for id {phantom} are no node: {whose}")
+    if as_json:
+        print(json.dumps([row.for_scripts() for row in found], indent=2))
+    else:
+        _print(found)
+
+
+def _run(line: Line, *, passive: bool, listen_s: float, timeout_s: float) -> Scanner:
+    def make(now: float) -> Scanner:
+        return Scanner(now, line.table.bitrate, passive=passive, listen_s=listen_s, timeout_s=timeout_s)
+
+    if passive or not sys.stderr.isatty():
+        tell(f"listening for {listen_s:g} s" if passive else "asking all 127 ids")
+        return carry_out(line, make)
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("asking all 127 ids", total=None)
+        return carry_out(line, make, lambda s: progress.update(task, total=s.total, completed=s.done))
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """One node of the list."""
+
+    node: FoundNode
+    match: Match | None
+    site_node: str | None
+
+    def for_scripts(self) -> dict[str, object]:
+        node = self.node
+        return {
+            "id": node.id,
+            "name": node.name,
+            "identity": {
+                "vendor": node.vendor,
+                "product": node.product,
+                "revision": node.revision,
+                "serial": node.serial,
+                "device_type": node.device_type,
+            },
+            "nmt_state": node.nmt_state.label,
+            "mapping": self.match.mapping if self.match else None,
+            "mapping_by": list(self.match.by) if self.match else [],
+            "site_node": self.site_node,
+        }
+
+    def for_people(self) -> tuple[str, ...]:
+        node = self.node
+        state = node.nmt_state.label.replace("_", " ")
+        numbers = (node.device_type, node.vendor, node.product, node.revision, node.serial)
+        by = f"{self.match.mapping} (by {', '.join(self.match.by)})" if self.match else "none"
+        shown = ("–" if number is None else f"{number:X}h" for number in numbers)
+        return (str(node.id), node.name or "–", state, *shown, by, self.site_node or "–")
+
+
+def _row(node: FoundNode, line: Line, families: dict[str, Family]) -> _Row:
+    found = Found(node.device_type, node.vendor, node.product, node.revision, node.name)
+    match = best_match(found, families)
+    site_node = next((table.name for table in line.table.node if table.id == node.id), None)
+    return _Row(node, match, site_node)
+
+
+def _print(found: list[_Row]) -> None:
+    if not found:
+        print("no nodes")
+        return
+    print_table([_COLUMNS, *(row.for_people() for row in found)])

@@ -1,0 +1,212 @@
+"""``sdo read`` and ``sdo write``: one object of one node."""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+import sys
+from contextlib import AbstractContextManager, nullcontext
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from bridge.cli.bus import (
+    AsJson,
+    Bitrate,
+    BusName,
+    Channel,
+    Interface,
+    Line,
+    carry_out,
+    choose_line,
+    split_site,
+)
+from bridge.errors import OperationFailed
+from bridge.southbound.canopen.sdo import SdoError
+from bridge.southbound.decode_sdo import shown
+from bridge.southbound.errand import SdoErrand
+
+app = typer.Typer(help="Read or write an object of a node.", no_args_is_help=True)
+
+_OBJECT = re.compile(r"(?:0x)?([0-9a-f]{1,4})h?(?::(?:0x)?([0-9a-f]{1,2})h?)?", re.IGNORECASE)
+_READ_USAGE = "drivebridge sdo read [SITE] NODE INDEX[:SUB]"
+_WRITE_USAGE = "drivebridge sdo write [SITE] NODE INDEX[:SUB] VALUE --type TYPE"
+
+
+class ValueType(StrEnum):
+    """Little-endian on the wire, all of them (CiA 301 §7.1.4)."""
+
+    BOOL = "bool"
+    UINT8 = "uint8"
+    UINT16 = "uint16"
+    UINT32 = "uint32"
+    UINT64 = "uint64"
+    INT8 = "int8"
+    INT16 = "int16"
+    INT32 = "int32"
+    INT64 = "int64"
+    FLOAT = "float"
+    DOUBLE = "double"
+    STRING = "string"
+    BYTES = "bytes"
+
+
+_STRUCTS = {
+    ValueType.BOOL: "<?",
+    ValueType.UINT8: "<B",
+    ValueType.UINT16: "<H",
+    ValueType.UINT32: "<I",
+    ValueType.UINT64: "<Q",
+    ValueType.INT8: "<b",
+    ValueType.INT16: "<h",
+    ValueType.INT32: "<i",
+    ValueType.INT64: "<q",
+    ValueType.FLOAT: "<f",
+    ValueType.DOUBLE: "<d",
+}
+
+Timeout = Annotated[
+    int | None, typer.Option(min=10, max=60_000, help="wait so long for each answer; 500, or the site's")
+]
+
+
+@app.command()
+def read(
+    what: Annotated[list[str], typer.Argument(metavar="[SITE] NODE INDEX[:SUB]")],
+    kind: Annotated[ValueType | None, typer.Option("--type", help="how to take the bytes")] = None,
+    bus: BusName = None,
+    interface: Interface = None,
+    channel: Channel = None,
+    bitrate: Bitrate = None,
+    timeout_ms: Timeout = None,
+    as_json: AsJson = False,
+) -> None:
+    """Read an object. INDEX and SUB are hexadecimal; SUB is 0 where it is left out."""
+    site, (node, name) = split_site(what, 2, _READ_USAGE)
+    line = choose_line(site, bus, interface, channel, bitrate)
+    index, sub = parse_object(name)
+    data = _transfer(line, line.node_id(node), index, sub, None, timeout_ms, as_json=as_json)
+    try:
+        value = None if kind is None else decode(kind, data)
+    except ValueError as error:
+        raise OperationFailed(f"{index:04X}h:{sub:02X}: {error}") from None
+    if as_json:
+        facts = {"node": line.node_id(node), "index": f"{index:04X}", "sub": sub, "data": data.hex()}
+        print(json.dumps({"ok": True} | facts | {"type": kind, "value": value}))
+        return
+    print(shown(data) if value is None else value)
+
+
+@app.command(context_settings={"ignore_unknown_options": True})
+def write(
+    what: Annotated[list[str], typer.Argument(metavar="[SITE] NODE INDEX[:SUB] VALUE")],
+    kind: Annotated[ValueType, typer.Option("--type", help="how to send the value")],
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask")] = False,
+    bus: BusName = None,
+    interface: Interface = None,
+    channel: Channel = None,
+    bitrate: Bitrate = None,
+    timeout_ms: Timeout = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write an object. On a terminal it asks first: a drive may move, and many keep it in EEPROM."""
+    site, (node, name, text) = split_site(what, 3, _WRITE_USAGE)
+    line = choose_line(site, bus, interface, channel, bitrate)
+    index, sub = parse_object(name)
+    node_id = line.node_id(node)
+    try:
+        data = encode(kind, text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+    where = f"{index:04X}h:{sub:02X} of node {node_id}"
+    if not yes and sys.stdin.isatty() and not typer.confirm(f"write {text} to {where}?", err=True):
+        raise OperationFailed("nothing written")
+    _transfer(line, node_id, index, sub, data, timeout_ms, as_json=as_json)
+    if as_json:
+        facts = {"node": node_id, "index": f"{index:04X}", "sub": sub, "data": data.hex()}
+        print(json.dumps({"ok": True} | facts))
+        return
+    print(f"{where} written: {text}")
+
+
+def parse_object(text: str) -> tuple[int, int]:
+    """Index and sub-index of ``1018:01``, ``1018h`` or ``0x1018:1``."""
+    match = _OBJECT.fullmatch(text)
+    if not match:
+        raise typer.BadParameter(f"{text!r} is no object: INDEX[:SUB] in hexadecimal, such as 1018:01")
+    return int(match[1], 16), int(match[2] or "0", 16)
+
+
+def encode(kind: ValueType, text: str) -> bytes:
+    """The bytes of a value. Raises ValueError with the sentence that says what is wrong."""
+    try:
+        match kind:
+            case ValueType.STRING:
+                return text.encode("latin-1")
+            case ValueType.BYTES:
+                return bytes.fromhex(text)
+            case ValueType.BOOL:
+                return struct.pack("<?", {"0": False, "1": True, "false": False, "true": True}[text.lower()])
+            case ValueType.FLOAT | ValueType.DOUBLE:
+                return struct.pack(_STRUCTS[kind], float(text))
+            case _:
+                return struct.pack(_STRUCTS[kind], int(text, 0))
+    except (ValueError, KeyError, OverflowError, struct.error):
+        raise ValueError(f"{text!r} is no {kind} value") from None
+
+
+def decode(kind: ValueType, data: bytes) -> int | float | str | bool:
+    """The value of these bytes. Raises ValueError where the node has sent another length."""
+    if kind is ValueType.STRING:
+        return data.split(b"\0", 1)[0].decode("latin-1")
+    if kind is ValueType.BYTES:
+        return data.hex(" ").upper()
+    form = struct.Struct(_STRUCTS[kind])
+    if len(data) != form.size:
+        raise ValueError(f"{kind} has {form.size} bytes, the node sent {len(data)}: {data.hex(' ').upper()}")
+    return form.unpack(data)[0]
+
+
+def _transfer(
+    line: Line,
+    node_id: int,
+    index: int,
+    sub: int,
+    data: bytes | None,
+    timeout_ms: int | None,
+    *,
+    as_json: bool,
+) -> bytes:
+    """Do it. Raises ``OperationFailed`` with the abort text where the node refuses or is silent."""
+    timeout_s = line.sdo_timeout_s if timeout_ms is None else timeout_ms / 1000
+    with _spinner(f"{index:04X}h:{sub:02X} of node {node_id}"):
+        errand = carry_out(line, lambda now: SdoErrand(node_id, index, sub, data, now, timeout_s))
+    if isinstance(errand.result, bytes):
+        return errand.result
+    if errand.result is None:
+        raise OperationFailed("interrupted")
+    if as_json:
+        print(json.dumps(_failure(node_id, errand.result)))
+    raise OperationFailed(f"node {node_id}: {errand.result}")
+
+
+def _failure(node_id: int, error: SdoError) -> dict[str, object]:
+    return {
+        "ok": False,
+        "node": node_id,
+        "index": f"{error.index:04X}",
+        "sub": error.sub,
+        "abort_code": f"{error.code:08X}",
+        "message": str(error),
+    }
+
+
+def _spinner(text: str) -> AbstractContextManager[object]:
+    """Says on a terminal what is being done."""
+    if not sys.stderr.isatty():
+        return nullcontext()
+    from rich.console import Console
+
+    return Console(stderr=True).status(text)

@@ -1,0 +1,63 @@
+"""What a DCF or XDC configures, as a list of SDO downloads."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.config.download import Download
+from bridge.eds.model import Description, Entry, Report
+from bridge.eds.values import BadValue, encode
+
+_COMMANDS: Final = (0x1010, 0x1011)
+"""Store and restore: writing them is a command, not a setting."""
+_COMMUNICATION: Final = range(0x1000, 0x2000)
+_MAPPINGS: Final = (range(0x1600, 0x1800), range(0x1A00, 0x1C00))
+
+
+def configuration(
+    description: Description, node_id: int | None = None, report: Report | None = None
+) -> tuple[Download, ...]:
+    """What has to be written to a node with factory settings, in this order: application objects, then
+    communication objects; of a mapping sub 0 last. Only what can be written, has a ParameterValue and
+    differs from its default. Switching PDOs off and on around it is the boot-up's (CiA 301 §7.5.2.36).
+
+    ``node_id`` stands for $NODEID; left out, that of the file. What cannot be encoded is reported.
+    """
+    if node_id is None:
+        node_id = description.commissioning.node_id
+    found: list[Download] = []
+    for one in description.objects:
+        for entry in one.entries:
+            data = _data(entry, node_id, report or Report())
+            if data is not None:
+                found.append(Download(entry.index, entry.sub, data, entry.access.readable))
+    return tuple(sorted(found, key=_order))
+
+
+def _order(download: Download) -> tuple[bool, int, int]:
+    is_mapping = any(download.index in indices for indices in _MAPPINGS)
+    last = is_mapping and download.sub == 0
+    return (download.index in _COMMUNICATION, download.index, 0x100 if last else download.sub)
+
+
+def _data(entry: Entry, node_id: int | None, report: Report) -> bytes | None:
+    value = entry.parameter_value
+    if value is None or value == entry.default or not entry.access.writable:
+        return None
+    if entry.refuses_download or entry.index in _COMMANDS:
+        return None
+    where = f"{entry.index:04X}h:{entry.sub:02X}"
+    plain = value.at(node_id)
+    if plain is None:
+        report.error(entry.line, f"{where} needs the node id, and none is given: not configured")
+        return None
+    if entry.data_type is None:
+        report.error(entry.line, f"{where} has no known data type: not configured")
+        return None
+    if entry.default and entry.default.at(node_id) == plain:
+        return None
+    try:
+        return encode(plain, entry.data_type)
+    except BadValue as error:
+        report.error(entry.line, f"{where}: {error}: not configured")
+        return None

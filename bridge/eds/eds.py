@@ -1,0 +1,139 @@
+"""EDS and DCF (CiA 306) into a ``Description``."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+from bridge.eds.fields import Fields
+from bridge.eds.ini import Section, read_sections, shown
+from bridge.eds.model import Commissioning, Description, Device, Object, Report
+from bridge.eds.objects import ObjectReader
+from bridge.eds.pdos import add_compact_pdos
+from bridge.eds.text import lines
+
+_INDEX: Final = re.compile(r"(?:0x)?([0-9a-f]{1,4})")
+_SUB: Final = re.compile(r"(?:0x)?([0-9a-f]{1,4})sub(?:0x)?([0-9a-f]{1,2})")
+_TABLE: Final = re.compile(r"(?:0x)?([0-9a-f]{1,4})(name|value)")
+_FIRST_OBJECT: Final = 0x1000
+"""Below it stand data types, which are no objects of the device."""
+_LISTS: Final = ("MandatoryObjects", "OptionalObjects", "ManufacturerObjects")
+_KBIT_S: Final = (10, 20, 50, 100, 125, 250, 500, 800, 1000)
+_COMMISSIONING: Final = ("devicecomissioning", "devicecommissioning")
+"""CiA 306 spells it with one m; tools spell it right."""
+
+
+def read_eds(text: str, report: Report) -> Description:
+    """Everything that can be read of ``text``. What cannot is in the report."""
+    sections = read_sections(lines(text), report)
+    reader = _EdsReader(sections, report)
+    objects = reader.objects()
+    commissioning = reader.commissioning()
+    return Description(
+        format=reader.format(objects),
+        device=reader.device(),
+        commissioning=commissioning,
+        objects=tuple(objects[index] for index in sorted(objects)),
+    )
+
+
+class _EdsReader:
+    def __init__(self, sections: dict[str, Section], report: Report) -> None:
+        self._sections = sections
+        self._report = report
+        self._fields = Fields(report)
+        self._roots: dict[int, Section] = {}
+        self._subs: dict[int, dict[int, Section]] = {}
+        self._tables: dict[tuple[int, str], Section] = {}
+        self._sort()
+
+    def _sort(self) -> None:
+        for key, section in self._sections.items():
+            if match := _INDEX.fullmatch(key):
+                self._once(self._roots, int(match[1], 16), section)
+            elif match := _SUB.fullmatch(key):
+                self._once(self._subs.setdefault(int(match[1], 16), {}), int(match[2], 16), section)
+            elif match := _TABLE.fullmatch(key):
+                self._tables[int(match[1], 16), match[2]] = section
+
+    def _once(self, place: dict[int, Section], number: int, section: Section) -> None:
+        """[1018sub1] and [1018sub01] are one."""
+        first = place.setdefault(number, section)
+        if first is not section:
+            self._report.error(
+                section.line, f"[{shown(section.name)}] is [{shown(first.name)}] again: left out"
+            )
+
+    def format(self, objects: dict[int, Object]) -> str:
+        configured = any(e.parameter_value is not None for o in objects.values() for e in o.entries)
+        return "DCF" if configured or any(name in self._sections for name in _COMMISSIONING) else "EDS"
+
+    def device(self) -> Device:
+        section = self._sections.get("deviceinfo")
+        if section is None:
+            self._report.warning(0, "there is no [DeviceInfo]: the device is not named")
+            return Device()
+        fields = self._fields
+        return Device(
+            vendor=section.text("VendorName"),
+            vendor_id=fields.number(section, "VendorNumber"),
+            product=section.text("ProductName"),
+            product_code=fields.number(section, "ProductNumber"),
+            revision=fields.number(section, "RevisionNumber"),
+            order_code=section.text("OrderCode"),
+            bitrates=tuple(1000 * rate for rate in _KBIT_S if fields.flag(section, f"BaudRate_{rate}")),
+        )
+
+    def commissioning(self) -> Commissioning:
+        found = [self._sections[name] for name in _COMMISSIONING if name in self._sections]
+        if not found:
+            return Commissioning()
+        kbit_s = self._fields.number(found[0], "Baudrate", 0, 1000)
+        return Commissioning(
+            node_id=self._fields.number(found[0], "NodeID", 1, 127),
+            node_name=found[0].text("NodeName"),
+            bitrate=1000 * kbit_s if kbit_s else None,
+        )
+
+    def objects(self) -> dict[int, Object]:
+        reader = ObjectReader(self._fields, self._report, self._roots, self._subs, self._tables)
+        for index in sorted(set(self._subs) - set(self._roots)):
+            line = min(section.line for section in self._subs[index].values())
+            self._report.warning(line, f"there are sub-indices of {index:04X}h and no [{index:04X}]")
+            self._roots[index] = Section(f"{index:04X}", line)
+        found = {index: reader.read(index) for index in sorted(self._roots) if index >= _FIRST_OBJECT}
+        info = self._sections.get("deviceinfo")
+        if info:
+            add_compact_pdos(info, found, self._fields, self._report)
+        self._check_lists(found)
+        return found
+
+    def _check_lists(self, found: dict[int, Object]) -> None:
+        """The lists of objects against the objects themselves; the objects count."""
+        listed: dict[int, int] = {}
+        for name in _LISTS:
+            section = self._sections.get(name.lower())
+            if section is None:
+                continue
+            values = list(section.numbered())
+            for number, text in values:
+                index = self._fields.whole(text, f"[{name}] {number}")
+                if index is None:
+                    continue
+                if index in listed:
+                    self._report.warning(
+                        text.line, f"{index:04X}h is listed again, first in line {listed[index]}"
+                    )
+                listed.setdefault(index, text.line)
+                if index not in found:
+                    self._report.error(text.line, f"{index:04X}h is listed and not described")
+            count = self._fields.number(section, "SupportedObjects", 0, 0xFFFF)
+            if count is not None and count != len(values):
+                self._report.warning(
+                    section.line, f"[{name}] says {count} objects and lists {len(values)}: the list counts"
+                )
+        for index in found:
+            if index in self._roots and index not in listed:
+                self._report.warning(
+                    self._roots[index].line, f"{index:04X}h is described and not listed: taken"
+                )

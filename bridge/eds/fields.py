@@ -1,0 +1,89 @@
+"""Reads single fields of a section: a wrong one is reported and left out, never raised."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.eds.ini import Section, Text, shown
+from bridge.eds.model import Access, DataType, Report, Value
+from bridge.eds.values import BadValue, integer, value
+
+_ACCESS: Final = {
+    "readonly": Access.RO,
+    "r": Access.RO,
+    "writeonly": Access.WO,
+    "w": Access.WO,
+    "readwrite": Access.RW,
+    "wr": Access.RW,
+    "rwrw": Access.RW,
+    "constant": Access.CONST,
+}
+"""Words that are not in the standard and yet in files."""
+
+
+class Fields:
+    """The fields of one file."""
+
+    def __init__(self, report: Report) -> None:
+        self._report = report
+
+    def number(self, section: Section, name: str, low: int = 0, high: int = 0xFFFF_FFFF) -> int | None:
+        """A whole number from ``low`` to ``high``, or None where there is none."""
+        found = section.get(name)
+        if found is None:
+            return None
+        number = self.whole(found, name)
+        if number is not None and not low <= number <= high:
+            self._report.error(found.line, f"{name}={shown(found.text)} is not within {low}…{high}: left out")
+            return None
+        return number
+
+    def whole(self, found: Text, name: str) -> int | None:
+        try:
+            number, note = integer(found.text)
+        except BadValue as error:
+            self._report.error(found.line, f"{name}: {error}: left out")
+            return None
+        if note:
+            self._report.warning(found.line, f"{name}: {note}")
+        return number
+
+    def flag(self, section: Section, name: str) -> bool:
+        """0 or 1; anything else that is not 0 is taken as 1."""
+        found = section.get(name)
+        if found is None:
+            return False
+        if found.text.lower() in ("true", "false", "yes", "no"):
+            self._report.warning(found.line, f"{name}={shown(found.text)} should be 1 or 0")
+            return found.text.lower() in ("true", "yes")
+        number = self.whole(found, name)
+        if number not in (None, 0, 1):
+            self._report.warning(found.line, f"{name}={shown(found.text)} is taken as 1")
+        return bool(number)
+
+    def value(self, section: Section, name: str, data_type: DataType | None) -> Value | None:
+        found = section.get(name)
+        return None if found is None else self.value_of(found, name, data_type)
+
+    def value_of(self, found: Text, name: str, data_type: DataType | None) -> Value | None:
+        try:
+            one, note = value(found.text, data_type)
+        except BadValue as error:
+            self._report.error(found.line, f"{name}: {error}: left out")
+            return None
+        if note:
+            self._report.warning(found.line, f"{name}: {note}")
+        return one
+
+    def access(self, found: Text | None, default: Access, line: int, whose: str) -> Access:
+        """The access; ``default`` where there is none or an unknown one, and that is reported."""
+        if found is None:
+            self._report.warning(line, f"{whose} has no AccessType: taken as {default}")
+            return default
+        word = found.text.lower()
+        if word in {one.value for one in Access}:
+            return Access(word)
+        known = _ACCESS.get(word.replace("_", "").replace("-", "").replace(" ", ""))
+        taken = known or default
+        self._report.warning(found.line, f"AccessType={shown(found.text)} is taken as {taken}")
+        return taken

@@ -1,0 +1,133 @@
+"""Sections and keys of an EDS, each with its line (CiA 306 §4.2), from text that need not be well formed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridge.eds.model import Report
+
+_SPELLING: Final = {
+    name.lower(): name
+    for name in (
+        *("ParameterName", "ObjectType", "DataType", "AccessType", "DefaultValue", "PDOMapping"),
+        *("SubNumber", "LowLimit", "HighLimit", "ParameterValue", "ObjFlags", "CompactSubObj"),
+        *("SupportedObjects", "NrOfEntries", "Denotation"),
+        *("VendorName", "VendorNumber", "ProductName", "ProductNumber", "RevisionNumber", "OrderCode"),
+        *("CompactPDO", "NodeID", "NodeName", "Baudrate"),
+    )
+}
+"""Keys as CiA 306 writes them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A value as it stands in the file."""
+
+    text: str
+    line: int
+
+
+@dataclass(slots=True)
+class Section:
+    """``name`` as it is written; ``keys`` in lower case, in the order of the file."""
+
+    name: str
+    line: int
+    keys: dict[str, Text] = field(default_factory=dict[str, Text])
+
+    def get(self, name: str) -> Text | None:
+        """The value of ``name``, or None where it is not there or empty."""
+        found = self.keys.get(name.lower())
+        return found if found and found.text else None
+
+    def text(self, name: str) -> str:
+        found = self.keys.get(name.lower())
+        return found.text if found else ""
+
+    def numbered(self) -> Iterator[tuple[int, Text]]:
+        """The keys that are plain numbers, with their values."""
+        for key, value in self.keys.items():
+            if key.isascii() and key.isdigit() and len(key) <= 4:
+                yield int(key), value
+
+
+def read_sections(lines: Iterable[str], report: Report) -> dict[str, Section]:
+    """Sections by their name in lower case without blanks."""
+    return _Reader(report).read(lines)
+
+
+class _Reader:
+    def __init__(self, report: Report) -> None:
+        self._report = report
+        self._sections: dict[str, Section] = {}
+        self._section: Section | None = None
+        self._other_spelling: list[tuple[int, str]] = []
+
+    def read(self, lines: Iterable[str]) -> dict[str, Section]:
+        for number, line in enumerate(lines, start=1):
+            line = line.strip(" \t\0\x1a\ufeff")  # 1Ah ended files of old editors
+            if line and line[0] not in ";#":
+                self._line(line, number)
+        if self._other_spelling:
+            number, key = self._other_spelling[0]
+            count = len(self._other_spelling)
+            self._report.warning(
+                number,
+                f"{count} key{'s are' if count > 1 else ' is'} not spelt as CiA 306 has it, "
+                f"such as {key}: taken as {_SPELLING[key.lower()]}",
+            )
+        return self._sections
+
+    def _line(self, line: str, number: int) -> None:
+        if line.startswith("["):
+            self._header(line, number)
+            return
+        key, equals, value = line.partition("=")
+        key = key.strip()
+        if not equals or not key:
+            self._report.error(number, f"is neither a section nor a key: {shown(line)}")
+        elif self._section is None:
+            self._report.error(number, f"{shown(key)} stands before the first section")
+        else:
+            self._assign(self._section, key, value.strip(), number)
+
+    def _header(self, line: str, number: int) -> None:
+        name, bracket, rest = line[1:].partition("]")
+        if not bracket:
+            self._report.warning(number, f"{shown(line)} has no closing bracket: taken as a section")
+        elif rest.strip() and rest.strip()[0] not in ";#":
+            self._report.warning(number, f"{shown(rest.strip())} after the section's name is ignored")
+        name = re.sub(r"\s+", "", name)
+        key = name.lower()
+        first = self._sections.get(key)
+        if first:
+            self._report.warning(
+                number, f"section [{shown(name)}] is there again, first in line {first.line}: joined"
+            )
+        else:
+            self._sections[key] = Section(name, number)
+        self._section = self._sections[key]
+
+    def _assign(self, section: Section, key: str, value: str, number: int) -> None:
+        name = key.lower()
+        if name in _SPELLING and key != _SPELLING[name]:
+            self._other_spelling.append((number, key))
+        first = section.keys.get(name)
+        if first and first.text:
+            where = f"{shown(key)} is there again in [{shown(section.name)}], first in line {first.line}"
+            if value in (first.text, ""):
+                self._report.warning(number, f"{where}, and says the same")
+            else:
+                # As Windows reads such files, on which these tools grew up.
+                self._report.error(number, f"{where}: {shown(first.text)} counts, not {shown(value)}")
+            return
+        section.keys[name] = Text(value, number)
+
+
+def shown(text: str) -> str:
+    """``text`` in a message: short, and without characters that disturb a terminal."""
+    clean = "".join(char if char.isprintable() else "�" for char in text[:60])
+    return clean + ("…" if len(text) > 60 else "")

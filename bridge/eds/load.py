@@ -1,0 +1,76 @@
+"""Opens a device description of any format."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from bridge.config.download import Download, parse_concise_dcf
+from bridge.eds.configuration import configuration
+from bridge.eds.eds import read_eds
+from bridge.eds.model import Description, Report, Severity
+from bridge.eds.text import decode
+from bridge.eds.xdd import read_xdd
+from bridge.errors import Fault, FileFaults
+
+CONCISE_SUFFIXES: Final = (".cdcf", ".concise", ".bin")
+_MOST_BYTES: Final = 16 << 20
+_XML_STARTS: Final = (b"<", b"\xef\xbb\xbf<", b"\xff\xfe<", b"\xfe\xff\0<")
+
+
+def read_device_file(path: Path) -> Description:
+    """The description in ``path``, with its oddities in ``findings``.
+
+    Raises ``FileFaults`` where it cannot be opened or is no device description.
+    """
+    return read_device(contents(path), str(path))
+
+
+def read_device(content: bytes, name: str) -> Description:
+    """As ``read_device_file``, of a file's content; ``name`` is for messages."""
+    report = Report()
+    is_xml = content.lstrip(b" \t\r\n").startswith(_XML_STARTS)
+    description = read_xdd(content, report) if is_xml else read_eds(decode(content, report), report)
+    findings = report.findings()
+    if not description.objects:
+        first = next((one for one in findings if one.severity is Severity.ERROR), None)
+        line, why = (first.line, f": {first.text}") if first else (0, "")
+        message = f"is not a device description: no object is described in it{why}"
+        raise FileFaults([Fault(name, line, "", message, "an EDS, DCF, XDD or XDC")])
+    return replace(description, findings=findings)
+
+
+def contents(path: Path) -> bytes:
+    """The bytes of ``path``. Raises ``FileFaults``."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(_MOST_BYTES + 1)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise FileFaults([Fault(str(path), 0, "", f"cannot be read: {why}")]) from error
+    if len(content) > _MOST_BYTES:
+        raise FileFaults([Fault(str(path), 0, "", f"has more than {_MOST_BYTES >> 20} MiB")])
+    return content
+
+
+def read_configuration(path: Path, node_id: int | None = None) -> tuple[Download, ...]:
+    """The downloads of a DCF, XDC or concise DCF for the node ``node_id``.
+
+    Raises ``FileFaults`` where the file cannot be read, and where a part of it cannot: half a
+    configuration is none.
+    """
+    content = contents(path)
+    if path.suffix.lower() in CONCISE_SUFFIXES:
+        try:
+            return parse_concise_dcf(content)
+        except ValueError as error:
+            raise FileFaults([Fault(str(path), 0, "", str(error))]) from error
+    report = Report()
+    description = read_device(content, str(path))
+    downloads = configuration(description, node_id, report)
+    findings = (*description.findings, *report.findings())
+    faults = [Fault(str(path), one.line, "", one.text) for one in findings if one.severity is Severity.ERROR]
+    if faults:
+        raise FileFaults(faults)
+    return downloads

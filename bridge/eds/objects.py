@@ -1,0 +1,207 @@
+"""One object of an EDS with its sub-indices (CiA 306 §4.6.3)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.eds.fields import Fields
+from bridge.eds.ini import Section, Text
+from bridge.eds.model import Access, DataType, Entry, Object, ObjectType, Report, Value
+
+_MOST_SUBS: Final = 254
+_REFUSES_DOWNLOAD: Final = 1
+_LONGEST_TYPE: Final = 0x1B
+_MOST_COMPACT: Final = 100_000
+"""Entries that CompactSubObj may make of one file: few lines can ask for millions."""
+
+
+class ObjectReader:
+    """Builds objects from the sections of a file; ``roots`` and ``subs`` are by index and sub-index."""
+
+    def __init__(
+        self,
+        fields: Fields,
+        report: Report,
+        roots: dict[int, Section],
+        subs: dict[int, dict[int, Section]],
+        tables: dict[tuple[int, str], Section],
+    ) -> None:
+        self._fields = fields
+        self._report = report
+        self._roots = roots
+        self._subs = subs
+        self._tables = tables
+        self._compact_left = _MOST_COMPACT
+
+    def read(self, index: int) -> Object:
+        root = self._roots[index]
+        subs = self._subs.get(index, {})
+        name = root.text("ParameterName")
+        if not name:
+            self._report.warning(root.line, f"{index:04X}h has no ParameterName")
+            name = f"{index:04X}h"
+        compact = self._fields.number(root, "CompactSubObj", 0, _MOST_SUBS) or 0
+        if compact > self._compact_left:
+            self._report.error(root.line, f"{index:04X}h: too many compact sub-indices in one file: left out")
+            compact = 0
+        self._compact_left -= compact
+        kind = self._object_type(index, root, bool(subs or compact))
+        if not kind.has_subs:
+            return Object(index, name, kind, (self._entry(root, index, 0, name, Access.RW),))
+        entries = self._compact(index, root, name, compact) if compact else {}
+        fallback = self._element_type(root, subs)
+        for sub in sorted(subs):
+            entries[sub] = self._sub(index, sub, subs[sub], fallback)
+        count = self._fields.number(root, "SubNumber", 0, 255)
+        if count is not None and not compact and count != len(subs):
+            self._report.warning(
+                root.line,
+                f"{index:04X}h says {count} sub-indices and has {len(subs)}: those that are there count",
+            )
+        if not entries:
+            self._report.error(root.line, f"{index:04X}h has no sub-indices")
+        elif 0 not in entries:
+            self._report.warning(root.line, f"{index:04X}h has no sub-index 0: made from the highest one")
+            entries[0] = _count_entry(index, max(entries), root.line)
+        return Object(index, name, kind, tuple(entries[sub] for sub in sorted(entries)))
+
+    def _object_type(self, index: int, root: Section, has_subs: bool) -> ObjectType:
+        """VAR where it is missing (CiA 306 §4.6.3.2), unless there are sub-indices."""
+        likely = ObjectType.RECORD if has_subs else ObjectType.VAR
+        code = self._fields.number(root, "ObjectType")
+        if code is None:
+            if has_subs:
+                self._report.warning(root.line, f"{index:04X}h has sub-indices and no ObjectType: a record")
+            return likely
+        known = code in {int(kind) for kind in ObjectType}
+        kind = ObjectType(code) if known else likely
+        if not known:
+            self._report.warning(
+                root.line, f"{index:04X}h: ObjectType {code} is unknown: taken as {likely.name}"
+            )
+        elif has_subs and not kind.has_subs:
+            self._report.warning(
+                root.line, f"{index:04X}h is a {kind.name} with sub-indices: taken as a record"
+            )
+            return likely
+        return kind
+
+    def _element_type(self, root: Section, subs: dict[int, Section]) -> Text | None:
+        """What the elements of an array are, for those that do not say."""
+        return root.get("DataType") or (subs[1].get("DataType") if 1 in subs else None)
+
+    def _sub(self, index: int, sub: int, section: Section, fallback: Text | None) -> Entry:
+        name = section.text("ParameterName")
+        if not name:
+            self._report.warning(section.line, f"{index:04X}h:{sub:02X} has no ParameterName")
+            name = f"{index:04X}h:{sub:02X}"
+        access = Access.RW if sub else Access.RO
+        return self._entry(section, index, sub, name, access, fallback)
+
+    def _entry(
+        self,
+        section: Section,
+        index: int,
+        sub: int,
+        name: str,
+        access: Access,
+        fallback: Text | None = None,
+    ) -> Entry:
+        fields = self._fields
+        whose = f"{index:04X}h:{sub:02X}" if sub or section.name.lower().find("sub") > 0 else f"{index:04X}h"
+        data_type = self._data_type(section, whose, sub, fallback)
+        if section.get("DownloadFile"):
+            self._report.warning(section.line, f"{whose}: the file that DownloadFile names is not read")
+        return Entry(
+            index,
+            sub,
+            name,
+            data_type,
+            fields.access(section.get("AccessType"), access, section.line, whose),
+            default=fields.value(section, "DefaultValue", data_type),
+            parameter_value=fields.value(section, "ParameterValue", data_type),
+            low=fields.value(section, "LowLimit", data_type),
+            high=fields.value(section, "HighLimit", data_type),
+            pdo_mappable=fields.flag(section, "PDOMapping"),
+            refuses_download=bool((fields.number(section, "ObjFlags") or 0) & _REFUSES_DOWNLOAD),
+            line=section.line,
+        )
+
+    def _data_type(self, section: Section, whose: str, sub: int, fallback: Text | None) -> DataType | None:
+        found = section.get("DataType")
+        if found is None:
+            if section.get("ObjectType") and self._fields.number(section, "ObjectType") == ObjectType.DOMAIN:
+                return DataType.DOMAIN
+            if sub == 0 and "sub" in section.name.lower():
+                self._report.warning(section.line, f"{whose} has no DataType: taken as UNSIGNED8")
+                return DataType.UNSIGNED8
+            if fallback is None:
+                self._report.error(section.line, f"{whose} has no DataType: its length is not known")
+                return None
+        text = found or fallback
+        code = self._fields.whole(text, "DataType") if text else None
+        code = self._named_type(code)
+        if code is not None and code in {int(one) for one in DataType}:
+            data_type = DataType(code)
+            if found is None:
+                self._report.warning(
+                    section.line, f"{whose} has no DataType: taken as {data_type.name} like the others"
+                )
+            return data_type
+        if code is not None and text:
+            self._report.error(text.line, f"{whose}: DataType 0x{code:X} is not known, nor its length")
+        return None
+
+    def _named_type(self, code: int | None) -> int | None:
+        """A type that the file itself describes, as CANFestival writes limited ones: [A0] with [A0sub1]."""
+        if code is None or code <= _LONGEST_TYPE or code not in self._subs:
+            return code
+        base = self._subs[code].get(1)
+        return self._fields.number(base, "DefaultValue") if base else code
+
+    def _compact(self, index: int, root: Section, name: str, count: int) -> dict[int, Entry]:
+        """Sub-indices that are not written out (CiA 306 §4.6.3.3), with their names and values."""
+        names, values = self._tables.get((index, "name")), self._tables.get((index, "value"))
+        element = self._entry(root, index, 1, name, Access.RW)
+        entries = {0: _count_entry(index, count, root.line)}
+        named = dict(names.numbered()) if names else {}
+        given = dict(values.numbered()) if values else {}
+        for table, kind in ((named, "Name"), (given, "Value")):
+            for sub, text in table.items():
+                if not 1 <= sub <= count:
+                    self._report.warning(
+                        text.line, f"[{index:04X}{kind}] {sub} is beyond CompactSubObj={count}"
+                    )
+        for sub in range(1, count + 1):
+            own = (
+                self._fields.value_of(given[sub], f"[{index:04X}Value] {sub}", element.data_type)
+                if sub in given
+                else None
+            )
+            entries[sub] = Entry(
+                index,
+                sub,
+                named[sub].text if sub in named else f"{name}{sub}",
+                element.data_type,
+                element.access,
+                default=element.default,
+                parameter_value=own or element.parameter_value,
+                low=element.low,
+                high=element.high,
+                pdo_mappable=element.pdo_mappable,
+                refuses_download=element.refuses_download,
+                line=root.line,
+            )
+        return entries
+
+
+def _count_entry(index: int, highest: int, line: int) -> Entry:
+    return Entry(
+        index,
+        0,
+        "Highest sub-index supported",
+        DataType.UNSIGNED8,
+        Access.RO,
+        default=Value(highest),
+        line=line,
+    )

@@ -1,0 +1,162 @@
+"""Values of a device description: text to number, number to bytes (CiA 306 §4.3, CiA 301 §7.4.7)."""
+
+from __future__ import annotations
+
+import math
+import re
+import struct
+from typing import Final
+
+from bridge.eds.ini import shown
+from bridge.eds.model import DataType, Value
+
+_INTEGER: Final = re.compile(
+    r"([+-]?)(?:0x([0-9a-f]{1,32})|([0-9]{1,39})|([0-9][0-9a-f]{0,31})h)", re.IGNORECASE
+)
+_NODE_ID: Final = re.compile(r"\$?NODE_?ID", re.IGNORECASE)
+_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)
+_BYTES: Final = (DataType.OCTET_STRING, DataType.DOMAIN)
+_REALS: Final = {DataType.REAL32: ("<f", "<I"), DataType.REAL64: ("<d", "<Q")}
+
+
+class BadValue(ValueError):
+    """A text that is no such value; the message says why."""
+
+
+def integer(text: str) -> tuple[int, str]:
+    """A whole number and what is odd about how it is written, or "".
+
+    Raises BadValue. 001 is 1 and 010 is 10: padding, as the tools in the field write it. C's octal,
+    which the standard allows, is named where it would be another number.
+    """
+    note = ""
+    bare = text.strip()
+    if ";" in bare:
+        bare = bare.partition(";")[0].rstrip()
+        note = f"{shown(text)}: what follows the semicolon is taken as a comment"
+    match = _INTEGER.fullmatch(bare)
+    if not match:
+        raise BadValue(f"{shown(text)} is not a number")
+    sign, hexadecimal, decimal, assembler = match.groups()
+    if decimal is None:
+        value = int(hexadecimal or assembler, 16)
+        if assembler:
+            note = f"{shown(bare)} is taken as 0x{value:X}"
+    else:
+        value = int(decimal)
+        if len(decimal) > 1 and decimal[0] == "0" and value:
+            octal = int(decimal, 8) if set(decimal) <= set("01234567") else value
+            note = f"{decimal} is taken as {value}" + (f", not as octal {octal}" if octal != value else "")
+    return (-value if sign == "-" else value), note
+
+
+def expression(text: str) -> tuple[Value, str]:
+    """A number that may hold $NODEID once, in any order, and what is odd about it. Raises BadValue."""
+    if not _NODE_ID.search(text):
+        value, note = integer(text)
+        return Value(value), note
+    bare = re.sub(r"[\s()]", "", text.partition(";")[0])
+    terms = re.findall(r"([+-]?)([^+-]+)", bare)
+    total, nodes = 0, 0
+    for sign, term in terms:
+        if _NODE_ID.fullmatch(term) and sign != "-":
+            nodes += 1
+            continue
+        value, _ = integer(term)
+        total += -value if sign == "-" else value
+    if nodes != 1 or "".join(sign + term for sign, term in terms) != bare:
+        raise BadValue(f"{shown(text)} is not a number with $NODEID")
+    usual = re.fullmatch(r"\$NODEID(\+(0x[0-9A-Fa-f]+|[0-9]+))?", text)
+    return Value(total, True), "" if usual else f"{shown(text)} is taken as {Value(total, True)}"
+
+
+def value(text: str, data_type: DataType | None) -> tuple[Value, str]:
+    """``text`` as a value of ``data_type``, and what is odd about it. Raises BadValue."""
+    if data_type in _TEXTS:
+        return Value(text), ""
+    if data_type in _BYTES:
+        return Value(_octets(text)), ""
+    if data_type in _REALS and not re.match(r"[+-]?0x", text.strip(), re.IGNORECASE):
+        return Value(_real(text)), ""
+    if data_type is None and not _NODE_ID.search(text):
+        try:
+            number, note = integer(text)
+        except BadValue:
+            return Value(text), ""
+        return Value(number), note
+    if data_type is DataType.BOOLEAN and text.strip().lower() in ("true", "false"):
+        return Value(int(text.strip().lower() == "true")), ""
+    number, note = expression(text)
+    if data_type is not None and data_type in _REALS:
+        return Value(_real_from_bits(number, data_type)), note
+    return _fitted(number, data_type, text), note
+
+
+def encode(plain: int | float | str | bytes, data_type: DataType) -> bytes:
+    """A value as an SDO carries it. Raises BadValue where it does not fit its type."""
+    if isinstance(plain, bytes):
+        return plain
+    if isinstance(plain, str):
+        return plain.encode("utf-16-le" if data_type is DataType.UNICODE_STRING else "latin-1", "replace")
+    if data_type in _REALS:
+        return _packed(_REALS[data_type][0], float(plain))
+    if not isinstance(plain, int) or not data_type.size:
+        raise BadValue(f"{plain} is no {data_type.name}")
+    try:
+        return plain.to_bytes(data_type.size, "little", signed=data_type.signed)
+    except OverflowError:
+        raise BadValue(f"{plain} is beyond {data_type.name}") from None
+
+
+def _octets(text: str) -> bytes:
+    bare = re.sub(r"[\s,]|0x", "", text.strip().strip('"'), flags=re.IGNORECASE)
+    try:
+        return bytes.fromhex(bare)
+    except ValueError:
+        raise BadValue(f"{shown(text)} is not a row of bytes in hexadecimal") from None
+
+
+def _real(text: str) -> float:
+    try:
+        number = float(text.strip().replace(",", "."))
+    except ValueError:
+        raise BadValue(f"{shown(text)} is not a number") from None
+    if not math.isfinite(number):
+        raise BadValue(f"{shown(text)} is not a finite number")
+    return number
+
+
+def _real_from_bits(number: Value, data_type: DataType) -> float:
+    """0x3F800000 for 1.0, as CiA 306 writes reals."""
+    real, bits = _REALS[data_type]
+    plain = number.plain
+    if not isinstance(plain, int) or number.plus_node_id:
+        raise BadValue("a real number has no $NODEID")
+    try:
+        (found,) = struct.unpack(real, struct.pack(bits, plain))
+    except struct.error:
+        raise BadValue(f"{plain:#x} is beyond {data_type.name}") from None
+    if not math.isfinite(found):
+        raise BadValue(f"{plain:#x} is not a finite number")
+    return found
+
+
+def _packed(form: str, number: float) -> bytes:
+    try:
+        return struct.pack(form, number)
+    except (OverflowError, struct.error):
+        raise BadValue(f"{number:g} does not fit") from None
+
+
+def _fitted(number: Value, data_type: DataType | None, text: str) -> Value:
+    """An integer within its type; 0xFFFF of an INTEGER16 is -1."""
+    plain = number.plain
+    if data_type is None or not isinstance(plain, int):
+        return number
+    bits = 8 * data_type.size
+    if data_type.signed and re.match(r"\s*0x", text, re.IGNORECASE) and 1 << bits - 1 <= plain < 1 << bits:
+        return Value(plain - (1 << bits), number.plus_node_id)
+    lowest, highest = (-(1 << bits - 1), (1 << bits - 1) - 1) if data_type.signed else (0, (1 << bits) - 1)
+    if not number.plus_node_id and not lowest <= plain <= highest:
+        raise BadValue(f"{shown(text)} is beyond {data_type.name}")
+    return number

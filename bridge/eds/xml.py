@@ -1,0 +1,105 @@
+"""XML as a small tree with line numbers, read by expat alone. Nothing outside the text is ever opened:
+a document type, and with it every entity, is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Final, NoReturn
+from xml.parsers import expat
+
+from bridge.eds.model import Report
+
+_DEEPEST: Final = 64
+_MOST_ELEMENTS: Final = 500_000
+
+
+class _Refused(Exception):
+    """The text is XML that we do not read on."""
+
+
+@dataclass(slots=True)
+class Element:
+    """``tag`` and the names of ``attributes`` are without their namespace, attributes in lower case."""
+
+    tag: str
+    line: int
+    attributes: dict[str, str] = field(default_factory=dict[str, str])
+    children: list[Element] = field(default_factory=list["Element"])
+    text: str = ""
+
+    def walk(self) -> Iterator[Element]:
+        """This element and all below it, in the order of the file."""
+        waiting: list[Element] = [self]
+        while waiting:
+            element = waiting.pop()
+            yield element
+            waiting.extend(reversed(element.children))
+
+    def all(self, tag: str) -> Iterator[Element]:
+        """The elements of this name at or below this one."""
+        return (element for element in self.walk() if element.tag == tag)
+
+    def first(self, tag: str) -> Element | None:
+        return next(self.all(tag), None)
+
+
+def parse(content: bytes, report: Report) -> Element:
+    """The tree of ``content``; where it is broken off, what stands before, and that is reported."""
+    builder = _Builder()
+    # Expat's own text encoding rules hold; an unknown encoding is an error like any other.
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    builder.attach(parser)
+    try:
+        parser.Parse(content, True)
+    except expat.ExpatError as error:
+        report.error(error.lineno, f"is not XML from here on: {expat.ErrorString(error.code)}")
+    except _Refused as error:
+        report.error(parser.CurrentLineNumber, str(error))
+    except (ValueError, LookupError) as error:  # a declared encoding that Python does not have
+        report.error(1, f"cannot be decoded: {error}")
+    return builder.root
+
+
+class _Builder:
+    def __init__(self) -> None:
+        self.root = Element("", 0)
+        self._open = [self.root]
+        self._count = 0
+
+    def attach(self, parser: expat.XMLParserType) -> None:
+        def start(tag: str, attributes: dict[str, str]) -> None:
+            self._start(tag, attributes, parser.CurrentLineNumber)
+
+        parser.StartElementHandler = start
+        parser.EndElementHandler = self._end
+        parser.CharacterDataHandler = self._characters
+        parser.StartDoctypeDeclHandler = self._refuse
+        parser.EntityDeclHandler = self._refuse
+        parser.ExternalEntityRefHandler = self._refuse
+
+    @staticmethod
+    def _refuse(*details: object) -> NoReturn:
+        del details
+        raise _Refused("has a document type or an entity: a device description needs none, so it is refused")
+
+    def _start(self, tag: str, attributes: dict[str, str], line: int) -> None:
+        self._count += 1
+        if self._count > _MOST_ELEMENTS or len(self._open) > _DEEPEST:
+            raise _Refused("has too many elements, or too many within each other")
+        named = {_local(name).lower(): value.strip() for name, value in attributes.items()}
+        element = Element(_local(tag), line, named)
+        self._open[-1].children.append(element)
+        self._open.append(element)
+
+    def _end(self, tag: str) -> None:
+        del tag
+        self._open.pop()
+
+    def _characters(self, text: str) -> None:
+        self._open[-1].text += text
+
+
+def _local(name: str) -> str:
+    return name.rpartition(":")[2]

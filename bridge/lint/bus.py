@@ -1,0 +1,227 @@
+"""A bus of the site file as the linter sees it: each node with its family, each PDO with what is known of it.
+
+What the site file sets counts, then the configuration that is downloaded, then what the family's own
+dictionary (an EDS beside the mapping file) says of the factory, then the mapping file. A node may be set
+otherwise; boot-up reads that back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from bridge.config import BusTable, DriveTable, NodeTable, PdoTable
+from bridge.config.download import Download
+from bridge.eds import Description
+from bridge.eds.pdos import PdoSummary, pdos
+from bridge.mapping.model import Family, Pdo
+from bridge.southbound.canopen.sync import LAST_SYNCHRONOUS, REMOTE_TYPES
+from bridge.tomlfile import Key
+
+EVENT_DRIVEN: Final = 254
+_FACTORY_TYPE: Final = 255
+_RPDO_PARAMETER: Final = 0x1400
+_TPDO_PARAMETER: Final = 0x1800
+
+Settings = Mapping[tuple[int, int], int]
+"""What is downloaded to a node, as numbers by index and sub-index."""
+Downloads = Mapping[str, Sequence[Download]]
+"""What configuration files ask of their nodes, by the node's name."""
+
+
+@dataclass(frozen=True, slots=True)
+class PdoView:
+    """One PDO of a node. ``length`` is in bytes; ``sent`` says whether the bridge uses it."""
+
+    name: str
+    key: Key
+    receives: bool
+    enabled: bool
+    cob_id: int
+    length: int
+    transmission_type: int
+    inhibit_ms: float
+    event_ms: int
+    sent: bool
+    rtr_poll_ms: int = 0
+
+    @property
+    def is_synchronous(self) -> bool:
+        return self.transmission_type <= LAST_SYNCHRONOUS
+
+    @property
+    def is_polled(self) -> bool:
+        """Whether the bridge asks for it by remote frame."""
+        return self.transmission_type in REMOTE_TYPES and bool(self.rtr_poll_ms)
+
+    def period_s(self, sync_s: float) -> float | None:
+        """How often a TPDO comes at least, or None where nothing makes it regular."""
+        kind = self.transmission_type
+        if 1 <= kind <= LAST_SYNCHRONOUS and sync_s:
+            return kind * sync_s
+        if self.is_polled:
+            return self.rtr_poll_ms / 1000
+        if kind >= EVENT_DRIVEN and self.event_ms:
+            return self.event_ms / 1000
+        return None
+
+    def shortest_s(self, sync_s: float) -> float | None:
+        """How often a TPDO may come at most, or None where nothing limits it."""
+        if self.is_synchronous:
+            return max(1, self.transmission_type) * sync_s or None
+        if self.is_polled:
+            return self.rtr_poll_ms / 1000
+        return self.inhibit_ms / 1000 or self.period_s(sync_s)
+
+
+@dataclass(frozen=True, slots=True)
+class DriveView:
+    table: DriveTable
+    key: Key
+    name: str
+    rpdo: PdoView
+    tpdo: PdoView
+
+
+@dataclass(frozen=True, slots=True)
+class NodeView:
+    table: NodeTable
+    family: Family
+    dictionary: Description | None
+    key: Key
+    drives: tuple[DriveView, ...]
+    pdos: tuple[PdoView, ...]
+    """All that the node has, those of drives the site file does not name included."""
+    own_timeout_ms: float = 0.0
+    """After how long without process data the node acts by itself, where we set that; 0 where not."""
+
+
+@dataclass(frozen=True, slots=True)
+class BusView:
+    table: BusTable
+    key: Key
+    nodes: tuple[NodeView, ...]
+
+    @property
+    def sync_s(self) -> float:
+        """The period of SYNC, 0 without one."""
+        return self.table.sync_period_ms / 1000
+
+
+def view_bus(
+    bus: BusTable,
+    key: Key,
+    families: Mapping[str, Family],
+    dictionaries: Mapping[str, Description],
+    downloads: Downloads,
+) -> BusView:
+    nodes: list[NodeView] = []
+    for n, table in enumerate(bus.node):
+        wanted = (*downloads.get(table.name, ()), *(entry.download for entry in table.configure))
+        dictionary = dictionaries.get(table.mapping)
+        nodes.append(_node(table, (*key, "node", n), families[table.mapping], dictionary, _settings(wanted)))
+    return BusView(bus, key, tuple(nodes))
+
+
+def _settings(downloads: Iterable[Download]) -> Settings:
+    return {(one.index, one.sub): int.from_bytes(one.data, "little") for one in downloads}
+
+
+def _node(
+    table: NodeTable, key: Key, family: Family, dictionary: Description | None, settings: Settings
+) -> NodeView:
+    known = {(one.receives, one.number): one for one in pdos(dictionary, table.id)} if dictionary else {}
+    by_slot = {drive.slot: (d, drive) for d, drive in enumerate(table.drive)}
+    drives: list[DriveView] = []
+    found: list[PdoView] = []
+    used: set[tuple[bool, int]] = set()
+    for slot in family.slot:
+        d, drive = by_slot.get(slot.name, (None, None))
+        drive_key: Key = key if d is None else (*key, "drive", d)
+        views: list[PdoView] = []
+        for receives, pdo in ((True, slot.rpdo), (False, slot.tpdo)):
+            used.add((receives, pdo.number))
+            view = _slot_pdo(pdo, receives, known.get((receives, pdo.number)), table.id, drive_key)
+            view = _downloaded(view, pdo.number, settings)
+            views.append(_from_site(view, drive) if drive else view)
+        found += views
+        if drive:
+            name = f"{table.name}/{drive.name or drive.slot}"
+            drives.append(DriveView(drive, drive_key, name, views[0], views[1]))
+    found += [_other_pdo(one, key) for place, one in known.items() if place not in used]
+    own = family.own_timeout
+    own_ms = own.unit_ms * settings.get((own.object.index, own.object.sub), 0) if own else 0.0
+    return NodeView(table, family, dictionary, key, tuple(drives), tuple(found), own_ms)
+
+
+def _slot_pdo(pdo: Pdo, receives: bool, summary: PdoSummary | None, node_id: int, key: Key) -> PdoView:
+    """A drive's PDO as the factory has it."""
+    kind = summary.transmission_type if summary else None
+    return PdoView(
+        name=f"{'RPDO' if receives else 'TPDO'}{pdo.number}",
+        key=key,
+        receives=receives,
+        enabled=True,
+        cob_id=pdo.cob_id + node_id,
+        length=(summary.bits + 7) // 8 if summary and summary.bits else 2 * len(pdo.objects),
+        transmission_type=_FACTORY_TYPE if kind is None else kind,
+        inhibit_ms=summary.inhibit_100us / 10 if summary else 0.0,
+        event_ms=summary.event_timer_ms if summary else 0,
+        sent=False,
+    )
+
+
+def _downloaded(view: PdoView, number: int, settings: Settings) -> PdoView:
+    """``view`` with what is downloaded to its communication object."""
+    index = (_RPDO_PARAMETER if view.receives else _TPDO_PARAMETER) + number - 1
+    return replace(
+        view,
+        transmission_type=settings.get((index, 2), view.transmission_type),
+        inhibit_ms=settings.get((index, 3), round(10 * view.inhibit_ms)) / 10,
+        event_ms=settings.get((index, 5), view.event_ms),
+    )
+
+
+def _from_site(view: PdoView, drive: DriveTable) -> PdoView:
+    """``view`` with what the site file's table for this PDO sets."""
+    own = drive.rpdo if view.receives else drive.tpdo
+    poll_ms = 0 if view.receives else drive.rtr_poll_ms
+    if own is None:
+        return replace(view, sent=True, rtr_poll_ms=poll_ms)
+    return replace(
+        view,
+        key=(*view.key, "rpdo" if view.receives else "tpdo"),
+        enabled=own.enable,
+        cob_id=own.cob_id or view.cob_id,
+        length=_bytes(own) or view.length,
+        transmission_type=_either(own.transmission_type, view.transmission_type),
+        inhibit_ms=view.inhibit_ms if own.inhibit_ms is None else own.inhibit_ms,
+        event_ms=_either(own.event_ms, view.event_ms),
+        sent=own.enable,
+        rtr_poll_ms=poll_ms,
+    )
+
+
+def _bytes(own: PdoTable) -> int:
+    return (sum(one.bits for one in own.mapping) + 7) // 8
+
+
+def _either(own: int | None, other: int) -> int:
+    return other if own is None else own
+
+
+def _other_pdo(summary: PdoSummary, key: Key) -> PdoView:
+    """A PDO that the family's dictionary has and the bridge does not use."""
+    return PdoView(
+        summary.name,
+        key,
+        summary.receives,
+        summary.enabled and summary.cob_id is not None,
+        summary.cob_id or 0,
+        (summary.bits + 7) // 8,
+        _FACTORY_TYPE if summary.transmission_type is None else summary.transmission_type,
+        summary.inhibit_100us / 10,
+        summary.event_timer_ms,
+        sent=False,
+    )

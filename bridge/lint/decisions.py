@@ -1,0 +1,28 @@
+"""What is allowed, decided by whoever wrote the file, and still worth repeating."""
+
+from __future__ import annotations
+
+from bridge.config import IGNORE_ALL_S, DriveTable, Site
+from bridge.lint.report import LintReport
+from bridge.tomlfile import Key
+
+
+def check_decisions(site: Site, report: LintReport) -> None:
+    for b, bus in enumerate(site.bus):
+        for n, node in enumerate(bus.node):
+            for d, drive in enumerate(node.drive):
+                name = f"{node.name}/{drive.name or drive.slot}"
+                _check_drive(drive, name, ("bus", b, "node", n, "drive", d), report)
+    if site.opcua and site.opcua.no_security:
+        report.warning(
+            ("opcua", "no_security"), "is true: anyone who reaches the port reads everything in clear text"
+        )
+
+
+def _check_drive(drive: DriveTable, name: str, key: Key, report: LintReport) -> None:
+    if drive.control != "none" and drive.fieldbus_timeout_ms == 0:
+        report.warning((*key, "fieldbus_timeout_ms"), f"is 0: a silent controller will not stop {name}")
+    if drive.telegram_downtime_s == IGNORE_ALL_S:
+        report.warning((*key, "telegram_downtime_s"), f"is -0.1: no communication error will stop {name}")
+    if drive.on_expiry == "hold" and drive.control != "none":
+        report.warning((*key, "on_expiry"), f'is "hold": a silent controller of {name} is only reported')

@@ -1,0 +1,86 @@
+"""Who uses which COB-ID: two senders of one identifier destroy each other's frames (CiA 301 §7.3.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.lint.bus import BusView, NodeView
+from bridge.lint.report import LintReport
+from bridge.southbound.canopen import cobid
+from bridge.tomlfile import Key
+
+_LSS: Final = (0x7E4, 0x7E5)
+
+
+@dataclass(frozen=True, slots=True)
+class _Use:
+    """``active``: in use as configured; else only reserved, off at factory or not opened."""
+
+    cob_id: int
+    what: str
+    owner: str
+    key: Key
+    active: bool = True
+
+    def __str__(self) -> str:
+        return f"{self.what} of {self.owner}"
+
+
+def check_identifiers(bus: BusView, report: LintReport) -> None:
+    """Error where two uses collide, warning where one of them is off at present. One finding for each
+    pair of nodes: where one identifier collides, many do."""
+    first: dict[int, list[_Use]] = {}
+    collisions: dict[tuple[str, str], list[tuple[_Use, _Use]]] = {}
+    for use in _uses(bus):
+        for other in first.setdefault(use.cob_id, []):
+            if use.active or other.active:
+                collisions.setdefault((other.owner, use.owner), []).append((other, use))
+        first[use.cob_id].append(use)
+    for pairs in collisions.values():
+        pairs.sort(key=lambda pair: not (pair[0].active and pair[1].active))
+        other, use = pairs[0]
+        more = f", and {len(pairs) - 1} more" if len(pairs) > 1 else ""
+        message = f"{use} has COB-ID {use.cob_id:X}h, which is {other}'s, too{more}"
+        if use.active and other.active:
+            report.error(use.key, message, "give one of the nodes another id or another cob_id")
+        else:
+            off = use if not use.active else other
+            hint = f"it works as long as {off} is off; another node id is safer"
+            report.warning(use.key, message, hint)
+
+
+def _uses(bus: BusView) -> Iterator[_Use]:
+    table = bus.table
+    bridge = "the bridge"
+    yield _Use(cobid.NMT, "NMT", bridge, bus.key)
+    yield _Use(cobid.SYNC, "SYNC", bridge, bus.key, active=bool(table.sync_period_ms))
+    yield _Use(cobid.TIME, "TIME", bridge, bus.key, active=bool(table.time_period_s))
+    for cob_id in _LSS:
+        yield _Use(cob_id, "LSS", bridge, bus.key, active=False)
+    yield _Use(
+        cobid.ERROR_CONTROL + table.master_node_id,
+        "the heartbeat",
+        bridge,
+        (*bus.key, "master_node_id"),
+        active=bool(table.heartbeat_ms),
+    )
+    for node in bus.nodes:
+        yield from _node_uses(node)
+
+
+def _node_uses(node: NodeView) -> Iterator[_Use]:
+    node_id, name, key = node.table.id, node.table.name, (*node.key, "id")
+    yield _Use(cobid.EMCY + node_id, "EMCY", name, key)
+    yield _Use(cobid.SDO_REQUEST + node_id, "SDO1 request", name, key)
+    yield _Use(cobid.SDO_REPLY + node_id, "SDO1 reply", name, key)
+    yield _Use(cobid.ERROR_CONTROL + node_id, "error control", name, key)
+    for server in node.family.sdo:
+        is_open = server.number in node.table.sdo_channels
+        yield _Use(server.request + node_id, f"SDO{server.number} request", name, key, active=is_open)
+        yield _Use(server.reply + node_id, f"SDO{server.number} reply", name, key, active=is_open)
+    for pdo in node.pdos:
+        moved = pdo.key[-1] in ("rpdo", "tpdo")
+        pdo_key = (*pdo.key, "cob_id") if moved else key
+        yield _Use(pdo.cob_id, pdo.name, name, pdo_key, active=pdo.enabled)

@@ -1,0 +1,61 @@
+"""All rules over all buses of a site."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from bridge.config import Site
+from bridge.eds import Description, read_device_file
+from bridge.lint.bus import Downloads, view_bus
+from bridge.lint.decisions import check_decisions
+from bridge.lint.identifiers import check_identifiers
+from bridge.lint.load import BusLoad, check_load
+from bridge.lint.pdos import check_pdos
+from bridge.lint.report import LintFinding, LintReport, Severity
+from bridge.lint.times import check_times
+from bridge.mapping import Family
+from bridge.mapping.loader import mappings_dir
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Findings in the order of the site file, and the predicted load of each bus."""
+
+    findings: tuple[LintFinding, ...]
+    loads: tuple[BusLoad, ...]
+
+    def of(self, severity: Severity) -> tuple[LintFinding, ...]:
+        return tuple(finding for finding in self.findings if finding.severity is severity)
+
+
+def family_dictionaries(names: Iterable[str]) -> dict[str, Description]:
+    """The object dictionaries that lie beside the mapping files, by family, for those that have one.
+
+    Raises ``FileFaults`` where one cannot be read.
+    """
+    files = {name: mappings_dir() / f"{name}.eds" for name in names}
+    return {name: read_device_file(file) for name, file in files.items() if file.is_file()}
+
+
+def lint(
+    site: Site,
+    families: Mapping[str, Family],
+    path: Path,
+    downloads: Downloads,
+    dictionaries: Mapping[str, Description] | None = None,
+) -> Verdict:
+    """Judge a site whose file, at ``path``, has no faults of its own. ``dictionaries`` are those of
+    ``family_dictionaries``, unless given."""
+    known = family_dictionaries(families) if dictionaries is None else dictionaries
+    report = LintReport(path)
+    loads: list[BusLoad] = []
+    for b, table in enumerate(site.bus):
+        bus = view_bus(table, ("bus", b), families, known, downloads)
+        check_identifiers(bus, report)
+        check_pdos(bus, report)
+        check_times(bus, report)
+        loads.append(check_load(bus, report))
+    check_decisions(site, report)
+    return Verdict(report.findings(), tuple(loads))

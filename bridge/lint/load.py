@@ -1,0 +1,168 @@
+"""How full a bus will be, from the frames that the site file makes regular and their longest form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.lint.bus import BusView, NodeView, PdoView
+from bridge.lint.report import LintReport
+from bridge.southbound.boot.error_control import heartbeat_period_ms
+from bridge.southbound.bus.wirebits import STUFFED_BITS, UNSTUFFED_BITS
+
+_SDO_BYTES: Final = 8
+_TIME_BYTES: Final = 6
+_WORTH_A_WARNING: Final = 60.0
+_FULL: Final = 100.0
+
+
+def longest_bits(length: int) -> int:
+    """Bits of a frame with an 11-bit identifier and ``length`` bytes: with the most stuff bits that there
+    can be, and the pause behind it (ISO 11898-1: after the first five bits one for every four)."""
+    stuffable = STUFFED_BITS + 8 * length
+    return stuffable + (stuffable - 1) // 4 + UNSTUFFED_BITS
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """Frames of one kind: ``length`` bytes every ``period_s``, in bursts at most every ``shortest_s``.
+    ``cyclic``: sent in every SYNC cycle, or in one of several."""
+
+    length: int
+    period_s: float | None
+    shortest_s: float | None = None
+    cyclic: bool = False
+
+    @property
+    def bits_per_s(self) -> float:
+        return longest_bits(self.length) / self.period_s if self.period_s else 0.0
+
+    @property
+    def most_bits_per_s(self) -> float:
+        return longest_bits(self.length) / self.shortest_s if self.shortest_s else self.bits_per_s
+
+
+@dataclass(frozen=True, slots=True)
+class BusLoad:
+    """The prediction for one bus. ``most_percent`` is with every event-driven TPDO at its inhibit time;
+    ``cycle_ms`` is what SYNC and all that belongs to one cycle takes on the wire."""
+
+    bus: str
+    bitrate: int
+    load_percent: float
+    most_percent: float
+    sync_period_ms: int
+    cycle_ms: float
+
+    def __str__(self) -> str:
+        most = f", at most {self.most_percent:.0f} %" if self.most_percent > self.load_percent + 0.5 else ""
+        cycle = f"SYNC budget: {self.cycle_ms:.1f} of {self.sync_period_ms} ms"
+        budget = cycle if self.sync_period_ms else "no SYNC"
+        rate = f"{self.bitrate // 1000} kbit/s"
+        return f"{self.bus}: predicted load {self.load_percent:.0f} %{most} of {rate} ({budget})"
+
+
+def predict(bus: BusView) -> BusLoad:
+    streams = list(_streams(bus))
+    cycle_bits = sum(longest_bits(one.length) * _in_cycle(one, bus.sync_s) for one in streams if one.cyclic)
+    bitrate = bus.table.bitrate
+    regular = sum(one.bits_per_s for one in streams)
+    most = sum(max(one.bits_per_s, one.most_bits_per_s) for one in streams)
+    return BusLoad(
+        bus.table.name,
+        bitrate,
+        round(100 * regular / bitrate, 1),
+        round(100 * most / bitrate, 1),
+        bus.table.sync_period_ms,
+        round(1000 * cycle_bits / bitrate, 3),
+    )
+
+
+def _in_cycle(stream: Stream, sync_s: float) -> int:
+    """How many of its frames fall into one SYNC cycle at most."""
+    if not sync_s or not stream.period_s:
+        return 1
+    return max(1, math.ceil(sync_s / stream.period_s - 1e-9))
+
+
+def _streams(bus: BusView) -> Iterator[Stream]:
+    table = bus.table
+    if table.sync_period_ms:
+        yield Stream(1 if table.sync_counter else 0, bus.sync_s, cyclic=True)
+    if table.heartbeat_ms:
+        yield Stream(1, table.heartbeat_ms / 1000)
+    if table.time_period_s:
+        yield Stream(_TIME_BYTES, table.time_period_s)
+    for node in bus.nodes:
+        if node.table.enabled:
+            yield from _node_streams(node, bus)
+
+
+def _node_streams(node: NodeView, bus: BusView) -> Iterator[Stream]:
+    supervision_s = node.table.supervision_ms / 1000
+    if node.table.supervision == "heartbeat":
+        yield Stream(1, heartbeat_period_ms(node.table.supervision_ms) / 1000)
+    elif node.table.supervision == "guarding":
+        yield Stream(0, supervision_s)
+        yield Stream(1, supervision_s)
+    for poll in node.family.poll:
+        for _ in ("request", "reply"):
+            yield Stream(_SDO_BYTES, poll.every_ms / 1000)
+    for pdo in node.pdos:
+        if pdo.receives and pdo.sent:
+            yield Stream(pdo.length, bus.table.rpdo_period_s, cyclic=bool(bus.sync_s))
+        elif not pdo.receives and pdo.enabled:
+            yield _tpdo_stream(pdo, bus.sync_s)
+            if pdo.is_polled:
+                yield Stream(0, pdo.rtr_poll_ms / 1000)
+
+
+def _tpdo_stream(pdo: PdoView, sync_s: float) -> Stream:
+    cyclic = pdo.is_synchronous and bool(sync_s)
+    return Stream(pdo.length, pdo.period_s(sync_s), pdo.shortest_s(sync_s), cyclic=cyclic)
+
+
+def check_load(bus: BusView, report: LintReport) -> BusLoad:
+    """Predict the load and judge it."""
+    load = predict(bus)
+    key = (*bus.key, "bitrate")
+    hint = "a longer rpdo_period_ms or sync_period_ms, a higher bit rate, or another bus"
+    if load.load_percent > _FULL:
+        message = f"the predicted load is {load.load_percent:.0f} %: more than the bus can carry"
+        report.error(key, message, hint)
+    elif load.load_percent > _WORTH_A_WARNING:
+        report.warning(key, f"the predicted load is {load.load_percent:.0f} %: frames will be late", hint)
+    elif load.most_percent > _FULL:
+        message = f"the predicted load is up to {load.most_percent:.0f} % while all actual values change"
+        report.warning(key, message, "a longer inhibit time of the TPDOs")
+    if bus.sync_s and load.cycle_ms > load.sync_period_ms:
+        report.error(
+            (*bus.key, "sync_period_ms"),
+            f"one cycle takes {load.cycle_ms:.1f} ms on the wire: more than the SYNC period",
+            f"at least {math.ceil(load.cycle_ms)}",
+        )
+    _check_window(bus, load, report)
+    return load
+
+
+def _check_window(bus: BusView, load: BusLoad, report: LintReport) -> None:
+    """All synchronous TPDOs must be through within the window (1007h), and one frame may be in their way."""
+    window_us = bus.table.sync_window_us
+    synchronous = any(
+        not pdo.receives and pdo.enabled and pdo.is_synchronous for node in bus.nodes for pdo in node.pdos
+    )
+    if not window_us:
+        return
+    key = (*bus.key, "sync_window_us")
+    if not synchronous:
+        report.warning(key, "has no effect: no TPDO of this bus is synchronous (transmission type 0…240)")
+        return
+    needed_us = 1000 * load.cycle_ms + 1e6 * longest_bits(8) / bus.table.bitrate
+    if needed_us > window_us:
+        report.warning(
+            key,
+            f"{window_us} µs is shorter than one cycle takes on the wire, {needed_us:.0f} µs",
+            f"at least {math.ceil(needed_us / 100) * 100}, or fewer synchronous PDOs",
+        )

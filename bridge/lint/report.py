@@ -1,0 +1,54 @@
+"""Findings of the linter: like faults of a file, with a severity."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from bridge.errors import Fault, FileFaults
+from bridge.tomlfile import Key, TomlFile, dotted
+
+
+class Severity(StrEnum):
+    ERROR = "error"
+    """Cannot work."""
+    WARNING = "warning"
+    """Can work, and is still worth a thought."""
+
+
+@dataclass(frozen=True, slots=True)
+class LintFinding:
+    severity: Severity
+    fault: Fault
+
+    def __str__(self) -> str:
+        return f"{self.severity}: {self.fault}"
+
+
+class LintReport:
+    """Collects findings with the lines of the site file at ``path``."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = str(path)
+        self._findings: list[LintFinding] = []
+        try:
+            self._file = TomlFile(path)
+        except FileFaults:  # it has gone since it was loaded: what is in it still holds
+            self._file = None
+
+    def error(self, key: Key, message: str, hint: str = "") -> None:
+        self._add(Severity.ERROR, key, message, hint)
+
+    def warning(self, key: Key, message: str, hint: str = "") -> None:
+        self._add(Severity.WARNING, key, message, hint)
+
+    def _add(self, severity: Severity, key: Sequence[int | str], message: str, hint: str) -> None:
+        line = self._file.line(key) if self._file else 0
+        fault = Fault(self._path, line, dotted(key), message, hint)
+        self._findings.append(LintFinding(severity, fault))
+
+    def findings(self) -> tuple[LintFinding, ...]:
+        """In the order of the file."""
+        return tuple(sorted(self._findings, key=lambda finding: finding.fault.line))

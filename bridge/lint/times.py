@@ -1,0 +1,145 @@
+"""Times that cannot work together."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.lint.bus import BusView, DriveView, NodeView
+from bridge.lint.report import LintReport
+from bridge.southbound.canopen.sync import tpdo_deadline_s
+
+_SLOW_ANSWER_MS: Final = 50
+"""What an SDO answer may take: 30 + 20 ms in an 8400 motec (EDS84DMOTCAN 3.0 §9), 50 ms and more behind
+NORD's system bus."""
+_SDO_LIVES: Final = 10
+
+
+def check_times(bus: BusView, report: LintReport) -> None:
+    for node in bus.nodes:
+        if not node.table.enabled:
+            continue
+        _check_supervision(bus, node, report)
+        _check_own_timeout(bus, node, report)
+        _check_sdo(node, report)
+        for drive in node.drives:
+            _check_controller(bus, drive, report)
+            _check_downtime(bus, node, drive, report)
+
+
+def life_ms(node: NodeView) -> int:
+    """After how long a silent node is lost; 0 where nothing watches it."""
+    table = node.table
+    factors = {"heartbeat": 1, "guarding": table.life_time_factor, "none": 0}
+    return table.supervision_ms * factors[table.supervision]
+
+
+def _check_supervision(bus: BusView, node: NodeView, report: LintReport) -> None:
+    table, dictionary = node.table, node.dictionary
+    objects = {"heartbeat": (0x1017,), "guarding": (0x100C, 0x100D), "none": ()}[table.supervision]
+    missing = [f"{index:04X}h" for index in objects if dictionary and not dictionary.object(index)]
+    if missing:
+        other = "guarding" if table.supervision == "heartbeat" else "heartbeat"
+        report.error(
+            (*node.key, "supervision"),
+            f"{node.family.family.name} has no {' and no '.join(missing)}",
+            f'{table.supervision} is not possible; "{other}" or "none" may be',
+        )
+    if table.supervision == "none":
+        return
+    if table.supervision_ms < 2 * bus.table.sync_period_ms:
+        report.warning(
+            (*node.key, "supervision_ms"),
+            f"{table.supervision_ms} ms is less than two SYNC periods: a full cycle delays a sign of life "
+            "by one",
+            f"at least {2 * bus.table.sync_period_ms}",
+        )
+
+
+def _check_own_timeout(bus: BusView, node: NodeView, report: LintReport) -> None:
+    """The node's own watch over our process data, P151 of a NORD interface."""
+    own = node.family.own_timeout
+    if own is None or not node.own_timeout_ms:
+        return
+    key = (*node.key, "configure" if node.table.configure else "configuration")
+    period_ms, own_ms = 1000 * bus.table.rpdo_period_s, node.own_timeout_ms
+    if own_ms < 2 * period_ms:
+        report.error(
+            key,
+            f"the node's own time-out, {own.object} = {own_ms:g} ms, is less than two RPDO periods of "
+            f"{period_ms:g} ms: one lost frame stops its drives",
+            f"at least {2 * period_ms:g} ms",
+        )
+    elif own_ms < bus.table.deadman_ms:
+        report.warning(
+            key,
+            f"the node's own time-out, {own.object} = {own_ms:g} ms, is shorter than deadman_ms = "
+            f"{bus.table.deadman_ms}: it stops its drives over a pause that the bridge gets over",
+            f"at least {bus.table.deadman_ms} ms, or a shorter deadman_ms",
+        )
+
+
+def _check_sdo(node: NodeView, report: LintReport) -> None:
+    timeout_ms, life = node.table.sdo_timeout_ms, life_ms(node)
+    key = (*node.key, "sdo_timeout_ms")
+    if timeout_ms < _SLOW_ANSWER_MS:
+        message = f"{timeout_ms} ms is shorter than drives take for some parameters"
+        report.warning(key, message, f"at least {_SLOW_ANSWER_MS}")
+    elif life and timeout_ms > _SDO_LIVES * life:
+        report.warning(
+            key,
+            f"{timeout_ms} ms: the node is given up after {life} ms, long before an answer is",
+            f"at most {_SDO_LIVES * life}, or a longer supervision_ms",
+        )
+
+
+def _check_controller(bus: BusView, drive: DriveView, report: LintReport) -> None:
+    timeout_ms = drive.table.fieldbus_timeout_ms
+    if not timeout_ms or drive.table.control == "none":
+        return
+    key = (*drive.key, "fieldbus_timeout_ms")
+    period_ms = 1000 * bus.table.rpdo_period_s
+    if timeout_ms < 2 * period_ms:
+        report.error(
+            key,
+            f"{timeout_ms} ms is less than two RPDO periods of {period_ms:g} ms: one lost frame is a trip",
+            f"at least {2 * period_ms:g}",
+        )
+    elif bus.table.deadman_ms > timeout_ms:
+        report.warning(
+            key,
+            f"{timeout_ms} ms is shorter than deadman_ms = {bus.table.deadman_ms}: a hung bridge keeps the "
+            "drive going for longer than a silent controller may",
+            f"at least {bus.table.deadman_ms}, or a shorter deadman_ms",
+        )
+
+
+def _check_downtime(bus: BusView, node: NodeView, drive: DriveView, report: LintReport) -> None:
+    """The twin of P513 watches the drive's TPDO: that must come more often (``command.link``)."""
+    downtime_s = drive.table.telegram_downtime_s
+    key = (*drive.key, "telegram_downtime_s")
+    tpdo = drive.tpdo
+    deadline_s = tpdo_deadline_s(
+        tpdo.transmission_type, tpdo.event_ms, bus.table.sync_period_ms, tpdo.rtr_poll_ms
+    )
+    given_ms = drive.table.tpdo_deadline_ms
+    if given_ms is not None:
+        deadline_s = given_ms / 1000 or None
+    if downtime_s <= 0:
+        if downtime_s == 0 and node.table.supervision == "none":
+            message = "is 0, and the node is not supervised: nothing notices that the drive is gone"
+            report.warning(key, message)
+        return
+    if deadline_s is None:
+        if given_ms == 0:
+            message = "has no effect: tpdo_deadline_ms = 0 says that the TPDO is never late"
+            report.warning(key, message, "leave one of the two out")
+        elif node.dictionary or drive.table.tpdo:
+            message = f"has no effect: {tpdo.name} comes only when a value changes"
+            report.warning(key, message, "an event_ms, or a synchronous transmission type")
+    elif downtime_s < deadline_s:
+        report.warning(
+            key,
+            f"{downtime_s:g} s is shorter than the pauses of {tpdo.name}: it is judged after "
+            f"{deadline_s:.3g} s",
+            f"at least {deadline_s:.3g}, or a shorter event_ms or transmission type",
+        )

@@ -1,0 +1,46 @@
+"""Boot-up of a node after CiA 302-2."""
+
+from bridge.southbound.boot.actions import (
+    Action,
+    Await,
+    AwaitRelease,
+    Boot,
+    BootResult,
+    DrivePlan,
+    Nmt,
+    NodePdoPlan,
+    PdoPlan,
+    Read,
+    SendStopped,
+    StartSupervision,
+    Step,
+    Write,
+)
+from bridge.southbound.boot.error_control import heartbeat_period_ms
+from bridge.southbound.boot.pdos import match_words
+from bridge.southbound.boot.procedure import boot
+from bridge.southbound.boot.scales import number_from, parameter_value
+from bridge.southbound.boot.status import BootError
+
+__all__ = [
+    "Action",
+    "Await",
+    "AwaitRelease",
+    "Boot",
+    "BootError",
+    "BootResult",
+    "DrivePlan",
+    "Nmt",
+    "NodePdoPlan",
+    "PdoPlan",
+    "Read",
+    "SendStopped",
+    "StartSupervision",
+    "Step",
+    "Write",
+    "boot",
+    "heartbeat_period_ms",
+    "match_words",
+    "number_from",
+    "parameter_value",
+]

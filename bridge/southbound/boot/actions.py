@@ -1,0 +1,146 @@
+"""What the boot-up asks of the one who runs it, and what it finds."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridge.command import Identification
+from bridge.southbound.boot.status import BootError
+from bridge.southbound.canopen.nmt import NmtCommand, NmtState
+from bridge.southbound.canopen.pdo import PdoCodec
+from bridge.southbound.canopen.sdo import SdoError
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What the boot-up is doing now, for ``boot_status``; ``letter`` is the error status if it fails."""
+
+    text: str
+    letter: str
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """Read an object over one of the node's SDO channels, by number."""
+
+    index: int
+    sub: int = 0
+    channel: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    index: int
+    sub: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Nmt:
+    command: NmtCommand
+
+
+@dataclass(frozen=True, slots=True)
+class SendStopped:
+    """Send a stopped word to every drive on its factory COB-ID: the node may still be operational."""
+
+
+@dataclass(frozen=True, slots=True)
+class StartSupervision:
+    """From now on the node is expected to be heard."""
+
+
+@dataclass(frozen=True, slots=True)
+class Await:
+    """Wait until the node reports this state, or any with None. Without supervision there is nothing
+    to wait for."""
+
+    state: NmtState | None
+    timeout_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class AwaitRelease:
+    """Wait until the network lets the node start (start order, mandatory nodes). No time limit."""
+
+
+Action = Step | Read | Write | Nmt | SendStopped | StartSupervision | Await | AwaitRelease
+
+
+@dataclass(frozen=True, slots=True)
+class PdoPlan:
+    """One PDO as the node has it. ``words`` gives for each entry its place in ``process.rpdo`` or
+    ``process.tpdo``, or None for what we do not know."""
+
+    cob_id: int
+    transmission_type: int
+    event_timer_ms: int
+    codec: PdoCodec
+    words: tuple[int | None, ...]
+    remote_allowed: bool = True
+    """Bit 30 of a TPDO's COB-ID is 0: it may be asked for by remote frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodePdoPlan:
+    """A TPDO of the node itself: which polls it saves. ``names`` has one for each entry, "" for what
+    nobody shows."""
+
+    pdo: PdoPlan
+    names: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class DrivePlan:
+    """Both PDOs of one drive, or the reason why it cannot be served."""
+
+    rpdo: PdoPlan | None = None
+    tpdo: PdoPlan | None = None
+    problem: str = ""
+
+
+@dataclass(slots=True)
+class BootResult:
+    identification: Identification = field(default_factory=Identification)
+    software_version: str = ""
+    drives: dict[str, DrivePlan] = field(default_factory=dict[str, DrivePlan])
+    scales: dict[str, dict[str, float]] = field(default_factory=dict[str, dict[str, float]])
+    node_tpdos: list[NodePdoPlan] = field(default_factory=list[NodePdoPlan])
+    notes: list[str] = field(default_factory=list[str])
+
+
+Boot = Generator[Action, bytes | None, BootResult]
+Ask = Generator[Action, bytes | None, bytes | None]
+Do = Generator[Action, bytes | None, None]
+
+
+_LONGEST_NUMBER: Final = 8
+
+
+def optional(index: int, sub: int = 0, channel: int = 1) -> Ask:
+    """An object that the node need not have: None where it aborts. A time-out is still an error."""
+    try:
+        return (yield Read(index, sub, channel))
+    except SdoError as error:
+        if error.by_server:
+            return None
+        raise
+
+
+def number(data: bytes | None, default: int = 0) -> int:
+    """The number in an answer. Raises BootError where it is longer than any number of CANopen."""
+    if data is None:
+        return default
+    if len(data) > _LONGEST_NUMBER:
+        raise BootError("J", f"the node answers with {len(data)} bytes where a number belongs")
+    return int.from_bytes(data, "little")
+
+
+def same(have: bytes | None, want: bytes) -> bool:
+    """Whether the node's bytes are ours. An expedited answer without a size always has four."""
+    if have is None:
+        return False
+    padded = len(have) == 4 > len(want) and not any(have[len(want) :])
+    return have == want or (padded and have[: len(want)] == want)

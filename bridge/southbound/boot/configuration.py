@@ -1,0 +1,136 @@
+"""Download of a node's configuration in order, compared first and read back (CiA 302-2, 302-3).
+
+A node that keeps a configuration date and time (1020h) is asked for it first: where it has ours, nothing
+is downloaded. The date the bridge writes is made from the configuration itself, so that a changed site
+file is never taken for the one the node has.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Generator, Sequence
+from typing import Final
+
+from bridge.config.download import Download
+from bridge.southbound.boot.actions import (
+    Action,
+    BootResult,
+    Do,
+    Read,
+    Step,
+    Write,
+    number,
+    optional,
+    same,
+)
+from bridge.southbound.boot.pdo_downloads import download_pdo, is_pdo, pdo_parameter
+from bridge.southbound.boot.status import BootError
+from bridge.southbound.canopen.sdo import SdoError
+
+_VERIFY: Final = 0x1020
+_STORE: Final = 0x1010
+_SAVE: Final = b"save"
+_DAY_MS: Final = 86_400_000
+_DAYS: Final = 0xFFFF
+
+
+def configuration_stamp(downloads: Sequence[Download]) -> tuple[int, int]:
+    """Date (days since 1984-01-01) and time (ms) that stand for this configuration in 1020h.
+
+    Those in the list, where a DCF brings its own; else made from the content.
+    """
+    given = {download.sub: number(download.data) for download in downloads if download.index == _VERIFY}
+    if 1 in given and 2 in given:
+        return given[1], given[2]
+    content = b"".join(
+        download.index.to_bytes(2, "little") + bytes((download.sub,)) + download.data
+        for download in downloads
+    )
+    days = 1 + zlib.crc32(content) % _DAYS
+    return days, zlib.crc32(content, days) % _DAY_MS
+
+
+def configure(downloads: Sequence[Download], *, store: bool, result: BootResult) -> Do:
+    """Bring the node's objects to ``downloads``; ``store`` saves them with 1010h:1 if one was written.
+
+    Raises BootError J with object, expected and read.
+    """
+    wanted = [download for download in downloads if download.index != _VERIFY]
+    if not wanted:
+        return
+    yield Step("comparing the configuration", "J")
+    stamp = configuration_stamp(downloads)
+    days = yield from optional(_VERIFY, 1)
+    has_stamp = days is not None
+    if has_stamp and (number(days), number((yield from optional(_VERIFY, 2)))) == stamp:
+        result.notes.append("the node has this configuration already (1020h)")
+        return
+    written = 0
+    parts = _parts(wanted)
+    for place, part in enumerate(parts, 1):
+        yield Step(f"downloading the configuration, {place} of {len(parts)}", "J")
+        if is_pdo(part[0].index):
+            written += yield from download_pdo(part)
+        else:
+            written += yield from _download(part[0])
+    if has_stamp:
+        for sub, value in enumerate(stamp, 1):
+            yield from _write(Download(_VERIFY, sub, value.to_bytes(4, "little")))
+    if store and (written or has_stamp):
+        yield Step("storing the configuration", "J")
+        yield from _write(Download(_STORE, 1, _SAVE))
+    if written:
+        result.notes.append(f"{written} of {len(wanted)} objects of the configuration were written")
+
+
+def _parts(downloads: Sequence[Download]) -> list[list[Download]]:
+    """In order, one by one; what belongs to one PDO stays together, where the first of it stands."""
+    parts: dict[object, list[Download]] = {}
+    for place, download in enumerate(downloads):
+        key = ("PDO", pdo_parameter(download.index)) if is_pdo(download.index) else place
+        parts.setdefault(key, []).append(download)
+    return list(parts.values())
+
+
+def _download(download: Download) -> Generator[Action, bytes | None, int]:
+    """One object; 1 where it was written."""
+    if not download.read_back:
+        yield from _write(download)
+        return 1
+    have = yield from optional(download.index, download.sub)
+    if same(have, download.data):
+        return 0
+    yield from _write(download)
+    read = yield from _read_back(download)
+    if not same(read, download.data):
+        raise BootError("J", f"{download.name} is {_shown(read)} after {_shown(download.data)} was written")
+    return 1
+
+
+def _read_back(download: Download) -> Generator[Action, bytes | None, bytes | None]:
+    try:
+        return (yield Read(download.index, download.sub))
+    except SdoError as error:
+        if not error.by_server:
+            raise
+        raise BootError(
+            "J", f"{error}; {_shown(download.data)} was written and cannot be read back"
+        ) from None
+
+
+def _write(download: Download) -> Do:
+    try:
+        yield Write(download.index, download.sub, download.data)
+    except SdoError as error:
+        if not error.by_server:
+            raise
+        raise BootError("J", f"{error}; it was to become {_shown(download.data)}") from None
+
+
+def _shown(data: bytes | None) -> str:
+    """A value as people write it: a number up to eight bytes, else its bytes."""
+    if data is None:
+        return "nothing"
+    if 0 < len(data) <= 8:
+        return f"{int.from_bytes(data, 'little'):0{2 * len(data)}X}h"
+    return data.hex(" ").upper() or "empty"

@@ -1,0 +1,85 @@
+"""Who the node is: 1000h, 1008h, 100Ah and 1018h, compared with mapping and site file (CiA 302-2)."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+from bridge.command import Identification
+from bridge.command.plant import Node
+from bridge.southbound.boot.actions import Action, BootResult, Do, Read, Step, number, optional
+from bridge.southbound.boot.status import BootError
+
+_ALL = 0xFFFF_FFFF
+_LONGEST_TEXT = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """``read & mask`` must be ``expected & mask``; a rule without a value compares nothing."""
+
+    letter: str
+    index: int
+    sub: int
+    expected: int | None
+    mask: int | None = None
+
+    def check(self, read: int, where: str) -> None:
+        """Raises BootError where the value is another one."""
+        mask = _ALL if self.mask is None else self.mask
+        if self.expected is None or not (read ^ self.expected) & mask:
+            return
+        masked = "" if mask == _ALL else f" (mask {mask:08X}h)"
+        raise BootError(
+            self.letter,
+            f"{self.index:04X}h:{self.sub:02X} is {read:08X}h, expected {self.expected:08X}h{masked} {where}",
+        )
+
+
+def _rules(expected: object, where: str) -> list[tuple[Rule, str]]:
+    """The rules of an identity table; the mapping's has fewer keys than the site file's."""
+    rules: list[tuple[Rule, str]] = []
+    for letter, index, sub, name in (
+        ("C", 0x1000, 0, "device_type"),
+        ("D", 0x1018, 1, "vendor_id"),
+        ("M", 0x1018, 2, "product_code"),
+        ("N", 0x1018, 3, "revision"),
+        ("O", 0x1018, 4, "serial"),
+    ):
+        value = getattr(expected, name, None)
+        mask = getattr(expected, f"{name}_mask", None)
+        rules.append((Rule(letter, index, sub, value, mask), where))
+    return rules
+
+
+def identify(node: Node, device_type: int, result: BootResult) -> Do:
+    """Read who the node is and compare. Raises BootError C, D, M, N or O."""
+    rules = _rules(node.table.identity, "by the site file")
+    # What the site file says of a field stands in place of what the mapping says.
+    given = {rule.letter for rule, _ in rules if rule.expected is not None}
+    rules += [
+        (rule, where)
+        for rule, where in _rules(node.family.identity, "by the mapping")
+        if rule.letter not in given
+    ]
+    read = {(0x1000, 0): device_type}
+    for sub, letter in ((1, "D"), (2, "M"), (3, "N"), (4, "O")):
+        yield Step("reading the identity", letter)
+        read[0x1018, sub] = number((yield from optional(0x1018, sub)))
+    for rule, where in rules:
+        rule.check(read[rule.index, rule.sub], where)
+    name = yield from _text(0x1008)
+    result.software_version = yield from _text(0x100A)
+    vendor, product, revision, serial = (read[0x1018, sub] for sub in (1, 2, 3, 4))
+    result.identification = Identification(vendor, product, revision, serial, name)
+
+
+def look_for() -> Generator[Action, bytes | None, int]:
+    """Device type of the node; SdoError where nobody answers."""
+    yield Step("looking for the node", "B")
+    return number((yield Read(0x1000)))
+
+
+def _text(index: int) -> Generator[Action, bytes | None, str]:
+    data = (yield from optional(index)) or b""
+    return data[:_LONGEST_TEXT].split(b"\0", 1)[0].decode("latin-1").strip()

@@ -1,0 +1,68 @@
+"""Boot-up of one node as a generator (after CiA 302-2): it asks, is answered, and ends with a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from bridge.command.plant import Node
+from bridge.config import NodeTable
+from bridge.config.download import Download
+from bridge.southbound.boot.actions import (
+    Await,
+    AwaitRelease,
+    Boot,
+    BootResult,
+    Do,
+    Nmt,
+    SendStopped,
+    StartSupervision,
+    Step,
+)
+from bridge.southbound.boot.configuration import configure
+from bridge.southbound.boot.error_control import set_error_control
+from bridge.southbound.boot.identity import identify, look_for
+from bridge.southbound.boot.pdos import plan_drive, plan_node_tpdos, refuse_doubles
+from bridge.southbound.boot.scales import read_scales
+from bridge.southbound.boot.sdo_servers import open_sdo_servers
+from bridge.southbound.canopen.nmt import NmtCommand, NmtState
+
+_GOES_OPERATIONAL_S: Final = 2.0
+
+
+def boot(node: Node, downloads: Sequence[Download] = ()) -> Boot:
+    """Boot ``node``; returns what is to be known of it.
+
+    Raises BootError where it is another device, cannot be configured or does not go operational,
+    SdoError where it does not answer. ``downloads`` go before what the tables of the site file say.
+    """
+    result = BootResult()
+    device_type = yield from look_for()
+    yield SendStopped()
+    yield Nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+    yield from identify(node, device_type, result)
+    wanted = (*downloads, *(entry.download for entry in node.table.configure))
+    yield from configure(wanted, store=node.table.configuration_store, result=result)
+    yield from open_sdo_servers(node, result)
+    yield from set_error_control(node.table, result)
+    for drive in node.drives:
+        result.drives[drive.name] = yield from plan_drive(node, drive, result)
+    refuse_doubles(result)
+    yield from plan_node_tpdos(node, result)
+    yield Step("reading the scaling parameters", "J")
+    for drive in node.drives:
+        result.scales[drive.name] = yield from read_scales(node, drive, result)
+    yield from _start(node.table)
+    return result
+
+
+def _start(table: NodeTable) -> Do:
+    """Error control first, then NMT start; both are seen from the node's own messages."""
+    not_heard = "F" if table.supervision == "guarding" else "K"
+    yield Step(f"waiting for {table.supervision}", not_heard)
+    yield StartSupervision()
+    yield Await(None, max(_GOES_OPERATIONAL_S, 3 * table.supervision_ms / 1000))
+    yield AwaitRelease()
+    yield Step("starting", "J")
+    yield Nmt(NmtCommand.START)
+    yield Await(NmtState.OPERATIONAL, _GOES_OPERATIONAL_S)

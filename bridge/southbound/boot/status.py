@@ -1,0 +1,54 @@
+"""Error status of the process "boot NMT slave" (CiA 302-2, error status A … O) with what helps."""
+
+from __future__ import annotations
+
+from typing import Final
+
+TEXTS: Final = {
+    "A": "the node is not in the network list",
+    "B": "no answer when object 1000h was read",
+    "C": "another device type (1000h)",
+    "D": "another vendor (1018h:01)",
+    "E": "heartbeat lost",
+    "F": "no answer to node guarding",
+    "G": "program download is not configured",
+    "H": "another program is required, and may not be downloaded",
+    "I": "the program download failed",
+    "J": "the configuration could not be downloaded",
+    "K": "no heartbeat when error control was started",
+    "L": "the node was operational already",
+    "M": "another product code (1018h:02)",
+    "N": "another revision (1018h:03)",
+    "O": "another serial number (1018h:04)",
+}
+"""By letter. G, H and I belong to program download, which the bridge does not do."""
+
+HINTS: Final = {
+    "A": "add it to the site file or take it off the bus",
+    "B": "is it powered and connected, and are address and bit rate right?",
+    "C": "another device has this address, or the mapping is not its own",
+    "D": "another device has this address, or the mapping is not its own",
+    "J": "compare the site file with the device's manual",
+    "K": "does the device have this kind of error control?",
+    "F": "does the device have node guarding, and is its heartbeat (1017h) off?",
+    "M": "was the device exchanged? If it may be used, change identity in the site file",
+    "N": "was the firmware changed? If it may be used, change identity in the site file",
+    "O": "was the device exchanged? If it may be used, change identity in the site file",
+}
+
+ABSENT: Final = frozenset("BEFK")
+"""With these the node is not there; with the others it is there and cannot be used."""
+
+
+class BootError(Exception):
+    """The boot-up ended. ``letter`` is the error status, ``detail`` names object, expected and read.
+
+    ``absent`` is true where the node did not answer, whatever the step was.
+    """
+
+    def __init__(self, letter: str, detail: str, *, absent: bool | None = None) -> None:
+        self.letter = letter
+        self.detail = detail
+        self.absent = letter in ABSENT if absent is None else absent
+        hint = HINTS.get(letter, "")
+        super().__init__(f"{letter}: {detail}: {hint}" if hint else f"{letter}: {detail}")

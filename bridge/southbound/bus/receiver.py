@@ -1,0 +1,117 @@
+"""Frames out of a raw CAN socket, many with one system call (recvmmsg(2)).
+
+A system call for each frame would cost more than everything that is done with the frame
+(``tests/bench/lab/bench_receive.py``), and Python's socket module has none for several.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import os
+import socket
+import struct
+from typing import Final, NamedTuple
+
+from bridge.southbound.bus.frame import ERROR, Frame
+
+_FRAME: Final = struct.Struct("=IB3x8s")  # struct can_frame: identifier with flags, length, data
+
+_SO_TIMESTAMPNS: Final = 35
+_SO_RXQ_OVFL: Final = 40
+# Two control messages in the kernel's order, aligned as CMSG_ALIGN does: time stamp (3: s,
+# 4: ns), drop counter (8).
+_CONTROL: Final = struct.Struct("@NiillNiiI0N")
+_MSG_DONTWAIT: Final = 0x40
+BATCH: Final = 64
+"""Frames per call at most."""
+
+_FULL: Final = 8
+
+
+class Stamps(NamedTuple):
+    """How time stamps become monotonic seconds: what is added to the wall clock, and the limits."""
+
+    wall_offset: float
+    earliest: float
+    latest: float
+
+
+class _Vector(ctypes.Structure):
+    _fields_ = (("base", ctypes.c_void_p), ("length", ctypes.c_size_t))
+
+
+class _Header(ctypes.Structure):  # struct msghdr
+    _fields_ = (
+        ("name", ctypes.c_void_p),
+        ("name_length", ctypes.c_uint32),
+        ("vector", ctypes.c_void_p),
+        ("vectors", ctypes.c_size_t),
+        ("control", ctypes.c_void_p),
+        ("control_length", ctypes.c_size_t),
+        ("flags", ctypes.c_int),
+    )
+
+
+class _Message(ctypes.Structure):  # struct mmsghdr
+    _fields_ = (("header", _Header), ("length", ctypes.c_uint))
+
+
+class Receiver:
+    """Receives from one socket without waiting, into buffers that are made once."""
+
+    def __init__(self, raw: socket.socket) -> None:
+        """Asks for time stamps and drop counters. Raises OSError."""
+        raw.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+        raw.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
+        self.drops = 0
+        """Frames that the kernel has dropped since the opening, modulo 2³²."""
+        self._raw = raw
+        self._receive = ctypes.CDLL(None, use_errno=True).recvmmsg
+        frames = ctypes.create_string_buffer(BATCH * _FRAME.size)
+        controls = ctypes.create_string_buffer(BATCH * _CONTROL.size)
+        self._vectors = (_Vector * BATCH)()
+        self._messages = (_Message * BATCH)()
+        for place, (vector, message) in enumerate(zip(self._vectors, self._messages, strict=True)):
+            vector.base = ctypes.addressof(frames) + place * _FRAME.size
+            vector.length = _FRAME.size
+            message.header.vector = ctypes.addressof(vector)
+            message.header.vectors = 1
+            message.header.control = ctypes.addressof(controls) + place * _CONTROL.size
+            message.header.control_length = _CONTROL.size
+        # The kernel writes lengths and flags into the messages: each call begins with a fresh copy.
+        self._fresh = bytes(self._messages)
+        self._buffers = frames, controls
+        self._frame_view, self._control_view = memoryview(frames), memoryview(controls)
+
+    def receive(self, frames: list[Frame], stamps: Stamps) -> tuple[int, list[tuple[int, bytes]]]:
+        """Put the next frames into ``frames``, at most ``BATCH`` of them.
+
+        Gives the number of all that came, and the identifiers and data of the error frames among them.
+        Raises OSError where the interface is gone or down.
+        """
+        ctypes.memmove(self._messages, self._fresh, len(self._fresh))
+        count: int = self._receive(self._raw.fileno(), self._messages, BATCH, _MSG_DONTWAIT, None)
+        errors: list[tuple[int, bytes]] = []
+        if count < 0:
+            number = ctypes.get_errno()
+            if number in (errno.EAGAIN, errno.EINTR):
+                return 0, errors
+            raise OSError(number, os.strerror(number))
+        wall_offset, earliest, latest = stamps
+        for (can_id, length, data), control in zip(
+            _FRAME.iter_unpack(self._frame_view[: count * _FRAME.size]),
+            _CONTROL.iter_unpack(self._control_view[: count * _CONTROL.size]),
+            strict=True,
+        ):
+            self.drops = control[8]
+            if can_id & ERROR:
+                errors.append((can_id, data))
+                continue
+            stamp = control[3] + control[4] * 1e-9 + wall_offset
+            if stamp > latest:
+                stamp = latest
+            elif stamp < earliest:
+                stamp = earliest
+            frames.append(Frame(can_id, data if length == _FULL else data[:length], stamp))
+        return count, errors

@@ -1,0 +1,54 @@
+"""A node that starts again and again is asked less and less often, and told of once a minute."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Final
+
+_MANY: Final = 4
+_WITHIN_S: Final = 20.0
+_FIRST_PAUSE_S: Final = 2.0
+_LAST_PAUSE_S: Final = 60.0
+_TELL_S: Final = 60.0
+
+
+class BootLoop:
+    """Counts the boot-up messages of one node."""
+
+    __slots__ = ("_pause_s", "_since_told", "_times", "_told_at", "count")
+
+    def __init__(self) -> None:
+        self._times: deque[float] = deque(maxlen=_MANY)
+        self._pause_s = 0.0
+        self._told_at = float("-inf")
+        self._since_told = 0
+        self.count = 0
+
+    def on_boot_up(self, now: float) -> float:
+        """A boot-up message; returns the seconds to wait before the node is booted, 0 where all is well."""
+        if self._times and now - self._times[-1] > max(_WITHIN_S, 2 * self._pause_s):
+            self._pause_s = 0.0
+            self._times.clear()
+        self._times.append(now)
+        self.count += 1
+        self._since_told += 1
+        if len(self._times) < _MANY or now - self._times[0] > max(_WITHIN_S, _MANY * self._pause_s):
+            return self._pause_s
+        self._times.clear()
+        self._times.append(now)
+        self._pause_s = min(max(_FIRST_PAUSE_S, 2 * self._pause_s), _LAST_PAUSE_S)
+        return self._pause_s
+
+    @property
+    def is_looping(self) -> bool:
+        return self._pause_s > 0
+
+    def report(self, now: float) -> str | None:
+        """What to tell, once a minute while it goes on."""
+        if not self.is_looping or now - self._told_at < _TELL_S:
+            return None
+        self._told_at = now
+        since, self._since_told = self._since_told, 0
+        return (
+            f"the node starts again and again: {since} boot-up messages; asked again in {self._pause_s:g} s"
+        )

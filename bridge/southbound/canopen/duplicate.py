@@ -1,0 +1,80 @@
+"""Signs that two devices share one node id. Pure: told of what the node sends, by its time stamps."""
+
+from __future__ import annotations
+
+from typing import Final
+
+_WINDOW: Final = 20
+"""Heartbeats that are counted together."""
+_TOO_SOON: Final = 0.7
+"""A window that takes less than this part of its time had more than one producer."""
+_TURNS: Final = 8
+"""Changes of state within one window that no single device makes."""
+_EXTRA_REPLIES: Final = 3
+_FORGET_S: Final = 60.0
+
+
+class DuplicateCheck:
+    """Watches one node id. Each method returns what is wrong, in words, or None."""
+
+    __slots__ = (
+        "_begin",
+        "_changes",
+        "_count",
+        "_extra",
+        "_extra_since",
+        "_last_reply",
+        "_state",
+        "period_s",
+    )
+
+    def __init__(self) -> None:
+        self.period_s: float | None = None
+        """The node's heartbeat period as the boot-up left it; None where it has none."""
+        self._last_reply = b""
+        self._extra = 0
+        self._extra_since = float("-inf")
+        self.restart()
+
+    def restart(self) -> None:
+        """Count anew: the node has started, or its period is another one now."""
+        self._begin: float | None = None
+        self._count = 0
+        self._changes = 0
+        self._state = -1
+
+    def on_heartbeat(self, state: int, time: float) -> str | None:
+        """A heartbeat; a boot-up message goes to ``restart``."""
+        if self.period_s is None:
+            return None
+        if self._begin is None:
+            self._begin, self._state = time, state
+            return None
+        self._count += 1
+        if state != self._state:
+            self._state = state
+            self._changes += 1
+        if self._count < _WINDOW:
+            return None
+        took_s, changes, expected_s = time - self._begin, self._changes, _WINDOW * self.period_s
+        self.restart()
+        if changes >= _TURNS:
+            return f"its heartbeat changed state {changes} times within {_WINDOW} messages"
+        if took_s < _TOO_SOON * expected_s:
+            return f"{_WINDOW} heartbeats came within {took_s:.2f} s, {expected_s:.2f} s were expected"
+        return None
+
+    def on_reply(self, data: bytes, time: float, *, matched: bool) -> str | None:
+        """An SDO answer; ``matched`` where it belonged to a request of ours."""
+        if matched:
+            self._last_reply = data[1:4]
+            return None
+        if len(data) != 8 or data[1:4] != self._last_reply:
+            return None
+        if time - self._extra_since > _FORGET_S:
+            self._extra, self._extra_since = 0, time
+        self._extra += 1
+        if self._extra < _EXTRA_REPLIES:
+            return None
+        self._extra = 0
+        return f"{_EXTRA_REPLIES} SDO requests were answered twice"

@@ -1,0 +1,189 @@
+"""LSS master (CiA 305): node ids and bit rates of devices that are told apart by their identity.
+
+Each service is a generator. It yields ``Exchange``s and is sent the reply's eight bytes, or None where
+none came in time; what it returns is the result. Services that need a device in configuration state say
+so: ``switch_selective``, ``switch_global`` or ``fastscan`` come first.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Final, NamedTuple, TypeVar
+
+REQUEST_ID: Final = 0x7E5
+REPLY_ID: Final = 0x7E4
+NO_NODE_ID: Final = 0xFF
+"""A device that has none."""
+
+BIT_RATES: Final = (1_000_000, 800_000, 500_000, 250_000, 125_000, None, 50_000, 20_000, 10_000)
+"""By table index of table 0 (CiA 305 §7.4; 5 is reserved)."""
+_AUTOMATIC: Final = 9
+
+_SWITCH_GLOBAL: Final = 0x04
+_NODE_ID: Final = 0x11
+_BIT_TIMING: Final = 0x13
+_ACTIVATE: Final = 0x15
+_STORE: Final = 0x17
+_SELECT: Final = (0x40, 0x41, 0x42, 0x43)
+_SELECTED: Final = 0x44
+_IDENTIFIED: Final = 0x4F
+_FASTSCAN: Final = 0x51
+_INQUIRE: Final = (0x5A, 0x5B, 0x5C, 0x5D)
+_INQUIRE_NODE_ID: Final = 0x5E
+_CONFIRM: Final = 0x80
+
+_FIELDS: Final = ("vendor id", "product code", "revision number", "serial number")
+_U32: Final = struct.Struct("<I")
+_STANDARD_ERRORS: Final = {
+    _NODE_ID: {1: "a node id must be 1…127 or 255"},
+    _BIT_TIMING: {1: "this bit rate is not supported"},
+    _STORE: {1: "the device cannot store", 2: "access to its memory failed"},
+}
+
+
+class LssError(Exception):
+    """A device refused, or did not answer."""
+
+
+class Identity(NamedTuple):
+    """Object 1018h: the LSS address."""
+
+    vendor: int
+    product: int
+    revision: int
+    serial: int
+
+
+@dataclass(frozen=True, slots=True)
+class Exchange:
+    """One request; ``reply`` is the command specifier that is waited for, None where none comes.
+
+    ``step`` says in words what is being done. ``fails`` false: silence is an answer. ``by_many``: any
+    number of devices may answer, so the whole time is waited: a late answer is not one to the next.
+    """
+
+    request: bytes
+    reply: int | None
+    step: str
+    fails: bool = True
+    by_many: bool = False
+
+
+_R = TypeVar("_R")
+Service = Generator[Exchange, bytes | None, _R]
+
+
+def _message(command: int, rest: bytes = b"") -> bytes:
+    return bytes((command,)) + rest.ljust(7, b"\0")
+
+
+def switch_global(*, configuration: bool) -> Service[None]:
+    """All devices to configuration or to waiting state; nobody answers."""
+    name = "configuration" if configuration else "waiting"
+    yield Exchange(_message(_SWITCH_GLOBAL, bytes((configuration,))), None, f"all devices to {name} state")
+
+
+def to_waiting() -> Service[None]:
+    """All devices to waiting state."""
+    return switch_global(configuration=False)
+
+
+def switch_selective(identity: Identity) -> Service[None]:
+    """The one device with this identity to configuration state. Raises LssError where it is not there."""
+    for command, value, name in zip(_SELECT, identity, _FIELDS, strict=True):
+        last = command == _SELECT[-1]
+        reply = _SELECTED if last else None
+        answer = yield Exchange(
+            _message(command, _U32.pack(value)), reply, f"selecting by {name}", fails=False
+        )
+        if last and answer is None:
+            raise LssError("no device has this identity, or it does not know LSS")
+
+
+def inquire_identity() -> Service[Identity]:
+    """What the device in configuration state is. Several of them would answer at once."""
+    values: list[int] = []
+    for command, name in zip(_INQUIRE, _FIELDS, strict=True):
+        answer = yield Exchange(_message(command), command, f"asking for its {name}")
+        values.append(_U32.unpack_from(answer or bytes(8), 1)[0])
+    return Identity(*values)
+
+
+def inquire_node_id() -> Service[int]:
+    """Its present node id, ``NO_NODE_ID`` where it has none."""
+    answer = yield Exchange(_message(_INQUIRE_NODE_ID), _INQUIRE_NODE_ID, "asking for its node id")
+    return answer[1] if answer else NO_NODE_ID
+
+
+def configure_node_id(node_id: int) -> Service[None]:
+    """Its node id after the next reset of its communication, 1…127, or ``NO_NODE_ID``."""
+    answer = yield Exchange(_message(_NODE_ID, bytes((node_id,))), _NODE_ID, f"setting node id {node_id}")
+    _check(answer)
+
+
+def configure_bit_rate(bit_rate: int | None) -> Service[None]:
+    """Its bit rate in bit/s after activation or its next start; None: it finds out by itself."""
+    index = _AUTOMATIC if bit_rate is None else BIT_RATES.index(bit_rate)
+    step = "setting automatic bit rate" if bit_rate is None else f"setting {bit_rate} bit/s"
+    answer = yield Exchange(_message(_BIT_TIMING, bytes((0, index))), _BIT_TIMING, step)
+    _check(answer)
+
+
+def activate_bit_rate(delay_ms: int) -> Service[None]:
+    """All devices in configuration state change their bit rate: silent for ``delay_ms``, then switched,
+    then silent for as long again. Nobody answers."""
+    request = _message(_ACTIVATE, struct.pack("<H", delay_ms))
+    yield Exchange(request, None, f"activating the bit rate within {delay_ms} ms")
+
+
+def store() -> Service[None]:
+    """Node id and bit rate into the device's memory."""
+    answer = yield Exchange(_message(_STORE), _STORE, "storing")
+    _check(answer)
+
+
+def _check(answer: bytes | None) -> None:
+    """The error code of a configuration service."""
+    if answer is None or not answer[1]:
+        return
+    if answer[1] == 0xFF:
+        raise LssError(f"the device refused: its own error {answer[2]}")
+    text = _STANDARD_ERRORS.get(answer[0], {}).get(answer[1], f"error {answer[1]}")
+    raise LssError(f"the device refused: {text}")
+
+
+def fastscan(known: Identity | None = None) -> Service[Identity | None]:
+    """Find one device that has no node id; it is in configuration state then (CiA 305 §6.10).
+
+    Each of 133 questions takes a whole reply time. None: there is no (further)
+    such device. ``known`` fills in fields that are the same for all (not 0).
+    """
+    request = struct.pack("<IBBB", 0, _CONFIRM, 0, 0)
+    if (yield _question(request, "is anybody there?")) is None:
+        return None
+    found: list[int] = []
+    for sub, name in enumerate(_FIELDS):
+        value = known[sub] if known else 0
+        if not value:
+            value = yield from _find_number(sub, name)
+        following = (sub + 1) % len(_FIELDS)
+        request = struct.pack("<IBBB", value, 0, sub, following)
+        if (yield _question(request, f"{name} is {value:08X}h")) is None:
+            raise LssError(f"a device answered and confirmed no {name} {value:08X}h: allow it more time")
+        found.append(value)
+    return Identity(*found)
+
+
+def _question(request: bytes, step: str) -> Exchange:
+    return Exchange(_message(_FASTSCAN, request), _IDENTIFIED, step, fails=False, by_many=True)
+
+
+def _find_number(sub: int, name: str) -> Service[int]:
+    value = 0
+    for bit in range(31, -1, -1):
+        request = struct.pack("<IBBB", value, bit, sub, sub)
+        if (yield _question(request, f"{name}, bit {bit}")) is None:
+            value |= 1 << bit
+    return value

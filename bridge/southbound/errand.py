@@ -1,0 +1,99 @@
+"""Single errands on a bus for the command line: one SDO transfer, one NMT command. Sans-IO."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.southbound.bus.frame import Frame
+from bridge.southbound.canopen import cobid, nmt
+from bridge.southbound.canopen.nmt import NmtCommand, NmtState
+from bridge.southbound.canopen.sdo import Result, SdoChannel
+
+_EXPECTED: Final = {
+    NmtCommand.START: NmtState.OPERATIONAL,
+    NmtCommand.STOP: NmtState.STOPPED,
+    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
+    # A reset shows in the boot-up message.
+    NmtCommand.RESET_NODE: NmtState.INITIALISING,
+    NmtCommand.RESET_COMMUNICATION: NmtState.INITIALISING,
+}
+
+
+class SdoErrand:
+    """One transfer with the first SDO server of a node; ``result`` is None until it has ended.
+
+    ``data`` None reads, bytes are written. Times are monotonic seconds.
+    """
+
+    def __init__(
+        self, node_id: int, index: int, sub: int, data: bytes | None, now: float, timeout_s: float
+    ) -> None:
+        self.result: Result | None = None
+        self.received = 0
+        """Frames of the server so far: tells that a long transfer goes on."""
+        self._channel = SdoChannel(cobid.SDO_REQUEST + node_id, cobid.SDO_REPLY + node_id, timeout_s)
+        if data is None:
+            self._channel.read(index, sub, now, self._done)
+        else:
+            self._channel.write(index, sub, data, now, self._done)
+
+    def _done(self, result: Result) -> None:
+        self.result = result
+
+    def is_finished(self, now: float) -> bool:
+        return self.result is not None
+
+    def on_frame(self, frame: Frame) -> None:
+        if frame.can_id == self._channel.reply_id:
+            self.received += 1
+            self._channel.on_frame(frame)
+
+    def on_time(self, now: float) -> None:
+        self._channel.on_time(now)
+
+    def next_deadline(self) -> float | None:
+        return self._channel.next_deadline()
+
+    def take_frames(self) -> list[Frame]:
+        return self._channel.take_frames()
+
+
+class NmtErrand:
+    """One NMT command to a node, or to all with ``node_id`` 0, and what the nodes say afterwards.
+
+    One node is waited for until it is where it should be, all of them for the whole of ``wait_s``.
+    """
+
+    def __init__(self, command: NmtCommand, node_id: int, now: float, wait_s: float) -> None:
+        self.states: dict[int, NmtState] = {}
+        """Last state that each node has reported since the command."""
+        self.reached: set[int] = set()
+        """Nodes that have reported the state that the command leads to."""
+        self._expected = _EXPECTED[command]
+        self._node_id = node_id
+        self._until = now + wait_s
+        self._frames = [nmt.command(command, node_id)]
+
+    def is_finished(self, now: float) -> bool:
+        return now >= self._until or (self._node_id in self.reached)
+
+    def on_frame(self, frame: Frame) -> None:
+        node_id = frame.can_id - cobid.ERROR_CONTROL
+        if not 1 <= node_id <= 127 or self._node_id not in (0, node_id) or len(frame.data) != 1:
+            return
+        if self._frames:
+            return  # said before the command
+        state = nmt.state_of(frame.data[0])
+        if state is self._expected:
+            self.reached.add(node_id)
+        self.states[node_id] = NmtState.PRE_OPERATIONAL if state is NmtState.INITIALISING else state
+
+    def on_time(self, now: float) -> None:
+        """Nothing is ever late: silence is an answer, too."""
+
+    def next_deadline(self) -> float | None:
+        return self._until
+
+    def take_frames(self) -> list[Frame]:
+        frames, self._frames = self._frames, []
+        return frames

@@ -1,0 +1,107 @@
+"""Error control of one node: is it there, in which state, once or twice, does it start again and again?
+
+What is known of the state is what the node has said, never what it was told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+
+from bridge.config import NodeTable
+from bridge.southbound.bus.frame import Frame
+from bridge.southbound.canopen import nmt
+from bridge.southbound.canopen.bootloop import BootLoop
+from bridge.southbound.canopen.duplicate import DuplicateCheck
+from bridge.southbound.canopen.heartbeat import HeartbeatConsumer, NodeGuard
+from bridge.southbound.canopen.nmt import NmtState
+
+
+class Sign(Enum):
+    """What an error control message says."""
+
+    MALFORMED = "malformed"
+    BOOT_UP = "boot-up"
+    SAME = "the state it had before"
+    CHANGED = "another state"
+
+
+class ErrorControl:
+    """``duplicate`` is called where two devices seem to have this node id."""
+
+    def __init__(self, table: NodeTable, duplicate: Callable[[str, float], None]) -> None:
+        self._table = table
+        self._duplicate = duplicate
+        self._duplicates = DuplicateCheck()
+        self.boot_loop = BootLoop()
+        self.state = NmtState.UNKNOWN
+        self._supervisor: HeartbeatConsumer | NodeGuard | None = None
+        if table.supervision == "heartbeat":
+            self._supervisor = HeartbeatConsumer(table.supervision_ms / 1000)
+        elif table.supervision == "guarding":
+            self._supervisor = NodeGuard(table.id, table.supervision_ms / 1000, table.life_time_factor)
+
+    @property
+    def supervises(self) -> bool:
+        """False for "none": such a node never says its state."""
+        return self._supervisor is not None
+
+    @property
+    def loss(self) -> str:
+        """How a loss is called: error status E or F of CiA 302-2."""
+        if self._table.supervision == "guarding":
+            return "F: lost: no answer to node guarding"
+        return f"E: lost: no heartbeat for {self._table.supervision_ms} ms"
+
+    def on_frame(self, frame: Frame) -> Sign:
+        if len(frame.data) != 1:
+            return Sign.MALFORMED
+        state = nmt.state_of(frame.data[0])
+        if state is NmtState.INITIALISING:
+            self._duplicates.restart()
+            self.state = NmtState.PRE_OPERATIONAL
+            return Sign.BOOT_UP
+        if self._supervisor:
+            self._supervisor.on_frame(frame)
+        found = self._duplicates.on_heartbeat(state, frame.time)
+        if found:
+            self._duplicate(found, frame.time)
+        if state is self.state:
+            return Sign.SAME
+        self.state = state
+        return Sign.CHANGED
+
+    def on_reply(self, frame: Frame, *, matched: bool) -> None:
+        """An SDO answer; ``matched`` where it belonged to a request of ours."""
+        found = self._duplicates.on_reply(frame.data, frame.time, matched=matched)
+        if found:
+            self._duplicate(found, frame.time)
+
+    def produces_every(self, period_s: float | None) -> None:
+        """The heartbeat period that the boot-up has set; None where there is none."""
+        self._duplicates.period_s = period_s
+
+    def expect(self, now: float) -> None:
+        """From now on the node has to be heard."""
+        self._duplicates.restart()
+        if self._supervisor:
+            self._supervisor.expect(now)
+
+    def stop(self, now: float, *, lost: bool = False) -> None:
+        """No longer expect the node. A guarded one whose loss is only reported goes on being asked: there
+        is no other way to hear that it is back."""
+        if self._supervisor is None:
+            return
+        self._supervisor.reset()
+        if lost and self._table.on_loss == "nothing" and isinstance(self._supervisor, NodeGuard):
+            self._supervisor.expect(now)
+
+    def on_time(self, now: float) -> bool:
+        """True once when the node has been silent for too long."""
+        return self._supervisor is not None and self._supervisor.on_time(now)
+
+    def next_deadline(self) -> float | None:
+        return self._supervisor.next_deadline() if self._supervisor else None
+
+    def take_frames(self) -> list[Frame]:
+        return self._supervisor.take_frames() if self._supervisor else []

@@ -1,0 +1,48 @@
+"""What a node and its network are to each other."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from bridge.config import NodeTable
+
+
+class Neighbour(Protocol):
+    """A node as the others of its bus see it."""
+
+    @property
+    def table(self) -> NodeTable: ...
+
+    @property
+    def is_ready(self) -> bool:
+        """Operational, or booted and waiting to be started."""
+        ...
+
+    @property
+    def is_operational(self) -> bool: ...
+
+    @property
+    def is_on_its_way(self) -> bool:
+        """Being booted, or not asked yet."""
+        ...
+
+    @property
+    def is_out_of_service(self) -> bool:
+        """An operator has switched it off or stopped it: nobody waits for it."""
+        ...
+
+    def next_deadline(self) -> float | None: ...
+
+
+class Neighbours(Protocol):
+    """The network as one of its nodes needs it."""
+
+    def touched(self, node: Neighbour) -> None:
+        """Something happened to the node beyond a sign of life: look at its frames and deadlines."""
+        ...
+
+    def may_start(self, node: Neighbour) -> bool: ...
+
+    def stop_others(self, node: Neighbour, why: str, now: float) -> None: ...
+
+    def duplicate(self, node: Neighbour, sign: str, now: float) -> None: ...

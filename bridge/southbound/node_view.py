@@ -1,0 +1,50 @@
+"""How a node is shown: its points of state and boot-up, and the events about it."""
+
+from __future__ import annotations
+
+from bridge.command import Event, Kind, Plant
+from bridge.command.link import NodeState
+from bridge.command.plant import Node
+from bridge.southbound.boot import BootError
+from bridge.southbound.canopen.bootloop import BootLoop
+from bridge.southbound.canopen.nmt import NmtState
+
+
+class NodeView:
+    def __init__(self, node: Node, plant: Plant) -> None:
+        self._node = node
+        self._plant = plant
+        self._top = f"{node.name}/node"
+        self._failure = ""
+
+    def say(self, text: str, now: float) -> None:
+        """Step or result of the boot-up."""
+        self._plant.set(f"{self._top}/boot_status", text, now)
+
+    def show(self, nmt_state: NmtState, state: NodeState, now: float) -> None:
+        self._plant.set(f"{self._top}/nmt_state", int(nmt_state), now)
+        supervision = self._node.table.supervision
+        self._plant.set(f"{self._top}/supervision_state", f"{supervision}: {state.value}", now)
+
+    def succeeded(self, text: str, now: float) -> None:
+        self._failure = ""
+        self.say(text, now)
+
+    def failed(self, error: BootError, now: float) -> None:
+        """The boot-up has failed; each way of failing is an event once until it succeeds."""
+        self.say(str(error), now)
+        if self._failure != str(error):
+            self._failure = str(error)
+            self._tell(Kind.CONFIGURATION, 600, f"boot-up failed: {error}", now)
+
+    def restarted(self, now: float) -> None:
+        self._tell(Kind.NODE_LOST, 800, "the node has restarted", now)
+
+    def loops(self, loop: BootLoop, now: float) -> None:
+        """Once a minute, where the node starts again and again."""
+        told = loop.report(now)
+        if told:
+            self._tell(Kind.CONFIGURATION, 600, told, now)
+
+    def _tell(self, kind: Kind, severity: int, message: str, now: float) -> None:
+        self._plant.report(Event(now, kind, self._node.name, severity, message))

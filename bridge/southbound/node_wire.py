@@ -1,0 +1,136 @@
+"""What one node sends and is sent: routes, SDO, emergencies, error control, process data. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from bridge.command import Event, Kind, Plant
+from bridge.command.plant import Node
+from bridge.southbound import boot
+from bridge.southbound.bus.frame import Frame
+from bridge.southbound.canopen import cobid, nmt
+from bridge.southbound.canopen.nmt import NmtCommand
+from bridge.southbound.canopen.sdo import SdoChannel
+from bridge.southbound.emergencies import Emergencies
+from bridge.southbound.error_control import ErrorControl, Sign
+from bridge.southbound.node_tpdo import node_tpdos
+from bridge.southbound.polling import Polling
+from bridge.southbound.process_data import DrivePdos, connect, stopped_frames
+from bridge.southbound.sdo_channels import SdoChannels
+
+Handler = Callable[[Frame], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Listener:
+    """Who is told what comes in."""
+
+    on_sign: Callable[[Sign, float], None]
+    """An error control message, and when it came."""
+    touch: Callable[[], None]
+    """Something came that may change frames to be sent or deadlines."""
+    on_duplicate: Callable[[str, float], None]
+    """Two devices seem to have this node id."""
+
+
+class NodeWire:
+    """``rejected`` counts frames that did not fit what the node says it sends."""
+
+    def __init__(self, node: Node, plant: Plant, listener: Listener) -> None:
+        self._node = node
+        self._plant = plant
+        self._listener = listener
+        self.sdo = SdoChannels(node)
+        self.rejected = 0
+        self.is_taken: Callable[[int], bool] = lambda cob_id: False
+        """Whether another node of the bus has something on this identifier."""
+        self._emergencies = Emergencies(node, plant, self.reject)
+        self.error_control = ErrorControl(node.table, listener.on_duplicate)
+        self.polling = Polling(node.family.poll, self.sdo.first, self._show_poll)
+        self.drives: dict[str, DrivePdos] = {}
+        self.routes: dict[int, Handler] = self._basic_routes()
+        self.routes_changed = True
+        self._frames: list[Frame] = []
+
+    def _basic_routes(self) -> dict[int, Handler]:
+        node_id = self._node.table.id
+        return {
+            **{channel.reply_id: partial(self._on_sdo, channel) for channel in self.sdo},
+            cobid.ERROR_CONTROL + node_id: self._on_error_control,
+            cobid.EMCY + node_id: self._on_emcy,
+        }
+
+    def take_frames(self) -> list[Frame]:
+        frames = self._frames + self.sdo.take_frames() + self.error_control.take_frames()
+        frames += self.polling.take_frames()
+        self._frames = []
+        return frames
+
+    def clear(self) -> None:
+        """Send nothing that waits: the bus is gone."""
+        self._frames.clear()
+
+    def send_nmt(self, command: NmtCommand) -> None:
+        self._frames.append(nmt.command(command, self._node.table.id))
+
+    def send_stopped(self) -> None:
+        self._frames += stopped_frames(self._node, self.drives)
+
+    def _on_sdo(self, channel: SdoChannel, frame: Frame) -> None:
+        before = channel.unmatched
+        channel.on_frame(frame)
+        self.error_control.on_reply(frame, matched=channel.unmatched == before)
+        self._listener.touch()
+
+    def _on_emcy(self, frame: Frame) -> None:
+        self._emergencies.on_frame(frame)
+        self._listener.touch()
+
+    def _on_error_control(self, frame: Frame) -> None:
+        sign = self.error_control.on_frame(frame)
+        if sign is Sign.MALFORMED:
+            self.reject(frame, "an error control message has 1 byte")
+        else:
+            self._listener.on_sign(sign, frame.time)
+
+    def reject(self, frame: Frame, why: str) -> None:
+        """A frame that does not fit: counted, told at most once a minute, nothing changed."""
+        self.rejected += 1
+        message = f"{frame!r} does not fit: {why}"
+        self._plant.report(Event(frame.time, Kind.CONFIGURATION, self._node.name, 300, message))
+
+    def on_time(self, now: float) -> None:
+        self._emergencies.on_time(now)
+        self.sdo.on_time(now)
+
+    def next_deadline(self) -> float | None:
+        times = (
+            self.sdo.next_deadline(),
+            self.error_control.next_deadline(),
+            self.polling.next_deadline(),
+            self._emergencies.next_deadline(),
+        )
+        return min((time for time in times if time is not None), default=None)
+
+    def _show_poll(self, name: str, value: int, now: float) -> None:
+        self._plant.set(f"{self._node.name}/node/{name}", value, now)
+
+    def connect(self, result: boot.BootResult, now: float) -> None:
+        """Take over what the boot-up found."""
+        heartbeat = self._node.table.supervision == "heartbeat"
+        period_ms = boot.heartbeat_period_ms(self._node.table.supervision_ms)
+        self.error_control.produces_every(period_ms / 1000 if heartbeat else None)
+        self._plant.set(f"{self._node.name}/node/software_version", result.software_version, now)
+        self.drives = connect(self._node, result, self.reject, self.is_taken, now)
+        self.routes = self._basic_routes()
+        self.routes |= {pdos.tpdo_id: pdos.on_tpdo for pdos in self.drives.values()}
+        sync_ms = self._node.bus.sync_period_ms
+        self.routes |= node_tpdos(result.node_tpdos, sync_ms, self.polling.on_pdo, self.reject)
+        self.routes_changed = True
+
+    def refresh(self, now: float) -> None:
+        self._plant.set(f"{self._node.name}/node/rejected_frames", self.rejected + self.sdo.unmatched, now)
+        self._emergencies.refresh(now)
+        self.sdo.show_aborts()

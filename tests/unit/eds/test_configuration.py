@@ -1,0 +1,150 @@
+"""What a DCF makes the bridge write, and the files a site names for it."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import pytest
+
+from bridge.config.download import to_concise_dcf
+from bridge.eds import configuration, read_configuration, read_device
+from bridge.errors import FileFaults
+from bridge.service import load_project
+
+DCF = """[DeviceComissioning]
+NodeID=5
+[1017]
+ParameterName=Heartbeat
+DataType=6
+AccessType=rw
+DefaultValue=0
+ParameterValue=100
+[1018]
+ParameterName=Identity
+DataType=7
+AccessType=ro
+ParameterValue=7
+[1010]
+ParameterName=Store
+DataType=7
+AccessType=rw
+ParameterValue=1
+[1600]
+ParameterName=Mapping
+ObjectType=9
+[1600sub0]
+ParameterName=Count
+DataType=5
+AccessType=rw
+DefaultValue=1
+ParameterValue=2
+[1600sub1]
+ParameterName=First
+DataType=7
+AccessType=rw
+ParameterValue=0x30000110
+[2000]
+ParameterName=Same as default
+DataType=6
+AccessType=rw
+DefaultValue=5
+ParameterValue=0x5
+[2001]
+ParameterName=Command
+DataType=5
+AccessType=wo
+ParameterValue=1
+[2002]
+ParameterName=Not to be written
+DataType=5
+AccessType=rw
+ObjFlags=1
+ParameterValue=1
+[2003]
+ParameterName=Identifier
+DataType=7
+AccessType=rw
+ParameterValue=$NODEID+0x200
+"""
+SITE = """
+[site]
+name = "dcf"
+[[bus]]
+name = "can0"
+interface = "virtual"
+[[bus.node]]
+name = "conveyor"
+id = 5
+mapping = "nord/sk-tu4-cao"
+configuration = "conveyor.dcf"
+[[bus.node.drive]]
+slot = "fu1"
+"""
+
+
+def shown(path: Path, node_id: int | None = None) -> list[str]:
+    return [f"{one.name}={one.data.hex()}" for one in read_configuration(path, node_id)]
+
+
+def test_application_objects_come_first_and_a_mappings_count_after_its_entries(tmp_path: Path) -> None:
+    file = tmp_path / "a.dcf"
+    file.write_text(DCF)
+    assert shown(file) == [
+        "2001h:00=01",
+        "2003h:00=05020000",
+        "1017h:00=6400",
+        "1600h:01=10010030",
+        "1600h:00=02",
+    ]
+
+
+def test_what_can_only_be_written_is_not_read_back(tmp_path: Path) -> None:
+    file = tmp_path / "a.dcf"
+    file.write_text(DCF)
+    assert [one.read_back for one in read_configuration(file)] == [False, True, True, True, True]
+
+
+def test_the_node_of_the_site_file_wins_over_that_of_the_dcf(tmp_path: Path) -> None:
+    file = tmp_path / "a.dcf"
+    file.write_text(DCF)
+    assert "2003h:00=06020000" in shown(file, 6)
+
+
+def test_a_concise_dcf_gives_the_same_back(tmp_path: Path) -> None:
+    downloads = configuration(read_device(DCF.encode(), "a.dcf"))
+    file = tmp_path / "a.cdcf"
+    file.write_bytes(to_concise_dcf(downloads))
+    assert file.read_bytes().startswith(struct.pack("<IHBI", 5, 0x2001, 0, 1))
+    assert shown(file) == [f"{one.name}={one.data.hex()}" for one in downloads]
+
+
+@pytest.mark.parametrize(("name", "old", "new"), [("a.dcf", "=100", "=70000"), ("a.cdcf", "[", "[")])
+def test_half_a_configuration_is_none(tmp_path: Path, name: str, old: str, new: str) -> None:
+    file = tmp_path / name
+    file.write_text(DCF.replace(old, new))
+    with pytest.raises(FileFaults):
+        read_configuration(file)
+
+
+def test_a_site_takes_the_configuration_file_it_names(tmp_path: Path) -> None:
+    (tmp_path / "site.toml").write_text(SITE)
+    (tmp_path / "conveyor.dcf").write_text(DCF)
+    assert len(load_project(tmp_path / "site.toml").downloads["conveyor"]) == 5
+
+
+def test_a_configuration_file_that_is_not_there_is_a_fault_of_the_site_file(tmp_path: Path) -> None:
+    (tmp_path / "site.toml").write_text(SITE)
+    with pytest.raises(FileFaults) as caught:
+        load_project(tmp_path / "site.toml")
+    [fault] = caught.value.faults
+    assert (fault.line, fault.key) == (11, "bus[0].node[0].configuration")
+
+
+def test_a_bad_line_of_a_configuration_file_is_named(tmp_path: Path) -> None:
+    (tmp_path / "site.toml").write_text(SITE)
+    (tmp_path / "conveyor.dcf").write_text(DCF.replace("=100", "=hundred"))
+    with pytest.raises(FileFaults) as caught:
+        load_project(tmp_path / "site.toml")
+    [fault] = caught.value.faults
+    assert (Path(fault.file).name, fault.line) == ("conveyor.dcf", 8)

@@ -1,0 +1,186 @@
+"""The LSS master against the slaves of ``tests/support/lss_slave.py``, on a virtual clock."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bridge.southbound import lss_errand
+from bridge.southbound.bus.frame import Frame
+from bridge.southbound.canopen import lss
+from bridge.southbound.canopen.lss import Identity, LssError, Service
+from bridge.southbound.lss_errand import LssErrand
+from tests.support.lss_slave import CONFIGURATION, WAITING, LssSlave
+
+T = TypeVar("T")
+NORD = Identity(0x0000_0038, 0x0001_0203, 0x0000_0007, 0x1234_5678)
+OTHER = Identity(0x0000_0038, 0x0001_0203, 0x0000_0007, 0x1234_5679)
+TIMEOUT_S = 0.05
+
+numbers = st.integers(0, 0xFFFF_FFFF)
+identities = st.tuples(numbers, numbers, numbers, numbers)
+
+
+class LssBus:
+    """Every slave hears every request; answers come ``delay_s`` later, all of them."""
+
+    def __init__(self, *slaves: LssSlave, delay_s: float = 0.001, mute: bool = False) -> None:
+        self.slaves = slaves
+        self.delay_s = delay_s
+        self.mute = mute
+        self.now = 100.0
+        self.requests: list[bytes] = []
+
+    def run(self, service: Service[T]) -> LssErrand[T]:
+        errand = LssErrand(service, self.now, TIMEOUT_S)
+        coming: list[Frame] = []
+        while not errand.is_finished(self.now):
+            for frame in errand.take_frames():
+                assert frame.can_id == 0x7E5
+                assert len(frame.data) == 8
+                self.requests.append(frame.data)
+                for number, slave in enumerate(self.slaves, 1):
+                    answer = slave.on_request(frame.data)
+                    if answer is not None and not self.mute:
+                        coming.append(Frame(0x7E4, answer, self.now + number * self.delay_s))
+            times = [frame.time for frame in coming]
+            deadline = errand.next_deadline()
+            if deadline is None:
+                break
+            self.now = min([*times, deadline])
+            for frame in [frame for frame in coming if frame.time <= self.now]:
+                coming.remove(frame)
+                errand.on_frame(frame)
+            errand.on_time(self.now)
+        for frame in errand.take_frames():
+            self.requests.append(frame.data)
+            for slave in self.slaves:
+                slave.on_request(frame.data)
+        return errand
+
+
+def test_the_messages_are_those_of_cia_305() -> None:
+    slave = LssSlave(NORD)
+    bus = LssBus(slave)
+    bus.run(lss_errand.set_node_id(NORD, 5, keep=True))
+    assert [request.hex().upper() for request in bus.requests] == [
+        "0400000000000000",
+        "4038000000000000",
+        "4103020100000000",
+        "4207000000000000",
+        "4378563412000000",
+        "1105000000000000",
+        "1700000000000000",
+        "0400000000000000",
+    ]
+
+
+@given(st.lists(identities, max_size=3, unique=True))
+@settings(max_examples=60, deadline=None)
+def test_a_scan_finds_every_device_and_leaves_it_waiting(present: list[tuple[int, int, int, int]]) -> None:
+    slaves = [LssSlave(identity) for identity in present]
+    errand = LssBus(*slaves).run(lss_errand.find_all(None))
+    assert sorted(errand.result) == sorted(present)
+    assert all(slave.state == WAITING for slave in slaves)
+
+
+def test_late_answers_of_several_devices_do_not_spoil_the_scan() -> None:
+    """Both answer the same question, the second nearly when the time is over."""
+    bus = LssBus(LssSlave(NORD), LssSlave(OTHER), delay_s=0.024)
+    assert set(bus.run(lss_errand.find_all(None)).result) == {NORD, OTHER}
+
+
+def test_a_scan_that_was_spoilt_by_a_late_answer_is_made_again() -> None:
+    bus = LssBus(LssSlave(NORD), delay_s=0.001)
+    service = lss_errand.find_all(None)
+    errand = LssErrand(service, 0.0, TIMEOUT_S)
+    asked, now = 0, 0.0
+    while not errand.is_finished(now):
+        for frame in errand.take_frames():
+            answer = bus.slaves[0].on_request(frame.data)
+            asked += 1
+            # Somebody else's late answer says "this bit is 0" in the middle of the first scan.
+            if asked == 20:
+                answer = b"\x4f" + bytes(7)
+            if answer:
+                errand.on_frame(Frame(0x7E4, answer, now))
+        now = errand.next_deadline() or now
+        errand.on_time(now)
+    assert errand.result == [NORD]
+
+
+def test_a_scan_passes_over_devices_that_have_a_node_id() -> None:
+    assert LssBus(LssSlave(NORD, node_id=5)).run(lss_errand.find_all(None)).result == []
+
+
+def test_what_is_known_is_not_searched() -> None:
+    bus = LssBus(LssSlave(NORD))
+    errand = bus.run(lss_errand.find_all(Identity(NORD.vendor, NORD.product, NORD.revision, 0)))
+    assert errand.result == [NORD]
+    assert len(bus.requests) < 45
+
+
+def test_a_device_without_a_node_id_has_one_afterwards() -> None:
+    one, other = LssSlave(NORD), LssSlave(OTHER)
+    LssBus(one, other).run(lss_errand.set_node_id(OTHER, 17, keep=False))
+    assert (one.node_id, other.node_id) == (255, 17)
+    assert other.stored is None
+
+
+def test_the_only_device_is_asked_without_its_identity() -> None:
+    slave = LssSlave(NORD, node_id=9)
+    assert LssBus(slave).run(lss_errand.inquire(None)).result == (NORD, 9)
+    assert slave.state == WAITING
+
+
+def test_bit_rate_is_set_stored_and_activated() -> None:
+    slave = LssSlave(NORD)
+    LssBus(slave).run(lss_errand.set_bit_rate(NORD, 250_000, keep=True, activate_ms=500))
+    assert (slave.bit_timing, slave.stored, slave.activated_ms) == (3, (255, 3), 500)
+
+
+def test_a_refusal_is_told_and_the_device_left_in_waiting_state() -> None:
+    slave = LssSlave(NORD)
+    errand = LssBus(slave).run(lss_errand.set_bit_rate(NORD, 800_000, keep=True, activate_ms=None))
+    with pytest.raises(LssError, match="this bit rate is not supported"):
+        _ = errand.result
+    assert slave.stored is None
+    assert slave.state == WAITING
+
+
+def test_a_device_that_cannot_store_says_so() -> None:
+    errand = LssBus(LssSlave(NORD, cannot_store=True)).run(lss_errand.keep_settings(None))
+    with pytest.raises(LssError, match="the device cannot store"):
+        _ = errand.result
+
+
+def test_nobody_with_this_identity_is_told() -> None:
+    errand = LssBus(LssSlave(OTHER)).run(lss_errand.inquire(NORD))
+    with pytest.raises(LssError, match="no device has this identity"):
+        _ = errand.result
+
+
+def test_a_silent_device_is_told_by_the_step_it_was_silent_at() -> None:
+    errand = LssBus(LssSlave(NORD), mute=True).run(lss_errand.inquire(None))
+    with pytest.raises(LssError, match="no answer: asking for its vendor id"):
+        _ = errand.result
+
+
+@given(st.lists(st.tuples(st.sampled_from([0x7E4, 0x7E5, 0x185]), st.binary(max_size=8)), max_size=40))
+def test_nothing_on_the_wire_raises(frames: list[tuple[int, bytes]]) -> None:
+    errand = LssErrand(lss_errand.find_all(None), 0.0, TIMEOUT_S)
+    now = 0.0
+    for can_id, data in frames:
+        errand.take_frames()
+        errand.on_frame(Frame(can_id, data, now))
+        now = errand.next_deadline() or now
+        errand.on_time(now)
+
+
+def test_a_selected_device_is_in_configuration_state() -> None:
+    slave = LssSlave(NORD)
+    LssBus(slave).run(lss.switch_selective(NORD))
+    assert slave.state == CONFIGURATION

@@ -1,0 +1,171 @@
+"""What the commands on a bus make of their words before they open it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import typer
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.cli.bus import choose_line, split_site
+from bridge.cli.sdo import ValueType, decode, encode, parse_object
+from bridge.southbound.bus.frame import Frame
+from bridge.southbound.canopen.nmt import NmtCommand, NmtState
+from bridge.southbound.errand import NmtErrand, SdoErrand
+
+SITE = """
+[site]
+name = "two"
+[[bus]]
+name = "north"
+interface = "socketcan"
+channel = "can0"
+[[bus.node]]
+name = "conveyor"
+id = 5
+mapping = "nord/sk-tu4-cao"
+[[bus.node.drive]]
+slot = "fu1"
+[[bus]]
+name = "south"
+interface = "socketcan"
+channel = "can1"
+"""
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Path:
+    path = tmp_path / "site.toml"
+    path.write_text(SITE, "utf-8")
+    return path
+
+
+def test_a_bus_is_named_by_its_options() -> None:
+    line = choose_line(None, None, "socketcan", "can0", 500_000)
+    assert (line.table.channel, line.table.bitrate, line.is_of_site) == ("can0", 500_000, False)
+
+
+def test_a_site_with_two_buses_needs_the_name_of_one(site: Path) -> None:
+    with pytest.raises(typer.BadParameter, match="one of north, south"):
+        choose_line(site, None, None, None, None)
+    line = choose_line(site, "north", None, None, None)
+    assert line.node_id("conveyor") == 5
+    assert line.node_id("0x11") == 17
+    with pytest.raises(typer.BadParameter, match="conveyor"):
+        line.node_id("conveior")
+
+
+@pytest.mark.parametrize(
+    ("bus", "interface", "channel"),
+    [(None, None, None), ("can0", None, None), (None, "socketcan", None), (None, "virtual", "x")],
+)
+def test_half_a_bus_is_bad_usage(bus: str | None, interface: str | None, channel: str | None) -> None:
+    with pytest.raises(typer.BadParameter):
+        choose_line(None, bus, interface, channel, None)
+
+
+def test_a_site_and_an_interface_are_two_buses(site: Path) -> None:
+    with pytest.raises(typer.BadParameter, match="leave the options out"):
+        choose_line(site, "north", "socketcan", "can0", None)
+
+
+def test_the_site_may_stand_first() -> None:
+    assert split_site(["5", "1000"], 2, "") == (None, ["5", "1000"])
+    assert split_site(["a.toml", "5", "1000"], 2, "") == (Path("a.toml"), ["5", "1000"])
+    with pytest.raises(typer.BadParameter):
+        split_site(["5"], 2, "usage")
+
+
+@pytest.mark.parametrize("text", ["1018:01", "1018:1", "0x1018:0x1", "1018h:01h"])
+def test_objects_are_hexadecimal(text: str) -> None:
+    assert parse_object(text) == (0x1018, 1)
+
+
+@pytest.mark.parametrize("text", ["", "1018:", "10188", "1018:100", "xyz", "1018:1:1"])
+def test_what_is_no_object_is_bad_usage(text: str) -> None:
+    with pytest.raises(typer.BadParameter):
+        parse_object(text)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "data"),
+    [
+        (ValueType.UINT16, "500", "f401"),
+        (ValueType.UINT32, "0x65766173", "73617665"),
+        (ValueType.INT8, "-1", "ff"),
+        (ValueType.BOOL, "true", "01"),
+        (ValueType.FLOAT, "1.5", "0000c03f"),
+        (ValueType.STRING, "save", "73617665"),
+        (ValueType.BYTES, "73 61", "7361"),
+    ],
+)
+def test_values_on_the_wire(kind: ValueType, text: str, data: str) -> None:
+    assert encode(kind, text) == bytes.fromhex(data)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text"),
+    [(ValueType.UINT8, "256"), (ValueType.UINT8, "-1"), (ValueType.BOOL, "2"), (ValueType.BYTES, "7")],
+)
+def test_values_that_do_not_fit(kind: ValueType, text: str) -> None:
+    with pytest.raises(ValueError, match=f"no {kind} value"):
+        encode(kind, text)
+
+
+def test_an_answer_of_another_length_is_named() -> None:
+    with pytest.raises(ValueError, match="uint16 has 2 bytes, the node sent 4"):
+        decode(ValueType.UINT16, bytes(4))
+
+
+@given(st.sampled_from([ValueType.UINT64, ValueType.INT32, ValueType.UINT16]), st.data())
+def test_what_is_written_is_read(kind: ValueType, data: st.DataObject) -> None:
+    bits = int(kind.removeprefix("u").removeprefix("int"))
+    low, high = (0, 2**bits - 1) if kind.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    value = data.draw(st.integers(low, high))
+    assert decode(kind, encode(kind, str(value))) == value
+
+
+# errands
+
+
+def test_an_nmt_command_is_followed_when_the_node_says_so() -> None:
+    errand = NmtErrand(NmtCommand.START, 5, 10.0, 2.0)
+    errand.on_frame(Frame(0x705, b"\x05", 10.0))  # said before the command
+    assert errand.take_frames() == [Frame(0, b"\x01\x05")]
+    errand.on_frame(Frame(0x705, b"\x7f", 10.1))
+    errand.on_frame(Frame(0x706, b"\x05", 10.1))
+    assert not errand.is_finished(10.1)
+    errand.on_frame(Frame(0x705, b"\x05", 10.2))
+    assert errand.is_finished(10.2)
+    assert (errand.states, errand.reached) == ({5: NmtState.OPERATIONAL}, {5})
+
+
+def test_a_reset_is_seen_by_the_boot_up_message() -> None:
+    errand = NmtErrand(NmtCommand.RESET_NODE, 5, 10.0, 2.0)
+    errand.take_frames()
+    errand.on_frame(Frame(0x705, b"\x7f", 10.1))
+    assert not errand.is_finished(10.1)
+    errand.on_frame(Frame(0x705, b"\x00", 10.2))
+    assert errand.is_finished(10.2)
+    assert errand.states == {5: NmtState.PRE_OPERATIONAL}
+
+
+def test_a_silent_node_is_waited_for_and_then_not() -> None:
+    errand = NmtErrand(NmtCommand.STOP, 0, 10.0, 2.0)
+    assert errand.next_deadline() == 12.0
+    assert errand.is_finished(12.0)
+    assert errand.states == {}
+
+
+def test_an_sdo_errand_ends_with_its_answer() -> None:
+    errand = SdoErrand(5, 0x1000, 0, None, 10.0, 0.5)
+    errand.on_time(10.0)
+    [request] = errand.take_frames()
+    assert request == Frame(0x605, bytes.fromhex("4000100000000000"))
+    errand.on_frame(Frame(0x586, bytes.fromhex("4300100001000000"), 10.1))
+    assert not errand.is_finished(10.1)
+    errand.on_frame(Frame(0x585, bytes.fromhex("4300100092010200"), 10.1))
+    assert errand.is_finished(10.1)
+    assert errand.result == bytes.fromhex("92010200")

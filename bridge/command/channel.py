@@ -200,9 +200,10 @@ class DriveChannel:
             self._leg.leave(Stimulus.STARTED, now)
         self._settle(now)
 
-    def on_bus_gone(self, now: float) -> None:
-        """The bus is down or off: whatever the drive was told does not count when it is back, not even
-        with errors ignored."""
+    def start_anew(self, now: float) -> None:
+        """The bus was gone, or the node was stopped or has restarted: whatever the drive was told does not
+        count any more, not even where communication errors are ignored."""
+        self._leg.start.end(Outcome(Code.CANCELLED, "the drive has to be enabled anew"))
         self._gate.stop(self.words.stop(self._gate.sent.words[0]))
         self._settle(now)
 

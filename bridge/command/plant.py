@@ -15,7 +15,7 @@ from bridge.command.drive import Drive
 from bridge.command.event import Event, EventGate, Kind
 from bridge.command.link import NodeState
 from bridge.command.points import bridge_points, bus_points, node_points
-from bridge.command.request import NODE_ACTIONS, STOP_ACTIONS, Code, Outcome, Reply, Request
+from bridge.command.request import NODE_ACTIONS, STOP_ACTIONS, Action, Code, Outcome, Reply, Request
 from bridge.config import BusTable, NodeTable, Site
 from bridge.errors import Fault, FileFaults
 from bridge.image import Image, Quality, Value
@@ -40,6 +40,9 @@ class Node:
     @property
     def name(self) -> str:
         return self.table.name
+
+
+_BRINGS_TIMERS_FORWARD: Final = (Action.SET_TIMEOUT, Action.TAKE_CONTROL)
 
 
 class Plant:
@@ -140,7 +143,7 @@ class Plant:
         try:
             drive.channel.handle(request, now, reply)
         finally:
-            if drive.channel.output != before:
+            if drive.channel.output != before or request.action in _BRINGS_TIMERS_FORWARD:
                 self.outputs_changed()
 
     def on_time(self, now: float) -> None:

@@ -81,6 +81,7 @@ class NodeCore:
         if self.is_operational:
             self._view.restarted(now)
         self.leave_operation(now)
+        self.stop_drives(now)
         if pause_s:
             self.say(f"starts again and again; asked again in {pause_s:g} s", now)
         self.set_state(NodeState.LOST if pause_s else NodeState.BOOTING, now)
@@ -199,6 +200,8 @@ class NodeCore:
     def _enter_operation(self, text: str, now: float) -> None:
         self.told_to_stop = False
         self._operational_since = now
+        # The guard may have run out between the start command and the node's answer.
+        self.error_control.expect(now)
         self.error_control.state = NmtState.OPERATIONAL
         self.boot_at = None
         self.set_state(NodeState.OPERATIONAL, now)
@@ -232,6 +235,7 @@ class NodeCore:
         reaction = self.table.on_loss
         if reaction == "stop_node":
             self.told_to_stop = True
+            self.stop_drives(now)
             self.wire.send_stopped()
             self.wire.send_nmt(NmtCommand.STOP)
         elif reaction != "nothing":
@@ -240,6 +244,11 @@ class NodeCore:
         if reaction == "stop_all" or (self.table.mandatory and policy == "stop_all"):
             self._neighbours.stop_others(self, f"{self.node.name} is lost", now)
 
+    def stop_drives(self, now: float) -> None:
+        """Every drive of the node has to be enabled anew."""
+        for drive in self.node.drives:
+            drive.channel.start_anew(now)
+
     def leave_operation(self, now: float) -> None:
         self.error_control.stop(now, lost=self.state is NodeState.LOST)
         self.wire.polling.stop()
@@ -247,6 +256,7 @@ class NodeCore:
 
     def hold(self, why: str, now: float) -> None:
         """All nodes are stopped: leave operation, and be booted up to the point where it would start."""
+        self.stop_drives(now)
         if not self.is_operational:
             return
         self.told_to_stop = True
@@ -259,13 +269,18 @@ class NodeCore:
     def bus_is_gone(self, now: float) -> None:
         """The bus is down: everything on it is lost at once."""
         self.error_control.state = NmtState.UNKNOWN
-        if self.state is NodeState.DISABLED:
+        self.stop_drives(now)
+        self.wire.clear()
+        was_stopped = self.state is NodeState.STOPPED or (
+            self.told_to_stop and self.table.on_loss == "stop_node"
+        )
+        if self.state is NodeState.DISABLED or was_stopped:
+            # Who was stopped on purpose is not started by a bus that comes back.
             return
         if self.state is not NodeState.ABSENT:
             self.say("lost: the bus is down", now)
             self.set_state(NodeState.LOST, now)
         self.leave_operation(now)
-        self.wire.clear()
         self.has_concluded = False
         self.boot_at = now + self._retry_s
 

@@ -34,6 +34,7 @@ class Commanded(Protocol):
     boot_at: float | None
     told_to_stop: bool
 
+    def stop_drives(self, now: float) -> None: ...
     def leave_operation(self, now: float) -> None: ...
     def set_state(self, state: NodeState, now: float) -> None: ...
     def say(self, text: str, now: float) -> None: ...
@@ -124,7 +125,8 @@ def _nmt(node: Commanded, command: NmtCommand, who: str, now: float, *, send: bo
         node.set_state(NodeState.BOOTING, now)
         node.boot_at = now
         return
-    if command in (NmtCommand.STOP, NmtCommand.ENTER_PRE_OPERATIONAL):
+    if command is not NmtCommand.START:
+        node.stop_drives(now)
         node.wire.send_stopped()
     if send:
         node.wire.send_nmt(command)

@@ -57,7 +57,7 @@ class DrivePdos:
         self._order = plain and tpdo.words == tuple(range(len(drive.words)))
         """The codec's values are the words as they are."""
         self._words = [0] * len(drive.words)
-        self._last = b""
+        self._last: bytes | None = None
         self._rpdo = rpdo
         self._rpdo_fill = _fill(rpdo, len(drive.family.process.rpdo))
         self._packed_words: tuple[int, ...] = ()
@@ -75,6 +75,7 @@ class DrivePdos:
                 return
             # CiA 301 §7.2.2.5: of a PDO that is too long the mapped bytes count.
             data = data[:length]
+            self._last = None
         else:
             self._last = data
         values = self._codec.unpack(data)

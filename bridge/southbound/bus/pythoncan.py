@@ -117,6 +117,7 @@ class PythonCanBus:
 
     def _break_down(self, broken: can.BusABC, error: Exception) -> None:
         """Receiving thread: the adapter is gone. Looks for it, less and less often, until it is back."""
+        self._status.outages += 1
         self._status.state = ControllerState.DOWN
         self._status.note_error(f"{self._interface} {self._channel}: {error}")
         self._rouse()

@@ -46,7 +46,7 @@ _MOST_PER_ROUND: Final = 2048
 _LOOK_S: Final = 1.0
 _REOPEN_S: Final = (0.2, 5.0)
 _SHORTEST_BURST: Final = 4
-_SLOW_LIMIT_S: Final = 0.05
+_SLOW_LIMIT_S: Final = 0.01
 _OUTAGES: Final = (ControllerState.BUS_OFF, ControllerState.PASSIVE)
 
 
@@ -226,7 +226,9 @@ class SocketCanBus:
         if not self._can_send:
             self._status.frames_expired += 1
         elif self._outbox or not self._try_send(frame, now):
-            self._status.frames_expired += not self._outbox.put(frame, now, deadline)
+            # Where the bus broke while sending, nothing may wait for its return.
+            kept = self._can_send and self._outbox.put(frame, now, deadline)
+            self._status.frames_expired += not kept
 
     @property
     def _can_send(self) -> bool:
@@ -264,7 +266,7 @@ class SocketCanBus:
             # renewed. What is that slow needs no kernel: a round sends it.
             first = self._slow.beat(frames, now, period_s, count, at_once=at_once)
             if first is not None:
-                self.send(first, now, now + period_s)
+                self.send(first, now, now + _SLOW_LIMIT_S)
             return
         job = self._jobs.get(can_id)
         # Refilling keeps the phase of a burst that runs and cannot wake one that has ended. Its last frame

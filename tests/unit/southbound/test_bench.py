@@ -308,3 +308,67 @@ def test_a_bridge_that_is_being_stopped_takes_no_command_but_stops(bench: Bench)
     assert bench.ask(Action.QUICK_STOP).ok
     assert bench.sent(RPDO1)
     assert all(frame.data[0] & 0x0F != 0x0F for frame in bench.sent(RPDO1))
+
+
+IGNORE = "telegram_downtime_s = -0.1"
+
+
+def moves(bench: Bench) -> bool:
+    return any(frame.data[0] & 0x0F == 0x0F for frame in bench.sent(RPDO1))
+
+
+def test_errors_ignored_or_not_an_outage_between_two_rounds_ends_the_enable(tmp_path: Path) -> None:
+    bench = Bench(write_site(tmp_path, drive=IGNORE))
+    bench.run(1.0)
+    running(bench)
+    bench.bus.status.outages += 1
+    bench.bus.clear()
+    bench.log.clear()
+    bench.keep_writing(1.0, control_word=0x047F, setpoint_1=0x2000)
+    assert not moves(bench)
+
+
+def test_errors_ignored_or_not_a_node_that_restarts_again_and_again_is_not_enabled(tmp_path: Path) -> None:
+    bench = Bench(write_site(tmp_path, drive=IGNORE))
+    bench.run(1.0)
+    running(bench)
+    for _ in range(4):
+        bench.receive(Frame(0x705, b"\x00"))
+        bench.log.clear()
+        bench.keep_writing(3.0, control_word=0x047F, setpoint_1=0x2000)
+        assert not moves(bench)
+
+
+@pytest.mark.parametrize("action", [Action.RESET, Action.RESET_COMMUNICATION, Action.STOP_NODE])
+def test_errors_ignored_or_not_a_node_that_we_stop_is_not_enabled(tmp_path: Path, action: Action) -> None:
+    bench = Bench(write_site(tmp_path, drive=IGNORE))
+    bench.run(1.0)
+    running(bench)
+    bench.log.clear()
+    assert bench.ask(action, "conveyor").ok
+    bench.keep_writing(0.5, control_word=0x047F, setpoint_1=0x2000)
+    assert not moves(bench)
+
+
+def test_a_node_that_was_stopped_stays_so_when_the_bus_comes_back(bench: Bench) -> None:
+    assert bench.ask(Action.STOP_NODE, "conveyor").ok
+    bench.run(0.5)
+    bench.bus.status.outages += 1
+    bench.bus.clear()
+    bench.run(5.0)
+    assert bench.value("conveyor/node/nmt_state") != NmtState.OPERATIONAL
+
+
+def test_an_empty_frame_is_no_sign_of_a_drive(bench: Bench) -> None:
+    age = bench.plant.drives["conveyor/fu1"].channel.link.last_pdo
+    bench.receive(Frame(TPDO1, b""))
+    bench.run(0.001)
+    assert bench.plant.drives["conveyor/fu1"].channel.link.last_pdo == age
+
+
+def test_after_a_tpdo_that_is_too_long_the_next_right_one_counts(bench: Bench) -> None:
+    ready, running_ = bytes.fromhex("310B000000000000"), bytes.fromhex("370B000000000000")
+    for data, low in ((ready, 0x31), (running_ + b"\0", 0x37), (ready, 0x31)):
+        bench.receive(Frame(TPDO1, data))
+        bench.run(0.001)
+        assert bench.number("conveyor/fu1/status/drive_status_word") & 0xFF == low

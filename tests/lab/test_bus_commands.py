@@ -132,12 +132,12 @@ def test_nmt_tells_the_state_that_the_node_reports(simulation: LabSite) -> None:
 def test_monitor_says_what_is_on_the_bus(simulation: LabSite, tmp_path: Path) -> None:
     log = tmp_path / "candump.log"
     with drivebridge(
-        tmp_path, "monitor", "monitor", str(simulation.path), "--json", "--seconds", "6", "--log", str(log)
+        tmp_path, "monitor", "monitor", str(simulation.path), "--json", "--seconds", "20", "--log", str(log)
     ) as monitor:
         time.sleep(3.0)
         call("sdo", "read", "5", "1018:09", *DIRECT)
         call("nmt", "start", "5", *DIRECT, "--seconds", "0.3")
-        until(lambda: monitor.popen.poll() is not None, 20.0, "the monitor ends by itself")
+        until(lambda: monitor.popen.poll() is not None, 40.0, "the monitor ends by itself")
         assert monitor.popen.returncode == 0
         seen = [json.loads(line) for line in monitor.output().splitlines()]
     kinds = {frame["kind"] for frame in seen}
@@ -158,7 +158,7 @@ def test_monitor_filters_counts_and_ends(simulation: LabSite) -> None:
     assert [line.split("  ")[-1] for line in done.stdout.splitlines()] == ["pre operational"] * 3
     tally = answer("monitor", *DIRECT, "--statistics", "--seconds", "1")
     [row] = [row for row in tally["cob_ids"] if row["cob_id"] == "705"]
-    assert row["frames_per_s"] == pytest.approx(50, rel=0.3)
+    assert 20 <= row["frames_per_s"] <= 60, "a heartbeat every 20 ms, on a slow machine"
     assert "705" in call("monitor", *DIRECT, "--statistics", "--seconds", "0.5").stdout
 
 

@@ -25,7 +25,7 @@ PYTEST := $(IN) -m pytest
 QUIETLY := tools/quietly $(VENV)/install.log
 
 # The lab runs on one slow CPU as root: it leaves no caches behind and gets a time limit.
-LAB_SECONDS := 420
+LAB_SECONDS := 1200
 VCAN := PYTHON=$(IN) PYTHONDONTWRITEBYTECODE=1 tests/lab/vcan-run -n 2 -t $(LAB_SECONDS) --
 PACKAGES := iproute2:ip kmod:insmod can-utils:cansend mbpoll:mbpoll nodejs:node npm:npm
 CLIENTS := tests/wire/node

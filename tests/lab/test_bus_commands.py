@@ -158,7 +158,7 @@ def test_monitor_filters_counts_and_ends(simulation: LabSite) -> None:
     assert [line.split("  ")[-1] for line in done.stdout.splitlines()] == ["pre operational"] * 3
     tally = answer("monitor", *DIRECT, "--statistics", "--seconds", "1")
     [row] = [row for row in tally["cob_ids"] if row["cob_id"] == "705"]
-    assert 20 <= row["frames_per_s"] <= 60, "a heartbeat every 20 ms, on a slow machine"
+    assert row["frames_per_s"] == pytest.approx(50, rel=0.3)
     assert "705" in call("monitor", *DIRECT, "--statistics", "--seconds", "0.5").stdout
 
 

@@ -29,6 +29,7 @@ from bridge.notify import Notifier
 from bridge.southbound.bus import Bus, open_bus
 from bridge.southbound.master import Master
 from bridge.southbound.network import Network
+from bridge.wear import WearKeeper
 
 _log = logging.getLogger(__name__)
 
@@ -80,6 +81,7 @@ class Service:
         site = project.site
         self.plant = Plant(site, project.families, __version__, clock.now())
         self.plant.on_event(EventLog())
+        self.wear = WearKeeper(self.plant.eeprom_writes, Path(site.site.state_dir))
         self.notifier = Notifier()
         networks = [
             (make_bus(table), Network(table, self.plant, clock.epoch_ns, project.downloads))
@@ -107,6 +109,8 @@ class Service:
         self._say_what_is_doubtful()
         async with AsyncExitStack() as stack:
             stack.callback(_log.info, "stopped")
+            self.wear.load()
+            stack.callback(self.wear.close)
             # Ports first: a service that cannot be reached has no business on the bus.
             if self.modbus:
                 await self.modbus.start()
@@ -130,6 +134,7 @@ class Service:
                 # Each waits until this task is cancelled, or tells that its part has failed.
                 tasks.create_task(self.master.failed(), name="master")
                 tasks.create_task(self.mirror.failed(), name="mirror")
+                tasks.create_task(self.wear.run(), name="EEPROM counts")
                 if self.zenoh:
                     tasks.create_task(self.zenoh.failed(), name="zenoh")
 

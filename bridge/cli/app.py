@@ -7,7 +7,7 @@ import sys
 import typer
 
 from bridge import __version__
-from bridge.cli import eds, export, lss, monitor, nmt, project, scan, sdo, serve
+from bridge.cli import eds, export, lss, monitor, nmt, parameter_sets, parameters, project, scan, sdo, serve
 from bridge.errors import BridgeError
 
 app = typer.Typer(
@@ -28,6 +28,9 @@ app.command()(scan.scan)
 app.command()(nmt.nmt)
 app.command()(monitor.monitor)
 app.add_typer(sdo.app, name="sdo")
+app.add_typer(parameters.app, name="parameters")
+for command in (parameter_sets.backup, parameter_sets.compare, parameter_sets.restore):
+    parameters.app.command()(command)
 app.add_typer(lss.app, name="lss")
 app.add_typer(export.app, name="export")
 

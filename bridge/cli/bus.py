@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Protocol, TypeVar
@@ -170,6 +171,15 @@ def carry_out(
         state = bus.status.state.name.lower().replace("_", "-")
         tell(f"warning: bus {table.channel} is {state}")
     return errand
+
+
+def with_status(text: str) -> AbstractContextManager[object]:
+    """Says on a terminal what is being done."""
+    if not sys.stderr.isatty():
+        return nullcontext()
+    from rich.console import Console
+
+    return Console(stderr=True).status(text)
 
 
 def tell(text: str) -> None:

@@ -13,8 +13,11 @@ import typer
 
 from bridge import __version__
 from bridge.command import Plant
+from bridge.dbc import describe
 from bridge.errors import OperationFailed
 from bridge.image import Point
+from bridge.lint import family_dictionaries
+from bridge.lint.bus import view_bus
 from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row, bridge_rows, drive_maps
 from bridge.northbound.zenoh.keys import KeySpace
 from bridge.service import load_project
@@ -66,6 +69,33 @@ def zenoh(site: SiteArgument, as_json: AsJson = False) -> None:
     space = KeySpace(project.site.zenoh.prefix, project.site.site.name, points)
     rows = [(key, *_point(point)) for key, point in zip(space.keys, points, strict=True)]
     _print(("key", *_POINT), rows, as_json)
+
+
+@app.command()
+def dbc(
+    site: SiteArgument,
+    bus: Annotated[str | None, typer.Option(help="which bus, where the site has several")] = None,
+    words: Annotated[bool, typer.Option("--words", help="raw words instead of values and bits")] = False,
+) -> None:
+    """A DBC file: PDOs with their signals, SYNC, NMT, heartbeats and emergency messages."""
+    from bridge.dbc.write import ENCODING, dbc_text
+
+    project = load_project(site)
+    names = [table.name for table in project.site.bus]
+    if bus is None and len(names) > 1:
+        raise typer.BadParameter(f"the site has the buses {', '.join(names)}", param_hint="--bus")
+    if bus is not None and bus not in names:
+        raise typer.BadParameter(f"there is no {bus}; the site has {', '.join(names)}", param_hint="--bus")
+    place = 0 if bus is None else names.index(bus)
+    dictionaries = family_dictionaries(project.families)
+    view = view_bus(
+        project.site.bus[place], ("bus", place), project.families, dictionaries, project.downloads
+    )
+    text = dbc_text(describe(view, words=words))
+    if sys.stdout.isatty():
+        print(text)
+    else:
+        sys.stdout.buffer.write(text.encode(ENCODING))
 
 
 def _point(point: Point) -> tuple[object, ...]:

@@ -6,7 +6,6 @@ import json
 import re
 import struct
 import sys
-from contextlib import AbstractContextManager, nullcontext
 from enum import StrEnum
 from typing import Annotated
 
@@ -22,6 +21,7 @@ from bridge.cli.bus import (
     carry_out,
     choose_line,
     split_site,
+    with_status,
 )
 from bridge.errors import OperationFailed
 from bridge.southbound.canopen.sdo import SdoError
@@ -181,7 +181,7 @@ def _transfer(
 ) -> bytes:
     """Do it. Raises ``OperationFailed`` with the abort text where the node refuses or is silent."""
     timeout_s = line.sdo_timeout_s if timeout_ms is None else timeout_ms / 1000
-    with _spinner(f"{index:04X}h:{sub:02X} of node {node_id}"):
+    with with_status(f"{index:04X}h:{sub:02X} of node {node_id}"):
         errand = carry_out(line, lambda now: SdoErrand(node_id, index, sub, data, now, timeout_s))
     if isinstance(errand.result, bytes):
         return errand.result
@@ -201,12 +201,3 @@ def _failure(node_id: int, error: SdoError) -> dict[str, object]:
         "abort_code": f"{error.code:08X}",
         "message": str(error),
     }
-
-
-def _spinner(text: str) -> AbstractContextManager[object]:
-    """Says on a terminal what is being done."""
-    if not sys.stderr.isatty():
-        return nullcontext()
-    from rich.console import Console
-
-    return Console(stderr=True).status(text)

@@ -9,7 +9,7 @@ a dead drive.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from bridge.command.controller import ControllerLeg
 from bridge.command.event import Event, Kind
@@ -19,7 +19,7 @@ from bridge.command.request import Code, Identity, Outcome, Reply, Request
 from bridge.command.status import DriveStatus
 from bridge.command.watchdog import Stimulus, WatchdogState
 from bridge.config import DriveTable
-from bridge.drive import DriveState, LinearScale
+from bridge.drive import DriveState, LinearScale, Told, scale_of
 from bridge.mapping.model import Family
 
 
@@ -43,12 +43,21 @@ class DriveChannel:
         self.family = family
         self.settings = settings
         self.scales: dict[str, LinearScale] = {}
-        """Known scales by the value's leaf (``actual/frequency``); from the site file and at boot-up."""
+        """Known scales by the value's leaf (``actual/frequency``); from the mapping and the site file, and
+        at boot-up."""
+        self.unserved: dict[str, str] = {}
+        """Points that the node cannot serve, by their leaf, with the reason; known after boot-up."""
+        for value in family.value:
+            scale = scale_of(value)
+            if scale is not None:
+                self.scales[value.leaf] = scale
         self.settled: Callable[[float], None] = lambda now: None
         self._report = report
         self._status = status = DriveStatus(family)
         self.link = Link(settings.telegram_downtime_s, hold_ms)
-        self._leg = leg = ControllerLeg(name, family, settings, self.link, status, self.scales, self._tell)
+        self._leg = leg = ControllerLeg(
+            name, family, settings, self.link, status, self.scales, self.unserved, self._tell
+        )
         self.authority = leg.authority
         self.watchdog = leg.watchdog
         self.words = leg.words
@@ -121,12 +130,17 @@ class DriveChannel:
 
     @property
     def current_fault(self) -> float:
-        """Present communication fault, such as 10.3; 0 where there is none."""
+        """Present fault: the bridge's own such as 10.3, else the one that the drive tells; 0 where there is
+        none."""
+        return self._bridge_fault or self._status.drive_fault
+
+    @property
+    def _bridge_fault(self) -> float:
         return self.family.faults.controller_silent if self.is_tripped else self._status.link_fault
 
     @property
     def fault_text(self) -> str:
-        return self._status.fault_text(self.current_fault)
+        return self._status.fault_text(self._bridge_fault)
 
     # from the drive
 
@@ -135,12 +149,18 @@ class DriveChannel:
         status = self._status
         status.word = word
         state = status.words.state(word)
-        if state is status.state and not self._gate.awaits_rest:
+        is_awaited = self._gate.on_status_word(word)
+        if state is status.state and not (is_awaited or self._gate.awaits_rest):
             return
         status.state = state
         self._gate.on_state(state)
         self._leg.start.on_state(state, self.fault_text)
         self._settle(now)
+
+    def on_actual_words(self, words: Sequence[int], now: float) -> None:
+        """What TPDOs have brought, the status word first, in the order of ``process.tpdo``."""
+        if self._gate.follow(words):
+            self._settle(now)
 
     def on_pdo(self, now: float) -> None:
         """A TPDO arrived, changed or not."""
@@ -148,11 +168,17 @@ class DriveChannel:
             self._status.link_fault = 0.0
             self._settle(now)
 
-    def on_emcy(self, code: int, now: float) -> None:
-        self._status.emcy_code = code
-        severity = 100 if code == 0 else 700
-        self._tell(now, Kind.EMERGENCY, severity, f"emergency {code:04X}h: {self._status.emcy_text()}")
+    def on_emcy(self, told: Told, now: float) -> None:
+        """An emergency message about this drive."""
+        self._status.on_emcy(told)
+        severity = 100 if told.is_gone else 700
+        self._tell(now, Kind.EMERGENCY, severity, f"emergency {told.code:04X}h: {told.text}")
         self._settle(now)
+
+    def on_drive_fault(self, current: float | None, last: float | None, now: float) -> None:
+        """The drive has been asked for its present and its last fault; None for what it did not tell."""
+        if self._status.on_drive_fault(current, last):
+            self._settle(now)
 
     def on_node(self, state: NodeState, now: float) -> None:
         """The node behind the drive is in another state now."""

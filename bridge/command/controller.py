@@ -19,9 +19,9 @@ from bridge.command.status import DriveStatus
 from bridge.command.telegram import Refusal, TelegramDecoder
 from bridge.command.watchdog import Effect, Stimulus, Watchdog, WatchdogState
 from bridge.config import DriveTable
-from bridge.drive import FAULTED, ControlWords, LinearScale
+from bridge.drive import FAULTED, ControlWords, Handshake, LinearScale, ValueCodec
 from bridge.image import Quality
-from bridge.mapping.model import Family
+from bridge.mapping.model import Family, Slot
 
 _LEASE_MS: Final = (100, 600_000)
 _TIMEOUT_MS: Final = (0, 32767)
@@ -41,6 +41,7 @@ class ControllerLeg:
         link: Link,
         status: DriveStatus,
         scales: dict[str, LinearScale],
+        unserved: dict[str, str],
         tell: Tell,
     ) -> None:
         self._settings = settings
@@ -50,11 +51,19 @@ class ControllerLeg:
         self.authority = Authority(settings.control)
         self.watchdog = Watchdog(settings.fieldbus_timeout_ms or 0, report_only=link.ignores_errors)
         self.words = ControlWords(family.control_word)
-        setpoints = len(family.process.rpdo) - 1
-        self.gate = Gate(self.words, setpoints, settings.on_expiry, settings.then_silence_ms)
+        slot = family.slot_named(settings.slot)
+        self._handshake = _handshake(family, slot)
+        self.gate = Gate(
+            self.words,
+            len(family.process.rpdo) - 1,
+            settings.on_expiry,
+            settings.then_silence_ms,
+            _follows(family, slot),
+            self._handshake,
+        )
         self.outcomes: list[tuple[Reply, Outcome]] = []
         self.start = StartSequence(self.words, self.gate, self.outcomes)
-        self._decoder = TelegramDecoder(name, family, scales)
+        self._decoder = TelegramDecoder(name, family, slot, scales, unserved)
         self.trips = 0
         self.refused_writes = 0
 
@@ -161,7 +170,7 @@ class ControllerLeg:
     def _write(self, request: Request, now: float) -> Outcome:
         is_owner = request.identity.is_same(self.owner)
         # A new owner inherits no setpoints.
-        kept = self.gate.setpoints if is_owner else (0,) * len(self.gate.setpoints)
+        kept = self.gate.setpoints if is_owner else self.gate.rest
         telegram = self._decoder.decode(request.values, kept)
         word = telegram.control_word
         if word is not None and not self.words.is_valid(word):
@@ -176,7 +185,9 @@ class ControllerLeg:
                 self.gate.control_word |= self.words.acknowledge_mask
                 return Outcome(Code.OK, "acknowledged; the drive stays stopped", forwarded=False)
         self.watchdog.apply(Stimulus.TELEGRAM, now)
-        if self.gate.take(word, telegram.setpoints, may_enable=self._link.may_enable):
+        position = self._handshake is not None and self._handshake.value in request.values
+        may_enable = self._link.may_enable
+        if self.gate.take(word, telegram.setpoints, may_enable=may_enable, position=position):
             return DONE
         return Outcome(Code.OK, self.why_blocked(), forwarded=False)
 
@@ -267,3 +278,23 @@ class ControllerLeg:
         self._own(request.identity, now)
         self.watchdog.apply(Stimulus.TELEGRAM, now)
         self.start.begin(bits, self._status.state, now, reply)
+
+
+def _handshake(family: Family, slot: Slot) -> Handshake | None:
+    """The handshake by which this drive takes over positions, or None where it has none."""
+    model = family.control_word.handshake
+    for value in family.values_of(slot) if model else ():
+        if model and (value.group, value.name) == ("command", model.value):
+            return Handshake(model, ValueCodec(value, family.process.rpdo[1:]).places)
+    return None
+
+
+def _follows(family: Family, slot: Slot) -> list[tuple[int, int]]:
+    """Setpoints that follow actual words: the place of each setpoint, and that of its actual word."""
+    values = {value.leaf: value for value in family.values_of(slot)}
+    return [
+        (family.process.rpdo.index(word) - 1, family.process.tpdo.index(source))
+        for value in values.values()
+        if value.follows is not None and (followed := values.get(f"actual/{value.follows}"))
+        for word, source in zip(value.word_names, followed.word_names, strict=True)
+    ]

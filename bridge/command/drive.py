@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.command.actual import ActualData, FurtherTpdo
 from bridge.command.channel import DriveChannel
 from bridge.command.event import Event
+from bridge.command.parameter_points import parameter_points
 from bridge.command.points import drive_points
 from bridge.config import BusTable, DriveTable, NodeTable
-from bridge.drive import LinearScale, signed
+from bridge.drive import ValueCodec, scale_of
 from bridge.image import Image, Point, Quality, Value
-from bridge.mapping.model import Family, ScaledValue, Slot
+from bridge.mapping.model import Family, Slot
 
 REACTION_BOUND_MS: Final = 20
 """How late the bridge may be itself, beside one cycle of the RPDO (``docs/explanation``)."""
 
-_GOOD: Final = (Quality.GOOD, "")
 _IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
 _SUPERVISION: Final = (
     "owner",
@@ -46,21 +47,10 @@ class Identification:
     device_name: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class _Scaled:
-    """One scaled value: the place of its word, value = word × full / at; unknown scales pass the word."""
-
-    place: int
-    full: float
-    at: int
-    unknown: str = ""
-
-
 class Drive:
     """One drive: its channel, and where its points stand in the image.
 
-    A PDO costs one comparison per value. All that is not process data is shown when the channel says
-    that it has settled.
+    All that is not process data is shown when the channel says that it has settled.
     """
 
     def __init__(
@@ -82,45 +72,49 @@ class Drive:
         self.identification = Identification()
         self.sdo_abort_code = 0
         self.rpdo_period_ms = round(bus.rpdo_period_s * 1000)
+        self.sync_period_ms = bus.sync_period_ms
         self.table = table
         self.given_parameters = table.parameters
-        self._actual = [value for value in family.value if value.group == "actual"]
-        self._commands = [value for value in family.value if value.group == "command"]
+        words = family.process.rpdo[1:]
+        self._commands = [
+            ValueCodec(value, words) for value in family.values_of(self.slot) if value.group == "command"
+        ]
+        self._setpoints = [
+            (words.index(word), f"command/{word}") for word in family.carried(self.slot)[0][1:]
+        ]
+        self._has_followers = any(value.follows for value in family.values_of(self.slot))
         for parameter, full in table.parameters.items():
             self._learn(parameter, full)
-        self.points: list[Point] = drive_points(self.name, family, self.channel.scales)
-        self.words: list[int] = [0] * len(family.process.tpdo)
-        """The words of the last TPDO, the status word first."""
-        self._quality = Quality.WAITING
-        self._shown: tuple[Quality, str] | None = None
-        """Quality and reason as the image has them for the process data."""
-        self._scaled_actual: list[_Scaled] = []
-        self._scaled_commands: list[_Scaled] = []
-        self._compile()
+        self._actual = ActualData(self.name, family, self.slot, self.channel)
+        self.points: list[Point] = [
+            *drive_points(self.name, family, self.slot, self.channel.scales),
+            *parameter_points(self.name, family),
+        ]
 
     def bind(self, image: Image) -> None:
         """Find this drive's points in the image, and show in it from now on what happens to the drive."""
         self._image = image
-        index = {point.name: image.index[point.name] for point in self.points}
 
         def places(group: str, leaves: Sequence[str]) -> list[int]:
-            return [index[f"{self.name}/{group}/{leaf}"] for leaf in leaves]
+            return [image.index[f"{self.name}/{group}/{leaf}"] for leaf in leaves]
 
-        process = self.family.process
-        self._data = places("status", ("status_word", "drive_status_word", "state", "emcy_code"))
-        self._data += places("actual", process.tpdo[1:])
-        self._data_scaled = places("actual", [value.name for value in self._actual])
-        self._data_all = self._data + self._data_scaled
-        self._command = places("command", process.rpdo)
-        self._command_scaled = places("command", [value.name for value in self._commands])
+        (self._control_word,) = places("command", ("control_word",))
+        self._setpoint_indices = [image.index[f"{self.name}/{leaf}"] for _, leaf in self._setpoints]
+        self._value_indices = places("command", [codec.model.name for codec in self._commands])
         self._supervision = places("status", ("fault_text",)) + places("supervision", _SUPERVISION)
         self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms"))
         self._identity = places("identity", _IDENTITY)
+        self._actual.bind(image)
         self.channel.settled = self.refresh
 
     @property
     def quality(self) -> Quality:
-        return self._quality
+        return self._actual.quality
+
+    @property
+    def words(self) -> list[int]:
+        """The words of the last TPDOs, the status word first, in the order of ``process.tpdo``."""
+        return self._actual.words
 
     def worst_case_stop_ms(self) -> int:
         """Longest time from the controller's last telegram to the reaction on the bus; 0 where none."""
@@ -133,44 +127,53 @@ class Drive:
     # fed by the southbound side
 
     def on_process_data(self, words: Sequence[int], now: float) -> None:
-        """A TPDO with changed words; ``words`` are raw, in the order of ``process.tpdo``."""
-        self.words[:] = words
-        self.channel.on_pdo(now)
-        self.channel.on_status_word(words[0], now)
-        self._refresh_data(now)
+        """The TPDO with the status word, changed; ``words`` are raw, in the order of ``process.tpdo``."""
+        if self._has_followers:
+            self.channel.on_actual_words(words, now)
+        self._actual.on_words(words, now)
 
     def on_unchanged_data(self, now: float) -> None:
         """A TPDO that says what the last one said."""
         self.channel.on_pdo(now)
-        if self._quality is not Quality.GOOD:
-            self._refresh_data(now)
+        if self._actual.quality is not Quality.GOOD:
+            self._actual.refresh(now)
+
+    def on_further_data(self, pdo: FurtherTpdo, now: float) -> None:
+        """Another TPDO; its words are in ``words`` already."""
+        if self._has_followers:
+            self.channel.on_actual_words(self._actual.words, now)
+        self._actual.on_further(pdo, now)
+
+    def on_pdos(self, unserved: Mapping[str, str], further: Sequence[FurtherTpdo], now: float) -> None:
+        """What the boot-up has found: ``unserved`` has the reason for each word that the node does not
+        carry, by its leaf such as ``actual/value_2``; ``further`` are the TPDOs beside the one with the
+        status word."""
+        found = dict(unserved)
+        for value in self.family.values_of(self.slot):
+            why = [
+                unserved[leaf] for word in value.word_names if (leaf := f"{value.group}/{word}") in unserved
+            ]
+            if why:
+                found[value.leaf] = why[0]
+        self.channel.unserved.clear()
+        self.channel.unserved.update(found)
+        self._actual.set_further(further)
+        self._compile()
+        self.refresh(now)
 
     def on_scale(self, parameter: str, full: float) -> None:
         """The drive's own value of a scaling parameter; it wins over the site file."""
         self._learn(parameter, full)
         self._compile()
-        self._shown = None
 
     def _learn(self, parameter: str, full: float) -> None:
-        if full <= 0:
-            return
         for value in self.family.value:
-            if value.scale.full == parameter:
-                scale = LinearScale(full, value.scale.at, value.scale.limit)
+            scale = scale_of(value, full) if value.full == parameter else None
+            if scale is not None:
                 self.channel.scales[value.leaf] = scale
 
     def _compile(self) -> None:
-        process = self.family.process
-        self._scaled_actual = [self._scaled(value, process.tpdo) for value in self._actual]
-        self._scaled_commands = [self._scaled(value, process.rpdo[1:]) for value in self._commands]
-
-    def _scaled(self, value: ScaledValue, words: list[str]) -> _Scaled:
-        scale = self.channel.scales.get(value.leaf)
-        place = words.index(value.word)
-        if scale is None:
-            unknown = f"{value.scale.full} cannot be read and is not in the site file"
-            return _Scaled(place, 1.0, 1, unknown)
-        return _Scaled(place, scale.full, scale.at)
+        self._actual.compile(self.channel.scales, self.channel.unserved)
 
     def on_identification(self, identification: Identification, now: float) -> None:
         self.identification = identification
@@ -180,52 +183,23 @@ class Drive:
 
     def refresh(self, now: float) -> None:
         """Bring every point of the drive up to date."""
-        self._refresh_data(now)
+        self._actual.refresh(now)
         self._refresh_command(now)
         self._refresh_supervision(now)
 
-    def _refresh_data(self, now: float) -> None:
-        channel = self.channel
-        quality = channel.link.quality(now)
-        if quality is not Quality.GOOD or self._shown is not _GOOD:
-            self._judge(quality, now)
-            if not quality.has_value:
-                return
-        words = self.words
-        values: list[Value] = [
-            channel.status_word,
-            channel.drive_status_word,
-            int(channel.served_state),
-            channel.emcy_code,
-            *words[1:],
-        ]
-        for scaled in self._scaled_actual:
-            word = words[scaled.place]
-            values.append((word - 0x1_0000 if word & 0x8000 else word) * scaled.full / scaled.at)
-        self._image.set_values(self._data_all, values, now)
-
-    def _judge(self, quality: Quality, now: float) -> None:
-        """Show another quality, or another reason for a bad one."""
-        self._quality = quality
-        reason = self.channel.link.reason(quality)
-        if (quality, reason) == self._shown:
-            return
-        self._shown = _GOOD if quality is Quality.GOOD else (quality, reason)
-        self._image.judge(self._data, quality, now, reason)
-        for index, scaled in zip(self._data_scaled, self._scaled_actual, strict=True):
-            if scaled.unknown and quality.has_value:
-                self._image.judge((index,), Quality.CONFIG_ERROR, now, scaled.unknown)
-            else:
-                self._image.judge((index,), quality, now, reason)
-
     def _refresh_command(self, now: float) -> None:
-        channel = self.channel
-        setpoints = channel.setpoints
-        self._show(self._command, (channel.control_word, *setpoints), now)
-        for index, scaled in zip(self._command_scaled, self._scaled_commands, strict=True):
-            quality = Quality.CONFIG_ERROR if scaled.unknown else Quality.GOOD
-            value = signed(setpoints[scaled.place]) * scaled.full / scaled.at
-            self._image.set(index, value, now, quality, scaled.unknown)
+        channel, image = self.channel, self._image
+        setpoints, unserved = channel.setpoints, channel.unserved
+        image.set(self._control_word, channel.control_word, now)
+        for index, (place, leaf) in zip(self._setpoint_indices, self._setpoints, strict=True):
+            why = unserved.get(leaf, "")
+            quality = Quality.CONFIG_ERROR if why else Quality.GOOD
+            image.set(index, setpoints[place], now, quality, why)
+        for index, codec in zip(self._value_indices, self._commands, strict=True):
+            codec.scale = channel.scales.get(codec.model.leaf)
+            why = unserved.get(codec.model.leaf) or codec.why_unknown
+            quality = Quality.CONFIG_ERROR if why else Quality.GOOD
+            image.set(index, codec.from_words(setpoints), now, quality, why)
 
     def _refresh_supervision(self, now: float) -> None:
         channel = self.channel
@@ -248,6 +222,7 @@ class Drive:
     def refresh_ages(self, now: float) -> None:
         """The points that change by themselves; called a few times a second."""
         channel = self.channel
+        self._actual.on_time(now)
         self._show(self._ages, (channel.watchdog.left_ms(now), channel.link.age_ms(now)), now)
 
     def _show(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:

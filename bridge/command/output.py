@@ -6,10 +6,11 @@ watchdog has tripped, the restart interlock is set or the drive's node is not th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from bridge.config import Reaction
-from bridge.drive import MOVING, ControlWords, DriveState
+from bridge.drive import MOVING, ControlWords, DriveState, Handshake
 
 _ACKNOWLEDGE_PULSE_S = 0.1
 """How long a generated acknowledge edge stays on the bus: longer than any cycle we send with."""
@@ -23,13 +24,30 @@ class Output(NamedTuple):
 
 
 class Gate:
-    """One drive's way out. Times are monotonic seconds; one that lies back counts as the latest known."""
+    """One drive's way out. Times are monotonic seconds; one that lies back counts as the latest known.
 
-    def __init__(self, words: ControlWords, setpoints: int, reaction: Reaction, then_silence_ms: int) -> None:
+    ``follows`` has the places of setpoints that are the drive's actual words, and those of these words, as
+    long as nothing is commanded: enabling moves nothing then. ``handshake`` takes over positions.
+    """
+
+    def __init__(
+        self,
+        words: ControlWords,
+        setpoints: int,
+        reaction: Reaction,
+        then_silence_ms: int,
+        follows: Sequence[tuple[int, int]] = (),
+        handshake: Handshake | None = None,
+    ) -> None:
         self._words = words
         self._reaction: Reaction = reaction
         self._then_silence_s = then_silence_ms / 1000
-        self._zero = (0,) * setpoints
+        self._follows = tuple(follows)
+        self._handshake = handshake
+        self._is_enabled = False
+        self._status_word = 0
+        self.rest: tuple[int, ...] = (0,) * setpoints
+        """The setpoints of a drive that nobody commands."""
         self._now = float("-inf")
         self._tripped_at: float | None = None
         self._held: Output | None = None
@@ -39,9 +57,9 @@ class Gate:
         """Tripped, and a quick stop is on its way that is followed by disable voltage."""
         self.control_word = words.stopped
         """The owner's control word, as it would like it."""
-        self.setpoints = self._zero
+        self.setpoints = self.rest
         self.interlocked = True
-        self.sent = Output((words.stopped, *self._zero))
+        self.sent = Output((words.stopped, *self.rest))
 
     @property
     def _silence_at(self) -> float | None:
@@ -52,12 +70,48 @@ class Gate:
             return self._tripped_at
         return self._tripped_at + self._then_silence_s if self._then_silence_s else None
 
-    def take(self, control_word: int | None, setpoints: tuple[int, ...], *, may_enable: bool) -> bool:
-        """A telegram of the owner; True if it goes to the drive as it is.
+    @property
+    def _is_commanded(self) -> bool:
+        """The drive is enabled, and what it gets does not stop it."""
+        return self._is_enabled and self._words.enables(self.sent.words[0])
+
+    def follow(self, actual: Sequence[int]) -> bool:
+        """The drive's actual words, the status word first. True where that changes what belongs on the bus."""
+        if not self._follows:
+            return False
+        rest = list(self.rest)
+        for place, source in self._follows:
+            rest[place] = actual[source]
+        self.rest = tuple(rest)
+        before = self.setpoints
+        self._keep_at_rest()
+        return self.setpoints != before
+
+    def _keep_at_rest(self) -> None:
+        """What was written for a drive that is not enabled yet must not make it jump when it is."""
+        if self._follows and not self._is_commanded:
+            setpoints = list(self.setpoints)
+            for place, _ in self._follows:
+                setpoints[place] = self.rest[place]
+            self.setpoints = tuple(setpoints)
+
+    def take(
+        self,
+        control_word: int | None,
+        setpoints: tuple[int, ...],
+        *,
+        may_enable: bool,
+        position: bool = False,
+    ) -> bool:
+        """A telegram of the owner; True if it goes to the drive as it is. ``position``: it has the value
+        that is handed over with a handshake.
 
         A control word that does not enable opens the interlock, or ends a "hold".
         """
         self.setpoints = setpoints
+        self._keep_at_rest()
+        if position and self._handshake is not None:
+            self._handshake.order(setpoints)
         if control_word is not None:
             self.control_word = control_word
         is_stop = control_word is not None and not self._words.enables(control_word)
@@ -72,9 +126,14 @@ class Gate:
     def stop(self, control_word: int) -> None:
         """Stop with this word in place of the owner's, and wait for a fresh enable."""
         self.control_word = control_word
-        self.setpoints = self._zero
+        self._drop_setpoints()
         self.interlocked = True
         self._held = None
+
+    def _drop_setpoints(self) -> None:
+        self.setpoints = self.rest
+        if self._handshake is not None:
+            self._handshake.reset()
 
     def trip(self, now: float) -> None:
         self._tripped_at = now
@@ -82,7 +141,7 @@ class Gate:
         if self._reaction == "hold":
             self._held = self.sent
         else:
-            self.setpoints = self._zero
+            self._drop_setpoints()
 
     def clear(self, now: float, *, pulse: bool) -> None:
         """Leave the trip, stopped. With ``pulse`` an acknowledge edge is sent to the drive."""
@@ -99,8 +158,16 @@ class Gate:
 
     def on_state(self, state: DriveState) -> None:
         """The drive reported this state."""
+        self._is_enabled = state is DriveState.OPERATION_ENABLED
         if state not in MOVING and state is not DriveState.UNKNOWN:
             self.awaits_rest = False
+
+    def on_status_word(self, word: int) -> bool:
+        """The drive's status word, before the state it says. True where something waits for one of its bits."""
+        if self._handshake is None or word == self._status_word:
+            return False
+        self._status_word = word
+        return True
 
     def next_deadline(self) -> float | None:
         """When what is sent changes by itself, beyond what ``compute`` has seen."""
@@ -111,13 +178,16 @@ class Gate:
         """What the drive gets from now on; also kept as ``sent``."""
         self._now = max(now, self._now)
         self.sent = self._compute(may_enable)
+        if self._handshake is not None:
+            self._handshake.step(self.setpoints, self._status_word, enabled=self._is_commanded)
+            self.sent = self._compute(may_enable)
         return self.sent
 
     def _compute(self, may_enable: bool) -> Output:
         if self._tripped_at is not None and self._reaction != "hold":
             silence_at = self._silence_at
             silent = silence_at is not None and self._now >= silence_at
-            return Output((self._reaction_word(), *self._zero), silent)
+            return Output((self._reaction_word(), *self.rest), silent)
         if self._held is not None:
             if may_enable or not self._words.enables(self._held.words[0]):
                 return self._held
@@ -128,7 +198,9 @@ class Gate:
             word = self._words.stop(word) | word & self._words.acknowledge_mask
         if self._acknowledge_until is not None and self._now < self._acknowledge_until:
             word |= self._words.acknowledge_mask
-        return Output((word, *(self._zero if blocked else self.setpoints)))
+        if self._handshake is not None and self._words.enables(word):
+            word |= self._handshake.bits
+        return Output((word, *(self.rest if blocked else self.setpoints)))
 
     def _reaction_word(self) -> int:
         word = self.sent.words[0]

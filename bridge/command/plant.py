@@ -8,23 +8,41 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Final
+from typing import Final, Protocol
 
 from bridge.command.deadlines import Deadlines
 from bridge.command.drive import Drive
 from bridge.command.event import Event, EventGate, Kind
 from bridge.command.link import NodeState
 from bridge.command.points import bridge_points, bus_points, node_points
-from bridge.command.request import NODE_ACTIONS, STOP_ACTIONS, Action, Code, Outcome, Reply, Request
+from bridge.command.request import (
+    NODE_ACTIONS,
+    PARAMETER_ACTIONS,
+    STOP_ACTIONS,
+    Action,
+    Code,
+    Outcome,
+    Reply,
+    Request,
+)
 from bridge.config import BusTable, NodeTable, Site
 from bridge.errors import Fault, FileFaults
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Family
+from bridge.parameter import Ledger
 
 _LOOK_PER_DRIVE_S: Final = 50e-6
 """Readings alone make us look at all timers this often at most, so that looking takes a tenth of the CPU."""
 
 NodeCommand = Callable[[Request, float, Reply], None]
+
+
+class ParameterAccess(Protocol):
+    """Reads and writes the parameters of a node's drives."""
+
+    def submit(self, request: Request, drive: Drive, now: float, reply: Reply) -> None: ...
+
+    def on_node(self, state: NodeState, now: float) -> None: ...
 
 
 @dataclass(slots=True)
@@ -36,6 +54,7 @@ class Node:
     family: Family
     drives: list[Drive] = field(default_factory=list[Drive])
     command: NodeCommand | None = None
+    parameters: ParameterAccess | None = None
 
     @property
     def name(self) -> str:
@@ -62,6 +81,8 @@ class Plant:
         self.bus_commands: dict[str, NodeCommand] = {}
         """Who carries out commands on all nodes of a bus, by ``bus/<name>``."""
         self.outputs_changed: Callable[[], None] = lambda: None
+        self.eeprom_writes = Ledger()
+        """How often parameters were written; whoever keeps it across restarts fills it first."""
         self._deadlines = Deadlines(self._next_of_drives)
         self._listeners: list[Callable[[Event], None]] = []
         self._gate = EventGate()
@@ -139,6 +160,14 @@ class Plant:
         if drive is None:
             reply(Outcome(Code.UNKNOWN_TARGET, f"there is no drive {request.target!r}"))
             return
+        if request.action in PARAMETER_ACTIONS:
+            access = self.nodes[drive.node_name].parameters
+            if access is None:
+                reply(Outcome(Code.NOT_READY, f"{drive.name} is on no bus", forwarded=False))
+                return
+            access.submit(request, drive, now, reply)
+            self.outputs_changed()
+            return
         before = drive.channel.output
         try:
             drive.channel.handle(request, now, reply)
@@ -198,6 +227,8 @@ class Plant:
         self._deadlines.on_change()
         for drive in node.drives:
             drive.channel.on_node(state, now)
+        if node.parameters:
+            node.parameters.on_node(state, now)
         if state is NodeState.LOST:
             self.report(Event(now, Kind.NODE_LOST, node.name, 800, "node lost"))
         elif state is NodeState.OPERATIONAL:

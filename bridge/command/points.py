@@ -8,9 +8,9 @@ from typing import Final
 from bridge.command import watchdog
 from bridge.command.request import Source
 from bridge.config import BusTable, NodeTable
-from bridge.drive import STATES, LinearScale
+from bridge.drive import STATES, LinearScale, ValueCodec
 from bridge.image import DataType, Point
-from bridge.mapping.model import Family, Poll, ScaledValue
+from bridge.mapping.model import Family, Poll, ProcessValue, Slot
 
 OWNERS: Final = tuple((source.value, source.label) for source in Source)
 NMT_STATES: Final = (
@@ -27,31 +27,30 @@ def _word(name: str, description: str, bits: tuple[str, ...] = (), *, writable: 
     return Point(name=name, data_type=DataType.UINT16, writable=writable, description=description, bits=bits)
 
 
-def drive_points(name: str, family: Family, scales: dict[str, LinearScale]) -> list[Point]:
-    """The points of the drive called ``<node>/<drive>``.
+def drive_points(name: str, family: Family, slot: Slot, scales: dict[str, LinearScale]) -> list[Point]:
+    """The points of the drive called ``<node>/<drive>``; of words that its PDOs do not carry there are none.
 
     ``scales`` holds the scales that are known already, by the value's leaf, for the ranges.
     """
     return [
-        *_command_points(name, family, scales),
+        *_command_points(name, family, slot, scales),
         *_status_points(name, family),
-        *_actual_points(name, family, scales),
+        *_actual_points(name, family, slot, scales),
         *_supervision_points(name),
         *_identity_points(name),
     ]
 
 
-def _command_points(name: str, family: Family, scales: dict[str, LinearScale]) -> list[Point]:
+def _command_points(name: str, family: Family, slot: Slot, scales: dict[str, LinearScale]) -> list[Point]:
     bits = tuple(family.control_word.bits)
     points = [
         _word(f"{name}/command/control_word", "control word as the owner wrote it", bits, writable=True),
         *(
             _word(f"{name}/command/{word}", "setpoint word as the owner wrote it", writable=True)
-            for word in family.process.rpdo[1:]
+            for word in family.carried(slot)[0][1:]
         ),
     ]
-    points += [_scaled(name, value, scales) for value in family.value if value.group == "command"]
-    return points
+    return points + _values(name, family, slot, scales, "command")
 
 
 def _status_points(name: str, family: Family) -> list[Point]:
@@ -67,25 +66,30 @@ def _status_points(name: str, family: Family) -> list[Point]:
     ]
 
 
-def _actual_points(name: str, family: Family, scales: dict[str, LinearScale]) -> list[Point]:
+def _actual_points(name: str, family: Family, slot: Slot, scales: dict[str, LinearScale]) -> list[Point]:
     points = [
         _word(f"{name}/actual/{word}", "actual value word as the drive sent it")
-        for word in family.process.tpdo[1:]
+        for word in family.carried(slot)[1][1:]
     ]
-    points += [_scaled(name, value, scales) for value in family.value if value.group == "actual"]
-    return points
+    return points + _values(name, family, slot, scales, "actual")
 
 
-def _scaled(name: str, value: ScaledValue, scales: dict[str, LinearScale]) -> Point:
-    scale = scales.get(value.leaf)
+def _values(name: str, family: Family, slot: Slot, scales: dict[str, LinearScale], group: str) -> list[Point]:
+    return [_value(name, value, scales) for value in family.values_of(slot) if value.group == group]
+
+
+def _value(name: str, value: ProcessValue, scales: dict[str, LinearScale]) -> Point:
+    low, high = ValueCodec(value, value.word_names, scales.get(value.leaf)).range
     return Point(
-        name=f"{name}/{value.group}/{value.name}",
-        data_type=DataType.FLOAT,
+        name=f"{name}/{value.leaf}",
+        data_type=value.point_type,
         unit=value.unit,
-        low=scale.low if scale else None,
-        high=scale.high if scale else None,
+        low=low,
+        high=high,
         writable=value.group == "command",
         description=value.description,
+        states=tuple(sorted(value.states.items())),
+        bits=tuple(value.bits),
     )
 
 

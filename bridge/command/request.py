@@ -36,13 +36,19 @@ class Identity:
     """Who asks. Two requests come from the same controller exactly if ``source`` and ``user`` agree.
 
     ``user`` is the session's user on OPC UA, the client's IP address on Modbus, the controller's name
-    on zenoh. ``address`` is for the log only.
+    on zenoh. ``address`` is for the log only. ``sets_parameters``: may write parameters of drives without
+    being an engineer, where a protocol knows no roles.
     """
 
     source: Source
     user: str
     role: Role = Role.OPERATOR
     address: str = ""
+    sets_parameters: bool = False
+
+    @property
+    def may_set_parameters(self) -> bool:
+        return self.sets_parameters or self.role >= Role.ENGINEER
 
     def is_same(self, other: Identity | None) -> bool:
         return other is not None and self.source is other.source and self.user == other.user
@@ -63,6 +69,9 @@ class Action(StrEnum):
     TAKE_CONTROL = "take_control"
     RELEASE_CONTROL = "release_control"
     SET_TIMEOUT = "set_timeout"
+    READ_PARAMETER = "read_parameter"
+    WRITE_PARAMETER = "write_parameter"
+    SAVE_PARAMETERS = "save_parameters"
     # on a node
     RESET = "reset"
     RESET_COMMUNICATION = "reset_communication"
@@ -84,6 +93,7 @@ NMT_ACTIONS = frozenset(
 )
 """The five commands of NMT (CiA 301 §7.2.8.2.1), on a node or on all nodes of a bus."""
 NODE_ACTIONS = NMT_ACTIONS | {Action.ENABLE, Action.DISABLE}
+PARAMETER_ACTIONS = frozenset((Action.READ_PARAMETER, Action.WRITE_PARAMETER, Action.SAVE_PARAMETERS))
 STOP_ACTIONS = frozenset((Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE))
 
 
@@ -102,16 +112,28 @@ class Code(StrEnum):
     NOT_CONFIGURED = "not_configured"
     TIMED_OUT = "timed_out"
     CANCELLED = "cancelled"
+    UNKNOWN_PARAMETER = "unknown_parameter"
+    WRITE_ONLY = "write_only"
+    BUSY = "busy"
+    TOO_OFTEN = "too_often"
+    REFUSED_BY_DRIVE = "refused_by_drive"
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """The end of a request. ``forwarded`` is False where a write was taken but not sent to the drive
-    (while tripped or interlocked); ``message`` is one sentence for a human."""
+    (while tripped or interlocked); ``message`` is one sentence for a human.
+
+    ``value`` is what a parameter holds, as it was read (back) at ``time`` in seconds of the monotonic
+    clock; ``abort_code`` is the drive's, where it has refused.
+    """
 
     code: Code
     message: str = ""
     forwarded: bool = True
+    value: Value | None = None
+    time: float = 0.0
+    abort_code: int = 0
 
     @property
     def ok(self) -> bool:
@@ -128,7 +150,9 @@ class Request:
     ``target`` is ``<node>/<drive>``, ``<node>`` or, for NMT, ``bus/<bus>``. ``values`` (WRITE) maps names
     of the command group to values: ``{"control_word": 0x047F, "setpoint_1": 0x2000}`` is one telegram.
     ``ttl_ms`` (TAKE_CONTROL) is the lease's length, ``direction`` (START) is 1 forward, -1 reverse, 0 as
-    the drive's own setting, ``timeout_ms`` goes with SET_TIMEOUT.
+    the drive's own setting, ``timeout_ms`` goes with SET_TIMEOUT. ``parameter`` is a vendor's name, an
+    object or the name of a point, ``value`` what is to be written, ``max_age_ms`` how old a value read
+    earlier may be.
     """
 
     identity: Identity
@@ -138,6 +162,9 @@ class Request:
     ttl_ms: int = 0
     direction: int = 0
     timeout_ms: int = 0
+    parameter: str = ""
+    value: Value | None = None
+    max_age_ms: int = 0
 
 
 Reply = Callable[[Outcome], None]

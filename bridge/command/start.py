@@ -49,6 +49,9 @@ class StartSequence:
         if state in _CAN_BE_ENABLED:
             self._gate.take(self._control_word, self._gate.setpoints, may_enable=True)
         if state is DriveState.OPERATION_ENABLED:
+            if self._words.begin:
+                word = self._control_word | self._words.begin
+                self._gate.take(word, self._gate.setpoints, may_enable=True)
             self.end(DONE)
 
     def on_time(self, state: DriveState, now: float) -> None:

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from bridge.drive import FAULTED, DriveState, StatusWords
+from bridge.drive import FAULTED, DriveState, StatusWords, Told
 from bridge.mapping.model import Family
 
 
 class DriveStatus:
     """Last known status of one drive. Fault numbers are the family's own, 0 where there is none."""
 
-    __slots__ = ("_emcy", "emcy_code", "faults", "last_fault", "link_fault", "state", "word", "words")
+    __slots__ = (
+        "_drive_last",
+        "_emcy",
+        "_emcy_text",
+        "drive_fault",
+        "emcy_code",
+        "faults",
+        "last_fault",
+        "link_fault",
+        "state",
+        "word",
+        "words",
+    )
 
     def __init__(self, family: Family) -> None:
         self._emcy = family.emcy
@@ -18,18 +30,45 @@ class DriveStatus:
         self.word = 0
         self.state = DriveState.UNKNOWN
         self.emcy_code = 0
+        self._emcy_text = ""
         self.link_fault = 0.0
         """Present fault of the leg between bridge and drive."""
+        self.drive_fault: float = 0.0
+        """Present fault as the drive itself was asked for it."""
+        self._drive_last: float = 0.0
         self.last_fault = 0.0
 
-    def emcy_text(self) -> str:
-        return self._emcy.text(self.emcy_code)
+    def on_emcy(self, told: Told) -> None:
+        self.emcy_code = told.code
+        self._emcy_text = "" if told.is_gone else told.text
 
-    def fault_text(self, current_fault: float) -> str:
-        """The present fault in words; empty where there is none."""
-        if current_fault:
-            number = f"{current_fault:.1f}"
+    def on_drive_fault(self, current: float | None, last: float | None) -> bool:
+        """What the drive answered; True where that changes something. Of the last faults that the bridge
+        and the drive tell, the newest counts."""
+        before = (self.drive_fault, self.last_fault)
+        if current is not None:
+            if current and current != self.drive_fault:
+                self.last_fault = current
+            self.drive_fault = current
+        if last is not None:
+            if last and last != self._drive_last:
+                self.last_fault = last
+            self._drive_last = last
+        return (self.drive_fault, self.last_fault) != before
+
+    def fault_text(self, bridge_fault: float) -> str:
+        """The present fault in words, the bridge's own before the drive's; empty where there is none."""
+        if bridge_fault:
+            number = f"{bridge_fault:.1f}"
             return f"{self.faults.prefix}{number} {self.faults.texts.get(number, '')}".strip()
+        if self.drive_fault:
+            return self._drive_text(self.drive_fault)
         if self.state in FAULTED:
-            return self.emcy_text() if self.emcy_code else "fault"
+            return self._emcy_text or "fault"
         return ""
+
+    def _drive_text(self, fault: float) -> str:
+        """The number the drive gives with its text: the family's, or that of the emergency message."""
+        number = f"{fault:g}"
+        text = self.faults.texts.get(f"{fault:.1f}") or self._emcy.events.get(number) or self._emcy_text
+        return text if text.startswith(f"{number} ") else f"{number} {text}".rstrip()

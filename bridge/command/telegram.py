@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from bridge.command.request import Code
-from bridge.drive import LinearScale
+from bridge.drive import LinearScale, ValueCodec, Written
 from bridge.image import Value
-from bridge.mapping.model import Family, ScaledValue
+from bridge.mapping.model import Family, Slot
+
+_WORD_MASK = 0xFFFF
 
 
 class Refusal(Exception):
@@ -29,48 +31,86 @@ class Telegram:
     setpoints: tuple[int, ...]
 
 
-class TelegramDecoder:
-    """Knows the command group of one drive. ``scales`` is read at each write: it fills at boot-up."""
+@dataclass(slots=True)
+class _Setpoints:
+    """What a write has set so far, by the word's place: which bits, and to what."""
 
-    def __init__(self, name: str, family: Family, scales: Mapping[str, LinearScale]) -> None:
+    masks: dict[int, int] = field(default_factory=dict[int, int])
+    bits: dict[int, int] = field(default_factory=dict[int, int])
+
+    def put(self, leaf: str, written: Written) -> None:
+        """Raises ``Refusal`` where the same bits have been written otherwise."""
+        mask, bits = self.masks.get(written.place, 0), self.bits.get(written.place, 0)
+        if (bits ^ written.bits) & mask & written.mask:
+            raise Refusal(Code.OUT_OF_RANGE, f"{leaf} and the word it is made from do not agree")
+        self.masks[written.place] = mask | written.mask
+        self.bits[written.place] = bits | written.bits
+
+    def over(self, before: tuple[int, ...]) -> tuple[int, ...]:
+        """``before`` with what was written."""
+        return tuple(
+            word & ~self.masks.get(place, 0) | self.bits.get(place, 0) for place, word in enumerate(before)
+        )
+
+
+class TelegramDecoder:
+    """Knows the command group of one drive. ``scales``, by the value's leaf, and ``unserved``, which has
+    the reason for each point that the node cannot take, are read at each write: they fill at boot-up."""
+
+    def __init__(
+        self,
+        name: str,
+        family: Family,
+        slot: Slot,
+        scales: Mapping[str, LinearScale],
+        unserved: Mapping[str, str],
+    ) -> None:
         self._name = name
         self._scales = scales
-        self._setpoints = {word: place for place, word in enumerate(family.process.rpdo[1:])}
-        self._scaled = {value.name: value for value in family.value if value.group == "command"}
+        self._unserved = unserved
+        words = family.process.rpdo[1:]
+        carried = family.carried(slot)[0]
+        self._setpoints = {word: place for place, word in enumerate(words) if word in carried}
+        self._values = {
+            value.name: ValueCodec(value, words)
+            for value in family.values_of(slot)
+            if value.group == "command"
+        }
 
     def decode(self, values: Mapping[str, Value], before: tuple[int, ...]) -> Telegram:
         """The words to be sent; setpoints that are not written stay as ``before``. Raises ``Refusal``."""
         control_word: int | None = None
-        written: dict[int, int] = {}
+        setpoints = _Setpoints()
         for leaf, value in values.items():
             if leaf == "control_word":
                 control_word = _as_word(leaf, value)
                 continue
-            place, word = self._setpoint(leaf, value)
-            if written.setdefault(place, word) != word:
-                raise Refusal(Code.OUT_OF_RANGE, f"{leaf} and the word it is made from do not agree")
-        setpoints = tuple(written.get(place, word) for place, word in enumerate(before))
-        return Telegram(control_word, setpoints)
+            for written in self._written(leaf, value):
+                setpoints.put(leaf, written)
+        return Telegram(control_word, setpoints.over(before))
 
-    def _setpoint(self, leaf: str, value: Value) -> tuple[int, int]:
-        """Place among the setpoints, and word."""
-        if leaf in self._setpoints:
-            return self._setpoints[leaf], _as_word(leaf, value)
-        scaled = self._scaled.get(leaf)
-        if scaled is None:
-            known = ", ".join(["control_word", *self._setpoints, *self._scaled])
+    def _written(self, leaf: str, value: Value) -> tuple[Written, ...]:
+        place, codec = self._setpoints.get(leaf), self._values.get(leaf)
+        if place is None and codec is None:
+            known = ", ".join(["control_word", *self._setpoints, *self._values])
             raise Refusal(Code.UNKNOWN_POINT, f"{self._name}/command has no {leaf!r}; it has {known}")
-        return self._setpoints[scaled.word], self._to_word(scaled, value)
+        why = self._unserved.get(f"command/{leaf}")
+        if why:
+            raise Refusal(Code.NOT_CONFIGURED, f"{leaf}: {why}")
+        if place is not None:
+            return (Written(place, _WORD_MASK, _as_word(leaf, value)),)
+        return self._from_value(self._values[leaf], value)
 
-    def _to_word(self, scaled: ScaledValue, value: Value) -> int:
-        scale = self._scales.get(scaled.leaf)
-        if scale is None:
-            full = scaled.scale.full
-            raise Refusal(Code.NOT_CONFIGURED, f"{scaled.name}: {full} is not known; see boot_status")
+    def _from_value(self, codec: ValueCodec, value: Value) -> tuple[Written, ...]:
+        model = codec.model
+        codec.scale = self._scales.get(model.leaf)
+        if codec.is_unknown:
+            raise Refusal(Code.NOT_CONFIGURED, f"{model.name}: {model.full} is not known; see boot_status")
+        is_bit = model.bit is not None and isinstance(value, bool)
         try:
-            return scale.to_word(_as_number(scaled.name, value))
+            return codec.to_words(int(value) if is_bit else _as_number(model.name, value))
         except ValueError as error:
-            raise Refusal(Code.OUT_OF_RANGE, f"{scaled.name} {error} {scaled.unit}".rstrip()) from None
+            raise Refusal(Code.OUT_OF_RANGE, f"{model.name} {error} {model.unit}".rstrip()) from None
 
 
 def _as_number(leaf: str, value: object) -> float:

@@ -22,7 +22,8 @@ INTEGERS: Final = {
     "uint64": (8, False),
 }
 """Bytes and sign of CiA 301's integers."""
-_REALS: Final = {"real32": "<f", "real64": "<d"}
+REALS: Final = {"real32": "<f", "real64": "<d"}
+"""Formats of CiA 301's floating point numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +48,11 @@ def encode(kind: str, value: bool | int | float | str) -> bytes:
     """``value`` as CiA 301 has it on the wire. Raises ValueError where it does not fit ``kind``."""
     if kind in INTEGERS:
         return _integer(kind, value)
-    if kind in _REALS:
+    if kind in REALS:
         if isinstance(value, bool | str):
             raise ValueError(f"a {kind} is a number")
         try:
-            return struct.pack(_REALS[kind], value)
+            return struct.pack(REALS[kind], value)
         except OverflowError:
             raise ValueError(f"{value} is too large for a {kind}") from None
     if not isinstance(value, str):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import re
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, cast
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
@@ -18,6 +18,7 @@ OnLoss = Literal["restart", "stop_node", "stop_all", "nothing"]
 MandatoryMissing = Literal["go_on", "hold_all", "stop_all"]
 Control = Literal["modbus", "opcua", "zenoh", "lease", "none"]
 Reaction = Literal["disable_voltage", "quick_stop", "stop", "silence", "hold"]
+ParameterRights = Literal["write", "read"]
 WordOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
 
 IGNORE_ALL_S: Final = -0.1
@@ -135,12 +136,21 @@ Mapped = Annotated[MappedObject, BeforeValidator(_mapped)]
 class PdoTable(Table):
     """How the bridge sets one PDO of the node; what is left out stays as the node has it."""
 
+    number: int | None = Field(None, ge=1, le=512, description="left out: the drive's first")
     enable: bool = True
     cob_id: int | None = Field(None, ge=0x181, le=0x6DF, description="385…1759 (181h…6DFh), with the node id")
     transmission_type: int | None = Field(None, ge=0, le=255, description="0…255, as the device allows")
     inhibit_ms: float | None = Field(None, ge=0, le=6553.5, description="0…6553.5 ms, in steps of 0.1")
     event_ms: int | None = Field(None, ge=0, le=65535, description="0…65535 ms")
     mapping: Annotated[list[Mapped], AfterValidator(_fits)] = Field(default_factory=list[MappedObject])
+
+
+def _listed(value: object) -> object:
+    """One table stands for a list of one."""
+    return [cast("object", value)] if isinstance(value, dict | PdoTable) else value
+
+
+PdoTables = Annotated[list[PdoTable], BeforeValidator(_listed)]
 
 
 class DriveTable(Table):
@@ -162,8 +172,8 @@ class DriveTable(Table):
     )
     tpdo_deadline_ms: int | None = Field(None, ge=0, le=600_000, description="0 (never late) or a time in ms")
     rtr_poll_ms: int = Field(100, ge=5, le=60_000, description="5…60000 ms")
-    rpdo: PdoTable | None = None
-    tpdo: PdoTable | None = None
+    rpdo: PdoTables = Field(default_factory=list[PdoTable])
+    tpdo: PdoTables = Field(default_factory=list[PdoTable])
 
 
 class IdentityTable(Table):
@@ -252,6 +262,7 @@ class ModbusTable(Table):
         default_factory=lambda: ["127.0.0.0/8", "::1/128"], description="networks that may connect"
     )
     max_connections: int = Field(32, ge=1, le=1024)
+    parameters: ParameterRights = Field("write", description="write or read")
 
 
 class UserTable(Table):
@@ -278,6 +289,7 @@ class ZenohTable(Table):
     encoding: Literal["json", "bare"] = "json"
     accept_put: bool = Field(False, description="true takes a plain put on a command key as a command")
     period_ms: int = Field(10, ge=1, le=10_000, description="1…10000 ms")
+    parameters: ParameterRights = Field("write", description="write or read")
     user: str | None = Field(None, description="the bridge's own user, one of password_file")
     password_file: str | None = Field(None, description="a file with user:password for each who may connect")
 

@@ -1,6 +1,9 @@
-"""Drive logic without vendor names: words, states, scaling."""
+"""Drive logic without vendor names: words, states, values, emergencies."""
 
-from bridge.drive.scaling import LinearScale, signed
+from bridge.drive.emergency import EmergencyReader, Told
+from bridge.drive.handshake import Handshake
+from bridge.drive.scaling import LinearScale, scale_of, signed
+from bridge.drive.values import ValueCodec, Written
 from bridge.drive.words import FAULTED, MOVING, STATES, ControlWords, DriveState, StatusWords
 
 __all__ = [
@@ -9,7 +12,13 @@ __all__ = [
     "STATES",
     "ControlWords",
     "DriveState",
+    "EmergencyReader",
+    "Handshake",
     "LinearScale",
     "StatusWords",
+    "Told",
+    "ValueCodec",
+    "Written",
+    "scale_of",
     "signed",
 ]

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+from bridge.image import DataType
+from bridge.image.point import INTEGER_RANGE
+from bridge.mapping.model import ProcessValue
 
 
 def signed(word: int) -> int:
@@ -12,26 +17,62 @@ def signed(word: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class LinearScale:
-    """value = word × full / at; ``limit`` is the largest magnitude as a multiple of ``full``."""
+    """value = word × full / at + offset; ``limit`` is the largest magnitude as a multiple of ``full``.
+
+    The word is a number of ``raw``, 16 or 32 bits. ``least`` and ``most`` are what the family allows
+    beside that, in the value's unit.
+    """
 
     full: float
-    at: int
-    limit: float
+    at: float = 1
+    limit: float = math.inf
+    offset: float = 0.0
+    raw: DataType = DataType.INT16
+    least: float = -math.inf
+    most: float = math.inf
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        one, other = (raw * self.full / self.at + self.offset for raw in INTEGER_RANGE[self.raw])
+        return min(one, other), max(one, other)
 
     @property
     def high(self) -> float:
-        """Largest value that the word and the limit allow, in the value's unit."""
-        return min(self.full * self.limit, self.full * 0x7FFF / self.at)
+        """Largest value that the word and the limits allow, in the value's unit."""
+        return min(abs(self.full) * self.limit, self._ends[1], self.most)
 
     @property
     def low(self) -> float:
-        return max(-self.full * self.limit, -self.full * 0x8000 / self.at)
+        return max(-abs(self.full) * self.limit, self._ends[0], self.least)
+
+    @property
+    def _mask(self) -> int:
+        return 0xFFFF_FFFF if self.raw in (DataType.INT32, DataType.UINT32) else 0xFFFF
 
     def from_word(self, word: int) -> float:
-        return signed(word) * self.full / self.at
+        return number_of(word, self.raw) * self.full / self.at + self.offset
 
     def to_word(self, value: float) -> int:
         """The nearest word. Raises ValueError where ``value`` is out of range."""
         if not self.low <= value <= self.high:
             raise ValueError(f"takes {self.low:g}…{self.high:g}, not {value:g}")
-        return round(value * self.at / self.full) & 0xFFFF
+        return round((value - self.offset) * self.at / self.full) & self._mask
+
+
+def number_of(word: int, raw: DataType) -> int:
+    """An unsigned word of 16 or 32 bits as the number of type ``raw`` that it stands for."""
+    low, high = INTEGER_RANGE[raw]
+    return word - (high - low + 1) if word > high else word
+
+
+def scale_of(value: ProcessValue, full: float | None = None) -> LinearScale | None:
+    """The scale of a value, ``full`` being what its parameter holds; None where it has none, or where
+    that is not known."""
+    scale = value.scale
+    if scale is None or (scale.full is not None and (full is None or full <= 0)):
+        return None
+    least = -math.inf if value.low is None else value.low
+    most = math.inf if value.high is None else value.high
+    if scale.full is None or full is None:
+        return LinearScale(scale.factor, 1, math.inf, scale.offset, value.raw_type, least, most)
+    return LinearScale(full, scale.at or 1, scale.limit, 0.0, value.raw_type, least, most)

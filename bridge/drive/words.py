@@ -48,6 +48,7 @@ class ControlWords:
         "_stop",
         "_valid_mask",
         "acknowledge_mask",
+        "begin",
         "forward",
         "ready",
         "reverse",
@@ -65,6 +66,7 @@ class ControlWords:
         self.run = model.run
         self.forward = model.forward
         self.reverse = model.reverse
+        self.begin = model.begin
         self._stop = self._bits(model.stop)
         self._quick_stop = self._bits(model.quick_stop)
         self._disable_voltage = self._bits(model.disable_voltage)

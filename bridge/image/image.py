@@ -100,6 +100,14 @@ class Image:
         for feed in self._feeds:
             feed.mark(index)
 
+    def renew(self, index: int, value: Value, now: float) -> None:
+        """Store a good value with its source time, also where it is what is there already: it was asked
+        for anew, and its age is what its reader wants to know."""
+        self._times[index] = now
+        self.set(index, value, now)
+        for feed in self._feeds:
+            feed.mark(index)
+
     def set_values(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:
         """Store values of points whose quality stays as it is; ``indices`` and ``values`` go together."""
         held, times = self._values, self._times

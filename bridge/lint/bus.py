@@ -16,6 +16,7 @@ from bridge.config.download import Download
 from bridge.eds import Description
 from bridge.eds.pdos import PdoSummary, pdos
 from bridge.mapping.model import Family, Pdo
+from bridge.southbound.boot import factory_entries
 from bridge.southbound.canopen.sync import LAST_SYNCHRONOUS, REMOTE_TYPES
 from bridge.tomlfile import Key
 
@@ -45,6 +46,10 @@ class PdoView:
     event_ms: int
     sent: bool
     rtr_poll_ms: int = 0
+    number: int = 0
+    words: int = 0
+    """How many words of its drive the mapping file has in it."""
+    is_optional: bool = False
 
     @property
     def is_synchronous(self) -> bool:
@@ -80,8 +85,9 @@ class DriveView:
     table: DriveTable
     key: Key
     name: str
-    rpdo: PdoView
-    tpdo: PdoView
+    rpdos: tuple[PdoView, ...]
+    tpdos: tuple[PdoView, ...]
+    """Those with control and status word first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +101,8 @@ class NodeView:
     """All that the node has, those of drives the site file does not name included."""
     own_timeout_ms: float = 0.0
     """After how long without process data the node acts by itself, where we set that; 0 where not."""
+    own_reaction: int | None = None
+    """What it does then, where we set that and the family has a choice."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,35 +147,48 @@ def _node(
     for slot in family.slot:
         d, drive = by_slot.get(slot.name, (None, None))
         drive_key: Key = key if d is None else (*key, "drive", d)
-        views: list[PdoView] = []
-        for receives, pdo in ((True, slot.rpdo), (False, slot.tpdo)):
-            used.add((receives, pdo.number))
-            view = _slot_pdo(pdo, receives, known.get((receives, pdo.number)), table.id, drive_key)
-            view = _downloaded(view, pdo.number, settings)
-            views.append(_from_site(view, drive) if drive else view)
-        found += views
+        views: dict[bool, list[PdoView]] = {True: [], False: []}
+        for receives, pdos_of in ((True, slot.rpdo), (False, slot.tpdo)):
+            process = family.process.rpdo if receives else family.process.tpdo
+            for pdo in sorted(pdos_of, key=lambda pdo: process[0] not in (pdo.words or process)):
+                used.add((receives, pdo.number))
+                view = _slot_pdo(pdo, receives, known.get((receives, pdo.number)), table.id, drive_key)
+                view = _downloaded(view, pdo.number, settings)
+                is_first = pdo is pdos_of[0]
+                views[receives].append(_from_site(view, drive, is_first=is_first) if drive else view)
+        found += [*views[True], *views[False]]
         if drive:
             name = f"{table.name}/{drive.name or drive.slot}"
-            drives.append(DriveView(drive, drive_key, name, views[0], views[1]))
+            drives.append(DriveView(drive, drive_key, name, tuple(views[True]), tuple(views[False])))
     found += [_other_pdo(one, key) for place, one in known.items() if place not in used]
     own = family.own_timeout
     own_ms = own.unit_ms * settings.get((own.object.index, own.object.sub), 0) if own else 0.0
-    return NodeView(table, family, dictionary, key, tuple(drives), tuple(found), own_ms)
+    reaction = own.reaction.object if own and own.reaction else None
+    does = settings.get((reaction.index, reaction.sub)) if reaction else None
+    return NodeView(table, family, dictionary, key, tuple(drives), tuple(found), own_ms, does)
 
 
 def _slot_pdo(pdo: Pdo, receives: bool, summary: PdoSummary | None, node_id: int, key: Key) -> PdoView:
-    """A drive's PDO as the factory has it."""
+    """A drive's PDO as the factory has it, or as the mapping file writes it."""
     kind = summary.transmission_type if summary else None
+    inhibit_ms = summary.inhibit_100us / 10 if summary else 0.0
+    event_ms = summary.event_timer_ms if summary else 0
+    bits = sum(entry.bits for entry in factory_entries(pdo))
+    if summary and summary.bits and not pdo.write:
+        bits = summary.bits
     return PdoView(
         name=f"{'RPDO' if receives else 'TPDO'}{pdo.number}",
         key=key,
         receives=receives,
-        enabled=True,
+        number=pdo.number,
+        words=len(pdo.objects),
+        is_optional=pdo.optional,
+        enabled=pdo.write or not pdo.optional,
         cob_id=pdo.cob_id + node_id,
-        length=(summary.bits + 7) // 8 if summary and summary.bits else 2 * len(pdo.objects),
-        transmission_type=_FACTORY_TYPE if kind is None else kind,
-        inhibit_ms=summary.inhibit_100us / 10 if summary else 0.0,
-        event_ms=summary.event_timer_ms if summary else 0,
+        length=(bits + 7) // 8,
+        transmission_type=_either(pdo.transmission_type, _FACTORY_TYPE if kind is None else kind),
+        inhibit_ms=inhibit_ms if pdo.inhibit_ms is None else pdo.inhibit_ms,
+        event_ms=_either(pdo.event_ms, event_ms),
         sent=False,
     )
 
@@ -175,23 +196,29 @@ def _slot_pdo(pdo: Pdo, receives: bool, summary: PdoSummary | None, node_id: int
 def _downloaded(view: PdoView, number: int, settings: Settings) -> PdoView:
     """``view`` with what is downloaded to its communication object."""
     index = (_RPDO_PARAMETER if view.receives else _TPDO_PARAMETER) + number - 1
+    cob_id = settings.get((index, 1))
     return replace(
         view,
+        enabled=view.enabled if cob_id is None else not cob_id >> 31,
         transmission_type=settings.get((index, 2), view.transmission_type),
         inhibit_ms=settings.get((index, 3), round(10 * view.inhibit_ms)) / 10,
         event_ms=settings.get((index, 5), view.event_ms),
     )
 
 
-def _from_site(view: PdoView, drive: DriveTable) -> PdoView:
-    """``view`` with what the site file's table for this PDO sets."""
-    own = drive.rpdo if view.receives else drive.tpdo
+def _from_site(view: PdoView, drive: DriveTable, *, is_first: bool) -> PdoView:
+    """``view`` with what the site file's table for this PDO sets; one without a number is for the first."""
+    tables = drive.rpdo if view.receives else drive.tpdo
     poll_ms = 0 if view.receives else drive.rtr_poll_ms
-    if own is None:
-        return replace(view, sent=True, rtr_poll_ms=poll_ms)
+    for place, own in enumerate(tables):
+        if own.number == view.number or (is_first and own.number is None):
+            break
+    else:
+        return replace(view, sent=view.enabled, rtr_poll_ms=poll_ms)
+    name = "rpdo" if view.receives else "tpdo"
     return replace(
         view,
-        key=(*view.key, "rpdo" if view.receives else "tpdo"),
+        key=(*view.key, name, place) if len(tables) > 1 else (*view.key, name),
         enabled=own.enable,
         cob_id=own.cob_id or view.cob_id,
         length=_bytes(own) or view.length,

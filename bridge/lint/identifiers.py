@@ -81,6 +81,6 @@ def _node_uses(node: NodeView) -> Iterator[_Use]:
         yield _Use(server.request + node_id, f"SDO{server.number} request", name, key, active=is_open)
         yield _Use(server.reply + node_id, f"SDO{server.number} reply", name, key, active=is_open)
     for pdo in node.pdos:
-        moved = pdo.key[-1] in ("rpdo", "tpdo")
+        moved = "rpdo" in pdo.key or "tpdo" in pdo.key
         pdo_key = (*pdo.key, "cob_id") if moved else key
         yield _Use(pdo.cob_id, pdo.name, name, pdo_key, active=pdo.enabled)

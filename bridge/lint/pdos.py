@@ -18,8 +18,10 @@ def check_pdos(bus: BusView, report: LintReport) -> None:
 
 def _check_drive(bus: BusView, node: NodeView, drive: DriveView, report: LintReport) -> None:
     family = node.family
-    for pdo, words in ((drive.rpdo, family.process.rpdo), (drive.tpdo, family.process.tpdo)):
-        length = 2 * len(words)
+    for pdo in (*drive.rpdos, *drive.tpdos):
+        length = 2 * pdo.words
+        if pdo.is_optional and not pdo.enabled:
+            continue
         if not pdo.enabled:
             report.error(
                 (*pdo.key, "enable"), f"{pdo.name} is off: {drive.name} has no process data without it"
@@ -30,7 +32,7 @@ def _check_drive(bus: BusView, node: NodeView, drive: DriveView, report: LintRep
             report.error(
                 (*pdo.key, "mapping"),
                 f"{pdo.name} has {pdo.length} bytes; {family.family.name} evaluates only {length}",
-                f"{len(words)} words of 16 bits",
+                f"{pdo.words} words of 16 bits",
             )
         if pdo.transmission_type in (*range(1, 241), 252) and not bus.sync_s:
             report.error(

@@ -6,8 +6,10 @@ from collections.abc import Iterable
 from typing import Final
 
 from bridge.image import DataType
-from bridge.mapping.model import ControlWord, Family, Pdo, pattern_bits
-from bridge.tomlfile import Key, TomlFile
+from bridge.mapping.checks_values import check_values
+from bridge.mapping.merge import Noted
+from bridge.mapping.model import ControlWord, Family, ObjectRef, Pdo, pattern_bits
+from bridge.tomlfile import Key
 
 _NODE_POINTS: Final = (
     "nmt_state",
@@ -17,12 +19,15 @@ _NODE_POINTS: Final = (
     "current_fault",
     "last_fault",
     "rejected_frames",
+    "emcy_history",
+    "emcy_suppressed",
 )
 """What every node has beside what is polled."""
 _STANDARD_ID_MOST: Final = 0x7FF
+_PDO_BITS: Final = 64
 
 
-def check(family: Family, file: TomlFile) -> None:
+def check(family: Family, file: Noted) -> None:
     """Note in ``file`` what does not go together."""
     facts = family.family
     if facts.node_id_low > facts.node_id_high:
@@ -30,14 +35,17 @@ def check(family: Family, file: TomlFile) -> None:
     _check_process(family, file)
     _check_slots(family, file)
     _check_sdo(family, file)
-    _check_values(family, file)
+    check_values(family, file)
     _check_parameters(family, file)
+    _check_eeprom(family, file)
     _check_polls(family, file)
     _check_control_word(family.control_word, file)
+    _check_handshake(family, file)
     _check_states(family, file)
+    _check_faults(family, file)
 
 
-def _twice(names: Iterable[tuple[str, Key]], what: str, file: TomlFile) -> None:
+def twice(names: Iterable[tuple[str, Key]], what: str, file: Noted) -> None:
     seen: dict[str, Key] = {}
     for name, key in names:
         if name in seen:
@@ -46,28 +54,109 @@ def _twice(names: Iterable[tuple[str, Key]], what: str, file: TomlFile) -> None:
             seen[name] = key
 
 
-def _check_process(family: Family, file: TomlFile) -> None:
+def _check_process(family: Family, file: Noted) -> None:
     for name, words, first in (
         ("rpdo", family.process.rpdo, "control_word"),
         ("tpdo", family.process.tpdo, "status_word"),
     ):
         if words[0] != first:
             file.fault(("process", name), f"must begin with {first}")
-        _twice(((word, ("process", name, place)) for place, word in enumerate(words)), "word", file)
+        twice(((word, ("process", name, place)) for place, word in enumerate(words)), "word", file)
 
 
-def _check_slots(family: Family, file: TomlFile) -> None:
-    _twice(((slot.name, ("slot", s, "name")) for s, slot in enumerate(family.slot)), "slot", file)
+def _check_slots(family: Family, file: Noted) -> None:
+    twice(((slot.name, ("slot", s, "name")) for s, slot in enumerate(family.slot)), "slot", file)
     for s, slot in enumerate(family.slot):
-        _check_pdo(family, slot.rpdo, family.process.rpdo, ("slot", s, "rpdo"), file)
-        _check_pdo(family, slot.tpdo, family.process.tpdo, ("slot", s, "tpdo"), file)
+        for name, pdos, words in (
+            ("rpdo", slot.rpdo, family.process.rpdo),
+            ("tpdo", slot.tpdo, family.process.tpdo),
+        ):
+            _check_direction(family, pdos, words, ("slot", s, name), file)
         if slot.emcy_drive is not None and family.emcy.drive_byte is None:
             file.fault(("slot", s, "emcy_drive"), "has no meaning without emcy.drive_byte")
 
 
-def _check_sdo(family: Family, file: TomlFile) -> None:
+def _check_direction(family: Family, pdos: list[Pdo], process: list[str], key: Key, file: Noted) -> None:
+    """All PDOs of one direction of a slot."""
+    keys = [file.item(key, p) for p in range(len(pdos))]
+    named = list(zip(pdos, keys, strict=True))
+    twice(((f"{pdo.number}", (*at, "number")) for pdo, at in named), f"{str(key[-1]).upper()} number", file)
+    carried: list[tuple[str, Key]] = []
+    for pdo, at in named:
+        words = pdo.words or process
+        carried += [(word, (*at, "words", w) if pdo.words else at) for w, word in enumerate(words)]
+        _check_pdo(family, pdo, process, at, file)
+    twice(carried, "word", file)
+    first = process[0]
+    if not any(first in (pdo.words or process) and not pdo.optional for pdo in pdos):
+        file.fault(key, f"none of them carries the {first}", "one that is not optional must")
+
+
+def _check_pdo(family: Family, pdo: Pdo, process: list[str], key: Key, file: Noted) -> None:
+    for w, word in enumerate(pdo.words):
+        if word not in process:
+            hint = f"known: {', '.join(process)}"
+            file.fault((*key, "words", w), f"process.{_direction(key)} has no word {word!r}", hint)
+    words = pdo.words or process
+    if len(pdo.objects) != len(words):
+        named = f"words names {len(words)}" if pdo.words else f"process.{_direction(key)} names {len(words)}"
+        file.fault((*key, "objects"), f"has {len(pdo.objects)} words and {named}")
+    _check_neighbours(pdo, words, process, key, file)
+    for w, refs in enumerate(pdo.objects):
+        for r, mapped in enumerate(refs):
+            if not mapped.is_composite and mapped.bits[0] > 16 * _run(pdo, w, r):
+                message = f"{mapped} is longer than the words it is named for"
+                file.fault((*key, "objects", w, r), message, "name it for each word that it fills")
+    bits = 16 * len(pdo.objects)
+    if bits > _PDO_BITS:
+        file.fault((*key, "objects"), f"has {bits} bits, a PDO has {_PDO_BITS}")
+    _check_cob_id(pdo.cob_id, family, (*key, "cob_id"), file)
+    if pdo.static and pdo.write:
+        file.fault((*key, "write"), "cannot be: a static mapping has no objects to write")
+    for name in ("transmission_type", "inhibit_ms", "event_ms"):
+        if getattr(pdo, name) is not None and not pdo.write:
+            file.fault((*key, name), "has no effect without write = true")
+
+
+def _check_neighbours(pdo: Pdo, words: list[str], process: list[str], key: Key, file: Noted) -> None:
+    """An object that fills several words fills them from one on, low words first."""
+    places = [process.index(word) if word in process else None for word in words]
+    for w in range(1, min(len(places), len(pdo.objects))):
+        before, here = places[w - 1], places[w]
+        shared = {ref.parts for ref in pdo.objects[w - 1]} & {ref.parts for ref in pdo.objects[w]}
+        if shared and before is not None and here is not None and here != before + 1:
+            message = f"{words[w - 1]} and {words[w]} share an object and are no neighbours"
+            file.fault((*key, "objects", w), message, f"put them side by side in process.{_direction(key)}")
+
+
+def _direction(key: Key) -> str:
+    return next(str(part) for part in reversed(key) if isinstance(part, str))
+
+
+def _run(pdo: Pdo, word: int, layout: int) -> int:
+    """How many words in a row this object is named for."""
+
+    def ref(place: int) -> tuple[ObjectRef, ...]:
+        refs = pdo.objects[place]
+        return refs[min(layout, len(refs) - 1)].parts
+
+    run = 1
+    while word + run < len(pdo.objects) and ref(word + run) == ref(word):
+        run += 1
+    while word and ref(word - 1) == ref(word):
+        run, word = run + 1, word - 1
+    return run
+
+
+def _check_cob_id(cob_id: int, family: Family, key: Key, file: Noted) -> None:
+    most = _STANDARD_ID_MOST - family.family.node_id_high
+    if cob_id > most:
+        file.fault(key, f"{cob_id:X}h leaves no room for the node id", f"at most {most:X}h")
+
+
+def _check_sdo(family: Family, file: Noted) -> None:
     slots = [slot.name for slot in family.slot]
-    _twice(((f"{sdo.number}", ("sdo", s, "number")) for s, sdo in enumerate(family.sdo)), "SDO server", file)
+    twice(((f"{sdo.number}", ("sdo", s, "number")) for s, sdo in enumerate(family.sdo)), "SDO server", file)
     for s, sdo in enumerate(family.sdo):
         if sdo.slot is not None and sdo.slot not in slots:
             hint = f"known: {', '.join(slots)}"
@@ -76,60 +165,58 @@ def _check_sdo(family: Family, file: TomlFile) -> None:
             _check_cob_id(cob_id, family, ("sdo", s, name), file)
 
 
-def _check_pdo(family: Family, pdo: Pdo, words: list[str], key: Key, file: TomlFile) -> None:
-    if len(pdo.objects) != len(words):
-        message = f"has {len(pdo.objects)} words and process.{key[-1]} names {len(words)}"
-        file.fault((*key, "objects"), message)
-    _check_cob_id(pdo.cob_id, family, (*key, "cob_id"), file)
-
-
-def _check_cob_id(cob_id: int, family: Family, key: Key, file: TomlFile) -> None:
-    most = _STANDARD_ID_MOST - family.family.node_id_high
-    if cob_id > most:
-        file.fault(key, f"{cob_id:X}h leaves no room for the node id", f"at most {most:X}h")
-
-
-def _check_values(family: Family, file: TomlFile) -> None:
-    parameters = sorted(parameter.name for parameter in family.parameter)
-    process = family.process
-    names: list[tuple[str, Key]] = [
-        *((f"command/{word}", ("process", "rpdo")) for word in process.rpdo),
-        *((f"actual/{word}", ("process", "tpdo")) for word in process.tpdo[1:]),
-    ]
-    for v, value in enumerate(family.value):
-        words = (process.rpdo if value.group == "command" else process.tpdo)[1:]
-        if value.word not in words:
-            message = f"there is no value word {value.word!r}"
-            file.fault(("value", v, "word"), message, f"known: {', '.join(words)}")
-        if value.scale.full not in parameters:
-            message = f"there is no parameter {value.scale.full!r}"
-            file.fault(("value", v, "scale", "full"), message, f"known: {', '.join(parameters)}")
-        names.append((value.leaf, ("value", v, "name")))
-    if len(set(process.rpdo)) == len(process.rpdo) and len(set(process.tpdo)) == len(process.tpdo):
-        _twice(names, "point", file)
-
-
-def _check_parameters(family: Family, file: TomlFile) -> None:
+def _check_parameters(family: Family, file: Noted) -> None:
     names = [(parameter.name, ("parameter", p, "name")) for p, parameter in enumerate(family.parameter)]
-    _twice(names, "parameter", file)
-    for p, parameter in enumerate(family.parameter):
-        _check_integer(parameter.data_type, ("parameter", p, "data_type"), file)
+    twice(names, "parameter", file)
+    points = [(one.leaf, ("parameter", p, "name")) for p, one in enumerate(family.parameter) if one.point]
+    if len({one.name for one in family.parameter}) == len(family.parameter):
+        twice(points, "point of a parameter,", file)
+    for p, one in enumerate(family.parameter):
+        key: Key = ("parameter", p)
+        if one.object is None and family.parameter_names is None:
+            file.fault(key, f"{one.name} has no object", "give it one, or [parameter_names]")
+        else:
+            try:
+                family.object_of(one)
+            except ValueError as error:
+                file.fault((*key, "name"), str(error))
+        if one.low is not None and one.high is not None and one.low > one.high:
+            file.fault((*key, "low"), f"is above high, {one.high:g}")
+        if one.every_ms and not one.point:
+            file.fault((*key, "every_ms"), "has no effect without point = true")
+        if one.factor == 0:
+            file.fault((*key, "factor"), "must not be 0")
+        if one.data_type in ("string", "bytes") and (one.factor != 1 or one.states):
+            file.fault((*key, "data_type"), "a text has neither factor nor states")
 
 
-def _check_polls(family: Family, file: TomlFile) -> None:
-    _twice(((poll.name, ("poll", p, "name")) for p, poll in enumerate(family.poll)), "poll", file)
+def _check_eeprom(family: Family, file: Noted) -> None:
+    ram_only = family.eeprom.ram_only if family.eeprom else None
+    if ram_only is not None:
+        check_parameter(ram_only.parameter, family, ("eeprom", "ram_only", "parameter"), file)
+
+
+def check_parameter(name: str, family: Family, key: Key, file: Noted) -> None:
+    """``name`` must be a parameter that is listed."""
+    known = sorted(parameter.name for parameter in family.parameter)
+    if name not in known:
+        file.fault(key, f"there is no parameter {name!r}", f"known: {', '.join(known)}")
+
+
+def _check_polls(family: Family, file: Noted) -> None:
+    twice(((poll.name, ("poll", p, "name")) for p, poll in enumerate(family.poll)), "poll", file)
     for p, poll in enumerate(family.poll):
         if poll.name in _NODE_POINTS:
             file.fault(("poll", p, "name"), f"every node has {poll.name!r} of its own", "choose another name")
         _check_integer(poll.data_type, ("poll", p, "data_type"), file)
 
 
-def _check_integer(data_type: DataType, key: Key, file: TomlFile) -> None:
+def _check_integer(data_type: DataType, key: Key, file: Noted) -> None:
     if not data_type.is_integer:
         file.fault(key, "must be an integer type", "uint8, uint16, uint32, int16 or int32")
 
 
-def _check_control_word(control: ControlWord, file: TomlFile) -> None:
+def _check_control_word(control: ControlWord, file: Noted) -> None:
     enabling = control.enabling
     acknowledge = 1 << control.acknowledge_bit
     commands = {"stop": control.stop, "quick_stop": control.quick_stop}
@@ -150,12 +237,26 @@ def _check_control_word(control: ControlWord, file: TomlFile) -> None:
     for name, command in commands.items():
         if (control.run & ~command.mask | command.value) & enabling.mask == enabling.value:
             file.fault(("control_word", name), "leaves the drive enabled")
-    for name, bits in (("forward", control.forward), ("reverse", control.reverse)):
+    for name, bits in (("forward", control.forward), ("reverse", control.reverse), ("begin", control.begin)):
         if bits & (enabling.mask | acknowledge):
             file.fault(("control_word", name), "has bits of enabling or of the acknowledge")
 
 
-def _check_states(family: Family, file: TomlFile) -> None:
+def _check_handshake(family: Family, file: Noted) -> None:
+    handshake = family.control_word.handshake
+    if handshake is None:
+        return
+    commands = sorted(value.name for value in family.value if value.group == "command")
+    key: Key = ("control_word", "handshake")
+    if handshake.value not in commands:
+        message = f"there is no command value {handshake.value!r}"
+        file.fault((*key, "value"), message, f"known: {', '.join(commands)}")
+    control = family.control_word
+    if 1 << handshake.bit & (control.enabling.mask | 1 << control.acknowledge_bit):
+        file.fault((*key, "bit"), "is a bit of enabling or of the acknowledge")
+
+
+def _check_states(family: Family, file: Noted) -> None:
     """The word that is served while tripped must decode as *fault*."""
     states = family.status_word.state
     faults = [s for s, state in enumerate(states) if state.name == "fault"]
@@ -171,3 +272,14 @@ def _check_states(family: Family, file: TomlFile) -> None:
                 f"{state.name} takes words that are a fault too",
                 "the first state that matches counts",
             )
+
+
+def _check_faults(family: Family, file: Noted) -> None:
+    emcy = family.emcy
+    if emcy.events and emcy.event is None and emcy.number is None:
+        file.fault(("emcy", "events"), "has no meaning without emcy.event or emcy.number")
+    if emcy.number is not None and emcy.number.byte + emcy.number.size > 8:
+        file.fault(("emcy", "number"), "ends behind the message, which has bytes 0…7")
+    for name, given in (("current", family.faults.current), ("last", family.faults.last)):
+        if given is not None:
+            check_parameter(given.parameter, family, ("faults", name, "parameter"), file)

@@ -1,42 +1,88 @@
-"""Finding and reading drive-family files."""
+"""Finding and reading drive-family files.
+
+Mappings are looked up in the folder ``mappings/`` beside the site file first, then in the program's own.
+"""
 
 from __future__ import annotations
 
+import tomllib
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Final, cast
 
 from bridge.errors import Fault, FileFaults
 from bridge.mapping.checks import check
+from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family
 from bridge.tomlfile import TomlFile
 
+_SITE_FOLDER: Final = "mappings"
+
 
 def mappings_dir() -> Path:
-    """The folder of the families: inside the installed package, or at the top of a checkout."""
+    """The folder of the families that come with the program: inside the installed package, or at the
+    top of a checkout."""
     package = Path(__file__).resolve().parents[1]
     installed = package / "families"
     return installed if installed.is_dir() else package.parent / "mappings"
 
 
-def family_names() -> list[str]:
-    """Every family that is there, as the site file names them."""
-    top = mappings_dir()
-    return sorted(str(file.relative_to(top).with_suffix("")) for file in top.rglob("*.toml"))
+def mapping_folders(site: Path | None = None) -> tuple[Path, ...]:
+    """Where the mappings of a site are looked up, in this order."""
+    own = mappings_dir()
+    beside = None if site is None else site.resolve().parent / _SITE_FOLDER
+    return (own,) if beside is None or beside == own or not beside.is_dir() else (beside, own)
 
 
-def load_family(name: str) -> Family:
+def _files(folders: Sequence[Path]) -> dict[str, list[Path]]:
+    """Every mapping by its name, in the order in which the folders have it."""
+    found: dict[str, list[Path]] = {}
+    for folder in folders:
+        for path in sorted(folder.rglob("*.toml")):
+            found.setdefault(path.relative_to(folder).with_suffix("").as_posix(), []).append(path)
+    return found
+
+
+def is_template(path: Path) -> bool:
+    """Whether a mapping file says that it can only be extended. What cannot be read is none."""
+    try:
+        family: object = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("family")
+    except (OSError, ValueError):
+        return False
+    return isinstance(family, dict) and cast("dict[str, object]", family).get("template") is True
+
+
+def family_names(folders: Sequence[Path] = ()) -> list[str]:
+    """Every family that a site can use, as the site file names it."""
+    files = _files(folders or mapping_folders())
+    return sorted(name for name, paths in files.items() if not is_template(paths[0]))
+
+
+def load_family(name: str, folders: Sequence[Path] = ()) -> Family:
     """The family called ``name`` (``nord/sk-tu4-cao``). Raises ``FileFaults`` with every fault in it."""
-    path = mappings_dir() / f"{name}.toml"
-    known = family_names()
-    if name not in known:
-        raise FileFaults(
-            [Fault(str(path), 0, "", f"there is no mapping {name!r}", f"there are: {', '.join(known)}")]
-        )
-    return read_family(path)
+    folders = folders or mapping_folders()
+    paths = _files(folders).get(name)
+    if not paths or is_template(paths[0]):
+        path = paths[0] if paths else folders[0] / f"{name}.toml"
+        hint = f"there are: {', '.join(family_names(folders))}"
+        raise FileFaults([Fault(str(path), 0, "", missing(name, template=bool(paths)), hint)])
+    return read_family(paths[0], folders)
 
 
-def read_family(path: Path) -> Family:
-    """Read and check one mapping file. Raises ``FileFaults`` with every fault in it."""
-    file = TomlFile(path)
+def missing(name: str, *, template: bool) -> str:
+    """Why no site can use a mapping of this name."""
+    return f"{name!r} is a template: it can only be extended" if template else f"there is no mapping {name!r}"
+
+
+def template_names(folders: Sequence[Path] = ()) -> list[str]:
+    """The mappings that can only be extended."""
+    files = _files(folders or mapping_folders())
+    return sorted(name for name, paths in files.items() if is_template(paths[0]))
+
+
+def read_family(path: Path, folders: Sequence[Path] = ()) -> Family:
+    """Read and check one mapping file and those it extends. Raises ``FileFaults`` with every fault."""
+    file = MergedFile(_chain(path, folders or mapping_folders()))
     family = file.validate(Family)
     if family is not None:
         check(family, file)
@@ -44,3 +90,27 @@ def read_family(path: Path) -> Family:
     if family is None:
         raise AssertionError("a mapping file without a model always has faults")
     return family
+
+
+def _chain(path: Path, folders: Sequence[Path]) -> list[TomlFile]:
+    """The file and those it extends, the last of those first."""
+    chain = [TomlFile(path)]
+    files = _files(folders)
+    while isinstance(name := chain[0].data.get("extends"), str):
+        file = chain[0]
+        # A file may extend the one of its own name in the next folder.
+        candidates = files.get(name, [])
+        here = file.path.resolve()
+        own = next((n for n, each in enumerate(candidates) if each.resolve() == here), None)
+        following = candidates if own is None else candidates[own + 1 :]
+        if not following:
+            what = "extends itself" if own is not None else missing(name, template=False)
+            others = ", ".join(other for other in sorted(files) if other != name)
+            file.fault(("extends",), what, f"there are: {others}")
+            file.finish()
+        base = following[0]
+        if any(base.resolve() == each.path.resolve() for each in chain):
+            file.fault(("extends",), f"{name!r} extends this file in its turn")
+            file.finish()
+        chain.insert(0, TomlFile(base))
+    return chain

@@ -6,92 +6,77 @@ of a vendor's drive is in such a file.
 
 from __future__ import annotations
 
-import re
-from typing import Annotated, Final, Literal
+from typing import Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import Field
 
-from bridge.config.model import Name
-from bridge.image import DataType
+from bridge.mapping.faults import EmcyEvent, EmcyNumber, EmcyTable, FaultNumbers, FaultParameter
+from bridge.mapping.fields import (
+    Bit,
+    Bits,
+    DeviceName,
+    Kind,
+    MappedObject,
+    Name,
+    ObjectRef,
+    Pattern,
+    Ref,
+    Table,
+    Word,
+    pattern_bits,
+)
+from bridge.mapping.parameters import Eeprom, Parameter, ParameterNames, RamOnly, object_of
+from bridge.mapping.process import (
+    NodeTpdo,
+    Pdo,
+    Process,
+    ProcessValue,
+    Scale,
+    SdoServer,
+    Slot,
+    StartWrite,
+)
 
-_OBJECT: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})")
-_PATTERN: Final = re.compile(r"[01X]{1,16}")
-_CODE: Final = re.compile(r"[0-9A-F]{4}|[0-9A-F]{2}xx")
-_NUMBER: Final = re.compile(r"\d+\.\d")
-
-
-class Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
-
-
-class ObjectRef(Table):
-    """An entry of the object dictionary."""
-
-    index: int
-    sub: int
-
-    def __str__(self) -> str:
-        return f"{self.index:04X}:{self.sub:02X}"
-
-
-def _object(text: object) -> object:
-    if isinstance(text, ObjectRef):
-        return text
-    match = _OBJECT.fullmatch(text) if isinstance(text, str) else None
-    if not match:
-        raise ValueError('must be an object as "3002:01", index and sub-index in hexadecimal')
-    return ObjectRef(index=int(match[1], 16), sub=int(match[2], 16))
-
-
-def _pattern(text: str) -> str:
-    text = text.replace(" ", "")
-    if not _PATTERN.fullmatch(text):
-        raise ValueError("must be written with 0, 1 and X (do not care), highest bit first")
-    return text
-
-
-def _code(text: str) -> str:
-    if not _CODE.fullmatch(text):
-        raise ValueError("must be four hexadecimal digits in capitals, or two and xx for the group")
-    return text
-
-
-def _number(text: str) -> str:
-    if not _NUMBER.fullmatch(text):
-        raise ValueError('must be a fault number with one decimal, such as "10.3"')
-    return text
-
-
-def _device_name(text: str) -> str:
-    try:
-        re.compile(text)
-    except re.error as error:
-        raise ValueError(f"must be a regular expression: {error}") from None
-    return text
-
-
-DeviceName = Annotated[str, AfterValidator(_device_name)]
-Ref = Annotated[ObjectRef, BeforeValidator(_object)]
-Pattern = Annotated[str, AfterValidator(_pattern)]
-Word = Annotated[int, Field(ge=0, le=0xFFFF)]
-Bit = Annotated[int, Field(ge=0, le=15)]
-Bits = Annotated[list[str], Field(max_length=16, description="names of the bits from bit 0 on")]
-Kind = Annotated[DataType, Field(strict=False)]
-EmcyCode = Annotated[str, AfterValidator(_code)]
-FaultNumber = Annotated[str, AfterValidator(_number)]
-
-
-def pattern_bits(pattern: str) -> tuple[int, int]:
-    """``"0XX1000"`` as (mask, value): the word matches where ``word & mask == value``."""
-    mask = int("".join("0" if c == "X" else "1" for c in pattern), 2)
-    value = int(pattern.replace("X", "0"), 2)
-    return mask, value
+__all__ = [
+    "Command",
+    "ControlWord",
+    "Eeprom",
+    "EmcyEvent",
+    "EmcyNumber",
+    "EmcyTable",
+    "Family",
+    "FamilyTable",
+    "FaultNumbers",
+    "FaultParameter",
+    "Handshake",
+    "IdentityRule",
+    "MappedObject",
+    "NodeTpdo",
+    "ObjectRef",
+    "OwnReaction",
+    "OwnTimeout",
+    "Parameter",
+    "ParameterNames",
+    "Pdo",
+    "Poll",
+    "Process",
+    "ProcessValue",
+    "RamOnly",
+    "Scale",
+    "SdoServer",
+    "Slot",
+    "StartWrite",
+    "State",
+    "StatusWord",
+    "pattern_bits",
+]
 
 
 class FamilyTable(Table):
     name: str
     vendor: str
     source: str = Field(description="the manual that the facts of this file are taken from")
+    template: bool = Field(False, description="true: it can only be extended, no site can use it")
     node_id_low: int = Field(1, ge=1, le=127)
     node_id_high: int = Field(127, ge=1, le=127)
 
@@ -111,85 +96,19 @@ class IdentityRule(Table):
     )
 
 
-class Pdo(Table):
-    """One PDO of a slot. ``objects`` gives for each word the objects that may stand for it, the
-    factory's first; the order is that of ``process.rpdo`` or ``process.tpdo``."""
-
-    number: int = Field(ge=1, le=512)
-    cob_id: int = Field(ge=0, le=0x7FF, description="without the node id, such as 0x200")
-    objects: list[Annotated[list[Ref], Field(min_length=1)]]
-    signed: list[Ref] = Field(
-        default_factory=list[ObjectRef], description="objects shorter than a word that hold signed numbers"
-    )
-
-
-class NodeTpdo(Table):
-    """A TPDO that belongs to no drive: where the node has it switched on, it saves polling."""
-
-    number: int = Field(ge=1, le=512)
-
-
-class Slot(Table):
-    """One drive of the node."""
-
-    name: Name
-    rpdo: Pdo
-    tpdo: Pdo
-    emcy_drive: int | None = Field(None, description="the value of the EMCY drive byte for this drive")
-    parameters_by_sdo: bool = Field(
-        False, description="true where this drive's parameters are reached by the default SDO channel"
-    )
-
-
-class SdoServer(Table):
-    """A further SDO server of the node, beside the first, which every node has at 600h and 580h."""
-
-    number: int = Field(ge=2, le=128, description="2 is object 1201h")
-    request: int = Field(ge=0, le=0x7FF, description="COB-ID to the node without the node id, such as 0x640")
-    reply: int = Field(ge=0, le=0x7FF, description="COB-ID from the node without the node id")
-    slot: Name | None = Field(None, description="the drive it reaches; left out: the same as the first")
-    after_stop: bool = Field(
-        False, description="true where a change counts only after Stopped and Pre-Operational"
-    )
-
-
-class Process(Table):
-    """Names of the words in the order they stand in the PDOs."""
-
-    rpdo: list[Name] = Field(min_length=1, description="control_word, then the setpoint words")
-    tpdo: list[Name] = Field(min_length=1, description="status_word, then the words of actual values")
-    exact_length: bool = Field(False, description="true where a PDO of any other length is not evaluated")
-
-
-class Scale(Table):
-    """value = word × full / at, with ``full`` a parameter of the drive such as P105."""
-
-    full: str
-    at: int = Field(gt=0)
-    limit: float = Field(2.0, gt=0, description="largest magnitude as a multiple of full")
-
-
-class ScaledValue(Table):
-    """A value with a unit beside the raw word it is made from."""
-
-    name: Name
-    group: Literal["command", "actual"]
-    word: str
-    scale: Scale
-    unit: str
-    description: str = ""
-
-    @property
-    def leaf(self) -> str:
-        """Its name below the drive, such as ``actual/frequency``."""
-        return f"{self.group}/{self.name}"
-
-
 class Command(Table):
     """Bits that a command sets in the control word: ``word & ~mask | value``."""
 
     mask: Word
     value: Word
+
+
+class Handshake(Table):
+    """How the drive takes over a position: the bridge does it when the value is written."""
+
+    value: Name = Field(description="the command value that is handed over, such as position")
+    bit: Bit = Field(description="of the control word: its rising edge says that there is a new one")
+    acknowledge_bit: Bit = Field(description="of the status word: 1 when the drive has taken it")
 
 
 class ControlWord(Table):
@@ -202,6 +121,8 @@ class ControlWord(Table):
     run: Word = Field(description="leads from ready to operation enabled")
     forward: Word = 0
     reverse: Word = 0
+    begin: Word = Field(0, description="bits that `Start` adds once the drive is enabled")
+    handshake: Handshake | None = None
     stop: Command
     quick_stop: Command
     disable_voltage: Command
@@ -226,18 +147,6 @@ class StatusWord(Table):
     state: list[State]
 
 
-class Parameter(Table):
-    """A parameter that the bridge itself needs: value = wire × factor."""
-
-    name: str
-    title: str
-    object: Ref
-    data_type: Kind
-    factor: float = 1.0
-    unit: str = ""
-    read: bool = Field(True, description="false where it can only be given in the site file")
-
-
 class Poll(Table):
     """An object of the node that is read again and again and shown as a point of the node."""
 
@@ -249,25 +158,11 @@ class Poll(Table):
     bits: list[str] = Field(default_factory=list[str])
 
 
-class EmcyTable(Table):
-    drive_byte: int | None = Field(None, ge=2, le=7, description="byte that says which drive it is about")
-    codes: dict[EmcyCode, str] = Field(description="EMCY code in hexadecimal to text; xx matches any")
+class OwnReaction(Table):
+    """The object that says what the node does when its own time-out has run out."""
 
-    def text(self, code: int) -> str:
-        """The text of an EMCY code, or of its group."""
-        name = f"{code:04X}"
-        return self.codes.get(name) or self.codes.get(f"{name[:2]}xx") or "unknown code"
-
-
-class FaultNumbers(Table):
-    """Numbers that the bridge reports in the family's own words."""
-
-    controller_silent: float
-    bridge_timeout: float = Field(description="the bus interface's own fault for the same event")
-    telegram_downtime: float
-    node_missing: float
-    prefix: str = ""
-    texts: dict[FaultNumber, str]
+    object: Ref
+    none: int = Field(0, description="the value with which it does nothing, as the factory has it")
 
 
 class OwnTimeout(Table):
@@ -275,20 +170,24 @@ class OwnTimeout(Table):
 
     object: Ref
     unit_ms: float = Field(1.0, gt=0, description="what one step of it is, in ms")
+    reaction: OwnReaction | None = Field(None, description="left out: the node stops its drives")
 
 
 class Family(Table):
-    """One mapping file."""
+    """One mapping file, merged with those it extends."""
 
+    extends: str | None = Field(None, description='another mapping, such as "nord/sk-tu4-cao"')
     family: FamilyTable
     identity: IdentityRule = Field(default_factory=lambda: IdentityRule.model_validate({}))
     process: Process
     sdo: list[SdoServer] = Field(default_factory=list[SdoServer])
     slot: list[Slot] = Field(min_length=1)
-    value: list[ScaledValue] = Field(default_factory=list[ScaledValue])
+    value: list[ProcessValue] = Field(default_factory=list[ProcessValue])
     control_word: ControlWord
     status_word: StatusWord
+    parameter_names: ParameterNames | None = None
     parameter: list[Parameter] = Field(default_factory=list[Parameter])
+    eeprom: Eeprom | None = None
     poll: list[Poll] = Field(default_factory=list[Poll])
     node_tpdo: list[NodeTpdo] = Field(default_factory=list[NodeTpdo])
     emcy: EmcyTable
@@ -301,3 +200,42 @@ class Family(Table):
             if slot.name == name:
                 return slot
         raise KeyError(name)
+
+    def parameter_named(self, name: str) -> Parameter:
+        """Raises KeyError where the family lists no such parameter."""
+        for parameter in self.parameter:
+            if parameter.name == name:
+                return parameter
+        raise KeyError(name)
+
+    def object_of(self, parameter: Parameter) -> ObjectRef:
+        """Where a parameter is in the object dictionary."""
+        if parameter.object is not None:
+            return parameter.object
+        if self.parameter_names is None:
+            raise ValueError(f"{parameter.name} has no object")
+        return object_of(self.parameter_names, parameter.name, parameter.sets, parameter.elements)
+
+    def rpdo_words(self, pdo: Pdo) -> list[str]:
+        """The words that this RPDO carries, in its order."""
+        return pdo.words or self.process.rpdo
+
+    def tpdo_words(self, pdo: Pdo) -> list[str]:
+        """The words that this TPDO carries, in its order."""
+        return pdo.words or self.process.tpdo
+
+    def carried(self, slot: Slot) -> tuple[list[str], list[str]]:
+        """The words that there are for this drive: of its RPDOs and of its TPDOs, as ``process`` orders
+        them. The others do not exist for it."""
+        commanded = {word for pdo in slot.rpdo for word in self.rpdo_words(pdo)}
+        actual = {word for pdo in slot.tpdo for word in self.tpdo_words(pdo)}
+        return (
+            [word for word in self.process.rpdo if word in commanded],
+            [word for word in self.process.tpdo if word in actual],
+        )
+
+    def values_of(self, slot: Slot) -> list[ProcessValue]:
+        """The values that there are for this drive: those all of whose words it has."""
+        rpdo, tpdo = self.carried(slot)
+        words = {"command": set(rpdo[1:]), "actual": set(tpdo)}
+        return [value for value in self.value if words[value.group].issuperset(value.word_names)]

@@ -8,7 +8,7 @@ from typing import cast
 
 from bridge.config import Site, read_site
 from bridge.errors import Fault, FileFaults
-from bridge.mapping.loader import family_names, load_family
+from bridge.mapping.loader import family_names, load_family, mapping_folders, missing, template_names
 from bridge.mapping.model import Family
 from bridge.tomlfile import RawTable, TomlFile
 
@@ -18,7 +18,9 @@ def load_site_and_families(path: Path) -> tuple[Site, dict[str, Family]]:
     file, site = read_site(path)
     families: dict[str, Family] = {}
     of_families: list[Fault] = []
-    known = family_names()
+    folders = mapping_folders(path)
+    known = family_names(folders)
+    templates = template_names(folders)
     for node in _nodes(file):
         name = node.text("mapping")
         if name is None or name in families:
@@ -26,10 +28,10 @@ def load_site_and_families(path: Path) -> tuple[Site, dict[str, Family]]:
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1)
             hint = f'did you mean "{near[0]}"?' if near else f"there are: {', '.join(known)}"
-            file.fault((*node.key, "mapping"), f"there is no mapping {name!r}", hint)
+            file.fault((*node.key, "mapping"), missing(name, template=name in templates), hint)
             continue
         try:
-            families[name] = load_family(name)
+            families[name] = load_family(name, folders)
         except FileFaults as error:
             of_families += [fault for fault in error.faults if fault not in of_families]
     _check(file, families)
@@ -83,9 +85,31 @@ def _check_drive(drive: RawTable, family: Family, file: TomlFile) -> None:
     if slot is not None and slot not in slots:
         message = f"{family.family.name} has no slot {slot!r}"
         file.fault((*drive.key, "slot"), message, f"it has {', '.join(slots)}")
-    scales = {value.scale.full for value in family.value}
+    if slot in slots:
+        _check_pdos(drive, family, slot, file)
+    scales = {value.full for value in family.value if value.full is not None}
     given = drive.table("parameters")
     for name in given.content:
         if name not in scales:
             message = f"{family.family.name} does not scale with {name!r}"
-            file.fault((*given.key, name), message, f"it scales with {', '.join(sorted(scales))}")
+            hint = f"it scales with {', '.join(sorted(scales))}" if scales else ""
+            file.fault((*given.key, name), message, hint)
+
+
+def _check_pdos(drive: RawTable, family: Family, slot: str, file: TomlFile) -> None:
+    """A table for a PDO must be for one that the drive has, and for each there is one at most."""
+    it = family.slot_named(slot)
+    for name, pdos in (("rpdo", it.rpdo), ("tpdo", it.tpdo)):
+        numbers = [pdo.number for pdo in pdos]
+        tables = list(drive.tables(name)) or [drive.table(name)] * (name in drive.content)
+        seen: list[int] = []
+        for table in tables:
+            number = table.whole("number")
+            place = numbers[0] if number is None else number
+            key = (*table.key, "number")
+            if place not in numbers:
+                hint = f"it has {', '.join(map(str, numbers))}"
+                file.fault(key, f"{slot} of {family.family.name} has no {name.upper()}{place}", hint)
+            elif place in seen:
+                file.fault(key, f"there are two tables for {name.upper()}{place}")
+            seen.append(place)

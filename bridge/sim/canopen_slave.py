@@ -203,7 +203,7 @@ class CanopenSlave:
     def _on_sync(self, now: float) -> None:
         # TPDOs are sampled before RPDOs act: both mean the moment of the SYNC (CiA 301 §7.2.2.2).
         for tpdo, settings in self._active_tpdos():
-            payload = pack(self._dictionary, settings)
+            payload = self._payload(settings)
             if tpdo.on_sync(settings, payload):
                 self._send(settings.cob_id, payload)
                 tpdo.sent(payload, now)
@@ -230,9 +230,12 @@ class CanopenSlave:
         pairs = zip(self._tpdos, self._store.current.tpdo, strict=True)
         return [(tpdo, settings) for tpdo, settings in pairs if settings.enabled and settings.count]
 
+    def _payload(self, settings: PdoSettings) -> bytes:
+        return pack(self._dictionary, settings)
+
     def _send_due_tpdos(self, now: float) -> None:
         for tpdo, settings in self._active_tpdos():
-            payload = pack(self._dictionary, settings)
+            payload = self._payload(settings)
             if tpdo.is_due(settings, payload, now):
                 self._send(settings.cob_id, payload)
                 tpdo.sent(payload, now)

@@ -6,8 +6,11 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from bridge.errors import OperationFailed
+from bridge.sim.cia402_catalogue import MAPPINGS, cia402
+from bridge.sim.lenze_catalogue import lenze_8400_motec
 from bridge.sim.node import SimulatedNode
 from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.stoeber_catalogue import stoeber_5000, stoeber_5000_four_axes
 
 Factory = Callable[[int, Mapping[str, float]], SimulatedNode]
 
@@ -15,7 +18,9 @@ Factory = Callable[[int, Mapping[str, float]], SimulatedNode]
 def simulate_node(mapping: str, node_id: int, parameters: dict[str, float]) -> SimulatedNode:
     """A simulated node of the family ``mapping``, with parameters in engineering units.
 
-    NORD: ``P105`` sets all four drives, ``fu2/P105`` one, ``P151`` (ms) the interface. Raises
+    NORD: ``P105`` sets all four drives, ``fu2/P105`` one, ``P151`` (ms) the interface. STÖBER: ``C01``
+    (1/min) and the ramps ``accelerate_s``, ``decelerate_s``, ``quick_stop_s``, ``axis2/C01`` of one.
+    CiA 402: objects, ``6083``, ``6046:02``, in the drive's units. Lenze: codes, ``C00011`` (1/min), ``C00593/1``. Raises
     ``OperationFailed`` for a family or a parameter that the simulation does not have.
     """
     factory = _FAMILIES.get(mapping)
@@ -53,4 +58,10 @@ def _commission(node: NordTu4, name: str, value: float) -> None:
             raise OperationFailed(str(error)) from None
 
 
-_FAMILIES: Final[dict[str, Factory]] = {"nord/sk-tu4-cao": _nord_tu4}
+_FAMILIES: Final[dict[str, Factory]] = {
+    **{f"cia402/{mapping}": cia402 for mapping in MAPPINGS},
+    "lenze/8400-motec": lenze_8400_motec,
+    "nord/sk-tu4-cao": _nord_tu4,
+    "stoeber/5000": stoeber_5000,
+    "stoeber/5000-four-axes": stoeber_5000_four_axes,
+}

@@ -68,7 +68,7 @@ def add_errors(dictionary: Dictionary, emcy: EmcyProducer) -> None:
 
     dictionary.add(0x1001, 0, Number(DataType.UNSIGNED8, lambda: emcy.error_register, in_tpdo=True))
     dictionary.add(0x1003, 0, Number(DataType.UNSIGNED8, lambda: len(emcy.history), clear))
-    for place in range(8):
+    for place in range(emcy.history_size):
         dictionary.add(0x1003, place + 1, error(place))
 
 

@@ -75,6 +75,13 @@ class Number:
     def max_size(self) -> int:
         return self.data_type.size
 
+    @property
+    def limits(self) -> tuple[int, int]:
+        """The least and the greatest value, of its own or of its type."""
+        bits = 8 * self.data_type.size
+        low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if self.data_type.signed else (0, (1 << bits) - 1)
+        return (low if self.low is None else self.low, high if self.high is None else self.high)
+
     def upload(self) -> bytes:
         if self.read is None:
             raise SdoAbort(AbortCode.WRITE_ONLY)

@@ -9,19 +9,23 @@ from bridge.sim.settings import CommunicationSettings, SlaveRules
 from bridge.sim.store import Store
 
 _WAITING_MAX: Final = 16
-_HISTORY_MAX: Final = 8
 
 
 class EmcyProducer:
-    """Sends errors no faster than 1015h allows and remembers the last eight."""
+    """Sends errors no faster than 1015h allows and remembers the last ones."""
 
     def __init__(self, store: Store[CommunicationSettings], rules: SlaveRules) -> None:
         self._store = store
         self._rules = rules
         self._waiting: deque[bytes] = deque(maxlen=_WAITING_MAX)
         self._sent_at: float | None = None
-        self._history: deque[int] = deque(maxlen=_HISTORY_MAX)
+        self._history: deque[int] = deque(maxlen=rules.error_entries)
         self.error_register = 0
+
+    @property
+    def history_size(self) -> int:
+        """How many errors 1003h remembers."""
+        return self._rules.error_entries
 
     @property
     def history(self) -> list[int]:

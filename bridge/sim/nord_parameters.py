@@ -36,8 +36,10 @@ class Parameter:
 PARAMETERS: Final = (
     Parameter(102, (200,), 0, 32000, unit=0.01, per_set=True),  # acceleration time, s
     Parameter(103, (200,), 0, 32000, unit=0.01, per_set=True),  # deceleration time, s
+    Parameter(104, (0,), 0, 4000, unit=0.1, per_set=True),  # minimum frequency, Hz
     Parameter(105, (500,), 1, 4000, unit=0.1, per_set=True),  # maximum frequency, Hz
     Parameter(112, (100,), 1, 32767, unit=0.1, per_set=True),  # torque current limit, A (see NordDrive)
+    Parameter(113, (0,), -4000, 4000, unit=0.1, per_set=True),  # jog frequency, Hz
     Parameter(120, (1, 1, 1, 1), 0, 2),  # option supervision
     Parameter(426, (10,), 0, 32000, unit=0.01, per_set=True),  # quick stop time, s
     Parameter(509, (3,), 0, 10),  # source of the control word; 3 = system bus (§7.2)

@@ -26,6 +26,8 @@ class SlaveRules:
     """Bits of a PDO's COB-ID object that always read 1."""
     emcy_inhibit_unit_s: float = 1e-4
     """Unit of 1015h; CiA 301 has 100 µs."""
+    error_entries: int = 8
+    """Errors that 1003h remembers."""
     map_entries: int = 8
     sdo_block_segments: int = 0
     """Segments in a block that the SDO servers take; 0: they know no block transfer."""

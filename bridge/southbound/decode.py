@@ -15,6 +15,7 @@ from enum import StrEnum
 from typing import Final
 
 from bridge.config import NodeTable
+from bridge.drive import EmergencyReader
 from bridge.mapping.model import Family
 from bridge.southbound.bus.frame import EXTENDED, REMOTE, STANDARD_MASK, Frame
 from bridge.southbound.canopen import cobid, emcy, nmt
@@ -193,7 +194,7 @@ class Decoder:
             return Meaning(Kind.EMCY, node_id, label, f"{len(data)} bytes are no emergency message")
         family = self._families.get(node_id)
         if family:
-            text = family.emcy.text(found.code)
+            text = EmergencyReader(family.emcy).read(found.code, found.vendor).text
         else:
             text = _EMCY_GROUPS.get(found.code >> 8) or _EMCY_GROUPS.get(
                 found.code >> 8 & 0xF0, "unknown code"

@@ -213,9 +213,9 @@ class Network:
 
         self._routes[cobid.SYNC] = window.on_sync
         for node in self.nodes:
-            for pdos in node.wire.drives.values():
-                if pdos.is_synchronous and pdos.tpdo_id in self._routes:
-                    self._routes[pdos.tpdo_id] = judged(self._routes[pdos.tpdo_id])
+            for tpdo in (tpdo for pdos in node.wire.drives.values() for tpdo in pdos.tpdos):
+                if tpdo.is_synchronous and tpdo.cob_id in self._routes:
+                    self._routes[tpdo.cob_id] = judged(self._routes[tpdo.cob_id])
 
     def beats(self) -> Beats:
         """The frames to be repeated."""
@@ -228,7 +228,8 @@ class Network:
             if node.sends_process_data:
                 for pdos in node.wire.drives.values():
                     if not pdos.is_silent:
-                        beats[pdos.cob_id] = ((pdos.rpdo(),), period_s)
+                        for frames in pdos.bursts():
+                            beats[frames[0].can_id] = (frames, period_s)
         # SYNC last: what goes out together with it is taken over by it (CiA 301 §7.2.2.2).
         if self.bus.sync_period_ms:
             beats[cobid.SYNC] = (self._sync, self.bus.sync_period_ms / 1000)
@@ -288,6 +289,7 @@ class Network:
 def _is_taken(others: list[NodeCore], cob_id: int) -> bool:
     """Whether one of the other nodes of the bus has a PDO, or anything else, on this identifier."""
     return any(
-        cob_id in node.wire.routes or cob_id in (pdos.cob_id for pdos in node.wire.drives.values())
+        cob_id in node.wire.routes
+        or any(cob_id == rpdo.cob_id for pdos in node.wire.drives.values() for rpdo in pdos.rpdos)
         for node in others
     )

@@ -18,6 +18,7 @@ from bridge.southbound.error_control import Sign
 from bridge.southbound.neighbours import Neighbours
 from bridge.southbound.node_view import NodeView
 from bridge.southbound.node_wire import Listener, NodeWire
+from bridge.southbound.parameters import NodeParameters
 from bridge.southbound.sdo_channels import SdoChannels
 
 _FIRST_RETRY_S: Final = 1.0
@@ -43,6 +44,7 @@ class NodeCore:
         self.wire = NodeWire(node, plant, listener)
         self.error_control = self.wire.error_control
         self.booting = Booting(self, partial(boot.boot, node, downloads), self.wire.sdo)
+        self.parameters = NodeParameters(node, plant, lambda: self.sdo)
         self.boot_at: float | None = 0.0
         self.has_concluded = False
         """Whether a boot-up has ended, well or not, since the bus is there."""
@@ -135,11 +137,13 @@ class NodeCore:
                 self.wire.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
             self.booting.begin(now)
         self.wire.polling.on_time(now)
+        self.parameters.on_time(now)
 
     def next_deadline(self) -> float | None:
         times = (
             self.wire.next_deadline(),
             self.booting.next_deadline(),
+            self.parameters.next_deadline(),
             None if self.booting.is_running else self.boot_at,
         )
         return min((time for time in times if time is not None), default=None)
@@ -205,7 +209,7 @@ class NodeCore:
         self.error_control.state = NmtState.OPERATIONAL
         self.boot_at = None
         self.set_state(NodeState.OPERATIONAL, now)
-        self.wire.polling.start(self.wire.drives.values(), now)
+        self.wire.start_polling(now)
         for drive in self.node.drives:
             if drive.name not in self.wire.drives:
                 drive.channel.on_node(NodeState.CONFIG_ERROR, now)
@@ -251,7 +255,7 @@ class NodeCore:
 
     def leave_operation(self, now: float) -> None:
         self.error_control.stop(now, lost=self.state is NodeState.LOST)
-        self.wire.polling.stop()
+        self.wire.stop_polling()
         self.booting.cancel(now)
 
     def hold(self, why: str, now: float) -> None:

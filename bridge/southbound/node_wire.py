@@ -15,6 +15,7 @@ from bridge.southbound.canopen.nmt import NmtCommand
 from bridge.southbound.canopen.sdo import SdoChannel
 from bridge.southbound.emergencies import Emergencies
 from bridge.southbound.error_control import ErrorControl, Sign
+from bridge.southbound.fault_reading import FaultReading
 from bridge.southbound.node_tpdo import node_tpdos
 from bridge.southbound.polling import Polling
 from bridge.southbound.process_data import DrivePdos, connect, stopped_frames
@@ -46,7 +47,8 @@ class NodeWire:
         self.rejected = 0
         self.is_taken: Callable[[int], bool] = lambda cob_id: False
         """Whether another node of the bus has something on this identifier."""
-        self._emergencies = Emergencies(node, plant, self.reject)
+        self.faults = FaultReading(node, self.sdo)
+        self._emergencies = Emergencies(node, plant, self.reject, self.faults.on_emcy)
         self.error_control = ErrorControl(node.table, listener.on_duplicate)
         self.polling = Polling(node.family.poll, self.sdo.first, self._show_poll)
         self.drives: dict[str, DrivePdos] = {}
@@ -103,6 +105,7 @@ class NodeWire:
 
     def on_time(self, now: float) -> None:
         self._emergencies.on_time(now)
+        self.faults.on_time(now)
         self.sdo.on_time(now)
 
     def next_deadline(self) -> float | None:
@@ -111,8 +114,18 @@ class NodeWire:
             self.error_control.next_deadline(),
             self.polling.next_deadline(),
             self._emergencies.next_deadline(),
+            self.faults.next_deadline(),
         )
         return min((time for time in times if time is not None), default=None)
+
+    def start_polling(self, now: float) -> None:
+        """The node is in operation: ask it what has to be asked for."""
+        self.polling.start(self.drives.values(), now)
+        self.faults.start(now)
+
+    def stop_polling(self) -> None:
+        self.polling.stop()
+        self.faults.stop()
 
     def _show_poll(self, name: str, value: int, now: float) -> None:
         self._plant.set(f"{self._node.name}/node/{name}", value, now)
@@ -125,7 +138,8 @@ class NodeWire:
         self._plant.set(f"{self._node.name}/node/software_version", result.software_version, now)
         self.drives = connect(self._node, result, self.reject, self.is_taken, now)
         self.routes = self._basic_routes()
-        self.routes |= {pdos.tpdo_id: pdos.on_tpdo for pdos in self.drives.values()}
+        for pdos in self.drives.values():
+            self.routes |= pdos.handlers
         sync_ms = self._node.bus.sync_period_ms
         self.routes |= node_tpdos(result.node_tpdos, sync_ms, self.polling.on_pdo, self.reject)
         self.routes_changed = True

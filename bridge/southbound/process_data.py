@@ -1,131 +1,196 @@
-"""Process data of one drive: its two PDOs as the node has them."""
+"""Process data of one drive: its PDOs as the node has them."""
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from bridge.command import Drive
+from bridge.command.actual import FurtherTpdo
 from bridge.command.plant import Node
 from bridge.config import BusTable
-from bridge.southbound.boot import BootResult, PdoPlan
+from bridge.image import Quality
+from bridge.mapping.model import Pdo
+from bridge.southbound.boot import BootResult, PdoPlan, factory_entries, layouts, match_words
 from bridge.southbound.bus.frame import Frame
+from bridge.southbound.canopen.pdo import PdoCodec
 from bridge.southbound.canopen.sync import LAST_SYNCHRONOUS, REMOTE_SYNCHRONOUS, REMOTE_TYPES, tpdo_deadline_s
+from bridge.southbound.words import WordMap
 
-_WORD_BITS: Final = 16
-_WORD_MASK: Final = 0xFFFF
+_FACTORY_TYPE: Final = 255
+
+Reject = Callable[[Frame, str], None]
 
 
-class DrivePdos:
-    """Unpacks a drive's TPDO into its words and packs its RPDO from the channel's output.
-
-    Words have 16 bits. An object that is longer fills several, the low word first; one that is shorter
-    fills its word with its sign or with zeros.
-    """
+class Tpdo:
+    """Unpacks one TPDO of a drive into the drive's words. ``further`` is None for the one with the status
+    word, by which the drive's freshness is judged."""
 
     __slots__ = (
         "_codec",
         "_drive",
-        "_fill",
+        "_in_order",
         "_last",
-        "_order",
-        "_packed",
-        "_packed_words",
+        "_length",
+        "_map",
         "_reject",
-        "_rpdo",
-        "_rpdo_fill",
         "_words",
-        "is_synchronous",
+        "cob_id",
+        "further",
+        "plan",
         "rtr_poll_s",
-        "tpdo",
-        "tpdo_id",
     )
 
-    def __init__(
-        self, drive: Drive, rpdo: PdoPlan, tpdo: PdoPlan, reject: Callable[[Frame, str], None]
-    ) -> None:
+    def __init__(self, drive: Drive, plan: PdoPlan, further: FurtherTpdo | None, reject: Reject) -> None:
         self._drive = drive
         self._reject = reject
-        self.tpdo = tpdo
+        self.plan = plan
+        self.further = further
+        self.cob_id = plan.cob_id
         self.rtr_poll_s = drive.table.rtr_poll_ms / 1000
-        self.tpdo_id = tpdo.cob_id
-        self.is_synchronous = tpdo.transmission_type <= LAST_SYNCHRONOUS
-        self._codec = tpdo.codec
-        self._fill = _fill(tpdo, len(drive.words))
-        plain = all(entry.bits <= _WORD_BITS for entry in tpdo.codec.entries) and not tpdo.codec.has_signed
-        self._order = plain and tpdo.words == tuple(range(len(drive.words)))
+        self._codec = plan.codec
+        self._length = plan.codec.length
+        self._map = WordMap(plan.codec.entries, plan.places, len(drive.words))
+        self._in_order = self._map.is_in_order and not plan.codec.has_signed
         """The codec's values are the words as they are."""
-        self._words = [0] * len(drive.words)
+        self._words = list(drive.words)
         self._last: bytes | None = None
-        self._rpdo = rpdo
-        self._rpdo_fill = _fill(rpdo, len(drive.family.process.rpdo))
-        self._packed_words: tuple[int, ...] = ()
-        self._packed = Frame(rpdo.cob_id)
 
-    def on_tpdo(self, frame: Frame) -> None:
+    @property
+    def is_synchronous(self) -> bool:
+        return self.plan.transmission_type <= LAST_SYNCHRONOUS
+
+    def on_frame(self, frame: Frame) -> None:
+        """The TPDO with the status word."""
         data = frame.data
         if data == self._last:
             self._drive.on_unchanged_data(frame.time)
             return
-        length = self._codec.length
+        if self._in_order and len(data) == self._length:
+            self._last = data
+            self._drive.on_process_data(self._codec.unpack(data), frame.time)
+            return
+        values = self._values(frame)
+        if values is None:
+            return
+        words = self._words
+        words[:] = self._drive.words
+        self._map.unpack(values, words)
+        self._drive.on_process_data(words, frame.time)
+
+    def on_further(self, frame: Frame) -> None:
+        """Another TPDO."""
+        further = self.further
+        if further is None:
+            return
+        if frame.data == self._last and further.quality is Quality.GOOD:
+            further.last = frame.time
+            return
+        values = self._values(frame)
+        if values is not None:
+            self._map.unpack(values, self._drive.words)
+            self._drive.on_further_data(further, frame.time)
+
+    def _values(self, frame: Frame) -> tuple[int, ...] | None:
+        """The values of a frame; None where it is too short."""
+        data = frame.data
+        length = self._length
         if len(data) != length:
             self._reject(frame, f"{length} bytes are mapped")
             if len(data) < length:
-                return
+                return None
             # CiA 301 §7.2.2.5: of a PDO that is too long the mapped bytes count.
             data = data[:length]
             self._last = None
         else:
             self._last = data
-        values = self._codec.unpack(data)
-        if self._order:
-            self._drive.on_process_data(values, frame.time)
-            return
-        words = self._words
-        for place, entry, shift in self._fill:
-            words[place] = values[entry] >> shift & _WORD_MASK
-        self._drive.on_process_data(words, frame.time)
+        return self._codec.unpack(data)
+
+
+class Rpdo:
+    """Packs one RPDO of a drive from the channel's output."""
+
+    __slots__ = ("_codec", "_map", "_packed", "_words", "cob_id")
+
+    def __init__(self, plan: PdoPlan, words: int) -> None:
+        self.cob_id = plan.cob_id
+        self._codec = plan.codec
+        self._map = WordMap(plan.codec.entries, plan.places, words)
+        self._words: Sequence[int] = ()
+        self._packed = (Frame(plan.cob_id),)
+
+    def frames(self, words: Sequence[int]) -> tuple[Frame, ...]:
+        """The burst that carries these words; the same one while they stay."""
+        if words != self._words:
+            self._words = words
+            self._packed = (self.frame(words),)
+        return self._packed
+
+    def frame(self, words: Sequence[int]) -> Frame:
+        """The frame that carries these words, the control word first; what is mapped beside them is 0."""
+        return Frame(self.cob_id, self._codec.pack(self._map.pack(words)))
+
+
+class DrivePdos:
+    """All PDOs of one drive. Of several the one with the status word is the first of ``tpdos``, and the
+    one with the control word the last of ``rpdos``: setpoints are there when an enable comes."""
+
+    __slots__ = ("_drive", "rpdos", "tpdos")
+
+    def __init__(
+        self, drive: Drive, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan], reject: Reject
+    ) -> None:
+        self._drive = drive
+        words = len(drive.family.process.rpdo)
+        self.rpdos = tuple(Rpdo(plan, words) for plan in reversed(rpdos))
+        main, *others = tpdos
+        self.tpdos = (
+            Tpdo(drive, main, None, reject),
+            *(Tpdo(drive, plan, _further(drive, plan), reject) for plan in others),
+        )
+
+    @property
+    def handlers(self) -> dict[int, Callable[[Frame], None]]:
+        """Who takes which identifier."""
+        main, *others = self.tpdos
+        return {main.cob_id: main.on_frame, **{tpdo.cob_id: tpdo.on_further for tpdo in others}}
+
+    @property
+    def further(self) -> list[FurtherTpdo]:
+        return [tpdo.further for tpdo in self.tpdos if tpdo.further is not None]
 
     @property
     def is_silent(self) -> bool:
         return self._drive.channel.output.silent
 
-    @property
-    def cob_id(self) -> int:
-        return self._rpdo.cob_id
-
-    def rpdo(self) -> Frame:
-        """The frame that belongs on the bus now."""
+    def bursts(self) -> list[tuple[Frame, ...]]:
+        """The frames that belong on the bus now, those of each identifier together."""
         words = self._drive.channel.output.words
-        if words != self._packed_words:
-            self._packed_words, self._packed = words, self.rpdo_with(words)
-        return self._packed
+        return [rpdo.frames(words) for rpdo in self.rpdos]
 
-    def rpdo_with(self, words: Sequence[int]) -> Frame:
-        """The frame that carries these words, the control word first; what is mapped beside them is 0."""
-        values = [0] * len(self._rpdo.words)
-        for place, entry, shift in self._rpdo_fill:
-            values[entry] |= words[place] << shift
-        return Frame(self._rpdo.cob_id, self._rpdo.codec.pack(values))
+    def frames_with(self, words: Sequence[int]) -> list[Frame]:
+        """The frames that carry these words."""
+        return [rpdo.frame(words) for rpdo in self.rpdos]
 
 
-def _fill(plan: PdoPlan, words: int) -> tuple[tuple[int, int, int], ...]:
-    """Which word is found where: place of the word, number of the entry, shift in its value."""
-    mapped = enumerate(zip(plan.words, plan.codec.entries, strict=True))
-    return tuple(
-        (first + part, number, part * _WORD_BITS)
-        for number, (first, entry) in mapped
-        if first is not None and not entry.is_dummy
-        for part in range((entry.bits + _WORD_BITS - 1) // _WORD_BITS)
-        if first + part < words
+def _further(drive: Drive, plan: PdoPlan) -> FurtherTpdo:
+    return FurtherTpdo(plan.name, plan.words, _deadline_s(drive, plan))
+
+
+def _deadline_s(drive: Drive, tpdo: PdoPlan) -> float | None:
+    """When a TPDO is late."""
+    given_ms = drive.table.tpdo_deadline_ms
+    if given_ms is not None:
+        return given_ms / 1000 or None
+    return tpdo_deadline_s(
+        tpdo.transmission_type, tpdo.event_timer_ms, drive.sync_period_ms, drive.table.rtr_poll_ms
     )
 
 
 def connect(
     node: Node,
     result: BootResult,
-    reject: Callable[[Frame, str], None],
+    reject: Reject,
     is_taken: Callable[[int], bool],
     now: float,
 ) -> dict[str, DrivePdos]:
@@ -137,54 +202,63 @@ def connect(
         for name, full in result.scales.get(drive.name, {}).items():
             drive.on_scale(name, full)
         plan = result.drives[drive.name]
-        if plan.rpdo is None or plan.tpdo is None or plan.problem:
+        if not plan.rpdos or not plan.tpdos or plan.problem:
             continue
-        if is_taken(plan.rpdo.cob_id) or is_taken(plan.tpdo.cob_id):
+        if any(is_taken(pdo.cob_id) for pdo in (*plan.rpdos, *plan.tpdos)):
             plan.problem = "another node has its PDO on the same identifier"
             result.notes.append(f"{drive.slot.name}: {plan.problem}")
             continue
-        connected[drive.name] = DrivePdos(drive, plan.rpdo, plan.tpdo, reject)
-        _set_times(drive, node.bus, plan.rpdo, plan.tpdo)
-        missing = _without_effect(node.bus, plan.rpdo, plan.tpdo)
+        pdos = connected[drive.name] = DrivePdos(drive, plan.rpdos, plan.tpdos, reject)
+        _set_times(drive, node.bus, plan.rpdos[0], plan.tpdos[0])
+        drive.on_pdos(plan.unserved, pdos.further, now)
+        missing = _without_effect(node.bus, plan.rpdos, plan.tpdos)
         result.notes += [f"{drive.slot.name}: {why}" for why in missing]
     return connected
 
 
 def _set_times(drive: Drive, bus: BusTable, rpdo: PdoPlan, tpdo: PdoPlan) -> None:
-    """When the drive's TPDO is late, and how long its RPDO may take."""
-    given_ms = drive.table.tpdo_deadline_ms
-    if given_ms is None:
-        drive.channel.link.pdo_deadline_s = tpdo_deadline_s(
-            tpdo.transmission_type, tpdo.event_timer_ms, bus.sync_period_ms, drive.table.rtr_poll_ms
-        )
-    else:
-        drive.channel.link.pdo_deadline_s = given_ms / 1000 or None
+    """When the drive's TPDO is late, and how long its RPDO may take: those with status and control word."""
+    drive.channel.link.pdo_deadline_s = _deadline_s(drive, tpdo)
     # A synchronous RPDO is taken over with the next SYNC (CiA 301 §7.5.2.36).
     waits_ms = bus.sync_period_ms if rpdo.transmission_type <= LAST_SYNCHRONOUS else 0
     drive.rpdo_period_ms = round(bus.rpdo_period_s * 1000) + waits_ms
 
 
-def _without_effect(bus: BusTable, rpdo: PdoPlan, tpdo: PdoPlan) -> list[str]:
+def _without_effect(bus: BusTable, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan]) -> list[str]:
     """What these PDOs wait for and will not get from us."""
     found: list[str] = []
-    for name, plan, last in (("RPDO", rpdo, LAST_SYNCHRONOUS), ("TPDO", tpdo, REMOTE_SYNCHRONOUS)):
+    listed = [("RPDO", plan, LAST_SYNCHRONOUS) for plan in rpdos]
+    listed += [("TPDO", plan, REMOTE_SYNCHRONOUS) for plan in tpdos]
+    for name, plan, last in listed:
         kind = plan.transmission_type
         if not bus.sync_period_ms and (kind <= LAST_SYNCHRONOUS or kind == last):
             found.append(f"{name} of type {kind} waits for SYNC, which the bridge does not send")
-    if tpdo.transmission_type in REMOTE_TYPES and not tpdo.remote_allowed:
-        found.append(f"TPDO of type {tpdo.transmission_type} with a COB-ID that allows no remote frames")
+    for tpdo in tpdos:
+        kind = tpdo.transmission_type
+        if kind in REMOTE_TYPES and not tpdo.remote_allowed:
+            found.append(f"TPDO of type {kind} with a COB-ID that allows no remote frames")
     return found
 
 
 def stopped_frames(node: Node, connected: Mapping[str, DrivePdos]) -> list[Frame]:
-    """A stopped word for every drive, by its PDO where that is known, else by the factory's COB-ID."""
+    """A stopped word for every drive and no setpoints, by its PDOs where those are known, else by the
+    factory's COB-IDs of those that are on at factory."""
     frames: list[Frame] = []
     for drive in node.drives:
         words = (drive.channel.words.stopped, *([0] * (len(drive.family.process.rpdo) - 1)))
         pdos = connected.get(drive.name)
         if pdos:
-            frames.append(pdos.rpdo_with(words))
-        else:
-            data = struct.pack(f"<{len(words)}H", *words)
-            frames.append(Frame(drive.slot.rpdo.cob_id + node.table.id, data))
+            frames += pdos.frames_with(words)
+            continue
+        factory = [pdo for pdo in drive.slot.rpdo if not pdo.optional]
+        frames += [_factory_rpdo(drive, pdo, node.table.id).frame(words) for pdo in factory]
     return frames
+
+
+def _factory_rpdo(drive: Drive, pdo: Pdo, node_id: int) -> Rpdo:
+    """An RPDO as the mapping file has it."""
+    process = drive.family.process.rpdo
+    entries = factory_entries(pdo)
+    places = match_words(entries, layouts([pdo], [drive.family.rpdo_words(pdo)], process))
+    plan = PdoPlan(pdo.cob_id + node_id, _FACTORY_TYPE, 0, PdoCodec(entries), places)
+    return Rpdo(plan, len(process))

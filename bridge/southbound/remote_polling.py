@@ -27,9 +27,10 @@ class RemotePolling:
     def start(self, drives: Iterable[DrivePdos], now: float) -> None:
         self._asked = [
             # The length of what is asked for: the two must not differ on the wire (CiA 301 §7.2.2.4).
-            _Asked(Frame(pdos.tpdo_id | REMOTE, bytes(pdos.tpdo.codec.length)), pdos.rtr_poll_s, now)
+            _Asked(Frame(tpdo.cob_id | REMOTE, bytes(tpdo.plan.codec.length)), tpdo.rtr_poll_s, now)
             for pdos in drives
-            if pdos.tpdo.transmission_type in REMOTE_TYPES and pdos.tpdo.remote_allowed
+            for tpdo in pdos.tpdos
+            if tpdo.plan.transmission_type in REMOTE_TYPES and tpdo.plan.remote_allowed
         ]
 
     def stop(self) -> None:

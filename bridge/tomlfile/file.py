@@ -110,7 +110,7 @@ class TomlFile:
             return model.model_validate(self.data)
         except ValidationError as error:
             for detail in error.errors(include_url=False):
-                self.fault(_real_key(self.data, detail["loc"]), *explain(model, detail))
+                self.fault(real_key(self.data, detail["loc"]), *explain(model, detail))
             return None
 
     def finish(self) -> None:
@@ -127,7 +127,7 @@ def dotted(key: Sequence[int | str]) -> str:
     return text
 
 
-def _real_key(data: Any, location: Sequence[int | str]) -> Key:
+def real_key(data: Any, location: Sequence[int | str]) -> Key:
     """``location`` without the tags pydantic adds for unions: only what stands in the file."""
     key: list[int | str] = []
     here = data

@@ -50,6 +50,8 @@ class Asked:
     key: str
     payload: bytes | None
     attachment: bytes | None
+    parameters: str
+    """What stands behind the ? of the selector."""
     _query: zenoh.Query
     _submit: Callable[[Callable[[zenoh.Session], None]], bool]
 
@@ -230,7 +232,8 @@ class ZenohLink:
 
         def on_query(query: zenoh.Query) -> None:
             payload, attachment = to_bytes(query.payload), to_bytes(query.attachment)
-            asked = Asked(str(query.key_expr), payload, attachment, query, self.submit)
+            parameters = str(query.parameters)
+            asked = Asked(str(query.key_expr), payload, attachment, parameters, query, self.submit)
             if not self._inbox.take_in(partial(handler, asked)):
                 query.drop()
 

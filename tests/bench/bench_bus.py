@@ -14,6 +14,7 @@ from bridge.southbound.boot import PdoPlan
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.canopen.pdo import Entry, PdoCodec
 from bridge.southbound.process_data import DrivePdos
+from bridge.southbound.words import Place
 from tests.bench.figures import cpu_us, milliseconds, show
 from tests.peers.foreign_slave import variable
 from tests.support.bench import Bench, write_site
@@ -32,13 +33,13 @@ def test_a_pdo_from_frame_to_image(tmp_path: Path) -> None:
     drive = bench.plant.drives["conveyor/fu1"]
     bench.plant.on_node(bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, 1.0)
     entries = tuple(Entry(0x3001 if n == 0 else 0x3003, max(n, 1), 16) for n in range(4))
-    plan = PdoPlan(0x185, 255, 250, PdoCodec(entries), (0, 1, 2, 3))
-    pdos = DrivePdos(drive, plan, plan, lambda frame, why: None)
+    plan = PdoPlan(0x185, 255, 250, PdoCodec(entries), tuple(Place(n) for n in range(4)))
+    (tpdo,) = DrivePdos(drive, [plan], [plan], lambda frame, why: None).tpdos
     changing, same = frames(COUNT), [Frame(0x185, bytes(8), 1.0)] * COUNT
 
     def ours(list_of: list[Frame]) -> None:
         for frame in list_of:
-            pdos.on_tpdo(frame)
+            tpdo.on_frame(frame)
 
     changed_us = cpu_us(lambda: ours(changing), COUNT)
     show("a changed PDO, from frame to image", f"{changed_us:6.2f} µs of CPU")

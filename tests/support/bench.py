@@ -122,20 +122,28 @@ class Bench:
     """``log`` has every frame of the wire in order; ``cut`` keeps the node's frames from the
     master, ``deaf_to`` those with these identifiers."""
 
-    def __init__(self, site: Site, *, present: bool = True, family: Family = NORD) -> None:
+    def __init__(
+        self,
+        site: Site,
+        *,
+        present: bool = True,
+        family: Family = NORD,
+        mapping: str = "nord/sk-tu4-cao",
+        node: Any = None,
+    ) -> None:
         self.now = BEGIN_S
         self.log: list[Frame] = []
         self.events: list[Event] = []
         self.cut = False
         self.deaf_to: frozenset[int] = frozenset()
-        self.plant = Plant(site, {"nord/sk-tu4-cao": family}, "0")
+        self.plant = Plant(site, {mapping: family}, "0")
         self.plant.on_event(self.events.append)
         self.bus = ClockBus(self._from_master)
         self.network = Network(site.bus[0], self.plant, epoch_ns)
         self.master = Master([(self.bus, self.network)], self.plant, lambda: self.now)
         self._wake_at = self.now
         self.master.attach(self._set_timer)
-        self.node = NordTu4(5)
+        self.node = NordTu4(5) if node is None else node
         self.powered = False
         if present:
             self.power_on()

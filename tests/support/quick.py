@@ -32,6 +32,8 @@ class QuickNode:
         self.state = PRE_OPERATIONAL
         self.objects = {(0x1000, 0): bytes(4), (0x1017, 0): bytes(2)}
         self.writes: list[tuple[int, int, bytes]] = []
+        self.refuses: set[int] = set()
+        """Indices that cannot be written."""
         self.toggle = 0
         self.outbox: list[Frame] = []
         self.heartbeat_at = float("inf")
@@ -73,6 +75,8 @@ class QuickNode:
                 self._answer(b"\x80" + head + struct.pack("<I", _MISSING))
             else:
                 self._answer(bytes((0x43 | (4 - len(value)) << 2,)) + head + value.ljust(4, b"\0"))
+        elif index in self.refuses:
+            self._answer(b"\x80" + head + struct.pack("<I", _MISSING))
         elif command & 0xE3 == 0x23:
             size = 4 - (command >> 2 & 3)
             value = data[4 : 4 + size]

@@ -6,7 +6,7 @@ from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Request
 from bridge.command.channel import DriveChannel
 from bridge.command.link import NodeState
 from bridge.config import DriveTable
-from bridge.drive import LinearScale
+from bridge.drive import EmergencyReader, LinearScale, Told
 from bridge.image import Value
 from bridge.mapping import Family, load_family
 
@@ -28,6 +28,11 @@ HALF_SPEED = 0x2000
 
 _ROUNDING_S = 1e-9
 """0.15 + 0.05 may come out a little less than 0.2."""
+
+
+def emergency(code: int, vendor: bytes = bytes(5)) -> Told:
+    """An emergency message of a NORD drive, read."""
+    return EmergencyReader(NORD.emcy).read(code, vendor)
 
 
 class Rig:

@@ -484,7 +484,7 @@ def test_the_methods_are_those_of_the_address_space(plant: Plant) -> None:
 
 
 def call(method: MethodNode) -> str:
-    return f"{method.browse_name}({method.argument.name if method.argument else ''})"
+    return f"{method.browse_name}({', '.join(argument.name for argument in method.arguments)})"
 
 
 def test_the_events_are_those_that_are_sent() -> None:

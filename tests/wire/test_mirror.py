@@ -139,7 +139,7 @@ async def test_a_request_carries_its_identity_and_brings_one_outcome(endpoint: s
         assert plant.drives["conveyor/fu4"].channel.owner == SCADA
         write = Request(SCADA, "conveyor/fu4", Action.WRITE, {"control_word": 0x047E, "setpoint_1": 0x1000})
         assert (await client.request(write)).ok
-        assert plant.drives["conveyor/fu4"].channel.output.words == (0x047E, 0x1000, 0, 0)
+        assert plant.drives["conveyor/fu4"].channel.output.words == (0x047E, 0x1000, 0, 0, 0)
         refused = await client.request(Request(SCADA, "conveyor/fu1", Action.WRITE, {"control_word": 0x047E}))
         assert refused == Outcome(Code.NOT_ALLOWED, "the drive is controlled by modbus", forwarded=False)
         engineer = Identity(Source.OPCUA, "eve", Role.ENGINEER)

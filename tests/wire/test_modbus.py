@@ -116,11 +116,11 @@ async def test_the_example_of_bu_2500_6_8_with_mbpoll(plant: Plant, server: Modb
     """047E → ready, 047F/2000h → 25 Hz at P105 = 50 Hz, 047E → stop."""
     status, output = await mbpoll(server, "-a", "1", "-r", "0", "-t", "4", "--", str(0x047E), "0")
     assert status == 0, output
-    assert on_the_bus(plant) == (0x047E, 0, 0, 0)
+    assert on_the_bus(plant) == (0x047E, 0, 0, 0, 0)
     drive_says(plant, READY)
     status, output = await mbpoll(server, "-a", "1", "-r", "0", "-t", "4", "--", str(0x047F), str(0x2000))
     assert status == 0, output
-    assert on_the_bus(plant) == (0x047F, 0x2000, 0, 0)
+    assert on_the_bus(plant) == (0x047F, 0x2000, 0, 0, 0)
     drive_says(plant, ENABLED, 0x2000)
     _, output = await mbpoll(server, "-a", "1", "-r", "0", "-c", "2", "-t", "3:hex")
     assert polled(output) == {0: "0x0237", 1: "0x2000"}

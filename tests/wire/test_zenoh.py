@@ -24,13 +24,13 @@ async def test_section_6_8_of_the_manual_is_played_through_zenoh() -> None:
 
         answer = await r.peer.command(f"{FU3}/command/control_word", {"v": 0x047E}, "plc")
         assert answer == {"ok": True, "forwarded": True}
-        assert r.on_the_bus == (0x047E, 0, 0, 0)
+        assert r.on_the_bus == (0x047E, 0, 0, 0, 0)
         drive_says(r.fu3, READY)
         await r.sees(f"{FU3}/status/status_word", v=READY)
 
         telegram = {"control_word": 0x047F, "setpoint_1": 0x2000}
         assert (await r.peer.command(f"{FU3}/command", telegram, "plc"))["forwarded"]
-        assert r.on_the_bus == (0x047F, 0x2000, 0, 0)
+        assert r.on_the_bus == (0x047F, 0x2000, 0, 0, 0)
         drive_says(r.fu3, ENABLED, 0x2000)
         await r.sees(f"{FU3}/status/state", s="operation_enabled")
         await r.sees(f"{FU3}/actual/frequency", v=25.0, q="good")
@@ -46,10 +46,10 @@ async def test_a_scaled_setpoint_is_written_under_its_meaning() -> None:
         drive_says(r.fu3, READY)
         assert (await r.peer.command(f"{FU3}/command/control_word", 0x047E))["ok"]
         assert (await r.peer.command(f"{FU3}/command/frequency", {"v": 12.5}))["ok"]
-        assert r.on_the_bus == (0x047E, 0x1000, 0, 0)
+        assert r.on_the_bus == (0x047E, 0x1000, 0, 0, 0)
         refused = await r.peer.command(f"{FU3}/command/frequency", {"v": 5000})
         assert refused["code"] == "out_of_range" and "Hz" in refused["message"]
-        assert r.on_the_bus == (0x047E, 0x1000, 0, 0)
+        assert r.on_the_bus == (0x047E, 0x1000, 0, 0, 0)
 
 
 async def test_methods() -> None:
@@ -164,7 +164,7 @@ async def test_plain_puts_are_commands_only_where_the_site_says_so() -> None:
             ):
                 await r.peer.do("put", f"{FU3}/command/{key}", payload=payload)
             if accept_put:
-                await until(lambda r=r: r.on_the_bus == (0x047E, 0x1000, 0, 0), "the put words")
+                await until(lambda r=r: r.on_the_bus == (0x047E, 0x1000, 0, 0, 0), "the put words")
                 await asyncio.sleep(0.1)  # what we publish ourselves on these keys is no command
                 assert r.fu3.channel.refused_writes == 0
             else:

@@ -51,6 +51,11 @@ EXCEPTIONS: Final = {
     Code.NOT_CONFIGURED: ExceptionCode.PATH_UNAVAILABLE,
     Code.TIMED_OUT: ExceptionCode.DEVICE_FAILURE,
     Code.CANCELLED: ExceptionCode.DEVICE_FAILURE,
+    Code.UNKNOWN_PARAMETER: ExceptionCode.ILLEGAL_ADDRESS,
+    Code.WRITE_ONLY: ExceptionCode.ILLEGAL_ADDRESS,
+    Code.BUSY: ExceptionCode.BUSY,
+    Code.TOO_OFTEN: ExceptionCode.ILLEGAL_FUNCTION,
+    Code.REFUSED_BY_DRIVE: ExceptionCode.DEVICE_FAILURE,
 }
 """How a request that did not succeed is told."""
 

@@ -9,8 +9,10 @@ of 0 … 31 therefore fails while there is no data, a read of 10 … 31 does not
 that are not the drive's actual values (supervision, identity) follow their own quality.
 
 Ranges: 02h where a range leaves the map, begins or ends within a 32-bit value (read or write), or a
-write touches what is not writable. Gaps inside the first 32 registers read as 0. Setpoint words the
-drive does not have, and register 9 within a longer write, take 0; anything else is 03h.
+write touches what is not writable, or more than one parameter. Gaps inside the first 32 registers read
+as 0. Setpoint words the drive does not have, and register 9 within a longer write, take 0; anything
+else is 03h. A range of nothing but words that the drive does not have is 02h, of words that its node does
+not carry 0Ah; within a longer range they read as 0 and take 0.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from bridge.northbound.modbus.registers import (
     ACKNOWLEDGE,
     DIAGNOSTICS,
     KEEP_ALIVE,
+    PARAMETERS,
     PROCESS_WORDS,
     QUALITY_BITS,
     TIMEOUT,
@@ -33,6 +36,8 @@ from bridge.northbound.modbus.registers import (
     Row,
     Table,
     Words32,
+    actual_words,
+    setpoint_words,
 )
 from bridge.northbound.modbus.unit import refuse_quality, state_code
 
@@ -44,7 +49,17 @@ _TIMEOUT_MOST_MS: Final = 32767  # P151, BU 2500 §7.1.1
 class DriveUnit:
     """One drive's unit id."""
 
-    __slots__ = ("_drive", "_halves", "_image", "_inputs", "_map", "_setpoints", "_words32")
+    __slots__ = (
+        "_drive",
+        "_halves",
+        "_image",
+        "_inputs",
+        "_map",
+        "_parameters",
+        "_setpoints",
+        "_words",
+        "_words32",
+    )
 
     def __init__(self, drive: Drive, image: Image, words32: Words32) -> None:
         self._drive = drive
@@ -53,6 +68,11 @@ class DriveUnit:
         self._map = drive_map = DriveMap(drive)
         self._inputs: Final = [(row, image.index[f"{drive.name}/{row.name}"]) for row in drive_map.inputs]
         self._setpoints: Final = [(r, image.index[f"{drive.name}/{r.name}"]) for r in drive_map.setpoints]
+        self._parameters: Final = [(r, image.index[f"{drive.name}/{r.name}"]) for r in drive_map.parameters]
+        self._words: Final = {
+            Table.INPUT_REGISTER: {place: f"actual/{word}" for place, word in actual_words(drive)},
+            Table.HOLDING_REGISTER: {place: f"command/{word}" for place, word in setpoint_words(drive)},
+        }
         self._halves: Final = {table: drive_map.second_halves(table) for table in Table}
 
     # reading
@@ -73,22 +93,42 @@ class DriveUnit:
     def read_words(self, table: Table, start: int, count: int, caller: Identity, now: float) -> Sequence[int]:
         is_input = table is Table.INPUT_REGISTER
         end = start + count
-        self._check_range(table, start, end, self._map.input_end if is_input else self._map.holding_end)
+        self._check_range(table, start, end)
+        if start >= PARAMETERS and not is_input:
+            return self._values(self._parameters, start, end, Quality.GOOD, PARAMETERS)
         if is_input:
             quality = self._drive.channel.link.quality(now)
+            if quality.has_value:
+                self._check_words(table, start, end)
             words = self._input_words(start, end, quality, now)
             if end > VALUES:
                 words += self._values(self._inputs, start, end, quality)
         else:
+            self._check_words(table, start, end)
             words = self._holding_words(caller)[start:end] if start < VALUES else []
             if end > VALUES:
                 words += self._values(self._setpoints, start, end, Quality.GOOD)
         return words
 
-    def _check_range(self, table: Table, start: int, end: int, most: int) -> None:
+    def _check_range(self, table: Table, start: int, end: int) -> None:
         halves = self._halves[table]
+        if table is Table.INPUT_REGISTER:
+            most = self._map.input_end
+        else:
+            most = self._map.holding_end if start < PARAMETERS else self._map.parameter_end
         if end > most or start in halves or end in halves:
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+
+    def _check_words(self, table: Table, start: int, end: int) -> None:
+        """A range of nothing but words that the drive does not have, or that its node does not carry."""
+        if not start or end > PROCESS_WORDS + 1:
+            return
+        words = self._words[table]
+        leaves = [words[address] for address in range(start, end) if address in words]
+        if not leaves:
+            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+        if all(leaf in self._drive.channel.unserved for leaf in leaves):
+            refuse_quality(Quality.CONFIG_ERROR)
 
     def _input_words(self, start: int, end: int, quality: Quality, now: float) -> list[int]:
         """Those of input registers 0 … 31 that are in the range."""
@@ -125,10 +165,17 @@ class DriveUnit:
         ]
         return words + [0] * (VALUES - DIAGNOSTICS - len(words))
 
-    def _values(self, values: list[tuple[Row, int]], start: int, end: int, quality: Quality) -> list[int]:
+    def _values(
+        self,
+        values: list[tuple[Row, int]],
+        start: int,
+        end: int,
+        quality: Quality,
+        first: int = VALUES,
+    ) -> list[int]:
         """The 32-bit values in the range, which begins and ends between values."""
         words: list[int] = []
-        for row, index in values[max(start - VALUES, 0) // 2 : (end - VALUES) // 2]:
+        for row, index in values[max(start - first, 0) // 2 : (end - first) // 2]:
             if row.name.startswith("actual/"):
                 # Judged now: the image learns of an expired deadline only when its timer has run.
                 refuse_quality(quality)
@@ -177,7 +224,10 @@ class DriveUnit:
         release (keep-alive 0) are taken first, then the drive is stopped and free.
         """
         end = start + len(words)
-        self._check_range(Table.HOLDING_REGISTER, start, end, self._map.holding_end)
+        self._check_range(Table.HOLDING_REGISTER, start, end)
+        self._check_words(Table.HOLDING_REGISTER, start, end)
+        if start >= PARAMETERS:
+            return [self._parameter(start, words, caller)]
         self._check_writable(start, end)
         target = self._drive.name
         block = dict(enumerate(words, start))
@@ -210,13 +260,15 @@ class DriveUnit:
 
     def _process_values(self, block: dict[int, int]) -> dict[str, Value]:
         """Registers 0 … 8 of a write as values of the command group."""
-        names = self._drive.family.process.rpdo[: PROCESS_WORDS + 1]
-        values: dict[str, Value] = {}
-        for address, word in block.items():
-            if address < len(names):
-                values[names[address]] = word
-            elif address <= PROCESS_WORDS and word:
+        leaves = self._words[Table.HOLDING_REGISTER]
+        unserved = self._drive.channel.unserved
+        values: dict[str, Value] = {"control_word": block[0]} if 0 in block else {}
+        for address in range(1, PROCESS_WORDS + 1):
+            leaf, word = leaves.get(address), block.get(address, 0)
+            if leaf is None and word:
                 raise Refused(ExceptionCode.ILLEGAL_VALUE)
+            if leaf is not None and address in block and (word or leaf not in unserved):
+                values[leaf.removeprefix("command/")] = word
         return values
 
     def _setpoint_values(self, start: int, words: Sequence[int]) -> dict[str, Value]:
@@ -224,9 +276,25 @@ class DriveUnit:
         pairs = zip(words[::2], words[1::2], strict=True)
         rows = self._map.setpoints[first : first + len(words) // 2]
         return {
-            row.name.removeprefix("command/"): self._words32.to_float(*pair)
+            row.name.removeprefix("command/"): self._value(row, pair)
             for row, pair in zip(rows, pairs, strict=True)
         }
+
+    def _value(self, row: Row, pair: Sequence[int]) -> Value:
+        """What two registers that are written say, by the type of their value."""
+        if row.type == "float32":
+            return self._words32.to_float(*pair)
+        return self._words32.to_int(*pair, signed=row.type == "int32")
+
+    def _parameter(self, start: int, words: Sequence[int], caller: Identity) -> Request:
+        """One parameter; more in one write could end half done."""
+        if len(words) != 2:
+            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+        row = self._map.parameters[(start - PARAMETERS) // 2]
+        value = self._value(row, words)
+        name = row.name.removeprefix("parameter/")
+        target = self._drive.name
+        return Request(caller, target, Action.WRITE_PARAMETER, parameter=name, value=value)
 
     def _write(self, values: Mapping[str, Value], caller: Identity) -> Request:
         return Request(caller, self._drive.name, Action.WRITE, values)

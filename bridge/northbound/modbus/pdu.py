@@ -42,6 +42,7 @@ class ExceptionCode(IntEnum):
     ILLEGAL_ADDRESS = 0x02
     ILLEGAL_VALUE = 0x03
     DEVICE_FAILURE = 0x04
+    BUSY = 0x06
     PATH_UNAVAILABLE = 0x0A
     NOT_RESPONDING = 0x0B
 

@@ -31,6 +31,8 @@ TIMEOUT: Final = 12
 DIAGNOSTICS: Final = 10
 VALUES: Final = 32
 """First register of the 32-bit values, input and holding alike."""
+PARAMETERS: Final = 1000
+"""First holding register of the writable parameters, two registers each."""
 QUALITY_BITS: Final = 16
 """First discrete input of the quality."""
 BRIDGE_DRIVES: Final = 5
@@ -79,16 +81,28 @@ class Row:
 
 
 class DriveMap:
-    """The map of one drive. ``inputs`` and ``setpoints`` are the 32-bit values from register 32 on."""
+    """The map of one drive. ``inputs`` and ``setpoints`` are the 32-bit values from register 32 on,
+    ``parameters`` those from register 1000 on."""
 
-    __slots__ = ("drive_name", "holding_end", "input_end", "inputs", "rows", "setpoints", "unit_id")
+    __slots__ = (
+        "drive_name",
+        "holding_end",
+        "input_end",
+        "inputs",
+        "parameter_end",
+        "parameters",
+        "rows",
+        "setpoints",
+        "unit_id",
+    )
 
     def __init__(self, drive: Drive) -> None:
         self.drive_name = drive.name
         self.unit_id = drive.unit_id
         points = {point.name[len(drive.name) + 1 :]: point for point in drive.points}
         fixed = (*_input_rows(drive), *_holding_rows(drive))
-        scaled = [value.name for value in drive.family.value if value.group == "actual"]
+        values = drive.family.values_of(drive.slot)
+        scaled = [value.name for value in values if value.group == "actual"]
         taken = {row.name for row in fixed}
         more = [
             leaf
@@ -100,8 +114,15 @@ class DriveMap:
         first = [f"actual/{name}" for name in scaled]
         chosen = first + [leaf for leaf in more if leaf not in first]
         self.inputs = _value_rows(Table.INPUT_REGISTER, chosen, points, "r")
-        commands = [f"command/{value.name}" for value in drive.family.value if value.group == "command"]
+        commands = [value.leaf for value in values if value.group == "command"]
         self.setpoints = _value_rows(Table.HOLDING_REGISTER, commands, points, "rw")
+        writable = [
+            leaf
+            for leaf, point in points.items()
+            if leaf.startswith("parameter/") and point.writable and point.data_type is not DataType.STRING
+        ]
+        self.parameters = _value_rows(Table.HOLDING_REGISTER, writable, points, "rw", PARAMETERS)
+        self.parameter_end = PARAMETERS + 2 * len(self.parameters)
         self.input_end = VALUES + 2 * len(self.inputs)
         self.holding_end = VALUES + 2 * len(self.setpoints)
         self.rows: tuple[Row, ...] = (
@@ -109,6 +130,7 @@ class DriveMap:
             *self.inputs,
             *(row for row in fixed if row.table is Table.HOLDING_REGISTER),
             *self.setpoints,
+            *self.parameters,
             *_bit_rows(drive),
         )
 
@@ -152,15 +174,27 @@ def _row_maker(table: Table, access: str) -> Callable[[int, str, str, str, str],
     return make
 
 
+def actual_words(drive: Drive) -> list[tuple[int, str]]:
+    """Register and name of each actual value word that the drive has; the register is the word's place in
+    its family."""
+    process = drive.family.process.tpdo
+    return [(process.index(word), word) for word in drive.family.carried(drive.slot)[1][1:]]
+
+
+def setpoint_words(drive: Drive) -> list[tuple[int, str]]:
+    """The same for the setpoint words."""
+    process = drive.family.process.rpdo
+    return [(process.index(word), word) for word in drive.family.carried(drive.slot)[0][1:]]
+
+
 def _input_rows(drive: Drive) -> list[Row]:
     row = _row_maker(Table.INPUT_REGISTER, "r")
-    words = drive.family.process.tpdo[1 : PROCESS_WORDS + 1]
     qualities = ", ".join(f"{quality.value} {quality.label}" for quality in Quality)
     states = "0 not ready, 1 switch-on inhibited, 2 ready, 3 switched on, 4 operation enabled, \
 5 quick stop active, 6 fault reaction active, 7 fault, 255 unknown"
     return [
         row(0, "status/status_word", "uint16", "", "status word; shows fault while tripped"),
-        *(row(i, f"actual/{name}", "uint16", "", "actual value, raw") for i, name in enumerate(words, 1)),
+        *(row(i, f"actual/{name}", "uint16", "", "actual value, raw") for i, name in actual_words(drive)),
         row(9, "status/drive_status_word", "uint16", "", "status word as the drive sent it"),
         row(10, "status/state", "uint16", "", states),
         row(11, "quality", "uint16", "", qualities),
@@ -176,12 +210,11 @@ def _input_rows(drive: Drive) -> list[Row]:
 
 def _holding_rows(drive: Drive) -> list[Row]:
     row = _row_maker(Table.HOLDING_REGISTER, "rw")
-    words = drive.family.process.rpdo[1 : PROCESS_WORDS + 1]
     timeout_access = "rw" if drive.channel.settings.fieldbus_timeout_writable else "r"
     name, text = "supervision/fieldbus_timeout_ms", "watchdog time, twin of P151; 0 is off"
     return [
         row(0, "command/control_word", "uint16", "", "control word"),
-        *(row(i, f"command/{leaf}", "uint16", "", "setpoint, raw") for i, leaf in enumerate(words, 1)),
+        *(row(i, f"command/{leaf}", "uint16", "", "setpoint, raw") for i, leaf in setpoint_words(drive)),
         row(KEEP_ALIVE, "keep_alive", "uint16", "", "not 0: a telegram; 0: release; reads 1 for the owner"),
         row(ACKNOWLEDGE, "acknowledge", "uint16", "", "write 1 to acknowledge a fault; reads 0"),
         Row(Table.HOLDING_REGISTER, TIMEOUT, name, "uint16", timeout_access, "ms", text),
@@ -189,7 +222,7 @@ def _holding_rows(drive: Drive) -> list[Row]:
 
 
 def _value_rows(
-    table: Table, leaves: Iterable[str], points: dict[str, Point], access: str
+    table: Table, leaves: Iterable[str], points: dict[str, Point], access: str, first: int = VALUES
 ) -> tuple[Row, ...]:
     """Two registers for each of ``leaves``; an integer stays one, so that no digit of it is lost."""
     rows: list[Row] = []
@@ -200,7 +233,7 @@ def _value_rows(
             kind = "float32"
         elif point.data_type in (DataType.INT16, DataType.INT32):
             kind = "int32"
-        rows.append(Row(table, VALUES + 2 * position, leaf, kind, access, point.unit, point.description))
+        rows.append(Row(table, first + 2 * position, leaf, kind, access, point.unit, point.description))
     return tuple(rows)
 
 
@@ -244,10 +277,16 @@ class Words32:
         return self.from_int(int.from_bytes(packed, "big"))
 
     def to_float(self, first: int, second: int) -> float:
+        return struct.unpack(">f", self._bytes(first, second))[0]
+
+    def to_int(self, first: int, second: int, *, signed: bool) -> int:
+        return int.from_bytes(self._bytes(first, second), "big", signed=signed)
+
+    def _bytes(self, first: int, second: int) -> bytes:
         high, low = (second, first) if self._swap_words else (first, second)
         if self._swap_bytes:
             high, low = _swapped(high), _swapped(low)
-        return struct.unpack(">f", struct.pack(">HH", high, low))[0]
+        return struct.pack(">HH", high, low)
 
 
 def _swapped(word: int) -> int:

@@ -86,7 +86,8 @@ class ModbusServer:
             self._make_room()
         self._sessions.add(session)
         shown = f"[{address}]" if address.version == 6 else str(address)
-        return Identity(Source.MODBUS, str(address), Role.OPERATOR, f"{shown}:{port}")
+        sets = self._settings.parameters == "write"
+        return Identity(Source.MODBUS, str(address), Role.OPERATOR, f"{shown}:{port}", sets)
 
     def leave(self, session: Session) -> None:
         self._sessions.discard(session)

@@ -26,7 +26,7 @@ from bridge.northbound.opcua.library import (
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableKind, VariableNode
 from bridge.northbound.opcua.structures import (
     Property,
-    input_arguments,
+    arguments,
     point_attributes,
     properties,
     property_attributes,
@@ -148,8 +148,10 @@ class Builder:
         )
         where = self._add(new, parent, ObjectIds.HasComponent)
         self.bindings.methods[where] = method
-        if method.argument:
-            self._property(where, method.id, input_arguments(method.argument))
+        if method.arguments:
+            self._property(where, method.id, arguments("InputArguments", method.arguments))
+        if method.results:
+            self._property(where, method.id, arguments("OutputArguments", method.results))
 
     def _variable(self, node: VariableNode, parent: ua.NodeId) -> None:
         kind = VARIANT_TYPE[node.point.data_type] if node.bit is None else ua.VariantType.Boolean

@@ -4,18 +4,29 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.command.request import Action, Identity, Request
+from bridge.command.request import PARAMETER_ACTIONS, Action, Code, Identity, Request
+from bridge.image import Value
 from bridge.northbound.opcua.library import AttributeIds, StatusCodes, get, make, status, ua
-from bridge.northbound.opcua.nodes import MethodNode
-from bridge.northbound.opcua.values import INTEGER_TYPES
+from bridge.northbound.opcua.nodes import Argument, ArgumentType, MethodNode
+from bridge.northbound.opcua.values import INTEGER_TYPES, outcome_status, plain_value, plain_variant
 from bridge.northbound.opcua.writes import ask
 from bridge.northbound.view import View
 
 _DIRECTIONS: Final = (-1, 0, 1)
+_AT_FAULT: Final = {Code.UNKNOWN_PARAMETER: 0, Code.READ_ONLY: 0, Code.WRITE_ONLY: 0, Code.OUT_OF_RANGE: 1}
+"""Which argument of a method for parameters an outcome is about."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Fault:
+    """What is wrong with an argument, as a status code."""
+
+    code: int
 
 
 class Caller:
@@ -38,18 +49,22 @@ class Caller:
         if refusal is not None:
             return _result(refusal)
         method = self._methods[method_id]
-        arguments: list[ua.Variant] = get(call, "InputArguments") or []
-        wanted = 1 if method.argument else 0
-        if len(arguments) != wanted:
-            few = len(arguments) < wanted
+        given: list[ua.Variant] = get(call, "InputArguments") or []
+        if len(given) != len(method.arguments):
+            few = len(given) < len(method.arguments)
             return _result(StatusCodes.BadArgumentsMissing if few else StatusCodes.BadTooManyArguments)
-        value = 0
-        if method.argument:
-            value, fault = _argument(method, arguments[0])
-            if fault:
-                return _result(StatusCodes.BadInvalidArgument, [status(fault)])
-        code = await ask(self._view, _request(identity, method, value))
-        return _result(code.value, [status(StatusCodes.Good)] * wanted)
+        checked = [_argument(method, *pair) for pair in zip(method.arguments, given, strict=True)]
+        faults = [one.code if isinstance(one, _Fault) else StatusCodes.Good for one in checked]
+        if any(faults):
+            return _result(StatusCodes.BadInvalidArgument, faults)
+        values = [one for one in checked if not isinstance(one, _Fault)]
+        outcome = await ask(self._view, _request(identity, method, values))
+        place = _AT_FAULT.get(outcome.code) if method.action in PARAMETER_ACTIONS else None
+        if place is not None and place < len(faults):
+            faults[place] = outcome_status(outcome).value
+            return _result(StatusCodes.BadInvalidArgument, faults)
+        results = [] if outcome.value is None or not method.results else [plain_variant(outcome.value)]
+        return _result(outcome_status(outcome).value, faults, results)
 
     def _refusal(self, call: ua.CallMethodRequest, method_id: ua.NodeId) -> int | None:
         node = self._space.get(method_id)
@@ -70,26 +85,46 @@ class Caller:
         return None
 
 
-def _argument(method: MethodNode, given: ua.Variant) -> tuple[int, int]:
-    """The argument's value and 0, or 0 and what is wrong with it. Any integer type is taken."""
-    if given.is_array or given.VariantType not in INTEGER_TYPES or not method.argument:
-        return 0, StatusCodes.BadTypeMismatch
-    low, high = method.argument.type.value
+def _argument(method: MethodNode, argument: Argument, given: ua.Variant) -> Value | _Fault:
+    """The argument's value, or what is wrong with it. Any integer type is taken for an integer."""
+    kind = argument.type.value
+    if not isinstance(kind, tuple):
+        try:
+            value = plain_value(given)
+        except TypeError:
+            return _Fault(StatusCodes.BadTypeMismatch)
+        fits = argument.type is ArgumentType.ANY or isinstance(value, str)
+        return value if fits else _Fault(StatusCodes.BadTypeMismatch)
+    if given.is_array or given.VariantType not in INTEGER_TYPES:
+        return _Fault(StatusCodes.BadTypeMismatch)
+    low, high = kind
     in_range = low <= given.Value <= high
     if not in_range or (method.action is Action.START and given.Value not in _DIRECTIONS):
-        return 0, StatusCodes.BadOutOfRange
-    return given.Value, 0
+        return _Fault(StatusCodes.BadOutOfRange)
+    return given.Value
 
 
-def _request(identity: Identity, method: MethodNode, value: int) -> Request:
+def _request(identity: Identity, method: MethodNode, values: Sequence[Value]) -> Request:
+    request = Request(identity, method.target, method.action)
     match method.action:
         case Action.START:
-            return Request(identity, method.target, method.action, direction=value)
+            return replace(request, direction=int(values[0]))
         case Action.TAKE_CONTROL:
-            return Request(identity, method.target, method.action, ttl_ms=value)
+            return replace(request, ttl_ms=int(values[0]))
+        case Action.READ_PARAMETER:
+            return replace(request, parameter=str(values[0]))
+        case Action.WRITE_PARAMETER:
+            return replace(request, parameter=str(values[0]), value=values[1])
         case _:
-            return Request(identity, method.target, method.action)
+            return request
 
 
-def _result(code: int, arguments: Sequence[ua.StatusCode] = ()) -> ua.CallMethodResult:
-    return make(ua.CallMethodResult, StatusCode=status(code), InputArgumentResults=list(arguments))
+def _result(
+    code: int, arguments: Sequence[int] = (), results: Sequence[ua.Variant] = ()
+) -> ua.CallMethodResult:
+    return make(
+        ua.CallMethodResult,
+        StatusCode=status(code),
+        InputArgumentResults=[status(one) for one in arguments],
+        OutputArguments=list(results),
+    )

@@ -26,10 +26,13 @@ class VariableKind(Enum):
 
 
 class ArgumentType(Enum):
-    """Types of method arguments with the range of their values."""
+    """Types of method arguments; integers with the range of their values."""
 
     INT32 = (-0x8000_0000, 0x7FFF_FFFF)
     UINT32 = (0, 0xFFFF_FFFF)
+    STRING = "string"
+    ANY = "any"
+    """A number, a text, true or false."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +51,8 @@ class MethodNode:
     action: Action
     target: str
     description: str
-    argument: Argument | None = None
+    arguments: tuple[Argument, ...] = ()
+    results: tuple[Argument, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,24 +88,34 @@ class ObjectNode:
 _DIRECTION: Final = Argument("direction", ArgumentType.INT32, "1 forward, -1 reverse, 0 as the drive is set")
 _TTL: Final = Argument("ttl_ms", ArgumentType.UINT32, "length of the lease in ms")
 
-_DRIVE_METHODS: Final = (
-    (Action.START, _DIRECTION, "through the drive's states to operation enabled; takes up to 3 s"),
-    (Action.STOP, None, "ramp down, then no voltage"),
-    (Action.QUICK_STOP, None, "quick stop ramp, then no voltage"),
-    (Action.DISABLE_VOLTAGE, None, "no voltage at once: the drive coasts"),
-    (Action.RESET_FAULT, None, "acknowledge a fault or a watchdog trip; the drive stays stopped"),
-    (Action.TAKE_CONTROL, _TTL, "become the controller of the drive"),
-    (Action.RELEASE_CONTROL, None, "give control back; a running drive is stopped"),
-    (Action.KEEP_ALIVE, None, "a telegram without a command: restarts the watchdog's timer"),
+_PARAMETER: Final = Argument(
+    "name", ArgumentType.STRING, "as the vendor calls it, such as P102[2], or an object such as 2066:01"
 )
-_NODE_METHODS: Final = (
-    (Action.RESET, None, "NMT reset node"),
-    (Action.RESET_COMMUNICATION, None, "NMT reset communication"),
-    (Action.START_NODE, None, "NMT start: the node is checked first"),
-    (Action.STOP_NODE, None, "NMT stop; the node stays stopped until it is started or starts again"),
-    (Action.ENTER_PRE_OPERATIONAL, None, "NMT enter pre-operational; the node stays there"),
-    (Action.ENABLE, None, "put the node in service"),
-    (Action.DISABLE, None, "take the node out of service"),
+_VALUE: Final = Argument("value", ArgumentType.ANY, "in the parameter's unit")
+
+_Methods = Sequence[tuple[Action, tuple[Argument, ...], tuple[Argument, ...], str]]
+
+_DRIVE_METHODS: Final[_Methods] = (
+    (Action.START, (_DIRECTION,), (), "through the drive's states to operation enabled; takes up to 3 s"),
+    (Action.STOP, (), (), "ramp down, then no voltage"),
+    (Action.QUICK_STOP, (), (), "quick stop ramp, then no voltage"),
+    (Action.DISABLE_VOLTAGE, (), (), "no voltage at once: the drive coasts"),
+    (Action.RESET_FAULT, (), (), "acknowledge a fault or a watchdog trip; the drive stays stopped"),
+    (Action.TAKE_CONTROL, (_TTL,), (), "become the controller of the drive"),
+    (Action.RELEASE_CONTROL, (), (), "give control back; a running drive is stopped"),
+    (Action.KEEP_ALIVE, (), (), "a telegram without a command: restarts the watchdog's timer"),
+    (Action.READ_PARAMETER, (_PARAMETER,), (_VALUE,), "read a parameter from the drive"),
+    (Action.WRITE_PARAMETER, (_PARAMETER, _VALUE), (), "write a parameter and read it back; for engineers"),
+    (Action.SAVE_PARAMETERS, (), (), "keep the node's parameters in its EEPROM; for engineers"),
+)
+_NODE_METHODS: Final[_Methods] = (
+    (Action.RESET, (), (), "NMT reset node"),
+    (Action.RESET_COMMUNICATION, (), (), "NMT reset communication"),
+    (Action.START_NODE, (), (), "NMT start: the node is checked first"),
+    (Action.STOP_NODE, (), (), "NMT stop; the node stays stopped until it is started or starts again"),
+    (Action.ENTER_PRE_OPERATIONAL, (), (), "NMT enter pre-operational; the node stays there"),
+    (Action.ENABLE, (), (), "put the node in service"),
+    (Action.DISABLE, (), (), "take the node out of service"),
 )
 
 
@@ -195,7 +209,7 @@ def _drive(node: _Branch, name: str) -> _Branch:
     return node.branch(name, make)
 
 
-def _methods(target: str, table: Sequence[tuple[Action, Argument | None, str]]) -> tuple[MethodNode, ...]:
+def _methods(target: str, table: _Methods) -> tuple[MethodNode, ...]:
     return tuple(
         MethodNode(
             f"{target}/{pascal_case(action.value)}",
@@ -203,9 +217,10 @@ def _methods(target: str, table: Sequence[tuple[Action, Argument | None, str]]) 
             action,
             target,
             description,
-            argument,
+            arguments,
+            results,
         )
-        for action, argument, description in table
+        for action, arguments, results, description in table
     )
 
 

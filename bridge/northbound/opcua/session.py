@@ -19,7 +19,7 @@ from asyncua.server.internal_server import InternalServer
 from asyncua.server.internal_session import InternalSession
 from asyncua.server.subscription_service import SubscriptionService
 
-from bridge.command.request import Identity, Role, Source
+from bridge.command.request import Action, Identity, Role, Source
 from bridge.northbound.opcua.library import (
     AttributeIds,
     ServiceError,
@@ -33,6 +33,7 @@ from bridge.northbound.opcua.library import (
     variant,
 )
 from bridge.northbound.opcua.methods import Caller
+from bridge.northbound.opcua.nodes import pascal_case
 from bridge.northbound.opcua.security import Users
 from bridge.northbound.opcua.structures import READ
 from bridge.northbound.opcua.subscriptions import Subscriptions
@@ -43,6 +44,10 @@ MOST_CALLS: Final = 100
 _BATCH: Final = 500
 _LONGEST_SESSION_MS: Final = 120_000.0
 _MOST_CONNECTIONS: Final = 100
+
+_FOR_ENGINEERS: Final = tuple(
+    f"/{pascal_case(action)}" for action in (Action.WRITE_PARAMETER, Action.SAVE_PARAMETERS)
+)
 
 _TOKEN_BYTES: Final = 32
 _OBSERVER_ACCESS: Final = data_value(variant(READ, ua.VariantType.Byte))
@@ -110,13 +115,21 @@ class Session(InternalSession):
             access = node.attributes.get(AttributeIds.AccessLevel) if node else None
             held = access.value.Value if access and access.value else None
             return value if held is None or held.Value & READ else _NOT_READABLE
-        if self.identity.role >= Role.OPERATOR or value.Value is None or not value.Value.Value:
+        if value.Value is None or not value.Value.Value or self._may(get(wanted, "NodeId")):
             return value
         if attribute == AttributeIds.UserAccessLevel:
             return _OBSERVER_ACCESS
         if attribute == AttributeIds.UserExecutable:
             return _OBSERVER_EXECUTABLE
         return value
+
+    def _may(self, where: ua.NodeId) -> bool:
+        """Whether this user may write or call ``where``, in so far as roles decide."""
+        name = str(where.Identifier)
+        if name.endswith(f"/{pascal_case(Action.READ_PARAMETER)}"):
+            return True
+        for_engineers = "/parameter/" in name or name.endswith(_FOR_ENGINEERS)
+        return self.identity.role >= (Role.ENGINEER if for_engineers else Role.OPERATOR)
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
         writes: list[ua.WriteValue] = get(params, "NodesToWrite")

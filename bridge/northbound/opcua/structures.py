@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from bridge.northbound.opcua.library import ObjectIds, make, node_id, text, ua, variant
@@ -14,7 +15,12 @@ READ_WRITE: Final = 3
 _SAMPLING_MS: Final = 50.0
 _SCALAR: Final = -1
 _ONE_DIMENSION: Final = 1
-_ARGUMENT_TYPE: Final = {ArgumentType.INT32: ObjectIds.Int32, ArgumentType.UINT32: ObjectIds.UInt32}
+_ARGUMENT_TYPE: Final = {
+    ArgumentType.INT32: ObjectIds.Int32,
+    ArgumentType.UINT32: ObjectIds.UInt32,
+    ArgumentType.STRING: ObjectIds.String,
+    ArgumentType.ANY: ObjectIds.BaseDataType,
+}
 
 Property = tuple[str, ua.Variant, int]
 """BrowseName, value, data type."""
@@ -38,15 +44,19 @@ def properties(node: VariableNode) -> list[Property]:
             return []
 
 
-def input_arguments(argument: Argument) -> Property:
-    described = make(
-        ua.Argument,
-        Name=argument.name,
-        DataType=node_id(_ARGUMENT_TYPE[argument.type]),
-        ValueRank=_SCALAR,
-        Description=text(argument.description),
-    )
-    return _structure("InputArguments", [described], ObjectIds.Argument)
+def arguments(name: str, described: Sequence[Argument]) -> Property:
+    """The property of a method called ``name``: InputArguments or OutputArguments."""
+    structures = [
+        make(
+            ua.Argument,
+            Name=argument.name,
+            DataType=node_id(_ARGUMENT_TYPE[argument.type]),
+            ValueRank=_SCALAR,
+            Description=text(argument.description),
+        )
+        for argument in described
+    ]
+    return _structure(name, structures, ObjectIds.Argument)
 
 
 def _structure(name: str, value: object, data_type: int) -> Property:

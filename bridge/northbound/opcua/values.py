@@ -35,6 +35,11 @@ OUTCOME_STATUS: Final = {
     Code.NOT_CONFIGURED: StatusCodes.BadConfigurationError,
     Code.TIMED_OUT: StatusCodes.BadTimeout,
     Code.CANCELLED: StatusCodes.BadRequestCancelledByRequest,
+    Code.UNKNOWN_PARAMETER: StatusCodes.BadNodeIdUnknown,
+    Code.WRITE_ONLY: StatusCodes.BadNotReadable,
+    Code.BUSY: StatusCodes.BadResourceUnavailable,
+    Code.TOO_OFTEN: StatusCodes.BadRequestNotAllowed,
+    Code.REFUSED_BY_DRIVE: StatusCodes.BadDeviceFailure,
 }
 
 VARIANT_TYPE: Final = {
@@ -69,8 +74,25 @@ _BITS: Final = (
 )
 
 
+ABORT_STATUS: Final = {
+    0x0601_0001: StatusCodes.BadNotReadable,
+    0x0601_0002: StatusCodes.BadNotWritable,
+    0x0602_0000: StatusCodes.BadNotFound,
+    0x0609_0011: StatusCodes.BadNotFound,
+    0x0609_0030: StatusCodes.BadOutOfRange,
+    0x0609_0031: StatusCodes.BadOutOfRange,
+    0x0609_0032: StatusCodes.BadOutOfRange,
+    0x0800_0021: StatusCodes.BadInvalidState,
+    0x0800_0022: StatusCodes.BadInvalidState,
+}
+"""What a drive means by an SDO abort code, where OPC UA has a word for it."""
+
+
 def outcome_status(outcome: Outcome) -> ua.StatusCode:
-    return status(OUTCOME_STATUS[outcome.code])
+    code = OUTCOME_STATUS[outcome.code]
+    if outcome.code is Code.REFUSED_BY_DRIVE:
+        code = ABORT_STATUS.get(outcome.abort_code, code)
+    return status(code)
 
 
 def source_time(epoch_ns: int) -> datetime:
@@ -120,3 +142,21 @@ def point_value(point: Point, written: ua.Variant) -> Value:
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"{point.name} does not take {value}")
     return value
+
+
+def plain_value(written: ua.Variant) -> Value:
+    """A single number, text, true or false, of whatever type. Raises TypeError for anything else."""
+    kind, value = written.VariantType, written.Value
+    fits = kind in _NUMBER_TYPES or kind in (ua.VariantType.String, ua.VariantType.Boolean)
+    if written.is_array or written.Dimensions or value is None or not fits:
+        raise TypeError("takes a single number, text, true or false")
+    return value
+
+
+def plain_variant(value: Value) -> ua.Variant:
+    """The value of a parameter: Boolean, Int64, Double or String."""
+    if isinstance(value, bool):
+        return variant(value, ua.VariantType.Boolean)
+    if isinstance(value, int):
+        return variant(value, ua.VariantType.Int64)
+    return variant(value, ua.VariantType.Double if isinstance(value, float) else ua.VariantType.String)

@@ -1,4 +1,5 @@
-"""The Write service: what clients write becomes telegrams, outcomes become status codes.
+"""The Write service: what clients write becomes telegrams and requests for parameters, outcomes become
+status codes.
 
 All command points of one drive in one Write call are one telegram, so that a control word and its
 setpoint reach the drive together, and each of them gets the telegram's outcome.
@@ -14,7 +15,7 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.command.request import Action, Identity, Outcome, Request
+from bridge.command.request import Action, Code, Identity, Outcome, Request
 from bridge.image import Value
 from bridge.northbound.opcua.library import GOOD, AttributeIds, StatusCodes, get, status, ua
 from bridge.northbound.opcua.nodes import VariableNode
@@ -36,20 +37,31 @@ class _Telegram:
     places: list[int] = field(default_factory=list[int])
     fault: int = StatusCodes.Good
 
+    def request(self, identity: Identity) -> Request:
+        return Request(identity, self.target, Action.WRITE, self.values)
 
-async def ask(view: View, request: Request) -> ua.StatusCode:
-    """Make a request and give its outcome as a status code."""
+
+@dataclass(slots=True)
+class _Parameter(_Telegram):
+    """One parameter that is written: a request of its own, which the drive answers."""
+
+    def request(self, identity: Identity) -> Request:
+        ((name, value),) = self.values.items()
+        return Request(identity, self.target, Action.WRITE_PARAMETER, parameter=name, value=value)
+
+
+async def ask(view: View, request: Request) -> Outcome:
+    """Make a request and wait for its outcome."""
     try:
         async with asyncio.timeout(ANSWER_LIMIT_S):
-            outcome: Outcome = await view.request(request)
+            return await view.request(request)
     except TimeoutError:
         _log.warning("%s on %s: no outcome within %g s", request.action, request.target, ANSWER_LIMIT_S)
-        return status(StatusCodes.BadTimeout)
-    return outcome_status(outcome)
+        return Outcome(Code.TIMED_OUT, "no outcome in time", forwarded=False)
 
 
 class Writer:
-    """Carries out Write calls. ``writable`` are the command points by NodeId."""
+    """Carries out Write calls. ``writable`` are the command points and parameters by NodeId."""
 
     def __init__(self, view: View, space: AddressSpace, writable: Mapping[ua.NodeId, VariableNode]) -> None:
         self._view = view
@@ -66,10 +78,14 @@ class Writer:
             if node is None or get(write, "AttributeId") != AttributeIds.Value:
                 results[place] = status(self._refusal(write))
                 continue
-            target, _, leaf = node.point.name.rpartition("/command/")
+            owner, _, leaf = node.point.name.rpartition("/")
+            target, _, group = owner.rpartition("/")
             telegram = latest.get(target)
+            if group == "parameter":
+                telegram = _Parameter(target)
+                telegrams.append(telegram)
             # The same point twice is two telegrams: the edge from one value to the other may count.
-            if telegram is None or leaf in telegram.values:
+            elif telegram is None or leaf in telegram.values:
                 telegram = latest[target] = _Telegram(target)
                 telegrams.append(telegram)
             telegram.places.append(place)
@@ -92,8 +108,7 @@ class Writer:
             # One value that does not fit takes the others with it: half a telegram is none.
             code = status(telegram.fault)
             if code.is_good():
-                request = Request(identity, telegram.target, Action.WRITE, telegram.values)
-                code = await ask(self._view, request)
+                code = outcome_status(await ask(self._view, telegram.request(identity)))
             for place in telegram.places:
                 results[place] = code
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from typing import Final
+from urllib.parse import unquote
 
 import msgspec
 
@@ -21,6 +22,7 @@ METHODS: Final = (
     Action.TAKE_CONTROL,
     Action.RELEASE_CONTROL,
     Action.KEEP_ALIVE,
+    Action.SAVE_PARAMETERS,
 )
 _WITHOUT_PAYLOAD: Final = (Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE, Action.RELEASE_CONTROL)
 """A stop is taken as it comes. Everything else must be meant: whoever reads a key by a plain get must not
@@ -41,6 +43,9 @@ ANONYMOUS: Final = "anonymous"
 
 _LONGEST: Final = 4096
 _NAME: Final = re.compile(r"[A-Za-z0-9_.\-]{1,64}")
+_PARAMETER: Final = "/parameter/"
+_CACHED_MS: Final = 2**31
+"""As old as can be: whatever was read last."""
 _HEXADECIMAL: Final = re.compile(r"0[xX][0-9A-Fa-f]{1,8}")
 
 
@@ -117,6 +122,10 @@ class Commands:
         """
         if len(payload) > _LONGEST:
             raise BadCommand(MALFORMED, f"a command has at most {_LONGEST} bytes")
+        drive, name = self.parameter(tail)
+        if name:
+            value = _decode_parameter(name, payload)
+            return Request(identity, drive, Action.WRITE_PARAMETER, parameter=name, value=value)
         owner, _, leaf = tail.rpartition("/")
         target, _, group = owner.rpartition("/")
         if leaf == "command" and owner in self._drives:
@@ -129,6 +138,21 @@ class Commands:
         if group != "command" or not point.writable:
             raise BadCommand(Code.READ_ONLY, f"{tail} is read-only; {self._how(target)}")
         return Request(identity, target, Action.WRITE, {leaf: _decode_value(point, payload)})
+
+    def parameter(self, tail: str) -> tuple[str, str]:
+        """The drive and the parameter's name where ``tail`` is ``<node>/<drive>/parameter/<name>``, or
+        empty texts.
+
+        The name may have further slashes (``C00039/1``), and what a key cannot hold (``* $ ? #``) or a
+        tool does not take (``[ ]``) may be written with per cent signs.
+        """
+        drive, found, name = tail.partition(_PARAMETER)
+        return (drive, unquote(name)) if found and drive in self._drives else ("", "")
+
+    def reading(self, drive: str, name: str, identity: Identity, *, cached: bool) -> Request:
+        """The request for the value of a parameter, from the drive or as it was last read."""
+        age_ms = _CACHED_MS if cached else 0
+        return Request(identity, drive, Action.READ_PARAMETER, parameter=name, max_age_ms=age_ms)
 
     def _unknown(self, tail: str, target: str, group: str) -> BadCommand:
         if group == "command" and target in self._drives:
@@ -165,6 +189,27 @@ def _decode_value(point: Point, payload: bytes) -> Value:
             MALFORMED, f'{point.name} takes a number or {{"v": <number>}} in JSON: {error}'
         ) from None
     return _bounded(point.name, decoded.v if isinstance(decoded, _One) else decoded)
+
+
+def _decode_parameter(name: str, payload: bytes) -> Value:
+    """A number, a text in quotes, true or false, or an object with it as ``v``; else the bare text, which
+    may be a state's."""
+    bare = payload.strip()
+    try:
+        text = bare.decode()
+    except UnicodeDecodeError:
+        raise BadCommand(MALFORMED, f"{name} takes a value in JSON or a bare text in UTF-8") from None
+    if not text:
+        raise BadCommand(MALFORMED, f"{name} takes a value, and got an empty payload")
+    if _HEXADECIMAL.fullmatch(text):
+        return int(text, 16)
+    try:
+        decoded = _one_or_bare.decode(bare)
+    except msgspec.DecodeError as error:
+        if text[0] in '{["':
+            raise BadCommand(MALFORMED, f"{name} takes a value in JSON: {error}") from None
+        return text
+    return _bounded(name, decoded.v if isinstance(decoded, _One) else decoded)
 
 
 def _decode_telegram(drive: str, payload: bytes) -> dict[str, Value]:

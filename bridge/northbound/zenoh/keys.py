@@ -47,12 +47,14 @@ class _Done(msgspec.Struct):
     ok: bool
     forwarded: bool
     message: str | msgspec.UnsetType = msgspec.UNSET
+    v: Value | msgspec.UnsetType = msgspec.UNSET
 
 
 class _Refused(msgspec.Struct):
     ok: bool
     code: str
     message: str
+    abort_code: str | msgspec.UnsetType = msgspec.UNSET
 
 
 class KeySpace:
@@ -119,14 +121,27 @@ def event_json(event: Event, epoch_ns: int) -> bytes:
 
 
 def outcome_json(outcome: Outcome) -> bytes:
-    """``{"ok": true, "forwarded": true}``, or ``{"ok": false, "code": …, "message": …}``."""
+    """``{"ok": true, "forwarded": true}``, or ``{"ok": false, "code": …, "message": …}``. A parameter that
+    was written brings ``v``, what the drive holds; one that the drive refused brings ``abort_code``."""
     if outcome.ok:
-        return _encode(_Done(True, outcome.forwarded, outcome.message or msgspec.UNSET))
-    return refusal_json(outcome.code, outcome.message)
+        value = msgspec.UNSET if outcome.value is None else outcome.value
+        return _encode(_Done(True, outcome.forwarded, outcome.message or msgspec.UNSET, value))
+    return refusal_json(outcome.code, outcome.message, outcome.abort_code)
 
 
-def refusal_json(code: str, message: str) -> bytes:
-    return _encode(_Refused(False, code, message))
+def refusal_json(code: str, message: str, abort_code: int = 0) -> bytes:
+    return _encode(_Refused(False, code, message, f"{abort_code:08X}" if abort_code else msgspec.UNSET))
+
+
+def parameter_json(value: Value, epoch_ns: int) -> bytes:
+    """A parameter that was read: ``{"v": …, "q": "good", "t": …}``, as ``as_json`` shows a point."""
+    return _encode(_Shown(value, Quality.GOOD.label, seconds(epoch_ns)))
+
+
+def parameter_bare(value: Value, epoch_ns: int) -> tuple[bytes, bytes]:
+    """The same as bare text and its attachment."""
+    text = value.encode() if isinstance(value, str) else _encode(value)
+    return text, _encode(_Beside(Quality.GOOD.label, seconds(epoch_ns)))
 
 
 def _value(reading: Reading) -> Value | None:

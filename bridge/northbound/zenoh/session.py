@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import zenoh
 
-from bridge.command import Code, Event, Outcome, Plant
+from bridge.command import Code, Event, Identity, Outcome, Plant
 from bridge.command.link import NodeState
 from bridge.config import ZenohTable
 from bridge.errors import Unavailable
@@ -123,6 +125,8 @@ class ZenohServer:
             _refuse(asked, BadCommand(MALFORMED, "a command goes to one key, without wildcards"))
         elif asked.payload is not None or self._commands.is_method(tail):
             self._command(asked, tail)
+        elif self._commands.parameter(tail)[1]:
+            self._read_parameter(asked, tail)
         elif asked.key in self._keys.index:
             asked.send([self._render(self._keys.index[asked.key])])
             asked.finish()
@@ -159,7 +163,40 @@ class ZenohServer:
                 asked.fail(payload, keys.JSON)
 
         try:
-            request = self._commands.request(tail, asked.payload or b"", identity_of(asked.attachment))
+            request = self._commands.request(tail, asked.payload or b"", self._identity(asked.attachment))
+        except BadCommand as bad:
+            _refuse(asked, bad)
+            return
+        self._plant.submit(request, self._clock(), reply)
+
+    def _identity(self, attachment: bytes | None) -> Identity:
+        """Raises ``BadCommand``."""
+        return replace(identity_of(attachment), sets_parameters=self._settings.parameters == "write")
+
+    def _read_parameter(self, asked: Asked, tail: str) -> None:
+        """A get on the key of a parameter: asked of the drive, or with ``?cached`` as it was last read."""
+        drive, name = self._commands.parameter(tail)
+        cached = "cached" in re.split("[;&=]", asked.parameters)
+        if cached and asked.key in self._keys.index:
+            asked.send([self._render(self._keys.index[asked.key])])
+            asked.finish()
+            return
+
+        def reply(outcome: Outcome) -> None:
+            if not outcome.ok or outcome.value is None:
+                asked.fail(keys.outcome_json(outcome), keys.JSON)
+                return
+            epoch_ns = self._epoch(outcome.time)
+            if self._settings.encoding == "json":
+                message = Message(asked.key, keys.parameter_json(outcome.value, epoch_ns), keys.JSON)
+            else:
+                text, attachment = keys.parameter_bare(outcome.value, epoch_ns)
+                message = Message(asked.key, text, keys.TEXT, attachment)
+            asked.send([message])
+            asked.finish()
+
+        try:
+            request = self._commands.reading(drive, name, self._identity(asked.attachment), cached=cached)
         except BadCommand as bad:
             _refuse(asked, bad)
             return
@@ -168,7 +205,7 @@ class ZenohServer:
     def _on_put(self, message: Message) -> None:
         """A plain put on a command key, where the site takes them. Nobody is there to be told."""
         try:
-            identity = identity_of(message.attachment)
+            identity = self._identity(message.attachment)
             request = self._commands.request(self._keys.tail(message.key), message.payload, identity)
         except BadCommand as bad:
             _log.info("zenoh: a put on %s is no command: %s", message.key, bad.message)

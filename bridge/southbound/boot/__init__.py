@@ -17,7 +17,7 @@ from bridge.southbound.boot.actions import (
     Write,
 )
 from bridge.southbound.boot.error_control import heartbeat_period_ms
-from bridge.southbound.boot.pdos import match_words
+from bridge.southbound.boot.layout import factory_entries, layouts, match_words
 from bridge.southbound.boot.procedure import boot
 from bridge.southbound.boot.scales import number_from, parameter_value
 from bridge.southbound.boot.status import BootError
@@ -39,7 +39,9 @@ __all__ = [
     "Step",
     "Write",
     "boot",
+    "factory_entries",
     "heartbeat_period_ms",
+    "layouts",
     "match_words",
     "number_from",
     "parameter_value",

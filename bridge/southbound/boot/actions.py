@@ -11,6 +11,7 @@ from bridge.southbound.boot.status import BootError
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
 from bridge.southbound.canopen.pdo import PdoCodec
 from bridge.southbound.canopen.sdo import SdoError
+from bridge.southbound.words import Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,16 +72,25 @@ Action = Step | Read | Write | Nmt | SendStopped | StartSupervision | Await | Aw
 
 @dataclass(frozen=True, slots=True)
 class PdoPlan:
-    """One PDO as the node has it. ``words`` gives for each entry its place in ``process.rpdo`` or
-    ``process.tpdo``, or None for what we do not know."""
+    """One PDO as the node has it. ``places`` says for each entry where it stands among the words of
+    ``process.rpdo`` or ``process.tpdo``, or None for what we do not know."""
 
     cob_id: int
     transmission_type: int
     event_timer_ms: int
     codec: PdoCodec
-    words: tuple[int | None, ...]
+    places: tuple[Place | None, ...]
     remote_allowed: bool = True
     """Bit 30 of a TPDO's COB-ID is 0: it may be asked for by remote frame."""
+    name: str = ""
+    """Such as RPDO1."""
+
+    @property
+    def words(self) -> frozenset[int]:
+        """Places of the words that it carries, whole or in part."""
+        return frozenset(
+            place.word + part for place in self.places if place is not None for part in range(place.span)
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,11 +104,14 @@ class NodePdoPlan:
 
 @dataclass(slots=True)
 class DrivePlan:
-    """Both PDOs of one drive, or the reason why it cannot be served."""
+    """The PDOs of one drive, those with control and status word first, or the reason why it cannot be
+    served. ``unserved`` has the reason for each word that they do not carry, by its leaf such as
+    ``actual/value_2``."""
 
-    rpdo: PdoPlan | None = None
-    tpdo: PdoPlan | None = None
+    rpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
+    tpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
     problem: str = ""
+    unserved: dict[str, str] = field(default_factory=dict[str, str])
 
 
 @dataclass(slots=True)

@@ -72,7 +72,7 @@ def configure(downloads: Sequence[Download], *, store: bool, result: BootResult)
         if is_pdo(part[0].index):
             written += yield from download_pdo(part)
         else:
-            written += yield from _download(part[0])
+            written += yield from download(part[0])
     if has_stamp:
         for sub, value in enumerate(stamp, 1):
             yield from _write(Download(_VERIFY, sub, value.to_bytes(4, "little")))
@@ -92,18 +92,18 @@ def _parts(downloads: Sequence[Download]) -> list[list[Download]]:
     return list(parts.values())
 
 
-def _download(download: Download) -> Generator[Action, bytes | None, int]:
-    """One object; 1 where it was written."""
-    if not download.read_back:
-        yield from _write(download)
+def download(one: Download) -> Generator[Action, bytes | None, int]:
+    """One object; 1 where it was written. Raises BootError J."""
+    if not one.read_back:
+        yield from _write(one)
         return 1
-    have = yield from optional(download.index, download.sub)
-    if same(have, download.data):
+    have = yield from optional(one.index, one.sub)
+    if same(have, one.data):
         return 0
-    yield from _write(download)
-    read = yield from _read_back(download)
-    if not same(read, download.data):
-        raise BootError("J", f"{download.name} is {_shown(read)} after {_shown(download.data)} was written")
+    yield from _write(one)
+    read = yield from _read_back(one)
+    if not same(read, one.data):
+        raise BootError("J", f"{one.name} is {_shown(read)} after {_shown(one.data)} was written")
     return 1
 
 

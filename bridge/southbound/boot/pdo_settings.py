@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.config import PdoTable
+from bridge.config.model import MappedObject
+from bridge.mapping.model import Pdo
 from bridge.southbound.boot.actions import Action, BootResult, Do, Write, number, optional
 from bridge.southbound.canopen import cobid
 from bridge.southbound.canopen.pdo import Entry, MappingError
@@ -43,6 +45,22 @@ class PdoObjects:
     parameter: int
     mapping: int
     default_cob_id: int
+
+
+def table_for(pdo: Pdo, factory: Sequence[Entry], asked: PdoTable | None) -> PdoTable | None:
+    """What this PDO is to be brought to: what the site file asks, and beside that, where the mapping file
+    says ``write``, what that has. None where nothing is to be written."""
+    if not pdo.write:
+        return asked
+    mapping = [MappedObject(index=entry.index, sub=entry.sub, bits=entry.bits) for entry in factory]
+    own: dict[str, object] = {
+        "transmission_type": pdo.transmission_type,
+        "inhibit_ms": pdo.inhibit_ms,
+        "event_ms": pdo.event_ms,
+        "mapping": mapping,
+    }
+    given = {name: getattr(asked, name) for name in asked.model_fields_set} if asked else {}
+    return PdoTable.model_validate({**own, **given})
 
 
 def set_pdo(objects: PdoObjects, wanted: PdoTable, result: BootResult) -> Do:
@@ -89,12 +107,12 @@ def _cob_id(objects: PdoObjects, wanted: PdoTable, have: int) -> int:
 
 
 def _mapping(index: int) -> Generator[Action, bytes | None, list[int]]:
-    """The mapping as the node has it; empty where it has none."""
+    """The mapping as the node has it, without places that are not used; empty where it has none."""
     count = number((yield from optional(index)))
     words = [0] * min(count, MOST_ENTRIES)
     for place in range(len(words)):
         words[place] = number((yield from optional(index, place + 1)))
-    return words
+    return [word for word in words if word]
 
 
 def write_pdo(

@@ -1,22 +1,25 @@
 """The PDOs of a drive: written where the site file or the mapping asks for it, then read back.
 
 What the node says of itself wins over the mapping file. A node without an object is taken by the mapping
-file's word, and that is noted.
+file's word, and that is noted. A drive works as long as control and status word are there; what else the
+node does not carry is noted and not served.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from bridge.command import Drive
 from bridge.command.plant import Node
 from bridge.config import PdoTable
 from bridge.image import DataType
-from bridge.mapping.model import ObjectRef, Pdo
+from bridge.mapping.model import Pdo
 from bridge.southbound.boot.actions import (
     Action,
     BootResult,
+    Do,
     DrivePlan,
     NodePdoPlan,
     PdoPlan,
@@ -25,100 +28,183 @@ from bridge.southbound.boot.actions import (
     number,
     optional,
 )
-from bridge.southbound.boot.pdo_settings import MOST_ENTRIES, PdoObjects, set_pdo
+from bridge.southbound.boot.layout import Layouts, differences, factory_entries, layouts, match_words
+from bridge.southbound.boot.pdo_settings import MOST_ENTRIES, PdoObjects, set_pdo, table_for
+from bridge.southbound.boot.start import write_start
 from bridge.southbound.canopen import cobid
 from bridge.southbound.canopen.pdo import Entry, MappingError, PdoCodec
 from bridge.southbound.canopen.sdo import SdoError
 
 _RPDO: Final = (0x1400, 0x1600)
 _TPDO: Final = (0x1800, 0x1A00)
+_BYTES: Final = 2
+
+
+class _Off(MappingError):
+    """The PDO is switched off in the node."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Direction:
+    """RPDOs or TPDOs of one drive. ``words`` has the names of each PDO's words, ``process`` all names."""
+
+    name: str
+    group: str
+    bases: tuple[int, int]
+    process: Sequence[str]
+    pdos: Sequence[Pdo]
+    words: Sequence[Sequence[str]]
+    tables: Sequence[PdoTable]
+    known: Layouts
+
+    def asked(self, pdo: Pdo) -> PdoTable | None:
+        """What the site file asks of this PDO."""
+        return next(
+            (table for table in self.tables if (table.number or self.pdos[0].number) == pdo.number), None
+        )
 
 
 def plan_drive(node: Node, drive: Drive, result: BootResult) -> Generator[Action, bytes | None, DrivePlan]:
-    """Both PDOs of one drive; what does not fit is the drive's problem, not the node's."""
+    """The PDOs of one drive; what does not fit is the drive's problem, not the node's."""
     plan = DrivePlan()
-    yield Step(f"setting and reading the process data mapping of {drive.slot.name}", "J")
+    slot, family, table = drive.slot, drive.family, drive.table
+    process = family.process
+    receives = [family.rpdo_words(pdo) for pdo in slot.rpdo]
+    sends = [family.tpdo_words(pdo) for pdo in slot.tpdo]
+    yield Step(f"setting and reading the process data mapping of {slot.name}", "J")
     try:
-        yield from _plan(node, drive, plan, result)
+        yield from write_start(drive, result)
+        for direction, found in (
+            (
+                _Direction(
+                    "RPDO", "command", _RPDO, process.rpdo, slot.rpdo, receives, table.rpdo,
+                    layouts(slot.rpdo, receives, process.rpdo),
+                ),
+                plan.rpdos,
+            ),
+            (
+                _Direction(
+                    "TPDO", "actual", _TPDO, process.tpdo, slot.tpdo, sends, table.tpdo,
+                    layouts(slot.tpdo, sends, process.tpdo),
+                ),
+                plan.tpdos,
+            ),
+        ):  # fmt: skip
+            yield from _plan(node, drive, direction, found, plan, result)
+        _require_followed(drive, plan)
     except MappingError as error:
         plan.problem = str(error)
-        result.notes.append(f"{drive.slot.name}: {error}")
+        result.notes.append(f"{slot.name}: {error}")
     return plan
 
 
+def _require_followed(drive: Drive, plan: DrivePlan) -> None:
+    """A command that follows an actual value needs it: without it, enabling might make the drive jump."""
+    for value in drive.family.values_of(drive.slot):
+        if value.follows is None:
+            continue
+        followed = next(
+            one for one in drive.family.value if (one.group, one.name) == ("actual", value.follows)
+        )
+        for word in followed.word_names:
+            why = plan.unserved.get(f"actual/{word}")
+            if why:
+                raise MappingError(f"{value.leaf} has to follow {followed.leaf}: {why}")
+
+
 def _plan(
-    node: Node, drive: Drive, plan: DrivePlan, result: BootResult
-) -> Generator[Action, bytes | None, None]:
-    slot, table = drive.slot, drive.table
-    plan.rpdo = yield from _pdo(node, slot.rpdo, table.rpdo, _RPDO, result)
-    plan.tpdo = yield from _pdo(node, slot.tpdo, table.tpdo, _TPDO, result)
-    if 0 not in plan.rpdo.words:
-        raise MappingError(f"RPDO{slot.rpdo.number} does not carry the control word")
-    if 0 not in plan.tpdo.words:
-        raise MappingError(f"TPDO{slot.tpdo.number} does not carry the status word")
-    words = len(node.family.process.rpdo)
-    if node.family.process.exact_length and plan.rpdo.codec.length != 2 * words:
+    node: Node, drive: Drive, direction: _Direction, found: list[PdoPlan], plan: DrivePlan, result: BootResult
+) -> Do:
+    """All PDOs of one direction, into ``found``. Raises MappingError where the first word is in none."""
+    first = direction.process[0]
+    reasons: dict[str, str] = {}
+    for pdo, words in zip(direction.pdos, direction.words, strict=True):
+        try:
+            one = yield from _pdo(node, drive, pdo, direction, result)
+            if direction.name == "RPDO" and node.family.process.exact_length:
+                _check_length(one, len(words))
+            found.append(one)
+        except MappingError as error:
+            if first in words:
+                raise
+            reasons |= dict.fromkeys(words, str(error))
+            expected = pdo.optional and isinstance(error, _Off) and direction.asked(pdo) is None
+            if not expected:
+                result.notes.append(f"{drive.slot.name}: {error}")
+    carried = {place for one in found for place in one.words}
+    if 0 not in carried:
+        names = " and ".join(one.name for one in found)
+        message = f"{names} does not carry" if len(found) == 1 else f"{names} do not carry"
+        raise MappingError(f"{message} the {first.replace('_', ' ')}")
+    found.sort(key=lambda one: 0 not in one.words)
+    for pdo, words in zip(direction.pdos, direction.words, strict=True):
+        for word in words:
+            if direction.process.index(word) in carried:
+                continue
+            why = reasons.get(word) or f"{direction.name}{pdo.number} of the node does not carry it"
+            plan.unserved[f"{direction.group}/{word}"] = why
+            if word not in reasons:
+                missing = f"{word} is not in {direction.name}{pdo.number}"
+                result.notes.append(f"{drive.slot.name}: {missing}")
+
+
+def _check_length(pdo: PdoPlan, words: int) -> None:
+    if pdo.codec.length != _BYTES * words:
+        plural = "word" if words == 1 else "words"
         raise MappingError(
-            f"RPDO{slot.rpdo.number} maps {plan.rpdo.codec.length} bytes; the interface "
-            f"evaluates only {words} words"
+            f"{pdo.name} maps {pdo.codec.length} bytes; the interface evaluates only {words} {plural}"
         )
 
 
 def _pdo(
-    node: Node, pdo: Pdo, wanted: PdoTable | None, bases: tuple[int, int], result: BootResult
+    node: Node, drive: Drive, pdo: Pdo, direction: _Direction, result: BootResult
 ) -> Generator[Action, bytes | None, PdoPlan]:
     """One PDO as the node has it. Raises MappingError where it is off or cannot be used."""
-    parameter, mapping = (base + pdo.number - 1 for base in bases)
+    name = f"{direction.name}{pdo.number}"
+    parameter, mapping = (base + pdo.number - 1 for base in direction.bases)
     default_id = pdo.cob_id + node.table.id
+    expected = factory_entries(pdo)
+    wanted = table_for(pdo, expected, direction.asked(pdo))
     if wanted is not None:
         yield from set_pdo(PdoObjects(parameter, mapping, default_id), wanted, result)
-    cob_id = number((yield from optional(parameter, 1)), default_id)
+    has_object = yield from optional(parameter, 1)
+    if has_object is None and pdo.optional:
+        raise _Off(f"the node has no {name}")
+    cob_id = number(has_object, default_id)
     if cob_id & cobid.PDO_DISABLED:
-        raise MappingError(f"{parameter:04X}h:01: the PDO is switched off in the node")
+        raise _Off(f"{parameter:04X}h:01: the PDO is switched off in the node")
     if cob_id & cobid.PDO_EXTENDED or not cobid.is_for_pdos(cob_id & cobid.COB_ID_MASK):
         raise MappingError(f"{parameter:04X}h:01 is {cob_id:08X}h: no identifier for a PDO")
     kind = number((yield from optional(parameter, 2)), 255)
     event_ms = 0
-    if bases is _TPDO and kind >= 254:
+    if direction.bases is _TPDO and kind >= 254:
         event_ms = number((yield from optional(parameter, 5)))
-    count = yield from optional(mapping, 0)
-    if count is None:
-        result.notes.append(f"the node has no {mapping:04X}h: taken as the mapping file has it")
-        entries = factory_entries(pdo)
-    else:
-        entries = yield from _entries(mapping, number(count))
-    words = match_words(entries, pdo.objects)
-    codec = PdoCodec(entries, {(ref.index, ref.sub) for ref in pdo.signed})
+    entries = expected
+    if not pdo.static:
+        count = yield from optional(mapping, 0)
+        if count is None:
+            result.notes.append(f"the node has no {mapping:04X}h: taken as the mapping file has it")
+        else:
+            entries = yield from _entries(mapping, number(count))
+    places = match_words(entries, direction.known)
+    told = differences(entries, expected, places)
+    result.notes += [f"{drive.slot.name}: {name}: {difference}" for difference in told]
+    codec = PdoCodec(entries, {(ref.index, ref.sub) for each in direction.pdos for ref in each.signed})
     remote_allowed = not cob_id & cobid.NO_REMOTE
-    return PdoPlan(cob_id & cobid.COB_ID_MASK, kind, event_ms, codec, words, remote_allowed)
+    return PdoPlan(cob_id & cobid.COB_ID_MASK, kind, event_ms, codec, places, remote_allowed, name)
 
 
 def refuse_doubles(result: BootResult) -> None:
     """Two drives behind one identifier would get each other's words: neither is served."""
     users: dict[int, list[DrivePlan]] = {}
     for plan in result.drives.values():
-        for pdo in (plan.rpdo, plan.tpdo):
-            if pdo is not None:
-                users.setdefault(pdo.cob_id, []).append(plan)
+        for pdo in (*plan.rpdos, *plan.tpdos):
+            users.setdefault(pdo.cob_id, []).append(plan)
     for cob_id, plans in users.items():
         for plan in plans if len(plans) > 1 else ():
             plan.problem = plan.problem or f"{cob_id:03X}h is the identifier of more than one PDO"
             if plan.problem not in result.notes:
                 result.notes.append(plan.problem)
-
-
-def factory_entries(pdo: Pdo) -> tuple[Entry, ...]:
-    """The mapping as the mapping file has it. An object that is named for several words in a row fills
-    them all."""
-    entries: list[Entry] = []
-    for refs in pdo.objects:
-        first = refs[0]
-        last = entries[-1] if entries else None
-        if last and (last.index, last.sub) == (first.index, first.sub):
-            entries[-1] = Entry(first.index, first.sub, last.bits + 16)
-        else:
-            entries.append(Entry(first.index, first.sub, 16))
-    return tuple(entries)
 
 
 def plan_node_tpdos(node: Node, result: BootResult) -> Generator[Action, bytes | None, None]:
@@ -157,20 +243,6 @@ def _entries(mapping: int, count: int) -> Generator[Action, bytes | None, tuple[
             if not error.by_server:
                 raise
             raise MappingError(str(error)) from None
-        entries = (*entries, Entry.from_object(value))
+        if value:  # some nodes have a fixed count, and 0 in the places that they do not use
+            entries = (*entries, Entry.from_object(value))
     return entries
-
-
-def match_words(entries: tuple[Entry, ...], objects: list[list[ObjectRef]]) -> tuple[int | None, ...]:
-    """For each entry the word it is, by the layout of the mapping file that explains the most of them."""
-    best: tuple[int | None, ...] = (None,) * len(entries)
-    for layout in range(max(len(refs) for refs in objects)):
-        places: dict[tuple[int, int], int] = {}
-        for word, refs in enumerate(objects):
-            ref = refs[min(layout, len(refs) - 1)]
-            # An object that fills several words begins with the first.
-            places.setdefault((ref.index, ref.sub), word)
-        found = tuple(places.get((entry.index, entry.sub)) for entry in entries)
-        if best.count(None) > found.count(None):
-            best = found
-    return best

@@ -83,8 +83,8 @@ class EmergencyLog:
         self._due = now + _EVERY_S if self._pending else None
         return told
 
-    def as_json(self, text: Callable[[int], str]) -> str:
-        """The history, newest first; ``text`` puts a code into the family's words."""
+    def as_json(self, text: Callable[[Emergency], str]) -> str:
+        """The history, newest first; ``text`` puts a message into the family's words."""
         self.changed = False
         return json.dumps(
             [
@@ -92,7 +92,7 @@ class EmergencyLog:
                     "code": f"{entry.code:04X}h",
                     "register": f"{entry.register:02X}h",
                     "vendor": entry.vendor.hex().upper(),
-                    "text": text(entry.code),
+                    "text": text(entry),
                 }
                 for entry in self._history
             ]

@@ -53,7 +53,7 @@ class TestIdle:
     def test_a_configured_time_begins_idle_and_stopped(self, rig: Rig):
         assert rig.watchdog == "idle"
         assert rig.sent == 0x0400
-        assert rig.sent_setpoints == (0, 0, 0)
+        assert rig.sent_setpoints == (0, 0, 0, 0)
 
     def test_before_the_first_telegram_nothing_expires(self, rig: Rig):
         rig.wait(3600)
@@ -204,7 +204,7 @@ class TestTripped:
         assert not rig.write(0x04FF, HALF_SPEED).forwarded
         assert rig.watchdog == "running"
         assert not rig.enables
-        assert rig.sent_setpoints == (0, 0, 0)
+        assert rig.sent_setpoints == (0, 0, 0, 0)
         assert not rig.write(ENABLE, HALF_SPEED).forwarded
         assert not rig.enables
 

@@ -302,7 +302,7 @@ class DriveByChance(RuleBasedStateMachine):
     @invariant()
     def setpoints_go_with_an_enable_alone(self) -> None:
         if self.channel.is_tripped and self.reaction != "hold":
-            assert self.rig.sent_setpoints == (0, 0, 0)
+            assert self.rig.sent_setpoints == (0, 0, 0, 0)
 
     @invariant()
     def a_start_has_one_outcome(self) -> None:

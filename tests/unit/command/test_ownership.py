@@ -76,7 +76,7 @@ class TestFixedSource:
         rig.write(SHUT_DOWN, identity=OTHER_PLC)
         rig.write(ENABLE, identity=OTHER_PLC)
         assert rig.enables
-        assert rig.sent_setpoints == (0, 0, 0)
+        assert rig.sent_setpoints == (0, 0, 0, 0)
 
 
 class TestLease:
@@ -144,7 +144,7 @@ class TestLease:
         assert not leased.enables
         assert leased.write(SHUT_DOWN, identity=OPERATOR).code is Code.NOT_ALLOWED
         leased.write(SHUT_DOWN, identity=ENGINEER)
-        assert leased.sent_setpoints == (0, 0, 0)
+        assert leased.sent_setpoints == (0, 0, 0, 0)
 
     def test_a_reader_gets_none(self, rig: Rig):
         assert rig.ask(Action.TAKE_CONTROL, OBSERVER, ttl_ms=1000).code is Code.NOT_ALLOWED

@@ -23,6 +23,7 @@ from tests.support.rig import (
     PLC,
     READY,
     SHUT_DOWN,
+    emergency,
 )
 
 SITE = """
@@ -142,9 +143,10 @@ class TestPoints:
     def test_nodes_and_buses_too(self, hall: Hall, name: str):
         assert name in hall.plant.image.index
 
-    def test_only_commands_are_writable(self, hall: Hall):
+    def test_only_commands_and_parameters_are_writable(self, hall: Hall):
         for point in hall.plant.image.points:
-            assert point.writable is ("/command/" in point.name)
+            if "/parameter/" not in point.name:
+                assert point.writable is ("/command/" in point.name)
 
     def test_a_known_scale_gives_a_range(self, hall: Hall):
         points = {point.name: point for point in hall.plant.image.points}
@@ -311,7 +313,7 @@ class TestRequests:
     def test_go_to_the_bus_at_once(self, running: Hall):
         running.flushed.clear()
         running.write(setpoint_1=0x1000)
-        assert running.flushed == [(ENABLE, 0x1000, 0, 0)]
+        assert running.flushed == [(ENABLE, 0x1000, 0, 0, 0)]
         running.write(setpoint_1=0x1000)
         assert len(running.flushed) == 1
 
@@ -341,7 +343,7 @@ class TestRequests:
         request = Request(OPERATOR, "conveyor/fu1", Action.STOP)
         with pytest.raises(ConnectionResetError):
             running.plant.submit(request, running.now, on_outcome)
-        assert running.flushed == [(SHUT_DOWN, 0, 0, 0)]
+        assert running.flushed == [(SHUT_DOWN, 0, 0, 0, 0)]
 
     def test_refused_ones_are_counted(self, running: Hall):
         assert running.write(OTHER_PLC, control_word=SHUT_DOWN).code is Code.NOT_ALLOWED
@@ -371,14 +373,14 @@ class TestRequests:
 
 
 def test_a_fault_of_the_drive_is_told_in_the_manuals_words(running: Hall):
-    running.drive.channel.on_emcy(0x2310, running.now)
+    running.drive.channel.on_emcy(emergency(0x2310), running.now)
     running.pdo(FAULT)
     assert running.value("status/emcy_code") == 0x2310
     assert running.value("status/fault_text") == "3.0 overcurrent of the inverter"
     assert [event.message for event in running.events if event.kind is Kind.EMERGENCY] == [
         "emergency 2310h: 3.0 overcurrent of the inverter"
     ]
-    running.drive.channel.on_emcy(0, running.now)
+    running.drive.channel.on_emcy(emergency(0), running.now)
     running.pdo(READY)
     assert running.value("status/fault_text") == ""
 

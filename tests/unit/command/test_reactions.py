@@ -81,8 +81,8 @@ def test_hold_goes_on_with_the_last_telegram_and_reports():
 @pytest.mark.parametrize("on_expiry", ["disable_voltage", "quick_stop", "stop", "silence"])
 def test_setpoints_go_to_zero(on_expiry: str):
     rig = tripped(on_expiry)
-    assert rig.sent_setpoints == (0, 0, 0)
-    assert rig.channel.setpoints == (0, 0, 0)
+    assert rig.sent_setpoints == (0, 0, 0, 0)
+    assert rig.channel.setpoints == (0, 0, 0, 0)
 
 
 @pytest.mark.parametrize("on_expiry", ["disable_voltage", "quick_stop", "stop"])
@@ -151,7 +151,7 @@ class TestHold:
         rig = tripped("hold")
         assert rig.ask(action, OPERATOR).ok
         assert not rig.enables
-        assert rig.sent_setpoints == (0, 0, 0)
+        assert rig.sent_setpoints == (0, 0, 0, 0)
 
     def test_a_release_stops_the_drive(self):
         rig = tripped("hold")

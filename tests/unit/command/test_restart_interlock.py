@@ -72,7 +72,7 @@ def test_the_old_enable_does_not_count_any_more(running: Rig, happens: Callable[
         assert not outcome.forwarded
         assert "restart interlock" in outcome.message
         assert not running.enables
-        assert running.sent_setpoints == (0, 0, 0)
+        assert running.sent_setpoints == (0, 0, 0, 0)
     assert running.write(SHUT_DOWN).forwarded
     assert running.write(ENABLE, HALF_SPEED).forwarded
     assert running.enables
@@ -134,7 +134,7 @@ class TestStopCommands:
     def test_stop_the_drive_whoever_owns_it(self, running: Rig, action: Action, word: int, who):
         assert running.ask(action, who).ok
         assert running.sent == word
-        assert running.sent_setpoints == (0, 0, 0)
+        assert running.sent_setpoints == (0, 0, 0, 0)
         assert running.channel.restart_interlock
 
     def test_are_not_for_those_who_may_only_read(self, running: Rig):

@@ -18,6 +18,7 @@ from tests.support.rig import (
     SHUT_DOWN,
     SWITCHED_ON,
     Rig,
+    emergency,
 )
 
 
@@ -114,7 +115,7 @@ def test_times_out_when_the_drive_does_not_follow(rig: Rig):
 def test_ends_when_the_drive_goes_into_fault(rig: Rig, word: int):
     outcomes = rig.submit(Action.START)
     rig.drive_says(READY)
-    rig.channel.on_emcy(0x2310, rig.now)
+    rig.channel.on_emcy(emergency(0x2310), rig.now)
     rig.drive_says(word)
     assert codes(outcomes) == [Code.NOT_READY]
     assert "overcurrent" in outcomes[0].message

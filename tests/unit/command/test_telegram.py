@@ -25,11 +25,11 @@ def rig() -> Rig:
 def test_the_manuals_example(rig: Rig):
     """BU 2500 §6.8 with P105 = 50 Hz: 2000h is 25 Hz, 1000h is 12.5 Hz."""
     assert rig.write(ENABLE, frequency=25.0).forwarded
-    assert rig.channel.output.words == (0x047F, 0x2000, 0, 0)
+    assert rig.channel.output.words == (0x047F, 0x2000, 0, 0, 0)
     rig.write(SHUT_DOWN)
     assert rig.sent == 0x047E
     rig.write(ENABLE, frequency=12.5)
-    assert rig.channel.output.words == (0x047F, 0x1000, 0, 0)
+    assert rig.channel.output.words == (0x047F, 0x1000, 0, 0, 0)
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_a_frequency_has_a_range(rig: Rig, frequency: Value):
     outcome = rig.write(frequency=frequency)
     assert outcome.code is Code.OUT_OF_RANGE
     assert outcome.message.startswith("frequency takes ")
-    assert rig.channel.setpoints == (0, 0, 0)
+    assert rig.channel.setpoints == (0, 0, 0, 0)
 
 
 def test_a_range_is_told_with_its_unit(rig: Rig):
@@ -74,7 +74,7 @@ def test_what_is_not_there_is_told_with_what_is(rig: Rig):
     assert outcome.code is Code.UNKNOWN_POINT
     assert outcome.message == (
         "conveyor/fu1/command has no 'velocity'; "
-        "it has control_word, setpoint_1, setpoint_2, setpoint_3, frequency"
+        "it has control_word, setpoint_1, setpoint_2, setpoint_3, setpoint_4, frequency, digital_outputs"
     )
 
 
@@ -93,7 +93,7 @@ def test_a_setpoint_and_its_raw_word_must_agree(rig: Rig):
 def test_what_is_not_written_stays(rig: Rig):
     rig.write(SHUT_DOWN, 1, 2, 3)
     rig.write(None, 7)
-    assert rig.channel.setpoints == (7, 2, 3)
+    assert rig.channel.setpoints == (7, 2, 3, 0)
     assert rig.channel.control_word == SHUT_DOWN
 
 
@@ -130,4 +130,4 @@ def test_half_a_telegram_is_not_applied(rig: Rig):
     rig.write(ENABLE, HALF_SPEED, setpoint_2=99_999)
     assert rig.write(SHUT_DOWN, 1, 70_000).code is Code.OUT_OF_RANGE
     assert rig.sent == ENABLE
-    assert rig.sent_setpoints == (HALF_SPEED, 0, 0)
+    assert rig.sent_setpoints == (HALF_SPEED, 0, 0, 0)

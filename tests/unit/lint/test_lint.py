@@ -56,13 +56,13 @@ TIMEOUT = "fieldbus_timeout_ms = 200"
 def foreign(pdo: int = 2, sdo: tuple[tuple[int, int, int], ...] = ()) -> Family:
     """A family at any address, with one drive on PDOs of this number and with further SDO channels."""
     slot = FAMILY.slot[0]
-    rpdo = Pdo(number=pdo, cob_id=0x100 + 0x100 * pdo, objects=slot.rpdo.objects)
-    tpdo = Pdo(number=pdo, cob_id=0x080 + 0x100 * pdo, objects=slot.tpdo.objects)
+    rpdo = Pdo(number=pdo, cob_id=0x100 + 0x100 * pdo, objects=slot.rpdo[0].objects)
+    tpdo = Pdo(number=pdo, cob_id=0x080 + 0x100 * pdo, objects=slot.tpdo[0].objects)
     servers = [SdoServer(number=number, request=request, reply=reply) for number, request, reply in sdo]
     return FAMILY.model_copy(
         update={
             "family": FAMILY.family.model_copy(update={"node_id_high": 127}),
-            "slot": [slot.model_copy(update={"rpdo": rpdo, "tpdo": tpdo})],
+            "slot": [slot.model_copy(update={"rpdo": [rpdo], "tpdo": [tpdo]})],
             "sdo": servers,
         }
     )
@@ -234,8 +234,9 @@ def test_nord_evaluates_four_words_only(tmp_path: Path) -> None:
 
 
 def test_a_family_with_more_words_than_a_pdo_holds(tmp_path: Path) -> None:
-    words = FAMILY.slot[0].rpdo.objects
-    wide = FAMILY.slot[0].model_copy(update={"rpdo": Pdo(number=1, cob_id=0x200, objects=[*words, words[3]])})
+    words = FAMILY.slot[0].rpdo[0].objects
+    pdo = Pdo(number=1, cob_id=0x200, objects=[*words, FAMILY.slot[0].rpdo[1].objects[0]])
+    wide = FAMILY.slot[0].model_copy(update={"rpdo": [pdo]})
     family = FAMILY.model_copy(update={"slot": [wide, *FAMILY.slot[1:]]})
     verdict = judge(tmp_path, families={NORD: family}, dictionary=None)
     assert "RPDO1 has 10 bytes, a PDO has at most 8" in only(verdict, Severity.ERROR)

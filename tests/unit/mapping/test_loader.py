@@ -131,13 +131,14 @@ def test_the_sample_is_a_family(tmp_path: Path):
         (
             'object = "2001:00"\ndata_type = "uint16"',
             'object = "2001:00"\ndata_type = "float"',
-            "28: parameter[0].data_type: must be an integer type (uint8, uint16, uint32, int16 or int32)",
+            '28: parameter[0].data_type: must be "bool", "int8", "int16", "int32", "int64", "uint8", "uint16", '
+            '"uint32", "uint64", "real32", "real64", "string" or "bytes", not "float"',
         ),
         (
             'object = "2001:00"\ndata_type = "uint16"',
             'object = "2001:00"\ndata_type = "unt16"',
-            '28: parameter[0].data_type: must be "bool", "uint8", "uint16", "uint32", "int16", "int32", '
-            '"float" or "string", not "unt16" (did you mean "uint16"?)',
+            '28: parameter[0].data_type: must be "bool", "int8", "int16", "int32", "int64", "uint8", "uint16", '
+            '"uint32", "uint64", "real32", "real64", "string" or "bytes", not "unt16" (did you mean "uint16"?)',
         ),
         ("stopped = 0", "stopped = 15", "38: control_word.stopped: 000Fh would enable the drive"),
         ("ready = 6", "ready = 0x86", "39: control_word.ready: 0086h acknowledges: bit 7 is 1"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from bridge.mapping import family_names
-from bridge.mapping.model import ObjectRef
 from tests.support.rig import NORD
 
 SLOTS = ("fu1", "fu2", "fu3", "fu4")
@@ -27,27 +26,38 @@ def test_is_one_node_with_four_drives_at_addresses_1_to_63():
 def test_cob_ids_are_those_of_the_factory(slot: str, rpdo: int, tpdo: int):
     """§6.4."""
     it = NORD.slot_named(slot)
-    assert (it.rpdo.cob_id, it.tpdo.cob_id) == (rpdo, tpdo)
-    assert it.rpdo.number == it.tpdo.number == SLOTS.index(slot) + 1
+    assert (it.rpdo[0].cob_id, it.tpdo[0].cob_id) == (rpdo, tpdo)
+    assert it.rpdo[0].number == it.tpdo[0].number == SLOTS.index(slot) + 1
 
 
 @pytest.mark.parametrize("number", range(4))
 def test_both_layouts_of_setpoints_are_known(number: int):
     """Three to a drive (§7.1.2, P165) and five to a drive (§6.7.5)."""
     slot = NORD.slot[number]
-    for pdo, word, values in ((slot.rpdo, 0x3000, 0x3002), (slot.tpdo, 0x3001, 0x3003)):
+    for pdo, word, values in ((slot.rpdo[0], 0x3000, 0x3002), (slot.tpdo[0], 0x3001, 0x3003)):
         (first, *others) = pdo.objects
-        assert first == [ObjectRef(index=word, sub=number + 1)]
-        for place, refs in enumerate(others, 1):
-            layouts = {3 * number + place, 5 * number + place}
-            assert {(ref.index, ref.sub) for ref in refs} == {(values, sub) for sub in layouts}
-            assert refs[0].sub == 3 * number + place  # the factory's first
+        assert [str(mapped) for mapped in first] == [f"{word:04X}:{number + 1:02X}"]
+        for place, mapped in enumerate(others, 1):
+            layouts = (3 * number + place, 5 * number + place)  # the factory's first
+            known = [f"{values:04X}:{sub:02X}" for sub in dict.fromkeys(layouts)]
+            assert [str(one) for one in mapped] == known
 
 
 def test_process_data_are_always_four_words():
     """§6.4, note."""
-    assert len(NORD.process.rpdo) == len(NORD.process.tpdo) == 4
+    for slot in NORD.slot:
+        assert len(NORD.rpdo_words(slot.rpdo[0])) == len(NORD.tpdo_words(slot.tpdo[0])) == 4
     assert NORD.process.exact_length
+
+
+def test_the_digital_outputs_go_with_fu1_by_rpdo5():
+    """§6.4: 240h + node id, off at factory; §6.7.5: 3004h."""
+    _, pdo = NORD.slot_named("fu1").rpdo
+    assert (pdo.number, pdo.cob_id, pdo.optional, str(pdo.objects[0][0])) == (5, 0x240, True, "3004:00")
+    assert [len(slot.rpdo) for slot in NORD.slot] == [2, 1, 1, 1]
+    assert [value.leaf for value in NORD.values_of(NORD.slot[1]) if value.group == "command"] == [
+        "command/frequency"
+    ]
 
 
 def test_emergencies_say_which_drive_in_byte_3():
@@ -57,7 +67,12 @@ def test_emergencies_say_which_drive_in_byte_3():
 
 def test_parameters_are_at_2000h_and_their_number():
     """§6.6.1: P102 is 2066h; set 1 of the first element is sub-index 1."""
-    assert {p.name: str(p.object) for p in NORD.parameter} == {"P105": "2069:01", "P112": "2070:01"}
+    objects = {p.name: str(NORD.object_of(p)) for p in NORD.parameter}
+    assert objects["P102"] == "2066:01"
+    assert (objects["P105"], objects["P112"]) == ("2069:01", "2070:01")
+    assert (objects["P543"], objects["P509"], objects["P700[2]"]) == ("221F:01", "21FD:00", "22BC:05")
+    # §7.1: the interface's own count from 1
+    assert (objects["P151"], objects["P173"]) == ("2097:01", "20AD:01")
 
 
 def test_fault_numbers_are_those_of_the_interface():

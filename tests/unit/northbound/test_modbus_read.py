@@ -12,6 +12,7 @@ from bridge.config import WordOrder
 from bridge.northbound.modbus.dispatch import EXCEPTIONS
 from bridge.northbound.modbus.pdu import Identify, identification_answer
 from bridge.northbound.modbus.registers import DriveMap, Table, Words32, bridge_rows, drive_maps
+from tests.support.rig import emergency
 from tests.unit.northbound.modbus_site import (
     ENABLED,
     OTHER_PLC,
@@ -30,7 +31,7 @@ def test_input_registers_of_a_running_drive():
     rig = Rig()
     rig.runs(ENABLED, 0x2000, 0x1234, 0xC000)
     rig.fu1.sdo_abort_code = 0x06020000
-    rig.fu1.channel.on_emcy(0x8100, rig.now)
+    rig.fu1.channel.on_emcy(emergency(0x8100), rig.now)
     rig.write(0, 0x047E)
     rig.now += 0.050
     words = rig.read(4, 0, 32)
@@ -72,7 +73,9 @@ def test_further_points_come_after_the_scaled_values_as_they_are_listed():
         "supervision/trips",
         "supervision/worst_case_stop_ms",
     ]
-    assert names[-4:] == [f"identity/{leaf}" for leaf in ("vendor", "product", "revision", "serial")]
+    ours = [name for name in names if not name.startswith("parameter/")]
+    assert ours[-4:] == [f"identity/{leaf}" for leaf in ("vendor", "product", "revision", "serial")]
+    assert names[: len(ours)] == ours
     rows = {row.name: row for row in DriveMap(rig.fu1).inputs}
     downtime, stop = rows["supervision/telegram_downtime_s"], rows["supervision/worst_case_stop_ms"]
     assert rig.read(4, downtime.address, 2) == list(float_words(0.5))
@@ -87,8 +90,10 @@ def test_nothing_is_readable_beyond_the_map():
     end = rows[-1].address + 2
     assert rig.read(4, end, 1) == [NO_ADDRESS]
     assert rig.read(4, 40, end - 40 + 1) == [NO_ADDRESS]
-    assert rig.read(3, 33, 1) == [NO_ADDRESS]
-    assert rig.read(3, 34, 1) == [NO_ADDRESS]
+    assert rig.read(3, 35, 1) == [NO_ADDRESS]
+    assert rig.read(3, 36, 1) == [NO_ADDRESS]
+    assert rig.read(3, 5, 1) == [NO_ADDRESS]
+    assert rig.read(4, 4, 5) == [NO_ADDRESS]
     assert rig.read(4, 65535, 1) == [NO_ADDRESS]
     assert rig.read(4, 65535, 125) == [NO_ADDRESS]
     assert rig.read_bits(2, 24, 1) == [NO_ADDRESS]
@@ -388,5 +393,7 @@ def test_every_listed_register_can_be_read():
         Table.INPUT_REGISTER: 4,
     }
     for row in DriveMap(rig.drive("fu2")).rows:
+        if row.name.startswith("parameter/"):
+            rig.plant.set(f"conveyor/fu2/{row.name}", 1, rig.now)
         request = struct.pack(">BHH", functions[row.table], row.address, row.size)
         assert rig.ask(request, unit=2, caller=PLC)[0] < 0x80, row

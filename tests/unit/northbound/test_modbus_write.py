@@ -42,11 +42,11 @@ def requests_of(rig: Rig) -> list[Request]:
 def test_the_example_of_bu_2500_6_8(rig: Rig):
     """P105 = 50 Hz: 047E → ready, 047F/2000h → 25 Hz, 047E → stop."""
     assert rig.write(0, 0x047E, 0) == OK
-    assert rig.sent == (0x047E, 0, 0, 0)
+    assert rig.sent == (0x047E, 0, 0, 0, 0)
     rig.runs(READY)
     assert rig.read(4, 0, 1)[0] & 0xFF == 0x31
     assert rig.write(0, 0x047F, 0x2000) == OK
-    assert rig.sent == (0x047F, 0x2000, 0, 0)
+    assert rig.sent == (0x047F, 0x2000, 0, 0, 0)
     rig.runs(ENABLED, 0x2000)
     assert rig.read(4, 0, 2) == [ENABLED, 0x2000]
     assert rig.read(4, 32, 2) == list(float_words(25.0))
@@ -77,7 +77,6 @@ def test_single_registers(rig: Rig):
     for address, word, action in (
         (0, 0x047E, "write"),
         (3, 9, "write"),
-        (8, 0, "write"),
         (10, 77, "keep_alive"),
         (11, 1, "reset_fault"),
         (11, 0, "keep_alive"),
@@ -91,8 +90,9 @@ def test_single_registers(rig: Rig):
 @pytest.mark.parametrize(
     ("start", "words", "code"),
     [
-        (4, [1], BAD_VALUE),  # a setpoint the drive does not have
-        (0, [0x047E, 0, 0, 0, 1], BAD_VALUE),
+        (5, [0], NO_ADDRESS),  # a setpoint the drive does not have
+        (5, [1, 0], NO_ADDRESS),
+        (0, [0x047E, 0, 0, 0, 0, 1], BAD_VALUE),
         (9, [0], NO_ADDRESS),
         (9, [0, 1], OK),
         (9, [1, 1], BAD_VALUE),
@@ -108,7 +108,7 @@ def test_single_registers(rig: Rig):
         (32, [0], NO_ADDRESS),
         (33, [0], NO_ADDRESS),
         (32, [0, 0, 0], NO_ADDRESS),
-        (34, [0, 0], NO_ADDRESS),
+        (36, [0, 0], NO_ADDRESS),
         (65535, [0, 0], NO_ADDRESS),
         (0, [0x007E], BAD_VALUE),  # control data valid is 0
         (0, [0x007E, 5, *[0] * 8, 1], BAD_VALUE),
@@ -138,7 +138,7 @@ def test_what_is_refused_is_no_telegram(rig: Rig):
 def test_a_float_setpoint_is_written_whole(rig: Rig):
     assert rig.write(0, 0x047E) == OK
     assert rig.write(32, *float_words(-12.5)) == OK
-    assert rig.sent == (0x047E, 0xF000, 0, 0)
+    assert rig.sent == (0x047E, 0xF000, 0, 0, 0)
     assert rig.write(32, *float_words(1.0), unit=9) == NOT_CONFIGURED
 
 
@@ -207,8 +207,33 @@ def test_mask_write(rig: Rig):
     assert rig.fu1.channel.setpoints[0] == 0x1234 & 0x00F2 | 0x0025 & 0xFF0D
     assert rig.ask("16 0009 0000 0000") == b"\x96\x02"
     assert rig.ask("16 000A 0000 0001") == b"\x96\x02"
-    assert rig.ask("16 0005 FFFF 0000") == bytes.fromhex("16 0005 FFFF 0000")
-    assert rig.ask("16 0005 0000 0001") == b"\x96\x03"
+    assert rig.ask("16 0005 FFFF 0000") == b"\x96\x02", "a setpoint the drive does not have"
+
+
+def test_a_word_that_another_drive_of_the_family_has_is_no_address(rig: Rig):
+    """setpoint_4, the digital outputs, goes with fu1."""
+    assert rig.write(0, 0x047E) == OK
+    assert rig.write(4, 3) == OK
+    assert rig.sent[4] == 3
+    assert rig.write(4, 0, unit=9) == NO_ADDRESS
+    assert rig.read(3, 4, 1, unit=9) == [-NO_ADDRESS]
+    assert rig.read(3, 3, 2, unit=9) == [0, 0]
+
+
+def test_a_word_that_the_node_does_not_carry_is_not_configured(rig: Rig):
+    rig.fu1.on_pdos({"command/setpoint_4": "RPDO5 is off"}, [], rig.now)
+    assert rig.write(4, 3) == NOT_CONFIGURED
+    assert rig.read(3, 4, 1) == [-NOT_CONFIGURED]
+    assert rig.write(0, 0x047E, 0, 0, 0, 3) == NOT_CONFIGURED
+    assert rig.write(0, 0x047E, 1, 2, 3, 0) == OK
+    assert rig.read(3, 0, 5) == [0x047E, 1, 2, 3, 0]
+
+
+def test_bits_are_written_as_a_whole_number(rig: Rig):
+    assert rig.write(0, 0x047E) == OK
+    assert rig.write(34, 0, 3) == OK
+    assert rig.sent[4] == 3
+    assert rig.write(34, 1, 0) == BAD_VALUE
 
 
 def test_read_write_writes_first(rig: Rig):

@@ -62,11 +62,12 @@ def test_every_point_has_its_node_and_no_id_is_there_twice(
     assert len(ids(trees)) == len(set(ids(trees)))
 
 
-def test_a_drive_has_all_its_folders_even_without_points(trees: tuple[ObjectNode, ...]) -> None:
+def test_a_drive_has_all_its_folders(trees: tuple[ObjectNode, ...]) -> None:
     drive = find(trees, "conveyor/fu1")
     assert [folder.id for folder in drive.objects] == [f"conveyor/fu1/{group}" for group in GROUPS]
     assert drive.objects[0].browse_name == "Command"
-    assert find(trees, "conveyor/fu1/parameter").variables == ()
+    parameters = [variable.id for variable in find(trees, "conveyor/fu1/parameter").variables]
+    assert "conveyor/fu1/parameter/p102" in parameters
 
 
 def test_site_names_stay_as_they_are_written_and_others_are_pascal_case(
@@ -89,6 +90,9 @@ def test_drives_and_nodes_have_their_methods(trees: tuple[ObjectNode, ...]) -> N
         "TakeControl",
         "ReleaseControl",
         "KeepAlive",
+        "ReadParameter",
+        "WriteParameter",
+        "SaveParameters",
     ]
     node = find(trees, "conveyor").methods
     assert [(method.action, method.target) for method in node] == [
@@ -117,8 +121,10 @@ def test_bits_without_a_meaning_are_left_out_and_none_is_writable(trees: tuple[O
     assert not any(bit.writable for bit in word.bits)
 
 
-def test_only_command_points_are_writable(trees: tuple[ObjectNode, ...]) -> None:
-    assert {v.id.split("/")[2] for v in variables(trees) if v.writable} == {"command"}
+def test_only_command_points_and_parameters_are_writable(trees: tuple[ObjectNode, ...]) -> None:
+    assert {v.id.split("/")[2] for v in variables(trees) if v.writable} == {"command", "parameter"}
+    readings = [v for v in variables(trees) if v.id == "conveyor/fu1/parameter/p700_1"]
+    assert [v.writable for v in readings] == [False]
 
 
 @pytest.mark.parametrize(

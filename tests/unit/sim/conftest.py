@@ -13,10 +13,11 @@ TPDO = (0x185, 0x285, 0x385, 0x485)
 
 
 class Bench:
-    """Time moves only in ``run``; the node is called exactly when it asked to be."""
+    """Time moves only in ``run``; the node is called exactly when it asked to be. ``node`` may be of
+    another family, whose address is 5 too where ``nmt``, ``guard`` and ``sdo`` are to reach it."""
 
-    def __init__(self, **options) -> None:
-        self.node = NordTu4(NODE, **options)
+    def __init__(self, node=None, **options) -> None:
+        self.node = NordTu4(NODE, **options) if node is None else node
         self.now = 10.0
         self.sent: list[tuple[float, Frame]] = []
         self.calls = 0
@@ -105,6 +106,12 @@ def make_bench():
         return bench
 
     return make
+
+
+@pytest.fixture
+def bench_of():
+    """A bench with this node, powered, in Pre-Operational."""
+    return Bench
 
 
 @pytest.fixture

@@ -12,13 +12,13 @@ from bridge.command.link import NodeState
 from bridge.image import Quality
 from bridge.mapping import load_family
 from bridge.mapping.model import Pdo
-from bridge.southbound.boot import PdoPlan, match_words
-from bridge.southbound.boot.pdos import factory_entries
+from bridge.southbound.boot import PdoPlan, factory_entries, layouts, match_words
 from bridge.southbound.bus.frame import REMOTE, Frame
 from bridge.southbound.canopen.pdo import Entry, MappingError, PdoCodec
 from bridge.southbound.canopen.sync import burst_length, tpdo_deadline_s
 from bridge.southbound.process_data import DrivePdos
 from bridge.southbound.remote_polling import RemotePolling
+from bridge.southbound.words import Place
 from tests.support.bench import Bench, write_site
 
 NORD = load_family("nord/sk-tu4-cao")
@@ -98,16 +98,31 @@ class Words:
         self.drive = bench.plant.drives["conveyor/fu1"]
         bench.plant.on_node(bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, 1.0)
         self.told: list[str] = []
-        self.pdos = DrivePdos(self.drive, rpdo or tpdo, tpdo, lambda frame, why: self.told.append(why))
+        self.pdos = DrivePdos(self.drive, [rpdo or tpdo], [tpdo], lambda frame, why: self.told.append(why))
 
     def receive(self, data: str) -> list[int]:
-        self.pdos.on_tpdo(Frame(0x185, bytes.fromhex(data), 2.0))
+        self.pdos.tpdos[0].on_frame(Frame(0x185, bytes.fromhex(data), 2.0))
         return self.drive.words
+
+    def sent(self, *words: int) -> bytes:
+        (frame,) = self.pdos.frames_with(words)
+        return frame.data
 
 
 def plan(*bits: int, words: tuple[int | None, ...], kind: int = 255, signed: tuple[int, ...] = ()) -> PdoPlan:
     entries = tuple(Entry(0x2000, n, length) for n, length in enumerate(bits))
-    return PdoPlan(0x185, kind, 0, PdoCodec(entries, {(0x2000, n) for n in signed}), words)
+    places = tuple(
+        None if word is None else Place(word, (length + 15) // 16)
+        for word, length in zip(words, bits, strict=True)
+    )
+    return PdoPlan(0x185, kind, 0, PdoCodec(entries, {(0x2000, n) for n in signed}), places)
+
+
+def matched(entries: tuple[Entry, ...], pdo: Pdo) -> tuple[int | None, ...]:
+    """The words that these entries are, by the layouts of this PDO; the first of those that are several."""
+    names = [f"word_{n}" for n in range(len(pdo.objects))]
+    places = match_words(entries, layouts([pdo], [names], names))
+    return tuple(None if place is None else place.word for place in places)
 
 
 @pytest.fixture
@@ -119,8 +134,7 @@ def test_a_long_object_fills_several_words_the_low_one_first(bench: Bench) -> No
     """BU 2500 §6.5.4: a position of 2800.758 rev is 002ABC76h."""
     words = Words(bench, plan(16, 32, words=(0, 1)))
     assert words.receive("370B 76BC2A00") == [0x0B37, 0xBC76, 0x002A, 0]
-    values = words.pdos.rpdo_with((0x047F, 0xBC76, 0x002A, 0))
-    assert values.data == bytes.fromhex("7F0476BC2A00")
+    assert words.sent(0x047F, 0xBC76, 0x002A, 0, 0) == bytes.fromhex("7F0476BC2A00")
 
 
 def test_a_short_signed_object_fills_its_word_with_its_sign(bench: Bench) -> None:
@@ -131,7 +145,7 @@ def test_a_short_signed_object_fills_its_word_with_its_sign(bench: Bench) -> Non
 def test_a_dummy_is_received_by_nobody_and_sent_as_zero(bench: Bench) -> None:
     words = Words(bench, plan(16, 16, 16, words=(0, None, 1)))
     assert words.receive("370B FFFF 0020") == [0x0B37, 0x2000, 0, 0]
-    assert words.pdos.rpdo_with((0x047F, 0x2000, 0, 0)).data == bytes.fromhex("7F0400000020")
+    assert words.sent(0x047F, 0x2000, 0, 0, 0) == bytes.fromhex("7F0400000020")
 
 
 def test_words_may_stand_in_any_order(bench: Bench) -> None:
@@ -156,7 +170,7 @@ def test_an_object_named_for_two_words_is_32_bits_long_where_the_node_has_no_map
     pdo = Pdo.model_validate({"number": 1, "cob_id": 0x180, "objects": objects})
     entries = factory_entries(pdo)
     assert entries == (Entry(0x6041, 0, 16), Entry(0x6064, 0, 32))
-    assert match_words(entries, pdo.objects) == (0, 1)
+    assert matched(entries, pdo) == (0, 1)
 
 
 def test_a_tpdo_of_type_253_is_asked_for(bench: Bench) -> None:
@@ -267,15 +281,15 @@ def test_they_are_polled_again_when_it_falls_silent(tmp_path: Path) -> None:
 @pytest.mark.parametrize("drives_have", [3, 5])
 def test_both_setpoint_layouts_of_the_manual_are_recognised(slot: object, drives_have: int) -> None:
     """BU 2500 §7.1.2 P165: three to a drive; §6.7.5: five to a drive."""
-    number = slot.rpdo.number  # type: ignore[attr-defined]
+    number = slot.rpdo[0].number  # type: ignore[attr-defined]
     first = (number - 1) * drives_have
     entries = (Entry(0x3000, number, 16), *(Entry(0x3002, first + n, 16) for n in (1, 2, 3)))
-    assert match_words(entries, slot.rpdo.objects) == (0, 1, 2, 3)  # type: ignore[attr-defined]
+    assert matched(entries, slot.rpdo[0]) == (0, 1, 2, 3)  # type: ignore[attr-defined]
 
 
 def test_an_object_that_the_mapping_does_not_know_has_no_word() -> None:
     entries = (Entry(0x3001, 1, 16), Entry(0x2222, 0, 16), Entry(0x3003, 2, 16))
-    assert match_words(entries, NORD.slot[0].tpdo.objects) == (0, None, 2)
+    assert matched(entries, NORD.slot[0].tpdo[0]) == (0, None, 2)
 
 
 @pytest.mark.parametrize(

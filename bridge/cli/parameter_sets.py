@@ -1,0 +1,170 @@
+"""``parameters backup``, ``compare``, ``restore``: whole parameter sets of a drive."""
+
+from __future__ import annotations
+
+import json
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridge.cli.bus import AsJson, print_table, tell
+from bridge.cli.parameter_drive import DriveArgument, SiteArgument, Target, Yes, find
+from bridge.errors import OperationFailed
+from bridge.image import Value
+from bridge.parameter import Definition, ParameterError, sets
+from bridge.parameter.codec import shown
+from bridge.parameter.set_file import SetFile, read_set
+
+FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="a parameter set, TOML")]
+
+
+def backup(
+    site: SiteArgument,
+    drive: DriveArgument,
+    file: FileArgument,
+    force: Annotated[bool, typer.Option("--force", help="write over FILE")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Read every setting that the mapping file lists, and write them to FILE."""
+    target = find(site, drive)
+    if file.exists() and not force:
+        raise typer.BadParameter(f"{file} is there already: --force writes over it")
+    found = sets.Backup()
+    target.run(lambda now: sets.back_up(target.access, found, now))
+    saved = datetime.now(UTC).isoformat(timespec="seconds")
+    entries = {entry.name: entry for entry in sets.settings(target.access.names)}
+    comments = {name: _comment(entries[name].definition) for name in found.values}
+    content = SetFile(target.node.mapping, target.name, saved, found.values, comments, found.missing)
+    try:
+        file.write_text(content.text(), encoding="utf-8")
+    except OSError as error:
+        raise OperationFailed(f"{file}: {error.strerror or error}") from None
+    if as_json:
+        print(json.dumps({"ok": True, "parameters": found.values, "missing": found.missing}))
+        return
+    missing = f"; the drive does not have {len(found.missing)} others" if found.missing else ""
+    print(f"{len(found.values)} parameters of {target.name} in {file}{missing}")
+
+
+def compare(site: SiteArgument, drive: DriveArgument, file: FileArgument, as_json: AsJson = False) -> None:
+    """Compare FILE with the drive; exit code 1 where they differ."""
+    target = find(site, drive)
+    found = _compare(target, _values(target, file))
+    _print_comparison(target, found, as_json)
+    if found.differences or found.missing:
+        raise typer.Exit(OperationFailed.exit_code)
+
+
+def restore(
+    site: SiteArgument,
+    drive: DriveArgument,
+    file: FileArgument,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="only say what would be written")] = False,
+    yes: Yes = False,
+    as_json: AsJson = False,
+) -> None:
+    """Write FILE to the drive where it differs, in the order of the mapping file, and read it back."""
+    target = find(site, drive)
+    values = _values(target, file)
+    asks = not yes and sys.stdin.isatty()
+    if dry_run or asks:
+        found = _compare(target, values)
+        _print_comparison(target, found, as_json)
+        if dry_run or not found.differences:
+            return
+        question = f"write {len(found.differences)} parameters of {target.name}?"
+        if not typer.confirm(question, err=True):
+            raise OperationFailed("nothing written")
+    done = sets.Restored()
+    try:
+        target.run(lambda now: sets.restore(target.access, values, done, now), writes=True)
+    except OperationFailed:
+        _print_restored(target, done)
+        raise
+    for warning in (one.warning for one in done.written if one.warning):
+        tell(f"warning: {warning}")
+    if as_json:
+        print(json.dumps(_as_json(done)))
+    else:
+        _print_restored(target, done)
+    if done.error:
+        raise OperationFailed(
+            f"{target.name}: {done.error}; it ended there: {len(done.written)} written, "
+            f"{len(done.left)} not come to"
+        )
+
+
+def _values(target: Target, file: Path) -> dict[str, Value]:
+    """The values of a file that fit this drive. Raises ``BadParameter`` where they do not."""
+    content = read_set(file)
+    if content.mapping != target.node.mapping:
+        raise typer.BadParameter(
+            f"{file} is of {content.mapping}, and {target.name} has {target.node.mapping}"
+        )
+    values = dict(content.values)
+    try:
+        sets.in_order(target.access.names, values)
+    except ParameterError as error:
+        raise typer.BadParameter(f"{file}: {error}") from None
+    return values
+
+
+def _compare(target: Target, values: dict[str, Value]) -> sets.Comparison:
+    found = sets.Comparison()
+    target.run(lambda now: sets.compare(target.access, values, found, now))
+    return found
+
+
+def _print_comparison(target: Target, found: sets.Comparison, as_json: bool) -> None:
+    if as_json:
+        differences = [
+            {"name": one.entry.name, "in_drive": one.in_drive, "in_file": one.in_set, "unit": one.entry.unit}
+            for one in found.differences
+        ]
+        same = not found.differences and not found.missing
+        facts = {"ok": same, "same": len(found.same), "differences": differences, "missing": found.missing}
+        print(json.dumps(facts))
+        return
+    if found.differences:
+        rows = [
+            (one.entry.name, shown(one.entry, one.in_drive), shown(one.entry, one.in_set))
+            for one in found.differences
+        ]
+        print_table([("name", "in the drive", "in the file"), *rows])
+    for name in found.missing:
+        print(f"{name}: the drive does not have it")
+    print(f"{target.name}: {len(found.differences)} differ, {len(found.same)} are the same")
+
+
+def _print_restored(target: Target, done: sets.Restored) -> None:
+    for one in done.written:
+        was = "" if one.before is None else f", was {shown(one.reading.entry, one.before)}"
+        print(f"{one.reading}{was}")
+    for name in done.missing:
+        print(f"{name}: the drive does not have it")
+    print(f"{target.name}: {len(done.written)} written, {len(done.same)} were the same")
+
+
+def _as_json(done: sets.Restored) -> dict[str, object]:
+    return {
+        "ok": done.error is None,
+        "written": [
+            {"name": one.reading.entry.name, "value": one.reading.value, "before": one.before}
+            for one in done.written
+        ],
+        "same": len(done.same),
+        "missing": done.missing,
+        "failed": done.failed or None,
+        "message": str(done.error or ""),
+        "left": done.left,
+    }
+
+
+def _comment(definition: Definition | None) -> str:
+    if definition is None:
+        return ""
+    unit = f"{definition.unit}, " if definition.unit else ""
+    return f"{unit}{definition.title}"

@@ -1,0 +1,204 @@
+"""What a drive tells in its TPDOs, in the image: words, values made of them, and how good they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from bridge.command.channel import DriveChannel
+from bridge.drive import LinearScale, ValueCodec
+from bridge.image import Image, Quality, Value
+from bridge.mapping.model import Family, Slot
+
+_GOOD: Final = (Quality.GOOD, "")
+_STATUS: Final = ("status_word", "drive_status_word", "state", "emcy_code")
+
+
+@dataclass(slots=True)
+class FurtherTpdo:
+    """A TPDO beside the one with the status word: what is in it has an age of its own.
+
+    ``places`` are those of its words in ``process.tpdo``; ``deadline_s`` is the longest regular pause
+    between two of them, None where it comes with changes only.
+    """
+
+    name: str
+    places: frozenset[int]
+    deadline_s: float | None
+    last: float | None = None
+    quality: Quality = Quality.WAITING
+
+    def on_data(self, now: float) -> bool:
+        """It has come; True where its values were not good before."""
+        self.last = now
+        was_good = self.quality is Quality.GOOD
+        self.quality = Quality.GOOD
+        return not was_good
+
+    def on_time(self, now: float) -> bool:
+        """True where it is late from now on."""
+        if self.quality is not Quality.GOOD or self.last is None or self.deadline_s is None:
+            return False
+        if now < self.last + self.deadline_s:
+            return False
+        self.quality = Quality.STALE
+        return True
+
+
+class _Plain(NamedTuple):
+    """One signed word times a factor: value = word × full / at."""
+
+    place: int
+    full: float
+    at: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Judged:
+    """One point of the process data: why it is not served, if so, and the further TPDO it comes by."""
+
+    index: int
+    why: str = ""
+    further: FurtherTpdo | None = None
+
+
+class ActualData:
+    """The process data of one drive. A PDO costs one comparison per value."""
+
+    def __init__(self, name: str, family: Family, slot: Slot, channel: DriveChannel) -> None:
+        self._name = name
+        self._channel = channel
+        self._process = family.process.tpdo
+        self.words: list[int] = [0] * len(self._process)
+        """The words of the last TPDOs, the status word first."""
+        self.quality = Quality.WAITING
+        self._carried = family.carried(slot)[1][1:]
+        self._places = [self._process.index(word) for word in self._carried]
+        self._has_all = len(self._carried) == len(self._process) - 1
+        self._codecs = [
+            ValueCodec(value, self._process) for value in family.values_of(slot) if value.group == "actual"
+        ]
+        # Those that most drives have go first: they are computed without a call.
+        self._codecs.sort(key=lambda codec: not codec.is_plain)
+        self._plain: list[_Plain] = []
+        self._others: list[ValueCodec] = []
+        self._further: list[FurtherTpdo] = []
+        self._judged: list[_Judged] = []
+        self._status: list[int] = []
+        self._indices: list[int] = []
+        self._shown: tuple[Quality, str] | None = None
+        """Quality and reason as the image has them for the process data."""
+
+    def bind(self, image: Image) -> None:
+        self._image = image
+        self._status = [image.index[f"{self._name}/status/{leaf}"] for leaf in _STATUS]
+        leaves = [f"actual/{word}" for word in self._carried]
+        leaves += [codec.model.leaf for codec in self._codecs]
+        self._indices = [image.index[f"{self._name}/{leaf}"] for leaf in leaves]
+        self.compile(self._channel.scales, self._channel.unserved)
+
+    def compile(self, scales: Mapping[str, LinearScale], unserved: Mapping[str, str]) -> None:
+        """Take over what the boot-up has found."""
+        for codec in self._codecs:
+            codec.scale = scales.get(codec.model.leaf)
+        plain = [codec for codec in self._codecs if codec.is_plain]
+        self._others = [codec for codec in self._codecs if not codec.is_plain]
+        self._plain = [
+            _Plain(codec.places[0], codec.scale.full, codec.scale.at)
+            if codec.scale
+            else _Plain(codec.places[0], 1, 1)
+            for codec in plain
+        ]
+        self._judged = list(self._to_judge(unserved))
+        self._shown = None
+
+    def _to_judge(self, unserved: Mapping[str, str]) -> Iterable[_Judged]:
+        for index in self._status:
+            yield _Judged(index)
+        rest = iter(self._indices)
+        for word, place in zip(self._carried, self._places, strict=True):
+            yield _Judged(next(rest), unserved.get(f"actual/{word}", ""), self._further_of((place,)))
+        for codec in self._codecs:
+            why = unserved.get(codec.model.leaf) or codec.why_unknown
+            yield _Judged(next(rest), why, self._further_of(codec.places))
+
+    def _further_of(self, places: Sequence[int]) -> FurtherTpdo | None:
+        return next((pdo for pdo in self._further if not pdo.places.isdisjoint(places)), None)
+
+    def set_further(self, further: Sequence[FurtherTpdo]) -> None:
+        """The TPDOs beside the one with the status word; ``compile`` follows."""
+        self._further = list(further)
+
+    def on_further(self, pdo: FurtherTpdo, now: float) -> None:
+        """One of them has brought words."""
+        if pdo.on_data(now):
+            self._shown = None
+        self.refresh(now)
+
+    def on_time(self, now: float) -> None:
+        """Judge the age of further TPDOs; called a few times a second."""
+        late = [pdo for pdo in self._further if pdo.on_time(now)]
+        if late:
+            self._shown = None
+            self.refresh(now)
+
+    def on_words(self, words: Sequence[int], now: float) -> None:
+        """The TPDO with the status word has brought these."""
+        held, channel = self.words, self._channel
+        has_new_status = words[0] != held[0]
+        held[:] = words
+        channel.on_pdo(now)
+        channel.on_status_word(words[0], now)
+        if has_new_status or not self._is_good(now):
+            self.refresh(now)
+        else:
+            self._refresh_values(now)
+
+    def refresh(self, now: float) -> None:
+        channel = self._channel
+        if not self._is_good(now):
+            quality = channel.link.quality(now)
+            self._judge(quality, now)
+            if not quality.has_value:
+                return
+        status = (
+            channel.status_word,
+            channel.drive_status_word,
+            int(channel.served_state),
+            channel.emcy_code,
+        )
+        self._image.set_values(self._status, status, now)
+        self._refresh_values(now)
+
+    def _is_good(self, now: float) -> bool:
+        """The process data are good, and the image says so."""
+        return self._shown is _GOOD and self._channel.link.quality(now) is Quality.GOOD
+
+    def _refresh_values(self, now: float) -> None:
+        """What TPDOs bring beside the status word, as it is and as values."""
+        words = self.words
+        values: list[Value] = words[1:] if self._has_all else [words[place] for place in self._places]
+        for place, full, at in self._plain:
+            word = words[place]
+            values.append((word - 0x1_0000 if word & 0x8000 else word) * full / at)
+        if self._others:
+            values.extend(codec.from_words(words) for codec in self._others)
+        self._image.set_values(self._indices, values, now)
+
+    def _judge(self, quality: Quality, now: float) -> None:
+        """Show another quality, or another reason for a bad one."""
+        self.quality = quality
+        reason = self._channel.link.reason(quality)
+        if (quality, reason) == self._shown:
+            return
+        self._shown = _GOOD if quality is Quality.GOOD else (quality, reason)
+        for point in self._judged:
+            own, why = quality, reason
+            if quality.has_value and point.why:
+                own, why = Quality.CONFIG_ERROR, point.why
+            elif quality.has_value and point.further and point.further.quality is not Quality.GOOD:
+                is_worse = quality is Quality.GOOD or point.further.quality is Quality.WAITING
+                if is_worse:
+                    own, why = point.further.quality, f"no {point.further.name} from the drive"
+            self._image.judge((point.index,), own, now, why)

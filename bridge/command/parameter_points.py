@@ -1,0 +1,38 @@
+"""The points of a drive's parameters, ``<node>/<drive>/parameter/…``: those that the mapping shows."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.image import DataType, Point
+from bridge.mapping.model import Family
+from bridge.parameter import Definition, Entry, Names
+
+_MOST_STATES: Final = 256
+"""An enumeration is shown as a list of texts from code 0 on (OPC UA Part 8 §5.3.3.3)."""
+
+
+def parameter_points(name: str, family: Family) -> list[Point]:
+    """The points of the drive called ``<node>/<drive>``, in the order of the mapping file."""
+    return [_point(f"{name}/parameter/{entry.leaf}", entry) for entry in Names(family).points()]
+
+
+def _point(name: str, entry: Entry) -> Point:
+    definition = entry.definition
+    if definition is None:
+        return Point(name=name, data_type=DataType.UINT32, description=entry.name)
+    return Point(
+        name=name,
+        data_type=definition.value_type,
+        unit=definition.unit,
+        low=definition.low,
+        high=definition.high,
+        writable=definition.writable,
+        description=f"{entry.name} {definition.title}",
+        states=definition.states if _can_be_listed(definition) else (),
+    )
+
+
+def _can_be_listed(definition: Definition) -> bool:
+    is_integer = definition.value_type.is_integer
+    return is_integer and all(0 <= code < _MOST_STATES for code, _ in definition.states)

@@ -1,0 +1,110 @@
+"""What CANopen itself sends: NMT, SYNC, heartbeats, emergency messages (CiA 301 §7.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from bridge.config import BusTable, NodeTable
+from bridge.dbc.model import BRIDGE, Message, Signal
+from bridge.mapping.model import EmcyTable, Family
+from bridge.southbound.boot.error_control import heartbeat_period_ms
+from bridge.southbound.canopen import cobid
+from bridge.southbound.canopen.nmt import NmtCommand, NmtState
+
+_NMT_BYTES: Final = 2
+_EMCY_BYTES: Final = 8
+_FIRST_VENDOR_BYTE: Final = 3
+_HEARTBEAT_STATES: Final = {0: "boot-up"} | {
+    state.value: state.label.replace("_", " ")
+    for state in NmtState
+    if state not in (NmtState.INITIALISING, NmtState.UNKNOWN)
+}
+
+
+def bus_messages(bus: BusTable) -> Iterator[Message]:
+    """What the bridge sends to all."""
+    receivers = tuple(node.name for node in bus.node)
+    commands = {command.value: command.name.lower().replace("_", " ") for command in NmtCommand}
+    yield Message(
+        cobid.NMT,
+        "NMT",
+        _NMT_BYTES,
+        BRIDGE,
+        receivers,
+        (
+            Signal("nmt_command", 0, 8, choices=commands),
+            Signal("nmt_node", 8, 8, low=0, high=127, comment="0: all nodes"),
+        ),
+    )
+    if bus.sync_period_ms:
+        counter = Signal("sync_counter", 0, 8, low=1, high=bus.sync_counter)
+        signals = (counter,) if bus.sync_counter else ()
+        length = len(signals)
+        yield Message(cobid.SYNC, "SYNC", length, BRIDGE, receivers, signals, cycle_ms=bus.sync_period_ms)
+    if bus.heartbeat_ms:
+        cob_id = cobid.ERROR_CONTROL + bus.master_node_id
+        signals = _heartbeat_signals(guarded=False)
+        yield Message(cob_id, f"{BRIDGE}_heartbeat", 1, BRIDGE, receivers, signals, cycle_ms=bus.heartbeat_ms)
+
+
+def node_messages(node: NodeTable, family: Family) -> Iterator[Message]:
+    """What a node sends beside its PDOs."""
+    guarded = node.supervision == "guarding"
+    period_ms = heartbeat_period_ms(node.supervision_ms)
+    cycle_ms = {"heartbeat": period_ms, "guarding": node.supervision_ms}.get(node.supervision, 0)
+    yield Message(
+        cobid.ERROR_CONTROL + node.id,
+        f"{node.name}_heartbeat",
+        1,
+        node.name,
+        (BRIDGE,),
+        _heartbeat_signals(guarded=guarded),
+        "boot-up, and the answers to node guarding" if guarded else "boot-up and heartbeat",
+        cycle_ms,
+    )
+    signals = tuple(_emcy_signals(family.emcy, _drives(node, family)))
+    yield Message(cobid.EMCY + node.id, f"{node.name}_EMCY", _EMCY_BYTES, node.name, (BRIDGE,), signals)
+
+
+def _heartbeat_signals(*, guarded: bool) -> tuple[Signal, ...]:
+    state = Signal("nmt_state", 0, 7, choices=_HEARTBEAT_STATES)
+    return (state, Signal("toggle", 7, 1, low=0, high=1)) if guarded else (state,)
+
+
+def _drives(node: NodeTable, family: Family) -> dict[int, str]:
+    """Names of the drives as the emergency message's drive byte has them."""
+    names = {drive.slot: drive.name or drive.slot for drive in node.drive}
+    return {
+        slot.emcy_drive: names.get(slot.name, slot.name)
+        for slot in family.slot
+        if slot.emcy_drive is not None
+    }
+
+
+def _emcy_signals(emcy: EmcyTable, drives: dict[int, str]) -> Iterator[Signal]:
+    codes = {int(code, 16): text for code, text in emcy.codes.items() if not code.endswith("xx")}
+    events = {int(number): text for number, text in emcy.events.items()}
+    yield Signal("error_code", 0, 16, choices=codes)
+    yield Signal("error_register", 16, 8)
+    own: list[Signal] = []
+    if emcy.drive_byte is not None and emcy.drive_byte >= _FIRST_VENDOR_BYTE:
+        own.append(_byte("drive", emcy.drive_byte, drives))
+    if emcy.event is not None:
+        own.append(_byte("event", emcy.event.byte, events))
+        if emcy.event.cause_byte is not None:
+            own.append(_byte("event_cause", emcy.event.cause_byte, {}))
+    if emcy.number is not None:
+        number = emcy.number
+        listed = ", ".join(f"{code}h" for code in number.codes)
+        comment = f"with the codes {listed}"
+        own.append(Signal("error_number", 8 * number.byte, 8 * number.size, choices=events, comment=comment))
+    taken = {bit for signal in own for bit in range(signal.start, signal.start + signal.length)}
+    yield from own
+    for byte in range(_FIRST_VENDOR_BYTE, _EMCY_BYTES):
+        if taken.isdisjoint(range(8 * byte, 8 * byte + 8)):
+            yield _byte(f"manufacturer_{byte}", byte, {})
+
+
+def _byte(name: str, byte: int, choices: dict[int, str]) -> Signal:
+    return Signal(name, 8 * byte, 8, choices=choices, comment=f"byte {byte}")

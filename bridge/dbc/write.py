@@ -1,0 +1,67 @@
+"""A described bus as the text of a DBC file, by cantools."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from cantools.database.can import Bus, Database, Node
+from cantools.database.can import Message as DbcMessage
+from cantools.database.can import Signal as DbcSignal
+from cantools.database.can.signal_group import SignalGroup
+from cantools.database.conversion import BaseConversion
+
+from bridge.dbc.model import BusDescription, Message, Signal
+
+ENCODING: Final = "cp1252"
+"""What tools take a DBC file to be written in."""
+
+
+def dbc_text(bus: BusDescription) -> str:
+    """The file; names longer than the format's 32 characters are kept in attributes."""
+    database = Database(
+        messages=[_message(message) for message in bus.messages],
+        nodes=[Node(name, _plain(comment)) for name, comment in bus.nodes.items()],
+        buses=[Bus(bus.name, _plain(bus.comment), bus.bitrate)],
+    )
+    return database.as_dbc_string()
+
+
+def _message(message: Message) -> DbcMessage:
+    return DbcMessage(
+        message.cob_id,
+        message.name,
+        message.length,
+        [_signal(signal, message.receivers) for signal in message.signals],
+        comment=_plain(message.comment),
+        senders=[message.sender],
+        cycle_time=message.cycle_ms or None,
+        signal_groups=[SignalGroup(name, 1, list(names)) for name, names in message.groups.items()],
+    )
+
+
+def _signal(signal: Signal, receivers: tuple[str, ...]) -> DbcSignal:
+    choices = {value: _plain(text) or "-" for value, text in signal.choices.items()} or None
+    return DbcSignal(
+        signal.name,
+        signal.start,
+        signal.length,
+        "little_endian",
+        signal.is_signed,
+        conversion=BaseConversion.factory(_number(signal.factor), _number(signal.offset), choices),
+        minimum=signal.low,
+        maximum=signal.high,
+        unit=_plain(signal.unit) or None,
+        comment=_plain(signal.comment),
+        receivers=list(receivers),
+    )
+
+
+def _number(value: float) -> float:
+    """A whole number as an integer: so it stands in the file as one."""
+    return int(value) if value == int(value) else value
+
+
+def _plain(text: str) -> str | None:
+    """``text`` as it may stand between quotation marks, in the characters that the format has."""
+    known = text.encode(ENCODING, "replace").decode(ENCODING)
+    return " ".join(known.replace("\\", "/").replace('"', "'").split()) or None

@@ -1,0 +1,59 @@
+"""What an emergency message says in a family's words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.mapping.model import EmcyTable
+
+_VENDOR_BYTE: Final = 3
+"""The manufacturer's bytes begin here (CiA 301 §7.2.7.3.1)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """``is_gone``: it says that there is no fault any more. ``number`` is the family's own number of the
+    event or error, None where the message has none."""
+
+    code: int
+    text: str
+    is_gone: bool
+    number: int | None = None
+
+
+class EmergencyReader:
+    """Reads the emergency messages of one family: the event number first, the code second."""
+
+    def __init__(self, model: EmcyTable) -> None:
+        self._model = model
+
+    def read(self, code: int, vendor: bytes) -> Told:
+        """``vendor`` is the manufacturer's five bytes, fewer where the message was short."""
+        model = self._model
+        if model.event is not None and (event := _byte(vendor, model.event.byte)) is not None:
+            is_gone = code == 0 or event == model.event.gone
+            text = model.text(code) if is_gone else self._named(event, "event", code)
+            cause = None if model.event.cause_byte is None else _byte(vendor, model.event.cause_byte)
+            if cause and not is_gone:
+                text += f", cause {cause}"
+            return Told(code, text, is_gone, event)
+        if model.number is not None and self._has_number(code):
+            first = model.number.byte - _VENDOR_BYTE
+            number = int.from_bytes(vendor[first : first + model.number.size], "little")
+            if number:
+                return Told(code, self._named(number, "error", code), is_gone=False, number=number)
+        return Told(code, model.text(code), is_gone=code == 0)
+
+    def _has_number(self, code: int) -> bool:
+        names = (f"{code:04X}", f"{code >> 8:02X}xx")
+        return any(name in names for name in self._model.number.codes) if self._model.number else False
+
+    def _named(self, number: int, what: str, code: int) -> str:
+        text = self._model.events.get(str(number))
+        return f"{number} {text}" if text else f"{what} {number}, {self._model.text(code)}"
+
+
+def _byte(vendor: bytes, place: int) -> int | None:
+    index = place - _VENDOR_BYTE
+    return vendor[index] if index < len(vendor) else None

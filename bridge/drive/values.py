@@ -1,0 +1,107 @@
+"""The values of a family, compiled: the words of a PDO as numbers, enumerations and bits, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.drive.scaling import LinearScale, number_of
+from bridge.image import DataType
+from bridge.mapping.model import ProcessValue
+
+_WORD_BITS: Final = 16
+_WORD_MASK: Final = 0xFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """Bits of one word that a write sets: ``word & ~mask | bits``, at this place."""
+
+    place: int
+    mask: int
+    bits: int
+
+
+class ValueCodec:
+    """One value of one drive. ``places`` says where its words stand, the low one first; ``scale`` is None
+    for what has none, and where it is not known."""
+
+    __slots__ = ("_bit", "_high", "_low", "_raw", "_states", "model", "places", "scale")
+
+    def __init__(self, model: ProcessValue, words: Sequence[str], scale: LinearScale | None = None) -> None:
+        self.model = model
+        self.places = tuple(words.index(word) for word in model.word_names)
+        self.scale = scale
+        self._raw = model.raw_type
+        self._bit = model.bit
+        self._states = model.states
+        low, high = model.raw_range
+        self._low = low if model.low is None else max(low, model.low)
+        self._high = high if model.high is None else min(high, model.high)
+
+    @property
+    def is_unknown(self) -> bool:
+        """It is scaled by a parameter that nobody has told."""
+        return self.scale is None and self.model.scale is not None
+
+    @property
+    def why_unknown(self) -> str:
+        return f"{self.model.full} cannot be read and is not in the site file" if self.is_unknown else ""
+
+    @property
+    def is_plain(self) -> bool:
+        """One signed word times a factor: what most values are."""
+        return (
+            len(self.places) == 1
+            and self._raw is DataType.INT16
+            and self._bit is None
+            and self.model.scale is not None
+            and not self.model.scale.offset
+        )
+
+    @property
+    def range(self) -> tuple[float | None, float | None]:
+        """What may be written, in the unit of the value; None where that is not known or not of interest."""
+        if self.scale is not None:
+            return self.scale.low, self.scale.high
+        if self.is_unknown or (self.model.low is None and self.model.high is None):
+            return None, None
+        return self._low, self._high
+
+    def from_words(self, words: Sequence[int]) -> bool | int | float:
+        """The value that these words stand for; with an unknown scale the bare number."""
+        word = words[self.places[0]]
+        if len(self.places) > 1:
+            word |= words[self.places[1]] << _WORD_BITS
+        if self._bit is not None:
+            return bool(word >> self._bit & 1)
+        if self.scale is not None:
+            return self.scale.from_word(word)
+        number = number_of(word, self._raw)
+        return float(number) if self.model.scale is not None else number
+
+    def to_words(self, value: bool | int | float) -> tuple[Written, ...]:
+        """What writing ``value`` sets. Raises ValueError, with a sentence that begins with "takes", where
+        it is out of range. The scale must be known."""
+        if self._bit is not None:
+            if value not in (0, 1):
+                raise ValueError(f"takes true or false, not {value:g}")
+            mask = 1 << self._bit
+            return (Written(self.places[0], mask, mask if value else 0),)
+        word = self.scale.to_word(value) if self.scale is not None else self._whole(value)
+        return tuple(
+            Written(place, _WORD_MASK, word >> _WORD_BITS * part & _WORD_MASK)
+            for part, place in enumerate(self.places)
+        )
+
+    def _whole(self, value: float) -> int:
+        if not self._low <= value <= self._high:
+            raise ValueError(f"takes {self._low:g}…{self._high:g}, not {value:g}")
+        number = int(value)
+        if number != value:
+            raise ValueError(f"takes a whole number, not {value:g}")
+        if self._states and number not in self._states:
+            known = ", ".join(f"{state} {text}" for state, text in sorted(self._states.items()))
+            raise ValueError(f"takes {known}, not {number}")
+        return number

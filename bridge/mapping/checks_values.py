@@ -1,0 +1,130 @@
+"""What the values of a mapping file say together with its words, slots and parameters."""
+
+from __future__ import annotations
+
+from bridge.mapping.merge import Noted
+from bridge.mapping.model import Family, ProcessValue
+from bridge.tomlfile import Key
+
+
+def check_values(family: Family, file: Noted) -> None:
+    """Note in ``file`` what does not go together."""
+    process = family.process
+    seen: dict[str, Key] = {
+        **{f"command/{word}": ("process", "rpdo") for word in reversed(process.rpdo)},
+        **{f"actual/{word}": ("process", "tpdo") for word in reversed(process.tpdo[1:])},
+    }
+    for v, value in enumerate(family.value):
+        key: Key = ("value", v)
+        _check_words(family, value, key, file)
+        _check_kind(value, key, file)
+        _check_scale(family, value, key, file)
+        _check_follows(family, value, key, file)
+        first = seen.setdefault(value.leaf, (*key, "name"))
+        if first != (*key, "name"):
+            message = f"point {value.leaf!r} is there twice"
+            file.fault((*key, "name"), message, f"first in line {file.line(first)}")
+
+
+def _check_words(family: Family, value: ProcessValue, key: Key, file: Noted) -> None:
+    process = family.process
+    if (value.word is None) is not bool(value.words):
+        file.fault(key, f"{value.name} needs either word or words")
+        return
+    if len(value.words) == 1 or len(set(value.word_names)) != len(value.word_names):
+        file.fault((*key, "words"), "must be two words, the low one first")
+    is_command = value.group == "command"
+    # The control word goes through the watchdog's gate: nothing else writes it.
+    known = process.rpdo[1:] if is_command else process.tpdo
+    at = (*key, "word" if value.word is not None else "words")
+    missing = [word for word in value.word_names if word not in known]
+    for word in missing:
+        file.fault(at, f"there is no value word {word!r}", f"known: {', '.join(known)}")
+    if missing:
+        return
+    for slot in family.slot:
+        pdos = slot.rpdo if is_command else slot.tpdo
+        carried = [set(pdo.words or (process.rpdo if is_command else process.tpdo)) for pdo in pdos]
+        names = set(value.word_names)
+        if names <= set[str]().union(*carried) and not any(names <= words for words in carried):
+            file.fault(at, f"the words of {value.name} are in two PDOs of {slot.name}", "they must be in one")
+
+
+def _check_kind(value: ProcessValue, key: Key, file: Noted) -> None:
+    """One meaning, and a type that goes with it."""
+    kinds = {
+        "scale": value.scale is not None,
+        "states": bool(value.states),
+        "bits": bool(value.bits),
+        "bit": value.bit is not None,
+    }
+    given = [name for name, is_given in kinds.items() if is_given]
+    if len(given) > 1:
+        file.fault(
+            (*key, given[1]), f"{value.name} has {given[0]} already", "one of scale, states, bits, bit"
+        )
+        return
+    is_long = len(value.words) == 2
+    if value.data_type is not None and value.data_type.endswith("32") is not is_long:
+        words = "two words" if is_long else "one word"
+        right = "int32 or uint32" if is_long else "int16 or uint16"
+        file.fault((*key, "data_type"), f"{value.data_type} does not fit {words}", right)
+        return
+    if value.bit is not None and is_long:
+        file.fault((*key, "bit"), "is a bit of one word", "name it as word")
+    if len(value.bits) > 16 * len(value.word_names):
+        file.fault((*key, "bits"), f"has {len(value.bits)} names for {16 * len(value.word_names)} bits")
+    if given and given[0] != "scale":
+        for name in ("low", "high"):
+            if getattr(value, name) is not None:
+                file.fault((*key, name), f"has no meaning with {given[0]}")
+    low, high = value.raw_range
+    for number in value.states:
+        if not low <= number <= high:
+            file.fault((*key, "states"), f"{number} is no {value.raw_type.value}", f"{low}…{high}")
+    if value.low is not None and value.high is not None and value.low > value.high:
+        file.fault((*key, "low"), f"is above high, {value.high:g}")
+
+
+def _check_follows(family: Family, value: ProcessValue, key: Key, file: Noted) -> None:
+    if value.follows is None:
+        return
+    if value.group != "command":
+        file.fault((*key, "follows"), "is for commands: an actual value follows nothing")
+        return
+    actual = {other.name: other for other in family.value if other.group == "actual"}
+    followed = actual.get(value.follows)
+    if followed is None:
+        message = f"there is no actual value {value.follows!r}"
+        file.fault((*key, "follows"), message, f"known: {', '.join(sorted(actual))}")
+    elif (followed.data_type, followed.scale, len(followed.word_names)) != (
+        value.data_type,
+        value.scale,
+        len(value.word_names),
+    ):
+        file.fault((*key, "follows"), f"{value.follows} has other words or another scale")
+
+
+def _check_scale(family: Family, value: ProcessValue, key: Key, file: Noted) -> None:
+    scale = value.scale
+    if scale is None:
+        return
+    at: Key = (*key, "scale")
+    if scale.full is None:
+        for name in ("at", "limit"):
+            if name in scale.model_fields_set:
+                file.fault((*at, name), "has no meaning without full")
+        if scale.factor == 0:
+            file.fault((*at, "factor"), "must not be 0")
+        return
+    if scale.at is None:
+        file.fault((*at, "at"), "is missing", "the word at 100 %")
+    for name in ("factor", "offset"):
+        if name in scale.model_fields_set:
+            file.fault((*at, name), "has no meaning with full", "value = word × full / at")
+    known = sorted(parameter.name for parameter in family.parameter)
+    if scale.full not in known:
+        message = f"there is no parameter {scale.full!r}"
+        file.fault((*at, "full"), message, f"known: {', '.join(known)}")
+    elif family.parameter_named(scale.full).data_type in ("string", "bytes"):
+        file.fault((*at, "full"), f"{scale.full} is a text")

@@ -1,0 +1,152 @@
+"""A mapping file merged over those it extends, which still knows where each of its keys stands.
+
+Tables are merged key by key. The lists ``value``, ``parameter``, ``poll`` and ``slot`` are merged item by
+item, by ``name`` (values by ``group`` too); every other list is replaced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final, Protocol, TypeVar, cast
+
+from pydantic import BaseModel, ValidationError
+
+from bridge.errors import Fault, FileFaults
+from bridge.tomlfile import Key, TomlFile
+from bridge.tomlfile.file import dotted, real_key
+from bridge.tomlfile.messages import explain
+
+Model = TypeVar("Model", bound=BaseModel)
+
+_BY_NAME: Final = {"value": ("name", "group"), "parameter": ("name",), "poll": ("name",), "slot": ("name",)}
+_Place = tuple[TomlFile, Key]
+
+
+class Noted(Protocol):
+    """A file in which faults are noted by the key where they are."""
+
+    def line(self, key: Sequence[int | str]) -> int: ...
+    def item(self, key: Key, place: int) -> Key:
+        """The key of one of several that may be written as one table."""
+        ...
+
+    def fault(self, key: Sequence[int | str], message: str, hint: str = "") -> None: ...
+
+
+class MergedFile:
+    """``files`` in the order in which they are laid over each other, the extended one first."""
+
+    def __init__(self, files: Sequence[TomlFile]) -> None:
+        self._last = files[-1]
+        self._places: dict[Key, _Place] = {}
+        self.faults: list[Fault] = []
+        self.data: dict[str, Any] = {}
+        for file in files:
+            self._forget_own()
+            self.data = self._table(self.data, file.data, (), (), file)
+
+    @property
+    def path(self) -> Path:
+        return self._last.path
+
+    def _forget_own(self) -> None:
+        """What a file says of itself is not inherited: what it extends, and that it is a template."""
+        self.data.pop("extends", None)
+        family = self.data.get("family")
+        if isinstance(family, dict):
+            self.data["family"] = {**cast("dict[str, Any]", family)}
+            self.data["family"].pop("template", None)
+
+    def _put(self, value: Any, at: Key, source: Key, file: TomlFile) -> Any:
+        """``value``, all of it from ``file``."""
+        self._places[at] = (file, source)
+        if isinstance(value, dict):
+            items = cast("dict[str, Any]", value).items()
+            return {name: self._put(item, (*at, name), (*source, name), file) for name, item in items}
+        if isinstance(value, list):
+            listed = enumerate(cast("list[Any]", value))
+            return [self._put(item, (*at, n), (*source, n), file) for n, item in listed]
+        return value
+
+    def _drop(self, at: Key) -> None:
+        """Forget what stood below ``at``: it is replaced."""
+        for key in [key for key in self._places if key[: len(at)] == at]:
+            del self._places[key]
+
+    def _table(
+        self, base: dict[str, Any], over: dict[str, Any], at: Key, source: Key, file: TomlFile
+    ) -> dict[str, Any]:
+        """``over``, which is ``source`` of ``file``, laid over ``base``, which is ``at`` of ours."""
+        if at:
+            self._places[at] = (file, source)
+        merged = dict(base)
+        for name, value in over.items():
+            here, there = (*at, name), (*source, name)
+            have = base.get(name)
+            if isinstance(have, dict) and isinstance(value, dict):
+                tables = cast("tuple[dict[str, Any], dict[str, Any]]", (have, value))
+                merged[name] = self._table(*tables, here, there, file)
+            elif not at and name in _BY_NAME and isinstance(have, list) and isinstance(value, list):
+                lists = cast("tuple[list[Any], list[Any]]", (have, value))
+                merged[name] = self._named(*lists, name, file)
+            else:
+                self._drop(here)
+                merged[name] = self._put(value, here, there, file)
+        return merged
+
+    def _named(self, base: list[Any], over: list[Any], name: str, file: TomlFile) -> list[Any]:
+        """Lists of tables that are told apart by their names. What has no name, or one that its own file
+        has given before, is an item of its own: the checks tell what is there twice."""
+        merged = list(base)
+        places = {_identity(item, name): n for n, item in enumerate(base)}
+        for n, item in enumerate(over):
+            place = places.pop(_identity(item, name), None)
+            if place is None:
+                merged.append(self._put(item, (name, len(merged)), (name, n), file))
+            else:
+                merged[place] = self._table(merged[place], item, (name, place), (name, n), file)
+        return merged
+
+    def place(self, key: Sequence[int | str]) -> _Place:
+        """In which file ``key`` stands, or the nearest table around it, and its key there."""
+        for length in range(len(key), 0, -1):
+            place = self._places.get(tuple(key[:length]))
+            if place:
+                return place[0], (*place[1], *key[length:])
+        return self._last, tuple(key)
+
+    def item(self, key: Key, place: int) -> Key:
+        return (*key, place) if (*key, place) in self._places else key
+
+    def line(self, key: Sequence[int | str]) -> int:
+        file, source = self.place(key)
+        return file.line(source)
+
+    def fault(self, key: Sequence[int | str], message: str, hint: str = "") -> None:
+        file, source = self.place(key)
+        self.faults.append(Fault(str(file.path), file.line(source), dotted(source), message, hint))
+
+    def validate(self, model: type[Model]) -> Model | None:
+        """The content as ``model``, or None with every fault noted."""
+        try:
+            return model.model_validate(self.data)
+        except ValidationError as error:
+            for detail in error.errors(include_url=False):
+                self.fault(real_key(self.data, detail["loc"]), *explain(model, detail))
+            return None
+
+    def finish(self) -> None:
+        """Raise ``FileFaults`` if any fault was noted, those of the last file first."""
+        own = str(self._last.path)
+        if self.faults:
+            raise FileFaults(sorted(self.faults, key=lambda fault: (fault.file != own, fault.line)))
+
+
+def _identity(item: Any, name: str) -> object:
+    """What tells an item of the list ``name`` from the others; itself where it does not say."""
+    if not isinstance(item, dict):
+        return id(item)
+    table = cast("dict[str, Any]", item)
+    values = tuple(table.get(key) for key in _BY_NAME[name])
+    return id(table) if None in values or not all(isinstance(value, str) for value in values) else values

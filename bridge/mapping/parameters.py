@@ -1,0 +1,123 @@
+"""Parameters of a family: how their names become objects, what they hold, what writing them wears out."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Final, Literal
+
+from pydantic import AfterValidator, Field
+
+from bridge.mapping.fields import ObjectRef, ObjectType, Ref, States, Table
+
+GROUPS: Final = ("number", "letter", "element", "set")
+"""What the pattern of parameter names may name."""
+_PUNCTUATION: Final = re.compile(r"[^a-z0-9]+")
+
+
+def _name_pattern(text: str) -> str:
+    try:
+        pattern = re.compile(text)
+    except re.error as error:
+        raise ValueError(f"must be a regular expression: {error}") from None
+    unknown = sorted(set(pattern.groupindex) - set(GROUPS))
+    if unknown:
+        raise ValueError(f"must name the groups {', '.join(GROUPS)} only; it has {', '.join(unknown)}")
+    if "number" not in pattern.groupindex:
+        raise ValueError("must have a group (?P<number>…)")
+    return text
+
+
+class ParameterNames(Table):
+    """index = ``index`` + ``letter_step`` × (letter − A) + ``number_step`` × number;
+    sub-index = ``sub`` + ``element_step`` × (element − ``element_first``) + ``set_step`` × set."""
+
+    pattern: Annotated[str, AfterValidator(_name_pattern)] = Field(
+        description="a regular expression with the groups number, letter, element, set"
+    )
+    hexadecimal: bool = Field(False, description="true: number and element are written in hexadecimal")
+    example: str = Field(description="how they are written, for messages")
+    index: int = Field(ge=0, le=0xFFFF)
+    number_step: int = 1
+    letter_step: int = 0
+    sub: int = Field(0, ge=0, le=0xFF, description="sub-index where nothing is given")
+    element_step: int = 1
+    element_first: int = Field(0, ge=0)
+    set_step: int = 0
+
+
+class Parameter(Table):
+    """A parameter of the drive: value = what is read × factor."""
+
+    name: str = Field(min_length=1)
+    title: str
+    object: Ref | None = Field(None, description="left out: by [parameter_names]")
+    data_type: ObjectType
+    factor: float = Field(1.0, allow_inf_nan=False)
+    unit: str = ""
+    low: float | None = Field(None, allow_inf_nan=False)
+    high: float | None = Field(None, allow_inf_nan=False)
+    access: Literal["rw", "ro", "wo"] = "rw"
+    sets: int = Field(0, ge=0, le=16, description="how many parameter sets it has; 0: it has one value")
+    elements: int = Field(0, ge=0, le=255, description="how many elements it has; 0: it is no array")
+    states: States = Field(default_factory=dict[int, str])
+    point: bool = Field(False, description="true: shown as a point of the drive")
+    every_ms: int = Field(0, ge=0, le=3_600_000, description="how often a point is read; 0: on demand")
+    read: bool = Field(True, description="false where it can only be given in the site file")
+    volatile: bool = Field(False, description="true where a write does not go to the EEPROM")
+
+    @property
+    def leaf(self) -> str:
+        """The name of its point: ``P102[2]`` is ``p102_2``."""
+        return _PUNCTUATION.sub("_", self.name.lower()).strip("_")
+
+
+class RamOnly(Table):
+    """While this parameter has this value, writes go to the RAM alone."""
+
+    parameter: str
+    value: int | float
+
+
+class Eeprom(Table):
+    """What writing parameters wears out, and how they are saved."""
+
+    cycles: int | None = Field(None, gt=0, description="writes that it stands")
+    ram_only: RamOnly | None = None
+    save: Ref | None = Field(None, description='"save" is written here, on request only')
+    written_on_save_only: bool = Field(False, description="true: a write stays in the RAM until it is saved")
+
+
+def object_of(names: ParameterNames, name: str, sets: int = 0, elements: int = 0) -> ObjectRef:
+    """The object of the parameter called ``name``. Raises ValueError with what is wrong.
+
+    What the name leaves out: of a parameter with ``sets`` it means the first, and of one with
+    ``elements`` the first too; elsewhere the sub-index is ``names.sub``. Where elements and sets share
+    the sub-index, an element of a parameter without sets is in the first set (BU 2500 §6.6.1).
+    """
+    match = re.fullmatch(names.pattern, name)
+    if match is None:
+        raise ValueError(f"{name!r} is no parameter; they are written as {names.example}")
+    groups = match.groupdict()
+    letter = (groups.get("letter") or "A").upper()
+    base = 16 if names.hexadecimal else 10
+    index = (
+        names.index
+        + names.letter_step * (ord(letter) - ord("A"))
+        + names.number_step * int(groups["number"], base)
+    )
+    sub = names.sub
+    element, in_set = groups.get("element"), groups.get("set")
+    if element is not None or elements:
+        number = names.element_first if element is None else int(element, base)
+        sub += names.element_step * (number - names.element_first)
+        if elements and not 0 <= number - names.element_first < elements:
+            last = names.element_first + elements - 1
+            raise ValueError(f"{name!r}: its elements are {names.element_first}…{last}")
+    if in_set is not None or sets or (names.set_step and (element is not None or elements)):
+        number = 1 if in_set is None else int(in_set)
+        sub += names.set_step * number
+        if sets and not 1 <= number <= sets:
+            raise ValueError(f"{name!r}: its parameter sets are 1…{sets}")
+    if not (0 <= index <= 0xFFFF and 0 <= sub <= 0xFF):
+        raise ValueError(f"{name!r} would be the object {index:X}h:{sub:X}, which there cannot be")
+    return ObjectRef(index=index, sub=sub)

@@ -1,0 +1,200 @@
+"""Process data of a family: words, PDOs, slots, and the values made of the words."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal, cast
+
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
+
+from bridge.config.download import Download, encode
+from bridge.image import DataType
+from bridge.image.point import INTEGER_RANGE
+from bridge.mapping.fields import Bit, Mapped, Name, ObjectRef, ObjectType, Ref, States, Table
+
+MOST_WORDS: Final = 9
+"""Control or status word and eight values: what Modbus has registers for."""
+ValueKind = Literal["int16", "uint16", "int32", "uint32"]
+
+
+class Process(Table):
+    """Names of the words. Their order is that of the registers, and of the words in a PDO that names none."""
+
+    rpdo: list[Name] = Field(
+        min_length=1, max_length=MOST_WORDS, description="control_word, then the setpoint words"
+    )
+    tpdo: list[Name] = Field(
+        min_length=1, max_length=MOST_WORDS, description="status_word, then the words of actual values"
+    )
+    exact_length: bool = Field(False, description="true where a PDO of any other length is not evaluated")
+
+
+class Pdo(Table):
+    """One PDO of a slot. ``objects`` gives for each word the objects that may stand for it, the
+    factory's first; the order is that of ``words``, or of ``process.rpdo`` or ``process.tpdo``."""
+
+    number: int = Field(ge=1, le=512)
+    cob_id: int = Field(ge=0, le=0x7FF, description="without the node id, such as 0x200")
+    words: list[Name] = Field(
+        default_factory=list[str], description="which words it carries; left out: all of them"
+    )
+    objects: list[Annotated[list[Mapped], Field(min_length=1)]]
+    signed: list[Ref] = Field(
+        default_factory=list[ObjectRef], description="objects shorter than a word that hold signed numbers"
+    )
+    static: bool = Field(
+        False,
+        description="true: what it carries is fixed and the node does not show it; its mapping object is "
+        "not read, and `objects` only names the words",
+    )
+    optional: bool = Field(False, description="true: the drive works without it, its words do not")
+    write: bool = Field(False, description="true: the boot-up writes it into the node where it differs")
+    transmission_type: int | None = Field(None, ge=0, le=255, description="0…255, with write = true")
+    inhibit_ms: float | None = Field(None, ge=0, le=6553.5, description="0…6553.5 ms, with write = true")
+    event_ms: int | None = Field(None, ge=0, le=65535, description="0…65535 ms, with write = true")
+
+
+class NodeTpdo(Table):
+    """A TPDO that belongs to no drive: where the node has it switched on, it saves polling."""
+
+    number: int = Field(ge=1, le=512)
+
+
+def _plain(value: object) -> object:
+    if not isinstance(value, bool | int | float | str):
+        raise ValueError("must be a number, true or false, or a text in quotes")
+    return value
+
+
+class StartWrite(Table):
+    """One object that the boot-up writes for a drive, such as its mode of operation."""
+
+    object: Ref
+    type: ObjectType = Field(description="the object's data type, such as int8")
+    value: Annotated[bool | int | float | str, BeforeValidator(_plain)]
+    read_back: bool = Field(True, description="false writes it blindly, as a command")
+
+    @field_validator("value")
+    @classmethod
+    def _encodes(cls, value: bool | int | float | str, info: ValidationInfo) -> bool | int | float | str:
+        """The fault is the value's, with its line. Without a type there is a fault already."""
+        kind = info.data.get("type")
+        if kind is not None:
+            encode(kind, value)
+        return value
+
+    @property
+    def download(self) -> Download:
+        data = encode(self.type, self.value)
+        return Download(self.object.index, self.object.sub, data, self.read_back)
+
+
+def _listed(value: object) -> object:
+    """One table stands for a list of one."""
+    return [cast("object", value)] if isinstance(value, dict | Pdo) else value
+
+
+Pdos = Annotated[
+    list[Pdo],
+    Field(min_length=1),
+    BeforeValidator(_listed, json_schema_input_type=Pdo | Annotated[list[Pdo], Field(min_length=1)]),
+]
+
+
+class Slot(Table):
+    """One drive of the node."""
+
+    name: Name
+    rpdo: Pdos
+    tpdo: Pdos
+    start: list[StartWrite] = Field(default_factory=list[StartWrite])
+    emcy_drive: int | None = Field(None, description="the value of the EMCY drive byte for this drive")
+    parameters_by_sdo: bool = Field(
+        False, description="true where this drive's parameters are reached by the default SDO channel"
+    )
+
+
+class SdoServer(Table):
+    """A further SDO server of the node, beside the first, which every node has at 600h and 580h."""
+
+    number: int = Field(ge=2, le=128, description="2 is object 1201h")
+    request: int = Field(ge=0, le=0x7FF, description="COB-ID to the node without the node id, such as 0x640")
+    reply: int = Field(ge=0, le=0x7FF, description="COB-ID from the node without the node id")
+    slot: Name | None = Field(None, description="the drive it reaches; left out: the same as the first")
+    after_stop: bool = Field(
+        False, description="true where a change counts only after Stopped and Pre-Operational"
+    )
+
+
+class Scale(Table):
+    """value = word × full / at, with ``full`` a parameter of the drive such as P105; or
+    value = word × factor + offset."""
+
+    full: str | None = None
+    at: int | None = Field(None, gt=0)
+    limit: float = Field(2.0, gt=0, description="largest magnitude as a multiple of full")
+    factor: float = Field(1.0, allow_inf_nan=False)
+    offset: float = Field(0.0, allow_inf_nan=False)
+
+
+class ProcessValue(Table):
+    """A value beside the raw words it is made from: a number with a unit, an enumeration, named bits or
+    one bit."""
+
+    name: Name
+    group: Literal["command", "actual"]
+    word: str | None = Field(None, description="the word it is made from")
+    words: list[str] = Field(
+        default_factory=list[str], max_length=2, description="two words, the low one first"
+    )
+    data_type: ValueKind | None = Field(None, description="int16 (int32 for two words) where left out")
+    scale: Scale | None = None
+    unit: str = ""
+    low: float | None = Field(None, allow_inf_nan=False)
+    high: float | None = Field(None, allow_inf_nan=False)
+    states: States = Field(default_factory=dict[int, str])
+    bits: list[str] = Field(
+        default_factory=list[str], max_length=32, description="names of the bits from bit 0 on"
+    )
+    bit: Bit | None = Field(None, description="one bit of the word, as true or false")
+    follows: str | None = Field(
+        None,
+        description="an actual value whose words this command has until the drive is enabled, so that "
+        "enabling moves nothing",
+    )
+    description: str = ""
+
+    @property
+    def leaf(self) -> str:
+        """Its name below the drive, such as ``actual/frequency``."""
+        return f"{self.group}/{self.name}"
+
+    @property
+    def word_names(self) -> tuple[str, ...]:
+        """The words it is made from, the low one first."""
+        return (self.word,) if self.word is not None else tuple(self.words)
+
+    @property
+    def raw_type(self) -> DataType:
+        """How the words are read as a number."""
+        if self.data_type is not None:
+            return DataType(self.data_type)
+        unsigned = bool(self.bits or self.states)
+        if len(self.word_names) > 1:
+            return DataType.UINT32 if unsigned else DataType.INT32
+        return DataType.UINT16 if unsigned else DataType.INT16
+
+    @property
+    def raw_range(self) -> tuple[int, int]:
+        return INTEGER_RANGE[self.raw_type]
+
+    @property
+    def point_type(self) -> DataType:
+        """The type of its point: a float where it is scaled."""
+        if self.bit is not None:
+            return DataType.BOOL
+        return self.raw_type if self.scale is None else DataType.FLOAT
+
+    @property
+    def full(self) -> str | None:
+        """The parameter that scales it, or None."""
+        return None if self.scale is None else self.scale.full

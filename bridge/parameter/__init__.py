@@ -1,0 +1,23 @@
+"""Parameters of drives by the vendor's own names: what they are called, how they are coded, what writing
+them wears out, and whole sets of them. No bus in here."""
+
+from bridge.parameter.access import DriveParameters, Reading, Transfer, Written
+from bridge.parameter.definition import Address, Definition, Entry
+from bridge.parameter.error import ParameterError, TransferFailed, Why
+from bridge.parameter.ledger import Ledger
+from bridge.parameter.names import Names
+
+__all__ = [
+    "Address",
+    "Definition",
+    "DriveParameters",
+    "Entry",
+    "Ledger",
+    "Names",
+    "ParameterError",
+    "Reading",
+    "Transfer",
+    "TransferFailed",
+    "Why",
+    "Written",
+]

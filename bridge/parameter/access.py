@@ -1,0 +1,234 @@
+"""How one drive's parameters are read and written: the policy, as procedures without a bus.
+
+A procedure yields the transfers it needs and is sent what each brought and when; whoever runs it
+carries them out on the SDO channel of the drive (``southbound.parameters``, or the command line).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.image import Value
+from bridge.mapping.model import Family
+from bridge.parameter.codec import decode, encode_value, matches, shown
+from bridge.parameter.definition import Address, Entry
+from bridge.parameter.error import ParameterError, TransferFailed, Why
+from bridge.parameter.ledger import Key, Ledger
+from bridge.parameter.names import Names
+
+FRESH_S: Final = 1.0
+"""A value that was read this long ago is what the drive holds: it is not read again before a write."""
+_RAM_ONLY_FRESH_S: Final = 10.0
+_SAVE: Final = b"save"
+_COMMUNICATION: Final = range(0x1000, 0x2000)
+MISSING: Final = (0x0602_0000, 0x0609_0011)
+"""Abort codes: no such object, no such sub-index."""
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """Read an object (``data`` None) or write it. ``of_node``: over the node's first SDO channel."""
+
+    address: Address
+    data: bytes | None = None
+    of_node: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a drive holds, and when it was asked, in monotonic seconds."""
+
+    entry: Entry
+    value: Value
+    time: float
+
+    def __str__(self) -> str:
+        return f"{self.entry.name} = {shown(self.entry, self.value)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A value that the drive holds now, as it was read back. ``before`` is None where it was not read.
+    ``changed`` is false where it was there already; ``warning`` is what the EEPROM guard has to say."""
+
+    reading: Reading
+    before: Value | None
+    changed: bool
+    in_eeprom: bool = False
+    warning: str = ""
+
+
+Reads = Generator[Transfer, tuple[bytes, float], Reading]
+Writes = Generator[Transfer, tuple[bytes, float], Written]
+Saves = Generator[Transfer, tuple[bytes, float], str]
+"""Returns the guard's warning, or an empty text."""
+
+
+class DriveParameters:
+    """The parameters of the drive called ``name`` of the node ``node_name``; its cache and its counts.
+
+    Every procedure raises ``ParameterError``; of ``TransferFailed``, which is thrown into it, it makes
+    one.
+    """
+
+    def __init__(self, name: str, node_name: str, family: Family, names: Names, ledger: Ledger) -> None:
+        self.name = name
+        self.names = names
+        self._node_name = node_name
+        self._eeprom = family.eeprom
+        self._ledger = ledger
+        self._cache: dict[Address, tuple[bytes, float]] = {}
+        self._process_objects = {
+            Address(part.index, part.sub)
+            for slot in family.slot
+            for pdo in slot.rpdo
+            for objects in pdo.objects
+            for mapped in objects
+            for part in mapped.parts
+        }
+
+    def forget(self) -> None:
+        """The drive may have been switched off, or exchanged."""
+        self._cache.clear()
+
+    def cached(self, entry: Entry) -> Reading | None:
+        """What was last read."""
+        held = self._cache.get(entry.address)
+        return Reading(entry, decode(entry, held[0]), held[1]) if held else None
+
+    # reading
+
+    def read(self, entry: Entry, now: float, max_age_s: float = 0.0) -> Reads:
+        """The value, from the drive, or from the cache where it is not older than ``max_age_s``."""
+        if entry.definition and not entry.definition.readable:
+            raise ParameterError(Why.WRITE_ONLY, f"{entry.name} can only be written")
+        data, time = yield from self._fetch(entry, now, max_age_s)
+        return Reading(entry, decode(entry, data), time)
+
+    def _fetch(
+        self, entry: Entry, now: float, max_age_s: float
+    ) -> Generator[Transfer, tuple[bytes, float], tuple[bytes, float]]:
+        held = self._cache.get(entry.address)
+        if held and now - held[1] < max_age_s:
+            return held
+        try:
+            held = yield Transfer(entry.address)
+        except TransferFailed as failure:
+            raise self._error(entry, failure) from None
+        self._cache[entry.address] = held
+        return held
+
+    def compare(
+        self, entry: Entry, value: Value, now: float
+    ) -> Generator[Transfer, tuple[bytes, float], tuple[Reading, bool]]:
+        """What the drive holds, and whether that is ``value``. Raises ``ParameterError`` also where it
+        cannot hold ``value``."""
+        held, time = yield from self._fetch(entry, now, FRESH_S)
+        same = matches(entry, held, encode_value(entry, value, held))
+        return Reading(entry, decode(entry, held), time), same
+
+    # writing
+
+    def write(self, entry: Entry, value: Value, now: float) -> Writes:
+        """Write ``value`` where the drive does not hold it yet, and read it back."""
+        self._check_writable(entry)
+        definition = entry.definition
+        blind = definition is not None and not definition.readable
+        before: bytes | None = None
+        if not blind:
+            before, time = yield from self._fetch(entry, now, FRESH_S)
+            now = max(now, time)
+        data = encode_value(entry, value, before)
+        if before is not None and matches(entry, before, data):
+            return Written(Reading(entry, decode(entry, before), now), decode(entry, before), changed=False)
+        wears = yield from self._wears(entry, now)
+        key = (self.name, str(entry.address))
+        if wears:
+            self._ledger.check(key, entry.name, now)
+        self._cache.pop(entry.address, None)
+        lost: TransferFailed | None = None
+        try:
+            _, now = yield Transfer(entry.address, data)
+        except TransferFailed as failure:
+            if failure.by_drive or blind:
+                raise self._error(entry, failure) from None
+            lost = failure
+        # Also where the answer was lost: it may have been written.
+        warning = self._count(key, entry.name, now) if wears else ""
+        if blind:
+            return Written(Reading(entry, decode(entry, data), now), None, True, wears, warning)
+        try:
+            held, now = yield from self._fetch(entry, now, 0.0)
+        except ParameterError as error:
+            raise ParameterError(error.why, f"{error}; it may have been written", error.abort_code) from None
+        if not matches(entry, held, data):
+            if lost:
+                raise self._error(entry, lost)
+            found = shown(entry, decode(entry, held))
+            raise ParameterError(Why.NOT_TAKEN, f"{entry.name}: the drive took the value and holds {found}")
+        was = None if before is None else decode(entry, before)
+        return Written(Reading(entry, decode(entry, held), now), was, True, wears, warning)
+
+    def _check_writable(self, entry: Entry) -> None:
+        """Raises ``ParameterError`` for what nobody writes by this way."""
+        if entry.definition and not entry.definition.writable:
+            raise ParameterError(Why.READ_ONLY, f"{entry.name} is read-only")
+        if entry.address.index in _COMMUNICATION:
+            raise ParameterError(
+                Why.PROTECTED,
+                f"{entry.name} belongs to the communication that the bridge supervises: set it in the site "
+                "file ([[bus.node.configure]])",
+            )
+        if entry.address in self._process_objects:
+            raise ParameterError(
+                Why.PROTECTED,
+                f"{entry.name} is process data, which the drive's controller alone commands",
+            )
+
+    # the EEPROM
+
+    def save(self, now: float) -> Saves:
+        """Write "save" where the family has it: the parameters of the node go to its EEPROM."""
+        eeprom = self._eeprom
+        if eeprom is None or eeprom.save is None:
+            raise ParameterError(Why.NOT_CONFIGURED, f"{self.name} has no command that saves its parameters")
+        entry = Entry("save", Address(eeprom.save.index, eeprom.save.sub))
+        key = (self._node_name, str(entry.address))
+        self._ledger.check(key, entry.name, now)
+        try:
+            _, now = yield Transfer(entry.address, _SAVE, of_node=True)
+        except TransferFailed as failure:
+            if not failure.by_drive:
+                self._count(key, entry.name, now)
+            raise self._error(entry, failure) from None
+        return self._count(key, entry.name, now)
+
+    def writes(self, entry: Entry) -> int:
+        """How often this parameter was written to the EEPROM, as far as is known."""
+        return self._ledger.writes((self.name, str(entry.address)))
+
+    def _count(self, key: Key, name: str, now: float) -> str:
+        return self._ledger.count(key, name, self._eeprom.cycles if self._eeprom else None, now)
+
+    def _wears(self, entry: Entry, now: float) -> Generator[Transfer, tuple[bytes, float], bool]:
+        """Whether writing it goes to the EEPROM. Where that cannot be read it is taken to."""
+        eeprom = self._eeprom
+        if eeprom is None or eeprom.written_on_save_only or (entry.definition and entry.definition.volatile):
+            return False
+        if eeprom.ram_only is None:
+            return True
+        switch = self.names.resolve(eeprom.ram_only.parameter)
+        if switch.address == entry.address:
+            return True
+        try:
+            data, _ = yield from self._fetch(switch, now, _RAM_ONLY_FRESH_S)
+            return decode(switch, data) != eeprom.ram_only.value
+        except ParameterError:
+            return True
+
+    def _error(self, entry: Entry, failure: TransferFailed) -> ParameterError:
+        hint = self.names.hint(entry.name) if failure.abort_code in MISSING and not entry.definition else ""
+        why = Why.REFUSED if failure.by_drive else Why.NO_ANSWER
+        return ParameterError(why, f"{entry.name}: {failure}{hint}", failure.abort_code)

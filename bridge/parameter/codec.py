@@ -1,0 +1,174 @@
+"""Values of parameters and their bytes: value = wire × factor, little-endian (CiA 301 §7.1.4).
+
+An object that no file describes is a whole number without sign of as many bytes as the node sends, or a
+text where it sends another length.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import Final
+
+from bridge.config.download import INTEGERS, encode
+from bridge.image import Value
+from bridge.parameter.definition import Entry
+from bridge.parameter.error import ParameterError, Why
+
+_REALS: Final = {"real32": "<f", "real64": "<d"}
+_RAW_SIZES: Final = (1, 2, 4, 8)
+_DIGITS: Final = 9
+"""Behind the point: what a factor such as 0.01 makes of a whole number is that number of hundredths."""
+
+
+def decode(entry: Entry, data: bytes) -> Value:
+    """The value in ``data``. Raises ``ParameterError`` where the node has sent another type.
+
+    Bytes beyond the type's are left out: some servers answer every read with four.
+    """
+    definition = entry.definition
+    if definition is None:
+        return _raw(data)
+    kind = definition.data_type
+    if kind == "string":
+        return data.split(b"\0", 1)[0].decode("latin-1")
+    if kind == "bytes":
+        return data.hex(" ").upper()
+    size = _size(kind)
+    if len(data) < size:
+        found = f"the drive sent {len(data)}: {data.hex(' ').upper()}"
+        raise ParameterError(Why.NOT_CONFIGURED, f"{entry.name} is {kind} with {size} bytes, {found}")
+    if kind == "bool":
+        return bool(data[0])
+    if kind in _REALS:
+        number: float = struct.unpack(_REALS[kind], data[:size])[0]
+        if not math.isfinite(number):
+            raise ParameterError(Why.REFUSED, f"{entry.name}: the drive has no number, but {number}")
+        return number if definition.factor == 1.0 else number * definition.factor
+    raw = int.from_bytes(data[:size], "little", signed=INTEGERS[kind][1])
+    return raw if definition.factor == 1.0 else round(raw * definition.factor, _DIGITS)
+
+
+def encode_value(entry: Entry, value: Value, held: bytes | None) -> bytes:
+    """The bytes of ``value``, the nearest that the parameter can hold.
+
+    ``held`` is what the drive holds now; for an object that no file describes it gives the length.
+    Raises ``ParameterError`` with what the parameter takes.
+    """
+    definition = entry.definition
+    if definition is None:
+        return _encode_raw(entry, value, held)
+    kind = definition.data_type
+    try:
+        if kind in ("string", "bytes", "bool"):
+            return encode(kind, value)
+        number = _number(entry, value)
+        if kind in _REALS:
+            _check_range(entry, number)
+            return encode(kind, number / definition.factor)
+        # A number of 64 bits has more digits than a division leaves it.
+        raw = round(number if definition.factor == 1.0 else number / definition.factor)
+        if definition.factor == 1.0 and raw != number:
+            raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes whole numbers, not {value}")
+        _check_range(entry, raw if definition.factor == 1.0 else round(raw * definition.factor, _DIGITS))
+        if definition.states and raw not in dict(definition.states):
+            raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {_shown_states(entry)}")
+        return encode(kind, raw)
+    except (ValueError, OverflowError) as error:
+        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} = {value!r}: {error}") from None
+
+
+def matches(entry: Entry, held: bytes, wanted: bytes) -> bool:
+    """Whether the drive holds what was to be written."""
+    if entry.definition and entry.definition.data_type == "string":
+        return held.split(b"\0", 1)[0] == wanted.split(b"\0", 1)[0]
+    return held[: len(wanted)] == wanted and not any(held[len(wanted) :])
+
+
+def parse(entry: Entry, text: str) -> Value:
+    """A value as it is typed. Raises ``ParameterError``; whether it is in range, ``encode_value`` says."""
+    definition = entry.definition
+    kind = definition.data_type if definition else ""
+    if kind in ("string", "bytes"):
+        return text
+    bare = text.strip()
+    if kind == "bool" and bare.lower() in ("0", "1", "false", "true"):
+        return bare.lower() in ("1", "true")
+    if definition and bare.lower() in (state.lower() for _, state in definition.states):
+        return bare
+    for reader in (lambda: int(bare, 0), lambda: float(bare)):
+        try:
+            return reader()
+        except ValueError:
+            continue
+    if definition is None:
+        return text
+    takes = _shown_states(entry) if definition.states else "true or false" if kind == "bool" else "a number"
+    raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {takes}, not {text!r}")
+
+
+def shown(entry: Entry, value: Value) -> str:
+    """``1.03 s``, ``1 (automatic)``."""
+    definition = entry.definition
+    if definition is None or isinstance(value, str | bool):
+        return str(value)
+    text = f"{value:.{_DIGITS + 1}g}" if isinstance(value, float) else str(value)
+    state = dict(definition.states).get(int(value)) if definition.states else None
+    return f"{text} ({state})" if state else f"{text} {definition.unit}".rstrip()
+
+
+def _size(kind: str) -> int:
+    return INTEGERS[kind][0] if kind in INTEGERS else struct.calcsize(_REALS[kind])
+
+
+def _raw(data: bytes) -> Value:
+    if len(data) in _RAW_SIZES:
+        return int.from_bytes(data, "little")
+    text = data.split(b"\0", 1)[0].decode("latin-1")
+    return text if text.isprintable() else data.hex(" ").upper()
+
+
+def _encode_raw(entry: Entry, value: Value, held: bytes | None) -> bytes:
+    if isinstance(value, str):
+        try:
+            return encode("string", value)
+        except ValueError as error:
+            raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name}: {error}") from None
+    whole = isinstance(value, bool | int) or value.is_integer()
+    size = len(held) if held is not None else 0
+    number = int(value) if whole else 0
+    if not whole or size not in _RAW_SIZES or not -(1 << 8 * size - 1) <= number < 1 << 8 * size:
+        what = f"a whole number of {size} bytes" if size in _RAW_SIZES else "a text"
+        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {what}, not {value}")
+    return (number & (1 << 8 * size) - 1).to_bytes(size, "little")
+
+
+def _number(entry: Entry, value: Value) -> int | float:
+    """``value`` as a number; the text of a state is taken for its code."""
+    definition = entry.definition
+    if isinstance(value, str) and definition:
+        for code, state in definition.states:
+            if state.lower() == value.strip().lower():
+                return code
+    if isinstance(value, bool | str):
+        takes = _shown_states(entry) if definition and definition.states else "a number"
+        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {takes}, not {value!r}")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes a finite number")
+    return value
+
+
+def _check_range(entry: Entry, number: int | float) -> None:
+    definition = entry.definition
+    if definition is None:
+        return
+    low = -math.inf if definition.low is None else definition.low
+    high = math.inf if definition.high is None else definition.high
+    if not low <= number <= high:
+        unit = f" {definition.unit}" if definition.unit else ""
+        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {low:g}…{high:g}{unit}, not {number:g}")
+
+
+def _shown_states(entry: Entry) -> str:
+    states = entry.definition.states if entry.definition else ()
+    return ", ".join(f"{code} ({state})" for code, state in states)

@@ -1,0 +1,43 @@
+"""Why a parameter was not read or not written."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class Why(Enum):
+    UNKNOWN_NAME = "unknown name"
+    READ_ONLY = "read-only"
+    WRITE_ONLY = "write-only"
+    OUT_OF_RANGE = "out of range"
+    PROTECTED = "protected"
+    """An object that is not written by anybody but the bridge."""
+    TOO_OFTEN = "too often"
+    """Written again and again: the EEPROM would not last."""
+    REFUSED = "refused"
+    """The drive has aborted the transfer."""
+    NO_ANSWER = "no answer"
+    NOT_TAKEN = "not taken"
+    """The drive has accepted a value and holds another one."""
+    NOT_CONFIGURED = "not configured"
+
+
+class ParameterError(Exception):
+    """``str()`` is one sentence for a human; ``abort_code`` is the drive's, or 0."""
+
+    def __init__(self, why: Why, message: str, abort_code: int = 0) -> None:
+        super().__init__(message)
+        self.why = why
+        self.abort_code = abort_code
+
+
+class TransferFailed(Exception):
+    """A transfer ended without success; thrown into a procedure by whoever carries out its transfers.
+
+    ``by_drive``: the drive has said so itself, and has not done what was asked.
+    """
+
+    def __init__(self, message: str, abort_code: int, *, by_drive: bool) -> None:
+        super().__init__(message)
+        self.abort_code = abort_code
+        self.by_drive = by_drive

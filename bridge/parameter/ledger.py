@@ -1,0 +1,97 @@
+"""The EEPROM guard: how often each parameter was written, and who writes too often.
+
+An EEPROM wears out by being written: NORD's stands 100,000 times (BU 2500 §6.6). Each write is counted
+by drive and object, kept across restarts (``ledger_file``), and told of at every tenth of what the
+family stands. Who writes one parameter more than ``MOST_WRITES`` times within ``WINDOW_S`` writes in a
+cycle, which no EEPROM is made for, and is refused.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridge.parameter.error import ParameterError, Why
+
+MOST_WRITES: Final = 10
+WINDOW_S: Final = 600.0
+
+Key = tuple[str, str]
+"""The drive's or the node's name, and the object such as ``2066:01``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Saved:
+    """What is kept of one object: writes so far, and when the last were, in seconds since 1970 UTC."""
+
+    writes: int
+    last: tuple[float, ...] = ()
+
+
+@dataclass(slots=True)
+class _Count:
+    writes: int = 0
+    recent: deque[float] = field(default_factory=lambda: deque[float](maxlen=MOST_WRITES))
+
+
+class Ledger:
+    """Counts in memory; times are monotonic seconds. ``take_unsaved`` and ``restore`` are for who keeps
+    them."""
+
+    def __init__(self) -> None:
+        self._counts: dict[Key, _Count] = {}
+        self._unsaved: dict[Key, list[float]] = {}
+
+    def writes(self, key: Key) -> int:
+        """Writes so far."""
+        count = self._counts.get(key)
+        return count.writes if count else 0
+
+    def check(self, key: Key, name: str, now: float) -> None:
+        """Raises ``ParameterError`` where one more write would be one too many."""
+        count = self._counts.get(key)
+        if count is None or len(count.recent) < MOST_WRITES:
+            return
+        left_s = count.recent[0] + WINDOW_S - now
+        if left_s > 0:
+            raise ParameterError(
+                Why.TOO_OFTEN,
+                f"{name} was written {MOST_WRITES} times within {WINDOW_S / 60:g} min, and the EEPROM wears "
+                f"out; try again in {left_s:.0f} s, or have the drive write to its RAM only",
+            )
+
+    def count(self, key: Key, name: str, cycles: int | None, now: float) -> str:
+        """One more write. The warning where it is one of the tenths of ``cycles``, or nothing."""
+        count = self._counts.setdefault(key, _Count())
+        count.writes += 1
+        count.recent.append(now)
+        self._unsaved.setdefault(key, []).append(now)
+        if not cycles or count.writes * 10 // cycles == (count.writes - 1) * 10 // cycles:
+            return ""
+        return f"{name} of {key[0]} was written {count.writes} times: its EEPROM stands {cycles} writes"
+
+    def take_unsaved(self) -> dict[Key, list[float]]:
+        """The times of the writes since the last call."""
+        unsaved, self._unsaved = self._unsaved, {}
+        return unsaved
+
+    def put_back(self, unsaved: Mapping[Key, list[float]]) -> None:
+        """They could not be kept: they are there again the next time."""
+        for key, times in unsaved.items():
+            self._unsaved[key] = [*times, *self._unsaved.get(key, ())]
+
+    def restore(self, saved: Mapping[Key, Saved], epoch_s: float, now: float) -> None:
+        """Take over what is kept, which includes all that ``take_unsaved`` has given.
+
+        ``epoch_s`` is the wall clock, in seconds since 1970, at monotonic 0. What was written in the
+        future, by a clock that was set back meanwhile, counts and is not recent.
+        """
+        for key, record in saved.items():
+            unsaved = self._unsaved.get(key, [])
+            times = [time - epoch_s for time in record.last]
+            recent = sorted([*(time for time in times if time <= now), *unsaved])[-MOST_WRITES:]
+            count = self._counts.setdefault(key, _Count())
+            count.writes = record.writes + len(unsaved)
+            count.recent = deque(recent, maxlen=MOST_WRITES)

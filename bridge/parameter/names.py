@@ -1,0 +1,171 @@
+"""From a vendor's name of a parameter to the object that holds it, by the rules of the mapping file.
+
+``P102``, ``P102[2].3``, ``C00039/1``, ``E08``, ``2066:01`` and the names of points (``p102_2_3``) all lead
+to an ``Entry``. A name that fits the vendor's pattern is taken whether or not the file lists it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator
+from typing import Final
+
+from bridge.mapping.model import Family, Parameter
+from bridge.mapping.parameters import object_of
+from bridge.parameter.definition import Address, Definition, Entry, leaf_of
+from bridge.parameter.error import ParameterError, Why
+
+_OBJECT: Final = re.compile(r"(?:0x)?([0-9a-f]{4})h?:(?:0x)?([0-9a-f]{1,2})h?", re.IGNORECASE)
+_SPELLINGS: Final = (
+    "{name}[{element}].{set}", "{name}[{element}]", "{name}.{set}", "{name}/{element}", "{name}.{element}",
+)  # fmt: skip
+"""How vendors write elements and sets; the one that the family's own pattern reads is used."""
+_PUNCTUATION: Final = re.compile(r"[^0-9A-Za-z]+$")
+_NEAREST: Final = 3
+_MOST_SUB: Final = 0xFF
+
+
+class Names:
+    """The parameters of one drive family by name. ``definitions`` are in the order of the file.
+
+    Raises ValueError where a listed parameter has no object; the mapping's own checks find that first.
+    """
+
+    def __init__(self, family: Family) -> None:
+        rule = self._rule = family.parameter_names
+        self._pattern = re.compile(rule.pattern, re.IGNORECASE) if rule else None
+        self._first = rule.element_first if rule else 1
+        self.definitions = tuple(_definition(parameter) for parameter in family.parameter)
+        self._by_name = {definition.name.upper(): definition for definition in self.definitions}
+        self._by_leaf: dict[str, Entry] = {}
+        self._by_address: dict[Address, Entry] = {}
+        for entry in self.entries():
+            self._by_leaf.setdefault(entry.leaf, entry)
+            self._by_address.setdefault(entry.address, entry)
+        for definition in self.definitions:
+            # Without element and set it is the first of each.
+            self._by_leaf.setdefault(leaf_of(definition.name), self._entry(definition, None, None))
+
+    def resolve(self, text: str) -> Entry:
+        """The entry that ``text`` means. Raises ``ParameterError`` with the nearest names."""
+        wanted = text.strip()
+        match = _OBJECT.fullmatch(wanted)
+        if match:
+            address = Address(int(match[1], 16), int(match[2], 16))
+            return self._by_address.get(address) or Entry(str(address), address)
+        definition = self._by_name.get(wanted.upper())
+        if definition is not None:
+            return self._entry(definition, None, None)
+        found = self._by_pattern(wanted) or self._by_leaf.get(wanted.lower())
+        if found is None:
+            raise ParameterError(Why.UNKNOWN_NAME, f"there is no parameter {text!r}{self.hint(wanted)}")
+        return found
+
+    def entries(self) -> Iterator[Entry]:
+        """Every value that the file lists: each element in each set."""
+        for definition in self.definitions:
+            for element in self._elements(definition):
+                for number in range(1, definition.sets + 1) if definition.sets else (None,):
+                    yield self._entry(definition, element, number)
+
+    def points(self) -> Iterator[Entry]:
+        """Every value that is shown as a point: each element, of the first set."""
+        for definition in self.definitions:
+            if definition.point and definition.readable:
+                for element in self._elements(definition):
+                    yield self._entry(definition, element, None)
+
+    def hint(self, text: str) -> str:
+        """The nearest names and how names look, as the end of a sentence."""
+        names = {definition.name.upper(): definition.name for definition in self.definitions}
+        near = difflib.get_close_matches(text.upper(), names, _NEAREST, 0.5)
+        parts = [f"did you mean {', '.join(names[name] for name in near)}?"] if near else []
+        if self._rule:
+            parts.append(f"names look like {self._rule.example}")
+        return f"; {'; '.join([*parts, 'an object such as 1018:01 is taken too'])}"
+
+    def _elements(self, definition: Definition) -> range | tuple[None]:
+        return range(self._first, self._first + definition.elements) if definition.elements else (None,)
+
+    def _by_pattern(self, text: str) -> Entry | None:
+        match = self._pattern.fullmatch(text) if self._pattern else None
+        if match is None or self._rule is None:
+            return None
+        parts = match.groupdict()
+        element, number = _number(parts.get("element")), _number(parts.get("set"))
+        begins = [match.start(group) for group in ("element", "set") if parts.get(group) is not None]
+        name = _PUNCTUATION.sub("", text[: min(begins)]).upper() if begins else ""
+        definition = self._by_name.get(name)
+        if definition is not None:
+            self._check(definition, element, number)
+            return self._entry(definition, element, number)
+        try:
+            found = object_of(self._rule, text.upper())
+        except ValueError:
+            return None
+        address = Address(found.index, found.sub)
+        listed = self._by_address.get(address)
+        return Entry(text.upper(), address, listed.definition if listed else None)
+
+    def _check(self, definition: Definition, element: int | None, number: int | None) -> None:
+        """Raises ``ParameterError`` where the parameter has no such element or set."""
+        for what, given, first, count in (
+            ("element", element, self._first, definition.elements),
+            ("parameter set", number, 1, definition.sets),
+        ):
+            if given is not None and not first <= given < first + count:
+                has = f"{what}s {first}…{first + count - 1}" if count else f"no {what}s"
+                raise ParameterError(Why.UNKNOWN_NAME, f"{definition.name} has {has}, not {given}")
+
+    def _entry(self, definition: Definition, element: int | None, number: int | None) -> Entry:
+        name = self._spelled(definition.name, element, number)
+        base = definition.base
+        if base is not None:
+            place = self._first if element is None else element
+            sub = base.sub + max(definition.sets, 1) * (place - self._first) + (number or 1) - 1
+            return Entry(name, Address(base.index, min(sub, _MOST_SUB)), definition)
+        if self._rule is None:
+            raise ValueError(f"{definition.name} has no object")
+        found = object_of(self._rule, name, definition.sets, definition.elements)
+        return Entry(name, Address(found.index, found.sub), definition)
+
+    def _spelled(self, name: str, element: int | None, number: int | None) -> str:
+        """The name of one element in one set, as the family's pattern reads it."""
+        if element is None and number is None:
+            return name
+        for form in _SPELLINGS:
+            if ("{element}" in form) is (element is not None) and ("{set}" in form) is (number is not None):
+                text = form.format(name=name, element=element, set=number)
+                match = self._pattern.fullmatch(text) if self._pattern else None
+                parts = match.groupdict() if match else {}
+                if (_number(parts.get("element")), _number(parts.get("set"))) == (element, number):
+                    return text
+        return "_".join(str(part) for part in (name, element, number) if part is not None)
+
+
+def _number(text: str | None) -> int | None:
+    return None if text is None else int(text)
+
+
+def _definition(parameter: Parameter) -> Definition:
+    base = parameter.object
+    # What is not to be read as a scale holds something else than the unit says.
+    as_scaled = parameter.read
+    return Definition(
+        name=parameter.name,
+        title=parameter.title,
+        data_type=parameter.data_type,
+        factor=parameter.factor if as_scaled else 1.0,
+        unit=parameter.unit if as_scaled else "",
+        low=parameter.low,
+        high=parameter.high,
+        access=parameter.access,
+        elements=parameter.elements,
+        sets=parameter.sets,
+        states=tuple(parameter.states.items()),
+        base=Address(base.index, base.sub) if base else None,
+        point=parameter.point,
+        every_ms=parameter.every_ms,
+        volatile=parameter.volatile,
+    )

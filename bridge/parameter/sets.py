@@ -1,0 +1,146 @@
+"""Whole parameter sets: read for a backup, compared with a drive, written back. Procedures without a bus.
+
+A set holds what can be set: parameters of the mapping file that are read and written, each element in
+each parameter set. It is restored in the order of the mapping file, and only where the drive differs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field
+
+from bridge.image import Value
+from bridge.parameter.access import MISSING, DriveParameters, Transfer, Written
+from bridge.parameter.definition import Entry
+from bridge.parameter.error import ParameterError
+from bridge.parameter.names import Names
+
+Told = Callable[[str], None]
+"""Is told what is being done."""
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """What a drive holds, and what the set has for it."""
+
+    entry: Entry
+    in_drive: Value
+    in_set: Value
+
+
+@dataclass(slots=True)
+class Backup:
+    """The values by name; ``missing`` are those that this drive does not have."""
+
+    values: dict[str, Value] = field(default_factory=dict[str, Value])
+    missing: list[str] = field(default_factory=list[str])
+
+
+@dataclass(slots=True)
+class Comparison:
+    same: list[str] = field(default_factory=list[str])
+    differences: list[Difference] = field(default_factory=list[Difference])
+    missing: list[str] = field(default_factory=list[str])
+
+
+@dataclass(slots=True)
+class Restored:
+    """``failed`` is the name at which it ended with ``error``; ``left`` are those not come to."""
+
+    written: list[Written] = field(default_factory=list[Written])
+    same: list[str] = field(default_factory=list[str])
+    missing: list[str] = field(default_factory=list[str])
+    failed: str = ""
+    error: ParameterError | None = None
+    left: list[str] = field(default_factory=list[str])
+
+
+Steps = Generator[Transfer, tuple[bytes, float], None]
+
+
+def settings(names: Names) -> list[Entry]:
+    """What belongs into a set, in the order of the mapping file."""
+    return [
+        entry
+        for entry in names.entries()
+        if entry.definition and entry.definition.readable and entry.definition.writable
+    ]
+
+
+def in_order(names: Names, values: Mapping[str, Value]) -> list[tuple[Entry, Value]]:
+    """The entries of a set in the order of the mapping file, then those that it does not list.
+
+    Raises ``ParameterError`` for a name that the family does not have, before anything is done.
+    """
+    places = {entry.address: place for place, entry in enumerate(settings(names))}
+    found = [(names.resolve(name), value) for name, value in values.items()]
+    return sorted(found, key=lambda pair: places.get(pair[0].address, len(places)))
+
+
+def back_up(access: DriveParameters, into: Backup, now: float, tell: Told = lambda _: None) -> Steps:
+    """Read every setting into ``into``. Raises ``ParameterError`` where one cannot be read."""
+    for entry in settings(access.names):
+        tell(entry.name)
+        try:
+            reading = yield from access.read(entry, now)
+        except ParameterError as error:
+            if error.abort_code not in MISSING:
+                raise
+            into.missing.append(entry.name)
+            continue
+        now = reading.time
+        into.values[entry.name] = reading.value
+
+
+def compare(
+    access: DriveParameters,
+    values: Mapping[str, Value],
+    into: Comparison,
+    now: float,
+    tell: Told = lambda _: None,
+) -> Steps:
+    """Compare a set with the drive. Raises ``ParameterError``."""
+    for entry, value in in_order(access.names, values):
+        tell(entry.name)
+        try:
+            reading, same = yield from access.compare(entry, value, now)
+        except ParameterError as error:
+            if error.abort_code not in MISSING:
+                raise
+            into.missing.append(entry.name)
+            continue
+        now = reading.time
+        if same:
+            into.same.append(entry.name)
+        else:
+            into.differences.append(Difference(entry, reading.value, value))
+
+
+def restore(
+    access: DriveParameters,
+    values: Mapping[str, Value],
+    into: Restored,
+    now: float,
+    tell: Told = lambda _: None,
+) -> Steps:
+    """Write a set where the drive differs; every write is read back, and the first refusal ends it.
+
+    Raises ``ParameterError`` only for a set that does not fit, before anything is written.
+    """
+    wanted = in_order(access.names, values)
+    for place, (entry, value) in enumerate(wanted):
+        tell(entry.name)
+        try:
+            written = yield from access.write(entry, value, now)
+        except ParameterError as error:
+            if error.abort_code in MISSING:
+                into.missing.append(entry.name)
+                continue
+            into.failed, into.error = entry.name, error
+            into.left = [later.name for later, _ in wanted[place + 1 :]]
+            return
+        now = written.reading.time
+        if written.changed:
+            into.written.append(written)
+        else:
+            into.same.append(entry.name)

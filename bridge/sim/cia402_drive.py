@@ -1,0 +1,227 @@
+"""A drive with the profile CiA 402 (IEC 61800-7-201): one node, one axis, six modes of operation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from bridge.sim.canopen_slave import CanopenSlave
+from bridge.sim.cia402_axis import Cia402Axis
+from bridge.sim.cia402_objects import Cia402Objects
+from bridge.sim.cia402_settings import RULES, Cia402Settings, factory_communication
+from bridge.sim.cia402_states import State
+from bridge.sim.cia402_supervision import HeartbeatConsumer
+from bridge.sim.communication_objects import Memory
+from bridge.sim.dictionary import Dictionary
+from bridge.sim.emcy_producer import EmcyProducer
+from bridge.sim.nmt_slave import NmtCommand, NmtState
+from bridge.sim.pdo_objects import PdoObjects
+from bridge.sim.sdo_server import SdoServer
+from bridge.sim.store import Store
+from bridge.southbound.bus.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
+
+_HEARTBEAT: Final = 0x700
+_MASTER_LOST: Final = 0x8130
+_REGISTERS: Final = {0x2: 0x03, 0x3: 0x05, 0x4: 0x09, 0x8: 0x21}
+"""1001h by the first digit of the error code; bit 4, communication, for 81xxh and 82xxh."""
+
+
+class Cia402Drive:
+    """The node as the CAN bus sees it. Times are seconds of the caller's monotonic clock.
+
+    What is injected (``fail`` and its like) happens at the next ``on_time`` or ``on_frame``;
+    ``next_deadline`` says at once that there is something to do.
+    """
+
+    def __init__(self, node_id: int, settings: Cia402Settings | None = None) -> None:
+        self.node_id = node_id
+        self.powered = False
+        self._now = 0.0
+        self._injected: list[Callable[[], None]] = []
+        self._settings = Store(Cia402Settings)
+        if settings is not None:
+            self._settings.current = settings
+        self.save_settings()  # commissioned before it came onto this bus
+        self._communication = Store(lambda: factory_communication(node_id))
+        self._emcy = EmcyProducer(self._communication, RULES)
+        self.axis = Cia402Axis(lambda: self._settings.current, self._report)
+        self._consumer = HeartbeatConsumer(lambda: self._settings.current.heartbeat_consumer)
+        self.objects = Dictionary()
+        pdos = PdoObjects(
+            self.objects, self._communication, RULES, lambda: self.slave.state is NmtState.PRE_OPERATIONAL
+        )
+        objects = Cia402Objects(self.axis, self._settings, self._communication)
+        objects.add_to(self.objects, self._emcy, pdos, Memory(self._save, self._load))
+        servers = [SdoServer(self.objects, RULES.sdo_block_segments)]
+        self.slave = CanopenSlave(node_id, self._communication, self.objects, servers, self._emcy, self)
+        self._heard = self._hears()
+
+    @property
+    def settings(self) -> Cia402Settings:
+        """The profile's parameters as they are now."""
+        return self._settings.current
+
+    def save_settings(self) -> None:
+        """Who commissions the drive saves its parameters."""
+        self._settings.save()
+
+    # The core: frames and time in, frames out.
+
+    def start(self, now: float) -> None:
+        """Power on."""
+        self._now = now
+        self._communication.power_on()
+        self._restart()
+        self.powered = True
+        self.slave.boot()
+        self._heard = self._hears()
+
+    def on_frame(self, frame: Frame, now: float) -> None:
+        cob_id = frame.can_id & STANDARD_MASK
+        if not self.powered or cob_id not in self._heard or frame.can_id & (EXTENDED | ERROR):
+            return
+        self._advance(now)
+        if not self.powered:
+            return
+        if self._consumer.node and cob_id == _HEARTBEAT + self._consumer.node and not frame.can_id & REMOTE:
+            if self._consumer.on_heartbeat(frame.data, self._now):
+                self._master_is_back()
+        else:
+            self.slave.on_frame(frame, self._now)
+            self.axis.obey()  # a control word that came by SDO
+        self.slave.poll(self._now)
+        self._heard = self._hears()
+
+    def on_time(self, now: float) -> None:
+        self._advance(now)
+        if self.powered:
+            self.slave.poll(self._now)
+
+    def next_deadline(self) -> float | None:
+        if self._injected:
+            return self._now
+        if not self.powered:
+            return None
+        deadlines = (
+            self.slave.next_deadline(),
+            self.axis.next_deadline(),
+            self._consumer.next_deadline(),
+        )
+        return min((deadline for deadline in deadlines if deadline is not None), default=None)
+
+    def take_frames(self) -> list[Frame]:
+        return self.slave.take_frames()
+
+    # What a test or a demonstration does to the node.
+
+    def fail(self, code: int, *, lasting: bool = False) -> None:
+        """An error with this code, such as 4310h. A ``lasting`` cause blocks the reset until ``mend``."""
+        if not 0 < code <= 0xFFFF:
+            raise ValueError(f"error code {code:X}h: 0001h … FFFFh")
+        self._injected.append(lambda: self.axis.fail(code, lasting=lasting))
+
+    def mend(self) -> None:
+        """The cause is gone."""
+        self._injected.append(self.axis.automaton.cause_gone)
+
+    def silence(self) -> None:
+        """The node sends nothing more; it goes on receiving and working."""
+        self.slave.silent = True
+
+    def speak(self) -> None:
+        self.slave.silent = False
+
+    def power_off(self) -> None:
+        def off() -> None:
+            self.powered = False
+            self.slave.power_off()
+
+        self._injected.append(off)
+
+    def power_cycle(self) -> None:
+        """Off and on again: unsaved settings are lost, the boot-up message comes."""
+        self.power_off()
+        self._injected.append(lambda: self.start(self._now))
+
+    # The application of the CANopen slave.
+
+    def nmt_changed(self, state: NmtState) -> None:
+        # 6007h is for "NMT stopped state entered" too.
+        if state is NmtState.STOPPED and self.axis.state is State.ENABLED:
+            self.axis.abort_connection(_MASTER_LOST)
+
+    def restarted(self, command: NmtCommand) -> None:
+        if command is NmtCommand.RESET_NODE:
+            self._restart()
+            return
+        self._consumer.reset()
+        if self.axis.state is State.ENABLED:
+            self.axis.abort_connection(_MASTER_LOST)
+
+    def accepts_rpdo(self, number: int, length: int) -> bool:
+        del number, length  # of one that is too long the mapped bytes count
+        return True
+
+    def rpdo_applied(self, number: int) -> None:
+        del number
+        self.axis.obey()
+
+    def master_lost(self) -> None:
+        self._abort_connection()
+
+    def master_back(self) -> None:
+        self._master_is_back()
+
+    # How it works inside.
+
+    def _hears(self) -> frozenset[int]:
+        watched = {_HEARTBEAT + self._consumer.node} if self._consumer.node else set[int]()
+        return self.slave.hears() | watched
+
+    def _save(self) -> None:
+        self._settings.save()
+        self._communication.save()
+
+    def _load(self) -> None:
+        self._settings.forget()
+        self._communication.forget()
+
+    def _restart(self) -> None:
+        self._settings.power_on()
+        self._emcy.error_register = 0
+        self._consumer.reset()
+        self.axis.power_on(self._now)
+
+    def _report(self, code: int) -> None:
+        """EMCY for a fault of the drive, or for its reset."""
+        self._emcy.report(code, _register(code) if code else 0)
+
+    def _abort_connection(self) -> None:
+        """1016h or life guarding: CiA 301 leads to Pre-Operational, CiA 402 does what 6007h says."""
+        if not self.axis.abort_connection(_MASTER_LOST):
+            self._emcy.report(_MASTER_LOST, _register(_MASTER_LOST))
+        if self.slave.state is NmtState.OPERATIONAL:
+            command = bytes([NmtCommand.ENTER_PRE_OPERATIONAL, self.node_id])
+            self.slave.on_frame(Frame(0, command), self._now)
+
+    def _master_is_back(self) -> None:
+        """Where it was no fault there is nothing to be reset: the error has gone."""
+        if self.axis.state not in (State.FAULT, State.FAULT_REACTION):
+            self._emcy.report(0, 0)
+
+    def _advance(self, now: float) -> None:
+        self._now = max(self._now, now)  # stamps of frames may lie before the last timer
+        if self.powered:
+            self.axis.advance(self._now)
+            if self._consumer.expired(self._now):
+                self._abort_connection()
+        injected, self._injected = self._injected, []
+        for action in injected:
+            action()
+
+
+def _register(code: int) -> int:
+    """1001h for an error code."""
+    if code >> 8 in (0x81, 0x82):
+        return 0x11
+    return _REGISTERS.get(code >> 12, 0x01)

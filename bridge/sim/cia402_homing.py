@@ -1,0 +1,97 @@
+"""Homing mode of the simulated CiA 402 drive: methods 17, 18 (limit switch), 33, 34 (zero pulse), 35 and 37
+(here), of 6098h."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from enum import Enum
+from typing import Final
+
+from bridge.sim.cia402_modes import BIT_4, BIT_12, BIT_13, TARGET_REACHED, Targets
+from bridge.sim.cia402_motion import Motor
+from bridge.sim.cia402_settings import INCREMENTS, Cia402Settings
+
+METHODS: Final = (17, 18, 33, 34, 35, 37)
+SWITCH_AT: Final = 100_000
+"""Where the limit switches are, from the place at which the drive was switched on."""
+_GIVES_UP_AFTER: Final = 4 * SWITCH_AT
+
+
+class _Phase(Enum):
+    IDLE = "not started, or interrupted"
+    RUNNING = "in progress"
+    DONE = "attained"
+    FAILED = "failed"
+
+
+class Homing:
+    """hm: begins with bit 4, ends when it falls. ``switches`` False: nobody finds them."""
+
+    def __init__(self, motor: Motor, settings: Callable[[], Cia402Settings], targets: Targets) -> None:
+        del targets
+        self.switches = True
+        self._motor = motor
+        self._settings = settings
+        self._shift = 0.0
+        """The place of the machine is the drive's position and this."""
+        self._phase = _Phase.IDLE
+        self._goal = 0.0
+        self._speed = 0.0
+
+    def power_on(self) -> None:
+        self._shift, self._phase = 0.0, _Phase.IDLE
+
+    def on_control_word(self, word: int, rising: int) -> None:
+        if rising & BIT_4:
+            self._begin()
+        elif not word & BIT_4 and self._phase is _Phase.RUNNING:
+            self._phase = _Phase.IDLE
+
+    def _begin(self) -> None:
+        method, speeds = self._settings().homing_method, self._settings().homing_speeds
+        place = self._motor.position + self._shift
+        self._phase = _Phase.RUNNING
+        self._speed = float(speeds[0] if method in (17, 18) else speeds[1])
+        match method:
+            case 17 | 18:
+                way = SWITCH_AT if self.switches else _GIVES_UP_AFTER
+                self._goal = float(-way if method == 17 else way)
+            case 33:
+                self._goal = math.ceil(place / INCREMENTS - 1) * INCREMENTS
+            case 34:
+                self._goal = math.floor(place / INCREMENTS + 1) * INCREMENTS
+            case _:
+                self._goal = place
+        self._goal -= self._shift
+
+    @property
+    def demand(self) -> float:
+        return self._motor.velocity
+
+    def advance(self, dt_s: float) -> None:
+        ramp = self._settings().homing_acceleration
+        if self._phase is not _Phase.RUNNING:
+            self._motor.ramp_to(0.0, 0.0, ramp, dt_s)
+        elif self._motor.go_to(self._goal, self._speed, ramp, ramp, dt_s):
+            self._arrived()
+
+    def _arrived(self) -> None:
+        settings, motor = self._settings(), self._motor
+        if settings.homing_method in (17, 18) and not self.switches:
+            self._phase = _Phase.FAILED
+            return
+        self._shift += motor.position - settings.home_offset
+        motor.position = float(settings.home_offset)
+        self._phase = _Phase.DONE
+
+    def leave(self) -> None:
+        if self._phase is _Phase.RUNNING:
+            self._phase = _Phase.IDLE
+
+    @property
+    def bits(self) -> int:
+        bits = TARGET_REACHED if self._motor.stands_still and self._phase is not _Phase.RUNNING else 0
+        if self._phase is _Phase.DONE:
+            bits |= BIT_12
+        return bits | (BIT_13 if self._phase is _Phase.FAILED else 0)

@@ -1,0 +1,189 @@
+"""The finite state automaton of a drive with CiA 402 (IEC 61800-7-201): states, commands, transitions.
+
+Transitions are numbered as the standard does. Where an option code lets the drive stop first, the
+transition is taken when it stands still: ``Automaton.leaving`` says that it waits for that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from enum import Enum, IntEnum
+from typing import Final
+
+SWITCH_ON: Final = 0x0001
+ENABLE_VOLTAGE: Final = 0x0002
+QUICK_STOP: Final = 0x0004
+ENABLE_OPERATION: Final = 0x0008
+FAULT_RESET: Final = 0x0080
+HALT: Final = 0x0100
+
+QUICK_STOP_OPTION: Final = 0x605A
+SHUTDOWN_OPTION: Final = 0x605B
+DISABLE_OPTION: Final = 0x605C
+HALT_OPTION: Final = 0x605D
+FAULT_OPTION: Final = 0x605E
+
+
+class State(IntEnum):
+    """The value is what bits 0 … 3, 5 and 6 of the status word show."""
+
+    NOT_READY = 0x00
+    SWITCH_ON_DISABLED = 0x40
+    READY = 0x21
+    SWITCHED_ON = 0x23
+    ENABLED = 0x27
+    QUICK_STOP_ACTIVE = 0x07
+    FAULT_REACTION = 0x0F
+    FAULT = 0x08
+
+
+class Command(Enum):
+    """What bits 0 … 3 of the control word ask for."""
+
+    SHUTDOWN = "shutdown"
+    SWITCH_ON = "switch on, disable operation"
+    ENABLE_OPERATION = "enable operation"
+    DISABLE_VOLTAGE = "disable voltage"
+    QUICK_STOP = "quick stop"
+
+
+class Ramp(Enum):
+    """How the motor comes to a standstill."""
+
+    COAST = "coast"
+    SLOW_DOWN = "slow down"
+    QUICK = "quick stop"
+
+
+TRANSITIONS: Final = {
+    (State.SWITCH_ON_DISABLED, Command.SHUTDOWN): (2, State.READY),
+    (State.READY, Command.SWITCH_ON): (3, State.SWITCHED_ON),
+    # "Enable operation" in "ready" takes transition 3 and then 4.
+    (State.READY, Command.ENABLE_OPERATION): (3, State.SWITCHED_ON),
+    (State.READY, Command.QUICK_STOP): (7, State.SWITCH_ON_DISABLED),
+    (State.READY, Command.DISABLE_VOLTAGE): (7, State.SWITCH_ON_DISABLED),
+    (State.SWITCHED_ON, Command.ENABLE_OPERATION): (4, State.ENABLED),
+    (State.SWITCHED_ON, Command.SHUTDOWN): (6, State.READY),
+    (State.SWITCHED_ON, Command.DISABLE_VOLTAGE): (10, State.SWITCH_ON_DISABLED),
+    (State.SWITCHED_ON, Command.QUICK_STOP): (10, State.SWITCH_ON_DISABLED),
+    (State.ENABLED, Command.SWITCH_ON): (5, State.SWITCHED_ON),
+    (State.ENABLED, Command.SHUTDOWN): (8, State.READY),
+    (State.ENABLED, Command.DISABLE_VOLTAGE): (9, State.SWITCH_ON_DISABLED),
+    (State.ENABLED, Command.QUICK_STOP): (11, State.QUICK_STOP_ACTIVE),
+    (State.QUICK_STOP_ACTIVE, Command.DISABLE_VOLTAGE): (12, State.SWITCH_ON_DISABLED),
+    (State.QUICK_STOP_ACTIVE, Command.ENABLE_OPERATION): (16, State.ENABLED),
+}
+"""By state and command. 0, 1, 13, 14 and 15 depend on no command."""
+
+
+def command_of(control_word: int) -> Command:
+    """The command in a control word (disable voltage: xx0x; quick stop: x01x)."""
+    if not control_word & ENABLE_VOLTAGE:
+        return Command.DISABLE_VOLTAGE
+    if not control_word & QUICK_STOP:
+        return Command.QUICK_STOP
+    if not control_word & SWITCH_ON:
+        return Command.SHUTDOWN
+    return Command.ENABLE_OPERATION if control_word & ENABLE_OPERATION else Command.SWITCH_ON
+
+
+def ramp_of(option: int) -> Ramp:
+    """What an option code of 605Ah … 605Eh says. 3 and 4 (at the current or voltage limit) brake as the
+    quick stop does."""
+    if option == 0:
+        return Ramp.COAST
+    return Ramp.SLOW_DOWN if option in (1, 5) else Ramp.QUICK
+
+
+class Automaton:
+    """The state of one drive. ``options`` are 605Ah … 605Eh by their index."""
+
+    def __init__(self, options: Callable[[], Mapping[int, int]]) -> None:
+        self._options = options
+        self.state = State.NOT_READY
+        self.control_word = 0
+        self.leaving: Command | None = None
+        self.taken: list[int] = []
+        """Numbers of the last transitions, the newest last."""
+        self._lasting = False
+
+    @property
+    def _stays_in_quick_stop(self) -> bool:
+        """605Ah = 5 … 8: the drive stands still in "quick stop active"."""
+        return self._options()[QUICK_STOP_OPTION] >= 5
+
+    @property
+    def ramp(self) -> Ramp | None:
+        """How the motor is being stopped; None while it follows its mode."""
+        options = self._options()
+        match self.state:
+            case State.ENABLED:
+                if self.leaving is Command.SHUTDOWN:
+                    return ramp_of(options[SHUTDOWN_OPTION])
+                if self.leaving is Command.SWITCH_ON:
+                    return ramp_of(options[DISABLE_OPTION])
+                return ramp_of(options[HALT_OPTION]) if self.control_word & HALT else None
+            case State.QUICK_STOP_ACTIVE:
+                return ramp_of(options[QUICK_STOP_OPTION])
+            case State.FAULT_REACTION:
+                return ramp_of(options[FAULT_OPTION])
+            case _:
+                return Ramp.COAST
+
+    def power_on(self) -> None:
+        """Transition 0."""
+        self.state, self.control_word, self.leaving, self._lasting = State.NOT_READY, 0, None, False
+        self.taken = [0]
+
+    def initialised(self) -> None:
+        """Transition 1."""
+        if self.state is State.NOT_READY:
+            self._go(1, State.SWITCH_ON_DISABLED)
+
+    def on_control_word(self, word: int, *, standstill: bool) -> bool:
+        """A control word came. True where its edge resets a fault (transition 15)."""
+        rising = word & ~self.control_word
+        self.control_word = word
+        is_reset = bool(rising & FAULT_RESET) and self.state is State.FAULT and not self._lasting
+        if is_reset:
+            self._go(15, State.SWITCH_ON_DISABLED)
+        self.settle(standstill=standstill)
+        return is_reset
+
+    def fault(self, *, lasting: bool) -> None:
+        """Transition 13. A ``lasting`` cause blocks the reset until ``cause_gone``."""
+        self._lasting = self._lasting or lasting
+        if self.state not in (State.FAULT, State.FAULT_REACTION):
+            self._go(13, State.FAULT_REACTION)
+
+    def cause_gone(self) -> None:
+        self._lasting = False
+
+    def settle(self, *, standstill: bool) -> None:
+        """Take every transition that is due; called with each control word and while the motor stops."""
+        if self.state is State.FAULT_REACTION and (standstill or self.ramp is Ramp.COAST):
+            self._go(14, State.FAULT)
+        if self.state is State.QUICK_STOP_ACTIVE and not self._stays_in_quick_stop:
+            if standstill or self.ramp is Ramp.COAST:
+                self._go(12, State.SWITCH_ON_DISABLED)
+            return
+        for _ in range(2):  # "enable operation" may take two steps
+            self._obey(command_of(self.control_word), standstill=standstill)
+
+    def _obey(self, command: Command, *, standstill: bool) -> None:
+        found = TRANSITIONS.get((self.state, command))
+        self.leaving = None
+        if found is None:
+            return
+        number, target = found
+        if number == 16 and not self._stays_in_quick_stop:
+            return
+        if number in (5, 8):
+            self.leaving = command
+            if not standstill and self.ramp is not Ramp.COAST:
+                return
+        self._go(number, target)
+
+    def _go(self, number: int, target: State) -> None:
+        self.state, self.leaving = target, None
+        self.taken = [*self.taken[-31:], number]

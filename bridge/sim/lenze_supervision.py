@@ -1,0 +1,144 @@
+"""What an 8400 motec watches on the bus and reports (EDS84DMOTCAN 3.0, §10)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from enum import IntEnum
+from typing import Final
+
+from bridge.sim.emcy_producer import EmcyProducer
+from bridge.sim.lenze_settings import heartbeat_step
+
+SUPPLY_FAILED: Final = 0x3100
+CAN_WARNING: Final = 0x8100
+HEARTBEAT_LOST: Final = 0x8130
+COB_ID_COLLISION: Final = 0x8150
+PDO_TOO_SHORT: Final = 0x8210
+PDO_TOO_LONG: Final = 0x8220
+DEVICE_ERROR: Final = 0xF000
+
+FAILED: Final = 250
+NO_RESPONSE: Final = 255
+"""C00347."""
+
+
+class Watched(IntEnum):
+    """What the CAN unit raises an error about, as numbers of C00168.
+
+    The manual prints one number only, 01.0127.00002 (§6.5), and not how its parts lie in the 32 bits:
+    module 127 in the high word and these errors are the simulation's own.
+    """
+
+    RPDO1_LATE = 0x007F_0101
+    RPDO2_LATE = 0x007F_0102
+    FAULTY_TELEGRAM = 0x007F_0111
+    BUS_OFF = 0x007F_0112
+    CAN_WARNING = 0x007F_0113
+    COMMUNICATION_STOPPED = 0x007F_0114
+    HEARTBEAT = 0x007F_0115
+
+
+class RpdoMonitor:
+    """C00357: while the node is operational, the next RPDO must come within this time (§10.1)."""
+
+    def __init__(self, time_ms: Callable[[], int]) -> None:
+        self._time_ms = time_ms
+        self._since: float | None = None
+        self.late = False
+
+    def start(self, now: float) -> None:
+        """Operational, or an RPDO has come."""
+        self._since, self.late = now, False
+
+    def stop(self) -> None:
+        self._since = None
+
+    def expired(self, now: float) -> bool:
+        """True once when the time has run out."""
+        deadline = self.next_deadline()
+        if deadline is None or now < deadline:
+            return False
+        self._since, self.late = None, True
+        return True
+
+    def next_deadline(self) -> float | None:
+        time_ms = self._time_ms()
+        return None if self._since is None or not time_ms else self._since + time_ms / 1000
+
+
+class HeartbeatConsumer:
+    """1016h: one producer is watched, from its first heartbeat or boot-up on (§10.3.2)."""
+
+    def __init__(self, node: Callable[[], int], time_ms: Callable[[], int]) -> None:
+        self._node = node
+        self._time_ms = time_ms
+        self._heard_at: float | None = None
+        self.status = NO_RESPONSE
+
+    @property
+    def node(self) -> int:
+        """The watched node, 0 where none is."""
+        return self._node() if heartbeat_step(self._time_ms()) else 0
+
+    def reset(self) -> None:
+        self._heard_at, self.status = None, NO_RESPONSE
+
+    def on_heartbeat(self, data: bytes, now: float) -> None:
+        if len(data) == 1:
+            self._heard_at, self.status = now, data[0] & 0x7F
+
+    def expired(self, now: float) -> bool:
+        """True once when the producer has been silent for too long."""
+        deadline = self.next_deadline()
+        if deadline is None or now < deadline:
+            return False
+        self._heard_at, self.status = None, FAILED
+        return True
+
+    def next_deadline(self) -> float | None:
+        if self._heard_at is None or not self.node:
+            return None
+        return self._heard_at + heartbeat_step(self._time_ms()) / 1000
+
+
+class ErrorReporter:
+    """EMCY once for everything that comes, and once for everything that goes (§10.4)."""
+
+    def __init__(self, emcy: EmcyProducer) -> None:
+        self._emcy = emcy
+        self._communication: set[int] = set()
+        self._device: set[int] = set()
+
+    def reset(self) -> None:
+        self._communication.clear()
+        self._device.clear()
+        self._emcy.error_register = 0
+
+    def begin(self, code: int) -> None:
+        """A communication error or the supply; ``code`` is its EMCY code."""
+        if code not in self._communication:
+            self._communication.add(code)
+            self._emcy.report(code, self._register())
+
+    def end(self, code: int) -> None:
+        if code in self._communication:
+            self._communication.discard(code)
+            self._emcy.report(0, self._register())
+
+    def device_errors(self, numbers: Sequence[int]) -> bool:
+        """The drive's errors as they are now: F000h with the Lenze number in bytes 4…7. True for news."""
+        come = [number for number in numbers if number not in self._device]
+        gone = self._device.difference(numbers)
+        self._device = set(numbers)
+        for number in come:
+            self._emcy.report(DEVICE_ERROR, self._register(), b"\0" + number.to_bytes(4, "little"))
+        for _ in gone:
+            self._emcy.report(0, self._register())
+        return bool(come or gone)
+
+    def _register(self) -> int:
+        """1001h: 11h is a communication error, 01h an error of the device (§13)."""
+        register = 0x01 if self._device else 0
+        for code in self._communication:
+            register |= 0x01 if code == SUPPLY_FAILED else 0x11
+        return register

@@ -1,0 +1,71 @@
+"""What an 8400 motec sends of its own accord, and what it counts (EDS84DMOTCAN 3.0, §7.2.3, §8.5, C00360)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from bridge.sim.lenze_settings import LenzeCodes
+from bridge.sim.settings import CommunicationSettings
+
+
+class QuasiMaster:
+    """C00352 = 1: starts every node, C00356/1 after power-on or a reset."""
+
+    def __init__(self, codes: Callable[[], LenzeCodes]) -> None:
+        self._codes = codes
+        self._at: float | None = None
+
+    def start(self, now: float) -> None:
+        codes = self._codes()
+        self._at = now + codes.times_ms[0] / 1000 if codes.master else None
+
+    def due(self, now: float) -> bool:
+        """True once."""
+        if self._at is None or now < self._at:
+            return False
+        self._at = None
+        return True
+
+    def next_deadline(self) -> float | None:
+        return self._at
+
+
+class SyncProducer:
+    """1005h, bit 30, and C00369: a SYNC every so many milliseconds."""
+
+    def __init__(self, codes: Callable[[], LenzeCodes]) -> None:
+        self._codes = codes
+        self._period_ms = 0
+        self._at = 0.0
+
+    def reset(self) -> None:
+        self._period_ms = 0
+
+    def due(self, now: float) -> bool:
+        """Whether a SYNC is to be sent now. A late caller gets one, not those that were missed."""
+        codes = self._codes()
+        period_ms = codes.sync_ms if codes.sync_producer else 0
+        if period_ms != self._period_ms:  # just written: the new period begins now
+            self._period_ms = period_ms
+            self._at = now + period_ms / 1000
+            return False
+        if not period_ms or now < self._at:
+            return False
+        self._at += period_ms / 1000
+        if self._at <= now:
+            self._at = now + period_ms / 1000
+        return True
+
+    def next_deadline(self) -> float | None:
+        return self._at if self._period_ms else None
+
+
+def counters_of(cob_id: int, settings: CommunicationSettings, *, sent: bool) -> tuple[int, ...]:
+    """The sub-codes of C00360 that this frame counts in: all of its direction, and its own channel."""
+    if sent:
+        channels = [pdo.cob_id for pdo in settings.tpdo] + [0] + [sdo.send_cob_id for sdo in settings.sdo]
+    else:
+        channels = [pdo.cob_id for pdo in settings.rpdo] + [0] + [sdo.receive_cob_id for sdo in settings.sdo]
+    if not cob_id or cob_id not in channels:
+        return ()
+    return (1 if sent else 2), (3 if sent else 8) + channels.index(cob_id)

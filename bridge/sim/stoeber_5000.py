@@ -1,0 +1,211 @@
+"""STÖBER MDS/FDS/SDS 5000 with CAN 5000: one axis, or four behind a POSISwitch (ID 441684.06)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+from bridge.sim.emcy_producer import EmcyProducer
+from bridge.sim.nmt_slave import NmtCommand, NmtState
+from bridge.sim.sdo_server import SdoServer
+from bridge.sim.stoeber_axis import StoeberAxis
+from bridge.sim.stoeber_device import StoeberDevice
+from bridge.sim.stoeber_dictionary import AxisView, WideDictionary
+from bridge.sim.stoeber_events import CODES, COMMUNICATION, LIFE_GUARDING, SYNC_MISSING
+from bridge.sim.stoeber_objects import CommunicationObjects, identity
+from bridge.sim.stoeber_parameters import add_axis, add_device
+from bridge.sim.stoeber_pdo_objects import StoeberPdoObjects
+from bridge.sim.stoeber_settings import CHANNELS, RULES, factory_communication, factory_settings
+from bridge.sim.stoeber_slave import StoeberSlave, SyncWatch
+from bridge.sim.store import Store
+from bridge.southbound.bus.frame import STANDARD_MASK, Frame
+
+
+class Stoeber5000:
+    """The node as the CAN bus sees it. Times are seconds of the caller's monotonic clock.
+
+    ``axes`` is 1, with A180 and D230 in PDO channel 1, or up to 4, with Q00 and Q01 of axis n in channel n.
+    ``mapped`` says that an application was downloaded; a drive as delivered maps nothing. What is injected
+    (``fail`` and its like) happens at the next ``on_time`` or ``on_frame``.
+    """
+
+    def __init__(
+        self,
+        node_id: int,
+        *,
+        axes: int = 1,
+        mapped: bool = True,
+        rated_power_kw: float = 1.5,
+        name: str = "MDS 5015",
+        bit_31_opens_sdo: bool = False,
+    ) -> None:
+        if not 1 <= axes <= CHANNELS:
+            raise ValueError(f"axes = {axes}: a POSISwitch has 1 … {CHANNELS}")
+        self.node_id = node_id
+        self.powered = False
+        self._now = 0.0
+        self._injected: list[Callable[[], None]] = []
+        self._communication = Store(lambda: factory_communication(node_id, axes, mapped=mapped))
+        self._settings = Store(lambda: factory_settings(axes))
+        self._emcy = EmcyProducer(self._communication, RULES)
+        self.device = StoeberDevice(axes, self._settings, self._report)
+        self.slave = self._build(rated_power_kw, name, bit_31_opens_sdo)
+        self._heard = self.slave.hears()
+
+    @property
+    def axes(self) -> tuple[StoeberAxis, ...]:
+        return self.device.axes
+
+    # The core: frames and time in, frames out.
+
+    def start(self, now: float) -> None:
+        """Power on."""
+        self._now = now
+        self._communication.power_on()
+        self._restart()
+        self.powered = True
+        self.slave.boot()
+        self._heard = self.slave.hears()
+
+    def on_frame(self, frame: Frame, now: float) -> None:
+        if not self.powered or frame.can_id & STANDARD_MASK not in self._heard:
+            return
+        self._advance(now)
+        self.slave.on_frame(frame, self._now)
+        self.device.settle()
+        self._poll()
+        self._heard = self.slave.hears()
+
+    def on_time(self, now: float) -> None:
+        self._advance(now)
+        self._poll()
+
+    def next_deadline(self) -> float | None:
+        if self._injected:
+            return self._now
+        if not self.powered:
+            return None
+        deadlines = (self.slave.next_deadline(), self.device.next_deadline())
+        return min((deadline for deadline in deadlines if deadline is not None), default=None)
+
+    def take_frames(self) -> list[Frame]:
+        return self.slave.take_frames()
+
+    # What a test or a demonstration does to the node.
+
+    def commission(self, axis: int | None = None, **values: float) -> None:
+        """Set parameters of an axis (from 0), or of all, by the names of ``AxisParameters``, and save
+        them, as POSITool does."""
+        for number, one in enumerate(self._settings.current.axes):
+            if axis in (None, number):
+                self._settings.current.axes[number] = replace(one, **values)
+        self._settings.save()
+
+    def fail(self, event: int, cause: int = 0, *, lasting: bool = False) -> None:
+        """An event of §9.3. A ``lasting`` cause blocks the acknowledge until ``cause_gone``."""
+        if event not in CODES:
+            raise ValueError(f"no event {event}: 31 … 70 of the list of events")
+        self._injected.append(lambda: self.device.trip(event, cause, lasting=lasting))
+
+    def cause_gone(self) -> None:
+        self.device.cause_lasts = False
+
+    def silence(self) -> None:
+        """The node sends nothing more; it goes on receiving and working."""
+        self.slave.silent = True
+
+    def speak(self) -> None:
+        self.slave.silent = False
+
+    def power_off(self) -> None:
+        def off() -> None:
+            self.powered = False
+            self.slave.power_off()
+
+        self._injected.append(off)
+
+    def power_cycle(self) -> None:
+        """Off and on again: unsaved settings are lost, the boot-up message comes."""
+        self.power_off()
+        self._injected.append(lambda: self.start(self._now))
+
+    # The application of the CANopen slave.
+
+    def nmt_changed(self, state: NmtState) -> None:
+        # The manual lets nothing but life guarding stop the drive: outside Operational it goes on.
+        del state
+
+    def restarted(self, command: NmtCommand) -> None:
+        if command is NmtCommand.RESET_NODE:
+            self._restart()
+
+    def accepts_rpdo(self, number: int, length: int) -> bool:
+        del number, length  # §8.1.1: any length is taken as far as it goes
+        return True
+
+    def rpdo_applied(self, number: int) -> None:
+        del number  # the objects have acted when they were written
+
+    def master_lost(self) -> None:
+        self.device.trip(COMMUNICATION, LIFE_GUARDING)
+
+    def master_back(self) -> None:
+        """The event stays until it is acknowledged."""
+
+    # How it works inside.
+
+    def _build(self, rated_power_kw: float, name: str, bit_31_opens_sdo: bool) -> StoeberSlave:
+        dictionary = WideDictionary()
+        own = [WideDictionary() for _ in self.axes]
+        # PDO channel n maps the parameters of axis n, SDO channel n reaches those that A11.n names.
+        mapped = [AxisView(dictionary, own, partial(min, n, len(own) - 1)) for n in range(CHANNELS)]
+        reached = [AxisView(dictionary, own, partial(self._edited_axis, n + 1)) for n in range(CHANNELS)]
+        pdos = StoeberPdoObjects(
+            self.node_id, mapped[0], self._communication, lambda: self.slave.state is NmtState.PRE_OPERATIONAL
+        )
+        objects = CommunicationObjects(
+            self.node_id, self._communication, self._settings, pdos, bit_31_opens=bit_31_opens_sdo
+        )
+        objects.add_to(
+            dictionary,
+            identity(rated_power_kw, name),
+            lambda: self.device.error_register,
+            lambda: self.device.state,
+        )
+        add_device(dictionary, self.device, self._settings)
+        for number, one in enumerate(own):
+            add_axis(one, self.device, number)
+        return StoeberSlave(
+            self.node_id,
+            self._communication,
+            mapped,
+            [SdoServer(view, RULES.sdo_block_segments) for view in reached],
+            self._emcy,
+            self,
+            SyncWatch(lambda: self._settings.current.sync_timeout_us),
+            partial(self.device.trip, COMMUNICATION, SYNC_MISSING),
+        )
+
+    def _edited_axis(self, channel: int) -> int:
+        return self._settings.current.edited_axis[channel]
+
+    def _report(self, code: int, register: int) -> None:
+        self._emcy.report(code, register, bytes([self.device.event, self.device.cause]))
+
+    def _restart(self) -> None:
+        self._settings.power_on()
+        self._emcy.error_register = 0
+        self.device.power_on(self._now)
+
+    def _advance(self, now: float) -> None:
+        self._now = max(self._now, now)  # stamps of frames may lie before the last timer
+        if self.powered:
+            self.device.advance(self._now)
+        injected, self._injected = self._injected, []
+        for action in injected:
+            action()
+
+    def _poll(self) -> None:
+        if self.powered:
+            self.slave.poll(self._now)

@@ -1,0 +1,45 @@
+"""A site file's parameters for a simulated STÖBER inverter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from bridge.errors import OperationFailed
+from bridge.sim.stoeber_5000 import Stoeber5000
+
+_AXES: Final = 4
+_PARAMETERS: Final = {
+    "C01": ("c01_rpm", 1.0, 32767.0),
+    "accelerate_s": ("accelerate_s", 0.0, 600.0),
+    "decelerate_s": ("decelerate_s", 0.0, 600.0),
+    "quick_stop_s": ("quick_stop_s", 0.0, 600.0),
+}
+"""What the simulation calls it, and its limits."""
+
+
+def stoeber_5000(node_id: int, parameters: Mapping[str, float]) -> Stoeber5000:
+    """One axis."""
+    return _commissioned(Stoeber5000(node_id), parameters)
+
+
+def stoeber_5000_four_axes(node_id: int, parameters: Mapping[str, float]) -> Stoeber5000:
+    return _commissioned(Stoeber5000(node_id, axes=_AXES, name="SDS 5015"), parameters)
+
+
+def _commissioned(node: Stoeber5000, parameters: Mapping[str, float]) -> Stoeber5000:
+    slots = [f"axis{axis.number}" for axis in node.axes]
+    # What is meant for one axis comes after what is meant for all.
+    for name in sorted(parameters, key=lambda name: "/" in name):
+        slot, _, parameter = name.rpartition("/")
+        if parameter not in _PARAMETERS or slot not in ("", *slots):
+            takes = ", ".join(_PARAMETERS)
+            hint = f"the simulated STÖBER 5000 takes {takes}, or {slots[-1]}/C01 for one axis"
+            raise OperationFailed(f"{name}: {hint}")
+        attribute, low, high = _PARAMETERS[parameter]
+        value = parameters[name]
+        if not low <= value <= high:
+            raise OperationFailed(f"{name} = {value:g} is outside {low:g} … {high:g}")
+        whole = round(value) if attribute == "c01_rpm" else value
+        node.commission(slots.index(slot) if slot else None, **{attribute: whole})
+    return node

@@ -1,0 +1,203 @@
+"""Communication objects of CAN 5000 and their STÖBER coordinates (ID 441684.06 §11.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from bridge.sim.abort import AbortCode, SdoAbort
+from bridge.sim.communication_objects import Identity, add_identity, add_protocols, add_sdo_servers
+from bridge.sim.dictionary import DataType as Type
+from bridge.sim.dictionary import Dictionary, Number, constant
+from bridge.sim.settings import COB_ID_MASK, DISABLED, CommunicationSettings, SdoSettings
+from bridge.sim.stoeber_pdo_objects import StoeberPdoObjects, resolved
+from bridge.sim.stoeber_settings import CHANNELS, MAP_ENTRIES, SDO_BASES, StoeberSettings, coordinate
+from bridge.sim.store import Store
+
+_SAVE: Final = int.from_bytes(b"save", "little")
+_SYNC_MOST_US: Final = 32_000_000
+_SYNC_MOST: Final = 0x7FF
+
+
+def identity(rated_power_kw: float, name: str) -> Identity:
+    """§11.1: the product code is the rated power in 0.1 kW."""
+    return Identity(
+        device_type=0x0002_0192,
+        vendor_id=0xB9,
+        product_code=round(rated_power_kw * 10),
+        revision=1,
+        serial=8_000_000,
+        device_name=name,
+        hardware_version="SIM",
+        software_version="V 5.6-H",
+    )
+
+
+def alias(dictionary: Dictionary, name: str, index: int, subs: tuple[int, ...] = (0,)) -> None:
+    """Show sub-indices of a communication object as the elements of a parameter, from 0."""
+    for element, sub in enumerate(subs):
+        dictionary.add(coordinate(name), element, dictionary.find(index, sub))
+
+
+class CommunicationObjects:
+    """Fills the dictionary with 1000h…1A03h, A00, A83 and A200…A244."""
+
+    def __init__(
+        self,
+        node_id: int,
+        communication: Store[CommunicationSettings],
+        settings: Store[StoeberSettings],
+        pdos: StoeberPdoObjects,
+        *,
+        bit_31_opens: bool,
+    ) -> None:
+        self._node_id = node_id
+        self._communication = communication
+        self._settings = settings
+        self._pdos = pdos
+        self._bit_31_opens = bit_31_opens
+        self.saves = 0
+
+    def add_to(
+        self, dictionary: Dictionary, who: Identity, register: Callable[[], int], state: Callable[[], int]
+    ) -> None:
+        """``register`` is 1001h, ``state`` 1002h."""
+        add_identity(dictionary, who, state)
+        dictionary.add(0x1001, 0, Number(Type.UNSIGNED8, register))
+        dictionary.add(0x100B, 0, constant(Type.UNSIGNED32, self._node_id))
+        add_protocols(dictionary, self._communication)
+        self._add_ranges(dictionary)
+        self._add_memory(dictionary)
+        self._add_configuration(dictionary)
+        add_sdo_servers(dictionary, self._communication)
+        for number in range(1, CHANNELS):
+            self._add_sdo_server(dictionary, number)
+        self._pdos.add()
+        self._add_coordinates(dictionary)
+
+    def _save(self) -> None:
+        self._communication.save()
+        self._settings.save()
+        self.saves += 1
+
+    def _add_ranges(self, dictionary: Dictionary) -> None:
+        """Where §11.1 says more than DS-301: SYNC 1…2047, 1015h as U32, 1006h."""
+        current = self._communication
+
+        def set_sync(value: int) -> None:
+            current.current.sync_cob_id = value
+
+        def set_inhibit(value: int) -> None:
+            current.current.emcy_inhibit = value
+
+        def set_timeout(value: int) -> None:
+            self._settings.current.sync_timeout_us = value
+
+        u32 = Type.UNSIGNED32
+        dictionary.add(0x1005, 0, Number(u32, lambda: current.current.sync_cob_id, set_sync, 1, _SYNC_MOST))
+        dictionary.add(0x1015, 0, Number(u32, lambda: current.current.emcy_inhibit, set_inhibit))
+        timeout = Number(
+            u32, lambda: self._settings.current.sync_timeout_us, set_timeout, low=0, high=_SYNC_MOST_US
+        )
+        dictionary.add(0x1006, 0, timeout)
+
+        def set_emcy(value: int) -> None:
+            current.current.emcy_cob_id = resolved(value & COB_ID_MASK, (0x80,), self._node_id)
+            current.current.emcy_on = not value & DISABLED and self._node_id != 0
+
+        def emcy() -> int:
+            return current.current.emcy_cob_id | (0 if current.current.emcy_on else DISABLED)
+
+        dictionary.add(0x1014, 0, Number(u32, emcy, set_emcy))
+
+    def _add_memory(self, dictionary: Dictionary) -> None:
+        """1010h and the action A00: start, progress, result."""
+
+        def by_signature(value: int) -> None:
+            if value != _SAVE:
+                raise SdoAbort(AbortCode.CANNOT_STORE)
+            self._save()
+
+        def by_action(value: int) -> None:
+            if value:
+                self._save()
+
+        dictionary.add_array(0x1010, [Number(Type.UNSIGNED32, lambda: 1, by_signature)])
+        dictionary.add(coordinate("A00"), 0, Number(Type.UNSIGNED8, lambda: 0, by_action, low=0, high=1))
+        progress = Number(Type.UNSIGNED8, lambda: 100 if self.saves else 0)
+        dictionary.add(coordinate("A00"), 1, progress)
+        dictionary.add(coordinate("A00"), 2, constant(Type.UNSIGNED8, 0))
+
+    def _add_configuration(self, dictionary: Dictionary) -> None:
+        def set_date(value: int) -> None:
+            self._settings.current.configuration_date = value
+
+        def set_time(value: int) -> None:
+            self._settings.current.configuration_time = value
+
+        u32 = Type.UNSIGNED32
+        dictionary.add_array(
+            0x1020,
+            [
+                Number(u32, lambda: self._settings.current.configuration_date, set_date),
+                Number(u32, lambda: self._settings.current.configuration_time, set_time),
+            ],
+        )
+
+    def _add_sdo_server(self, dictionary: Dictionary, number: int) -> None:
+        """Bit 31 closes a channel, as in DS-301. The example of §7.3.2 opens one with bit 31 set: that is
+        ``bit_31_opens``."""
+
+        def channel() -> SdoSettings:
+            return self._communication.current.sdo[number]
+
+        def shown(cob_id: int, is_on: bool) -> int:
+            return cob_id | (DISABLED if is_on is self._bit_31_opens else 0)
+
+        def is_on(value: int) -> bool:
+            return bool(value & DISABLED) is self._bit_31_opens
+
+        def set_receive(value: int) -> None:
+            cob_id = resolved(value & COB_ID_MASK, (SDO_BASES[number][0],), self._node_id)
+            channel().receive_cob_id, channel().receive_on = cob_id, is_on(value)
+
+        def set_send(value: int) -> None:
+            cob_id = resolved(value & COB_ID_MASK, (SDO_BASES[number][1],), self._node_id)
+            channel().send_cob_id, channel().send_on = cob_id, is_on(value)
+
+        def set_client(value: int) -> None:
+            self._settings.current.sdo_client[number] = value
+
+        u32 = Type.UNSIGNED32
+        dictionary.add_array(
+            0x1200 + number,
+            [
+                Number(u32, lambda: shown(channel().receive_cob_id, channel().receive_on), set_receive),
+                Number(u32, lambda: shown(channel().send_cob_id, channel().send_on), set_send),
+                Number(u32, lambda: self._settings.current.sdo_client[number], set_client),
+            ],
+        )
+
+    def _add_coordinates(self, dictionary: Dictionary) -> None:
+        """The same objects by the names POSITool has for them."""
+        single = {"A200": 0x1005, "A201": 0x1006, "A203": 0x100C, "A204": 0x100D}
+        single |= {"A207": 0x1014, "A208": 0x1015, "A210": 0x1017}
+        for name, index in single.items():
+            alias(dictionary, name, index)
+        alias(dictionary, "A211", 0x1020, (1,))
+        alias(dictionary, "A212", 0x1020, (2,))
+        dictionary.add(coordinate("A83"), 0, constant(Type.UNSIGNED8, self._node_id))
+        entries = tuple(range(1, MAP_ENTRIES + 1))
+        for number in range(CHANNELS):
+            if number:
+                alias(dictionary, f"A{217 + number}", 0x1200 + number, (1, 2, 3))
+            alias(dictionary, f"A{221 + number}", 0x1400 + number, (1, 2))
+            alias(dictionary, f"A{225 + number}", 0x1600 + number, entries)
+            alias(dictionary, f"A{229 + number}", 0x1800 + number, (1, 2, 3, 5))
+            alias(dictionary, f"A{233 + number}", 0x1A00 + number, entries)
+            for name, receives in ((f"A{237 + number}", True), (f"A{241 + number}", False)):
+                dictionary.add(coordinate(name), 0, self._length(number, receives))
+
+    def _length(self, number: int, receives: bool) -> Number:
+        """A237…A244: bytes that the mapping makes."""
+        return Number(Type.UNSIGNED8, lambda: self._pdos.pdo(number, receives=receives).mapped_bits // 8)

@@ -1,0 +1,187 @@
+"""What the CANopen slave of CAN 5000 does its own way (ID 441684.06 §7 … §9)."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from bridge.sim.canopen_slave import Application, CanopenSlave
+from bridge.sim.dictionary import Dictionary
+from bridge.sim.emcy_producer import EmcyProducer
+from bridge.sim.nmt_slave import NmtCommand, NmtState, nmt_command_for
+from bridge.sim.pdo import Tpdo, pack, unpack
+from bridge.sim.sdo_server import SdoServer
+from bridge.sim.settings import CommunicationSettings, PdoSettings, SdoSettings
+from bridge.sim.stoeber_settings import ANSWERED, StoeberPdo
+from bridge.sim.store import Store
+
+_FRESH: Final = (NmtState.INITIALISING, NmtState.STOPPED)
+
+
+class StoeberTpdo(Tpdo):
+    """Type 254 is sent as the answer to an RPDO or by the event timer, not when its data change (§8.1.2)."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._asked = False
+
+    def start(self) -> None:
+        super().start()
+        self._asked = False
+
+    def ask(self) -> None:
+        self._asked = True
+
+    def is_due(self, settings: PdoSettings, payload: bytes, now: float) -> bool:
+        if settings.transmission_type != ANSWERED:
+            return False
+        if self._sent_at is None:
+            return self._asked or settings.event_timer_ms > 0
+        if now < self._inhibited_until(settings, self._sent_at):
+            return False
+        return self._asked or now >= self._event_at(settings, self._sent_at)
+
+    def sent(self, payload: bytes, now: float) -> None:
+        super().sent(payload, now)
+        self._asked = False
+
+    def next_deadline(self, settings: PdoSettings) -> float | None:
+        if settings.transmission_type != ANSWERED or self._sent_at is None:
+            return None
+        free_at = self._inhibited_until(settings, self._sent_at)
+        if self._asked:
+            return free_at
+        return max(free_at, self._event_at(settings, self._sent_at)) if settings.event_timer_ms else None
+
+
+class SyncWatch:
+    """1006h: from the first SYNC on, the next must come within this time (§6, red LED)."""
+
+    def __init__(self, timeout_us: Callable[[], int]) -> None:
+        self._timeout_us = timeout_us
+        self._seen_at: float | None = None
+
+    def reset(self) -> None:
+        self._seen_at = None
+
+    def on_sync(self, now: float) -> None:
+        self._seen_at = now
+
+    def expired(self, now: float) -> bool:
+        """True once."""
+        deadline = self.next_deadline()
+        if deadline is None or now < deadline:
+            return False
+        self._seen_at = None
+        return True
+
+    def next_deadline(self) -> float | None:
+        timeout_us = self._timeout_us()
+        return self._seen_at + timeout_us / 1e6 if self._seen_at is not None and timeout_us else None
+
+
+class StoeberSlave(CanopenSlave):
+    """``views`` are the objects as each PDO channel sees them: channel n maps parameters of axis n.
+
+    SDO channels that were changed count after reset communication, or after Stopped and Pre-Operational
+    (§7.3.1); reset communication keeps what was written, as it is that which makes it count.
+    """
+
+    def __init__(
+        self,
+        node_id: int,
+        store: Store[CommunicationSettings],
+        views: Sequence[Dictionary],
+        servers: Sequence[SdoServer],
+        emcy: EmcyProducer,
+        application: Application,
+        sync: SyncWatch,
+        sync_lost: Callable[[], None],
+    ) -> None:
+        super().__init__(node_id, store, views[0], servers, emcy, application)
+        self._views = tuple(views)
+        self._answers = tuple(StoeberTpdo() for _ in store.current.tpdo)
+        self._tpdos = self._answers
+        self._open_sdo: list[SdoSettings] = []
+        self._sync = sync
+        self._sync_lost = sync_lost
+
+    def poll(self, now: float) -> None:
+        if self.state is NmtState.OPERATIONAL and self._sync.expired(now):
+            self._sync_lost()
+        super().poll(now)
+        if self.state is NmtState.STOPPED:  # §7.1: emergency messages are sent in Stopped too
+            for data in self.emcy.due(now):
+                self._send(self._store.current.emcy_cob_id, data)
+
+    def next_deadline(self) -> float | None:
+        deadlines = [super().next_deadline()]
+        if self.state is NmtState.STOPPED:
+            deadlines.append(self.emcy.next_deadline())
+        if self.state is NmtState.OPERATIONAL:
+            deadlines.append(self._sync.next_deadline())
+        return min((deadline for deadline in deadlines if deadline is not None), default=None)
+
+    def hears(self) -> frozenset[int]:
+        return super().hears() | {channel.receive_cob_id for channel in self._open_sdo}
+
+    def _on_nmt(self, data: bytes) -> None:
+        if nmt_command_for(self.node_id, data) is NmtCommand.RESET_COMMUNICATION:
+            self._application.restarted(NmtCommand.RESET_COMMUNICATION)
+            self.boot()
+            return
+        super()._on_nmt(data)
+
+    def _enter(self, state: NmtState) -> None:
+        if state is NmtState.PRE_OPERATIONAL and self.state in _FRESH:
+            self._open_sdo = copy.deepcopy(self._store.current.sdo)
+        self._sync.reset()
+        super()._enter(state)
+
+    def _on_object(self, cob_id: int, data: bytes, now: float) -> None:
+        for server, channel in zip(self._servers, self._open_sdo, strict=True):
+            if channel.enabled and cob_id == channel.receive_cob_id:
+                for answer in server.on_request(data):
+                    self._send(channel.send_cob_id, answer)
+                return
+        if self.state is not NmtState.OPERATIONAL:
+            return
+        settings = self._store.current
+        if settings.sync_on and cob_id == settings.sync_cob_id:
+            self._on_sync(now)
+            return
+        for number, pdo in enumerate(settings.rpdo):
+            if pdo.enabled and cob_id == pdo.cob_id:
+                self._on_rpdo(number, pdo, data)
+
+    def _on_rpdo(self, number: int, pdo: PdoSettings, data: bytes) -> None:
+        if not pdo.count:
+            self.rpdos_ignored += 1
+            return
+        effective = self._rpdos[number].on_data(pdo, data)
+        if effective is not None:
+            self._apply(number, pdo, effective)
+
+    def _on_sync(self, now: float) -> None:
+        self._sync.on_sync(now)
+        super()._on_sync(now)
+
+    def _apply(self, number: int, pdo: PdoSettings, data: bytes) -> None:
+        """§8.1.1: surplus bytes are left out, an object that is not covered whole stays as it is."""
+        covered: list[int] = []
+        bits = 0
+        for entry in pdo.mapping:
+            bits += entry & 0xFF
+            if bits > 8 * len(data):
+                break
+            covered.append(entry)
+        part = StoeberPdo(pdo.cob_id, entries=covered, count=len(covered))
+        self.rpdos_ignored += unpack(self._views[number], part, data)
+        self._application.rpdo_applied(number)
+        if pdo.transmission_type == ANSWERED:
+            self._answers[number].ask()
+
+    def _payload(self, settings: PdoSettings) -> bytes:
+        number = next(n for n, one in enumerate(self._store.current.tpdo) if one is settings)
+        return pack(self._views[number], settings)

@@ -1,0 +1,91 @@
+"""Shows what is known of parameters in the image: value, quality, and when it was read. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from bridge.command import Drive
+from bridge.command.link import NodeState
+from bridge.command.plant import Node
+from bridge.image import Image, Quality
+from bridge.parameter import Address, Entry, Names, ParameterError, Reading, Why
+
+_FINAL_ABORTS: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0602_0000, 0x0609_0011))
+"""Abort codes of what a drive does not have: asking again brings the same answer."""
+
+
+NO_CHANNEL: Final = "no SDO channel reaches it: name its channel in sdo_channels of the site file"
+
+
+class ParameterView:
+    """The parameter points of one node's drives."""
+
+    def __init__(self, node: Node, image: Image, names: Names) -> None:
+        self._image = image
+        self._hold_s = node.table.hold_ms / 1000
+        self._indices: dict[tuple[str, Address], int] = {
+            (drive.name, entry.address): image.index[f"{drive.name}/parameter/{entry.leaf}"]
+            for drive in node.drives
+            for entry in names.points()
+        }
+        self._dead_at: float | None = None
+
+    def on_node(self, state: NodeState, now: float) -> None:
+        """The node is in another state: what was read from it may not be so any more."""
+        self._dead_at = None
+        match state:
+            case NodeState.OPERATIONAL | NodeState.CONFIG_ERROR | NodeState.ABSENT:
+                return  # values are read anew
+            case NodeState.DISABLED:
+                quality = Quality.DISABLED
+            case NodeState.LOST:
+                quality, self._dead_at = Quality.LOST, now + self._hold_s
+            case _:
+                quality = Quality.STALE
+        self._judge(quality, now, f"node {state.value}")
+
+    def unreached(self, drives: Iterable[Drive], now: float) -> None:
+        """No open SDO channel leads to these."""
+        names = {drive.name for drive in drives}
+        for (name, _), index in self._indices.items():
+            if name in names:
+                self._image.judge((index,), Quality.CONFIG_ERROR, now, NO_CHANNEL)
+
+    def on_time(self, now: float) -> None:
+        if self._dead_at is not None and now >= self._dead_at:
+            self._dead_at = None
+            self._judge(Quality.DEAD, now, f"node {NodeState.LOST.value}")
+
+    def next_deadline(self) -> float | None:
+        return self._dead_at
+
+    def _judge(self, quality: Quality, now: float, reason: str) -> None:
+        """What never had a value waits on, except where the node is out of service."""
+        for index in self._indices.values():
+            if self._image[index].quality is not Quality.WAITING or quality is Quality.DISABLED:
+                self._image.judge((index,), quality, now, reason)
+
+    def show(self, drive: str, reading: Reading) -> None:
+        """A value as the drive holds it."""
+        index = self._indices.get((drive, reading.entry.address))
+        if index is not None:
+            value = reading.value
+            kind = self._image.points[index].data_type
+            self._image.renew(index, float(value) if kind == "float" else value, reading.time)
+
+    def is_final(self, error: ParameterError) -> bool:
+        """Whether asking the drive again would bring the same answer."""
+        return error.abort_code in _FINAL_ABORTS or error.why in (Why.NOT_CONFIGURED, Why.WRITE_ONLY)
+
+    def failed(self, drive: str, entry: Entry, error: ParameterError, now: float) -> None:
+        """It could not be read: the last value is kept and is not a present one."""
+        index = self._indices.get((drive, entry.address))
+        if index is None:
+            return
+        had_value = self._image[index].quality.has_value
+        if self.is_final(error):
+            quality = Quality.CONFIG_ERROR
+        else:
+            quality = Quality.STALE if had_value else Quality.WAITING
+        self._image.judge((index,), quality, now, str(error))

@@ -1,0 +1,148 @@
+"""Values of parameters and their bytes."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.config.download import INTEGERS
+from bridge.image import Value
+from bridge.parameter import Address, Definition, Entry, ParameterError, Why
+from bridge.parameter.codec import decode, encode_value, matches, parse, shown
+
+WHERE = Address(0x2066, 1)
+RAW = Entry("2066:01", WHERE)
+NUMBERS = [kind for kind in INTEGERS if kind != "bool"]
+
+
+def entry(data_type: str, **more: object) -> Entry:
+    return Entry("P1", WHERE, Definition("P1", "one", data_type, **more))  # pyright: ignore[reportArgumentType]
+
+
+def limits(kind: str) -> tuple[int, int]:
+    size, signed = INTEGERS[kind]
+    bits = 8 * size
+    return (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
+
+
+def test_the_manuals_acceleration_time() -> None:
+    # BU 2500 §6.6.1: P102 = 1.03 s is 0067h
+    p102 = entry("int16", factor=0.01, unit="s", low=0.0, high=320.0)
+    assert encode_value(p102, 1.03, None) == bytes.fromhex("67 00")
+    assert decode(p102, bytes.fromhex("67 00 00 00")) == 1.03
+    assert shown(p102, 1.03) == "1.03 s"
+
+
+@given(st.data())
+def test_a_whole_number_comes_back_as_it_was(data: st.DataObject) -> None:
+    kind = data.draw(st.sampled_from(NUMBERS))
+    number = data.draw(st.integers(*limits(kind)))
+    one = entry(kind)
+    coded = encode_value(one, number, None)
+    assert len(coded) == INTEGERS[kind][0]
+    assert decode(one, coded) == number
+    assert decode(one, coded + b"\xff\xff") == number
+
+
+@given(st.data())
+def test_a_scaled_number_comes_back_within_half_a_step(data: st.DataObject) -> None:
+    factor = data.draw(st.sampled_from([0.1, 0.01, 0.001, 0.25, 10.0]))
+    kind = data.draw(st.sampled_from(["int16", "uint16", "int32"]))
+    low, high = limits(kind)
+    value = data.draw(st.floats(low * factor, high * factor))
+    one = entry(kind, factor=factor)
+    back = decode(one, encode_value(one, value, None))
+    assert isinstance(back, float)
+    assert abs(back - value) <= factor / 2 * (1 + 1e-6)
+    assert encode_value(one, back, None) == encode_value(one, value, None)
+
+
+@given(st.data())
+def test_what_does_not_fit_is_refused_and_never_cut(data: st.DataObject) -> None:
+    kind = data.draw(st.sampled_from(NUMBERS))
+    low, high = limits(kind)
+    number = data.draw(st.one_of(st.integers(max_value=low - 1), st.integers(min_value=high + 1)))
+    with pytest.raises(ParameterError) as told:
+        encode_value(entry(kind), number, None)
+    assert told.value.why is Why.OUT_OF_RANGE
+
+
+@given(st.binary(max_size=12), st.sampled_from([*INTEGERS, "real32", "real64", "string", "bytes"]))
+def test_whatever_a_drive_sends_is_a_value_or_one_error(data: bytes, kind: str) -> None:
+    for one in (entry(kind), entry(kind, factor=0.1), RAW):
+        try:
+            value = decode(one, data)
+        except ParameterError:
+            continue
+        assert not isinstance(value, float) or math.isfinite(value)
+
+
+@given(st.one_of(st.booleans(), st.integers(), st.floats(), st.text()), st.binary(max_size=9))
+def test_whatever_a_client_sends_is_coded_or_one_error(value: Value, held: bytes) -> None:
+    states = entry("uint16", states=((0, "off"), (1, "on")))
+    for one in (
+        entry("int16", factor=0.1, low=-5.0, high=5.0),
+        entry("real32"),
+        entry("string"),
+        states,
+        RAW,
+    ):
+        try:
+            data = encode_value(one, value, held)
+        except ParameterError:
+            continue
+        assert matches(one, data, data)
+
+
+def test_a_range_is_that_of_the_value_the_drive_will_hold() -> None:
+    one = entry("int16", factor=0.1, low=-0.1, high=100.0, unit="s")
+    # 0.1 as IEEE 754 single, as Modbus brings it, is a little more
+    as_single: float = struct.unpack("<f", struct.pack("<f", 100.0 / 3))[0]
+    assert decode(one, encode_value(one, as_single, None)) == 33.3
+    assert encode_value(one, -0.1000000015, None) == b"\xff\xff"
+    with pytest.raises(ParameterError, match=r"takes -0\.1…100 s, not 100\.1"):
+        encode_value(one, 100.1, None)
+
+
+def test_a_state_is_written_by_its_code_or_its_text() -> None:
+    one = entry("int16", states=((0, "RAM only"), (1, "EEPROM")))
+    assert encode_value(one, "ram only", None) == encode_value(one, 0, None) == b"\0\0"
+    assert shown(one, 1) == "1 (EEPROM)"
+    with pytest.raises(ParameterError, match=r"takes 0 \(RAM only\), 1 \(EEPROM\)"):
+        encode_value(one, 2, None)
+    with pytest.raises(ParameterError, match="takes 0"):
+        encode_value(one, "flash", None)
+
+
+def test_an_object_that_no_file_describes_takes_the_length_it_has() -> None:
+    assert decode(RAW, b"\xff\xff") == 0xFFFF
+    assert encode_value(RAW, -1, b"\0\0") == b"\xff\xff"
+    assert decode(RAW, b"SK TU4-CAO") == "SK TU4-CAO"
+    with pytest.raises(ParameterError, match="a whole number of 2 bytes"):
+        encode_value(RAW, 0x1_0000, b"\0\0")
+    with pytest.raises(ParameterError, match="a whole number of 2 bytes"):
+        encode_value(RAW, 1.5, b"\0\0")
+
+
+@pytest.mark.parametrize(
+    ("one", "text", "value"),
+    [
+        (entry("int16"), "0x10", 16),
+        (entry("int16", factor=0.1), " 2.5 ", 2.5),
+        (entry("int16", states=((0, "off"),)), "OFF", "OFF"),
+        (entry("bool"), "true", True),
+        (entry("string"), "12", "12"),
+        (RAW, "12", 12),
+    ],
+)
+def test_what_is_typed_is_read_as_the_parameter_takes_it(one: Entry, text: str, value: Value) -> None:
+    assert parse(one, text) == value
+
+
+def test_what_is_typed_and_is_no_value_is_refused() -> None:
+    with pytest.raises(ParameterError, match="takes a number, not 'much'"):
+        parse(entry("int16"), "much")

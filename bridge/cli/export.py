@@ -17,6 +17,7 @@ from bridge.dbc import describe
 from bridge.errors import OperationFailed
 from bridge.image import Point
 from bridge.lint import family_dictionaries
+from bridge.mapping.loader import mapping_folders
 from bridge.lint.bus import view_bus
 from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row, bridge_rows, drive_maps
 from bridge.northbound.zenoh.keys import KeySpace
@@ -87,7 +88,7 @@ def dbc(
     if bus is not None and bus not in names:
         raise typer.BadParameter(f"there is no {bus}; the site has {', '.join(names)}", param_hint="--bus")
     place = 0 if bus is None else names.index(bus)
-    dictionaries = family_dictionaries(project.families)
+    dictionaries = family_dictionaries(project.families, mapping_folders(project.path))
     view = view_bus(
         project.site.bus[place], ("bus", place), project.families, dictionaries, project.downloads
     )

@@ -90,11 +90,10 @@ def find(site: Path, drive: str) -> Target:
     targets: dict[str, tuple[BusTable, NodeTable, Slot]] = {}
     for bus in project.site.bus:
         for node in bus.node:
-            slots = project.families[node.mapping].slot
+            family = project.families[node.mapping]
             for table in node.drive:
-                leaf = table.name or (table.slot if len(slots) > 1 else "drive")
-                slot = project.families[node.mapping].slot_named(table.slot)
-                targets[f"{node.name}/{leaf}"] = (bus, node, slot)
+                slot = family.slot_named(table.slot)
+                targets[f"{node.name}/{family.leaf_of(table)}"] = (bus, node, slot)
     found = [name for name in targets if drive in (name, name.partition("/")[0])]
     if len(found) != 1:
         known = ", ".join(found or targets)

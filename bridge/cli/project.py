@@ -47,7 +47,7 @@ def check(
 
 def _drives(project: Project) -> list[str]:
     return [
-        f"{node.name}/{drive.name or drive.slot}"
+        f"{node.name}/{project.families[node.mapping].leaf_of(drive)}"
         for bus in project.site.bus
         for node in bus.node
         for drive in node.drive

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, cast
 import typer
 
 from bridge.cli import logs
-from bridge.config import BusTable
+from bridge.config import BusTable, ZenohTable
 from bridge.errors import OperationFailed
 from bridge.fronts import Front, become_front
 from bridge.service import Project, Service, load_project, make_bus
@@ -25,8 +25,13 @@ from bridge.southbound.bus.virtual import VirtualWire
 
 SiteArgument = Annotated[Path, typer.Argument(metavar="SITE", help="the site file")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="log more")]
-_DEMO_CONTROLLED = "conveyor/fu4"
-_DEMO_FREQUENCY_HZ = 40.0
+_DEMO_MOVES = (
+    ("conveyor/fu4", "frequency", 40.0),
+    ("pump/drive", "velocity", 1200.0),
+    ("lift/drive", "velocity", 2400.0),
+    ("fan/drive", "velocity", 900.0),
+)
+"""What the demo's own controller moves: drive, setpoint, and how far, in the setpoint's unit."""
 
 
 def run(
@@ -78,13 +83,13 @@ def simulate(site: SiteArgument, verbose: Verbose = False) -> None:
     until_stopped(play())
 
 
-def demo_controller(endpoint: str, drive_key: str, frequency_hz: float, parent: int = 0) -> None:
+def demo_controller(endpoint: str, moves: list[str], parent: int = 0) -> None:
     """The demo's controller, a process of its own."""
-    from bridge.sim.controller import run_controller
+    from bridge.sim.controller import Move, run_controller
 
     logs.set_up(verbose=False)
     become_front(parent)
-    run_controller(endpoint, drive_key, frequency_hz)
+    run_controller(endpoint, [Move.from_text(move) for move in moves])
 
 
 async def _serve(
@@ -106,11 +111,7 @@ async def _serve(
 
     service = Service(project, open_bus, fronts=fronts)
     if controller and project.site.zenoh:
-        key = f"{project.site.zenoh.prefix}/{project.site.site.name}/{_DEMO_CONTROLLED}"
-        endpoint = project.site.zenoh.listen[0]
-        service.fronts.append(
-            Front("demo controller", ["demo-controller", endpoint, key, str(_DEMO_FREQUENCY_HZ)])
-        )
+        service.fronts.append(_demo_controller(project.site.zenoh, project.site.site.name))
     async with asyncio.TaskGroup() as tasks:
         playing = [tasks.create_task(simulation.run()) for simulation in simulations]
         try:
@@ -118,6 +119,13 @@ async def _serve(
         finally:
             for task in playing:
                 task.cancel()
+
+
+def _demo_controller(table: ZenohTable, site: str) -> Front:
+    from bridge.sim.controller import Move
+
+    moves = [str(Move(f"{table.prefix}/{site}/{drive}", value, most)) for drive, value, most in _DEMO_MOVES]
+    return Front("demo controller", ["demo-controller", table.listen[0], *moves])
 
 
 def _simulation(bus: Bus, table: BusTable) -> Simulation:
@@ -147,12 +155,17 @@ def _print_demo(project: Project) -> None:
     key = f"{site.zenoh.prefix}/{site.site.name}"
     print(
         f"""
-drivebridge demo: a simulated NORD SK TU4-CAO, node "conveyor", with the drives fu1 … fu4
+drivebridge demo: simulated drives on one virtual CAN bus
+
+  conveyor    NORD SK TU4-CAO with the drives fu1 … fu4
+  pump        Lenze 8400 motec
+  lift        STÖBER MDS 5000
+  fan         CiA 402, velocity mode
 
   Modbus TCP  {site.modbus.listen}                fu1 is yours: unit 1, holding registers 0 and 1
   OPC UA      opc.tcp://{site.opcua.listen}      fu2 is yours: Objects/Drives/conveyor/fu2
   zenoh       {site.zenoh.listen[0]}            fu3 is yours: {key}/conveyor/fu3/**
-  fu4 is moved by a controller of the demo's own.
+  fu4, pump, lift and fan are moved by a controller of the demo's own.
 
 The OPC UA endpoint is open (no security, anonymous operator): it is bound to loopback.
 Keep writing: a drive whose controller is silent for 1000 ms stops. Ctrl-C ends the demo.

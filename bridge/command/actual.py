@@ -178,7 +178,7 @@ class ActualData:
     def _refresh_values(self, now: float) -> None:
         """What TPDOs bring beside the status word, as it is and as values."""
         words = self.words
-        values: list[Value] = words[1:] if self._has_all else [words[place] for place in self._places]
+        values: list[Value] = [*words[1:]] if self._has_all else [words[place] for place in self._places]
         for place, full, at in self._plain:
             word = words[place]
             values.append((word - 0x1_0000 if word & 0x8000 else word) * full / at)

@@ -269,8 +269,11 @@ class ControllerLeg:
 
     def _begin_start(self, request: Request, now: float, reply: Reply) -> None:
         bits = {0: 0, 1: self.words.forward, -1: self.words.reverse}.get(request.direction)
-        if bits is None or (request.direction and not bits):
-            raise Refusal(Code.OUT_OF_RANGE, "direction takes 1, -1 (where the drive has it) or 0")
+        if bits is None:
+            raise Refusal(Code.OUT_OF_RANGE, f"direction takes 1, -1 or 0, not {request.direction}")
+        if request.direction < 0 and not bits:
+            # Forward is what such a drive does with a positive setpoint: that needs no bit.
+            raise Refusal(Code.OUT_OF_RANGE, "direction -1: here the sign of the setpoint is the direction")
         if self.is_tripped or self._status.state in FAULTED:
             raise Refusal(Code.ACKNOWLEDGE_FIRST, "acknowledge first")
         if not self._link.may_enable:

@@ -62,8 +62,7 @@ class Drive:
         unit_id: int,
         report: Callable[[Event], None],
     ) -> None:
-        leaf = table.name or (table.slot if len(family.slot) > 1 else "drive")
-        self.name = f"{node.name}/{leaf}"
+        self.name = f"{node.name}/{family.leaf_of(table)}"
         self.node_name = node.name
         self.unit_id = unit_id
         self.family = family

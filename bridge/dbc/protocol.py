@@ -74,7 +74,7 @@ def _heartbeat_signals(*, guarded: bool) -> tuple[Signal, ...]:
 
 def _drives(node: NodeTable, family: Family) -> dict[int, str]:
     """Names of the drives as the emergency message's drive byte has them."""
-    names = {drive.slot: drive.name or drive.slot for drive in node.drive}
+    names = {drive.slot: family.leaf_of(drive) for drive in node.drive}
     return {
         slot.emcy_drive: names.get(slot.name, slot.name)
         for slot in family.slot

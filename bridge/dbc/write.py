@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from typing import Final
 
 from cantools.database.can import Bus, Database, Node
@@ -9,6 +10,7 @@ from cantools.database.can import Message as DbcMessage
 from cantools.database.can import Signal as DbcSignal
 from cantools.database.can.signal_group import SignalGroup
 from cantools.database.conversion import BaseConversion
+from cantools.database.namedsignalvalue import NamedSignalValue
 
 from bridge.dbc.model import BusDescription, Message, Signal
 
@@ -40,14 +42,15 @@ def _message(message: Message) -> DbcMessage:
 
 
 def _signal(signal: Signal, receivers: tuple[str, ...]) -> DbcSignal:
-    choices = {value: _plain(text) or "-" for value, text in signal.choices.items()} or None
+    texts = ((value, _plain(text) or "-") for value, text in signal.choices.items())
+    choices: OrderedDict[int, str | NamedSignalValue] = OrderedDict(texts)
     return DbcSignal(
         signal.name,
         signal.start,
         signal.length,
         "little_endian",
         signal.is_signed,
-        conversion=BaseConversion.factory(_number(signal.factor), _number(signal.offset), choices),
+        conversion=BaseConversion.factory(_number(signal.factor), _number(signal.offset), choices or None),
         minimum=signal.low,
         maximum=signal.high,
         unit=_plain(signal.unit) or None,

@@ -158,7 +158,7 @@ def _node(
                 views[receives].append(_from_site(view, drive, is_first=is_first) if drive else view)
         found += [*views[True], *views[False]]
         if drive:
-            name = f"{table.name}/{drive.name or drive.slot}"
+            name = f"{table.name}/{family.leaf_of(drive)}"
             drives.append(DriveView(drive, drive_key, name, tuple(views[True]), tuple(views[False])))
     found += [_other_pdo(one, key) for place, one in known.items() if place not in used]
     own = family.own_timeout
@@ -210,11 +210,11 @@ def _from_site(view: PdoView, drive: DriveTable, *, is_first: bool) -> PdoView:
     """``view`` with what the site file's table for this PDO sets; one without a number is for the first."""
     tables = drive.rpdo if view.receives else drive.tpdo
     poll_ms = 0 if view.receives else drive.rtr_poll_ms
-    for place, own in enumerate(tables):
-        if own.number == view.number or (is_first and own.number is None):
-            break
-    else:
+    numbers = (view.number, None) if is_first else (view.number,)
+    place = next((place for place, table in enumerate(tables) if table.number in numbers), None)
+    if place is None:
         return replace(view, sent=view.enabled, rtr_poll_ms=poll_ms)
+    own = tables[place]
     name = "rpdo" if view.receives else "tpdo"
     return replace(
         view,

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from bridge.config import IGNORE_ALL_S, DriveTable, Site
 from bridge.lint.report import LintReport
+from bridge.mapping import Family
 from bridge.tomlfile import Key
 
 
-def check_decisions(site: Site, report: LintReport) -> None:
+def check_decisions(site: Site, families: Mapping[str, Family], report: LintReport) -> None:
     for b, bus in enumerate(site.bus):
         for n, node in enumerate(bus.node):
             for d, drive in enumerate(node.drive):
-                name = f"{node.name}/{drive.name or drive.slot}"
+                name = f"{node.name}/{families[node.mapping].leaf_of(drive)}"
                 _check_drive(drive, name, ("bus", b, "node", n, "drive", d), report)
     if site.opcua and site.opcua.no_security:
         report.warning(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from bridge.lint.pdos import check_pdos
 from bridge.lint.report import LintFinding, LintReport, Severity
 from bridge.lint.times import check_times
 from bridge.mapping import Family
-from bridge.mapping.loader import mappings_dir
+from bridge.mapping.loader import mapping_folders
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,13 +30,19 @@ class Verdict:
         return tuple(finding for finding in self.findings if finding.severity is severity)
 
 
-def family_dictionaries(names: Iterable[str]) -> dict[str, Description]:
-    """The object dictionaries that lie beside the mapping files, by family, for those that have one.
+def family_dictionaries(names: Iterable[str], folders: Sequence[Path] = ()) -> dict[str, Description]:
+    """The object dictionaries that lie beside the mapping files, by family, for those that have one. They
+    are looked up where the mappings are.
 
     Raises ``FileFaults`` where one cannot be read.
     """
-    files = {name: mappings_dir() / f"{name}.eds" for name in names}
-    return {name: read_device_file(file) for name, file in files.items() if file.is_file()}
+    found: dict[str, Description] = {}
+    for name in names:
+        files = (folder / f"{name}.eds" for folder in folders or mapping_folders())
+        file = next((file for file in files if file.is_file()), None)
+        if file is not None:
+            found[name] = read_device_file(file)
+    return found
 
 
 def lint(
@@ -48,7 +54,9 @@ def lint(
 ) -> Verdict:
     """Judge a site whose file, at ``path``, has no faults of its own. ``dictionaries`` are those of
     ``family_dictionaries``, unless given."""
-    known = family_dictionaries(families) if dictionaries is None else dictionaries
+    known = dictionaries
+    if known is None:
+        known = family_dictionaries(families, mapping_folders(path))
     report = LintReport(path)
     loads: list[BusLoad] = []
     for b, table in enumerate(site.bus):
@@ -57,5 +65,5 @@ def lint(
         check_pdos(bus, report)
         check_times(bus, report)
         loads.append(check_load(bus, report))
-    check_decisions(site, report)
+    check_decisions(site, families, report)
     return Verdict(report.findings(), tuple(loads))

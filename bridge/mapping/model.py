@@ -10,6 +10,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from bridge.config import DriveTable
 from bridge.mapping.faults import EmcyEvent, EmcyNumber, EmcyTable, FaultNumbers, FaultParameter
 from bridge.mapping.fields import (
     Bit,
@@ -200,6 +201,11 @@ class Family(Table):
             if slot.name == name:
                 return slot
         raise KeyError(name)
+
+    def leaf_of(self, drive: DriveTable) -> str:
+        """What the site calls this drive below its node: its name, else its slot; the one drive of a node
+        that has one only is ``drive``."""
+        return drive.name or (drive.slot if len(self.slot) > 1 else "drive")
 
     def parameter_named(self, name: str) -> Parameter:
         """Raises KeyError where the family lists no such parameter."""

@@ -65,3 +65,6 @@ _FAMILIES: Final[dict[str, Factory]] = {
     "stoeber/5000": stoeber_5000,
     "stoeber/5000-four-axes": stoeber_5000_four_axes,
 }
+
+SIMULATED: Final = tuple(sorted(_FAMILIES))
+"""The mappings whose nodes can be played."""

@@ -164,11 +164,13 @@ class Automaton:
         if self.state is State.FAULT_REACTION and (standstill or self.ramp is Ramp.COAST):
             self._go(14, State.FAULT)
         if self.state is State.QUICK_STOP_ACTIVE and not self._stays_in_quick_stop:
-            if standstill or self.ramp is Ramp.COAST:
+            if standstill or command_of(self.control_word) is Command.DISABLE_VOLTAGE:
                 self._go(12, State.SWITCH_ON_DISABLED)
             return
         for _ in range(2):  # "enable operation" may take two steps
             self._obey(command_of(self.control_word), standstill=standstill)
+        if self.state is State.QUICK_STOP_ACTIVE and self.ramp is Ramp.COAST:
+            self._go(12, State.SWITCH_ON_DISABLED)
 
     def _obey(self, command: Command, *, standstill: bool) -> None:
         found = TRANSITIONS.get((self.state, command))

@@ -1,4 +1,4 @@
-"""The demo's controller: an ordinary zenoh client that takes a lease on a drive and moves it.
+"""The demo's controller: an ordinary zenoh client that takes leases on drives and moves them.
 
 It knows nothing of the bridge but its keys. What it does is what any controller has to do: take
 control, keep saying so, acknowledge when it was too late.
@@ -9,7 +9,9 @@ from __future__ import annotations
 import json
 import logging
 import math
+import threading
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -33,16 +35,36 @@ class Times:
     retry_s: float = 1.0
 
 
-class Controller:
-    """Moves one drive, ``<prefix>/<site>/<drive>``, up to ``frequency_hz``."""
+@dataclass(frozen=True, slots=True)
+class Move:
+    """What to move: ``drive_key`` is ``<prefix>/<site>/<drive>``, ``value`` its setpoint (``frequency``),
+    ``most`` how far, in the setpoint's unit."""
 
-    def __init__(
-        self, session: zenoh.Session, drive_key: str, frequency_hz: float, times: Times | None = None
-    ) -> None:
+    drive_key: str
+    value: str
+    most: float
+
+    @classmethod
+    def from_text(cls, text: str) -> Move:
+        """From ``drives/demo/fan/drive/command/velocity=1500``. Raises ValueError for anything else."""
+        key, _, most = text.rpartition("=")
+        drive_key, _, value = key.rpartition("/command/")
+        if not drive_key:
+            raise ValueError(f"{text!r} is not written as <drive>/command/<value>=<number>")
+        return cls(drive_key, value, float(most))
+
+    def __str__(self) -> str:
+        return f"{self.drive_key}/command/{self.value}={self.most:g}"
+
+
+class Controller:
+    """Moves one drive."""
+
+    def __init__(self, session: zenoh.Session, move: Move, times: Times | None = None) -> None:
         self._times = times or Times()
         self._session = session
-        self._key = drive_key
-        self._frequency_hz = frequency_hz
+        self._move = move
+        self._key = move.drive_key
 
     def ask(self, leaf: str, **payload: object) -> dict[str, object]:
         """One command; its outcome, or an error of our own where nobody answered."""
@@ -69,10 +91,10 @@ class Controller:
             time.sleep(self._times.retry_s)
             return False
         self.ask("reset_fault")
-        self.ask("control_word", v=0x047E)
-        return self._move() or self._hold(self._times.retry_s)
+        self.ask("disable_voltage")
+        return self._run() or self._hold(self._times.retry_s)
 
-    def _move(self) -> bool:
+    def _run(self) -> bool:
         started = self.ask("start", direction=1)
         if not started.get("ok"):
             _log.info("%s: not started: %s", self._key, started.get("message"))
@@ -80,7 +102,7 @@ class Controller:
         begin = time.monotonic()
         while (elapsed := time.monotonic() - begin) < self._times.run_s:
             wave = 0.6 - 0.4 * math.cos(2 * math.pi * elapsed / _WAVE_S)
-            if not self.ask("frequency", v=round(self._frequency_hz * wave, 2)).get("ok"):
+            if not self.ask(self._move.value, v=round(self._move.most * wave, 2)).get("ok"):
                 return False
             time.sleep(self._times.cycle_s)
         self.ask("stop")
@@ -97,8 +119,20 @@ class Controller:
         return True
 
 
-def run_controller(endpoint: str, drive_key: str, frequency_hz: float) -> None:
-    """Connect to the bridge at ``endpoint`` (``tcp/127.0.0.1:7447``) and move the drive until killed."""
+def run_controller(endpoint: str, moves: Sequence[Move]) -> None:
+    """Connect to the bridge at ``endpoint`` (``tcp/127.0.0.1:7447``) and move the drives until killed.
+
+    Each has a thread of its own: a drive that is slow to start must not keep the others' telegrams.
+    """
+    session = _connect(endpoint)
+    threads = [threading.Thread(target=_keep_moving, args=(session, move), daemon=True) for move in moves]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+
+def _connect(endpoint: str) -> zenoh.Session:
     settings = {
         "mode": "client",
         "connect": {"endpoints": [endpoint]},
@@ -107,8 +141,17 @@ def run_controller(endpoint: str, drive_key: str, frequency_hz: float) -> None:
     config = zenoh.Config.from_json5(json.dumps(settings))
     while True:
         try:
-            with zenoh.open(config) as session:
-                Controller(session, drive_key, frequency_hz).run()
+            return zenoh.open(config)
         except zenoh.ZError as error:
             _log.info("%s: %s", endpoint, error)
+            time.sleep(1.0)
+
+
+def _keep_moving(session: zenoh.Session, move: Move) -> None:
+    controller = Controller(session, move)
+    while True:
+        try:
+            controller.run()
+        except zenoh.ZError as error:
+            _log.info("%s: %s", move.drive_key, error)
             time.sleep(1.0)

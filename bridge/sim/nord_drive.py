@@ -1,15 +1,16 @@
-"""One NORD inverter behind a bus interface: control word in, status word and actual values out."""
+"""One NORD inverter: control word in, status word and actual values out."""
 
 from __future__ import annotations
 
 import random
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from bridge.sim.dictionary import Dictionary
 from bridge.sim.nord_faults import INTERFACE_MISSING
-from bridge.sim.nord_parameters import DriveParameters, add_display
+from bridge.sim.nord_parameters import PARAMETERS, DriveParameters, Parameter, add_display
 from bridge.sim.nord_ramp import step
 from bridge.sim.nord_states import STATE_BITS, State, commanded
 
@@ -32,6 +33,22 @@ _IGNORE: Final = -1
 """P513 = -0.1 s."""
 
 
+POLE_PAIRS: Final = 2
+"""A motor of four poles, as in §5.4."""
+INCREMENTS: Final = 1000
+"""Of a position, to a revolution (§6.5.4)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """What an interface asks for in the drive profile (§6.7.3), instead of setpoints and ramps of the
+    drive. The times are those between 0 and P105; None is P102 or P103."""
+
+    target_hz: float
+    accelerate_s: float | None
+    decelerate_s: float | None
+
+
 class NordDrive:
     """State machine, ramp, load and fault memory of one inverter (BU 2500 §6.5).
 
@@ -39,15 +56,24 @@ class NordDrive:
     """
 
     def __init__(
-        self, *, p105_hz: float = 50.0, p112_a: float = 10.0, ripple: float = 0.0, seed: int = 0
+        self,
+        *,
+        p105_hz: float = 50.0,
+        p112_a: float = 10.0,
+        ripple: float = 0.0,
+        seed: int = 0,
+        parameters: Sequence[Parameter] = PARAMETERS,
     ) -> None:
-        self.parameters = DriveParameters()
+        self.parameters = DriveParameters(parameters)
         self.parameters.commission(105, p105_hz)
         self.parameters.commission(112, p112_a)
         self.state = State.NOT_READY
         self.control_word = 0
         self.setpoints: tuple[int, ...] = (0,) * SET_POINTS
+        self.demand: Demand | None = None
         self.output_hz = 0.0
+        self.position_increments = 0.0
+        """Of the motor's shaft; an absolute encoder may set it."""
         self.fault_tenths = 0
         self.warning_tenths = 0
         self.last_faults: deque[int] = deque([0] * 5, maxlen=5)
@@ -85,7 +111,8 @@ class NordDrive:
     @property
     def actual_values(self) -> tuple[int, ...]:
         """IW1…IW5 as raw words, by P543."""
-        return tuple(self._actual(self.parameters.raw(543, n, self._set)) for n in range(1, SET_POINTS + 1))
+        meanings = (self.parameters.meaning(543, n, self._set) for n in range(1, SET_POINTS + 1))
+        return tuple(self._actual(meaning) for meaning in meanings)
 
     @property
     def current_a(self) -> float:
@@ -118,7 +145,7 @@ class NordDrive:
 
     def power_on(self, now: float) -> None:
         self.parameters.power_on()
-        self.control_word, self.setpoints = 0, (0,) * SET_POINTS
+        self.control_word, self.setpoints, self.demand = 0, (0,) * SET_POINTS, None
         self.fault_tenths, self._cause_present = 0, False
         self._output_off(now)
         self.state, self._until, self._time = State.NOT_READY, now + CHARGING_S, now
@@ -183,8 +210,8 @@ class NordDrive:
 
     @property
     def _set(self) -> int:
-        """Active parameter set, 1…4: bits 14 and 15."""
-        return (self.control_word >> 14) + 1
+        """Active parameter set, 1…4: bits 14 and 15. The drive profile has set 1 alone (§7.1.2, P168)."""
+        return 1 if self.demand else (self.control_word >> 14) + 1
 
     @property
     def _max_hz(self) -> float:
@@ -197,9 +224,11 @@ class NordDrive:
     def _commanded_hz(self) -> float:
         """Setpoint frequency, signed: positive turns right. Bit 12 turns it round, bit 11 changes nothing
         (§6.5.1 note 3: bit 12 = 0 means right); clipped to P105."""
+        if self.demand:
+            return max(-self._max_hz, min(self._max_hz, self.demand.target_hz))
         share = 0.0
         for n, word in enumerate(self.setpoints, start=1):
-            if self.parameters.raw(546, n, self._set) == 1:
+            if self.parameters.meaning(546, n, self._set) == 1:
                 share += ((word & 0xFFFF ^ 0x8000) - 0x8000) / HUNDRED_PERCENT
         share = max(-1.0, min(1.0, share))
         return self._max_hz * (-share if self.control_word & LEFT else share)
@@ -220,15 +249,25 @@ class NordDrive:
 
     def _ramp(self, dt_s: float) -> None:
         before_hz, target_hz = self.output_hz, self._ramp_target_hz()
-        down = 426 if self.state is State.QUICK_STOP else 103
         if self.state is State.ENABLED and self.control_word & 0x11 == 0x01:
             self.output_hz = 0.0  # bit 4 = 0 sets the ramp generator to 0; the voltage stays on
         else:
-            up_s = self.parameters.value(102, self._set)
-            down_s = self.parameters.value(down, self._set)
+            up_s, down_s = self._ramp_times_s()
             self.output_hz = step(before_hz, target_hz, up_s, down_s, self._max_hz, dt_s)
+        turns = (before_hz + self.output_hz) / 2 / POLE_PAIRS * dt_s
+        self.position_increments = _within_32_bits(self.position_increments + turns * INCREMENTS)
         self._accelerating = abs(self.output_hz) > abs(before_hz) and self.output_hz != target_hz
         self._ripple_now = self._random.uniform(-self._ripple, self._ripple) if self.output_hz else 0.0
+
+    def _ramp_times_s(self) -> tuple[float, float]:
+        """Up and down, between 0 and P105."""
+        up_s, down_s = (self.parameters.value(number, self._set) for number in (102, 103))
+        if self.demand:
+            up_s = up_s if self.demand.accelerate_s is None else self.demand.accelerate_s
+            down_s = down_s if self.demand.decelerate_s is None else self.demand.decelerate_s
+        if self.state is State.QUICK_STOP:
+            down_s = self.parameters.value(426, self._set)
+        return up_s, down_s
 
     def _settle(self) -> None:
         """Take every transition that the control word asks for; the drive goes on without a new telegram."""
@@ -252,7 +291,8 @@ class NordDrive:
         self.output_hz, self._accelerating, self._ripple_now = 0.0, False, 0.0
 
     def _actual(self, meaning: int) -> int:
-        """One actual value by its P543 code: frequency, current, inputs, setpoint, fault number; others 0."""
+        """One actual value by its P543 code: frequency, current, inputs, setpoint, fault number, position
+        (low and high word, §5.4); others 0."""
         match meaning:
             case 1:
                 return _word(self.output_hz / self._max_hz)
@@ -264,11 +304,20 @@ class NordDrive:
                 return _word(self._commanded_hz() / self._max_hz)
             case 9:
                 return self.fault_tenths
+            case 10:
+                return round(self.position_increments) & 0xFFFF
+            case 15:
+                return round(self.position_increments) >> 16 & 0xFFFF
             case _:
                 return 0
 
     def _shown(self, words: Sequence[int], element: int) -> int:
         return words[element - 1] if self.parameters.raw(509) else 0
+
+
+def _within_32_bits(increments: float) -> float:
+    """A position that has run over goes on at the other end."""
+    return (increments + 0x8000_0000) % 0x1_0000_0000 - 0x8000_0000
 
 
 def _word(share: float) -> int:

@@ -46,6 +46,10 @@ class ProcessImage:
         self._touched.clear()
         return touched
 
+    def touch(self, drive: int) -> None:
+        """A word for this drive has been written somewhere else."""
+        self._touched.add(drive)
+
     def setpoints_of(self, drive: int) -> list[int]:
         return self.setpoints[drive * self._per_drive : (drive + 1) * self._per_drive]
 
@@ -71,8 +75,8 @@ class ProcessImage:
         return self.status(drive) if word == 0 else self.actual(drive, word - 1)
 
     def add_to(self, dictionary: Dictionary) -> None:
-        dictionary.add_array(CONTROL_WORDS, [self._control_entry(drive) for drive in range(DRIVES)])
-        dictionary.add_array(STATUS_WORDS, [self._status_entry(drive) for drive in range(DRIVES)])
+        dictionary.add_array(CONTROL_WORDS, [self.control_entry(drive) for drive in range(DRIVES)])
+        dictionary.add_array(STATUS_WORDS, [self.status_entry(drive) for drive in range(DRIVES)])
         count = DRIVES * self._per_drive
         dictionary.add_array(SETPOINTS, [self._setpoint_entry(place) for place in range(count)])
         dictionary.add_array(ACTUAL_VALUES, [self._actual_entry(place) for place in range(count)])
@@ -86,12 +90,18 @@ class ProcessImage:
         )
         dictionary.add(DIGITAL_INPUTS, 0, Number(u16, lambda: self.inputs, in_tpdo=True))
 
-    def _control_entry(self, drive: int) -> Number:
+    def control_entry(self, drive: int) -> Number:
+        """The control word of a drive, 3000h or 6040h."""
+
         def write(value: int) -> None:
             self.control[drive] = value
             self._touched.add(drive)
 
         return Number(DataType.UNSIGNED16, lambda: self.control[drive], write, in_rpdo=True, in_tpdo=True)
+
+    def status_entry(self, drive: int) -> Number:
+        """The status word of a drive, 3001h or 6041h."""
+        return Number(DataType.UNSIGNED16, lambda: self.status(drive), in_tpdo=True)
 
     def _setpoint_entry(self, place: int) -> Number:
         def write(value: int) -> None:
@@ -100,9 +110,6 @@ class ProcessImage:
 
         # §6.5.8 maps a control word and a setpoint into 1A00h: what is RW goes either way.
         return Number(DataType.UNSIGNED16, lambda: self.setpoints[place], write, in_rpdo=True, in_tpdo=True)
-
-    def _status_entry(self, drive: int) -> Number:
-        return Number(DataType.UNSIGNED16, lambda: self.status(drive), in_tpdo=True)
 
     def _actual_entry(self, place: int) -> Number:
         drive, value = divmod(place, self._per_drive)

@@ -1,11 +1,11 @@
-"""Object dictionary of a bus interface SK TU4-CAO, and what each SDO channel reaches (BU 2500 §6.7, §7.1)."""
+"""Object dictionary of a bus interface SK TU4-CAO or SK CU4-CAO, and what each SDO channel reaches (BU 2500 §6.7, §7.1)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Final
+from typing import Final, Literal
 
 from bridge.sim.abort import AbortCode, SdoAbort
 from bridge.sim.communication_objects import (
@@ -23,6 +23,7 @@ from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.nord_can_parameters import CanParameters
 from bridge.sim.nord_drive import NordDrive
 from bridge.sim.nord_image import ProcessImage, add_parameter, display, fixed
+from bridge.sim.nord_profile import VelocityMode
 from bridge.sim.nord_settings import DRIVES, RULES, InterfaceSettings
 from bridge.sim.nord_supervision import FaultDisplay
 from bridge.sim.pdo_objects import PdoObjects
@@ -30,19 +31,11 @@ from bridge.sim.sdo_server import SdoServer
 from bridge.sim.settings import CommunicationSettings
 from bridge.sim.store import Store
 
-IDENTITY: Final = Identity(
-    device_type=0x0001_0192,  # DS-402, frequency converter
-    vendor_id=0,  # the manual prints none of the numbers of 1018h, and an invented one would be believed
-    product_code=0,
-    revision=0,
-    serial=0,
-    device_name="SK TU4-CAO",
-    hardware_version="SIM",
-    software_version="1.2 R0",
-)
+Kind = Literal["SK CU4-CAO", "SK TU4-CAO"]
+KINDS: Final[tuple[Kind, ...]] = ("SK CU4-CAO", "SK TU4-CAO")
+"""In the order of P172."""
 _SOFTWARE: Final = (12, 0, 0)
 """P171: version 1.2, revision 0, no special version."""
-_TU4: Final = 1
 _BAUD_250: Final = 1
 
 
@@ -51,13 +44,30 @@ class InterfaceParts:
     """What the dictionary shows and changes."""
 
     node_id: int
+    kind: Kind
     communication: Store[CommunicationSettings]
     interface: Store[InterfaceSettings]
     image: ProcessImage
     faults: FaultDisplay
     emcy: EmcyProducer
+    profile: VelocityMode
     module_state: Callable[[], int]
     to_factory: Callable[[], None]
+    set_profile: Callable[[bool], None]
+
+
+def identity(device_name: str) -> Identity:
+    """What a NORD node says of itself."""
+    return Identity(
+        device_type=0x0001_0192,  # DS-402, frequency converter
+        vendor_id=0,  # the manual prints none of the numbers of 1018h, and an invented one would be believed
+        product_code=0,
+        revision=0,
+        serial=0,
+        device_name=device_name,
+        hardware_version="SIM",
+        software_version="1.2 R0",
+    )
 
 
 def build_dictionary(dictionary: Dictionary, parts: InterfaceParts, pdos: PdoObjects) -> None:
@@ -71,12 +81,13 @@ def build_dictionary(dictionary: Dictionary, parts: InterfaceParts, pdos: PdoObj
         parts.communication.forget()
         parts.interface.forget()
 
-    add_identity(dictionary, IDENTITY, parts.module_state)
+    add_identity(dictionary, identity(parts.kind), parts.module_state)
     add_errors(dictionary, parts.emcy)
     add_memory(dictionary, Memory(save, load))
     add_protocols(dictionary, parts.communication)
     add_sdo_servers(dictionary, parts.communication)
     parts.image.add_to(dictionary)
+    parts.profile.add_to(dictionary)
     pdos.add()
     _add_standard_parameters(dictionary, parts)
     CanParameters(parts.communication, pdos).add_to(dictionary)
@@ -103,15 +114,20 @@ def _add_standard_parameters(dictionary: Dictionary, parts: InterfaceParts) -> N
 
         return Number(Type.UNSIGNED16, lambda: values()[place], write, low=0, high=high)
 
+    def set_profile(value: int) -> None:
+        parts.set_profile(value != 0)
+
     u16 = Type.UNSIGNED16
-    add_parameter(dictionary, 150, [Number(u16, lambda: store.current.relays, set_relays, 0, 4)])
+    if parts.kind == "SK TU4-CAO":  # the SK CU4-CAO has no outputs
+        add_parameter(dictionary, 150, [Number(u16, lambda: store.current.relays, set_relays, 0, 4)])
     add_parameter(dictionary, 151, [Number(u16, lambda: store.current.p151_ms, set_p151, 0, 32767)])
     add_parameter(dictionary, 152, [Number(u16, lambda: 0, set_p152, 0, 1)])
     cycles = [element(lambda: store.current.system_bus_cycle_ms, place, 250) for place in range(2)]
     add_parameter(dictionary, 153, cycles)
     add_parameter(dictionary, 154, [element(lambda: store.current.io_access, place, 5) for place in range(2)])
-    profile = [element(lambda: store.current.profile, place, 16383) for place in range(17)]
-    add_parameter(dictionary, 168, profile)
+    switch = Number(u16, lambda: store.current.profile[0], set_profile, 0, 1)
+    ramps = [element(lambda: store.current.profile, place, 16383) for place in range(1, 17)]
+    add_parameter(dictionary, 168, [switch, *ramps])
 
 
 def _add_displays(dictionary: Dictionary, parts: InterfaceParts) -> None:
@@ -131,10 +147,11 @@ def _add_displays(dictionary: Dictionary, parts: InterfaceParts) -> None:
     elements = range(1, 2 + 4 * DRIVES)
     add_parameter(dictionary, 170, [display(lambda: faults.present), display(lambda: faults.last)])
     add_parameter(dictionary, 171, [fixed(number) for number in _SOFTWARE])
-    add_parameter(dictionary, 172, [fixed(_TU4)])
+    add_parameter(dictionary, 172, [fixed(KINDS.index(parts.kind))])
     add_parameter(dictionary, 173, [display(parts.module_state)])
     add_parameter(dictionary, 174, [display(lambda: image.inputs & 0x0F)])
-    add_parameter(dictionary, 175, [display(relays)])
+    if parts.kind == "SK TU4-CAO":
+        add_parameter(dictionary, 175, [display(relays)])
     add_parameter(dictionary, 176, [bus_in(element) for element in elements])
     add_parameter(dictionary, 177, [bus_out(element) for element in elements])
     add_parameter(dictionary, 180, [fixed(parts.node_id)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -50,8 +50,21 @@ PARAMETERS: Final = (
     Parameter(560, (1,), 0, 2),  # 0 = changes go to RAM only, 1 = to the EEPROM too
 )
 
-_BY_NUMBER: Final = {parameter.number: parameter for parameter in PARAMETERS}
+_ON_SYSTEM_BUS: Final = (120, 509, 543, 546)
+_DIRECT: Final = (
+    *(parameter for parameter in PARAMETERS if parameter.number not in _ON_SYSTEM_BUS),
+    Parameter(509, (6,), 0, 10),  # 6 = CANopen (§7.2)
+)
+SK_5XXE: Final = (
+    *_DIRECT,
+    *(Parameter(543 + place, (value,), 0, 57, per_set=True) for place, value in enumerate((1, 4, 5))),
+    *(Parameter(546 + place, (value,), 0, 57, per_set=True) for place, value in enumerate((1, 0, 0))),
+)
+"""SK 500E…535E: P543…P545 and P546…P548 without elements (§6.5.4)."""
+SK_54XE: Final = (*_DIRECT, *(parameter for parameter in PARAMETERS if parameter.number in (543, 546)))
+
 _SAVE_TO_EEPROM: Final = 560
+_PLAIN_VALUES: Final = 3
 
 Values = dict[tuple[int, int, int], int]
 """Raw values by number, element and set, the last two counted from 1."""
@@ -65,9 +78,10 @@ def sub_index(element: int, parameter_set: int) -> int:
 class DriveParameters:
     """RAM and EEPROM of a drive's parameters."""
 
-    def __init__(self) -> None:
+    def __init__(self, parameters: Sequence[Parameter] = PARAMETERS) -> None:
+        self._by_number = {parameter.number: parameter for parameter in parameters}
         self._eeprom: Values = {}
-        for parameter in PARAMETERS:
+        for parameter in parameters:
             for element, default in enumerate(parameter.defaults, start=1):
                 for parameter_set in range(1, SETS + 1):
                     self._eeprom[parameter.number, element, parameter_set] = default
@@ -82,14 +96,21 @@ class DriveParameters:
 
     def value(self, number: int, parameter_set: int = 1) -> float:
         """Element 1 in engineering units."""
-        return self.raw(number, 1, parameter_set) * _BY_NUMBER[number].unit
+        return self.raw(number, 1, parameter_set) * self._by_number[number].unit
+
+    def meaning(self, number: int, value: int, parameter_set: int) -> int:
+        """What actual value (P543) or setpoint (P546) ``value`` from 1 means: an element of that parameter,
+        or in an SK 500E…535E one of the three from that number on. 0 is nothing."""
+        by_elements = len(self._by_number[number].defaults) > 1
+        key = (number, value, parameter_set) if by_elements else (number + value - 1, 1, parameter_set)
+        return self._ram.get(key, 0) if by_elements or value <= _PLAIN_VALUES else 0
 
     def commission(self, number: int, value: float) -> None:
         """Set all sets and elements, as a technician did before the drive came onto the bus.
 
         Raises ``KeyError`` for a parameter the simulation does not have and ``ValueError`` out of range.
         """
-        parameter = _BY_NUMBER[number]
+        parameter = self._by_number[number]
         raw = round(value / parameter.unit)
         if not parameter.low <= raw <= parameter.high:
             low, high = parameter.low * parameter.unit, parameter.high * parameter.unit
@@ -111,7 +132,7 @@ class DriveParameters:
 
     def add_to(self, dictionary: Dictionary) -> None:
         """Put every parameter into ``dictionary`` at 2000h + number."""
-        for parameter in PARAMETERS:
+        for parameter in self._by_number.values():
             index = PARAMETER_BASE + parameter.number
             if parameter.is_plain:
                 dictionary.add(index, 0, self._entry(parameter, 1, 1))

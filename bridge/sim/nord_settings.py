@@ -95,10 +95,12 @@ def _pdo(cob_id: int, words: list[int], *, enabled: bool = True) -> PdoSettings:
 
 @dataclass(slots=True)
 class InterfaceSettings:
-    """P150…P154 and P168."""
+    """P150…P154, P168 and 6046h, which no parameter shows."""
 
     relays: int = 0
     p151_ms: int = 0
     system_bus_cycle_ms: list[int] = field(default_factory=lambda: [10, 5])
     io_access: list[int] = field(default_factory=lambda: [0, 0])
     profile: list[int] = field(default_factory=lambda: [0] + [1500, 2] * 8)
+    velocity_min: list[int] = field(default_factory=lambda: [0] * DRIVES)
+    velocity_max: list[int] = field(default_factory=lambda: [32767] * DRIVES)

@@ -1,4 +1,4 @@
-"""What the bus interface watches and reports: P151, P170, P173 (BU 2500 §7.1.1, §7.1.3, §8.2)."""
+"""What a NORD node watches and reports: P151 or P513, P170, P173 (BU 2500 §7.1.1, §7.1.3, §8.1, §8.2)."""
 
 from __future__ import annotations
 
@@ -30,8 +30,9 @@ def module_state(nmt: NmtState, master_lost: bool, p151_tripped: bool, drives: S
     return state
 
 
-class ExternalBusTimeout:
-    """P151: from the first valid telegram on, the next must come within this time."""
+class TelegramWatch:
+    """P151, or P513 where there is no interface with parameters of its own (§8.1): from the first valid
+    telegram on, the next must come within this time. 0 ms is off."""
 
     def __init__(self, time_ms: Callable[[], int]) -> None:
         self._time_ms = time_ms
@@ -42,7 +43,7 @@ class ExternalBusTimeout:
         self._telegram_at, self.tripped = None, False
 
     def on_telegram(self, now: float) -> None:
-        """A valid telegram for any drive; it also ends a trip. With P151 = 0 nothing is watched."""
+        """A valid telegram for any drive; it also ends a trip. With a time of 0 nothing is watched."""
         self._telegram_at = now if self._time_ms() else None
         self.tripped = False
 

@@ -36,7 +36,14 @@ class PdoNode(QuickNode):
         return int.from_bytes(self.objects[int(index, 16), int(sub, 16)], "little", signed=signed)
 
     def pdo(
-        self, kind: str, number: int, cob_id: int, objects: Sequence[str], *, event_ms: int = 0, on: bool = True
+        self,
+        kind: str,
+        number: int,
+        cob_id: int,
+        objects: Sequence[str],
+        *,
+        event_ms: int = 0,
+        on: bool = True,
     ) -> None:
         """Set up a PDO; ``objects`` are such as ``"6041:00/16"``, ``cob_id`` is without the node id."""
         parameter, mapping = (base + number - 1 for base in _BASES[kind])

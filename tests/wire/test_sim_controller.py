@@ -7,7 +7,7 @@ from pathlib import Path
 
 import zenoh
 
-from bridge.sim.controller import Controller, Times
+from bridge.sim.controller import Controller, Move, Times
 from tests.support.process import drivebridge, free_port
 
 SITE = """
@@ -55,7 +55,7 @@ def test_the_demos_controller_never_trips_its_own_watchdog(tmp_path: Path) -> No
                 "drives/demo/@/event/**",
                 lambda sample: kinds.append(str(sample.key_expr).rpartition("/")[2]),
             )
-            controller = Controller(session, "drives/demo/conveyor/fu4", 40.0, TIMES)
+            controller = Controller(session, Move("drives/demo/conveyor/fu4", "frequency", 40.0), TIMES)
             rounds = [controller.run_once() for _ in range(3)]
             events.undeclare()
         assert rounds == [True] * 3, bridge.output()

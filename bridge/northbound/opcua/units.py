@@ -29,6 +29,7 @@ _COMMON_CODES: Final = {
     "rpm": ("RPM", "revolutions per minute"),
     "1/min": ("RPM", "revolutions per minute"),
     "1/s": ("RPS", "revolutions per second"),
+    "rev": ("M44", "revolution"),
     "°": ("DD", "degree"),
     "rad": ("C81", "radian"),
     "mm": ("MMT", "millimetre"),

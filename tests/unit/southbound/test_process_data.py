@@ -152,7 +152,8 @@ class TestValues:
 
     def test_points_have_types_ranges_states_and_bits(self, tmp_path: Path) -> None:
         points = {
-            point.name.removeprefix(f"{DRIVE}/"): point for point in running(tmp_path, spindle()).plant.image.points
+            point.name.removeprefix(f"{DRIVE}/"): point
+            for point in running(tmp_path, spindle()).plant.image.points
         }
         target, mode = points["command/target"], points["command/mode"]
         assert (target.data_type, target.low, target.high, target.unit) == ("float", -100.0, 1000.0, "mm")

@@ -1,0 +1,160 @@
+"""The CiA 402 families: what the standard says of words, states and names (IEC 61800-7-201)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bridge.drive import ControlWords, DriveState, StatusWords
+from bridge.errors import FileFaults
+from bridge.mapping import family_names, load_family
+from bridge.mapping.loader import mapping_folders, read_family
+from bridge.mapping.match import Found, best_match
+from bridge.parameter import Names
+from bridge.sim.cia402_catalogue import MAPPINGS
+from bridge.sim.cia402_states import Command, State, command_of
+
+FAMILIES = {name: load_family(f"cia402/{name}") for name in MAPPINGS}
+ANY = FAMILIES["profile-velocity"]
+STATES = {
+    State.NOT_READY: DriveState.NOT_READY,
+    State.SWITCH_ON_DISABLED: DriveState.SWITCH_ON_INHIBITED,
+    State.READY: DriveState.READY,
+    State.SWITCHED_ON: DriveState.SWITCHED_ON,
+    State.ENABLED: DriveState.OPERATION_ENABLED,
+    State.QUICK_STOP_ACTIVE: DriveState.QUICK_STOP_ACTIVE,
+    State.FAULT_REACTION: DriveState.FAULT_REACTION_ACTIVE,
+    State.FAULT: DriveState.FAULT,
+}
+
+
+def test_there_is_one_file_for_each_mode_and_the_base_is_none():
+    assert {name for name in family_names() if name.startswith("cia402/")} == {f"cia402/{name}" for name in MAPPINGS}
+    with pytest.raises(FileFaults, match="template"):
+        load_family("cia402/base")
+
+
+@pytest.mark.parametrize("kind", [0x0000_0192, 0x0001_0192, 0x0002_0192, 0x0042_0192])
+def test_the_low_word_of_1000h_tells_the_profile(kind: int):
+    families = {f"cia402/{name}": family for name, family in FAMILIES.items()}
+    assert best_match(Found(device_type=kind), families)
+    assert not best_match(Found(device_type=kind & ~0xFF | 0x91), families)
+
+
+@pytest.mark.parametrize("name", MAPPINGS)
+def test_every_state_is_told_whatever_the_other_bits_are(name: str):
+    words = StatusWords(FAMILIES[name].status_word)
+    for state, expected in STATES.items():
+        for others in (0x0000, 0xFF90, 0x1200):
+            # Bit 5 is not of interest in the states that leave it open.
+            assert words.state(state | others) is expected
+    assert words.state(words.as_fault(0x1637)) is DriveState.FAULT
+
+
+@pytest.mark.parametrize("name", MAPPINGS)
+def test_the_words_are_the_commands_of_the_standard(name: str):
+    words = ControlWords(FAMILIES[name].control_word)
+    assert command_of(words.stopped) is Command.DISABLE_VOLTAGE
+    assert command_of(words.ready) is Command.SHUTDOWN
+    assert command_of(words.run) is Command.ENABLE_OPERATION
+    assert command_of(words.stop(words.run)) is Command.SWITCH_ON
+    assert command_of(words.quick_stop(words.run)) is Command.QUICK_STOP
+    assert command_of(words.disable_voltage(words.run)) is Command.DISABLE_VOLTAGE
+    assert words.acknowledges(0x0000, 0x0080)
+    assert words.enables(words.run | words.begin)
+
+
+def test_the_bits_of_the_modes():
+    runs = {name: f"{family.control_word.run | family.control_word.begin:04X}" for name, family in FAMILIES.items()}
+    assert runs == {
+        "velocity": "007F",
+        "profile-velocity": "000F",
+        "profile-position": "002F",
+        "homing": "001F",
+        "cyclic-position": "000F",
+        "cyclic-velocity": "000F",
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "place"),
+    [
+        ("6083", "6083:00"),
+        ("6083:00", "6083:00"),
+        ("0x6083:00", "6083:00"),
+        ("60ff", "60FF:00"),
+        ("6046:01", "6046:01"),
+        ("1A00:0A", "1A00:0A"),
+        ("603F", "603F:00"),
+    ],
+)
+def test_parameters_are_named_by_their_index(name: str, place: str):
+    assert str(Names(ANY).resolve(name).address).upper().replace("H", "") == place
+
+
+def test_emergencies_have_their_text_or_that_of_their_group():
+    assert ANY.emcy.text(0x8611) == "following error"
+    assert ANY.emcy.text(0x3211) == "DC link voltage"
+    assert ANY.emcy.text(0x8130) == "life guarding or heartbeat"
+    assert ANY.emcy.text(0xFF42) == "manufacturer's own"
+    groups = {code[:2] for code in ANY.emcy.codes if code.endswith("xx")}
+    assert {code[:2] for code in ANY.emcy.codes} == groups
+
+
+SCALED = """
+extends = "cia402/profile-velocity"
+[[value]]
+name = "velocity"
+group = "command"
+unit = "1/min"
+scale = { factor = 0.006 }
+[[value]]
+name = "velocity"
+group = "actual"
+unit = "1/min"
+scale = { factor = 0.006 }
+"""
+
+
+def site_family(folder: Path, text: str):
+    (folder / "mappings").mkdir()
+    path = folder / "mappings" / "own.toml"
+    path.write_text(text, encoding="utf-8")
+    return read_family(path, mapping_folders(folder / "site.toml"))
+
+
+def test_a_sites_own_units_are_a_small_file(tmp_path: Path):
+    family = site_family(tmp_path, SCALED)
+    values = {value.leaf: value for value in family.value}
+    assert values["command/velocity"].unit == "1/min"
+    assert values["command/velocity"].word_names == ("setpoint_1", "setpoint_2")
+    assert values["actual/velocity"].scale.factor == 0.006
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('follows = "speed"', "there is no actual value 'speed'"),
+        ('follows = "mode"', "mode has other words"),
+        ('follows = "position"\nscale = { factor = 2.0 }', "position has other words or another scale"),
+    ],
+)
+def test_what_a_command_follows_must_be_like_it(tmp_path: Path, text: str, message: str):
+    head = 'extends = "cia402/cyclic-position"\n[[value]]\nname = "position"\ngroup = "command"\n'
+    with pytest.raises(FileFaults, match=message):
+        site_family(tmp_path, head + text)
+
+
+@pytest.mark.parametrize(
+    ("handshake", "message"),
+    [
+        ('{ value = "speed", bit = 4, acknowledge_bit = 12 }', "there is no command value 'speed'"),
+        ('{ value = "position", bit = 3, acknowledge_bit = 12 }', "is a bit of enabling"),
+        ('{ value = "position", bit = 7, acknowledge_bit = 12 }', "of the acknowledge"),
+    ],
+)
+def test_a_handshake_must_have_its_value_and_its_own_bit(tmp_path: Path, handshake: str, message: str):
+    head = 'extends = "cia402/profile-position"\n[control_word]\n'
+    with pytest.raises(FileFaults, match=message):
+        site_family(tmp_path, f"{head}handshake = {handshake}\n")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from bridge.command.channel import DriveChannel
 from bridge.command.event import Event
@@ -46,8 +46,7 @@ class Identification:
     device_name: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class _Scaled:
+class _Scaled(NamedTuple):
     """One scaled value: the place of its word, value = word × full / at; unknown scales pass the word."""
 
     place: int
@@ -107,10 +106,11 @@ class Drive:
             return [index[f"{self.name}/{group}/{leaf}"] for leaf in leaves]
 
         process = self.family.process
-        self._data = places("status", ("status_word", "drive_status_word", "state", "emcy_code"))
-        self._data += places("actual", process.tpdo[1:])
+        self._status = places("status", ("status_word", "drive_status_word", "state", "emcy_code"))
+        self._actual_words = places("actual", process.tpdo[1:])
         self._data_scaled = places("actual", [value.name for value in self._actual])
-        self._data_all = self._data + self._data_scaled
+        self._data = self._status + self._actual_words
+        self._values = self._actual_words + self._data_scaled
         self._command = places("command", process.rpdo)
         self._command_scaled = places("command", [value.name for value in self._commands])
         self._supervision = places("status", ("fault_text",)) + places("supervision", _SUPERVISION)
@@ -134,10 +134,15 @@ class Drive:
 
     def on_process_data(self, words: Sequence[int], now: float) -> None:
         """A TPDO with changed words; ``words`` are raw, in the order of ``process.tpdo``."""
-        self.words[:] = words
-        self.channel.on_pdo(now)
-        self.channel.on_status_word(words[0], now)
-        self._refresh_data(now)
+        held, channel = self.words, self.channel
+        has_new_status = words[0] != held[0]
+        held[:] = words
+        channel.on_pdo(now)
+        channel.on_status_word(words[0], now)
+        if has_new_status or not self._is_good(now):
+            self._refresh_data(now)
+        else:
+            self._refresh_values(now)
 
     def on_unchanged_data(self, now: float) -> None:
         """A TPDO that says what the last one said."""
@@ -186,23 +191,32 @@ class Drive:
 
     def _refresh_data(self, now: float) -> None:
         channel = self.channel
-        quality = channel.link.quality(now)
-        if quality is not Quality.GOOD or self._shown is not _GOOD:
+        if not self._is_good(now):
+            quality = channel.link.quality(now)
             self._judge(quality, now)
             if not quality.has_value:
                 return
-        words = self.words
-        values: list[Value] = [
+        status = (
             channel.status_word,
             channel.drive_status_word,
             int(channel.served_state),
             channel.emcy_code,
-            *words[1:],
-        ]
-        for scaled in self._scaled_actual:
-            word = words[scaled.place]
-            values.append((word - 0x1_0000 if word & 0x8000 else word) * scaled.full / scaled.at)
-        self._image.set_values(self._data_all, values, now)
+        )
+        self._image.set_values(self._status, status, now)
+        self._refresh_values(now)
+
+    def _is_good(self, now: float) -> bool:
+        """The process data are good, and the image says so."""
+        return self._shown is _GOOD and self.channel.link.quality(now) is Quality.GOOD
+
+    def _refresh_values(self, now: float) -> None:
+        """What a TPDO brings beside the status word, as it is and scaled."""
+        words = self.words
+        values: list[Value] = [*words[1:]]
+        for place, full, at, _ in self._scaled_actual:
+            word = words[place]
+            values.append((word - 0x1_0000 if word & 0x8000 else word) * full / at)
+        self._image.set_values(self._values, values, now)
 
     def _judge(self, quality: Quality, now: float) -> None:
         """Show another quality, or another reason for a bad one."""

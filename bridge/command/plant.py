@@ -62,6 +62,8 @@ class Plant:
         self.bus_commands: dict[str, NodeCommand] = {}
         """Who carries out commands on all nodes of a bus, by ``bus/<name>``."""
         self.outputs_changed: Callable[[], None] = lambda: None
+        self.settled = 0
+        """Counts up whenever what a drive is sent may have changed."""
         self._deadlines = Deadlines(self._next_of_drives)
         self._listeners: list[Callable[[Event], None]] = []
         self._gate = EventGate()
@@ -170,6 +172,7 @@ class Plant:
         102.0 is there while a controller is silent; it clears by itself and is then the last fault, as
         P170 does.
         """
+        self.settled += 1
         self._deadlines.on_change()
         drive.refresh(now)
         silent = any(
@@ -193,11 +196,13 @@ class Plant:
         times = [drive.channel.next_deadline(now) for drive in self.drives.values()]
         return min((time for time in times if time is not None), default=None)
 
-    def on_node(self, node: Node, state: NodeState, now: float) -> None:
-        """The southbound side says that a node is in another state."""
+    def on_node(self, node: Node, state: NodeState, now: float, *, tell: bool = True) -> None:
+        """The southbound side says that a node is in another state; ``tell`` makes that an event."""
         self._deadlines.on_change()
         for drive in node.drives:
             drive.channel.on_node(state, now)
+        if not tell:
+            return
         if state is NodeState.LOST:
             self.report(Event(now, Kind.NODE_LOST, node.name, 800, "node lost"))
         elif state is NodeState.OPERATIONAL:

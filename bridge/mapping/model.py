@@ -11,7 +11,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
-from bridge.config.model import Name
+from bridge.config.model import Name, RegularExpression
 from bridge.image import DataType
 
 _OBJECT: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})")
@@ -62,15 +62,6 @@ def _number(text: str) -> str:
     return text
 
 
-def _device_name(text: str) -> str:
-    try:
-        re.compile(text)
-    except re.error as error:
-        raise ValueError(f"must be a regular expression: {error}") from None
-    return text
-
-
-DeviceName = Annotated[str, AfterValidator(_device_name)]
 Ref = Annotated[ObjectRef, BeforeValidator(_object)]
 Pattern = Annotated[str, AfterValidator(_pattern)]
 Word = Annotated[int, Field(ge=0, le=0xFFFF)]
@@ -106,7 +97,7 @@ class IdentityRule(Table):
     product_code_mask: int | None = None
     revision: int | None = None
     revision_mask: int | None = None
-    device_name: DeviceName | None = Field(
+    device_name: RegularExpression | None = Field(
         None, description="a regular expression found in 1008h; `scan` alone goes by it"
     )
 
@@ -159,6 +150,9 @@ class Process(Table):
     rpdo: list[Name] = Field(min_length=1, description="control_word, then the setpoint words")
     tpdo: list[Name] = Field(min_length=1, description="status_word, then the words of actual values")
     exact_length: bool = Field(False, description="true where a PDO of any other length is not evaluated")
+    forbidden_types: list[Annotated[int, Field(ge=0, le=255)]] = Field(
+        default_factory=list[int], description="transmission types that the drives do not have"
+    )
 
 
 class Scale(Table):

@@ -3,6 +3,7 @@
 # PYTHON=...  the interpreter for .venv     (default: the first Python >= 3.11 found)
 # LAB=0       leave out the tests that need a CAN interface, and the Debian packages they need
 # APT=0       install no Debian packages, only say which are missing
+# JOBS=n      how many tests run at a time; 0 in this process, as a debugger wants  (default: CPUs)
 # ARGS=...    further arguments, e.g. make unit ARGS='-k watchdog -x'
 
 SHELL := /bin/bash
@@ -15,6 +16,7 @@ MAKEFLAGS += --no-builtin-rules
 LAB ?= 1
 export APT ?= 1
 export PYTHON
+JOBS ?= $(shell n=$$(nproc); echo $$((n < 8 ? n : 8)))
 ARGS ?=
 
 VENV := .venv
@@ -24,9 +26,14 @@ PIP := $(IN) -m pip --disable-pip-version-check
 PYTEST := $(IN) -m pytest
 QUIETLY := tools/quietly $(VENV)/install.log
 
-# The lab runs on one slow CPU as root: it leaves no caches behind and gets a time limit.
+# Unit tests know no time. The others do: they run on two at the most, a module of them in one place.
+FEW_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 2)))
+
+# The lab runs on slow CPUs as root: it leaves no caches behind and gets a time limit.
 LAB_SECONDS := 1200
-VCAN := PYTHON=$(IN) PYTHONDONTWRITEBYTECODE=1 tests/lab/vcan-run -n 2 -t $(LAB_SECONDS) --
+ON_VCAN := PYTHON=$(IN) PYTHONDONTWRITEBYTECODE=1
+VCAN := $(ON_VCAN) tests/lab/vcan-run -n 2 -t $(LAB_SECONDS) --
+LAB_RUN := $(ON_VCAN) tests/lab/run-lab -j $(FEW_JOBS) -t $(LAB_SECONDS) --
 PACKAGES := iproute2:ip kmod:insmod can-utils:cansend mbpoll:mbpoll nodejs:node npm:npm
 CLIENTS := tests/wire/node
 
@@ -39,11 +46,11 @@ test: unit wire lab ## all tests: unit, wire, lab
 
 unit: $(VENV)/dev.stamp ## tests of the code alone
 	@echo "== unit tests"
-	@$(PYTEST) tests/unit $(ARGS)
+	@$(PYTEST) -n $(JOBS) tests/unit $(ARGS)
 
-wire: $(VENV)/dev.stamp packages clients ## tests with real protocol clients on loopback
+wire: compiled packages clients ## tests with real protocol clients on loopback
 	@echo "== wire tests"
-	@$(PYTEST) -rs tests/wire $(ARGS)
+	@$(PYTEST) -n $(FEW_JOBS) --dist loadfile -rs tests/wire $(ARGS)
 
 ifeq ($(LAB),0)
 lab:
@@ -52,9 +59,9 @@ lab:
 packages clients:
 	@echo "LAB=0: nothing is installed for $@; wire tests that need it skip themselves"
 else
-lab: $(VENV)/dev.stamp packages ## tests on real SocketCAN: vcan, or a user-mode kernel that has it
+lab: compiled packages ## tests on real SocketCAN: vcan, or a user-mode kernel that has it
 	@echo "== lab tests ($$(PYTHON=$(IN) tests/lab/vcan-run -w | sed 's/here/on vcan of this kernel/;s/uml/in a user-mode kernel: this one has no vcan/'))"
-	@$(VCAN) $(PYTEST) -rs -p no:cacheprovider --timeout=120 tests/lab $(ARGS)
+	@$(LAB_RUN) $(PYTEST) -rs -p no:cacheprovider --timeout=120 tests/lab $(ARGS)
 
 packages: $(VENV)/dev.stamp ## install the Debian packages that the tests need
 	@tools/need-packages "the tests (LAB=0 leaves those on a CAN bus out)" $(PACKAGES)
@@ -69,7 +76,11 @@ $(CLIENTS)/node_modules/made.stamp: $(CLIENTS)/package-lock.json | packages
 	@touch $@
 endif
 
-bench: $(VENV)/dev.stamp packages ## print the measured figures
+# Each test that starts a process would compile all of it anew where nothing may be written.
+compiled: $(VENV)/dev.stamp
+	@$(IN) -m compileall -q bridge tests/peers tests/support
+
+bench: compiled packages ## print the measured figures
 	@echo "== figures: this machine"
 	@$(PYTEST) -s -p no:cacheprovider -o python_files='bench_*.py' --ignore=tests/bench/lab tests/bench $(ARGS)
 ifneq ($(LAB),0)
@@ -99,6 +110,9 @@ check-imports: $(VENV)/dev.stamp
 format: $(VENV)/dev.stamp ## put the code into the format that check asks for
 	@$(IN) -m ruff check --fix
 	@$(IN) -m ruff format
+
+docs: $(VENV)/dev.stamp ## write the pages that are made from the mapping files
+	@$(IN) -m tools.family_pages
 
 ##@ Set up and build
 setup: $(VENV)/dev.stamp ## make .venv with everything for demo, test and check
@@ -142,5 +156,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test unit wire lab packages clients bench check check-style check-format check-types check-imports \
-  format setup lock wheel clean help
+.PHONY: demo test unit wire lab packages clients compiled bench check check-style check-format check-types \
+  check-imports format setup lock wheel clean help

@@ -16,10 +16,12 @@ from bridge import clock
 from bridge.cli.serve import until_stopped
 from bridge.config import BusTable
 from bridge.mapping import Family
+from bridge.mapping.model import SdoServer
 from bridge.service import load_project
 from bridge.southbound.bus import Bus, open_bus
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import ControllerState
+from bridge.southbound.sdo_channels import FIRST
 
 BusName = Annotated[str | None, typer.Option("--bus", help="the bus of SITE; not needed where it has one")]
 Interface = Annotated[str | None, typer.Option(help="without SITE: socketcan, or one of python-can's")]
@@ -45,9 +47,27 @@ class Line:
     is_of_site: bool
     states_bitrate: bool = True
 
-    @property
-    def sdo_timeout_s(self) -> float:
-        return max((node.sdo_timeout_ms for node in self.table.node), default=500) / 1000
+    def sdo_policy(self, node_id: int) -> tuple[float, int]:
+        """How long to wait for an answer of this node in seconds, and how often to ask again: as the site
+        has it, 0.5 s and never for a node that it does not have."""
+        for node in self.table.node:
+            if node.id == node_id:
+                return node.sdo_timeout_ms / 1000, node.sdo_retries
+        return 0.5, 0
+
+    def sdo_server(self, node_id: int, number: int) -> SdoServer | None:
+        """The further SDO server ``number`` of this node, None for the first. Raises ``BadParameter``."""
+        if number == FIRST:
+            return None
+        node = next((node for node in self.table.node if node.id == node_id), None)
+        if node is None:
+            raise typer.BadParameter("a further SDO channel has the COB-IDs of the mapping: give SITE")
+        for server in self.families[node.mapping].sdo:
+            if server.number == number:
+                return server
+        known = ", ".join(str(server.number) for server in self.families[node.mapping].sdo)
+        hint = f"1, {known}" if known else "1"
+        raise typer.BadParameter(f"{node.mapping} has no SDO channel {number}: {hint}")
 
     @property
     def own_id(self) -> int | None:

@@ -21,6 +21,7 @@ from bridge.cli.bus import (
     carry_out,
     choose_line,
     print_table,
+    tell,
 )
 from bridge.errors import OperationFailed
 from bridge.southbound import lss_errand
@@ -54,10 +55,12 @@ def scan(
     interface: Interface = None,
     channel: Channel = None,
     bitrate: Bitrate = None,
-    timeout_ms: Timeout = 100,
+    timeout_ms: Annotated[
+        int, typer.Option(min=5, max=10_000, help="wait so long at least for each answer")
+    ] = 100,
     as_json: AsJson = False,
 ) -> None:
-    """Find every device that has no node id (fastscan). Up to 14 seconds for each."""
+    """Find every device that has no node id (fastscan). 14 seconds for each, longer for slow ones."""
     line = choose_line(site, bus, interface, channel, bitrate)
     found = _run(line, lss_errand.find_all(parse_identity(known) if known else None), timeout_ms)
     if as_json:
@@ -206,6 +209,8 @@ def _run(line: Line, service: Service[_T], timeout_ms: int) -> _T:
             errand = carry_out(line, make, watch)
     else:
         errand = carry_out(line, make)
+    if errand.late:
+        tell(f"warning: answers came too late ({errand.late}): --timeout-ms gives more time")
     try:
         return errand.result
     except LssError as error:

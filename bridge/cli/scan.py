@@ -49,7 +49,7 @@ def scan(
     listen_s = seconds or (_PASSIVE_S if passive else _ACTIVE_S)
     scanner = _run(line, passive=passive, listen_s=listen_s, timeout_s=timeout_ms / 1000)
     families = {name: load_family(name) for name in family_names()}
-    found = [_row(node, line, families) for node in scanner.nodes() if node.id != line.own_id]
+    found = [_row(node, line, families) for node in scanner.nodes()]
     for phantom, owner in scanner.phantoms().items():
         whose = "nobody confirms it" if owner is None else f"they are another SDO channel of node {owner}"
         tell(f"answers for id {phantom} are no node: {whose}")
@@ -61,7 +61,14 @@ def scan(
 
 def _run(line: Line, *, passive: bool, listen_s: float, timeout_s: float) -> Scanner:
     def make(now: float) -> Scanner:
-        return Scanner(now, line.table.bitrate, passive=passive, listen_s=listen_s, timeout_s=timeout_s)
+        return Scanner(
+            now,
+            line.table.bitrate,
+            passive=passive,
+            listen_s=listen_s,
+            timeout_s=timeout_s,
+            own_id=line.own_id,
+        )
 
     if passive or not sys.stderr.isatty():
         tell(f"listening for {listen_s:g} s" if passive else "asking all 127 ids")

@@ -6,6 +6,7 @@ import json
 import re
 import struct
 import sys
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated
 
@@ -24,6 +25,7 @@ from bridge.cli.bus import (
     with_status,
 )
 from bridge.errors import OperationFailed
+from bridge.mapping.model import SdoServer
 from bridge.southbound.canopen.sdo import SdoError
 from bridge.southbound.decode_sdo import shown
 from bridge.southbound.errand import SdoErrand
@@ -70,6 +72,12 @@ _STRUCTS = {
 Timeout = Annotated[
     int | None, typer.Option(min=10, max=60_000, help="wait so long for each answer; 500, or the site's")
 ]
+Retries = Annotated[
+    int | None, typer.Option(min=0, max=10, help="ask so often again after silence; 0, or the site's")
+]
+Server = Annotated[
+    int, typer.Option("--sdo-channel", min=1, max=128, help="one of the mapping's further SDO channels")
+]
 
 
 @app.command()
@@ -81,13 +89,16 @@ def read(
     channel: Channel = None,
     bitrate: Bitrate = None,
     timeout_ms: Timeout = None,
+    retries: Retries = None,
+    sdo_channel: Server = 1,
     as_json: AsJson = False,
 ) -> None:
     """Read an object. INDEX and SUB are hexadecimal; SUB is 0 where it is left out."""
     site, (node, name) = split_site(what, 2, _READ_USAGE)
     line = choose_line(site, bus, interface, channel, bitrate)
     index, sub = parse_object(name)
-    data = _transfer(line, line.node_id(node), index, sub, None, timeout_ms, as_json=as_json)
+    way = _way(line, line.node_id(node), sdo_channel, timeout_ms, retries)
+    data = _transfer(line, way, index, sub, None, as_json=as_json)
     try:
         value = None if kind is None else decode(kind, data)
     except ValueError as error:
@@ -109,6 +120,8 @@ def write(
     channel: Channel = None,
     bitrate: Bitrate = None,
     timeout_ms: Timeout = None,
+    retries: Retries = None,
+    sdo_channel: Server = 1,
     as_json: AsJson = False,
 ) -> None:
     """Write an object. On a terminal it asks first: a drive may move, and many keep it in EEPROM."""
@@ -120,10 +133,11 @@ def write(
         data = encode(kind, text)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
+    way = _way(line, node_id, sdo_channel, timeout_ms, retries)
     where = f"{index:04X}h:{sub:02X} of node {node_id}"
     if not yes and sys.stdin.isatty() and not typer.confirm(f"write {text} to {where}?", err=True):
         raise OperationFailed("nothing written")
-    _transfer(line, node_id, index, sub, data, timeout_ms, as_json=as_json)
+    _transfer(line, way, index, sub, data, as_json=as_json)
     if as_json:
         facts = {"node": node_id, "index": f"{index:04X}", "sub": sub, "data": data.hex()}
         print(json.dumps({"ok": True} | facts))
@@ -169,20 +183,36 @@ def decode(kind: ValueType, data: bytes) -> int | float | str | bool:
     return form.unpack(data)[0]
 
 
-def _transfer(
-    line: Line,
-    node_id: int,
-    index: int,
-    sub: int,
-    data: bytes | None,
-    timeout_ms: int | None,
-    *,
-    as_json: bool,
-) -> bytes:
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """To which server of which node, and how patiently."""
+
+    node_id: int
+    server: SdoServer | None
+    timeout_s: float
+    retries: int
+
+
+def _way(line: Line, node_id: int, sdo_channel: int, timeout_ms: int | None, retries: int | None) -> _Way:
+    timeout_s, times = line.sdo_policy(node_id)
+    if timeout_ms is not None:
+        timeout_s = timeout_ms / 1000
+    return _Way(
+        node_id, line.sdo_server(node_id, sdo_channel), timeout_s, times if retries is None else retries
+    )
+
+
+def _transfer(line: Line, way: _Way, index: int, sub: int, data: bytes | None, *, as_json: bool) -> bytes:
     """Do it. Raises ``OperationFailed`` with the abort text where the node refuses or is silent."""
-    timeout_s = line.sdo_timeout_s if timeout_ms is None else timeout_ms / 1000
+    node_id = way.node_id
+
+    def make(now: float) -> SdoErrand:
+        return SdoErrand(
+            node_id, index, sub, data, now, way.timeout_s, retries=way.retries, server=way.server
+        )
+
     with with_status(f"{index:04X}h:{sub:02X} of node {node_id}"):
-        errand = carry_out(line, lambda now: SdoErrand(node_id, index, sub, data, now, timeout_s))
+        errand = carry_out(line, make)
     if isinstance(errand.result, bytes):
         return errand.result
     if errand.result is None:

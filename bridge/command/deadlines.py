@@ -41,7 +41,8 @@ class Deadlines:
 
     def next(self, now: float) -> float | None:
         """When to ask ``is_due`` next."""
-        if self._must_look(now):
+        # Whoever has just asked ``is_due`` has looked.
+        if self._changed or (now != self._looked_at and self._must_look(now)):
             self._look_again(now)
         if not self._readings:
             return self._deadline

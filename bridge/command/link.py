@@ -117,7 +117,11 @@ class Link:
 
     def quality(self, now: float) -> Quality:
         """The quality that the drive's data have at ``now``."""
-        node, last_pdo = self.node, self.last_pdo
+        node, last_pdo, deadline_s = self.node, self.last_pdo, self.pdo_deadline_s
+        if node is NodeState.OPERATIONAL and last_pdo is not None and self._expired_at is None:
+            # First, because it is asked with every PDO.
+            fresh = last_pdo >= self._since and (deadline_s is None or now < last_pdo + deadline_s)
+            return Quality.GOOD if fresh else Quality.STALE
         if node is NodeState.DISABLED:
             return Quality.DISABLED
         if node is NodeState.CONFIG_ERROR:
@@ -126,11 +130,7 @@ class Link:
             return Quality.WAITING
         if self._expired_at is not None:
             return Quality.DEAD if now >= self._expired_at + self._hold_s else Quality.LOST
-        if node is not NodeState.OPERATIONAL or last_pdo < self._since:
-            return Quality.STALE
-        if self.pdo_deadline_s is not None and now >= last_pdo + self.pdo_deadline_s:
-            return Quality.STALE
-        return Quality.GOOD
+        return Quality.STALE
 
     def reason(self, quality: Quality) -> str:
         """Why the data have this quality, in a few words; empty where they are good."""

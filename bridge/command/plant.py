@@ -83,6 +83,8 @@ class Plant:
         self.outputs_changed: Callable[[], None] = lambda: None
         self.eeprom_writes = Ledger()
         """How often parameters were written; whoever keeps it across restarts fills it first."""
+        self.settled = 0
+        """Counts up whenever what a drive is sent may have changed."""
         self._deadlines = Deadlines(self._next_of_drives)
         self._listeners: list[Callable[[Event], None]] = []
         self._gate = EventGate()
@@ -199,6 +201,7 @@ class Plant:
         102.0 is there while a controller is silent; it clears by itself and is then the last fault, as
         P170 does.
         """
+        self.settled += 1
         self._deadlines.on_change()
         drive.refresh(now)
         silent = any(
@@ -222,13 +225,15 @@ class Plant:
         times = [drive.channel.next_deadline(now) for drive in self.drives.values()]
         return min((time for time in times if time is not None), default=None)
 
-    def on_node(self, node: Node, state: NodeState, now: float) -> None:
-        """The southbound side says that a node is in another state."""
+    def on_node(self, node: Node, state: NodeState, now: float, *, tell: bool = True) -> None:
+        """The southbound side says that a node is in another state; ``tell`` makes that an event."""
         self._deadlines.on_change()
         for drive in node.drives:
             drive.channel.on_node(state, now)
         if node.parameters:
             node.parameters.on_node(state, now)
+        if not tell:
+            return
         if state is NodeState.LOST:
             self.report(Event(now, Kind.NODE_LOST, node.name, 800, "node lost"))
         elif state is NodeState.OPERATIONAL:

@@ -10,6 +10,8 @@ from typing import Final
 _HEAD: Final = struct.Struct("<HBI")
 _COUNT: Final = struct.Struct("<I")
 
+COMMANDS: Final = frozenset((0x1010, 0x1011))
+
 INTEGERS: Final = {
     "bool": (1, False),
     "int8": (1, True),
@@ -30,14 +32,19 @@ REALS: Final = {"real32": "<f", "real64": "<d"}
 class Download:
     """One object and its bytes as they go over the wire.
 
-    With ``read_back`` it is compared first, written where it differs and read back; without, it is a
-    command that is written blindly, such as "save".
+    With ``read_back`` it is compared first, written where it differs and read back; without, it is written
+    blindly, as a command is.
     """
 
     index: int
     sub: int
     data: bytes
     read_back: bool = True
+
+    @property
+    def is_command(self) -> bool:
+        """Store or restore: what is read there is never what was written (CiA 301 §7.5.2.13–14)."""
+        return self.index in COMMANDS
 
     @property
     def name(self) -> str:
@@ -100,7 +107,7 @@ def parse_concise_dcf(content: bytes) -> tuple[Download, ...]:
         place += _HEAD.size
         if not size or place + size > len(content):
             raise ValueError(f"entry {entry}, {index:04X}h:{sub:02X}, has an impossible size of {size} bytes")
-        found.append(Download(index, sub, content[place : place + size]))
+        found.append(Download(index, sub, content[place : place + size], index not in COMMANDS))
         place += size
     if place != len(content):
         raise ValueError(f"has {len(content) - place} bytes after its {count} entries")

@@ -6,7 +6,15 @@ import ipaddress
 import re
 from typing import Annotated, Final, Literal, cast
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    field_validator,
+)
 
 from bridge.config.download import Download, encode
 
@@ -31,6 +39,14 @@ _MAPPED: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})/([0-9]{1,2})")
 _PDO_BITS: Final = 64
 _MOST_COUNTER: Final = 240
 _LOCATOR: Final = re.compile(r"[a-z][a-z0-9-]*/.+")
+
+
+def _regular_expression(text: str) -> str:
+    try:
+        re.compile(text)
+    except re.error as error:
+        raise ValueError(f"must be a regular expression: {error}") from None
+    return text
 
 
 def _name(text: str) -> str:
@@ -89,6 +105,7 @@ def _object(text: str) -> str:
 
 
 Name = Annotated[str, AfterValidator(_name)]
+RegularExpression = Annotated[str, AfterValidator(_regular_expression)]
 ObjectName = Annotated[str, AfterValidator(_object)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Network = Annotated[str, AfterValidator(_network)]
@@ -121,6 +138,12 @@ def _mapped(text: object) -> object:
     if not match or not 1 <= int(match[3]) <= _PDO_BITS:
         raise ValueError('must be an object and its length in bits as "3000:01/16"')
     return MappedObject(index=int(match[1], 16), sub=int(match[2], 16), bits=int(match[3]))
+
+
+def _plain(value: object) -> object:
+    if not isinstance(value, bool | int | float | str):
+        raise ValueError("must be a number, true or false, or a text in quotes")
+    return value
 
 
 def _fits(objects: list[MappedObject]) -> list[MappedObject]:
@@ -180,11 +203,19 @@ class IdentityTable(Table):
     device_type: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
     device_type_mask: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
     vendor_id: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
+    vendor_id_mask: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
     product_code: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
     product_code_mask: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
     revision: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
     revision_mask: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
     serial: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
+    serial_mask: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
+    device_name: RegularExpression | None = Field(
+        None, description="a regular expression that is found in 1008h"
+    )
+    software_version: RegularExpression | None = Field(
+        None, description="a regular expression that is found in 100Ah"
+    )
 
 
 class ConfigureTable(Table):
@@ -192,13 +223,17 @@ class ConfigureTable(Table):
 
     object: ObjectName = Field(description='an object as "2097:01", index and sub-index in hexadecimal')
     type: ObjectType = Field(description="the object's data type, such as uint16")
-    value: bool | int | float | str
+    value: Annotated[bool | int | float | str, BeforeValidator(_plain)]
     read_back: bool = Field(True, description="false writes it blindly, as a command")
 
-    @model_validator(mode="after")
-    def _encodes(self) -> ConfigureTable:
-        encode(self.type, self.value)
-        return self
+    @field_validator("value")
+    @classmethod
+    def _encodes(cls, value: bool | int | float | str, info: ValidationInfo) -> bool | int | float | str:
+        """The fault is the value's, with its line. Without a type there is a fault already."""
+        kind = info.data.get("type")
+        if kind is not None:
+            encode(kind, value)
+        return value
 
     @property
     def download(self) -> Download:

@@ -7,7 +7,7 @@ otherwise; boot-up reads that back.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -15,25 +15,29 @@ from bridge.config import BusTable, DriveTable, NodeTable, PdoTable
 from bridge.config.download import Download
 from bridge.eds import Description
 from bridge.eds.pdos import PdoSummary, pdos
+from bridge.lint.settings import RPDO, TPDO, Settings, pdo_cob_id
 from bridge.mapping.model import Family, Pdo
 from bridge.southbound.boot import factory_entries
+from bridge.southbound.canopen import cobid
 from bridge.southbound.canopen.sync import LAST_SYNCHRONOUS, REMOTE_TYPES
 from bridge.tomlfile import Key
 
 EVENT_DRIVEN: Final = 254
 _FACTORY_TYPE: Final = 255
-_RPDO_PARAMETER: Final = 0x1400
-_TPDO_PARAMETER: Final = 0x1800
+_EMCY: Final = 0x1014
+_WORD_BITS: Final = 16
 
-Settings = Mapping[tuple[int, int], int]
-"""What is downloaded to a node, as numbers by index and sub-index."""
 Downloads = Mapping[str, Sequence[Download]]
 """What configuration files ask of their nodes, by the node's name."""
 
 
 @dataclass(frozen=True, slots=True)
 class PdoView:
-    """One PDO of a node. ``length`` is in bytes; ``sent`` says whether the bridge uses it."""
+    """One PDO of a node. ``length`` is in bytes; ``sent`` says whether the bridge uses it.
+
+    ``cob_id_key`` and ``type_key`` are the keys that give it its COB-ID and its transmission type; None
+    where those are the factory's.
+    """
 
     name: str
     key: Key
@@ -50,6 +54,8 @@ class PdoView:
     words: int = 0
     """How many words of its drive the mapping file has in it."""
     is_optional: bool = False
+    cob_id_key: Key | None = None
+    type_key: Key | None = None
 
     @property
     def is_synchronous(self) -> bool:
@@ -99,10 +105,13 @@ class NodeView:
     drives: tuple[DriveView, ...]
     pdos: tuple[PdoView, ...]
     """All that the node has, those of drives the site file does not name included."""
+    settings: Settings
     own_timeout_ms: float = 0.0
     """After how long without process data the node acts by itself, where we set that; 0 where not."""
     own_reaction: int | None = None
     """What it does then, where we set that and the family has a choice."""
+    emcy_id: int | None = None
+    """On which identifier its emergency messages come (1014h), None where they are off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,14 +135,11 @@ def view_bus(
 ) -> BusView:
     nodes: list[NodeView] = []
     for n, table in enumerate(bus.node):
-        wanted = (*downloads.get(table.name, ()), *(entry.download for entry in table.configure))
+        node_key = (*key, "node", n)
+        settings = Settings(table, node_key, downloads.get(table.name, ()))
         dictionary = dictionaries.get(table.mapping)
-        nodes.append(_node(table, (*key, "node", n), families[table.mapping], dictionary, _settings(wanted)))
+        nodes.append(_node(table, node_key, families[table.mapping], dictionary, settings))
     return BusView(bus, key, tuple(nodes))
-
-
-def _settings(downloads: Iterable[Download]) -> Settings:
-    return {(one.index, one.sub): int.from_bytes(one.data, "little") for one in downloads}
 
 
 def _node(
@@ -152,20 +158,39 @@ def _node(
             process = family.process.rpdo if receives else family.process.tpdo
             for pdo in sorted(pdos_of, key=lambda pdo: process[0] not in (pdo.words or process)):
                 used.add((receives, pdo.number))
-                view = _slot_pdo(pdo, receives, known.get((receives, pdo.number)), table.id, drive_key)
-                view = _downloaded(view, pdo.number, settings)
+                summary = known.get((receives, pdo.number))
+                view = _slot_pdo(pdo, receives, summary, table.id, drive_key)
+                view = _downloaded(view, pdo.number, _entry_bits(summary, len(pdo.objects)), settings)
                 is_first = pdo is pdos_of[0]
                 views[receives].append(_from_site(view, drive, is_first=is_first) if drive else view)
         found += [*views[True], *views[False]]
         if drive:
             name = f"{table.name}/{family.leaf_of(drive)}"
             drives.append(DriveView(drive, drive_key, name, tuple(views[True]), tuple(views[False])))
-    found += [_other_pdo(one, key) for place, one in known.items() if place not in used]
+    # What the bridge does not use may collide all the same.
+    others = {place: _other_pdo(one, key) for place, one in known.items() if place not in used}
+    for place in settings.pdos():
+        if place not in used:
+            others.setdefault(place, _unknown_pdo(*place, key))
+    for place, view in others.items():
+        found.append(_downloaded(view, place[1], _entry_bits(known.get(place), 0), settings))
     own = family.own_timeout
-    own_ms = own.unit_ms * settings.get((own.object.index, own.object.sub), 0) if own else 0.0
+    own_ms = own.unit_ms * settings.number(own.object.index, own.object.sub, 0) if own else 0.0
     reaction = own.reaction.object if own and own.reaction else None
-    does = settings.get((reaction.index, reaction.sub)) if reaction else None
-    return NodeView(table, family, dictionary, key, tuple(drives), tuple(found), own_ms, does)
+    does = settings[reaction.index, reaction.sub] if reaction else None
+    emcy_id = dictionary.number(_EMCY, 0, table.id) if dictionary else None
+    return NodeView(
+        table,
+        family,
+        dictionary,
+        key,
+        tuple(drives),
+        tuple(found),
+        settings,
+        own_ms,
+        None if does is None else does.value,
+        settings.emcy_id(cobid.EMCY + table.id if emcy_id is None else emcy_id),
+    )
 
 
 def _slot_pdo(pdo: Pdo, receives: bool, summary: PdoSummary | None, node_id: int, key: Key) -> PdoView:
@@ -193,16 +218,28 @@ def _slot_pdo(pdo: Pdo, receives: bool, summary: PdoSummary | None, node_id: int
     )
 
 
-def _downloaded(view: PdoView, number: int, settings: Settings) -> PdoView:
-    """``view`` with what is downloaded to its communication object."""
-    index = (_RPDO_PARAMETER if view.receives else _TPDO_PARAMETER) + number - 1
-    cob_id = settings.get((index, 1))
+def _entry_bits(summary: PdoSummary | None, words: int) -> list[int]:
+    """The lengths of a PDO's objects at the factory: by the dictionary, else that many words."""
+    if summary and summary.mapped:
+        return [one.bits for one in summary.mapped]
+    return [_WORD_BITS] * words
+
+
+def _downloaded(view: PdoView, number: int, have: Sequence[int], settings: Settings) -> PdoView:
+    """``view`` with what is downloaded to its communication and its mapping object."""
+    index, mapping = (base + number - 1 for base in (RPDO if view.receives else TPDO))
+    cob_id, kind = settings[index, 1], settings[index, 2]
+    is_mapped = any(True for _ in settings.of(mapping))
     return replace(
         view,
-        enabled=view.enabled if cob_id is None else not cob_id >> 31,
-        transmission_type=settings.get((index, 2), view.transmission_type),
-        inhibit_ms=settings.get((index, 3), round(10 * view.inhibit_ms)) / 10,
-        event_ms=settings.get((index, 5), view.event_ms),
+        enabled=view.enabled if cob_id is None else not cob_id.value & cobid.PDO_DISABLED,
+        cob_id=view.cob_id if cob_id is None else pdo_cob_id(cob_id.value),
+        cob_id_key=cob_id.key if cob_id else None,
+        length=(settings.mapped_bits(mapping, have) + 7) // 8 if is_mapped else view.length,
+        transmission_type=view.transmission_type if kind is None else kind.value,
+        type_key=kind.key if kind else None,
+        inhibit_ms=settings.number(index, 3, round(10 * view.inhibit_ms)) / 10,
+        event_ms=settings.number(index, 5, view.event_ms),
     )
 
 
@@ -216,13 +253,16 @@ def _from_site(view: PdoView, drive: DriveTable, *, is_first: bool) -> PdoView:
         return replace(view, sent=view.enabled, rtr_poll_ms=poll_ms)
     own = tables[place]
     name = "rpdo" if view.receives else "tpdo"
+    key = (*view.key, name, place) if len(tables) > 1 else (*view.key, name)
     return replace(
         view,
-        key=(*view.key, name, place) if len(tables) > 1 else (*view.key, name),
+        key=key,
         enabled=own.enable,
         cob_id=own.cob_id or view.cob_id,
+        cob_id_key=(*key, "cob_id") if own.cob_id else view.cob_id_key,
         length=_bytes(own) or view.length,
         transmission_type=_either(own.transmission_type, view.transmission_type),
+        type_key=view.type_key if own.transmission_type is None else (*key, "transmission_type"),
         inhibit_ms=view.inhibit_ms if own.inhibit_ms is None else own.inhibit_ms,
         event_ms=_either(own.event_ms, view.event_ms),
         sent=own.enable,
@@ -252,3 +292,9 @@ def _other_pdo(summary: PdoSummary, key: Key) -> PdoView:
         summary.event_timer_ms,
         sent=False,
     )
+
+
+def _unknown_pdo(receives: bool, number: int, key: Key) -> PdoView:
+    """One of which only the configuration says that it is there."""
+    name = f"{'RPDO' if receives else 'TPDO'}{number}"
+    return PdoView(name, key, receives, False, 0, 0, _FACTORY_TYPE, 0.0, 0, sent=False)

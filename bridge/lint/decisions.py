@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from bridge.config import IGNORE_ALL_S, DriveTable, Site
+from bridge.config import IGNORE_ALL_S, DriveTable, NodeTable, Site
 from bridge.lint.report import LintReport
 from bridge.mapping import Family
 from bridge.tomlfile import Key
@@ -13,6 +13,7 @@ from bridge.tomlfile import Key
 def check_decisions(site: Site, families: Mapping[str, Family], report: LintReport) -> None:
     for b, bus in enumerate(site.bus):
         for n, node in enumerate(bus.node):
+            _check_commands(node, ("bus", b, "node", n), report)
             for d, drive in enumerate(node.drive):
                 name = f"{node.name}/{families[node.mapping].leaf_of(drive)}"
                 _check_drive(drive, name, ("bus", b, "node", n, "drive", d), report)
@@ -20,6 +21,16 @@ def check_decisions(site: Site, families: Mapping[str, Family], report: LintRepo
         report.warning(
             ("opcua", "no_security"), "is true: anyone who reaches the port reads everything in clear text"
         )
+
+
+def _check_commands(node: NodeTable, key: Key, report: LintReport) -> None:
+    for c, entry in enumerate(node.configure):
+        if entry.download.is_command and entry.read_back:
+            report.warning(
+                (*key, "configure", c),
+                f"{entry.download.name} is a command: it never reads back as it was written",
+                'read_back = false; "save" after a download is configuration_store = true',
+            )
 
 
 def _check_drive(drive: DriveTable, name: str, key: Key, report: LintReport) -> None:

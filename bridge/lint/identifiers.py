@@ -16,13 +16,15 @@ _LSS: Final = (0x7E4, 0x7E5)
 
 @dataclass(frozen=True, slots=True)
 class _Use:
-    """``active``: in use as configured; else only reserved, off at factory or not opened."""
+    """``active``: in use as configured; else only reserved, off at factory or not opened. ``moved``: the
+    site gives it this COB-ID, with ``key``."""
 
     cob_id: int
     what: str
     owner: str
     key: Key
     active: bool = True
+    moved: bool = False
 
     def __str__(self) -> str:
         return f"{self.what} of {self.owner}"
@@ -42,13 +44,14 @@ def check_identifiers(bus: BusView, report: LintReport) -> None:
         pairs.sort(key=lambda pair: not (pair[0].active and pair[1].active))
         other, use = pairs[0]
         more = f", and {len(pairs) - 1} more" if len(pairs) > 1 else ""
+        key = other.key if other.moved and not use.moved else use.key
         message = f"{use} has COB-ID {use.cob_id:X}h, which is {other}'s, too{more}"
         if use.active and other.active:
-            report.error(use.key, message, "give one of the nodes another id or another cob_id")
+            report.error(key, message, "give one of the nodes another id or another cob_id")
         else:
             off = use if not use.active else other
             hint = f"it works as long as {off} is off; another node id is safer"
-            report.warning(use.key, message, hint)
+            report.warning(key, message, hint)
 
 
 def _uses(bus: BusView) -> Iterator[_Use]:
@@ -72,7 +75,8 @@ def _uses(bus: BusView) -> Iterator[_Use]:
 
 def _node_uses(node: NodeView) -> Iterator[_Use]:
     node_id, name, key = node.table.id, node.table.name, (*node.key, "id")
-    yield _Use(cobid.EMCY + node_id, "EMCY", name, key)
+    if node.emcy_id is not None:
+        yield _Use(node.emcy_id, "EMCY", name, key)
     yield _Use(cobid.SDO_REQUEST + node_id, "SDO1 request", name, key)
     yield _Use(cobid.SDO_REPLY + node_id, "SDO1 reply", name, key)
     yield _Use(cobid.ERROR_CONTROL + node_id, "error control", name, key)
@@ -81,6 +85,5 @@ def _node_uses(node: NodeView) -> Iterator[_Use]:
         yield _Use(server.request + node_id, f"SDO{server.number} request", name, key, active=is_open)
         yield _Use(server.reply + node_id, f"SDO{server.number} reply", name, key, active=is_open)
     for pdo in node.pdos:
-        moved = "rpdo" in pdo.key or "tpdo" in pdo.key
-        pdo_key = (*pdo.key, "cob_id") if moved else key
-        yield _Use(pdo.cob_id, pdo.name, name, pdo_key, active=pdo.enabled)
+        moved = pdo.cob_id_key
+        yield _Use(pdo.cob_id, pdo.name, name, moved or key, active=pdo.enabled, moved=moved is not None)

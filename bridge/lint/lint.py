@@ -9,6 +9,7 @@ from pathlib import Path
 from bridge.config import Site
 from bridge.eds import Description, read_device_file
 from bridge.lint.bus import Downloads, view_bus
+from bridge.lint.contradictions import check_contradictions
 from bridge.lint.decisions import check_decisions
 from bridge.lint.identifiers import check_identifiers
 from bridge.lint.load import BusLoad, check_load
@@ -64,6 +65,7 @@ def lint(
         check_identifiers(bus, report)
         check_pdos(bus, report)
         check_times(bus, report)
+        check_contradictions(bus, report)
         loads.append(check_load(bus, report))
     check_decisions(site, families, report)
     return Verdict(report.findings(), tuple(loads))

@@ -48,6 +48,9 @@ def _check_supervision(bus: BusView, node: NodeView, report: LintReport) -> None
         )
     if table.supervision == "none":
         return
+    if table.supervision == "guarding" and table.life_time_factor == 1:
+        message = "is 1: one lost frame, and the node is lost"
+        report.warning((*node.key, "life_time_factor"), message, "at least 2")
     if table.supervision_ms < 2 * bus.table.sync_period_ms:
         report.warning(
             (*node.key, "supervision_ms"),

@@ -14,7 +14,6 @@ __all__ = [
     "Bit",
     "Bits",
     "Decimal",
-    "DeviceName",
     "EmcyCode",
     "FaultNumber",
     "Kind",
@@ -146,19 +145,10 @@ def _state(key: object) -> object:
     raise ValueError("must be a number in decimal, such as 3")
 
 
-def _device_name(text: str) -> str:
-    try:
-        re.compile(text)
-    except re.error as error:
-        raise ValueError(f"must be a regular expression: {error}") from None
-    return text
-
-
 def _text_schema(pattern: str) -> WithJsonSchema:
     return WithJsonSchema({"type": "string", "pattern": f"^{pattern}$"})
 
 
-DeviceName = Annotated[str, AfterValidator(_device_name)]
 Ref = Annotated[ObjectRef, BeforeValidator(_object), _text_schema(_OBJECT_TEXT)]
 Mapped = Annotated[
     MappedObject, BeforeValidator(_mapped), _text_schema(rf"{_MAPPED_TEXT}(\+{_MAPPED_TEXT})*")

@@ -11,11 +11,11 @@ from typing import Literal
 from pydantic import Field
 
 from bridge.config import DriveTable
+from bridge.config.model import RegularExpression
 from bridge.mapping.faults import EmcyEvent, EmcyNumber, EmcyTable, FaultNumbers, FaultParameter
 from bridge.mapping.fields import (
     Bit,
     Bits,
-    DeviceName,
     Kind,
     MappedObject,
     Name,
@@ -92,7 +92,7 @@ class IdentityRule(Table):
     product_code_mask: int | None = None
     revision: int | None = None
     revision_mask: int | None = None
-    device_name: DeviceName | None = Field(
+    device_name: RegularExpression | None = Field(
         None, description="a regular expression found in 1008h; `scan` alone goes by it"
     )
 

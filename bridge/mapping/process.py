@@ -26,6 +26,9 @@ class Process(Table):
         min_length=1, max_length=MOST_WORDS, description="status_word, then the words of actual values"
     )
     exact_length: bool = Field(False, description="true where a PDO of any other length is not evaluated")
+    forbidden_types: list[Annotated[int, Field(ge=0, le=255)]] = Field(
+        default_factory=list[int], description="transmission types that the drives do not have"
+    )
 
 
 class Pdo(Table):

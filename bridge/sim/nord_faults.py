@@ -8,9 +8,11 @@ UNKNOWN_CODE: Final = 0x1000
 """The interface does not know the drive's fault number; P700 says it."""
 
 TELEGRAM_DOWNTIME: Final = 102
-"""10.2, here: the NMT master's life time has run out."""
+"""10.2: the NMT master's life time has run out, or P513 (BU 0260, p. 77)."""
 BUS_TIMEOUT: Final = 103
 """10.3, P151."""
+LINK_BROKEN: Final = 108
+"""10.8, the SK TU3-CAO and its drive have lost each other."""
 INTERFACE_MISSING: Final = 109
 """10.9, the drive does not reach the bus interface on the system bus."""
 

@@ -186,7 +186,7 @@ class NordTu4(NordNode):
         of the profile; without the profile the mapping is that of the factory."""
         now, factory = self._communication.current, factory_communication(self.node_id, self._layout)
         for pdo, delivered in zip((*now.rpdo, *now.tpdo), (*factory.rpdo, *factory.tpdo), strict=True):
-            if any(self.profile.hides(entry >> 16) for entry in pdo.entries):
+            if not any(pdo.entries) or any(self.profile.hides(entry >> 16) for entry in pdo.entries):
                 pdo.entries = [0] * PDO_WORDS if self.profile.is_on else delivered.entries
                 pdo.count = 0 if self.profile.is_on else delivered.count
 

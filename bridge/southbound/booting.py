@@ -105,8 +105,7 @@ class Booting:
                 self._end(end.value, now)
                 return
             except SdoError as error:
-                absent = not error.by_server
-                self._end(boot.BootError(self._step.letter, str(error), absent=absent), now)
+                self._end(_failure(error, self._step.letter), now)
                 return
             except boot.BootError as error:
                 self._end(error, now)
@@ -143,6 +142,13 @@ class Booting:
     def _end(self, result: boot.BootResult | boot.BootError, now: float) -> None:
         self._boot = None
         self._host.boot_ended(result, now)
+
+
+def _failure(error: SdoError, letter: str) -> boot.BootError:
+    """What the boot-up ends with. Silence says nothing about what was asked for."""
+    if error.by_server or letter == "B":
+        return boot.BootError(letter, str(error), absent=not error.by_server)
+    return boot.BootError(letter, f"the node does not answer: {error}", absent=True)
 
 
 def _resume(generator: boot.Boot, answer: Result | None) -> boot.Action:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from bridge.mapping.model import SdoServer
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.canopen import cobid, nmt
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
@@ -20,18 +21,28 @@ _EXPECTED: Final = {
 
 
 class SdoErrand:
-    """One transfer with the first SDO server of a node; ``result`` is None until it has ended.
+    """One transfer with an SDO server of a node; ``result`` is None until it has ended.
 
-    ``data`` None reads, bytes are written. Times are monotonic seconds.
+    ``data`` None reads, bytes are written. ``server`` None is the first. Times are monotonic seconds.
     """
 
     def __init__(
-        self, node_id: int, index: int, sub: int, data: bytes | None, now: float, timeout_s: float
+        self,
+        node_id: int,
+        index: int,
+        sub: int,
+        data: bytes | None,
+        now: float,
+        timeout_s: float,
+        *,
+        retries: int = 0,
+        server: SdoServer | None = None,
     ) -> None:
         self.result: Result | None = None
         self.received = 0
         """Frames of the server so far: tells that a long transfer goes on."""
-        self._channel = SdoChannel(cobid.SDO_REQUEST + node_id, cobid.SDO_REPLY + node_id, timeout_s)
+        request, reply = (server.request, server.reply) if server else (cobid.SDO_REQUEST, cobid.SDO_REPLY)
+        self._channel = SdoChannel(request + node_id, reply + node_id, timeout_s, retries=retries)
         if data is None:
             self._channel.read(index, sub, now, self._done)
         else:

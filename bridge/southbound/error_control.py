@@ -9,6 +9,7 @@ from collections.abc import Callable
 from enum import Enum
 
 from bridge.config import NodeTable
+from bridge.southbound.boot.status import HINTS
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.canopen import nmt
 from bridge.southbound.canopen.bootloop import BootLoop
@@ -22,6 +23,7 @@ class Sign(Enum):
 
     MALFORMED = "malformed"
     BOOT_UP = "boot-up"
+    WRONG_TOGGLE = "an answer to node guarding that does not count"
     SAME = "the state it had before"
     CHANGED = "another state"
 
@@ -35,6 +37,7 @@ class ErrorControl:
         self._duplicates = DuplicateCheck()
         self.boot_loop = BootLoop()
         self.state = NmtState.UNKNOWN
+        self._toggle_errors_before = 0
         self._supervisor: HeartbeatConsumer | NodeGuard | None = None
         if table.supervision == "heartbeat":
             self._supervisor = HeartbeatConsumer(table.supervision_ms / 1000)
@@ -49,9 +52,17 @@ class ErrorControl:
     @property
     def loss(self) -> str:
         """How a loss is called: error status E or F of CiA 302-2."""
-        if self._table.supervision == "guarding":
-            return "F: lost: no answer to node guarding"
-        return f"E: lost: no heartbeat for {self._table.supervision_ms} ms"
+        if self._table.supervision != "guarding":
+            return f"E: lost: no heartbeat for {self._table.supervision_ms} ms: {HINTS['E']}"
+        wrong = self.toggle_errors - self._toggle_errors_before
+        if wrong:
+            return f"F: lost: no right answer to node guarding, {wrong} with the wrong toggle bit"
+        return f"F: lost: no answer to node guarding: {HINTS['E']}"
+
+    @property
+    def toggle_errors(self) -> int:
+        """Answers to node guarding whose toggle bit was not the one that is due."""
+        return self._supervisor.toggle_errors if isinstance(self._supervisor, NodeGuard) else 0
 
     def on_frame(self, frame: Frame) -> Sign:
         if len(frame.data) != 1:
@@ -61,8 +72,8 @@ class ErrorControl:
             self._duplicates.restart()
             self.state = NmtState.PRE_OPERATIONAL
             return Sign.BOOT_UP
-        if self._supervisor:
-            self._supervisor.on_frame(frame)
+        if self._supervisor and not self._supervisor.on_frame(frame):
+            return Sign.WRONG_TOGGLE
         found = self._duplicates.on_heartbeat(state, frame.time)
         if found:
             self._duplicate(found, frame.time)
@@ -71,6 +82,10 @@ class ErrorControl:
         self.state = state
         return Sign.CHANGED
 
+    def on_foreign_request(self, frame: Frame) -> None:
+        """Another SDO client asks this node: its answers are not for us."""
+        self._duplicates.on_foreign_request(frame.time)
+
     def on_reply(self, frame: Frame, *, matched: bool) -> None:
         """An SDO answer; ``matched`` where it belonged to a request of ours."""
         found = self._duplicates.on_reply(frame.data, frame.time, matched=matched)
@@ -78,12 +93,13 @@ class ErrorControl:
             self._duplicate(found, frame.time)
 
     def produces_every(self, period_s: float | None) -> None:
-        """The heartbeat period that the boot-up has set; None where there is none."""
+        """The heartbeat period that the node has kept at boot-up; None where there is none."""
         self._duplicates.period_s = period_s
 
     def expect(self, now: float) -> None:
         """From now on the node has to be heard."""
         self._duplicates.restart()
+        self._toggle_errors_before = self.toggle_errors
         if self._supervisor:
             self._supervisor.expect(now)
 

@@ -12,6 +12,10 @@ _PAUSE_S: Final = 0.02
 """After a request that nobody answers: the devices have to act on it."""
 _MOST_FOUND: Final = 127
 _MOST_SPOILT: Final = 3
+_FIRST_QUESTION: Final = 5
+"""How many times longer the first question of a scan waits: it measures how quick the devices are."""
+_SAFETY: Final = 4
+"""How many times longer than the slowest answer so far the next ones are waited for."""
 
 _R = TypeVar("_R")
 
@@ -20,17 +24,24 @@ class LssErrand(Generic[_R]):
     """Carries a service's requests to the bus and the replies back.
 
     ``error`` says why it failed; ``steps`` and ``step`` tell how far it is. Times are monotonic seconds.
+
+    In a fastscan silence is an answer, and nothing in an answer says to which question it belongs. So its
+    questions are given ``timeout_s`` or four times what the slowest answer has taken, whichever is longer.
     """
 
     def __init__(self, service: Service[_R], now: float, timeout_s: float) -> None:
         self.error: LssError | None = None
         self.steps = 0
         self.step = ""
+        self.late = 0
+        """Answers to a scan that came when nobody waited for one."""
         self._service = service
         self._timeout_s = timeout_s
         self._exchange: Exchange | None = None
         self._reply: bytes | None = None
         self._deadline: float | None = None
+        self._asked = now
+        self._slowest_s = 0.0
         self._frames: list[Frame] = []
         self._result: list[_R] = []
         self._finished = False
@@ -50,6 +61,9 @@ class LssErrand(Generic[_R]):
         exchange = self._exchange
         if frame.can_id != lss.REPLY_ID or exchange is None or len(frame.data) != 8:
             return
+        if frame.data[0] == lss.IDENTIFIED:
+            self._slowest_s = max(self._slowest_s, frame.time - self._asked)
+            self.late += exchange.reply != lss.IDENTIFIED
         if frame.data[0] != exchange.reply or self._reply is not None:
             return
         self._reply = frame.data
@@ -85,8 +99,17 @@ class LssErrand(Generic[_R]):
             self._exchange = exchange
             self.step = exchange.step
             self.steps += 1
-            self._frames.append(Frame(lss.REQUEST_ID, exchange.request))
-            self._deadline = now + (_PAUSE_S if exchange.reply is None else self._timeout_s)
+            if exchange.request:
+                self._frames.append(Frame(lss.REQUEST_ID, exchange.request))
+            self._deadline = now + self._wait_s(exchange)
+            if exchange.reply == lss.IDENTIFIED:
+                self._asked = now
+
+    def _wait_s(self, exchange: Exchange) -> float:
+        if exchange.reply is None and not exchange.by_many:
+            return _PAUSE_S
+        least_s = self._timeout_s * (_FIRST_QUESTION if exchange.is_first else 1)
+        return max(least_s, _SAFETY * self._slowest_s)
 
     def _end(self, error: LssError | None) -> None:
         """Whatever came of it, no device is left in configuration state."""
@@ -101,25 +124,44 @@ class LssErrand(Generic[_R]):
 def find_all(known: Identity | None) -> Service[list[Identity]]:
     """Every device without a node id, one after the other; all are left in waiting state.
 
-    An answer that comes too late spoils a scan, which shows when the device does not confirm: it is
-    looked for again. Raises LssError where that happens too often.
+    A late answer that was taken for one to another question spoils a scan: the device does not confirm,
+    or has another identity than was found. It is looked for again, with the time that the late answer has
+    shown to be needed; and what was found counts if the device can be selected by it. Raises LssError where
+    scans are spoilt too often.
     """
     found: list[Identity] = []
     spoilt = 0
     yield from lss.to_waiting()
     while len(found) < _MOST_FOUND:
+        yield from lss.settle()
         try:
             identity = yield from lss.fastscan(known)
+            if identity is None:
+                break
+            if identity in found:
+                raise LssError("devices answer too late: allow them more time")
         except LssError:
             spoilt += 1
             if spoilt > _MOST_SPOILT:
                 raise
             continue
-        if identity is None:
-            break
         found.append(identity)
+    # Who was found is still in configuration state, and silent in a scan.
     yield from lss.to_waiting()
-    return found
+    phantoms: set[Identity] = set()
+    for identity in found:
+        if not (yield from _is_there(identity)):
+            phantoms.add(identity)
+    yield from lss.to_waiting()
+    return [identity for identity in found if identity not in phantoms]
+
+
+def _is_there(identity: Identity) -> Service[bool]:
+    try:
+        yield from lss.switch_selective(identity)
+    except LssError:
+        return False
+    return True
 
 
 def select(which: Identity | None) -> Service[None]:

@@ -16,7 +16,7 @@ from bridge.errors import OperationFailed
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import Bus, ControllerState
 from bridge.southbound.canopen.sync import burst_length
-from bridge.southbound.network import Network
+from bridge.southbound.network import Beats, Network
 from bridge.southbound.ratelimit import RateLimit
 from bridge.southbound.timer import LoopTimer
 
@@ -48,9 +48,11 @@ class _Line:
     bus: Bus
     network: Network
     beating: dict[int, tuple[Frame, ...]] = field(default_factory=dict[int, tuple[Frame, ...]])
+    beats: Beats | None = None
     renew_at: float = 0.0
     was_up: bool = True
     shown: ControllerState = ControllerState.OK
+    shown_refusal: str = ""
     limit: RateLimit = field(default_factory=lambda: RateLimit(_BUS_EVENTS, _BUS_EVENT_EVERY_S))
     outages: int = 0
 
@@ -200,6 +202,7 @@ class Master:
         status = line.bus.status
         is_up = status.state not in (ControllerState.DOWN, ControllerState.BUS_OFF)
         self._tell_state(line, now)
+        self._tell_refusal(line, now)
         if status.outages != line.outages:
             line.outages = status.outages
             if is_up and line.was_up:
@@ -228,6 +231,17 @@ class Master:
             message += f": {status.last_error}"
         self._plant.report(Event(now, Kind.BUS, line.bus.name, _SEVERITIES[status.state], message))
 
+    def _tell_refusal(self, line: _Line, now: float) -> None:
+        """The kernel no longer takes bursts, or takes them again."""
+        refusal = line.bus.status.bursts_refused
+        if refusal == line.shown_refusal or not line.limit.allows(now):
+            return
+        line.shown_refusal = refusal
+        message = "the kernel sends the bursts again"
+        if refusal:
+            message = f"the kernel takes no bursts ({refusal}): the bridge sends them itself, less evenly"
+        self._plant.report(Event(now, Kind.BUS, line.bus.name, 600 if refusal else 300, message))
+
     def _flush(self, line: _Line, now: float) -> None:
         bus, network = line.bus, line.network
         routes = network.take_routes()
@@ -240,7 +254,10 @@ class Master:
         renew = now >= line.renew_at
         if renew:
             line.renew_at = now + network.bus.deadman_ms / 1000 / _RENEWALS
-        beats = network.beats()
+        beats = network.beats(anew=renew)
+        if beats is line.beats and not renew:
+            return
+        line.beats = beats
         for can_id in [can_id for can_id in line.beating if can_id not in beats]:
             bus.silence(can_id)
             del line.beating[can_id]

@@ -65,13 +65,16 @@ class Network:
         self._schedule = Schedule(self.nodes)
         own_id = bus.master_node_id if bus.heartbeat_ms else None
         known = {node.table.id: node.node.name for node in self.nodes}
-        self._watch = BusWatch(bus.name, own_id, known, plant)
+        self._watch = BusWatch(bus.name, own_id, lambda: self.nmt_state, known, plant)
         self._has_booted = False
         self._nmt_for_all: Frame | None = None
         plant.bus_commands[f"bus/{bus.name}"] = self.command
         self.unrouted = 0
         self._routes_changed = True
         self._routes: dict[int, Handler] = {}
+        self._routings = 0
+        self._beats: Beats = {}
+        self._beats_for: tuple[int, int, NmtState] | None = None
         self._measured: tuple[float, int] | None = None
         self._sync = sync_frames(bus.sync_counter)
         self._window = SyncWindow(bus.sync_window_us / 1e6) if bus.sync_window_us else None
@@ -164,6 +167,8 @@ class Network:
         self._gate.stopped_by(node)
         self._plant.report(Event(now, Kind.BUS, self.bus.name, 800, f"all nodes are stopped: {why}"))
         for other in self.nodes:
+            # One frame stops them all, the lost one included if it still hears us.
+            other.told_to_stop = True
             if other is not node:
                 other.hold(why, now)
                 self._schedule.touch(other)
@@ -193,6 +198,7 @@ class Network:
         if not self._routes_changed:
             return None
         self._routes_changed = False
+        self._routings += 1
         self._routes = self._watch.routes()
         for node in self.nodes:
             node.wire.routes_changed = False
@@ -217,10 +223,22 @@ class Network:
                 if tpdo.is_synchronous and tpdo.cob_id in self._routes:
                     self._routes[tpdo.cob_id] = judged(self._routes[tpdo.cob_id])
 
-    def beats(self) -> Beats:
-        """The frames to be repeated."""
+    def beats(self, *, anew: bool = False) -> Beats:
+        """The frames to be repeated: the same object while they are the same.
+
+        A drive's settling, a node's new PDOs and our own state change them; asked ``anew``, every drive is
+        looked at.
+        """
+        made_for = self._plant.settled, self._routings, self.nmt_state
+        if anew or made_for != self._beats_for:
+            self._beats_for = made_for
+            self._beats = self._make_beats()
+        return self._beats
+
+    def _make_beats(self) -> Beats:
         beats: Beats = {}
-        if self.bus.heartbeat_ms:
+        # The state before that is said once, by the boot-up message.
+        if self.bus.heartbeat_ms and self._has_booted:
             frame = Frame(cobid.ERROR_CONTROL + self.bus.master_node_id, bytes((self.nmt_state,)))
             beats[frame.can_id] = ((frame,), self.bus.heartbeat_ms / 1000)
         period_s = self.bus.rpdo_period_s

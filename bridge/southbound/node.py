@@ -11,6 +11,7 @@ from bridge.command.link import NodeState
 from bridge.command.plant import Node
 from bridge.config.download import Download
 from bridge.southbound import boot, node_commands
+from bridge.southbound.backoff import BETWEEN_BOOTS_S, BackOff
 from bridge.southbound.booting import Booting
 from bridge.southbound.canopen.bootloop import BootLoop
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
@@ -21,9 +22,6 @@ from bridge.southbound.node_wire import Listener, NodeWire
 from bridge.southbound.parameters import NodeParameters
 from bridge.southbound.sdo_channels import SdoChannels
 
-_FIRST_RETRY_S: Final = 1.0
-_LAST_RETRY_S: Final = 10.0
-_BETWEEN_BOOTS_S: Final = 0.2
 _SETTLE_S: Final = 2.0
 
 
@@ -43,14 +41,15 @@ class NodeCore:
         listener = Listener(self._on_sign, self._touch, partial(neighbours.duplicate, self))
         self.wire = NodeWire(node, plant, listener)
         self.error_control = self.wire.error_control
-        self.booting = Booting(self, partial(boot.boot, node, downloads), self.wire.sdo)
+        self._memory = boot.BootMemory()
+        self.booting = Booting(self, partial(boot.boot, node, downloads, self._memory), self.wire.sdo)
         self.parameters = NodeParameters(node, plant, lambda: self.sdo)
         self.boot_at: float | None = 0.0
         self.has_concluded = False
         """Whether a boot-up has ended, well or not, since the bus is there."""
         self.told_to_stop = False
         """A stopped node answers no SDO: it has to be woken before it is asked."""
-        self._retry_s = _FIRST_RETRY_S
+        self._back_off = BackOff()
         self._last_boot = float("-inf")
         self._operational_since = 0.0
         node.command = node_commands.taker(node.name, [self], plant)
@@ -68,6 +67,9 @@ class NodeCore:
         if sign is Sign.BOOT_UP:
             self._on_boot_up(now)
             return
+        if sign is Sign.WRONG_TOGGLE:
+            self._show(now)
+            return
         if sign is Sign.CHANGED:
             self._show(now)
         self._judge_nmt_state(now)
@@ -75,6 +77,7 @@ class NodeCore:
     def _on_boot_up(self, now: float) -> None:
         """The node has started: whatever it was told before is forgotten."""
         self.told_to_stop = False
+        self._memory.start_anew()
         loop = self.error_control.boot_loop
         pause_s = loop.on_boot_up(now)
         self._view.loops(loop, now)
@@ -87,8 +90,8 @@ class NodeCore:
         if pause_s:
             self.say(f"starts again and again; asked again in {pause_s:g} s", now)
         self.set_state(NodeState.LOST if pause_s else NodeState.BOOTING, now)
-        self.boot_at = max(now + pause_s, self._last_boot + _BETWEEN_BOOTS_S)
-        self._retry_s = _FIRST_RETRY_S
+        self.boot_at = max(now + pause_s, self._last_boot + BETWEEN_BOOTS_S)
+        self._back_off.reset()
 
     def _judge_nmt_state(self, now: float) -> None:
         seen = self.error_control.state
@@ -104,7 +107,7 @@ class NodeCore:
             self.error_control.state = seen
             self._show(now)
             if self.boot_at is not None:
-                self.boot_at = now
+                self.boot_at = self._soon(now)
 
     def _heard_again(self, now: float) -> None:
         """Heard again without a boot-up message: the cable was the fault, not the node."""
@@ -115,7 +118,11 @@ class NodeCore:
             self.error_control.expect(now)
             self._enter_operation("ok; heard again", now)
         elif reaction != "stop_node":
-            self.boot_at = max(now, self._last_boot + _BETWEEN_BOOTS_S)
+            self.boot_at = self._soon(now)
+
+    def _soon(self, now: float) -> float:
+        """When a node that is there may be booted, by the time since the boot-up before."""
+        return max(now, self._last_boot + self._back_off.between_boots_s)
 
     @property
     def sdo(self) -> SdoChannels:
@@ -129,6 +136,9 @@ class NodeCore:
         self.wire.on_time(now)
         if self.error_control.on_time(now):
             self._lose(self.error_control.loss, now)
+        if self._back_off.steady_at is not None and now >= self._back_off.steady_at:
+            self._back_off.reset()
+            self._view.stays(now)
         self.booting.on_time(now, self.error_control.state)
         if self.boot_at is not None and now >= self.boot_at and not self.booting.is_running:
             self.boot_at = None
@@ -145,6 +155,7 @@ class NodeCore:
             self.booting.next_deadline(),
             self.parameters.next_deadline(),
             None if self.booting.is_running else self.boot_at,
+            self._back_off.steady_at,
         )
         return min((time for time in times if time is not None), default=None)
 
@@ -178,6 +189,9 @@ class NodeCore:
             case boot.SendStopped():
                 self.set_state(NodeState.BOOTING, now)
                 self.wire.send_stopped()
+            case boot.Wake():
+                self.wire.send_stopped()
+                self.wire.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
             case boot.StartSupervision():
                 self.error_control.expect(now)
             case _:
@@ -196,7 +210,6 @@ class NodeCore:
         if isinstance(result, boot.BootError):
             self._fail_boot(result, now)
             return
-        self._retry_s = _FIRST_RETRY_S
         self.wire.connect(result, now)
         problems = [f"J: {name}" for name, plan in result.drives.items() if plan.problem]
         self._enter_operation("; ".join([", ".join(problems) or "ok", *result.notes]), now)
@@ -204,6 +217,7 @@ class NodeCore:
     def _enter_operation(self, text: str, now: float) -> None:
         self.told_to_stop = False
         self._operational_since = now
+        self._back_off.entered_operation(now)
         # The guard may have run out between the start command and the node's answer.
         self.error_control.expect(now)
         self.error_control.state = NmtState.OPERATIONAL
@@ -221,8 +235,7 @@ class NodeCore:
         self._view.failed(error, now)
         if self.state is NodeState.BOOTING:
             self.set_state(NodeState.LOST if error.absent else NodeState.CONFIG_ERROR, now)
-        self.boot_at = now + self._retry_s
-        self._retry_s = min(self._retry_s * 2, _LAST_RETRY_S)
+        self.boot_at = now + self._back_off.failed(absent=error.absent)
 
     # states
 
@@ -234,6 +247,8 @@ class NodeCore:
             self._show(now)
             return
         self.say(why, now)
+        pause_s = self._back_off.lost(now)
+        self._view.flaps(self._back_off, now)
         self.set_state(NodeState.LOST, now)
         self.leave_operation(now)
         reaction = self.table.on_loss
@@ -243,7 +258,7 @@ class NodeCore:
             self.wire.send_stopped()
             self.wire.send_nmt(NmtCommand.STOP)
         elif reaction != "nothing":
-            self.boot_at = now + self._retry_s
+            self.boot_at = now + pause_s
         policy = self.node.bus.mandatory_missing
         if reaction == "stop_all" or (self.table.mandatory and policy == "stop_all"):
             self._neighbours.stop_others(self, f"{self.node.name} is lost", now)
@@ -259,25 +274,29 @@ class NodeCore:
         self.booting.cancel(now)
 
     def hold(self, why: str, now: float) -> None:
-        """All nodes are stopped: leave operation, and be booted up to the point where it would start."""
+        """All nodes are stopped: leave operation, and be booted up to the point where it would start.
+
+        Whoever is in operation or at its boot-up begins again, and so does a node that cannot be used: it
+        stays no longer in Stopped than it has to. The others are woken when their time comes.
+        """
         self.stop_drives(now)
-        if not self.is_operational:
-            return
-        self.told_to_stop = True
-        self.wire.send_stopped()
-        self.leave_operation(now)
-        self.say(f"stopped: {why}", now)
-        self.set_state(NodeState.BOOTING, now)
-        self.boot_at = now + _BETWEEN_BOOTS_S
+        begins_again = self.is_operational or self.booting.is_running
+        if begins_again:
+            self.wire.send_stopped()
+            self.leave_operation(now)
+            self.say(f"stopped: {why}", now)
+        if self.is_operational:
+            self.set_state(NodeState.BOOTING, now)
+        if begins_again or self.state is NodeState.CONFIG_ERROR:
+            self.boot_at = now + BETWEEN_BOOTS_S
 
     def bus_is_gone(self, now: float) -> None:
         """The bus is down: everything on it is lost at once."""
         self.error_control.state = NmtState.UNKNOWN
         self.stop_drives(now)
         self.wire.clear()
-        was_stopped = self.state is NodeState.STOPPED or (
-            self.told_to_stop and self.table.on_loss == "stop_node"
-        )
+        gave_up = self.boot_at is None and self.state is NodeState.LOST and self.table.on_loss == "stop_node"
+        was_stopped = self.state is NodeState.STOPPED or gave_up
         if self.state is NodeState.DISABLED or was_stopped:
             # Who was stopped on purpose is not started by a bus that comes back.
             return
@@ -286,13 +305,13 @@ class NodeCore:
             self.set_state(NodeState.LOST, now)
         self.leave_operation(now)
         self.has_concluded = False
-        self.boot_at = now + self._retry_s
+        self.boot_at = now + self._back_off.pause_s
 
     def set_state(self, state: NodeState, now: float) -> None:
         if state is self.state:
             return
         self.state = state
-        self.plant.on_node(self.node, state, now)
+        self.plant.on_node(self.node, state, now, tell=not self._back_off.is_flapping)
         self._show(now)
 
     @property
@@ -308,11 +327,13 @@ class NodeCore:
         self._view.say(text, now)
 
     def _show(self, now: float) -> None:
-        self._view.show(self.error_control.state, self.state, now)
+        self._view.show(self.error_control.state, self.state, self.error_control.toggle_errors, now)
 
     def carry_out_command(self, action: Action, who: str, now: float, *, send: bool = True) -> None:
         """A command that may be given; ``send`` is false where one frame has told all nodes."""
         self.error_control.boot_loop = BootLoop()
-        self._retry_s = _FIRST_RETRY_S
+        self._back_off.reset()
+        if action in (Action.RESET, Action.RESET_COMMUNICATION):
+            self._memory.start_anew()
         node_commands.carry_out(self, action, who, now, send=send)
         self._touch()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bridge.command import Event, Kind, Plant
 from bridge.command.link import NodeState
 from bridge.command.plant import Node
+from bridge.southbound.backoff import BackOff
 from bridge.southbound.boot import BootError
 from bridge.southbound.canopen.bootloop import BootLoop
 from bridge.southbound.canopen.nmt import NmtState
@@ -21,10 +22,12 @@ class NodeView:
         """Step or result of the boot-up."""
         self._plant.set(f"{self._top}/boot_status", text, now)
 
-    def show(self, nmt_state: NmtState, state: NodeState, now: float) -> None:
+    def show(self, nmt_state: NmtState, state: NodeState, toggle_errors: int, now: float) -> None:
         self._plant.set(f"{self._top}/nmt_state", int(nmt_state), now)
-        supervision = self._node.table.supervision
-        self._plant.set(f"{self._top}/supervision_state", f"{supervision}: {state.value}", now)
+        text = f"{self._node.table.supervision}: {state.value}"
+        if toggle_errors:
+            text += f", {toggle_errors} wrong toggle bit{'s' if toggle_errors > 1 else ''}"
+        self._plant.set(f"{self._top}/supervision_state", text, now)
 
     def succeeded(self, text: str, now: float) -> None:
         self._failure = ""
@@ -45,6 +48,15 @@ class NodeView:
         told = loop.report(now)
         if told:
             self._tell(Kind.CONFIGURATION, 600, told, now)
+
+    def flaps(self, back_off: BackOff, now: float) -> None:
+        """Once a minute, where the node is lost soon after each boot-up."""
+        told = back_off.report(now)
+        if told:
+            self._tell(Kind.NODE_LOST, 800, told, now)
+
+    def stays(self, now: float) -> None:
+        self._tell(Kind.NODE_BACK, 200, "node operational, and no longer lost again and again", now)
 
     def _tell(self, kind: Kind, severity: int, message: str, now: float) -> None:
         self._plant.report(Event(now, kind, self._node.name, severity, message))

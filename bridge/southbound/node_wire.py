@@ -50,19 +50,23 @@ class NodeWire:
         self.faults = FaultReading(node, self.sdo)
         self._emergencies = Emergencies(node, plant, self.reject, self.faults.on_emcy)
         self.error_control = ErrorControl(node.table, listener.on_duplicate)
-        self.polling = Polling(node.family.poll, self.sdo.first, self._show_poll)
+        self.polling = Polling(node.family.poll, self.sdo.for_polls, self._show_poll)
         self.drives: dict[str, DrivePdos] = {}
+        self._emcy_id: int | None = cobid.EMCY + node.table.id
         self.routes: dict[int, Handler] = self._basic_routes()
         self.routes_changed = True
         self._frames: list[Frame] = []
 
     def _basic_routes(self) -> dict[int, Handler]:
-        node_id = self._node.table.id
-        return {
+        routes: dict[int, Handler] = {
             **{channel.reply_id: partial(self._on_sdo, channel) for channel in self.sdo},
-            cobid.ERROR_CONTROL + node_id: self._on_error_control,
-            cobid.EMCY + node_id: self._on_emcy,
+            # What we send does not come back.
+            **{channel.request_id: self.error_control.on_foreign_request for channel in self.sdo},
+            cobid.ERROR_CONTROL + self._node.table.id: self._on_error_control,
         }
+        if self._emcy_id is not None:
+            routes[self._emcy_id] = self._on_emcy
+        return routes
 
     def take_frames(self) -> list[Frame]:
         frames = self._frames + self.sdo.take_frames() + self.error_control.take_frames()
@@ -81,9 +85,10 @@ class NodeWire:
         self._frames += stopped_frames(self._node, self.drives)
 
     def _on_sdo(self, channel: SdoChannel, frame: Frame) -> None:
-        before = channel.unmatched
+        unmatched, late = channel.unmatched, channel.late
         channel.on_frame(frame)
-        self.error_control.on_reply(frame, matched=channel.unmatched == before)
+        if channel.late == late:
+            self.error_control.on_reply(frame, matched=channel.unmatched == unmatched)
         self._listener.touch()
 
     def _on_emcy(self, frame: Frame) -> None:
@@ -132,9 +137,8 @@ class NodeWire:
 
     def connect(self, result: boot.BootResult, now: float) -> None:
         """Take over what the boot-up found."""
-        heartbeat = self._node.table.supervision == "heartbeat"
-        period_ms = boot.heartbeat_period_ms(self._node.table.supervision_ms)
-        self.error_control.produces_every(period_ms / 1000 if heartbeat else None)
+        self.error_control.produces_every(result.heartbeat_ms / 1000 or None)
+        self._emcy_id = self._usable_emcy_id(result)
         self._plant.set(f"{self._node.name}/node/software_version", result.software_version, now)
         self.drives = connect(self._node, result, self.reject, self.is_taken, now)
         self.routes = self._basic_routes()
@@ -143,6 +147,15 @@ class NodeWire:
         sync_ms = self._node.bus.sync_period_ms
         self.routes |= node_tpdos(result.node_tpdos, sync_ms, self.polling.on_pdo, self.reject)
         self.routes_changed = True
+
+    def _usable_emcy_id(self, result: boot.BootResult) -> int | None:
+        """Where emergency messages come, unless that is somebody else's."""
+        default = cobid.EMCY + self._node.table.id
+        wanted = result.emcy_id
+        if wanted in (None, default) or not self.is_taken(wanted):
+            return wanted
+        result.notes.append(f"another node has {wanted:03X}h, too: emergency messages are not taken there")
+        return default
 
     def refresh(self, now: float) -> None:
         self._plant.set(f"{self._node.name}/node/rejected_frames", self.rejected + self.sdo.unmatched, now)

@@ -118,8 +118,16 @@ class Scanner:
     """
 
     def __init__(
-        self, now: float, bitrate: int, *, passive: bool, timeout_s: float = 0.3, listen_s: float = 0.5
+        self,
+        now: float,
+        bitrate: int,
+        *,
+        passive: bool,
+        timeout_s: float = 0.3,
+        listen_s: float = 0.5,
+        own_id: int | None = None,
     ) -> None:
+        """``own_id`` is the bridge's own: a heartbeat with it is no node, an SDO answer is."""
         self._nodes = {node_id: FoundNode(node_id) for node_id in _IDS}
         self._channels: dict[int, SdoChannel] = {}
         self._interviews: dict[int, Interview] = {}
@@ -127,6 +135,7 @@ class Scanner:
         self._guarding: dict[int, float] = {}
         self._frames: list[Frame] = []
         self._timeout_s = timeout_s
+        self._own_id = own_id
         self._until = now + listen_s
         step_s = max(_LEAST_STEP_S, _BITS_PER_ID / bitrate)
         self._starts = [] if passive else [(now + n * step_s, node_id) for n, node_id in enumerate(_IDS)]
@@ -227,7 +236,7 @@ class Scanner:
         }
 
     def _is_there(self, node: FoundNode) -> bool:
-        if node.is_heard:
+        if node.is_heard and node.id != self._own_id:
             return True
         # 1000h and one object more: a single stray answer is nobody.
         return node.answers > 1 and self._owner(node) is None

@@ -56,6 +56,8 @@ class SdoChannels:
             server.number: channel(server.request, server.reply) for server in opened_servers(node)
         }
         self._all = tuple(self._channels.values())
+        same = (server.number for server in opened_servers(node) if server.slot is None)
+        self._for_polls = self._channels[next(same, FIRST)]
         self._slots = {drive.name: channel_of(node, drive.slot) for drive in node.drives}
 
     def __getitem__(self, number: int) -> SdoChannel:
@@ -68,6 +70,12 @@ class SdoChannels:
     @property
     def first(self) -> SdoChannel:
         return self._all[0]
+
+    @property
+    def for_polls(self) -> SdoChannel:
+        """One that keeps polls out of the way of boot-up and commands, where there is one that reaches the
+        same objects as the first."""
+        return self._for_polls
 
     @property
     def unmatched(self) -> int:

@@ -32,7 +32,7 @@ class StartGate:
             node for node in (*required, *self._awaited) if not (node.is_ready or node.is_out_of_service)
         ]
         self.missing = sorted({node.table.name for node in absent})
-        coming = [node for node in self._nodes if node.is_on_its_way and not node.is_operational]
+        coming = [node for node in self._nodes if not node.is_operational and node.is_on_its_way]
         self._order = min((node.table.start_order for node in coming), default=0)
 
     def may_start(self, node: Neighbour) -> bool:

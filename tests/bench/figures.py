@@ -2,13 +2,31 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
+import os
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 
 def show(what: str, figure: str) -> None:
     print(f"  {what:<62} {figure}", flush=True)
+
+
+@contextlib.contextmanager
+def as_the_service() -> Iterator[str]:
+    """Run with the scheduling of ``systemd/drivebridge.service``; gives what it is, in words."""
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(10))
+    except PermissionError:
+        yield "without the service's real-time priority (not allowed here)"
+        return
+    try:
+        yield "with the service's real-time priority"
+    finally:
+        os.sched_setscheduler(0, *before)
 
 
 def milliseconds(seconds: Sequence[float]) -> str:
@@ -24,3 +42,19 @@ def cpu_us(work: Callable[[], object], count: int, rounds: int = 5) -> float:
         work()
         best = min(best, time.process_time() - begin)
     return best * 1e6 / count
+
+
+def lateness(times: Sequence[float], period_s: float) -> str:
+    """How late each of some periodic moments was, against the earliest phase, and how many are missing."""
+    phases = sorted((at - times[0]) % period_s for at in times)
+    # The phase before the widest empty part of the period is the latest; the one after it is "in time".
+    gaps = [(after - before, after) for before, after in itertools.pairwise(phases)]
+    gaps.append((phases[0] + period_s - phases[-1], phases[0]))
+    first = max(gaps)[1]
+    late_us = sorted((phase - first) % period_s * 1e6 for phase in phases)
+    missing = round((times[-1] - times[0]) / period_s) + 1 - len(times)
+    longest = max(after - before for before, after in itertools.pairwise(times))
+    return (
+        f"median {statistics.median(late_us):.0f} µs   99 % {late_us[len(late_us) * 99 // 100]:.0f} µs   "
+        f"longest pause {longest * 1e3:.2f} ms   {missing} of {len(times) + missing} left out"
+    )

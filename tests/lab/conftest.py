@@ -2,11 +2,15 @@
 
 ``make lab`` runs these tests through ``vcan-run``, which provides the buses. A lab test that skips
 itself would look like a proof that was never made, so here a skip is a failure.
+
+``--share FOLDER`` is for several runs at once, each on buses of its own: a run takes the next module that
+no other has taken, and its fixtures with it, until none is left.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +23,10 @@ def vcan_is_missing() -> bool:
     return not Path("/sys/class/net/vcan0").exists()
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--share", type=Path, metavar="FOLDER", help="run what no other run takes from FOLDER")
+
+
 def pytest_sessionstart() -> None:
     """End a run of the lab alone with one sentence. (A run that came here from elsewhere is past this.)"""
     if vcan_is_missing():
@@ -29,6 +37,23 @@ def pytest_sessionstart() -> None:
 def _vcan() -> None:
     if vcan_is_missing():
         pytest.fail(NEEDS_VCAN, pytrace=False)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
+    """Leave out, without a report, what another run has taken."""
+    folder = item.config.getoption("--share", None)
+    return None if folder is None or take(folder / item.path.stem) else True
+
+
+@cache
+def take(claim: Path) -> bool:
+    """Whether ``claim`` is ours. Making a folder is atomic, also across user-mode kernels."""
+    try:
+        claim.mkdir()
+    except FileExistsError:
+        return False
+    return True
 
 
 @pytest.hookimpl(wrapper=True)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -131,13 +131,19 @@ def test_nmt_tells_the_state_that_the_node_reports(simulation: LabSite) -> None:
 
 def test_monitor_says_what_is_on_the_bus(simulation: LabSite, tmp_path: Path) -> None:
     log = tmp_path / "candump.log"
-    with drivebridge(
-        tmp_path, "monitor", "monitor", str(simulation.path), "--json", "--seconds", "20", "--log", str(log)
-    ) as monitor:
-        time.sleep(3.0)
+    arguments = ("monitor", str(simulation.path), "--json", "--log", str(log))
+    with sniffing() as bus, drivebridge(tmp_path, "monitor", *arguments) as monitor:
+
+        def it_listens() -> bool:
+            bus.send(0x77F, b"\x05")
+            return bool(monitor.output())
+
+        until(it_listens, 60.0, "a heartbeat is shown")
         call("sdo", "read", "5", "1018:09", *DIRECT)
         call("nmt", "start", "5", *DIRECT, "--seconds", "0.3")
-        until(lambda: monitor.popen.poll() is not None, 40.0, "the monitor ends by itself")
+        monitor.wait_output("TPDO1 conveyor/fu1")
+        monitor.signal(signal.SIGINT)
+        until(lambda: monitor.popen.poll() is not None, 40.0, "Ctrl-C ends it")
         assert monitor.popen.returncode == 0
         seen = [json.loads(line) for line in monitor.output().splitlines()]
     kinds = {frame["kind"] for frame in seen}

@@ -1,14 +1,16 @@
 """A CANopen slave that we did not write: canopen.LocalNode, dressed as a SK TU4-CAO with one drive.
 
-foreign_slave.py CHANNEL NODE_ID
+foreign_slave.py CHANNEL NODE_ID [asked]
 
 Its object dictionary has what the master asks for. Each RPDO is answered by a TPDO whose status word is
-that of a simple drive and whose first actual value is the setpoint.
+that of a simple drive and whose first actual value is the setpoint. With ``asked`` the TPDO has type 253 and
+comes on a remote frame only.
 """
 
 import sys
 import time
 
+import can
 import canopen
 from canopen.objectdictionary import (
     UNSIGNED8,
@@ -20,6 +22,7 @@ from canopen.objectdictionary import (
     ODVariable,
 )
 
+ON_REMOTE_FRAME = 253
 READY, RUNNING, INHIBITED = 0x0B31, 0x0B37, 0x0B40
 
 
@@ -79,10 +82,24 @@ def status_for(control: int) -> int:
     return RUNNING if control & 0x0F == 0x0F else READY if control & 0x07 == 0x06 else INHIBITED
 
 
-def main(channel: str, node_id: int) -> None:
+class Asked(can.Listener):
+    """Answers remote frames, which canopen passes over."""
+
+    def __init__(self, node: canopen.LocalNode) -> None:
+        self._node = node
+
+    def on_message_received(self, msg: can.Message) -> None:
+        if msg.is_remote_frame and msg.arbitration_id == 0x180 + self._node.id:
+            self._node.tpdo[1].transmit()
+
+
+def main(channel: str, node_id: int, *, asked: bool) -> None:
     network = canopen.Network()
-    network.connect(interface="socketcan", channel=channel)
     node = network.create_node(node_id, dictionary(node_id))
+    if asked:
+        node.object_dictionary[0x1800][2].default = ON_REMOTE_FRAME
+        network.listeners.append(Asked(node))
+    network.connect(interface="socketcan", channel=channel)
     node.rpdo.read()
     node.tpdo.read()
 
@@ -90,7 +107,7 @@ def main(channel: str, node_id: int) -> None:
         control, setpoint = rpdo[0].raw, rpdo[1].raw
         node.tpdo[1][0].raw = status_for(control)
         node.tpdo[1][1].raw = setpoint if status_for(control) == RUNNING else 0
-        if node.nmt.state == "OPERATIONAL":
+        if node.nmt.state == "OPERATIONAL" and not asked:
             node.tpdo[1].transmit()
 
     node.rpdo[1].subscribe()
@@ -102,4 +119,4 @@ def main(channel: str, node_id: int) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]))
+    main(sys.argv[1], int(sys.argv[2]), asked="asked" in sys.argv[3:])

@@ -18,42 +18,19 @@ from bridge.southbound.bus.interface import BusStatus, ControllerState
 from bridge.southbound.bus.softbeat import SoftBeat
 from bridge.southbound.master import Master
 from bridge.southbound.network import Network
-
-SITE = """
-[site]
-name = "bench"
-[[bus]]
-name = "can0"
-interface = "virtual"
-{bus}
-[[bus.node]]
-name = "conveyor"
-id = 5
-mapping = "nord/sk-tu4-cao"
-{node}
-[[bus.node.drive]]
-slot = "fu1"
-control = "modbus"
-fieldbus_timeout_ms = 200
-parameters = {{ P105 = 50.0, P112 = 10.0 }}
-{drive}
-[[bus.node.drive]]
-slot = "fu2"
-control = "zenoh"
-fieldbus_timeout_ms = 200
-parameters = {{ P105 = 50.0, P112 = 10.0 }}
-[modbus]
-[zenoh]
-"""
+from tests.support import sites
 
 NORD = load_family("nord/sk-tu4-cao")
 PLC = Identity(Source.MODBUS, "192.168.1.10")
 
 
 def write_site(folder: Path, *, bus: str = "", node: str = "", drive: str = "") -> Site:
-    path = folder / "site.toml"
-    path.write_text(SITE.format(bus=bus, node=node, drive=drive), encoding="utf-8")
-    return load_site(path)
+    drives = (
+        sites.drive("fu1", "modbus", 200, f"{sites.SCALED}\n{drive}"),
+        sites.drive("fu2", "zenoh", 200),
+    )
+    whole = sites.bus(sites.node(*drives, more=node), more=bus)
+    return load_site(sites.write(folder, whole, sites.modbus(), sites.zenoh(), name="bench"))
 
 
 BEGIN_S = 1000.0
@@ -138,7 +115,7 @@ class Bench:
         self.deaf_to: frozenset[int] = frozenset()
         self.plant = Plant(site, {mapping: family}, "0")
         self.plant.on_event(self.events.append)
-        self.bus = ClockBus(self._from_master)
+        self.bus = self.make_bus()
         self.network = Network(site.bus[0], self.plant, epoch_ns)
         self.master = Master([(self.bus, self.network)], self.plant, lambda: self.now)
         self._wake_at = self.now
@@ -147,6 +124,9 @@ class Bench:
         self.powered = False
         if present:
             self.power_on()
+
+    def make_bus(self) -> ClockBus:
+        return ClockBus(self._from_master)
 
     def power_on(self) -> None:
         self.powered = True

@@ -16,42 +16,13 @@ from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.virtual import VirtualBus, VirtualWire
+from tests.support import sites
 from tests.support.process import free_port
 
 SYNC, RPDO1, TPDO2 = 0x080, 0x205, 0x285
 TIMEOUT_S = 0.2
 SYNC_PERIOD_S = 0.01
 _PLC = Identity(Source.MODBUS, "127.0.0.1")
-
-_SITE = """
-[site]
-name = "load"
-state_dir = "{folder}/state"
-runtime_dir = "{folder}/run"
-[[bus]]
-name = "can0"
-interface = "virtual"
-deadman_ms = 500
-[[bus.node]]
-name = "conveyor"
-id = 5
-mapping = "nord/sk-tu4-cao"
-supervision_ms = 1000
-{drives}
-[modbus]
-listen = "127.0.0.1:{modbus}"
-[opcua]
-listen = "127.0.0.1:{opcua}"
-no_security = true
-anonymous = "operator"
-"""
-_DRIVE = """
-[[bus.node.drive]]
-slot = "fu{n}"
-control = "modbus"
-fieldbus_timeout_ms = 200
-parameters = {{ P105 = 50.0, P112 = 10.0 }}
-"""
 
 
 @dataclass(slots=True)
@@ -117,9 +88,9 @@ class Load:
 async def loaded(folder: Path) -> AsyncIterator[Load]:
     """Start the bus process in this one, with a front of its own, and wait until the node is booted."""
     opcua = free_port()
-    path = folder / "site.toml"
-    drives = "".join(_DRIVE.format(n=n) for n in (1, 2, 3, 4))
-    path.write_text(_SITE.format(folder=folder, drives=drives, modbus=free_port(), opcua=opcua), "utf-8")
+    drives = [sites.drive(f"fu{n}", "modbus", 200) for n in (1, 2, 3, 4)]
+    bus = sites.bus(sites.node(*drives, more="supervision_ms = 1000"), more="deadman_ms = 500")
+    path = sites.write(folder, bus, sites.modbus(free_port()), sites.opcua(opcua))
     wire = VirtualWire()
     service = Service(load_project(path), lambda table: wire.end(table.name))
     load = Load(service, wire.end("firehose"), f"opc.tcp://127.0.0.1:{opcua}")

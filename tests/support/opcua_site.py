@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import time
-import tomllib
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
@@ -14,49 +13,23 @@ from asyncua import Client, ua
 from bridge.command import Event, Identification, Outcome, Plant, Request, Role
 from bridge.command.link import NodeState
 from bridge.command.request import DONE, Code, Reply
-from bridge.config import OpcUaTable, Site
+from bridge.config import OpcUaTable
 from bridge.image import Image
-from bridge.mapping import load_family
 from bridge.northbound.opcua.server import OpcUaServer
+from tests.support import sites
 
-FAMILY = "nord/sk-tu4-cao"
-SITE = """
-site.name = "hall"
-
-[[bus]]
-name = "can0"
-interface = "virtual"
-
-[[bus.node]]
-name = "conveyor"
-id = 5
-mapping = "nord/sk-tu4-cao"
-
-[[bus.node.drive]]
-slot = "fu1"
-control = "opcua"
-fieldbus_timeout_ms = 0
-parameters = { P105 = 50.0, P112 = 10.0 }
-
-[[bus.node.drive]]
-slot = "fu2"
-control = "modbus"
-fieldbus_timeout_ms = 200
-parameters = { P105 = 50.0 }
-
-[[bus.node.drive]]
-slot = "fu3"
-control = "lease"
-fieldbus_timeout_ms = 300
-parameters = { P105 = 50.0, P112 = 10.0 }
-
-[[bus.node.drive]]
-slot = "fu4"
-control = "none"
-
-[modbus]
-[opcua]
-"""
+SITE = sites.site(
+    sites.bus(
+        sites.node(
+            sites.drive("fu1", "opcua", 0),
+            sites.drive("fu2", "modbus", 200, "parameters = { P105 = 50.0 }"),
+            sites.drive("fu3", "lease", 300),
+            '[[bus.node.drive]]\nslot = "fu4"\ncontrol = "none"\n',
+        )
+    ),
+    sites.modbus(),
+    "[opcua]\n",
+)
 
 OPEN = OpcUaTable(listen="127.0.0.1:0", no_security=True, anonymous="operator")
 SWITCH_ON_INHIBITED, READY, ENABLED = 0x0240, 0x0231, 0x0237
@@ -64,8 +37,7 @@ SWITCH_ON_INHIBITED, READY, ENABLED = 0x0240, 0x0231, 0x0237
 
 def make_plant() -> Plant:
     """Every node operational, every drive ready to be switched on."""
-    site = Site.model_validate(tomllib.loads(SITE))
-    plant = Plant(site, {FAMILY: load_family(FAMILY)}, "1.2.3")
+    plant = sites.plant_of(SITE)
     now = time.monotonic()
     for node in plant.nodes.values():
         plant.on_node(node, NodeState.OPERATIONAL, now)
@@ -89,6 +61,7 @@ class LocalView:
         self._offset_ns = time.time_ns() - time.monotonic_ns()
         for node in plant.nodes.values():
             node.command = self._node_command
+        plant.bus_commands["bus/can0"] = self._node_command
 
     @property
     def image(self) -> Image:

@@ -27,7 +27,9 @@ def free_port() -> int:
 class Process:
     """A running command; its output is in ``log``."""
 
-    def __init__(self, command: Sequence[str], log: Path, notify: socket.socket | None) -> None:
+    def __init__(
+        self, command: Sequence[str], log: Path, notify: socket.socket | None, files: Sequence[int] = ()
+    ) -> None:
         self.log = log
         self._notify = notify
         environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
@@ -37,7 +39,12 @@ class Process:
         with log.open("wb") as output:
             # A folder that is not the repository: nothing may be found by accident.
             self.popen = subprocess.Popen(
-                command, stdout=output, stderr=subprocess.STDOUT, env=environment, cwd=log.parent
+                command,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                env=environment,
+                cwd=log.parent,
+                pass_fds=files,
             )
 
     @property
@@ -82,15 +89,19 @@ class Process:
 
 
 @contextmanager
-def running(folder: Path, name: str, *command: str, notify: bool = False) -> Iterator[Process]:
-    """Run ``command`` with its output in ``folder``; with ``notify``, ``wait_ready`` can be used."""
+def running(
+    folder: Path, name: str, *command: str, notify: bool = False, files: Sequence[int] = ()
+) -> Iterator[Process]:
+    """Run ``command`` with its output in ``folder``; with ``notify``, ``wait_ready`` can be used. It gets
+    the open ``files`` under the same numbers."""
     with contextlib.ExitStack() as stack:
         listener = None
         if notify:
             listener = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
             listener.bind(f"\0drivebridge-test-{os.getpid()}-{name}-{time.monotonic_ns()}")
             # getsockname gives the abstract name as bytes; systemd writes it with an @.
-        process = Process(list(command), folder / f"{name}.log", _Named(listener) if listener else None)
+        named = _Named(listener) if listener else None
+        process = Process(list(command), folder / f"{name}.log", named, files)
         stack.callback(process.stop)
         yield process
 
@@ -114,10 +125,12 @@ def drivebridge(
     return running(folder, name, sys.executable, "-m", "bridge", *arguments, notify=notify)
 
 
-def peer(folder: Path, name: str, *arguments: str) -> AbstractContextManager[Process]:
+def peer(
+    folder: Path, name: str, *arguments: str, files: Sequence[int] = ()
+) -> AbstractContextManager[Process]:
     """A script of ``tests/peers``: a client of the bridge in a process of its own."""
     script = REPOSITORY / "tests" / "peers" / f"{name}.py"
-    return running(folder, name, sys.executable, str(script), *arguments)
+    return running(folder, name, sys.executable, str(script), *arguments, files=files)
 
 
 def until(condition: object, limit_s: float, what: str, pause_s: float = 0.02) -> None:

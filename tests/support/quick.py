@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -24,7 +25,8 @@ ENGINEER = Identity(Source.LOCAL, "test", Role.ENGINEER)
 
 
 class QuickNode:
-    """``present`` is its plug. What it does not have it aborts: the master then takes the mapping's word."""
+    """``present`` is its plug, ``delay_s`` how long it takes for an SDO answer. What it does not have it
+    aborts: the master then takes the mapping's word."""
 
     def __init__(self, node_id: int) -> None:
         self.node_id = node_id
@@ -37,6 +39,9 @@ class QuickNode:
         self.toggle = 0
         self.outbox: list[Frame] = []
         self.heartbeat_at = float("inf")
+        self.delay_s = 0.0
+        self.now = 0.0
+        self._late: deque[tuple[float, Frame]] = deque()
 
     def start(self, now: float) -> None:
         """Power on."""
@@ -50,12 +55,23 @@ class QuickNode:
     def period_s(self) -> float:
         return int.from_bytes(self.objects[0x1017, 0], "little") / 1000
 
+    @property
+    def next_at(self) -> float:
+        """When it has something to send."""
+        return min(self.heartbeat_at, self._late[0][0] if self._late else float("inf"))
+
     def on_time(self, now: float) -> None:
+        self.now = now
+        while self._late and self._late[0][0] <= now:
+            answer = self._late.popleft()[1]
+            if self.state != STOPPED:
+                self.outbox.append(answer)
         if now >= self.heartbeat_at:
             self.heartbeat_at = now + self.period_s
             self.outbox.append(Frame(0x700 + self.node_id, bytes((self.state,))))
 
     def on_frame(self, frame: Frame, now: float) -> None:
+        self.now = now
         if frame.can_id == 0 and len(frame.data) == 2 and frame.data[1] in (0, self.node_id):
             self.state = _AFTER.get(frame.data[0], self.state)
             if self.state == 0:
@@ -72,7 +88,7 @@ class QuickNode:
         if command == 0x40:
             value = self.objects.get((index, sub))
             if value is None:
-                self._answer(b"\x80" + head + struct.pack("<I", _MISSING))
+                self._abort(index, sub, _MISSING)
             else:
                 self._answer(bytes((0x43 | (4 - len(value)) << 2,)) + head + value.ljust(4, b"\0"))
         elif index in self.refuses:
@@ -86,8 +102,15 @@ class QuickNode:
                 self.heartbeat_at = now + self.period_s if any(value) else float("inf")
             self._answer(b"\x60" + head + bytes(4))
 
+    def _abort(self, index: int, sub: int, code: int) -> None:
+        self._answer(struct.pack("<BHBI", 0x80, index, sub, code))
+
     def _answer(self, data: bytes) -> None:
-        self.outbox.append(Frame(0x580 + self.node_id, data))
+        answer = Frame(0x580 + self.node_id, data)
+        if self.delay_s:
+            self._late.append((self.now + self.delay_s, answer))
+        else:
+            self.outbox.append(answer)
 
 
 def quick_site(
@@ -127,7 +150,7 @@ class Quick:
         end = self.now + seconds
         while True:
             times = [end, self.refresh_at, self.network.next_deadline() or end]
-            times += [node.heartbeat_at for node in self.nodes.values() if node.present]
+            times += [node.next_at for node in self.nodes.values() if node.present]
             self.now = min(end, max(self.now, min(times)))
             self.round()
             if self.now >= end:

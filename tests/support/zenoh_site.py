@@ -3,50 +3,22 @@
 from __future__ import annotations
 
 import time
-import tomllib
-from functools import cache
 
 from bridge.command import Drive, Plant
 from bridge.command.link import NodeState
-from bridge.config import Site
-from bridge.mapping import load_family
-
-FAMILY = "nord/sk-tu4-cao"
-SITE = """
-site.name = "demo"
-[[bus]]
-name = "can0"
-interface = "virtual"
-[[bus.node]]
-name = "conveyor"
-id = 5
-mapping = "nord/sk-tu4-cao"
-[[bus.node.drive]]
-slot = "fu1"
-control = "modbus"
-fieldbus_timeout_ms = 1000
-parameters = { P105 = 50.0, P112 = 10.0 }
-[[bus.node.drive]]
-slot = "fu3"
-control = "zenoh"
-fieldbus_timeout_ms = 1000
-parameters = { P105 = 50.0, P112 = 10.0 }
-[[bus.node.drive]]
-slot = "fu4"
-control = "lease"
-fieldbus_timeout_ms = 0
-[modbus]
-[zenoh]
-"""
+from tests.support import sites
 
 SWITCH_ON_INHIBITED, READY, ENABLED = 0x0240, 0x0231, 0x0237
 
-_family = cache(load_family)
-
 
 def make_plant(node: str = "conveyor") -> Plant:
-    site = Site.model_validate(tomllib.loads(SITE.replace('"conveyor"', f'"{node}"')))
-    return Plant(site, {FAMILY: _family(FAMILY)}, "1.2.3")
+    drives = (
+        sites.drive("fu1", "modbus", 1000),
+        sites.drive("fu3", "zenoh", 1000),
+        sites.drive("fu4", "lease", 0, ""),
+    )
+    bus = sites.bus(sites.node(*drives, name=node))
+    return sites.plant_of(sites.site(bus, sites.modbus(), sites.zenoh(), name="demo"))
 
 
 def epoch(monotonic: float) -> int:

@@ -159,6 +159,40 @@ def test_a_silent_node_is_waited_for_and_then_not() -> None:
     assert errand.states == {}
 
 
+def test_a_nodes_own_time_and_retries_are_taken_from_the_site(site: Path) -> None:
+    text = site.read_text("utf-8").replace("id = 5", "id = 5\nsdo_timeout_ms = 700\nsdo_retries = 3")
+    site.write_text(text, "utf-8")
+    line = choose_line(site, "north", None, None, None)
+    assert line.sdo_policy(5) == (0.7, 3)
+    assert line.sdo_policy(6) == (0.5, 0), "a node that the site does not have"
+
+
+def test_a_further_sdo_channel_has_the_cob_ids_of_the_mapping(site: Path) -> None:
+    """BU 2500 §6.4: SDO3 is 440h and 3C0h + node id."""
+    line = choose_line(site, "north", None, None, None)
+    assert line.sdo_server(5, 1) is None
+    server = line.sdo_server(5, 3)
+    assert server is not None
+    errand = SdoErrand(5, 0x2069, 1, None, 10.0, 0.5, server=server)
+    assert [frame.can_id for frame in errand.take_frames()] == [0x445]
+    errand.on_frame(Frame(0x3C5, bytes.fromhex("4B692001F4010000"), 10.1))
+    assert errand.result == b"\xf4\x01"
+    with pytest.raises(typer.BadParameter, match="no SDO channel 9: 1, 2, 3, 4"):
+        line.sdo_server(5, 9)
+    with pytest.raises(typer.BadParameter, match="give SITE"):
+        choose_line(None, None, "socketcan", "can0", None).sdo_server(5, 2)
+
+
+def test_an_sdo_errand_asks_again_as_often_as_it_was_told() -> None:
+    errand = SdoErrand(5, 0x1000, 0, None, 10.0, 0.5, retries=2)
+    asked, now = 0, 10.0
+    while not errand.is_finished(now):
+        asked += sum(frame.data[0] == 0x40 for frame in errand.take_frames())
+        now = errand.next_deadline() or now
+        errand.on_time(now)
+    assert (asked, now) == (3, 11.5)
+
+
 def test_an_sdo_errand_ends_with_its_answer() -> None:
     errand = SdoErrand(5, 0x1000, 0, None, 10.0, 0.5)
     errand.on_time(10.0)

@@ -11,29 +11,8 @@ from pathlib import Path
 import pytest
 
 from bridge import __version__
+from tests.support import sites
 from tests.support.process import drivebridge, free_port
-
-SITE = """
-[site]
-name = "cli"
-state_dir = "{folder}/state"
-runtime_dir = "{folder}/run"
-[[bus]]
-name = "can0"
-interface = "{interface}"
-channel = "nosuchcan"
-[[bus.node]]
-name = "conveyor"
-id = 5
-mapping = "nord/sk-tu4-cao"
-[[bus.node.drive]]
-slot = "fu1"
-control = "modbus"
-fieldbus_timeout_ms = 0
-parameters = {{ P105 = 50.0, P112 = 10.0 }}
-[modbus]
-listen = "127.0.0.1:{port}"
-"""
 
 
 def call(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -42,9 +21,15 @@ def call(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def write_site(folder: Path, interface: str = "virtual", port: int | None = None) -> Path:
-    path = folder / "site.toml"
-    path.write_text(SITE.format(folder=folder, interface=interface, port=port or free_port()), "utf-8")
-    return path
+    node = sites.node(sites.drive("fu1", "modbus", 0))
+    bus = sites.bus(node, interface=interface, more='channel = "nosuchcan"')
+    return sites.write(folder, bus, sites.modbus(port or free_port()))
+
+
+def line_of(path: Path, start: str) -> int:
+    """The number of the one line that begins like this."""
+    [number] = [n for n, line in enumerate(path.read_text("utf-8").splitlines(), 1) if line.startswith(start)]
+    return number
 
 
 def test_version() -> None:
@@ -72,8 +57,31 @@ def test_a_bad_site_is_refused_with_all_its_faults(tmp_path: Path, command: str)
     done = call(command, str(path))
     assert done.returncode == 2
     faults = done.stderr.splitlines()
-    assert any(":12: bus[0].node[0].id" in fault for fault in faults), faults
-    assert any(":16: bus[0].node[0].drive[0].control" in fault for fault in faults), faults
+    assert any(f":{line_of(path, 'id =')}: bus[0].node[0].id" in fault for fault in faults), faults
+    control = line_of(path, "control =")
+    assert any(f":{control}: bus[0].node[0].drive[0].control" in fault for fault in faults), faults
+
+
+@pytest.mark.parametrize(
+    ("timeout_ms", "level", "words"),
+    [
+        (0, "WARNING", "is 0: a silent controller"),
+        (15, "ERROR", "15 ms is less than two RPDO periods"),
+    ],
+)
+def test_what_check_doubts_is_in_the_log_of_run_which_runs_all_the_same(
+    tmp_path: Path, timeout_ms: int, level: str, words: str
+) -> None:
+    path = write_site(tmp_path)
+    text = path.read_text("utf-8").replace("fieldbus_timeout_ms = 0", f"fieldbus_timeout_ms = {timeout_ms}")
+    path.write_text(text, "utf-8")
+    with drivebridge(tmp_path, "run", "run", str(path), "--role", "bus", notify=True) as bridge:
+        bridge.wait_ready()
+        log = bridge.output()
+    line = line_of(path, "fieldbus_timeout_ms")
+    where = f"{path}:{line}: bus[0].node[0].drive[0].fieldbus_timeout_ms: "
+    assert any(f" {level} " in entry and where in entry and words in entry for entry in log.splitlines()), log
+    assert "can0: predicted load 10 %" in log
 
 
 def test_faults_of_site_and_mapping_are_readable_by_scripts(tmp_path: Path) -> None:
@@ -82,7 +90,7 @@ def test_faults_of_site_and_mapping_are_readable_by_scripts(tmp_path: Path) -> N
     done = call("check", str(path), "--json")
     assert done.returncode == 2
     [fault] = json.loads(done.stdout)["faults"]
-    assert fault["line"] == 15
+    assert fault["line"] == line_of(path, "slot =")
     assert "fu9" in fault["message"]
     assert "fu1" in fault["hint"]
 
@@ -92,13 +100,15 @@ def test_what_cannot_work_together_is_bad_usage_too(tmp_path: Path) -> None:
     path.write_text(path.read_text("utf-8").replace("timeout_ms = 0", "timeout_ms = 15"), "utf-8")
     done = call("check", str(path))
     assert done.returncode == 2
-    assert ":17: bus[0].node[0].drive[0].fieldbus_timeout_ms: 15 ms is less than two RPDO" in done.stderr
+    line = line_of(path, "fieldbus_timeout_ms")
+    what = "bus[0].node[0].drive[0].fieldbus_timeout_ms: 15 ms is less than two RPDO"
+    assert f":{line}: {what}" in done.stderr
     assert "predicted load" in done.stdout
     done = call("check", str(path), "--json")
     assert done.returncode == 2
     result = json.loads(done.stdout)
     assert not result["ok"]
-    assert [(fault["severity"], fault["line"]) for fault in result["faults"]] == [("error", 17)]
+    assert [(fault["severity"], fault["line"]) for fault in result["faults"]] == [("error", line)]
     assert result["buses"][0]["load_percent"] > 5
 
 

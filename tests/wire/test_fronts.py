@@ -12,34 +12,9 @@ import pytest
 from asyncua import Client
 from pymodbus.client import AsyncModbusTcpClient
 
+from tests.support import sites
 from tests.support.process import Process, drivebridge, free_port, until
 
-SITE = """
-[site]
-name = "fronts"
-state_dir = "{folder}/state"
-runtime_dir = "{folder}/run"
-[[bus]]
-name = "can0"
-interface = "virtual"
-deadman_ms = 500
-[[bus.node]]
-name = "conveyor"
-id = 5
-mapping = "nord/sk-tu4-cao"
-[[bus.node.drive]]
-slot = "fu1"
-unit_id = 1
-control = "modbus"
-fieldbus_timeout_ms = 2000
-parameters = {{ P105 = 50.0, P112 = 10.0 }}
-[modbus]
-listen = "127.0.0.1:{modbus}"
-[opcua]
-listen = "127.0.0.1:{opcua}"
-no_security = true
-anonymous = "operator"
-"""
 BACK_S = 5.0
 NOISE_S = 5.0
 """A machine that is busy with other things."""
@@ -63,9 +38,9 @@ def ports() -> tuple[int, int]:
 
 
 def start(folder: Path, ports: tuple[int, int]) -> Path:
-    path = folder / "site.toml"
-    path.write_text(SITE.format(folder=folder, modbus=ports[0], opcua=ports[1]), "utf-8")
-    return path
+    node = sites.node(sites.drive("fu1", "modbus", 2000, f"unit_id = 1\n{sites.SCALED}"))
+    bus = sites.bus(node, more="deadman_ms = 500")
+    return sites.write(folder, bus, sites.modbus(ports[0]), sites.opcua(ports[1]))
 
 
 def starts(bridge: Process) -> int:

@@ -20,7 +20,7 @@ from bridge.config import ModbusTable
 from bridge.errors import Unavailable
 from bridge.northbound.modbus import session
 from bridge.northbound.modbus.server import ModbusServer
-from tests.unit.northbound.modbus_site import ENABLED, READY, SWITCH_ON_INHIBITED, float_words, make_plant
+from tests.support.modbus_site import ENABLED, READY, SWITCH_ON_INHIBITED, float_words, make_plant
 
 HOST = "127.0.0.1"
 

@@ -8,28 +8,9 @@ from pathlib import Path
 import zenoh
 
 from bridge.sim.controller import Controller, Move, Times
+from tests.support import sites
 from tests.support.process import drivebridge, free_port
 
-SITE = """
-[site]
-name = "demo"
-state_dir = "{folder}/state"
-runtime_dir = "{folder}/run"
-[[bus]]
-name = "can0"
-interface = "virtual"
-[[bus.node]]
-name = "conveyor"
-id = 5
-mapping = "nord/sk-tu4-cao"
-[[bus.node.drive]]
-slot = "fu4"
-control = "lease"
-fieldbus_timeout_ms = 800
-parameters = {{ P105 = 50.0, P112 = 10.0 }}
-[zenoh]
-listen = ["tcp/127.0.0.1:{port}"]
-"""
 TIMES = Times(cycle_s=0.05, run_s=0.5, pause_s=1.2, retry_s=1.2)
 
 
@@ -44,8 +25,8 @@ def session_to(port: int) -> zenoh.Session:
 
 def test_the_demos_controller_never_trips_its_own_watchdog(tmp_path: Path) -> None:
     port = free_port()
-    site = tmp_path / "site.toml"
-    site.write_text(SITE.format(folder=tmp_path, port=port), "utf-8")
+    bus = sites.bus(sites.node(sites.drive("fu4", "lease", 800)))
+    site = sites.write(tmp_path, bus, sites.zenoh(port), name="demo")
     with drivebridge(tmp_path, "run", "run", str(site), notify=True) as bridge:
         bridge.wait_ready()
         bridge.wait_output("node operational")

@@ -15,28 +15,9 @@ from bridge.service import Service, load_project
 from bridge.southbound.bus.virtual import VirtualWire
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 from bridge.zenohlink import link as link_module
+from tests.support import sites
 from tests.support.zenoh_peer import free_port, until, zenoh_peer
 
-SITE = """
-[site]
-name = "link"
-state_dir = "{folder}/state"
-runtime_dir = "{folder}/run"
-[[bus]]
-name = "can0"
-interface = "virtual"
-[[bus.node]]
-name = "conveyor"
-id = 5
-mapping = "nord/sk-tu4-cao"
-[[bus.node.drive]]
-slot = "fu1"
-control = "zenoh"
-fieldbus_timeout_ms = 1000
-parameters = {{ P105 = 50.0, P112 = 10.0 }}
-[zenoh]
-listen = ["tcp/127.0.0.1:{port}"]
-"""
 DIES = pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 
 
@@ -285,7 +266,8 @@ def dies(_: object) -> None:
 async def test_a_service_whose_link_is_dead_ends(tmp_path: Path) -> None:
     for part in ("zenoh", "mirror"):
         path = tmp_path / "site.toml"
-        path.write_text(SITE.format(folder=tmp_path, port=free_port()), "utf-8")
+        drive = sites.drive("fu1", "zenoh", 1000)
+        path = sites.write(tmp_path, sites.bus(sites.node(drive)), sites.zenoh(free_port()), name="link")
         wire = VirtualWire()
         service = Service(load_project(path), lambda table, wire=wire: wire.end(table.name))
         ready = asyncio.Event()

@@ -1,4 +1,4 @@
-"""The Call service: methods of drives and nodes become requests."""
+"""The Call service: methods of drives, nodes and buses become requests."""
 
 from __future__ import annotations
 

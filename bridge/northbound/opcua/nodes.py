@@ -44,7 +44,7 @@ class Argument:
 
 @dataclass(frozen=True, slots=True)
 class MethodNode:
-    """``target`` is the drive or node that ``action`` is done to."""
+    """``target`` is the drive, node or bus that ``action`` is done to."""
 
     id: str
     browse_name: str
@@ -117,6 +117,13 @@ _NODE_METHODS: Final[_Methods] = (
     (Action.ENABLE, (), (), "put the node in service"),
     (Action.DISABLE, (), (), "take the node out of service"),
 )
+_BUS_METHODS: Final[_Methods] = (
+    (Action.RESET, (), (), "NMT reset node to all nodes"),
+    (Action.RESET_COMMUNICATION, (), (), "NMT reset communication to all nodes"),
+    (Action.START_NODE, (), (), "NMT start for every node of the site file, each checked first"),
+    (Action.STOP_NODE, (), (), "NMT stop to all nodes"),
+    (Action.ENTER_PRE_OPERATIONAL, (), (), "NMT enter pre-operational to all nodes"),
+)
 
 
 def pascal_case(name: str) -> str:
@@ -185,7 +192,11 @@ def layout(points: Sequence[Point]) -> tuple[ObjectNode, ObjectNode, ObjectNode]
 
 
 def _bus(buses: _Branch, name: str) -> _Branch:
-    return buses.branch(name, lambda: _Branch(f"bus/{name}", name, folder=False, notifier=True))
+    full = f"bus/{name}"
+    return buses.branch(
+        name,
+        lambda: _Branch(full, name, folder=False, notifier=True, methods=_methods(full, _BUS_METHODS)),
+    )
 
 
 def _node(drives: _Branch, name: str) -> _Branch:

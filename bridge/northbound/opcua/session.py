@@ -1,6 +1,6 @@
 """A client's session: its identity, and the services that asyncua does too freely.
 
-Corrected here, each with a test in ``tests/wire/test_opcua_security.py``: sequential session tokens,
+Corrected here, each with a test in ``tests/wire/opcua/test_security.py``: sequential session tokens,
 writes of anything anywhere, methods that are not executable, reads of what is not readable, calls
 without end, subscriptions of others.
 """

@@ -1,6 +1,6 @@
 """asyncua's subscriptions with limits, an owner, and without a deep copy for each value.
 
-Corrected here (``tests/wire/test_opcua_subscriptions.py``): the publishing interval had no floor, a
+Corrected here (``tests/wire/opcua/test_subscriptions.py``): the publishing interval had no floor, a
 session could change and delete another's subscriptions, ten thousand items held the loop for a
 second to make and for longer to delete, the absolute deadband lost values and statuses.
 """

@@ -1,6 +1,6 @@
 """Connections: what may pass a channel, who may open a session on it, and answers out of turn.
 
-Corrected here (``tests/wire/test_opcua_security.py``): sessions on a channel without security that
+Corrected here (``tests/wire/opcua/test_security.py``): sessions on a channel without security that
 no endpoint offers, a session taken over from another channel, registering servers, a Call of three
 seconds that held up its own session's keep-alives, connections left hanging after an error, chunks of
 any size.

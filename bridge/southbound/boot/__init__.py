@@ -14,10 +14,12 @@ from bridge.southbound.boot.actions import (
     SendStopped,
     StartSupervision,
     Step,
+    Wake,
     Write,
 )
 from bridge.southbound.boot.error_control import heartbeat_period_ms
 from bridge.southbound.boot.layout import factory_entries, layouts, match_words
+from bridge.southbound.boot.memory import BootMemory
 from bridge.southbound.boot.procedure import boot
 from bridge.southbound.boot.scales import number_from, parameter_value
 from bridge.southbound.boot.status import BootError
@@ -28,6 +30,7 @@ __all__ = [
     "AwaitRelease",
     "Boot",
     "BootError",
+    "BootMemory",
     "BootResult",
     "DrivePlan",
     "Nmt",
@@ -37,6 +40,7 @@ __all__ = [
     "SendStopped",
     "StartSupervision",
     "Step",
+    "Wake",
     "Write",
     "boot",
     "factory_entries",

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.command import Identification
+from bridge.southbound.boot.memory import BootMemory
 from bridge.southbound.boot.status import BootError
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
 from bridge.southbound.canopen.pdo import PdoCodec
@@ -49,6 +50,12 @@ class SendStopped:
 
 
 @dataclass(frozen=True, slots=True)
+class Wake:
+    """Tell a node that does not answer to go pre-operational, after a stopped word for every drive: it
+    may be stopped, and answers no SDO then."""
+
+
+@dataclass(frozen=True, slots=True)
 class StartSupervision:
     """From now on the node is expected to be heard."""
 
@@ -67,7 +74,7 @@ class AwaitRelease:
     """Wait until the network lets the node start (start order, mandatory nodes). No time limit."""
 
 
-Action = Step | Read | Write | Nmt | SendStopped | StartSupervision | Await | AwaitRelease
+Action = Step | Read | Write | Nmt | SendStopped | Wake | StartSupervision | Await | AwaitRelease
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +129,11 @@ class BootResult:
     scales: dict[str, dict[str, float]] = field(default_factory=dict[str, dict[str, float]])
     node_tpdos: list[NodePdoPlan] = field(default_factory=list[NodePdoPlan])
     notes: list[str] = field(default_factory=list[str])
+    emcy_id: int | None = None
+    """Where emergency messages come; None where the node sends none."""
+    heartbeat_ms: int = 0
+    """The heartbeat period that the node keeps; 0 for none."""
+    memory: BootMemory = field(default_factory=BootMemory)
 
 
 Boot = Generator[Action, bytes | None, BootResult]

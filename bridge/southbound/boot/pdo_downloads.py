@@ -11,6 +11,7 @@ from typing import Final
 
 from bridge.config.download import Download
 from bridge.southbound.boot.actions import Action, number, optional, same
+from bridge.southbound.boot.memory import BootMemory
 from bridge.southbound.boot.pdo_settings import FIXED_BITS, Change, PdoObjects, write_pdo
 from bridge.southbound.boot.status import BootError
 from bridge.southbound.canopen.pdo import MappingError
@@ -30,7 +31,7 @@ def pdo_parameter(index: int) -> int:
     return index & ~_MAPPING
 
 
-def download_pdo(downloads: Sequence[Download]) -> Generator[Action, bytes | None, int]:
+def download_pdo(downloads: Sequence[Download], memory: BootMemory) -> Generator[Action, bytes | None, int]:
     """The objects of one PDO, only if one differs; how many did. Raises BootError J."""
     parameter = pdo_parameter(downloads[0].index)
     objects = PdoObjects(parameter, parameter + _MAPPING, 0)
@@ -55,10 +56,10 @@ def download_pdo(downloads: Sequence[Download]) -> Generator[Action, bytes | Non
     entries = number((yield from optional(objects.mapping, 0))) if count is None else count.value
     if count is not None and not mapped:
         mapped = [count]
+    memory.unsaved = True
+    target_id = have_id if want_id is None else want_id.value
     try:
-        yield from write_pdo(
-            objects, have_id, have_id if want_id is None else want_id.value, mapped, entries, changes
-        )
+        yield from write_pdo(objects, have_id, target_id, mapped, entries, changes, memory)
     except MappingError as error:
         raise BootError("J", str(error).removeprefix("J: ")) from None
     return different

@@ -14,6 +14,7 @@ from bridge.config import PdoTable
 from bridge.config.model import MappedObject
 from bridge.mapping.model import Pdo
 from bridge.southbound.boot.actions import Action, BootResult, Do, Write, number, optional
+from bridge.southbound.boot.memory import NOT_AGAIN, BootMemory
 from bridge.southbound.canopen import cobid
 from bridge.southbound.canopen.pdo import Entry, MappingError
 from bridge.southbound.canopen.sdo import SdoError
@@ -86,7 +87,7 @@ def set_pdo(objects: PdoObjects, wanted: PdoTable, result: BootResult) -> Do:
     mapped = [
         Change(objects.mapping, sub, 4, entry.to_object()) for sub, entry in enumerate(entries, 1) if maps
     ]
-    yield from write_pdo(objects, have_id, want_id, mapped, len(mapped), changes)
+    yield from write_pdo(objects, have_id, want_id, mapped, len(mapped), changes, result.memory)
     done = [f"sub {change.sub} = {change.value}" for change in changes]
     if maps:
         done.append(f"{objects.mapping:04X}h = {' '.join(str(entry) for entry in entries)}")
@@ -122,10 +123,12 @@ def write_pdo(
     mapped: Sequence[Change],
     count: int,
     changes: Sequence[Change],
+    memory: BootMemory,
 ) -> Do:
     """Off, mapping (where ``mapped`` has entries), communication, on; then everything is read back.
 
-    Raises MappingError where the node refuses a value or does not keep it.
+    Raises MappingError where the node refuses a value or does not keep it. Where one of the values was
+    not kept before, nothing is written.
     """
     parameter, mapping = objects.parameter, objects.mapping
     off = Change(parameter, 1, 4, have_id | cobid.PDO_DISABLED)
@@ -135,12 +138,15 @@ def write_pdo(
     writes += changes
     if want_id != have_id | cobid.PDO_DISABLED:
         writes.append(Change(parameter, 1, 4, want_id))
-    for change in writes:
-        yield from _write_one(change)
-    # Of an object that was written more than once the last value counts.
+    # Of an object that is written more than once the last value counts.
     final = {(change.index, change.sub): change for change in writes}
     for change in final.values():
-        yield from _verify(change)
+        if memory.was_not_kept(change.index, change.sub, change.data):
+            yield from _verify(change, memory)
+    for change in writes:
+        yield from _write_one(change)
+    for change in final.values():
+        yield from _verify(change, memory)
 
 
 def _write_one(change: Change) -> Do:
@@ -152,10 +158,12 @@ def _write_one(change: Change) -> Do:
         raise MappingError(f"J: {error}; it was to become {change.value:X}h") from None
 
 
-def _verify(change: Change) -> Do:
+def _verify(change: Change, memory: BootMemory) -> Do:
+    """Raises MappingError where the node holds something else, and remembers that."""
     read = number((yield from optional(change.index, change.sub)), -1)
     # Some nodes fix bits 30 and 29 of a COB-ID.
     ignored = FIXED_BITS if change.index & 0x0200 == 0 and change.sub == 1 else 0
     if (read ^ change.value) & ~ignored:
+        memory.note_not_kept(change.index, change.sub, change.data)
         name = f"{change.index:04X}h:{change.sub:02X}"
-        raise MappingError(f"J: {name} is {read:X}h after {change.value:X}h was written")
+        raise MappingError(f"J: {name} is {read:X}h after {change.value:X}h was written; {NOT_AGAIN}")

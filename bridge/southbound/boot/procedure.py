@@ -20,8 +20,10 @@ from bridge.southbound.boot.actions import (
     Step,
 )
 from bridge.southbound.boot.configuration import configure
+from bridge.southbound.boot.emergency import read_emcy_id
 from bridge.southbound.boot.error_control import set_error_control
 from bridge.southbound.boot.identity import identify, look_for
+from bridge.southbound.boot.memory import BootMemory
 from bridge.southbound.boot.own_timeout import note_own_timeout
 from bridge.southbound.boot.pdos import plan_drive, plan_node_tpdos, refuse_doubles
 from bridge.southbound.boot.scales import read_scales
@@ -31,19 +33,21 @@ from bridge.southbound.canopen.nmt import NmtCommand, NmtState
 _GOES_OPERATIONAL_S: Final = 2.0
 
 
-def boot(node: Node, downloads: Sequence[Download] = ()) -> Boot:
+def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | None = None) -> Boot:
     """Boot ``node``; returns what is to be known of it.
 
     Raises BootError where it is another device, cannot be configured or does not go operational,
     SdoError where it does not answer. ``downloads`` go before what the tables of the site file say.
+    ``memory`` is what the node's boot-ups before this one have left.
     """
-    result = BootResult()
+    result = BootResult(memory=memory or BootMemory())
     device_type = yield from look_for()
     yield SendStopped()
     yield Nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
     yield from identify(node, device_type, result)
     wanted = (*downloads, *(entry.download for entry in node.table.configure))
     yield from configure(wanted, store=node.table.configuration_store, result=result)
+    yield from read_emcy_id(node.table.id, result)
     yield from open_sdo_servers(node, result)
     yield from set_error_control(node.table, result)
     for drive in node.drives:
@@ -55,6 +59,7 @@ def boot(node: Node, downloads: Sequence[Download] = ()) -> Boot:
     for drive in node.drives:
         result.scales[drive.name] = yield from read_scales(node, drive, result)
     yield from _start(node.table)
+    result.memory.boot_succeeded()
     return result
 
 

@@ -16,7 +16,7 @@ def write_start(drive: Drive, result: BootResult) -> Do:
     """
     for start in drive.slot.start:
         try:
-            written = yield from download(start.download)
+            written = yield from download(start.download, result.memory)
         except BootError as error:
             raise MappingError(f"J: {error.detail}") from None
         if written and start.read_back:

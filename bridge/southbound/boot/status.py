@@ -17,17 +17,19 @@ TEXTS: Final = {
     "J": "the configuration could not be downloaded",
     "K": "no heartbeat when error control was started",
     "L": "the node was operational already",
-    "M": "another product code (1018h:02)",
-    "N": "another revision (1018h:03)",
+    "M": "another product code (1018h:02) or device name (1008h)",
+    "N": "another revision (1018h:03) or software version (100Ah)",
     "O": "another serial number (1018h:04)",
 }
 """By letter. G, H and I belong to program download, which the bridge does not do."""
 
 HINTS: Final = {
     "A": "add it to the site file or take it off the bus",
-    "B": "is it powered and connected, and are address and bit rate right?",
+    "B": "is it powered and connected, are address and bit rate right? A node that stays stopped answers "
+    "nothing either",
     "C": "another device has this address, or the mapping is not its own",
     "D": "another device has this address, or the mapping is not its own",
+    "E": "is it powered and connected, and does the bus show errors?",
     "J": "compare the site file with the device's manual",
     "K": "does the device have this kind of error control?",
     "F": "does the device have node guarding, and is its heartbeat (1017h) off?",
@@ -35,6 +37,9 @@ HINTS: Final = {
     "N": "was the firmware changed? If it may be used, change identity in the site file",
     "O": "was the device exchanged? If it may be used, change identity in the site file",
 }
+
+SILENT: Final = "did the node restart or lose its connection just now, or is the bus disturbed?"
+"""What helps where a node that was there says nothing any more, whatever it was asked."""
 
 ABSENT: Final = frozenset("BEFK")
 """With these the node is not there; with the others it is there and cannot be used."""
@@ -50,5 +55,5 @@ class BootError(Exception):
         self.letter = letter
         self.detail = detail
         self.absent = letter in ABSENT if absent is None else absent
-        hint = HINTS.get(letter, "")
+        hint = SILENT if self.absent and letter not in ABSENT else HINTS.get(letter, "")
         super().__init__(f"{letter}: {detail}: {hint}" if hint else f"{letter}: {detail}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from typing import Final
 
-from bridge.southbound.bus.frame import REMOTE, Frame
+from bridge.southbound.bus.frame import Frame
 
 _FRAME: Final = struct.Struct("=IB3x8s")
 # Aligned as the C compiler aligns it; the frames begin on eight bytes.
@@ -18,9 +18,8 @@ _TX_ANNOUNCE: Final = 8
 
 
 def frame_bytes(frame: Frame) -> bytes:
-    """``struct can_frame``. A remote frame asks for one byte: the answer to node guarding."""
-    length = 1 if frame.can_id & REMOTE else len(frame.data)
-    return _FRAME.pack(frame.can_id, length, frame.data.ljust(8, b"\0"))
+    """``struct can_frame``. A remote frame has the length of what it asks for, and no data."""
+    return _FRAME.pack(frame.can_id, len(frame.data), frame.data.ljust(8, b"\0"))
 
 
 def setup(frames: tuple[Frame, ...], period_s: float, count: int, *, start: bool, at_once: bool) -> bytes:

@@ -27,6 +27,8 @@ class BusStatus:
     bits: int = 0
     """All bits that have passed on the bus, everybody's, as far as the bus can know."""
     error_frames: int = 0
+    bursts_refused: str = ""
+    """Why the kernel takes no bursts at present, so that a timer of ours sends them; empty where it does."""
     _last_error: tuple[int, bytes] | str = ""
 
     def note_error(self, error: tuple[int, bytes] | str) -> None:

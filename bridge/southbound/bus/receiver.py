@@ -19,9 +19,9 @@ _FRAME: Final = struct.Struct("=IB3x8s")  # struct can_frame: identifier with fl
 
 _SO_TIMESTAMPNS: Final = 35
 _SO_RXQ_OVFL: Final = 40
-# Two control messages in the kernel's order, aligned as CMSG_ALIGN does: time stamp (3: s,
-# 4: ns), drop counter (8).
-_CONTROL: Final = struct.Struct("@NiillNiiI0N")
+# Two control messages in the kernel's order, aligned as CMSG_ALIGN does: time stamp (s, ns), drop counter.
+_HEAD_BYTES: Final = struct.calcsize("@Nii")
+_CONTROL: Final = struct.Struct(f"@{_HEAD_BYTES}xll{_HEAD_BYTES}xI0N")
 _MSG_DONTWAIT: Final = 0x40
 BATCH: Final = 64
 """Frames per call at most."""
@@ -57,6 +57,9 @@ class _Message(ctypes.Structure):  # struct mmsghdr
     _fields_ = (("header", _Header), ("length", ctypes.c_uint))
 
 
+_MESSAGE_BYTES: Final = ctypes.sizeof(_Message)
+
+
 class Receiver:
     """Receives from one socket without waiting, into buffers that are made once."""
 
@@ -79,8 +82,11 @@ class Receiver:
             message.header.vectors = 1
             message.header.control = ctypes.addressof(controls) + place * _CONTROL.size
             message.header.control_length = _CONTROL.size
-        # The kernel writes lengths and flags into the messages: each call begins with a fresh copy.
+        # The kernel writes lengths and flags into the messages it fills: they are made fresh again.
         self._fresh = bytes(self._messages)
+        self._message_view = memoryview(self._messages).cast("B")
+        self._used = 0
+        """Bytes of the messages that the last call may have written to."""
         self._buffers = frames, controls
         self._frame_view, self._control_view = memoryview(frames), memoryview(controls)
 
@@ -90,8 +96,10 @@ class Receiver:
         Gives the number of all that came, and the identifiers and data of the error frames among them.
         Raises OSError where the interface is gone or down.
         """
-        ctypes.memmove(self._messages, self._fresh, len(self._fresh))
+        used = self._used
+        self._message_view[:used] = self._fresh[:used]
         count: int = self._receive(self._raw.fileno(), self._messages, BATCH, _MSG_DONTWAIT, None)
+        self._used = min(max(count, 0) + 1, BATCH) * _MESSAGE_BYTES
         errors: list[tuple[int, bytes]] = []
         if count < 0:
             number = ctypes.get_errno()
@@ -99,16 +107,16 @@ class Receiver:
                 return 0, errors
             raise OSError(number, os.strerror(number))
         wall_offset, earliest, latest = stamps
-        for (can_id, length, data), control in zip(
+        for (can_id, length, data), (seconds, nanoseconds, drops) in zip(
             _FRAME.iter_unpack(self._frame_view[: count * _FRAME.size]),
             _CONTROL.iter_unpack(self._control_view[: count * _CONTROL.size]),
             strict=True,
         ):
-            self.drops = control[8]
+            self.drops = drops
             if can_id & ERROR:
                 errors.append((can_id, data))
                 continue
-            stamp = control[3] + control[4] * 1e-9 + wall_offset
+            stamp = seconds + nanoseconds * 1e-9 + wall_offset
             if stamp > latest:
                 stamp = latest
             elif stamp < earliest:

@@ -23,10 +23,10 @@ from bridge.southbound.bus.errorframe import judge
 from bridge.southbound.bus.explain import WrongBitrate, explain
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import BusStatus, ControllerState
-from bridge.southbound.bus.netlink import look_at
+from bridge.southbound.bus.kernelbeat import KernelBeat
+from bridge.southbound.bus.netlink import Link, look_at
 from bridge.southbound.bus.outbox import Outbox
 from bridge.southbound.bus.receiver import BATCH, Receiver, Stamps
-from bridge.southbound.bus.softbeat import SoftBeat
 from bridge.southbound.bus.wirebits import WireBits
 
 _FILTER: Final = struct.Struct("=II")
@@ -45,8 +45,7 @@ _SEND_BUFFER: Final = 1
 _MOST_PER_ROUND: Final = 2048
 _LOOK_S: Final = 1.0
 _REOPEN_S: Final = (0.2, 5.0)
-_SHORTEST_BURST: Final = 4
-_SLOW_LIMIT_S: Final = 0.01
+_BEAT_LIMIT_S: Final = 0.01
 _OUTAGES: Final = (ControllerState.BUS_OFF, ControllerState.PASSIVE)
 
 
@@ -60,19 +59,18 @@ class SocketCanBus:
         self._channel = channel
         self._status = BusStatus()
         self._raw: socket.socket | None = None
-        self._bcm: socket.socket | None = None
         self._receiver: Receiver | None = None
         self._wake: Callable[[], None] = lambda: None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._filters: bytes | None = None
-        self._jobs: dict[int, tuple[float, float]] = {}  # can id: period, until when it surely runs
-        self._slow = SoftBeat()
+        self._beats = KernelBeat()
         self._outbox = Outbox()
         self._wire = WireBits()
         self._passed = (0, 0)
         self._drops = 0
         self._last_drain = 0.0
         self._look_at = 0.0
+        self._looking: asyncio.Future[Link] | None = None
         self._reopen_at: float | None = None
         self._reopen_s = _REOPEN_S[0]
 
@@ -90,35 +88,60 @@ class SocketCanBus:
         self._loop = asyncio.get_running_loop()
         self._wake = wake
         try:
-            self._open()
+            self._open(self._link())
         except OSError as error:
             self._close_sockets()
             raise Unavailable(f"bus {self._name}: {explain(error, self._channel)}") from error
 
-    def _open(self) -> None:
+    def _open(self, link: Link) -> None:
         # First: a socket binds to an interface that is down without complaint.
-        self._check_link()
-        raw = self._raw = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-        raw.setblocking(False)
-        raw.setsockopt(_SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, struct.pack("=I", _CAN_ERR_MASK))
-        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
-        raw.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
+        self._check_link(link)
+        raw = self._raw = self._raw_socket()
         self._receiver = Receiver(raw)
         self._drops = 0
-        if self._filters is not None:
-            raw.setsockopt(_SOL_CAN_RAW, _CAN_RAW_FILTER, self._filters)
-        raw.bind((self._channel,))
-        broadcaster = self._bcm = socket.socket(socket.AF_CAN, socket.SOCK_DGRAM, _CAN_BCM)
-        broadcaster.setblocking(False)
-        broadcaster.connect((self._channel,))
+        self._open_manager()
         self._last_drain = time.monotonic()
         self._look_at = self._last_drain + _LOOK_S
         self._status.state = ControllerState.OK
         if self._loop:
             self._loop.add_reader(raw.fileno(), self._wake)
 
-    def _check_link(self) -> None:
-        link = look_at(self._channel)
+    def _raw_socket(self) -> socket.socket:
+        raw = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        try:
+            raw.setblocking(False)
+            raw.setsockopt(_SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, struct.pack("=I", _CAN_ERR_MASK))
+            raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
+            raw.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
+            self._filter(raw)
+            raw.bind((self._channel,))
+        except OSError:
+            raw.close()
+            raise
+        return raw
+
+    def _open_manager(self) -> None:
+        self._beats.open(self._bcm_socket())
+        self._status.bursts_refused = ""
+
+    def _bcm_socket(self) -> socket.socket:
+        broadcaster = socket.socket(socket.AF_CAN, socket.SOCK_DGRAM, _CAN_BCM)
+        try:
+            broadcaster.setblocking(False)
+            broadcaster.connect((self._channel,))
+        except OSError:
+            broadcaster.close()
+            raise
+        return broadcaster
+
+    def _filter(self, raw: socket.socket) -> None:
+        if self._filters is not None:
+            raw.setsockopt(_SOL_CAN_RAW, _CAN_RAW_FILTER, self._filters)
+
+    def _link(self) -> Link:
+        return look_at(self._channel)
+
+    def _check_link(self, link: Link) -> None:
         if not link.is_up:
             raise OSError(errno.ENETDOWN, "the interface is down")
         if self._bitrate and link.bitrate and link.bitrate != self._bitrate:
@@ -131,16 +154,15 @@ class SocketCanBus:
             wanted = {(can_id & 0x780, _FUNCTION) for can_id in can_ids}
         self._filters = b"".join(_FILTER.pack(*pair) for pair in sorted(wanted))
         if self._raw:
-            self._raw.setsockopt(_SOL_CAN_RAW, _CAN_RAW_FILTER, self._filters)
+            self._filter(self._raw)
 
     def close(self) -> None:
         self._reopen_at = None
+        self._looking = None
         self._close_sockets()
 
     def _close_sockets(self) -> None:
-        # Closing the socket of the broadcast manager removes its jobs.
-        self._jobs.clear()
-        self._slow.clear()
+        self._beats.close()
         self._drop_waiting()
         self._receiver = None
         if self._raw:
@@ -148,9 +170,6 @@ class SocketCanBus:
                 self._loop.remove_reader(self._raw.fileno())
             self._raw.close()
             self._raw = None
-        if self._bcm:
-            self._bcm.close()
-            self._bcm = None
 
     def _break_down(self, error: OSError, now: float) -> None:
         """The interface is gone or down. Its bursts go first: they would outlive a short outage."""
@@ -158,6 +177,10 @@ class SocketCanBus:
         self._status.outages += 1
         self._status.state = ControllerState.DOWN
         self._status.note_error(explain(error, self._channel))
+        self._looking = None
+        self._plan_reopening(now)
+
+    def _plan_reopening(self, now: float) -> None:
         self._reopen_at = now + self._reopen_s
         self._reopen_s = min(self._reopen_s * 2, _REOPEN_S[1])
 
@@ -214,9 +237,10 @@ class SocketCanBus:
         if is_outage:
             self._status.outages += 1
             self._drop_waiting()
-            self._slow.clear()
-            for can_id in list(self._jobs):
-                self.silence(can_id)
+            try:
+                self._beats.silence_all(now)
+            except OSError as error:
+                self._break_down(error, now)
 
     # sending
 
@@ -260,71 +284,79 @@ class SocketCanBus:
     def beat(
         self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool = False
     ) -> None:
-        can_id = frames[0].can_id
-        if count < _SHORTEST_BURST:
-            # The kernel counts the first frame of a burst, so one of a frame or two ends before it can be
-            # renewed. What is that slow needs no kernel: a round sends it.
-            first = self._slow.beat(frames, now, period_s, count, at_once=at_once)
-            if first is not None:
-                self.send(first, now, now + _SLOW_LIMIT_S)
+        try:
+            first = self._beats.beat(frames, now, period_s, count, at_once=at_once)
+        except OSError as error:
+            self._break_down(error, now)
             return
-        job = self._jobs.get(can_id)
-        # Refilling keeps the phase of a burst that runs and cannot wake one that has ended. Its last frame
-        # comes up to a period before its count of periods is over.
-        runs = job is not None and job[0] == period_s and now < job[1]
-        self._jobs[can_id] = (period_s, now + (count - 2) * period_s)
-        self._tell_bcm(bcm.setup(frames, period_s, count, start=not runs, at_once=at_once), now)
+        if first is not None:
+            self.send(first, now, now + _BEAT_LIMIT_S)
         self._wire.sample(frames[0])
 
     def silence(self, can_id: int) -> None:
-        self._slow.silence(can_id)
-        if self._jobs.pop(can_id, None) is not None:
-            self._tell_bcm(bcm.delete(can_id), self._last_drain)
-
-    def _tell_bcm(self, message: bytes, now: float) -> None:
-        if self._bcm is None:
-            return
         try:
-            self._bcm.send(message)
+            self._beats.silence(can_id, self._last_drain)
         except OSError as error:
-            if error.errno in (errno.ENETDOWN, errno.ENODEV, errno.ENXIO):
-                self._break_down(error, now)
-            else:
-                self._jobs.clear()
-                self._status.frames_expired += 1
+            self._break_down(error, self._last_drain)
+
+    def _send_beats(self, now: float) -> None:
+        """What the kernel does not send for us, and again what it has refused."""
+        try:
+            frames = self._beats.on_time(now)
+        except OSError as error:
+            self._break_down(error, now)
+            return
+        self._status.bursts_refused = self._beats.refusal
+        for frame in frames:
+            self.send(frame, now, now + _BEAT_LIMIT_S)
 
     # time
 
     def next_deadline(self) -> float | None:
-        waiting = [self._look_at, self._outbox.retry_at, self._slow.next_deadline()]
+        waiting = [self._look_at, self._outbox.retry_at, self._beats.next_deadline()]
         times = [self._reopen_at] if self._raw is None else waiting
         return min((time for time in times if time is not None), default=None)
 
     def on_time(self, now: float) -> None:
         if self._outbox:
             self._send_waiting(now)
-        for frame in self._slow.due(now):
-            self.send(frame, now, now + _SLOW_LIMIT_S)
+        self._send_beats(now)
+        if self._looking and self._looking.done():
+            self._take_look(self._looking, now)
         if self._raw is not None and now >= self._look_at:
-            self._look(now)
-        if self._reopen_at is None or now < self._reopen_at:
-            return
-        try:
-            self._open()
-        except OSError as error:
-            self._break_down(error, now)
-        else:
-            self._reopen_at = None
-            self._reopen_s = _REOPEN_S[0]
+            self._look_at = now + _LOOK_S
+            self._look()
+        if self._reopen_at is not None and now >= self._reopen_at:
+            self._plan_reopening(now)
+            self._look()
 
-    def _look(self, now: float) -> None:
-        """What has passed since the last look, and what the controller says about itself."""
-        self._look_at = now + _LOOK_S
+    def _look(self) -> None:
+        """Ask the kernel about the interface, in a thread: it answers when nobody is changing any network
+        interface of the machine (rtnl_lock), and no bus may wait for that."""
+        if self._loop and self._looking is None:
+            self._looking = self._loop.run_in_executor(None, self._link)
+            self._looking.add_done_callback(lambda _: self._wake())
+
+    def _take_look(self, looking: asyncio.Future[Link], now: float) -> None:
+        self._looking = None
+        is_open = self._raw is not None
         try:
-            link = look_at(self._channel)
+            link = looking.result()
+            if is_open:
+                self._see(link, now)
+            else:
+                self._open(link)
+                self._reopen_at = None
+                self._reopen_s = _REOPEN_S[0]
         except OSError as error:
-            self._break_down(error, now)
-            return
+            if is_open:
+                self._break_down(error, now)
+            else:
+                self._close_sockets()
+                self._status.note_error(explain(error, self._channel))
+
+    def _see(self, link: Link, now: float) -> None:
+        """What has passed since the last look, and what the controller says about itself."""
         frames, data_bytes = link.frames - self._passed[0], link.data_bytes - self._passed[1]
         self._passed = link.frames, link.data_bytes
         if frames >= 0 and data_bytes >= 0:  # else the interface has been made anew
@@ -333,6 +365,8 @@ class SocketCanBus:
         status.bits = int(self._wire.total)
         if link.tx_errors is not None and link.rx_errors is not None:
             status.tx_errors, status.rx_errors = link.tx_errors, link.rx_errors
+        if self._beats.refusal:
+            self._open_manager()
         # An error frame may be lost in a full socket buffer; the driver's own state is not.
         if link.state is not None and link.state <= ControllerState.BUS_OFF and link.state != status.state:
             self._enter(ControllerState(link.state), now)

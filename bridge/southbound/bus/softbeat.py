@@ -44,6 +44,9 @@ class SoftBeat:
         job.left = count
         return job.take() if at_once else None
 
+    def __contains__(self, can_id: int) -> bool:
+        return can_id in self._jobs
+
     def silence(self, can_id: int) -> None:
         self._jobs.pop(can_id, None)
 

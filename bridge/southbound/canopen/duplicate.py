@@ -12,6 +12,10 @@ _TURNS: Final = 8
 """Changes of state within one window that no single device makes."""
 _EXTRA_REPLIES: Final = 3
 _FORGET_S: Final = 60.0
+_TOGETHER_S: Final = 0.05
+"""Two devices answer one request within this time; what comes later is a late answer."""
+_FOREIGN_S: Final = 2.0
+"""So long after another client's request an answer may be its own."""
 
 
 class DuplicateCheck:
@@ -23,7 +27,9 @@ class DuplicateCheck:
         "_count",
         "_extra",
         "_extra_since",
+        "_foreign_at",
         "_last_reply",
+        "_last_reply_at",
         "_state",
         "period_s",
     )
@@ -32,6 +38,8 @@ class DuplicateCheck:
         self.period_s: float | None = None
         """The node's heartbeat period as the boot-up left it; None where it has none."""
         self._last_reply = b""
+        self._last_reply_at = float("-inf")
+        self._foreign_at = float("-inf")
         self._extra = 0
         self._extra_since = float("-inf")
         self.restart()
@@ -64,12 +72,19 @@ class DuplicateCheck:
             return f"{_WINDOW} heartbeats came within {took_s:.2f} s, {expected_s:.2f} s were expected"
         return None
 
+    def on_foreign_request(self, time: float) -> None:
+        """An SDO request that is not ours."""
+        self._foreign_at = time
+
     def on_reply(self, data: bytes, time: float, *, matched: bool) -> str | None:
-        """An SDO answer; ``matched`` where it belonged to a request of ours."""
+        """An SDO answer; ``matched`` where it belonged to a request of ours. Late answers to requests of
+        ours are left out by the caller."""
         if matched:
-            self._last_reply = data[1:4]
+            self._last_reply, self._last_reply_at = data[1:4], time
             return None
-        if len(data) != 8 or data[1:4] != self._last_reply:
+        if len(data) != 8 or data[1:4] != self._last_reply or time - self._last_reply_at > _TOGETHER_S:
+            return None
+        if time - self._foreign_at < _FOREIGN_S:
             return None
         if time - self._extra_since > _FORGET_S:
             self._extra, self._extra_since = 0, time

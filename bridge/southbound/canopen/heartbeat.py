@@ -19,8 +19,10 @@ class HeartbeatConsumer:
         self.timeout_s = timeout_s
         self._last: float | None = None
 
-    def on_frame(self, frame: Frame) -> None:
+    def on_frame(self, frame: Frame) -> bool:
+        """Every heartbeat counts."""
         self._last = frame.time
+        return True
 
     def expect(self, now: float) -> None:
         """Begin supervision now, although the node has not been heard yet."""
@@ -63,17 +65,21 @@ class NodeGuard:
         self._last: float | None = None
         self._frames: list[Frame] = []
 
-    def on_frame(self, frame: Frame) -> None:
+    def on_frame(self, frame: Frame) -> bool:
+        """Whether the answer counts. A repeated one proves nothing, neither that the node is there nor which
+        state it has; the next right one does."""
+        if self._due is None:
+            return True  # not asked by us
         if len(frame.data) != 1:
-            return
+            return False
         toggle = frame.data[0] & 0x80
         if self._toggle is not None and toggle != self._toggle:
-            # A repeated answer proves nothing; the next right one does.
             self.toggle_errors += 1
             self._toggle = toggle ^ 0x80
-            return
+            return False
         self._toggle = toggle ^ 0x80
         self._last = frame.time
+        return True
 
     def expect(self, now: float) -> None:
         """Begin guarding now. The first toggle bit is taken as it comes: the node may be guarded already."""
@@ -97,7 +103,8 @@ class NodeGuard:
             self.reset()
             return True
         if now >= self._due:
-            self._frames.append(Frame(self._id | REMOTE))
+            # The length of what is asked for: the two must not differ on the wire (ISO 11898-1).
+            self._frames.append(Frame(self._id | REMOTE, b"\0"))
             # A late loop asks once and goes on from now: a burst of remote frames would help nobody.
             on_time = self._due + self.guard_time_s
             self._due = on_time if on_time > now else now + self.guard_time_s

@@ -28,7 +28,8 @@ _ACTIVATE: Final = 0x15
 _STORE: Final = 0x17
 _SELECT: Final = (0x40, 0x41, 0x42, 0x43)
 _SELECTED: Final = 0x44
-_IDENTIFIED: Final = 0x4F
+IDENTIFIED: Final = 0x4F
+"""What every device says that a question of a fastscan fits."""
 _FASTSCAN: Final = 0x51
 _INQUIRE: Final = (0x5A, 0x5B, 0x5C, 0x5D)
 _INQUIRE_NODE_ID: Final = 0x5E
@@ -58,10 +59,12 @@ class Identity(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Exchange:
-    """One request; ``reply`` is the command specifier that is waited for, None where none comes.
+    """One request, empty where nothing is sent; ``reply`` is the command specifier that is waited for, None
+    where none comes.
 
     ``step`` says in words what is being done. ``fails`` false: silence is an answer. ``by_many``: any
-    number of devices may answer, so the whole time is waited: a late answer is not one to the next.
+    number of devices may answer, or be answering something asked before, so the whole time is waited: a
+    late answer is not one to the next.
     """
 
     request: bytes
@@ -69,6 +72,8 @@ class Exchange:
     step: str
     fails: bool = True
     by_many: bool = False
+    is_first: bool = False
+    """The first question of a scan: how quick its devices are is not known yet."""
 
 
 _R = TypeVar("_R")
@@ -77,6 +82,11 @@ Service = Generator[Exchange, bytes | None, _R]
 
 def _message(command: int, rest: bytes = b"") -> bytes:
     return bytes((command,)) + rest.ljust(7, b"\0")
+
+
+def settle() -> Service[None]:
+    """Ask nothing for a whole answer time: what comes then is late, and not taken for an answer."""
+    yield Exchange(b"", None, "waiting for late answers", fails=False, by_many=True)
 
 
 def switch_global(*, configuration: bool) -> Service[None]:
@@ -161,7 +171,7 @@ def fastscan(known: Identity | None = None) -> Service[Identity | None]:
     such device. ``known`` fills in fields that are the same for all (not 0).
     """
     request = struct.pack("<IBBB", 0, _CONFIRM, 0, 0)
-    if (yield _question(request, "is anybody there?")) is None:
+    if (yield _question(request, "is anybody there?", is_first=True)) is None:
         return None
     found: list[int] = []
     for sub, name in enumerate(_FIELDS):
@@ -176,8 +186,9 @@ def fastscan(known: Identity | None = None) -> Service[Identity | None]:
     return Identity(*found)
 
 
-def _question(request: bytes, step: str) -> Exchange:
-    return Exchange(_message(_FASTSCAN, request), _IDENTIFIED, step, fails=False, by_many=True)
+def _question(request: bytes, step: str, *, is_first: bool = False) -> Exchange:
+    message = _message(_FASTSCAN, request)
+    return Exchange(message, IDENTIFIED, step, fails=False, by_many=True, is_first=is_first)
 
 
 def _find_number(sub: int, name: str) -> Service[int]:

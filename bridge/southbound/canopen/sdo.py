@@ -33,17 +33,22 @@ SEGMENTS_AT_ONCE: Final = 8
 """So many frames of a block go out together: a block is up to 127, more than a driver's queue holds."""
 _COMMANDS: Final = frozenset((0x1010, 0x1011))
 """Writing them does something each time (store and restore, CiA 301 §7.5.2.13–14): never repeated."""
+_COMMAND_S: Final = 10.0
+"""So long a node may take for one: it writes all its parameters to its memory before it answers."""
+_MOST_OWED: Final = 8
+"""So many late answers are expected; a node that is silent for long owes no more."""
 
 T = TypeVar("T")
 
 
 @dataclass(slots=True)
 class _Owed:
-    """An answer that may still come, after we have given up waiting for it or have asked again."""
+    """Answers that may still come, after we have given up waiting for them or have asked again."""
 
     index: int
     sub: int
     until: float
+    answers: int = 1
 
     def is_about(self, job: SdoJob) -> bool:
         return (self.index, self.sub) == (job.index, job.sub)
@@ -67,6 +72,8 @@ class SdoChannel:
         self.retries = retries
         self.unmatched = 0
         """Frames on the reply COB-ID that were no answer."""
+        self.late = 0
+        """Those of them that answered a request of ours which we had given up."""
         self.last_abort = 0
         """Code of the last transfer that the server aborted or that we gave up."""
         self._segment_s = segment_s
@@ -103,7 +110,7 @@ class SdoChannel:
         def start(block: BlockUse) -> Transfer:
             return read_object(index, sub, block)
 
-        return self._submit(SdoJob(index, sub, start, done, priority, self.retries), now)
+        return self._submit(SdoJob(index, sub, start, done, priority, self.retries, self.timeout_s), now)
 
     def write(
         self,
@@ -121,8 +128,10 @@ class SdoChannel:
         def start(block: BlockUse) -> Transfer:
             return write_object(index, sub, data, block)
 
-        retries = self.retries if repeatable and index not in _COMMANDS else 0
-        return self._submit(SdoJob(index, sub, start, done, priority, retries), now)
+        is_command = index in _COMMANDS
+        retries = self.retries if repeatable and not is_command else 0
+        timeout_s = max(self.timeout_s, _COMMAND_S) if is_command else self.timeout_s
+        return self._submit(SdoJob(index, sub, start, done, priority, retries, timeout_s), now)
 
     def cancel(self, job: SdoJob, now: float) -> bool:
         """End this transfer without calling its ``done``; False where it has ended already."""
@@ -177,7 +186,9 @@ class SdoChannel:
         self.unmatched += 1
         owed = self._owed
         if owed and len(data) == 8 and MUX.unpack_from(data, 1) == (owed.index, owed.sub):
-            self._owed = None
+            self.late += 1
+            owed.answers -= 1
+            self._owed = owed if owed.answers else None
 
     def on_time(self, now: float) -> None:
         if self._send_at is not None and now >= self._send_at:
@@ -245,7 +256,8 @@ class SdoChannel:
         for _ in range(min(most, len(self._unsent))):
             self._frames.append(Frame(self.request_id, self._unsent.popleft()))
         self._send_at = now + SEGMENTS_AT_ONCE * self._segment_s if self._unsent else None
-        self._deadline = now + self.timeout_s
+        if self._job:
+            self._deadline = now + self._job.timeout_s
 
     def _fail(self, error: SdoError, now: float) -> None:
         """The transfer has failed: try it again, or tell the one who asked."""
@@ -265,7 +277,9 @@ class SdoChannel:
         self._frames.append(Frame(self.request_id, abort_request(job.index, job.sub, code)))
 
     def _owe(self, job: SdoJob, now: float) -> None:
-        self._owed = _Owed(job.index, job.sub, now + self.timeout_s)
+        before = self._owed.answers if self._owed and self._owed.is_about(job) else 0
+        answers = min(before + 1, _MOST_OWED)
+        self._owed = _Owed(job.index, job.sub, now + job.timeout_s, answers)
 
     def _clear(self) -> None:
         if self._transfer:
@@ -280,7 +294,7 @@ class SdoChannel:
             self.last_abort = result.code
         elif job and self._owed and self._owed.is_about(job):
             # It may have been the answer to the first attempt: the second's is still to come.
-            self._owe(job, now)
+            self._owed.until = now + job.timeout_s
         if job is not None:
             job.done(result)
         if self._job is None:

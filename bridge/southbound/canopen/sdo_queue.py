@@ -32,6 +32,7 @@ class SdoJob:
     done: Callable[[Result], None]
     priority: Priority
     retries_left: int
+    timeout_s: float
 
 
 class SdoQueue:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
-
 import pytest
 
-from bridge.command import Action, Code, Drive, Event, Identification, Kind, Outcome, Plant, Request
+from bridge.command import Action, Code, Drive, Event, Identification, Kind, Outcome, Request
 from bridge.command.link import NodeState
-from bridge.config import Site
 from bridge.image import Quality, Reading, Value
+from tests.support import sites
 from tests.support.rig import (
     ACKNOWLEDGE,
     ENABLE,
@@ -17,7 +15,6 @@ from tests.support.rig import (
     FAULT,
     HALF_SPEED,
     INHIBITED,
-    NORD,
     OPERATOR,
     OTHER_PLC,
     PLC,
@@ -26,37 +23,22 @@ from tests.support.rig import (
     emergency,
 )
 
-SITE = """
-[site]
-name = "hall"
-[[bus]]
-name = "can0"
-interface = "virtual"
-[[bus.node]]
-name = "conveyor"
-id = 5
-mapping = "nord/sk-tu4-cao"
-[[bus.node.drive]]
-slot = "fu1"
-control = "modbus"
-fieldbus_timeout_ms = 200
-parameters = { P105 = 50.0 }
-[[bus.node.drive]]
-slot = "fu2"
-name = "infeed"
-unit_id = 1
-control = "lease"
-fieldbus_timeout_ms = 0
-[modbus]
-"""
+SITE = sites.site(
+    sites.bus(
+        sites.node(
+            sites.drive("fu1", "modbus", 200, "parameters = { P105 = 50.0 }"),
+            sites.drive("fu2", "lease", 0, 'name = "infeed"\nunit_id = 1'),
+        )
+    ),
+    sites.modbus(),
+)
 
 
 class Hall:
     """A plant on a virtual clock, and what it told."""
 
     def __init__(self, text: str = SITE) -> None:
-        site = Site.model_validate(tomllib.loads(text))
-        self.plant = Plant(site, {"nord/sk-tu4-cao": NORD}, "1.2.3")
+        self.plant = sites.plant_of(text)
         self.node = self.plant.nodes["conveyor"]
         self.events: list[Event] = []
         self.plant.on_event(self.events.append)

@@ -79,8 +79,11 @@ slot = "fu1"
     [
         ({"object": '"2097"'}, 11, 'must be an object as "2097:01"'),
         ({"type": "uint17"}, 12, "must be"),
-        ({"value": "70000"}, 10, "a uint16 is 0…65535"),
-        ({"value": '"five"'}, 10, "a uint16 is a whole number"),
+        ({"value": "70000"}, 13, "a uint16 is 0…65535"),
+        ({"value": '"five"'}, 13, "a uint16 is a whole number"),
+        ({"value": "[1]"}, 13, "must be a number, true or false, or a text in quotes"),
+        ({"value": "{ a = 1 }"}, 13, "must be a number, true or false, or a text in quotes"),
+        ({"type": "uint17", "value": "70000"}, 12, 'did you mean "uint16"?'),
         ({"drive": "tpdo = { transmission_type = 256 }"}, 16, "must be at most 255"),
         ({"drive": 'rpdo = { mapping = ["3000:01"] }'}, 16, "its length in bits"),
         ({"drive": f"rpdo = {{ mapping = {['3000:01/16'] * 5} }}"}, 16, "has 80 bits, a PDO has 64"),

@@ -2,55 +2,19 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from bridge.config import Site
 from bridge.config.download import Download
-from bridge.eds import Description
-from bridge.lint import Severity, Verdict, family_dictionaries, lint
+from bridge.lint import Severity
 from bridge.lint.load import longest_bits
-from bridge.mapping import Family, load_family
+from bridge.mapping import Family
 from bridge.mapping.model import Pdo, SdoServer
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.wirebits import exact_bits
-
-NORD = "nord/sk-tu4-cao"
-FAMILY = load_family(NORD)
-DICTIONARY = family_dictionaries([NORD])[NORD]
-
-SITE = """
-[site]
-name = "lint"
-[[bus]]
-name = "can0"
-interface = "virtual"
-{bus}
-[[bus.node]]
-name = "conveyor"
-id = 5
-mapping = "nord/sk-tu4-cao"
-{node}
-[[bus.node.drive]]
-slot = "fu1"
-control = "modbus"
-{drive}
-{more}
-[modbus]
-listen = "127.0.0.1:1502"
-"""
-OTHER = """
-[[bus.node]]
-name = "pump"
-id = {id}
-mapping = "{family}"
-[[bus.node.drive]]
-slot = "fu1"
-"""
-TIMEOUT = "fieldbus_timeout_ms = 200"
+from tests.support.lint_site import DICTIONARY, FAMILY, NORD, OTHER, TIMEOUT, findings, judge, only
 
 
 def foreign(pdo: int = 2, sdo: tuple[tuple[int, int, int], ...] = ()) -> Family:
@@ -58,7 +22,8 @@ def foreign(pdo: int = 2, sdo: tuple[tuple[int, int, int], ...] = ()) -> Family:
     slot = FAMILY.slot[0]
     rpdo = Pdo(number=pdo, cob_id=0x100 + 0x100 * pdo, objects=slot.rpdo[0].objects)
     tpdo = Pdo(number=pdo, cob_id=0x080 + 0x100 * pdo, objects=slot.tpdo[0].objects)
-    servers = [SdoServer(number=number, request=request, reply=reply) for number, request, reply in sdo]
+    names = ("number", "request", "reply")
+    servers = [SdoServer.model_validate(dict(zip(names, one, strict=True))) for one in sdo]
     return FAMILY.model_copy(
         update={
             "family": FAMILY.family.model_copy(update={"node_id_high": 127}),
@@ -72,37 +37,6 @@ LENZE_LIKE = foreign(sdo=((2, 0x640, 0x5C0),))
 STOEBER_LIKE = foreign(sdo=((2, 0x620, 0x5A0), (3, 0x640, 0x5C0), (4, 0x660, 0x5E0)))
 
 
-def judge(
-    folder: Path,
-    *,
-    bus: str = "",
-    node: str = "",
-    drive: str = TIMEOUT,
-    more: str = "",
-    families: dict[str, Family] | None = None,
-    dictionary: Description | None = DICTIONARY,
-    downloads: tuple[Download, ...] = (),
-) -> Verdict:
-    text = SITE.format(bus=bus, node=node, drive=drive, more=more)
-    path = folder / "site.toml"
-    path.write_text(text)
-    site = Site.model_validate(tomllib.loads(text))
-    known = {NORD: FAMILY} | (families or {})
-    return lint(site, known, path, {"conveyor": downloads}, {NORD: dictionary} if dictionary else {})
-
-
-def findings(verdict: Verdict, severity: Severity) -> list[str]:
-    return [f"{one.fault.key}: {one.fault.message}" for one in verdict.of(severity)]
-
-
-def only(verdict: Verdict, severity: Severity) -> str:
-    """The one finding there is."""
-    [finding] = verdict.findings
-    assert finding.severity is severity, finding
-    assert finding.fault.line > 0
-    return str(finding)
-
-
 def test_a_sound_site_has_no_findings(tmp_path: Path) -> None:
     assert judge(tmp_path).findings == ()
 
@@ -113,6 +47,30 @@ def test_a_sound_site_has_no_findings(tmp_path: Path) -> None:
 def test_nodes_of_one_family_do_not_collide(tmp_path: Path) -> None:
     more = "".join(OTHER.format(id=n, family=NORD).replace("pump", f"pump{n}") for n in (1, 6, 63))
     assert judge(tmp_path, bus="bitrate = 1000000", more=more).findings == ()
+
+
+@pytest.mark.parametrize(
+    ("value", "collides"), [(0x86, True), (0x8000_0086, False), (0x40, False), (0xC5, False)]
+)
+def test_emergency_messages_count_where_1014h_sends_them(tmp_path: Path, value: int, collides: bool) -> None:
+    moved = Download(0x1014, 0, value.to_bytes(4, "little"))
+    verdict = judge(tmp_path, more=OTHER.format(id=6, family=NORD), downloads=(moved,))
+    found = findings(verdict, Severity.ERROR)
+    assert [text for text in found if "EMCY of pump has COB-ID 86h, which is EMCY of conveyor's" in text] == (
+        found if collides else []
+    )
+    assert bool(found) == collides
+
+
+@pytest.mark.parametrize("object_", ["1010:01", "1011:01"])
+@pytest.mark.parametrize(("more", "number"), [("", 1), ("read_back = false", 0)])
+def test_a_command_that_is_to_be_read_back_is_doubtful(
+    tmp_path: Path, object_: str, more: str, number: int
+) -> None:
+    node = f'[[bus.node.configure]]\nobject = "{object_}"\ntype = "uint32"\nvalue = 1702257011\n{more}'
+    found = findings(judge(tmp_path, node=node), Severity.WARNING)
+    assert len(found) == number
+    assert all("is a command: it never reads back as it was written" in text for text in found)
 
 
 def test_a_foreign_node_above_63_sits_on_nords_closed_channels(tmp_path: Path) -> None:
@@ -162,7 +120,9 @@ def test_a_pdo_moved_onto_another_is_named_where_it_was_moved(tmp_path: Path) ->
 def test_a_pdo_moved_onto_the_sdo_of_another_node(tmp_path: Path) -> None:
     drive = f"{TIMEOUT}\nrpdo = {{ cob_id = 0x586 }}"
     verdict = judge(tmp_path, drive=drive, more=OTHER.format(id=6, family=NORD))
-    assert "SDO1 reply of pump has COB-ID 586h" in only(verdict, Severity.ERROR)
+    collision, identifier = sorted(findings(verdict, Severity.ERROR))
+    assert "RPDO1 cannot have COB-ID 586h" in collision
+    assert "SDO1 reply of pump has COB-ID 586h" in identifier
 
 
 # load
@@ -291,7 +251,9 @@ def test_a_deadline_that_the_site_file_gives_counts(tmp_path: Path) -> None:
 
 def test_a_polled_tpdo_is_regular_and_costs_its_question(tmp_path: Path) -> None:
     drive = f"{TIMEOUT}\nrtr_poll_ms = 20\ntpdo = {{ transmission_type = 253 }}"
-    verdict = judge(tmp_path, drive=drive)
+    process = FAMILY.process.model_copy(update={"forbidden_types": []})
+    families = {NORD: FAMILY.model_copy(update={"process": process})}
+    verdict = judge(tmp_path, drive=drive, families=families)
     assert verdict.findings == ()
     extra = 50 * (55 + 135) - 4 * 135
     [polled], [plain] = verdict.loads, judge(tmp_path).loads

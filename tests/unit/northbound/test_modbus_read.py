@@ -13,7 +13,7 @@ from bridge.northbound.modbus.dispatch import EXCEPTIONS
 from bridge.northbound.modbus.pdu import Identify, identification_answer
 from bridge.northbound.modbus.registers import DriveMap, Table, Words32, bridge_rows, drive_maps
 from tests.support.rig import emergency
-from tests.unit.northbound.modbus_site import (
+from tests.support.modbus_site import (
     ENABLED,
     OTHER_PLC,
     PLC,

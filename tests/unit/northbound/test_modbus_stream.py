@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.northbound.modbus.conversation import Conversation
-from tests.unit.northbound.modbus_site import PLC, READY, Rig
+from tests.support.modbus_site import PLC, READY, Rig
 
 
 def adu(transaction: int, unit: int, pdu: bytes) -> bytes:

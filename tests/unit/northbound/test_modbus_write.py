@@ -7,7 +7,7 @@ import struct
 import pytest
 
 from bridge.command import Code, Event, Kind, Outcome, Plant, Reply, Request
-from tests.unit.northbound.modbus_site import (
+from tests.support.modbus_site import (
     ENABLED,
     OTHER_PLC,
     READY,

@@ -104,6 +104,14 @@ def test_drives_and_nodes_have_their_methods(trees: tuple[ObjectNode, ...]) -> N
         (Action.ENABLE, "conveyor"),
         (Action.DISABLE, "conveyor"),
     ]
+    bus = find(trees, "bus/can0").methods
+    assert [(method.action, method.target, method.id) for method in bus] == [
+        (Action.RESET, "bus/can0", "bus/can0/Reset"),
+        (Action.RESET_COMMUNICATION, "bus/can0", "bus/can0/ResetCommunication"),
+        (Action.START_NODE, "bus/can0", "bus/can0/StartNode"),
+        (Action.STOP_NODE, "bus/can0", "bus/can0/StopNode"),
+        (Action.ENTER_PRE_OPERATIONAL, "bus/can0", "bus/can0/EnterPreOperational"),
+    ]
 
 
 def test_kinds_follow_from_the_points(trees: tuple[ObjectNode, ...]) -> None:

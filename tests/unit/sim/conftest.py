@@ -123,3 +123,16 @@ def bench(make_bench) -> Bench:
 def live(make_bench) -> Bench:
     """Operational, drives in switch-on inhibited."""
     return make_bench(operational=True)
+
+
+@pytest.fixture
+def watched(make_bench):
+    """P151 = 100 ms, FU1 running at 25 Hz, the last telegram just now."""
+    bench = make_bench(operational=True, p151_ms=100)
+    bench.command(0x047E)
+    bench.command(0x047F, 0x2000)
+    for _ in range(30):
+        bench.run(0.05)
+        bench.command(0x047F, 0x2000)
+    assert bench.node.drives[0].output_hz == 25.0
+    return bench

@@ -372,3 +372,13 @@ def test_after_a_tpdo_that_is_too_long_the_next_right_one_counts(bench: Bench) -
         bench.receive(Frame(TPDO1, data))
         bench.run(0.001)
         assert bench.number("conveyor/fu1/status/drive_status_word") & 0xFF == low
+
+
+def test_bursts_that_the_kernel_no_longer_takes_are_told_once_and_so_is_their_return(bench: Bench) -> None:
+    for refusal in ("Cannot allocate memory", "Cannot allocate memory", "", ""):
+        bench.bus.status.bursts_refused = refusal
+        bench.run(0.2)
+    assert [event.message for event in bench.events if "bursts" in event.message] == [
+        "the kernel takes no bursts (Cannot allocate memory): the bridge sends them itself, less evenly",
+        "the kernel sends the bursts again",
+    ]

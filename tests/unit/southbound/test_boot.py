@@ -44,6 +44,8 @@ def run(folder: Path, answers: Answers) -> boot.BootResult:
         action = next(generator)
         while True:
             if not isinstance(action, boot.Read):
+                if isinstance(action, boot.Write):
+                    answers[action.index, action.sub] = action.data
                 action = generator.send(None)
             elif (action.index, action.sub) in answers:
                 action = generator.send(answers[action.index, action.sub])

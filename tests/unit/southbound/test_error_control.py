@@ -42,7 +42,7 @@ def test_guarding_asks_by_remote_frame_and_wants_the_toggle_bit() -> None:
     for step in range(10):
         now = 10.0 + 0.1 * step
         assert not guard.on_time(now + 1e-6)
-        assert guard.take_frames() == [Frame(0x705 | REMOTE)]
+        assert guard.take_frames() == [Frame(0x705 | REMOTE, b"\0")]
         guard.on_frame(guard_answer(toggle, now))
         toggle ^= 1
     assert guard.toggle_errors == 0

@@ -31,10 +31,16 @@ SDO2 = {0x645: 0x5C5}
 class Air:
     """Everything between the scanner and the devices arrives at once."""
 
-    def __init__(self, *devices: SdoDevice, passive: bool = False, bitrate: int = 250_000) -> None:
+    def __init__(
+        self,
+        *devices: SdoDevice,
+        passive: bool = False,
+        bitrate: int = 250_000,
+        own_id: int | None = None,
+    ) -> None:
         self.now = 100.0
         self.devices = devices
-        self.scanner = Scanner(self.now, bitrate, passive=passive)
+        self.scanner = Scanner(self.now, bitrate, passive=passive, own_id=own_id)
         self.sent: list[Frame] = []
 
     def hear(self, *frames: Frame) -> None:
@@ -89,6 +95,24 @@ def test_a_node_is_found_by_its_heartbeat_or_its_boot_up_alone() -> None:
     assert air.run() == [0x11, 0x12]
     assert air.node(0x11).nmt_state is NmtState.OPERATIONAL
     assert air.node(0x12).nmt_state is NmtState.PRE_OPERATIONAL
+
+
+def test_the_bridges_own_heartbeat_is_no_node() -> None:
+    air = Air(own_id=127)
+    air.hear(Frame(0x77F, b"\x05"))
+    assert air.run() == []
+
+
+def test_a_device_on_the_bridges_own_id_is_found() -> None:
+    air = Air(SdoDevice(127, LENZE, state=0x7F), own_id=127)
+    air.hear(Frame(0x77F, b"\x05"))
+    assert air.run() == [127]
+
+
+def test_a_second_sdo_channel_that_answers_for_the_bridges_own_id_is_no_node() -> None:
+    air = Air(SdoDevice(63, LENZE, {0x67F: 0x5FF}, state=0x7F), own_id=127)
+    air.hear(Frame(0x77F, b"\x05"))
+    assert air.run() == [63]
 
 
 def test_passive_sends_nothing() -> None:

@@ -247,9 +247,19 @@ def test_what_the_server_refuses_is_not_asked_again() -> None:
 
 
 @pytest.mark.parametrize("index", [0x1010, 0x1011])
-def test_store_and_restore_are_never_repeated(index: int) -> None:
+def test_store_and_restore_may_take_ten_seconds_and_are_never_repeated(index: int) -> None:
     client = Client(retries=3)
     client.write(index, 1, b"save")
+    client.wait(9.9)
+    assert not client.results
+    client.wait(0.2)
+    assert isinstance(client.result, SdoError)
+
+
+@pytest.mark.parametrize("index", [0x1010, 0x1011])
+def test_what_is_stored_is_read_in_the_ordinary_time(index: int) -> None:
+    client = Client()
+    client.read(index, 1)
     client.wait(0.6)
     assert isinstance(client.result, SdoError)
 

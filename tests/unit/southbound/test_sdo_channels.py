@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.errors import FileFaults
-from bridge.mapping import load_family
+from bridge.mapping import Family, load_family
 from bridge.mapping.model import SdoServer
 from bridge.mapping.site import load_site_and_families
 from bridge.southbound.boot import BootError, BootResult, Nmt, Read, Step, Write
@@ -16,7 +16,8 @@ from bridge.southbound.bus.frame import Frame
 from bridge.southbound.canopen import abort
 from bridge.southbound.canopen.nmt import NmtCommand
 from bridge.southbound.canopen.sdo import Result, SdoError
-from tests.support.bench import SITE, Bench, write_site
+from tests.support import sites
+from tests.support.bench import Bench, write_site
 
 OPENED = 'sdo_channels = [2]\nsupervision = "none"'
 
@@ -96,6 +97,30 @@ def test_a_node_that_is_lost_ends_the_transfers_of_all_its_channels(tmp_path: Pa
     assert [type(result) for result in results] == [SdoError, SdoError]
 
 
+def same_as_first() -> Family:
+    """The NORD family as if its SDO2 reached what SDO1 reaches, as Lenze's does."""
+    family = load_family("nord/sk-tu4-cao")
+    servers = [server.model_copy(update={"slot": None}) for server in family.sdo]
+    return family.model_copy(update={"sdo": servers})
+
+
+def test_polls_take_a_channel_of_their_own_where_one_reaches_the_same(tmp_path: Path) -> None:
+    bench = Bench(write_site(tmp_path, node=OPENED), family=same_as_first())
+    bench.run(2.0)
+    polled = {poll.object.index.to_bytes(2, "little") for poll in same_as_first().poll}
+    assert polled <= {frame.data[1:3] for frame in bench.sent(0x345)}
+    assert polled.isdisjoint({frame.data[1:3] for frame in bench.sent(0x605)})
+
+
+def test_polls_stay_on_the_first_channel_where_the_others_reach_a_drive_only(tmp_path: Path) -> None:
+    bench = bench_with(tmp_path, OPENED)
+    before = len(bench.sent(0x605))
+    bench.run(3.0)
+    assert len(bench.sent(0x605)) > before
+    polled = {poll.object.index.to_bytes(2, "little") for poll in load_family("nord/sk-tu4-cao").poll}
+    assert polled.isdisjoint({frame.data[1:3] for frame in bench.sent(0x345)})
+
+
 def test_retries_are_those_of_the_site_file(tmp_path: Path) -> None:
     bench = bench_with(tmp_path, 'supervision = "none"\nsdo_retries = 2\nsdo_timeout_ms = 50')
     results: list[Result] = []
@@ -118,8 +143,8 @@ def test_answers_to_what_nobody_asked_are_counted_where_the_user_sees_it(tmp_pat
 
 
 def test_a_channel_that_the_family_does_not_have_is_a_fault(tmp_path: Path) -> None:
-    path = tmp_path / "site.toml"
-    path.write_text(SITE.format(bus="", node="sdo_channels = [2, 5, 2]", drive=""), encoding="utf-8")
+    node = sites.node(sites.drive("fu1", "none", 0), more="sdo_channels = [2, 5, 2]")
+    path = sites.write(tmp_path, sites.bus(node))
     with pytest.raises(FileFaults) as caught:
         load_site_and_families(path)
     messages = [fault.message for fault in caught.value.faults]

@@ -1,4 +1,4 @@
-"""What a client of the OPC UA server sees and does: names, values, writes, methods."""
+"""What a client of the OPC UA server sees and writes: names, values, qualities."""
 
 from __future__ import annotations
 
@@ -6,67 +6,21 @@ import asyncio
 import math
 import socket
 import time
-from collections.abc import AsyncIterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-import pytest_asyncio
-from asyncua import Client, Node, ua
+from asyncua import Client, ua
 
 from bridge.command import Action
 from bridge.errors import Unavailable
 from bridge.image import Quality
 from bridge.northbound.opcua.server import OpcUaServer
-from tests.support.opcua_site import OPEN, LocalView, connected, make_plant, namespace, serving
+from tests.support.opcua_client import node, word, write, write_all, write_value
+from tests.support.opcua_site import OPEN, LocalView, make_plant, namespace
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 Codes = ua.StatusCodes
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def served(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[tuple[OpcUaServer, LocalView]]:
-    async with serving(OPEN, tmp_path_factory.mktemp("state")) as found:
-        yield found
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def client(served: tuple[OpcUaServer, LocalView]) -> AsyncIterator[Client]:
-    async with connected(served[0]) as found:
-        yield found
-
-
-@pytest.fixture
-def view(served: tuple[OpcUaServer, LocalView]) -> LocalView:
-    served[1].requests.clear()
-    return served[1]
-
-
-async def node(client: Client, name: str) -> Node:
-    return client.get_node(ua.NodeId(name, await namespace(client)))
-
-
-async def write(client: Client, **values: ua.Variant | ua.DataValue) -> list[int]:
-    """Write command points of conveyor/fu1 in one call; the status codes in their order."""
-    wanted: list[ua.WriteValue] = []
-    for leaf, value in values.items():
-        found = await node(client, f"conveyor/fu1/command/{leaf}")
-        wanted.append(write_value(found.nodeid, value))
-    return await write_all(client, wanted)
-
-
-def write_value(where: ua.NodeId, value: ua.Variant | ua.DataValue) -> ua.WriteValue:
-    data = value if isinstance(value, ua.DataValue) else ua.DataValue(value)
-    return ua.WriteValue(NodeId=where, AttributeId=ua.AttributeIds.Value, Value=data)
-
-
-async def write_all(client: Client, wanted: list[ua.WriteValue]) -> list[int]:
-    results = await client.uaclient.write(ua.WriteParameters(NodesToWrite=wanted))
-    return [result.value for result in results]
-
-
-def word(value: int) -> ua.Variant:
-    return ua.Variant(value, ua.VariantType.UInt16)
 
 
 class TestNames:
@@ -290,117 +244,6 @@ class TestWrites:
         (code,) = await write_all(client, [write_value(where, ua.Variant(1.0, ua.VariantType.Double))])
         # fu4 is commanded by nobody, which comes first.
         assert code == Codes.BadUserAccessDenied
-
-
-class TestMethods:
-    async def test_a_drive_is_started_and_stopped(self, client: Client, view: LocalView) -> None:
-        drive, space = await node(client, "conveyor/fu1"), await namespace(client)
-        await drive.call_method(f"{space}:Stop")
-        await asyncio.sleep(0.03)
-        await drive.call_method(f"{space}:Start", ua.Variant(-1, ua.VariantType.Int32))
-        assert view.plant.drives["conveyor/fu1"].channel.control_word == 0x147F
-        for name in ("KeepAlive", "QuickStop", "DisableVoltage", "ResetFault", "ReleaseControl"):
-            await drive.call_method(f"{space}:{name}")
-        assert [request.action for request in view.requests] == [
-            Action.STOP,
-            Action.START,
-            Action.KEEP_ALIVE,
-            Action.QUICK_STOP,
-            Action.DISABLE_VOLTAGE,
-            Action.RESET_FAULT,
-            Action.RELEASE_CONTROL,
-        ]
-
-    async def test_a_method_says_what_it_takes(self, client: Client) -> None:
-        start = await node(client, "conveyor/fu1/Start")
-        (argument,) = await (await start.get_child("0:InputArguments")).read_value()
-        assert (argument.Name, argument.DataType) == ("direction", ua.NodeId(ua.ObjectIds.Int32))
-
-    async def test_a_lease_is_taken_for_a_time(self, client: Client, view: LocalView) -> None:
-        drive, space = await node(client, "conveyor/fu3"), await namespace(client)
-        await drive.call_method(f"{space}:TakeControl", ua.Variant(500, ua.VariantType.UInt32))
-        assert view.requests[-1].ttl_ms == 500
-        assert await (await node(client, "conveyor/fu3/supervision/owner")).read_value() == "opcua:anonymous"
-        with pytest.raises(ua.uaerrors.BadOutOfRange):
-            await drive.call_method(f"{space}:TakeControl", ua.Variant(1, ua.VariantType.UInt32))
-        await drive.call_method(f"{space}:ReleaseControl")
-
-    async def test_a_node_is_commanded(self, client: Client, view: LocalView) -> None:
-        conveyor, space = await node(client, "conveyor"), await namespace(client)
-        for name in ("Reset", "ResetCommunication", "Disable", "Enable"):
-            await conveyor.call_method(f"{space}:{name}")
-        assert [(request.target, request.action.value) for request in view.requests] == [
-            ("conveyor", "reset"),
-            ("conveyor", "reset_communication"),
-            ("conveyor", "disable"),
-            ("conveyor", "enable"),
-        ]
-
-    async def test_a_drive_of_another_controller_is_not_started(self, client: Client) -> None:
-        drive, space = await node(client, "conveyor/fu2"), await namespace(client)
-        with pytest.raises(ua.uaerrors.BadUserAccessDenied):
-            await drive.call_method(f"{space}:Start", ua.Variant(1, ua.VariantType.Int32))
-
-    async def test_a_tripped_drive_wants_an_acknowledge_first(self, client: Client, view: LocalView) -> None:
-        drive, space = await node(client, "conveyor/fu3"), await namespace(client)
-        start = ua.Variant(1, ua.VariantType.Int32)
-        await drive.call_method(f"{space}:TakeControl", ua.Variant(60_000, ua.VariantType.UInt32))
-        await drive.call_method(f"{space}:KeepAlive")
-        await asyncio.sleep(0.4)
-        with pytest.raises(ua.uaerrors.BadInvalidState):
-            await drive.call_method(f"{space}:Start", start)
-        await drive.call_method(f"{space}:ResetFault")
-        await drive.call_method(f"{space}:ReleaseControl")
-
-    @pytest.mark.parametrize(
-        ("arguments", "code"),
-        [
-            ([], Codes.BadArgumentsMissing),
-            ([ua.Variant(1, ua.VariantType.Int32)] * 2, Codes.BadTooManyArguments),
-            ([ua.Variant(1.0, ua.VariantType.Double)], Codes.BadInvalidArgument),
-            ([ua.Variant(7, ua.VariantType.Int32)], Codes.BadInvalidArgument),
-            ([ua.Variant([1], ua.VariantType.Int32)], Codes.BadInvalidArgument),
-        ],
-    )
-    async def test_wrong_arguments_start_nothing(
-        self, client: Client, view: LocalView, arguments: list[ua.Variant], code: int
-    ) -> None:
-        assert await call(client, "conveyor/fu1", "conveyor/fu1/Start", arguments) == code
-        assert view.requests == []
-
-    async def test_a_method_belongs_to_its_object(self, client: Client, view: LocalView) -> None:
-        assert await call(client, "conveyor/fu1", "conveyor/fu2/Stop", []) == Codes.BadMethodInvalid
-        assert await call(client, "conveyor/fu1", "conveyor/fu1/Fly", []) == Codes.BadNodeIdUnknown
-        assert view.requests == []
-
-    async def test_a_start_that_takes_long_holds_nobody_up(self, client: Client, view: LocalView) -> None:
-        """Not even the session that called it: its keep-alives are what keeps the drive going."""
-        await call(client, "conveyor/fu1", "conveyor/fu1/Stop", [])
-        await asyncio.sleep(0.05)
-        view.answers = False
-        try:
-            start = [ua.Variant(1, ua.VariantType.Int32)]
-            # From switch-on inhibited, with a drive that says nothing, until the channel gives up.
-            view.plant.drives["conveyor/fu1"].on_process_data([0x0240, 0, 0, 0], time.monotonic())
-            starting = asyncio.create_task(call(client, "conveyor/fu1", "conveyor/fu1/Start", start))
-            began = time.monotonic()
-            await asyncio.sleep(0.05)
-            assert await call(client, "conveyor/fu1", "conveyor/fu1/KeepAlive", []) == Codes.Good
-            await (await node(client, "conveyor/fu1/status/state")).read_value()
-            assert time.monotonic() - began < 1
-            assert not starting.done()
-            assert await starting == Codes.BadTimeout
-        finally:
-            view.answers = True
-
-
-async def call(client: Client, owner: str, method: str, arguments: list[ua.Variant]) -> int:
-    space = await namespace(client)
-    request = ua.CallMethodRequest(
-        ObjectId=ua.NodeId(owner, space), MethodId=ua.NodeId(method, space), InputArguments=arguments
-    )
-    (result,) = await client.uaclient.call([request])
-    return result.StatusCode.value
 
 
 async def test_a_port_in_use_is_one_helpful_sentence(

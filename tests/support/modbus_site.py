@@ -3,54 +3,25 @@
 from __future__ import annotations
 
 import struct
-import tomllib
 from collections.abc import Sequence
-from functools import cache
 
 from bridge.command import Drive, Identity, Plant, Source
 from bridge.command.link import NodeState
-from bridge.config import Site, WordOrder
-from bridge.mapping import load_family
+from bridge.config import WordOrder
 from bridge.northbound.modbus.dispatch import Dispatcher
+from tests.support import sites
 
-FAMILY = "nord/sk-tu4-cao"
-SITE = """
-site.name = "hall"
-
-[[bus]]
-name = "can0"
-interface = "virtual"
-
-[[bus.node]]
-name = "conveyor"
-id = 5
-mapping = "nord/sk-tu4-cao"
-hold_ms = 2000
-
-[[bus.node.drive]]
-slot = "fu1"
-unit_id = 1
-control = "modbus"
-fieldbus_timeout_ms = 200
-parameters = { P105 = 50.0 }
-
-[[bus.node.drive]]
-slot = "fu2"
-unit_id = 2
-control = "opcua"
-fieldbus_timeout_ms = 200
-parameters = { P105 = 50.0, P112 = 10.0 }
-
-[[bus.node.drive]]
-slot = "fu3"
-unit_id = 9
-control = "modbus"
-fieldbus_timeout_ms = 200
-fieldbus_timeout_writable = true
-
-[modbus]
-listen = "127.0.0.1:0"
-"""
+SITE = sites.site(
+    sites.bus(
+        sites.node(
+            sites.drive("fu1", "modbus", 200, "unit_id = 1\nparameters = { P105 = 50.0 }"),
+            sites.drive("fu2", "opcua", 200, f"unit_id = 2\n{sites.SCALED}"),
+            sites.drive("fu3", "modbus", 200, "unit_id = 9\nfieldbus_timeout_writable = true"),
+            more="hold_ms = 2000",
+        )
+    ),
+    sites.modbus(0),
+)
 
 PLC = Identity(Source.MODBUS, "10.0.0.5", address="10.0.0.5:40001")
 OTHER_PLC = Identity(Source.MODBUS, "10.0.0.6", address="10.0.0.6:40001")
@@ -58,12 +29,8 @@ OTHER_PLC = Identity(Source.MODBUS, "10.0.0.6", address="10.0.0.6:40001")
 SWITCH_ON_INHIBITED, READY, ENABLED = 0x0240, 0x0231, 0x0237
 
 
-_family = cache(load_family)
-
-
 def make_plant() -> Plant:
-    site = Site.model_validate(tomllib.loads(SITE))
-    return Plant(site, {FAMILY: _family(FAMILY)}, "1.2.3")
+    return sites.plant_of(SITE)
 
 
 class Rig:

@@ -12,8 +12,9 @@ import pytest
 from bridge.config import OpcUaTable, UserTable
 from bridge.northbound.opcua.security import hash_password
 from tests.support.opcua_site import serving
+from tests.support.process import REPOSITORY
 
-FOLDER = Path(__file__).parent / "node"
+FOLDER = REPOSITORY / "tests" / "wire" / "node"
 
 
 @pytest.fixture(autouse=True)

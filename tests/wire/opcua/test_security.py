@@ -241,6 +241,8 @@ class TestRoles:
                     await drive.call_method(f"{space}:{method}")
             with pytest.raises(Refused):
                 await client.get_node(ua.NodeId("conveyor", space)).call_method(f"{space}:Reset")
+            with pytest.raises(Refused):
+                await client.get_node(ua.NodeId("bus/can0", space)).call_method(f"{space}:StopNode")
 
     async def test_an_observer_with_a_name_commands_nothing_either(self, strict: Served, scada: Peer) -> None:
         async with logged_in(strict, scada, "otto", PASSWORD) as client:

@@ -1,0 +1,103 @@
+"""Downloads that the bridge's own settings undo: the node is written twice in each boot-up, and holds what
+the configuration does not say. And a node told to watch a heartbeat that does not come."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from bridge.config import NodeTable, PdoTable
+from bridge.lint.bus import BusView, NodeView
+from bridge.lint.report import LintReport
+from bridge.lint.settings import RPDO, TPDO, pdo_cob_id
+from bridge.southbound.boot import heartbeat_period_ms
+
+_CONSUMER: Final = 0x1016
+_COB_ID: Final = 1
+
+
+def check_contradictions(bus: BusView, report: LintReport) -> None:
+    for node in bus.nodes:
+        for (index, sub), value, why in _own_settings(node):
+            setting = node.settings[index, sub]
+            if setting is None:
+                continue
+            given = pdo_cob_id(setting.value) if _is_cob_id(index, sub) else setting.value
+            if given != value:
+                number = "{:X}h".format if _is_cob_id(index, sub) else str
+                report.warning(
+                    setting.key,
+                    f"{index:04X}h:{sub:02X} = {number(given)}, and the bridge sets it to {number(value)}",
+                    f"leave it out: {why} decides",
+                )
+        _check_consumer(bus, node, report)
+
+
+def _is_cob_id(index: int, sub: int) -> bool:
+    return index >= RPDO[0] and sub == _COB_ID
+
+
+def _own_settings(node: NodeView) -> Iterator[tuple[tuple[int, int], int, str]]:
+    """What the boot-up sets after the configuration: object, value, and the key that asks for it."""
+    for index, value in _error_control(node.table).items():
+        yield (index, 0), value, "supervision"
+    slots = {slot.name: slot for slot in node.family.slot}
+    for drive in node.drives:
+        slot = slots[drive.table.slot]
+        for (base, _), tables, pdos, name in (
+            (RPDO, drive.table.rpdo, slot.rpdo, "rpdo"),
+            (TPDO, drive.table.tpdo, slot.tpdo, "tpdo"),
+        ):
+            for own in tables:
+                number = pdos[0].number if own.number is None else own.number
+                for sub, value in _pdo_settings(own):
+                    yield (base + number - 1, sub), value, f"{name} of {drive.name}"
+
+
+def _error_control(table: NodeTable) -> dict[int, int]:
+    """1017h, 100Ch and 100Dh as ``boot.error_control`` sets them: one of the two kinds is off."""
+    guarding = table.supervision == "guarding"
+    return {
+        0x1017: heartbeat_period_ms(table.supervision_ms) if table.supervision == "heartbeat" else 0,
+        0x100C: table.supervision_ms if guarding else 0,
+        0x100D: table.life_time_factor if guarding else 0,
+    }
+
+
+def _pdo_settings(own: PdoTable) -> Iterator[tuple[int, int]]:
+    inhibit_100us = None if own.inhibit_ms is None else round(10 * own.inhibit_ms)
+    for sub, value in (
+        (_COB_ID, own.cob_id),
+        (2, own.transmission_type),
+        (3, inhibit_100us),
+        (5, own.event_ms),
+    ):
+        if value is not None:
+            yield sub, value
+
+
+def _check_consumer(bus: BusView, node: NodeView, report: LintReport) -> None:
+    """1016h: node id in bits 16…22, consumer time in ms below (CiA 301, object 1016h). Other nodes'
+    heartbeats are the site's own affair; that they are there at all is checked."""
+    heartbeats = {
+        other.table.id: heartbeat_period_ms(other.table.supervision_ms)
+        for other in bus.nodes
+        if other.table.supervision == "heartbeat"
+    }
+    if bus.table.heartbeat_ms:
+        heartbeats[bus.table.master_node_id] = bus.table.heartbeat_ms
+    for sub, setting in node.settings.of(_CONSUMER):
+        node_id, time_ms = setting.value >> 16 & 0x7F, setting.value & 0xFFFF
+        if not sub or not node_id or not time_ms:
+            continue
+        name = f"{_CONSUMER:04X}h:{sub:02X}"
+        period_ms = heartbeats.get(node_id)
+        if period_ms is None:
+            report.warning(setting.key, f"{name}: there is no heartbeat of node {node_id} to wait for")
+        elif time_ms <= period_ms:
+            whose = "the bridge" if node_id == bus.table.master_node_id else f"node {node_id}"
+            report.warning(
+                setting.key,
+                f"{name} waits for {time_ms} ms, and {whose}'s heartbeat comes every {period_ms} ms",
+                f"at least {2 * period_ms}",
+            )

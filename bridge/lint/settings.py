@@ -1,0 +1,77 @@
+"""What is downloaded to a node, as numbers, and where the site file says so."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.config import NodeTable
+from bridge.config.download import Download
+from bridge.southbound.canopen import cobid
+from bridge.tomlfile import Key
+
+_EMCY: Final = 0x1014
+_MOST_PDOS: Final = 512
+_ENTRY_BITS: Final = 0xFF
+_EXTENDED_ID: Final = cobid.PDO_EXTENDED | 0x1FFF_FFFF
+RPDO: Final = (0x1400, 0x1600)
+TPDO: Final = (0x1800, 0x1A00)
+"""First communication and first mapping object."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One object as it will be when all is downloaded."""
+
+    value: int
+    key: Key
+
+
+class Settings:
+    """All downloads of one node. Of an object that is written more than once the last value counts."""
+
+    def __init__(self, node: NodeTable, key: Key, from_file: Sequence[Download]) -> None:
+        """``from_file`` are the objects of the node's configuration file."""
+        listed = [(one, (*key, "configuration")) for one in from_file]
+        listed += [(one.download, (*key, "configure", c)) for c, one in enumerate(node.configure)]
+        self._found: Mapping[tuple[int, int], Setting] = {
+            (one.index, one.sub): Setting(int.from_bytes(one.data, "little"), where) for one, where in listed
+        }
+
+    def __getitem__(self, place: tuple[int, int]) -> Setting | None:
+        """What ``index, sub`` will hold, None where nothing is said of it."""
+        return self._found.get(place)
+
+    def number(self, index: int, sub: int, default: int) -> int:
+        found = self._found.get((index, sub))
+        return default if found is None else found.value
+
+    def of(self, index: int) -> Iterator[tuple[int, Setting]]:
+        """All sub-indices of an object."""
+        for (one, sub), setting in self._found.items():
+            if one == index:
+                yield sub, setting
+
+    def pdos(self) -> Iterator[tuple[bool, int]]:
+        """PDOs that are given a COB-ID: whether the node receives it, and its number."""
+        for receives, (base, _) in ((True, RPDO), (False, TPDO)):
+            for index, sub in self._found:
+                if sub == 1 and base <= index < base + _MOST_PDOS:
+                    yield receives, index - base + 1
+
+    def mapped_bits(self, index: int, have: Sequence[int]) -> int:
+        """The bits of a PDO with mapping object ``index``; ``have`` are those of the entries it has now."""
+        count = self.number(index, 0, len(have))
+        bits = [*have, *([0] * (count - len(have)))][:count]
+        return sum(self.number(index, sub, old) & _ENTRY_BITS for sub, old in enumerate(bits, 1))
+
+    def emcy_id(self, default: int) -> int | None:
+        """The identifier of emergency messages, None where they are off; ``default`` is 1014h now."""
+        value = self.number(_EMCY, 0, default)
+        return None if value & cobid.PDO_DISABLED else value & cobid.COB_ID_MASK
+
+
+def pdo_cob_id(value: int) -> int:
+    """The identifier in sub-index 1 of a communication object; one with 29 bits keeps bit 29."""
+    return value & (_EXTENDED_ID if value & cobid.PDO_EXTENDED else cobid.COB_ID_MASK)

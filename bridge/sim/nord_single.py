@@ -1,0 +1,214 @@
+"""One NORD inverter SK 5xxE to a node: with an SK TU3-CAO, or by its own RJ45 sockets (BU 2500)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from bridge.sim.communication_objects import (
+    Memory,
+    add_errors,
+    add_identity,
+    add_memory,
+    add_protocols,
+    add_sdo_servers,
+)
+from bridge.sim.dictionary import DataType as Type
+from bridge.sim.dictionary import Dictionary, Number
+from bridge.sim.nmt_slave import NmtCommand, NmtState
+from bridge.sim.nord_drive import VALID, NordDrive
+from bridge.sim.nord_faults import LINK_BROKEN, TELEGRAM_DOWNTIME
+from bridge.sim.nord_interface import DriveAccess, FirstChannel, identity
+from bridge.sim.nord_node import NordNode
+from bridge.sim.nord_settings import ACTUAL_VALUES, CONTROL_WORDS, RULES, SETPOINTS, STATUS_WORDS
+from bridge.sim.nord_single_settings import ENCODER, TU3, Variant, factory_settings
+from bridge.sim.nord_states import State
+from bridge.sim.nord_supervision import TelegramWatch
+from bridge.sim.pdo_objects import PdoObjects
+from bridge.sim.sdo_server import SdoServer
+from bridge.sim.store import Store
+
+_P513: Final = 513
+_P513_UNIT_MS: Final = 100
+_P746: Final = 0x2000 + 746
+_INTERFACE_ID: Final = 0x0C00
+"""The high byte of P746 (§7.2)."""
+
+
+class NordSingle(NordNode):
+    """``p513_s`` is the drive's watch over its master, the only one there is (§8.1): 0 off, -0.1 ignore."""
+
+    def __init__(
+        self,
+        node_id: int,
+        variant: Variant = TU3,
+        *,
+        p513_s: float = 0.0,
+        p105_hz: float = 50.0,
+        p112_a: float = 10.0,
+        ripple: float = 0.0,
+        seed: int = 0,
+    ) -> None:
+        self.variant = variant
+        self.drive = NordDrive(
+            p105_hz=p105_hz, p112_a=p112_a, ripple=ripple, seed=seed, parameters=variant.parameters
+        )
+        self.drive.parameters.commission(_P513, p513_s)
+        self.linked = True
+        self._control = 0
+        self._setpoints = [0] * variant.values
+        self._written: set[int] = set()
+        """Words written since they were last forwarded: 0 is the control word, n setpoint n."""
+        super().__init__(
+            node_id,
+            [self.drive],
+            Store(lambda: factory_settings(node_id, variant)),
+            TelegramWatch(self._p513_ms),
+        )
+        self._build()
+
+    # What a test or a demonstration does to the drive.
+
+    def fail_drive(self, fault_tenths: int) -> None:
+        """The drive trips by itself; 30 is E003/3.0. The cause is gone at once, the acknowledge works."""
+        self._injected.append(lambda: self.drive.trip(fault_tenths))
+
+    def drop_drive(self) -> None:
+        """Interface and drive lose each other: 10.8 in the drive (§8.4). By RJ45 there is no interface."""
+        if not self.variant.has_interface:
+            raise ValueError(f"{self.variant.device_name} has no interface that it could lose")
+        self._injected.append(self._unlink)
+
+    def restore_drive(self) -> None:
+        """Interface and drive have each other again. The fault stays until the acknowledge."""
+        self._injected.append(self._link)
+
+    # The application of the CANopen slave.
+
+    def restarted(self, command: NmtCommand) -> None:
+        if command is NmtCommand.RESET_COMMUNICATION:
+            return  # the application, and with it P513, is not touched (CiA 301 §7.3.2.2.1)
+        self._power_on()
+        # Interface or CANopen are gone for a moment. The manual does not say what a drive makes of it; here
+        # one that is running reports it, one at rest lets it pass.
+        if self.drive.state in (State.ENABLED, State.QUICK_STOP):
+            self.drive.communication_lost(LINK_BROKEN if self.variant.has_interface else TELEGRAM_DOWNTIME)
+            self.drive.cause_gone()
+
+    def accepts_rpdo(self, number: int, length: int) -> bool:
+        del number, length  # the rule of the four words is the SK xU4-CAO's (§6.4)
+        return True
+
+    def rpdo_applied(self, number: int) -> None:
+        del number  # what was written says it
+        if 0 in self._written and self._control & VALID and self.linked:
+            self._watch.on_telegram(self._now)
+            self._causes_gone(TELEGRAM_DOWNTIME)
+        self._forward()
+
+    def master_lost(self) -> None:
+        if self.linked:
+            self.drive.communication_lost(TELEGRAM_DOWNTIME)
+
+    def master_back(self) -> None:
+        self._causes_gone(TELEGRAM_DOWNTIME)
+
+    # How it works inside.
+
+    def _fill(self, dictionary: Dictionary, pdos: PdoObjects) -> Sequence[SdoServer]:
+        add_identity(dictionary, identity(self.variant.device_name), self._module_state)
+        add_errors(dictionary, self._emcy)
+        add_memory(dictionary, Memory(self._communication.save, self._communication.forget))
+        add_protocols(dictionary, self._communication)
+        add_sdo_servers(dictionary, self._communication)
+        self._add_words(dictionary)
+        pdos.add()
+        parameters = Dictionary()
+        self.drive.add_to(parameters)
+        if self.variant.has_interface:
+            parameters.add(_P746, 0, Number(Type.UNSIGNED16, self._module_state))
+        access = DriveAccess(parameters, lambda: self.linked)
+        return [SdoServer(FirstChannel([dictionary, access]), RULES.sdo_block_segments)]
+
+    def _add_words(self, dictionary: Dictionary) -> None:
+        """3000h…3003h as §6.5.7 numbers them for one drive: the two words without a sub-index."""
+        u16, drive = Type.UNSIGNED16, self.drive
+
+        def set_control(value: int) -> None:
+            self._control = value
+            self._written.add(0)
+
+        def setpoint(place: int) -> Number:
+            def write(value: int) -> None:
+                self._setpoints[place] = value
+                self._written.add(place + 1)
+
+            return Number(u16, lambda: self._setpoints[place], write, in_rpdo=True, in_tpdo=True)
+
+        def actual(place: int) -> Number:
+            return Number(u16, lambda: drive.actual_values[place] if self.linked else 0, in_tpdo=True)
+
+        control = Number(u16, lambda: self._control, set_control, in_rpdo=True, in_tpdo=True)
+        status = Number(u16, lambda: drive.status_word if self.linked else 0, in_tpdo=True)
+        dictionary.add(CONTROL_WORDS, 0, control)
+        dictionary.add(STATUS_WORDS, 0, status)
+        dictionary.add_array(SETPOINTS, [setpoint(place) for place in range(self.variant.values)])
+        dictionary.add_array(ACTUAL_VALUES, [actual(place) for place in range(self.variant.values)])
+        if not self.variant.has_interface:
+            dictionary.add(ENCODER, 0, self._encoder())
+
+    def _encoder(self) -> Number:
+        """The position that an absolute encoder, or who plays it, tells the drive."""
+
+        def write(value: int) -> None:
+            self.drive.position_increments = value
+
+        return Number(
+            Type.INTEGER32, lambda: round(self.drive.position_increments), write, in_rpdo=True, in_tpdo=True
+        )
+
+    def _p513_ms(self) -> int:
+        """P513; at -0.1 s the drive ignores it."""
+        return max(0, self.drive.parameters.raw(_P513)) * _P513_UNIT_MS
+
+    def _module_state(self) -> int:
+        """P746 (§7.2): ready, operational, fault, time-out; 0Ch in the high byte. 1002h shows it too."""
+        state = 0x01 | (0x02 if self.slave.state is NmtState.OPERATIONAL else 0)
+        state |= (0 if self.linked else 0x10) | (0x20 if self._watch.tripped else 0)
+        return state | _INTERFACE_ID if self.variant.has_interface else state
+
+    def _power_on(self) -> None:
+        self._control, self._setpoints = 0, [0] * self.variant.values
+        self._written.clear()
+        self._watch.disarm()
+        self._reporter.reset()
+
+    def _words_by_sdo(self) -> None:
+        if self.slave.state is NmtState.OPERATIONAL:
+            # They act on the drive, but P513 waits for a process data telegram.
+            self._forward()
+
+    def _watch_expired(self) -> None:
+        if self.linked:
+            self.drive.communication_lost(TELEGRAM_DOWNTIME)
+
+    def _unlink(self) -> None:
+        self.linked = False
+        self.drive.communication_lost(LINK_BROKEN)
+
+    def _link(self) -> None:
+        self.linked = True
+        self._causes_gone(LINK_BROKEN)
+
+    def _forward(self) -> None:
+        written, self._written = self._written, set()
+        if not written or not self.linked:
+            return
+        setpoints = list(self._setpoints)
+        if self.variant.has_interface and 0 in written:
+            # §6.5.7: the RPDO that is sent says whether one or up to three setpoints are evaluated.
+            setpoints = [word if n in written else 0 for n, word in enumerate(setpoints, start=1)]
+        self.drive.on_telegram(self._control, setpoints)
+
+    def _present_faults(self) -> Sequence[int | None]:
+        return [self.drive.fault_tenths if self.linked else None]

@@ -1,0 +1,187 @@
+"""What the shared design (watchdog) says of the controller leg, written down a second time.
+
+Nothing here is taken from ``bridge.command``: the exploration compares the two after every event.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+
+from bridge.command import Identity, Role
+
+START_LIMIT_S = 3.0
+
+
+class Stage(IntEnum):
+    """What is still missing before an enabling control word may leave the bridge, from the most to nothing."""
+
+    ACKNOWLEDGE = 0
+    STOP_WORD = 1
+    ENABLE = 2
+    ENABLED = 3
+
+
+@dataclass(slots=True)
+class LegModel:
+    """One drive's controller leg. ``timeout_s`` 0 is off; ``ignores``: telegram downtime -0.1."""
+
+    control: str
+    timeout_s: float
+    ignores: bool
+    holds: bool
+    now: float
+    is_there: bool = False
+    """The node is operational."""
+    owner: Identity | None = None
+    deadline: float | None = None
+    """The timer of the controller leg."""
+    lease_until: float | None = None
+    ttl_s: float = 0.0
+    start_until: float | None = None
+    silent: bool = False
+    tripped: bool = False
+    held: bool = False
+    """With the reaction "hold": a drive that moved when the watchdog tripped goes on."""
+    acknowledges: bool = False
+    """The acknowledge bit of the owner's last control word."""
+    stage: Stage = Stage.STOP_WORD
+
+    def copy(self) -> LegModel:
+        return replace(self)
+
+    # what it may do
+
+    @property
+    def may_enable(self) -> bool:
+        return self.is_there
+
+    @property
+    def enables(self) -> bool:
+        return self.held or self.stage is Stage.ENABLED
+
+    @property
+    def is_due(self) -> bool:
+        """A timer has run out that nobody has looked at."""
+        times = (self.deadline, self.lease_until, self.start_until)
+        return any(time is not None and self.now >= time for time in times)
+
+    def may(self, who: Identity, *, take: bool = False) -> bool:
+        """Whether ``who`` may command the drive, or take control of it."""
+        if who.role < Role.OPERATOR:
+            return False
+        is_owner = who.is_same(self.owner)
+        if self.control == "lease":
+            free = self.owner is None or self.silent
+            return is_owner or (take and (free or who.role >= Role.ENGINEER))
+        never_spoke = self.deadline is None and not self.silent and not self.tripped
+        free = self.owner is None or self.silent or (never_spoke and self.timeout_s > 0 and not self.ignores)
+        return who.source.label == self.control and (is_owner or free)
+
+    # time
+
+    def judge(self) -> None:
+        """The controller's timers."""
+        if self.deadline is not None and self.now >= self.deadline:
+            self.deadline = None
+            self.silent = True
+            if not self.ignores and not self.tripped:
+                self.held = self.holds and self.stage is Stage.ENABLED
+                self.tripped = True
+                self.stage = Stage.ACKNOWLEDGE
+                self.start_until = None
+        if self.lease_until is not None and self.now >= self.lease_until:
+            self.leave()
+
+    def pump(self) -> None:
+        """All timers, as in each round of the service."""
+        self.judge()
+        if self.start_until is not None and self.now >= self.start_until:
+            self.stop()
+
+    # what happens
+
+    def stop(self) -> None:
+        """Whatever was enabled has to be enabled anew."""
+        self.stage = min(self.stage, Stage.STOP_WORD)
+        self.held = self.acknowledges = False
+        self.start_until = None
+
+    def leave(self) -> None:
+        self.stop()
+        self.owner = self.lease_until = self.deadline = None
+        self.silent = False
+
+    def own(self, who: Identity) -> None:
+        if not who.is_same(self.owner):
+            if self.owner is not None:
+                self.leave()
+            self.owner = who
+        if self.control == "lease":
+            self.lease_until = self.now + self.ttl_s
+
+    def telegram(self, who: Identity) -> None:
+        self.own(who)
+        self.silent = False
+        self.deadline = self.now + self.timeout_s if self.timeout_s else None
+
+    def take(self, who: Identity, ttl_s: float) -> None:
+        if self.control == "lease":
+            self.ttl_s = ttl_s
+        self.own(who)
+
+    def acknowledge(self, who: Identity) -> None:
+        self.telegram(who)
+        if self.tripped:
+            self.tripped = False
+            self.stop()
+            self.stage = Stage.STOP_WORD
+
+    def word(self, who: Identity, *, enables: bool, acknowledges: bool) -> None:
+        """A valid control word."""
+        self.telegram(who)
+        self.start_until = None
+        is_edge = acknowledges and not self.acknowledges
+        if self.tripped and is_edge:
+            self.acknowledge(who)
+        elif self.tripped:
+            self.held = self.held and enables
+        elif enables:
+            self.stage = Stage.ENABLED if self.stage >= Stage.ENABLE else self.stage
+        elif self.may_enable:
+            self.stage = Stage.ENABLE
+        self.acknowledges = acknowledges
+
+    def start(self, who: Identity, *, ready: bool, enabled: bool) -> None:
+        """A start that was taken, of a drive that is in this state."""
+        self.telegram(who)
+        self.stage = Stage.ENABLED if ready else Stage.ENABLE
+        self.acknowledges = False
+        self.start_until = None if enabled else self.now + START_LIMIT_S
+
+    def drive_is(self, *, fault: bool, ready: bool, enabled: bool) -> None:
+        if self.start_until is None:
+            return
+        if fault:
+            self.stop()
+        elif ready:
+            self.stage = Stage.ENABLED
+        if enabled:
+            self.start_until = None
+
+    def node(self, *, is_there: bool) -> None:
+        was_there = self.is_there
+        self.is_there = is_there or (self.ignores and was_there)
+        if is_there or not self.is_there:
+            start_until = self.start_until if self.is_there else None
+            acknowledges, held = self.acknowledges, self.held and self.is_there
+            self.stop()
+            self.acknowledges, self.held, self.start_until = acknowledges, held, start_until
+
+    def gap(self) -> None:
+        """The bridge itself hung."""
+        self.judge()
+        if self.tripped:
+            self.stop()
+        else:
+            self.leave()

@@ -1,0 +1,92 @@
+"""Site files for tests, put together from their tables.
+
+``site(bus(node(drive("fu1", "modbus", 200))), modbus())`` is the text of one with a single drive. ``more`` is
+TOML text with further keys of the same table.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from pathlib import Path
+
+from bridge.command import Plant
+from bridge.config import Site
+from bridge.mapping import load_family
+
+FAMILY = "nord/sk-tu4-cao"
+SCALED = "parameters = { P105 = 50.0, P112 = 10.0 }"
+"""What setpoints and currents are scaled with: P105 in Hz, P112 in A."""
+
+family = cache(load_family)
+
+
+def drive(slot: str, control: str, timeout_ms: int, more: str = SCALED) -> str:
+    return f"""
+[[bus.node.drive]]
+slot = "{slot}"
+control = "{control}"
+fieldbus_timeout_ms = {timeout_ms}
+{more}
+"""
+
+
+def node(*drives: str, name: str = "conveyor", more: str = "") -> str:
+    """A SK TU4-CAO, node 5 of its bus."""
+    return f"""
+[[bus.node]]
+name = "{name}"
+id = 5
+mapping = "{FAMILY}"
+{more}
+{"".join(drives)}"""
+
+
+def bus(*nodes: str, name: str = "can0", interface: str = "virtual", more: str = "") -> str:
+    return f"""
+[[bus]]
+name = "{name}"
+interface = "{interface}"
+{more}
+{"".join(nodes)}"""
+
+
+def socketcan(*nodes: str, number: int = 0, more: str = "") -> str:
+    """can0 on vcan0, can1 on vcan1, at 1 Mbit/s."""
+    channel = f'channel = "vcan{number}"\nbitrate = 1000000\n{more}'
+    return bus(*nodes, name=f"can{number}", interface="socketcan", more=channel)
+
+
+def modbus(port: int | None = None) -> str:
+    return f"[modbus]\n{_listen(port)}"
+
+
+def opcua(port: int | None = None) -> str:
+    """Without security, every client an operator."""
+    return f'[opcua]\n{_listen(port)}no_security = true\nanonymous = "operator"\n'
+
+
+def zenoh(port: int | None = None) -> str:
+    return "[zenoh]\n" + ("" if port is None else f'listen = ["tcp/127.0.0.1:{port}"]\n')
+
+
+def _listen(port: int | None) -> str:
+    return "" if port is None else f'listen = "127.0.0.1:{port}"\n'
+
+
+def site(*tables: str, name: str = "hall", folder: Path | None = None) -> str:
+    """``folder`` takes what the service keeps and its sockets."""
+    folders = "" if folder is None else f'state_dir = "{folder}/state"\nruntime_dir = "{folder}/run"\n'
+    return f'[site]\nname = "{name}"\n{folders}' + "".join(tables)
+
+
+def write(folder: Path, *tables: str, name: str = "hall") -> Path:
+    """The site as ``folder/site.toml``."""
+    path = folder / "site.toml"
+    path.write_text(site(*tables, name=name, folder=folder), encoding="utf-8")
+    return path
+
+
+def plant_of(text: str) -> Plant:
+    """The plant of a site's text, without a bus."""
+    return Plant(Site.model_validate(tomllib.loads(text)), {FAMILY: family(FAMILY)}, "1.2.3")

@@ -1,0 +1,75 @@
+"""What is repeated on the bus is kept from round to round, and never longer than it is right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bridge.command import Action, Outcome, Request
+from bridge.command.link import NodeState
+from tests.support.bench import PLC, Bench, write_site
+from tests.support.quick import Quick, quick_site
+
+RPDO1 = 0x200
+
+
+def operational(folder: Path, nodes: int = 3) -> Quick:
+    quick = Quick(quick_site(folder, nodes, bus="sync_period_ms = 10"))
+    quick.run(3.0)
+    assert all(node.state is NodeState.OPERATIONAL for node in quick.network.nodes)
+    return quick
+
+
+def kept_is_right(quick: Quick) -> bool:
+    quick.network.take_routes()
+    kept = quick.network.beats()
+    return kept == quick.network.beats(anew=True)
+
+
+def test_heartbeats_do_not_make_it_anew(tmp_path: Path) -> None:
+    quick = operational(tmp_path)
+    quick.network.take_routes()
+    before = quick.network.beats()
+    quick.run(0.5)
+    assert quick.network.beats() is before
+
+
+def test_a_changed_word_is_in_it_at_once(tmp_path: Path) -> None:
+    bench = Bench(write_site(tmp_path))
+    bench.run(3.0)
+    before = bench.network.beats()[RPDO1 + 5]
+    request = Request(PLC, "conveyor/fu1", Action.WRITE, {"control_word": 0x047E})
+    outcomes: list[Outcome] = []
+    bench.plant.submit(request, bench.now, outcomes.append)
+    assert outcomes[0].forwarded
+    assert bench.network.beats()[RPDO1 + 5] != before
+
+
+def test_it_is_right_whatever_becomes_of_the_nodes(tmp_path: Path) -> None:
+    quick = operational(tmp_path)
+    quick.nodes[1].present = False
+    for _ in range(20):
+        quick.run(0.1)
+        assert kept_is_right(quick)
+    assert quick.core(1).state is NodeState.LOST
+    quick.nodes[1].present = True
+    quick.nodes[1].start(quick.now)
+    for _ in range(40):
+        quick.run(0.1)
+        assert kept_is_right(quick)
+    assert quick.core(1).state is NodeState.OPERATIONAL
+    for action in (Action.STOP_NODE, Action.START_NODE):
+        quick.ask(action, "n2")
+        for _ in range(20):
+            assert kept_is_right(quick)
+            quick.run(0.1)
+    quick.network.bus_is_gone(quick.now)
+    assert kept_is_right(quick)
+    assert RPDO1 + 3 in quick.network.beats(), "stopped words go to a lost node as well"
+
+
+def test_the_transfers_of_three_nodes_are_under_way_at_the_same_time(tmp_path: Path) -> None:
+    quick = Quick(quick_site(tmp_path, 3))
+    quick.lose = lambda frame: frame.can_id & 0x780 == 0x580
+    quick.run(0.05)
+    asked = {frame.can_id for frame in quick.log if frame.can_id & 0x780 == 0x600}
+    assert asked == {0x601, 0x602, 0x603}, "none has waited for another's answer"

@@ -1,0 +1,276 @@
+"""Every table of the reference agrees with the code."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from typing import Any, get_args
+
+import pytest
+import typer.main
+from asyncua.ua.status_codes import get_name_and_doc
+
+from bridge import __version__
+from bridge.cli.app import app
+from bridge.command import Kind, Plant
+from bridge.command.points import CONTROLLER_STATES, NMT_STATES
+from bridge.command.request import Code
+from bridge.command.watchdog import STATES as WATCHDOG_STATES
+from bridge.command.watchdog import TABLE, Effect, Stimulus, WatchdogState
+from bridge.config import Reaction, Site
+from bridge.config.model import MappedObject
+from bridge.drive import STATES
+from bridge.image import Point, Quality
+from bridge.mapping.model import Family, ObjectRef
+from bridge.mapping.model import MappedObject as MappingObject
+from bridge.northbound.modbus.dispatch import EXCEPTIONS
+from bridge.northbound.modbus.pdu import Function
+from bridge.northbound.modbus.registers import DriveMap, Row, Table, bridge_rows, drive_maps
+from bridge.northbound.opcua.events import type_name
+from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, layout
+from bridge.northbound.opcua.values import OUTCOME_STATUS, QUALITY_STATUS
+from bridge.northbound.zenoh.commands import MALFORMED, METHODS, NODE_METHODS
+from bridge.service import load_project
+from bridge.southbound.boot.status import TEXTS as BOOT_TEXTS
+from tests.support.docs import (
+    page,
+)
+from tests.support.model_facts import KeyFacts, model_tables
+from tests.support.process import REPOSITORY
+
+DEMO_SITE = REPOSITORY / "bridge" / "demo" / "site.toml"
+
+
+# reference: files
+
+
+@pytest.mark.parametrize(
+    ("name", "model", "leaves"),
+    [
+        ("reference/site-file.md", Site, (MappedObject,)),
+        ("reference/mapping-file.md", Family, (ObjectRef, MappingObject)),
+    ],
+)
+def test_every_key_of_a_file_is_described(name: str, model: Any, leaves: tuple[type, ...]) -> None:
+    reference = page(name)
+    described: dict[str, dict[str, KeyFacts]] = {}
+    for heading in reference.headings:
+        headers = [""] if heading == "Top of the file" else re.findall(r"`(\[[^`]+\])`", heading)
+        if headers:
+            rows = reference.table(heading)
+            facts = {row["key"]: KeyFacts(row["type"], row["default"], row["allowed"]) for row in rows}
+            described |= dict.fromkeys(headers, facts)
+    expected = model_tables(model, leaves)
+    assert described.keys() == expected.keys()
+    for header, keys in expected.items():
+        assert described[header].keys() == keys.keys(), header
+        for key, facts in keys.items():
+            shown = described[header][key]
+            assert (shown.type, shown.default) == (facts.type, facts.default), f"{header} {key}"
+            if facts.allowed:
+                assert shown.allowed == facts.allowed, f"{header} {key}"
+
+
+def test_the_reactions_are_explained() -> None:
+    explained = page("explanation/dead-man-chain.md").column("Reactions", "on_expiry")
+    assert explained == list(get_args(Reaction))
+
+
+# reference: points
+
+
+@pytest.fixture(scope="module")
+def plant() -> Plant:
+    project = load_project(DEMO_SITE)
+    return Plant(project.site, project.families, __version__)
+
+
+def general_name(point: Point) -> str:
+    name = point.name.replace("conveyor/fu1/", "<node>/<drive>/").replace("conveyor/node/", "<node>/node/")
+    return name.replace("bus/can0/", "bus/<bus>/")
+
+
+def test_every_point_is_described(plant: Plant) -> None:
+    reference = page("reference/points.md")
+    described = [
+        (row["point"], row["type"], row["unit"], row["access"])
+        for heading in reference.headings
+        if heading.startswith("Points of")
+        for row in reference.table(heading)
+    ]
+    expected = [
+        (general_name(point), point.data_type.value, point.unit or "–", "rw" if point.writable else "r")
+        for point in plant.image.points
+        if not re.match(r"conveyor/fu[2-9]/", point.name)
+    ]
+    assert sorted(described) == sorted(expected)
+
+
+@pytest.mark.parametrize(
+    ("heading", "states"),
+    [
+        ("Drive states", STATES),
+        ("Watchdog states", WATCHDOG_STATES),
+        ("NMT states", NMT_STATES),
+        ("CAN controller states", CONTROLLER_STATES),
+        ("Quality", tuple((quality.value, quality.label) for quality in Quality)),
+    ],
+)
+def test_states_have_their_numbers(heading: str, states: Iterable[tuple[int, str]]) -> None:
+    rows = page("reference/points.md").table(heading)
+    assert [(int(row["code"]), row["name"]) for row in rows] == list(states)
+
+
+def test_the_letters_of_the_boot_status_are_listed() -> None:
+    rows = page("reference/points.md").table("Boot status")
+    assert {row["letter"]: row["meaning"] for row in rows} == BOOT_TEXTS
+
+
+def test_the_bits_of_the_words_are_listed(plant: Plant) -> None:
+    for word, heading in (("command/control_word", "Control word"), ("status/status_word", "Status word")):
+        point = plant.image.points[plant.image.index[f"conveyor/fu1/{word}"]]
+        rows = page("reference/points.md").table(heading)
+        assert [(row["bit"], row["name"]) for row in rows] == [
+            (str(number), name or "–") for number, name in enumerate(point.bits)
+        ]
+
+
+# reference: Modbus
+
+
+def registers(rows: Iterable[Row]) -> list[tuple[str, str, str, str, str]]:
+    return [(str(row.address), row.name, row.type, row.access, row.unit or "–") for row in rows]
+
+
+def test_the_register_map_is_that_of_the_export(plant: Plant) -> None:
+    reference = page("reference/modbus.md")
+    drive: DriveMap = drive_maps(plant)[0]
+    for heading, rows in (
+        ("Input registers of a drive", [r for r in drive.rows if r.table is Table.INPUT_REGISTER]),
+        ("Holding registers of a drive", [r for r in drive.rows if r.table is Table.HOLDING_REGISTER]),
+    ):
+        shown = [
+            (row["address"], row["name"], row["type"], row["access"], row["unit"])
+            for row in reference.table(heading)
+        ]
+        assert shown == registers(rows), heading
+    bridge = [row for row in bridge_rows(plant) if "/" not in row.name]
+    shown = [(row["address"], row["name"], row["unit"]) for row in reference.table("The bridge's own unit")]
+    assert shown[:-1] == [(str(row.address), row.name, row.unit or "–") for row in bridge]
+
+
+def test_the_function_codes_are_those_that_are_served() -> None:
+    shown = page("reference/modbus.md").column("Functions", "code")
+    assert [int(code.partition("/")[0]) for code in shown] == [function.value for function in Function]
+
+
+def test_each_outcome_has_its_exception() -> None:
+    rows = page("reference/outcomes.md").table("Outcomes")
+    assert [row["code"] for row in rows] == [code.value for code in Code]
+    for row in rows[1:]:
+        code = Code(row["code"])
+        assert row["Modbus"] == f"{EXCEPTIONS[code].value:02X}h", code
+        assert row["OPC UA"] == status_name(OUTCOME_STATUS[code]), code
+
+
+# reference: OPC UA
+
+
+def status_name(code: int) -> str:
+    return get_name_and_doc(code)[0]
+
+
+def test_each_quality_has_its_status() -> None:
+    rows = page("reference/points.md").table("Quality")
+    assert [row["OPC UA"] for row in rows] == [status_name(QUALITY_STATUS[q].value) for q in Quality]
+
+
+def test_the_methods_are_those_of_the_address_space(plant: Plant) -> None:
+    drives, _, _ = layout(plant.image.points)
+    (node,) = drives.objects
+    drive = next(child for child in node.objects if child.browse_name == "fu1")
+    reference = page("reference/opcua.md")
+    assert reference.column("Methods of a drive", "method") == [call(method) for method in drive.methods]
+    assert reference.column("Methods of a node", "method") == [call(method) for method in node.methods]
+    assert reference.column("Address space", "BrowseName") == [
+        child.browse_name for child in drive.objects if isinstance(child, ObjectNode)
+    ]
+
+
+def call(method: MethodNode) -> str:
+    return f"{method.browse_name}({', '.join(argument.name for argument in method.arguments)})"
+
+
+def test_the_events_are_those_that_are_sent() -> None:
+    rows = page("reference/opcua.md").table("Events")
+    assert [(row["type"], row["kind"]) for row in rows] == [(type_name(kind), kind.value) for kind in Kind]
+
+
+# reference: zenoh
+
+
+def test_the_commands_are_those_that_are_taken() -> None:
+    reference = page("reference/zenoh.md")
+    assert reference.column("Commands of a drive", "command") == [action.value for action in METHODS]
+    assert reference.column("Commands of a node", "command") == [action.value for action in NODE_METHODS]
+    assert reference.column("Further error codes", "code")[0] == MALFORMED
+
+
+# reference: command line
+
+
+def leaf_commands(command: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Every command that does something, by what is typed for it. (typer brings its own click.)"""
+    if not hasattr(command, "commands"):
+        yield path, command
+        return
+    for name, inner in command.commands.items():
+        if not inner.hidden:
+            yield from leaf_commands(inner, f"{path} {name}".strip())
+
+
+def test_every_command_and_option_is_described() -> None:
+    reference = page("reference/command-line.md")
+    headings = {
+        re.sub(r" (\[?SITE|FILE).*", "", heading.strip("`").removeprefix("drivebridge ")): heading
+        for heading in reference.headings
+        if heading.startswith("`drivebridge ")
+    }
+    expected = dict(leaf_commands(typer.main.get_command(app)))
+    assert headings.keys() == expected.keys()
+    for name, command in expected.items():
+        shown = "\n".join(reference.section(headings[name]))
+        takes_site = any(
+            parameter.name == "site" or "[SITE]" in (getattr(parameter, "metavar", None) or "")
+            for parameter in command.params
+        )
+        assert ("SITE" in headings[name]) == takes_site, name
+        options = {
+            option
+            for parameter in command.params
+            if parameter.param_type_name == "option" and not parameter.hidden
+            for option in parameter.opts
+            if option.startswith("--")
+        }
+        assert set(re.findall(r"--[a-z-]+", shown)) == options, name
+
+
+# explanation
+
+
+def test_the_state_table_is_that_of_the_watchdog() -> None:
+    shown = page("explanation/dead-man-chain.md").table("The controller leg as a table")
+    assert shown == watchdog_table()
+
+
+def watchdog_table() -> list[dict[str, str]]:
+    return [
+        {"event": stimulus.value} | {state.label: cell(state, stimulus) for state in WatchdogState}
+        for stimulus in Stimulus
+    ]
+
+
+def cell(state: WatchdogState, stimulus: Stimulus) -> str:
+    after, effect = TABLE[state, stimulus]
+    what = "–" if effect is Effect.NOTHING else effect.value
+    return what if after is state else f"→ **{after.label}**: {what}"

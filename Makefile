@@ -157,4 +157,4 @@ help: ## this list
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
 .PHONY: demo test unit wire lab packages clients compiled bench check check-style check-format check-types \
-  check-imports format setup lock wheel clean help
+  check-imports format docs setup lock wheel clean help

@@ -16,8 +16,9 @@ from bridge.cli import logs
 from bridge.config import BusTable, ZenohTable
 from bridge.errors import OperationFailed
 from bridge.fronts import Front, become_front
+from bridge.mapping.loader import lineage, mapping_folders
 from bridge.service import Project, Service, load_project, make_bus
-from bridge.sim.catalogue import simulate_node
+from bridge.sim.catalogue import SIMULATED, simulate_node
 from bridge.sim.node import SimulatedNode
 from bridge.sim.shell import Simulation
 from bridge.southbound.bus import Bus
@@ -69,7 +70,7 @@ def simulate(site: SiteArgument, verbose: Verbose = False) -> None:
     project = load_project(site)
 
     async def play() -> None:
-        simulations = [_simulation(make_bus(table), table) for table in project.site.bus]
+        simulations = [_simulation(make_bus(table), table, project.path) for table in project.site.bus]
         try:
             async with asyncio.TaskGroup() as tasks:
                 for simulation in simulations:
@@ -106,7 +107,7 @@ async def _serve(
         if table.interface != "virtual":
             return make_bus(table)
         wire = VirtualWire()
-        simulations.append(_simulation(wire.end(f"{table.name}-simulation"), table))
+        simulations.append(_simulation(wire.end(f"{table.name}-simulation"), table, project.path))
         return wire.end(table.name)
 
     service = Service(project, open_bus, fronts=fronts)
@@ -128,14 +129,17 @@ def _demo_controller(table: ZenohTable, site: str) -> Front:
     return Front("demo controller", ["demo-controller", table.listen[0], *moves])
 
 
-def _simulation(bus: Bus, table: BusTable) -> Simulation:
-    """All nodes of one bus, with the parameters that the site file gives their drives."""
+def _simulation(bus: Bus, table: BusTable, site: Path) -> Simulation:
+    """All nodes of one bus, with the parameters that the site file gives their drives. A mapping that has
+    no simulation of its own is played by the nearest that it extends."""
     nodes: list[SimulatedNode] = []
+    folders = mapping_folders(site)
     for node in table.node:
         parameters: dict[str, float] = {}
         for drive in node.drive:
             parameters |= {f"{drive.slot}/{name}": value for name, value in drive.parameters.items()}
-        nodes.append(simulate_node(node.mapping, node.id, parameters))
+        known = [name for name in lineage(node.mapping, folders) if name in SIMULATED]
+        nodes.append(simulate_node(known[0] if known else node.mapping, node.id, parameters))
     return Simulation(bus, nodes)
 
 

@@ -14,14 +14,15 @@ from bridge.command.event import Kind
 from bridge.command.link import Link
 from bridge.command.output import Gate
 from bridge.command.request import DONE, STOP_ACTIONS, Action, Code, Identity, Outcome, Reply, Request, Role
+from bridge.command.setpoints import followers_of, handshake_of
 from bridge.command.start import StartSequence
 from bridge.command.status import DriveStatus
 from bridge.command.telegram import Refusal, TelegramDecoder
 from bridge.command.watchdog import Effect, Stimulus, Watchdog, WatchdogState
 from bridge.config import DriveTable
-from bridge.drive import FAULTED, ControlWords, Handshake, LinearScale, ValueCodec
+from bridge.drive import FAULTED, ControlWords, LinearScale
 from bridge.image import Quality
-from bridge.mapping.model import Family, Slot
+from bridge.mapping.model import Family
 
 _LEASE_MS: Final = (100, 600_000)
 _TIMEOUT_MS: Final = (0, 32767)
@@ -52,13 +53,13 @@ class ControllerLeg:
         self.watchdog = Watchdog(settings.fieldbus_timeout_ms or 0, report_only=link.ignores_errors)
         self.words = ControlWords(family.control_word)
         slot = family.slot_named(settings.slot)
-        self._handshake = _handshake(family, slot)
+        self._handshake = handshake_of(family, slot)
         self.gate = Gate(
             self.words,
             len(family.process.rpdo) - 1,
             settings.on_expiry,
             settings.then_silence_ms,
-            _follows(family, slot),
+            followers_of(family, slot),
             self._handshake,
         )
         self.outcomes: list[tuple[Reply, Outcome]] = []
@@ -281,23 +282,3 @@ class ControllerLeg:
         self._own(request.identity, now)
         self.watchdog.apply(Stimulus.TELEGRAM, now)
         self.start.begin(bits, self._status.state, now, reply)
-
-
-def _handshake(family: Family, slot: Slot) -> Handshake | None:
-    """The handshake by which this drive takes over positions, or None where it has none."""
-    model = family.control_word.handshake
-    for value in family.values_of(slot) if model else ():
-        if model and (value.group, value.name) == ("command", model.value):
-            return Handshake(model, ValueCodec(value, family.process.rpdo[1:]).places)
-    return None
-
-
-def _follows(family: Family, slot: Slot) -> list[tuple[int, int]]:
-    """Setpoints that follow actual words: the place of each setpoint, and that of its actual word."""
-    values = {value.leaf: value for value in family.values_of(slot)}
-    return [
-        (family.process.rpdo.index(word) - 1, family.process.tpdo.index(source))
-        for value in values.values()
-        if value.follows is not None and (followed := values.get(f"actual/{value.follows}"))
-        for word, source in zip(value.word_names, followed.word_names, strict=True)
-    ]

@@ -11,8 +11,8 @@ from bridge.command.channel import DriveChannel
 from bridge.command.event import Event
 from bridge.command.parameter_points import parameter_points
 from bridge.command.points import drive_points
-from bridge.config import BusTable, DriveTable, NodeTable
-from bridge.drive import ValueCodec, scale_of
+from bridge.config import IGNORE_ALL_S, BusTable, DriveTable, NodeTable
+from bridge.drive import OwnJudgement, OwnVerdict, ValueCodec, scale_of
 from bridge.image import Image, Point, Quality, Value
 from bridge.mapping.model import Family, Slot
 
@@ -47,6 +47,16 @@ class Identification:
     device_name: str = ""
 
 
+def worst_case_stop_ms(table: DriveTable, timeout_ms: int, rpdo_period_ms: int) -> int:
+    """Longest time from the controller's last telegram to the reaction on the bus; 0 where none.
+
+    ``rpdo_period_ms`` includes the SYNC period where the drive takes its RPDO over with SYNC.
+    """
+    if not timeout_ms or table.telegram_downtime_s == IGNORE_ALL_S or table.on_expiry == "hold":
+        return 0
+    return timeout_ms + rpdo_period_ms + REACTION_BOUND_MS
+
+
 class Drive:
     """One drive: its channel, and where its points stand in the image.
 
@@ -69,6 +79,8 @@ class Drive:
         self.slot: Slot = family.slot_named(table.slot)
         self.channel = DriveChannel(self.name, family, table, node.hold_ms, report)
         self.identification = Identification()
+        self.own: OwnJudgement | None = None
+        """What it does by itself when the bridge falls silent; None until the boot-up has read it."""
         self.sdo_abort_code = 0
         self.rpdo_period_ms = round(bus.rpdo_period_s * 1000)
         self.sync_period_ms = bus.sync_period_ms
@@ -102,6 +114,7 @@ class Drive:
         self._value_indices = places("command", [codec.model.name for codec in self._commands])
         self._supervision = places("status", ("fault_text",)) + places("supervision", _SUPERVISION)
         self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms"))
+        (self._bridge_ms,) = places("supervision", ("worst_case_bridge_ms",))
         self._identity = places("identity", _IDENTITY)
         self._actual.bind(image)
         self.channel.settled = self.refresh
@@ -117,11 +130,7 @@ class Drive:
 
     def worst_case_stop_ms(self) -> int:
         """Longest time from the controller's last telegram to the reaction on the bus; 0 where none."""
-        settings = self.channel.settings
-        timeout_ms = self.channel.watchdog.timeout_ms
-        if not timeout_ms or self.channel.link.ignores_errors or settings.on_expiry == "hold":
-            return 0
-        return timeout_ms + self.rpdo_period_ms + REACTION_BOUND_MS
+        return worst_case_stop_ms(self.table, self.channel.watchdog.timeout_ms, self.rpdo_period_ms)
 
     # fed by the southbound side
 
@@ -173,6 +182,17 @@ class Drive:
 
     def _compile(self) -> None:
         self._actual.compile(self.channel.scales, self.channel.unserved)
+
+    def on_own_supervision(self, own: OwnJudgement, now: float) -> None:
+        """What the drive does by itself when the bridge falls silent, as the boot-up has read it."""
+        self.own = own
+        accepted = own.verdict is OwnVerdict.RUNS_ON and own.accepted
+        if own.verdict is OwnVerdict.STOPS or accepted:
+            self._image.set(self._bridge_ms, own.bridge_ms, now, Quality.GOOD, own.accepted)
+            return
+        verdict = "the drive runs on" if own.verdict is OwnVerdict.RUNS_ON else "not known"
+        reason = f"{verdict}: {own.reason}"
+        self._image.set(self._bridge_ms, 0, now, Quality.CONFIG_ERROR, reason)
 
     def on_identification(self, identification: Identification, now: float) -> None:
         self.identification = identification

@@ -76,7 +76,7 @@ class Gate:
         return self._is_enabled and self._words.enables(self.sent.words[0])
 
     def follow(self, actual: Sequence[int]) -> bool:
-        """The drive's actual words, the status word first. True where that changes what belongs on the bus."""
+        """The drive's actual words, the status word first. True where that changes what is to be sent."""
         if not self._follows:
             return False
         rest = list(self.rest)
@@ -163,7 +163,7 @@ class Gate:
             self.awaits_rest = False
 
     def on_status_word(self, word: int) -> bool:
-        """The drive's status word, before the state it says. True where something waits for one of its bits."""
+        """The drive's status word, before the state it says. True where one of its bits is waited for."""
         if self._handshake is None or word == self._status_word:
             return False
         self._status_word = word

@@ -131,6 +131,12 @@ def _supervision_points(name: str) -> list[Point]:
             description="true until the owner has sent a control word that does not enable",
         ),
         Point(name=f"{top}/refused_writes", data_type=u32, description="refused requests since start"),
+        Point(
+            name=f"{top}/worst_case_bridge_ms",
+            data_type=u32,
+            unit=ms,
+            description="longest time from a hang of the bridge to the drive's own reaction",
+        ),
     ]
 
 

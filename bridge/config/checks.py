@@ -91,6 +91,8 @@ def _check_node(bus: RawTable, node: RawTable, file: TomlFile) -> None:
     if name in _RESERVED_NODES:
         file.fault((*node.key, "name"), f"{name!r} is reserved", "choose another name")
     master = _given(bus, "master_node_id", _BUS.master_node_id)
+    if node.content.get("enforce") is True and "own_timeout_ms" not in node.content:
+        file.fault((*node.key, "enforce"), "says nothing without own_timeout_ms", "give the time, in ms")
     if node_id == master and _given(bus, "heartbeat_ms", _BUS.heartbeat_ms):
         file.fault((*node.key, "id"), f"node id {node_id} is the bridge's own", "change it or master_node_id")
 

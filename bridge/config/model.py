@@ -38,6 +38,7 @@ _OBJECT: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})")
 _MAPPED: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})/([0-9]{1,2})")
 _PDO_BITS: Final = 64
 _MOST_COUNTER: Final = 240
+_SHORTEST_REASON: Final = 10
 _LOCATOR: Final = re.compile(r"[a-z][a-z0-9-]*/.+")
 
 
@@ -46,6 +47,12 @@ def _regular_expression(text: str) -> str:
         re.compile(text)
     except re.error as error:
         raise ValueError(f"must be a regular expression: {error}") from None
+    return text
+
+
+def _reason(text: str) -> str:
+    if len(text.strip()) < _SHORTEST_REASON:
+        raise ValueError(f"must say why, in {_SHORTEST_REASON} characters or more")
     return text
 
 
@@ -176,6 +183,14 @@ def _listed(value: object) -> object:
 PdoTables = Annotated[list[PdoTable], BeforeValidator(_listed)]
 
 
+class AcceptsTable(Table):
+    """What a site takes knowingly, each with its reason."""
+
+    runs_on: Annotated[str, AfterValidator(_reason)] | None = Field(
+        None, description="why the drive may run on when the bridge falls silent"
+    )
+
+
 class DriveTable(Table):
     slot: str = Field(description="the drive as the mapping calls it, such as fu1")
     name: Name | None = None
@@ -195,6 +210,7 @@ class DriveTable(Table):
     )
     tpdo_deadline_ms: int | None = Field(None, ge=0, le=600_000, description="0 (never late) or a time in ms")
     rtr_poll_ms: int = Field(100, ge=5, le=60_000, description="5…60000 ms")
+    accepts: AcceptsTable = Field(default_factory=lambda: AcceptsTable.model_validate({}))
     rpdo: PdoTables = Field(default_factory=list[PdoTable])
     tpdo: PdoTables = Field(default_factory=list[PdoTable])
 
@@ -259,6 +275,10 @@ class NodeTable(Table):
     sdo_retries: int = Field(1, ge=0, le=10, description="0…10")
     sdo_channels: list[Annotated[int, Field(ge=2, le=128)]] = Field(default_factory=list[int])
     identity: IdentityTable = Field(default_factory=lambda: IdentityTable.model_validate({}))
+    own_timeout_ms: int | None = Field(
+        None, ge=1, le=65535, description="the drives' own watch over the bridge, 1…65535 ms"
+    )
+    enforce: bool = Field(False, description="true writes own_timeout_ms at boot-up where it differs")
     configuration: str | None = None
     configuration_store: bool = False
     configure: list[ConfigureTable] = Field(default_factory=list[ConfigureTable])

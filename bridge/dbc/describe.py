@@ -35,7 +35,7 @@ def describe(bus: BusView, *, words: bool = False) -> BusDescription:
     for node in bus.nodes:
         facts = node.family.family
         nodes[node.table.name] = f"node {node.table.id}: {facts.vendor} {facts.name} ({node.table.mapping})"
-        messages += node_messages(node.table, node.family)
+        messages += node_messages(node.table, node.family, node.emcy_id)
     optional: list[Message] = []
     for node in bus.nodes:
         for drive in node.drives:
@@ -57,7 +57,8 @@ def _pdos(drive: DriveView, slot: Slot) -> Iterator[tuple[PdoView, Pdo]]:
         by_number = {view.number: view for view in views}
         for pdo in pdos:
             view = by_number[pdo.number]
-            if view.enabled or pdo.optional:
+            asked = _asked(drive, view, pdos[0].number)
+            if view.enabled or (pdo.optional and asked is None):
                 yield view, pdo
 
 

@@ -48,8 +48,8 @@ def bus_messages(bus: BusTable) -> Iterator[Message]:
         yield Message(cob_id, f"{BRIDGE}_heartbeat", 1, BRIDGE, receivers, signals, cycle_ms=bus.heartbeat_ms)
 
 
-def node_messages(node: NodeTable, family: Family) -> Iterator[Message]:
-    """What a node sends beside its PDOs."""
+def node_messages(node: NodeTable, family: Family, emcy_id: int | None) -> Iterator[Message]:
+    """What a node sends beside its PDOs. ``emcy_id`` is None where it sends no emergency messages."""
     guarded = node.supervision == "guarding"
     period_ms = heartbeat_period_ms(node.supervision_ms)
     cycle_ms = {"heartbeat": period_ms, "guarding": node.supervision_ms}.get(node.supervision, 0)
@@ -63,8 +63,9 @@ def node_messages(node: NodeTable, family: Family) -> Iterator[Message]:
         "boot-up, and the answers to node guarding" if guarded else "boot-up and heartbeat",
         cycle_ms,
     )
-    signals = tuple(_emcy_signals(family.emcy, _drives(node, family)))
-    yield Message(cobid.EMCY + node.id, f"{node.name}_EMCY", _EMCY_BYTES, node.name, (BRIDGE,), signals)
+    if emcy_id is not None:
+        signals = tuple(_emcy_signals(family.emcy, _drives(node, family)))
+        yield Message(emcy_id, f"{node.name}_EMCY", _EMCY_BYTES, node.name, (BRIDGE,), signals)
 
 
 def _heartbeat_signals(*, guarded: bool) -> tuple[Signal, ...]:

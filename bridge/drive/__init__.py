@@ -2,6 +2,7 @@
 
 from bridge.drive.emergency import EmergencyReader, Told
 from bridge.drive.handshake import Handshake
+from bridge.drive.own_supervision import OwnJudgement, OwnVerdict
 from bridge.drive.scaling import LinearScale, scale_of, signed
 from bridge.drive.values import ValueCodec, Written
 from bridge.drive.words import FAULTED, MOVING, STATES, ControlWords, DriveState, StatusWords
@@ -15,6 +16,8 @@ __all__ = [
     "EmergencyReader",
     "Handshake",
     "LinearScale",
+    "OwnJudgement",
+    "OwnVerdict",
     "StatusWords",
     "Told",
     "ValueCodec",

@@ -1,4 +1,4 @@
-"""The new set-point handshake of a positioning drive (CiA 402 profile position: control bit 4, status bit 12).
+"""The new set-point handshake of a positioning drive (CiA 402 profile position: bit 4, status bit 12).
 
 The bridge does it for who writes the position as a value: the bit rises with the new words, stays until the
 drive says that it has taken them, falls, and may rise again when the drive has seen that.

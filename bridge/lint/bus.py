@@ -106,10 +106,6 @@ class NodeView:
     pdos: tuple[PdoView, ...]
     """All that the node has, those of drives the site file does not name included."""
     settings: Settings
-    own_timeout_ms: float = 0.0
-    """After how long without process data the node acts by itself, where we set that; 0 where not."""
-    own_reaction: int | None = None
-    """What it does then, where we set that and the family has a choice."""
     emcy_id: int | None = None
     """On which identifier its emergency messages come (1014h), None where they are off."""
 
@@ -174,10 +170,6 @@ def _node(
             others.setdefault(place, _unknown_pdo(*place, key))
     for place, view in others.items():
         found.append(_downloaded(view, place[1], _entry_bits(known.get(place), 0), settings))
-    own = family.own_timeout
-    own_ms = own.unit_ms * settings.number(own.object.index, own.object.sub, 0) if own else 0.0
-    reaction = own.reaction.object if own and own.reaction else None
-    does = settings[reaction.index, reaction.sub] if reaction else None
     emcy_id = dictionary.number(_EMCY, 0, table.id) if dictionary else None
     return NodeView(
         table,
@@ -187,8 +179,6 @@ def _node(
         tuple(drives),
         tuple(found),
         settings,
-        own_ms,
-        None if does is None else does.value,
         settings.emcy_id(cobid.EMCY + table.id if emcy_id is None else emcy_id),
     )
 

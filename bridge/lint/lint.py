@@ -13,6 +13,7 @@ from bridge.lint.contradictions import check_contradictions
 from bridge.lint.decisions import check_decisions
 from bridge.lint.identifiers import check_identifiers
 from bridge.lint.load import BusLoad, check_load
+from bridge.lint.own import WorstCase, check_own_supervision, worst_cases
 from bridge.lint.pdos import check_pdos
 from bridge.lint.report import LintFinding, LintReport, Severity
 from bridge.lint.times import check_times
@@ -22,10 +23,12 @@ from bridge.mapping.loader import mapping_folders
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Findings in the order of the site file, and the predicted load of each bus."""
+    """Findings in the order of the site file, the predicted load of each bus, and how long each drive may
+    take to stop."""
 
     findings: tuple[LintFinding, ...]
     loads: tuple[BusLoad, ...]
+    worst_cases: tuple[WorstCase, ...] = ()
 
     def of(self, severity: Severity) -> tuple[LintFinding, ...]:
         return tuple(finding for finding in self.findings if finding.severity is severity)
@@ -60,12 +63,15 @@ def lint(
         known = family_dictionaries(families, mapping_folders(path))
     report = LintReport(path)
     loads: list[BusLoad] = []
+    cases: list[WorstCase] = []
     for b, table in enumerate(site.bus):
         bus = view_bus(table, ("bus", b), families, known, downloads)
         check_identifiers(bus, report)
         check_pdos(bus, report)
         check_times(bus, report)
+        check_own_supervision(bus, report)
         check_contradictions(bus, report)
+        cases += worst_cases(bus)
         loads.append(check_load(bus, report))
     check_decisions(site, families, report)
-    return Verdict(report.findings(), tuple(loads))
+    return Verdict(report.findings(), tuple(loads), tuple(cases))

@@ -53,6 +53,11 @@ class Settings:
             if one == index:
                 yield sub, setting
 
+    @property
+    def values(self) -> dict[tuple[int, int], int]:
+        """All of them."""
+        return {place: setting.value for place, setting in self._found.items()}
+
     def pdos(self) -> Iterator[tuple[bool, int]]:
         """PDOs that are given a COB-ID: whether the node receives it, and its number."""
         for receives, (base, _) in ((True, RPDO), (False, TPDO)):

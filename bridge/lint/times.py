@@ -6,9 +6,7 @@ from typing import Final
 
 from bridge.lint.bus import BusView, DriveView, NodeView
 from bridge.lint.report import LintReport
-from bridge.mapping.model import OwnTimeout
 from bridge.southbound.canopen.sync import tpdo_deadline_s
-from bridge.tomlfile import Key
 
 _SLOW_ANSWER_MS: Final = 50
 """What an SDO answer may take: 30 + 20 ms in an 8400 motec (EDS84DMOTCAN 3.0 §9), 50 ms and more behind
@@ -21,7 +19,6 @@ def check_times(bus: BusView, report: LintReport) -> None:
         if not node.table.enabled:
             continue
         _check_supervision(bus, node, report)
-        _check_own_timeout(bus, node, report)
         _check_sdo(node, report)
         for drive in node.drives:
             _check_controller(bus, drive, report)
@@ -57,50 +54,6 @@ def _check_supervision(bus: BusView, node: NodeView, report: LintReport) -> None
             f"{table.supervision_ms} ms is less than two SYNC periods: a full cycle delays a sign of life "
             "by one",
             f"at least {2 * bus.table.sync_period_ms}",
-        )
-
-
-def _check_own_timeout(bus: BusView, node: NodeView, report: LintReport) -> None:
-    """The node's own watch over our process data, P151 of a NORD interface."""
-    own = node.family.own_timeout
-    if own is None:
-        return
-    key = (*node.key, "configure" if node.table.configure else "configuration")
-    _check_own_reaction(own, node, key, report)
-    if not node.own_timeout_ms:
-        return
-    period_ms, own_ms = 1000 * bus.table.rpdo_period_s, node.own_timeout_ms
-    if own_ms < 2 * period_ms:
-        report.error(
-            key,
-            f"the node's own time-out, {own.object} = {own_ms:g} ms, is less than two RPDO periods of "
-            f"{period_ms:g} ms: one lost frame stops its drives",
-            f"at least {2 * period_ms:g} ms",
-        )
-    elif own_ms < bus.table.deadman_ms:
-        report.warning(
-            key,
-            f"the node's own time-out, {own.object} = {own_ms:g} ms, is shorter than deadman_ms = "
-            f"{bus.table.deadman_ms}: it stops its drives over a pause that the bridge gets over",
-            f"at least {bus.table.deadman_ms} ms, or a shorter deadman_ms",
-        )
-
-
-def _check_own_reaction(own: OwnTimeout, node: NodeView, key: Key, report: LintReport) -> None:
-    """A node that may do nothing when its time-out has run out, and does so at factory."""
-    reaction = own.reaction
-    if reaction is None or node.own_reaction not in (None, reaction.none):
-        return
-    if node.own_timeout_ms:
-        message = f"the node's own time-out, {own.object}, has no effect: its reaction {reaction.object} is "
-        message += f"{reaction.none}" if node.own_reaction is not None else "not set, and at factory nothing"
-        report.warning(key, message, f"write {reaction.object} too")
-    elif node.own_reaction is None:
-        report.warning(
-            node.key,
-            f"{node.family.family.name} does nothing by itself when the bridge falls silent, unless "
-            f"{reaction.object} has been set in it: at factory its drives run on",
-            f"a [[bus.node.configure]] for {reaction.object}, and for {own.object}, its time",
         )
 
 

@@ -92,6 +92,16 @@ def read_family(path: Path, folders: Sequence[Path] = ()) -> Family:
     return family
 
 
+def lineage(name: str, folders: Sequence[Path] = ()) -> list[str]:
+    """The mapping ``name`` and those it extends, by their names. Raises ``FileFaults`` where one is
+    missing; there must be a mapping of this name."""
+    folders = folders or mapping_folders()
+    files = _files(folders)
+    by_path = {path.resolve(): known for known, paths in files.items() for path in paths}
+    chain = _chain(files[name][0], folders)
+    return list(dict.fromkeys(by_path[file.path.resolve()] for file in reversed(chain)))
+
+
 def _chain(path: Path, folders: Sequence[Path]) -> list[TomlFile]:
     """The file and those it extends, the last of those first."""
     chain = [TomlFile(path)]

@@ -1,7 +1,7 @@
 """A mapping file merged over those it extends, which still knows where each of its keys stands.
 
-Tables are merged key by key. The lists ``value``, ``parameter``, ``poll`` and ``slot`` are merged item by
-item, by ``name`` (values by ``group`` too); every other list is replaced.
+Tables are merged key by key. The lists ``value``, ``parameter``, ``poll``, ``slot`` and ``own_supervision``
+are merged item by item, by ``name`` (values by ``group`` too); every other list is replaced.
 """
 
 from __future__ import annotations
@@ -19,7 +19,10 @@ from bridge.tomlfile.messages import explain
 
 Model = TypeVar("Model", bound=BaseModel)
 
-_BY_NAME: Final = {"value": ("name", "group"), "parameter": ("name",), "poll": ("name",), "slot": ("name",)}
+_BY_NAME: Final = {
+    "value": ("name", "group"),
+    **dict.fromkeys(("parameter", "poll", "slot", "own_supervision"), ("name",)),
+}
 _Place = tuple[TomlFile, Key]
 
 

@@ -26,6 +26,7 @@ from bridge.mapping.fields import (
     Word,
     pattern_bits,
 )
+from bridge.mapping.own_supervision import OwnObject, OwnReaction, OwnSupervision
 from bridge.mapping.parameters import Eeprom, Parameter, ParameterNames, RamOnly, object_of
 from bridge.mapping.process import (
     NodeTpdo,
@@ -54,8 +55,9 @@ __all__ = [
     "MappedObject",
     "NodeTpdo",
     "ObjectRef",
+    "OwnObject",
     "OwnReaction",
-    "OwnTimeout",
+    "OwnSupervision",
     "Parameter",
     "ParameterNames",
     "Pdo",
@@ -159,21 +161,6 @@ class Poll(Table):
     bits: list[str] = Field(default_factory=list[str])
 
 
-class OwnReaction(Table):
-    """The object that says what the node does when its own time-out has run out."""
-
-    object: Ref
-    none: int = Field(0, description="the value with which it does nothing, as the factory has it")
-
-
-class OwnTimeout(Table):
-    """The object by which the node itself watches the bridge's process data; 0 in it is off."""
-
-    object: Ref
-    unit_ms: float = Field(1.0, gt=0, description="what one step of it is, in ms")
-    reaction: OwnReaction | None = Field(None, description="left out: the node stops its drives")
-
-
 class Family(Table):
     """One mapping file, merged with those it extends."""
 
@@ -193,7 +180,7 @@ class Family(Table):
     node_tpdo: list[NodeTpdo] = Field(default_factory=list[NodeTpdo])
     emcy: EmcyTable
     faults: FaultNumbers
-    own_timeout: OwnTimeout | None = None
+    own_supervision: list[OwnSupervision] = Field(default_factory=list[OwnSupervision])
 
     def slot_named(self, name: str) -> Slot:
         """Raises KeyError where the family has no such slot."""

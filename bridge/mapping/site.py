@@ -10,6 +10,7 @@ from bridge.config import Site, read_site
 from bridge.errors import Fault, FileFaults
 from bridge.mapping.loader import family_names, load_family, mapping_folders, missing, template_names
 from bridge.mapping.model import Family
+from bridge.mapping.own_places import impossible
 from bridge.tomlfile import RawTable, TomlFile
 
 
@@ -61,6 +62,10 @@ def _check_node(node: RawTable, family: Family, file: TomlFile) -> None:
         allowed = f"{facts.node_id_low}…{facts.node_id_high}"
         file.fault((*node.key, "id"), f"{facts.name} has addresses {allowed}, not {node_id}")
     _check_sdo_channels(node, family, file)
+    time_ms = node.whole("own_timeout_ms")
+    why = impossible(family, time_ms) if time_ms is not None and 1 <= time_ms <= 0xFFFF else ""
+    if why:
+        file.fault((*node.key, "own_timeout_ms"), why)
 
 
 def _check_sdo_channels(node: RawTable, family: Family, file: TomlFile) -> None:

@@ -31,7 +31,9 @@ def cia402(node_id: int, parameters: Mapping[str, float]) -> Cia402Drive:
     for name, value in parameters.items():
         match = _NAME.fullmatch(name)
         if match is None:
-            raise OperationFailed(f"{name}: the simulated CiA 402 drive takes objects such as 6083 or 6046:02")
+            raise OperationFailed(
+                f"{name}: the simulated CiA 402 drive takes objects such as 6083 or 6046:02"
+            )
         _commission(node, name, int(match[1], 16), int(match[2] or "0", 16), value)
     node.save_settings()
     return node

@@ -50,7 +50,11 @@ class Motor:
         before = self.velocity
         self._accelerate(wanted, acceleration, 2 * braking, dt_s)
         way = (before + self.velocity) / 2 * dt_s
-        if way * distance > 0 and abs(way) >= abs(distance) and abs(self.velocity) <= 4 * braking * dt_s + _STILL:
+        if (
+            way * distance > 0
+            and abs(way) >= abs(distance)
+            and abs(self.velocity) <= 4 * braking * dt_s + _STILL
+        ):
             self.position, self.velocity = goal, 0.0
             return True
         self.move(way)

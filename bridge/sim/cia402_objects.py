@@ -116,7 +116,9 @@ class Cia402Objects:
 
         u16, i8 = Type.UNSIGNED16, Type.INTEGER8
         dictionary.add(0x603F, 0, Number(u16, lambda: axis.error_code, in_tpdo=True))
-        dictionary.add(0x6040, 0, Number(u16, lambda: axis.control_word, axis.command, in_rpdo=True, in_tpdo=True))
+        dictionary.add(
+            0x6040, 0, Number(u16, lambda: axis.control_word, axis.command, in_rpdo=True, in_tpdo=True)
+        )
         dictionary.add(0x6041, 0, Number(u16, lambda: axis.status_word, in_tpdo=True))
         mode = Number(i8, lambda: self._settings.mode, set_mode, in_rpdo=True, in_tpdo=True)
         dictionary.add(0x6060, 0, mode)

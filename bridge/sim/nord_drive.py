@@ -5,13 +5,12 @@ from __future__ import annotations
 import random
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from bridge.sim.dictionary import Dictionary
 from bridge.sim.nord_faults import INTERFACE_MISSING
 from bridge.sim.nord_parameters import PARAMETERS, DriveParameters, Parameter, add_display
-from bridge.sim.nord_ramp import step
+from bridge.sim.nord_ramp import Demand, step, turned
 from bridge.sim.nord_states import STATE_BITS, State, commanded
 
 CHARGING_S: Final = 0.2
@@ -31,22 +30,6 @@ _BUS_SOURCES: Final = (3, 6)
 """P509: system bus, CANopen (§7.2)."""
 _IGNORE: Final = -1
 """P513 = -0.1 s."""
-
-
-POLE_PAIRS: Final = 2
-"""A motor of four poles, as in §5.4."""
-INCREMENTS: Final = 1000
-"""Of a position, to a revolution (§6.5.4)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Demand:
-    """What an interface asks for in the drive profile (§6.7.3), instead of setpoints and ramps of the
-    drive. The times are those between 0 and P105; None is P102 or P103."""
-
-    target_hz: float
-    accelerate_s: float | None
-    decelerate_s: float | None
 
 
 class NordDrive:
@@ -254,8 +237,7 @@ class NordDrive:
         else:
             up_s, down_s = self._ramp_times_s()
             self.output_hz = step(before_hz, target_hz, up_s, down_s, self._max_hz, dt_s)
-        turns = (before_hz + self.output_hz) / 2 / POLE_PAIRS * dt_s
-        self.position_increments = _within_32_bits(self.position_increments + turns * INCREMENTS)
+        self.position_increments = turned(self.position_increments, before_hz, self.output_hz, dt_s)
         self._accelerating = abs(self.output_hz) > abs(before_hz) and self.output_hz != target_hz
         self._ripple_now = self._random.uniform(-self._ripple, self._ripple) if self.output_hz else 0.0
 
@@ -313,11 +295,6 @@ class NordDrive:
 
     def _shown(self, words: Sequence[int], element: int) -> int:
         return words[element - 1] if self.parameters.raw(509) else 0
-
-
-def _within_32_bits(increments: float) -> float:
-    """A position that has run over goes on at the other end."""
-    return (increments + 0x8000_0000) % 0x1_0000_0000 - 0x8000_0000
 
 
 def _word(share: float) -> int:

@@ -8,7 +8,7 @@ UNKNOWN_CODE: Final = 0x1000
 """The interface does not know the drive's fault number; P700 says it."""
 
 TELEGRAM_DOWNTIME: Final = 102
-"""10.2: the NMT master's life time has run out, or P513 (BU 0260, p. 77)."""
+"""10.2: the NMT master's life time has run out, or P513 (the older BU 0260 tells it from 10.3 so)."""
 BUS_TIMEOUT: Final = 103
 """10.3, P151."""
 LINK_BROKEN: Final = 108

@@ -1,4 +1,4 @@
-"""Object dictionary of a bus interface SK TU4-CAO or SK CU4-CAO, and what each SDO channel reaches (BU 2500 §6.7, §7.1)."""
+"""Object dictionary of a bus interface SK xU4-CAO, and what each SDO channel reaches (BU 2500 §6.7, §7.1)."""
 
 from __future__ import annotations
 

@@ -7,9 +7,10 @@ from typing import Final
 
 from bridge.sim.dictionary import DataType as Type
 from bridge.sim.dictionary import Dictionary, Entry, Number
-from bridge.sim.nord_drive import POLE_PAIRS, Demand, NordDrive
+from bridge.sim.nord_drive import NordDrive
 from bridge.sim.nord_faults import emcy_code
 from bridge.sim.nord_image import ProcessImage
+from bridge.sim.nord_ramp import POLE_PAIRS, Demand
 from bridge.sim.nord_settings import DRIVES, InterfaceSettings
 from bridge.sim.store import Store
 

@@ -73,9 +73,7 @@ TU3: Final = Variant(
     ),
     has_interface=True,
 )
-RJ45_5XX: Final = Variant(
-    "SK 535E", 3, SK_5XXE, rpdo=(_RPDO_1, View(0x300, _ENCODER_ENTRY)), tpdo=(_TPDO_1,)
-)
+RJ45_5XX: Final = Variant("SK 535E", 3, SK_5XXE, rpdo=(_RPDO_1, View(0x300, _ENCODER_ENTRY)), tpdo=(_TPDO_1,))
 RJ45_54X: Final = Variant(
     "SK 540E",
     5,

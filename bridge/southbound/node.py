@@ -41,7 +41,7 @@ class NodeCore:
         listener = Listener(self._on_sign, self._touch, partial(neighbours.duplicate, self))
         self.wire = NodeWire(node, plant, listener)
         self.error_control = self.wire.error_control
-        self._memory = boot.BootMemory()
+        self._memory = boot.BootMemory(count_write=self._count_write)
         self.booting = Booting(self, partial(boot.boot, node, downloads, self._memory), self.wire.sdo)
         self.parameters = NodeParameters(node, plant, lambda: self.sdo)
         self.boot_at: float | None = 0.0
@@ -328,6 +328,12 @@ class NodeCore:
 
     def _show(self, now: float) -> None:
         self._view.show(self.error_control.state, self.state, self.error_control.toggle_errors, now)
+
+    def _count_write(self, owner: str, address: str, name: str) -> str:
+        """The boot-up writes to an EEPROM: counted as of its beginning."""
+        ledger, eeprom = self.plant.eeprom_writes, self.node.family.eeprom
+        ledger.check((owner, address), name, self._last_boot)
+        return ledger.count((owner, address), name, eeprom.cycles if eeprom else None, self._last_boot)
 
     def carry_out_command(self, action: Action, who: str, now: float, *, send: bool = True) -> None:
         """A command that may be given; ``send`` is false where one frame has told all nodes."""

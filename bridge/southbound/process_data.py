@@ -199,6 +199,7 @@ def connect(
     connected: dict[str, DrivePdos] = {}
     for drive in node.drives:
         drive.on_identification(result.identification, now)
+        drive.on_own_supervision(result.own[drive.name], now)
         for name, full in result.scales.get(drive.name, {}).items():
             drive.on_scale(name, full)
         plan = result.drives[drive.name]

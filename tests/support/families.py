@@ -18,92 +18,59 @@ from bridge.sim.catalogue import simulate_node
 from bridge.sim.cia402_drive import Cia402Drive
 from bridge.sim.lenze_motec import LenzeMotec
 from bridge.sim.node import SimulatedNode
+from bridge.sim.nord_single import NordSingle
+from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
 from bridge.sim.stoeber_5000 import Stoeber5000
 from bridge.southbound.bus import Bus
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.virtual import VirtualWire
+from tests.support import sites
 from tests.support.process import free_port, until
 
 _START_S: Final = 40.0
 _PARAMETERS: Final = {"P105": 50.0, "P112": 10.0, "C00011": 1500.0, "C01": 3000.0}
 """Scaling of the families, where they have it."""
 
-_SITE: Final = """
-[site]
-name = "families"
-state_dir = "{folder}/state"
-runtime_dir = "{folder}/run"
-
-[[bus]]
-name = "can0"
-interface = "virtual"
-bitrate = 1000000
-sync_period_ms = 20
-{nodes}
-{servers}
-"""
-_NODE: Final = """
-[[bus.node]]
-name = "{name}"
-id = {node_id}
-mapping = "{mapping}"
-supervision = "{supervision}"
-supervision_ms = 1000
-
-[[bus.node.drive]]
-slot = "{slot}"
-unit_id = {node_id}
-control = "{control}"
-fieldbus_timeout_ms = 20000
-telegram_downtime_s = 0
-parameters = {{ {parameters} }}
-"""
-_SERVERS: Final = {
-    "modbus": '[modbus]\nlisten = "127.0.0.1:{port}"\n',
-    "opcua": '[opcua]\nlisten = "127.0.0.1:{port}"\nno_security = true\nanonymous = "operator"\n',
-    "zenoh": '[zenoh]\nlisten = ["tcp/127.0.0.1:{port}"]\n',
+_SERVERS: Final = {"modbus": sites.modbus, "opcua": sites.opcua, "zenoh": sites.zenoh}
+_MORE: Final = {
+    "lenze/": "tpdo = { event_ms = 50 }",  # at factory it sends on a change only
 }
 
 T = TypeVar("T")
 
 
-def node_name(mapping: str, protocol: str) -> str:
-    return f"{mapping.replace('/', '_').replace('-', '_')}_{protocol}"
-
-
 class FamilySite:
-    """A site with one node of each family for each protocol. ``drives`` has the names of the drives, by
-    mapping and protocol; ``ports`` those of the servers."""
+    """A site with one node of each family, all controlled by one protocol. ``drives`` has the names of the
+    drives by mapping, ``units`` their Modbus units, ``port`` is the server's."""
 
-    def __init__(self, folder: Path, mappings: Sequence[str], protocols: Sequence[str]) -> None:
-        self.path = folder / "families.toml"
+    def __init__(self, folder: Path, mappings: Sequence[str], protocol: str) -> None:
+        self.protocol = protocol
         self.families = {mapping: load_family(mapping) for mapping in mappings}
-        self.drives: dict[tuple[str, str], str] = {}
-        self.ports = {protocol: free_port() for protocol in protocols}
+        self.drives: dict[str, str] = {}
+        self.units: dict[str, int] = {}
+        self.port = free_port()
         # Families with few addresses take the lowest.
-        wanted = sorted(
-            ((mapping, protocol) for mapping in mappings for protocol in protocols),
-            key=lambda one: self.families[one[0]].family.node_id_high,
-        )
-        nodes = [self._node(node_id, *one) for node_id, one in enumerate(wanted, 1)]
-        servers = [_SERVERS[protocol].format(port=port) for protocol, port in self.ports.items()]
-        text = _SITE.format(folder=folder, nodes="".join(nodes), servers="\n".join(servers))
-        self.path.write_text(text, encoding="utf-8")
+        ordered = sorted(mappings, key=lambda mapping: self.families[mapping].family.node_id_high)
+        nodes = [self._node(node_id, mapping) for node_id, mapping in enumerate(ordered, 1)]
+        bus = sites.bus(*nodes, more="bitrate = 1000000\nsync_period_ms = 20")
+        self.path = sites.write(folder, bus, _SERVERS[protocol](self.port), name="families")
 
-    def _node(self, node_id: int, mapping: str, protocol: str) -> str:
-        family, name = self.families[mapping], node_name(mapping, protocol)
+    def _node(self, node_id: int, mapping: str) -> str:
+        family, name = self.families[mapping], mapping.replace("/", "_").replace("-", "_")
         slot = family.slot[0].name
-        self.drives[mapping, protocol] = f"{name}/{slot if len(family.slot) > 1 else 'drive'}"
-        full = {value.full for value in family.value if value.full}
-        return _NODE.format(
+        self.drives[mapping] = f"{name}/{slot if len(family.slot) > 1 else 'drive'}"
+        self.units[mapping] = node_id
+        full = sorted({value.full for value in family.value if value.full})
+        scaled = ", ".join(f"{parameter} = {_PARAMETERS[parameter]}" for parameter in full)
+        own = [text for maker, text in _MORE.items() if mapping.startswith(maker)]
+        more = [f"unit_id = {node_id}", "telegram_downtime_s = 0", f"parameters = {{ {scaled} }}", *own]
+        return sites.node(
+            sites.drive(slot, self.protocol, 20_000, "\n".join(more)),
             name=name,
             node_id=node_id,
             mapping=mapping,
-            supervision="guarding" if mapping.startswith("stoeber/") else "heartbeat",
-            slot=slot,
-            control=protocol,
-            parameters=", ".join(f"{name} = {_PARAMETERS[name]}" for name in sorted(full)),
+            more=f'supervision = "{"guarding" if mapping.startswith("stoeber/") else "heartbeat"}"',
         )
 
 
@@ -141,7 +108,7 @@ class FamilyBridge:
     async def _serve(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._work = asyncio.current_task()
-        self.service = Service(self._project, self._open_bus, fronts="opcua" in self.site.ports)
+        self.service = Service(self._project, self._open_bus, fronts=True)
         assert self._simulation
         playing = asyncio.create_task(self._simulation.run())
         try:
@@ -180,23 +147,28 @@ class FamilyBridge:
         until(lambda: outcomes, 5.0, f"an outcome of {action} {drive}")
         return outcomes[0]
 
-    def fail(self, drive: str) -> None:
-        """The motor of this drive gets too warm, or the nearest to it that the simulation has."""
+    def fail(self, drive: str) -> str:
+        """The motor of this drive gets too warm, or the nearest to it that the simulation has. What the
+        fault text then says."""
         node = self._nodes[drive.partition("/")[0]]
 
-        def happen() -> None:
+        def happen() -> str:
+            assert self._simulation
+            self._simulation.poke()
             if isinstance(node, LenzeMotec):
                 node.fail(111)
-            elif isinstance(node, Stoeber5000):
+                return "error 111"
+            if isinstance(node, Stoeber5000):
                 node.fail(41, 2)
             elif isinstance(node, Cia402Drive):
                 node.fail(0x4310)
-            else:
-                node.fail_drive(1, 20)  # pyright: ignore[reportAttributeAccessIssue]: every NORD has it
-            assert self._simulation
-            self._simulation.poke()
+            elif isinstance(node, NordTu4):
+                node.fail_drive(1, 20)
+            elif isinstance(node, NordSingle):
+                node.fail_drive(20)
+            return "temperature"
 
-        self.call(happen)
+        return self.call(happen)
 
     def cut(self) -> None:
         """Nobody hears anybody any more; what is on its way arrives."""
@@ -224,10 +196,8 @@ class FamilyBridge:
 
 
 @contextmanager
-def family_bridge(
-    folder: Path, mappings: Sequence[str], protocols: Sequence[str]
-) -> Iterator[FamilyBridge]:
-    bridge = FamilyBridge(FamilySite(folder, mappings, protocols))
+def family_bridge(folder: Path, mappings: Sequence[str], protocol: str) -> Iterator[FamilyBridge]:
+    bridge = FamilyBridge(FamilySite(folder, mappings, protocol))
     try:
         bridge.start()
         yield bridge
@@ -237,7 +207,7 @@ def family_bridge(
 
 def setpoint_of(family: Family) -> tuple[str, float] | None:
     """A setpoint of the family that is soon reached: name and value; None where it has none."""
-    for value in family.value:
+    for value in family.values_of(family.slot[0]):
         if value.group == "command" and value.name in ("frequency", "velocity", "position"):
-            return value.name, {"Hz": 5.0, "1/min": 120.0}.get(value.unit, 500.0)
+            return value.name, {"Hz": 2.0, "1/min": 120.0}.get(value.unit, 500.0)
     return None

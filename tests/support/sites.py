@@ -31,13 +31,15 @@ fieldbus_timeout_ms = {timeout_ms}
 """
 
 
-def node(*drives: str, name: str = "conveyor", more: str = "") -> str:
-    """A SK TU4-CAO, node 5 of its bus."""
+def node(
+    *drives: str, name: str = "conveyor", node_id: int = 5, mapping: str = FAMILY, more: str = ""
+) -> str:
+    """A SK TU4-CAO, node 5 of its bus, where nothing else is said."""
     return f"""
 [[bus.node]]
 name = "{name}"
-id = 5
-mapping = "{FAMILY}"
+id = {node_id}
+mapping = "{mapping}"
 {more}
 {"".join(drives)}"""
 

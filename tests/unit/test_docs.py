@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from bridge.config import Site, load_site
+from bridge.mapping import read_family
 from tests.support.docs import (
     LINKED,
     RUN,
@@ -40,9 +41,10 @@ def test_every_link_leads_somewhere(page: Page) -> None:
 
 
 def test_every_page_can_be_found_from_the_index() -> None:
-    index = page("index.md")
-    linked = {(index.path.parent / link.partition("#")[0]).resolve() for link in index.links}
-    missing = [str(page) for page in RUN[1:] if page.path not in linked and page.path != index.path]
+    indices = [page("index.md"), page("reference/families/index.md")]
+    linked = {(one.path.parent / link.partition("#")[0]).resolve() for one in indices for link in one.links}
+    linked.add(indices[0].path)
+    missing = [str(page) for page in RUN[1:] if page.path not in linked]
     assert not missing
 
 
@@ -70,7 +72,11 @@ def test_snippets_are_what_they_say(page: Page, tmp_path: Path) -> None:
             configparser.ConfigParser(strict=False, interpolation=None).read_string(block.text)
         elif block.language == "toml":
             source = block.note("from")
-            if source:
+            if block.note("mapping") is not None:
+                path = tmp_path / "mapping.toml"
+                path.write_text(block.text, encoding="utf-8")
+                read_family(path)
+            elif source:
                 check_quotation(block.text, REPOSITORY / source, where)
             else:
                 load_fragment(block.text, tmp_path, where)

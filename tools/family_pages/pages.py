@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Iterator
 
 from bridge.mapping import Family, family_names, load_family
-from bridge.mapping.loader import mappings_dir
+from bridge.mapping.loader import lineage, mappings_dir
 from bridge.sim.catalogue import SIMULATED
 from tools.family_pages.faults import faults, own_supervision
 from tools.family_pages.parameters import parameters, polls
@@ -64,7 +63,7 @@ Simulated: `drivebridge simulate` and the virtual bus can play it. Another one i
 
 def _page(name: str, family: Family) -> Iterator[str]:
     facts = family.family
-    chain = _chain(name)
+    chain = lineage(name, (mappings_dir(),))
     yield f"# {_title(family)}"
     yield ""
     yield _MADE
@@ -91,17 +90,6 @@ Addresses: {facts.node_id_low}…{facts.node_id_high}.'
     yield from polls(family)
     yield from faults(family)
     yield from own_supervision(family)
-
-
-def _chain(name: str) -> list[str]:
-    """The mapping and those it extends."""
-    found = [name]
-    while True:
-        data = tomllib.loads((mappings_dir() / f"{found[-1]}.toml").read_text(encoding="utf-8"))
-        base = data.get("extends")
-        if not isinstance(base, str):
-            return found
-        found.append(base)
 
 
 def _notes(name: str) -> Iterator[str]:

@@ -16,7 +16,8 @@ def parameters(family: Family) -> Iterator[str]:
     yield "## Parameters"
     yield ""
     if names is not None:
-        yield f"Written as {', '.join(f'`{one.strip()}`' for one in names.example.split(','))}; every object as \
+        written = ", ".join(f"`{one.strip()}`" for one in names.example.split(","))
+        yield f"Written as {written}; every object as \
 `2066:01` too. \
 {_rule(family)}"
         yield ""

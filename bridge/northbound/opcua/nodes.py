@@ -235,9 +235,13 @@ def _methods(target: str, table: _Methods) -> tuple[MethodNode, ...]:
     )
 
 
+_MOST_STATES: Final = 256
+"""EnumStrings is a list from code 0 on (Part 8 §5.3.3.3): for codes beyond this one it says nothing."""
+
+
 def _variable(point: Point, index: int) -> VariableNode:
     kind = VariableKind.PLAIN
-    if point.states:
+    if point.states and all(0 <= code < _MOST_STATES for code, _ in point.states):
         kind = VariableKind.MULTI_STATE
     elif point.unit:
         kind = VariableKind.ANALOG

@@ -26,6 +26,7 @@ _COMMON_CODES: Final = {
     "s": ("SEC", "second"),
     "min": ("MIN", "minute"),
     "h": ("HUR", "hour"),
+    "d": ("DAY", "day"),
     "rpm": ("RPM", "revolutions per minute"),
     "1/min": ("RPM", "revolutions per minute"),
     "1/s": ("RPS", "revolutions per second"),

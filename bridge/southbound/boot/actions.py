@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.command import Identification
+from bridge.drive import OwnJudgement
 from bridge.southbound.boot.memory import BootMemory
 from bridge.southbound.boot.status import BootError
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
@@ -37,6 +38,7 @@ class Write:
     index: int
     sub: int
     data: bytes
+    channel: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +135,8 @@ class BootResult:
     """Where emergency messages come; None where the node sends none."""
     heartbeat_ms: int = 0
     """The heartbeat period that the node keeps; 0 for none."""
+    own: dict[str, OwnJudgement] = field(default_factory=dict[str, OwnJudgement])
+    """What each drive does by itself when the bridge falls silent."""
     memory: BootMemory = field(default_factory=BootMemory)
 
 

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
 NOT_AGAIN: Final = "it is not written again until the node restarts or is reset"
+
+
+CountWrite = Callable[[str, str, str], str]
+"""One more write to an EEPROM: owner, object, name. Returns a warning or an empty text, and raises
+``ParameterError`` where it is one too many (``parameter.ledger``)."""
+
+
+def _not_counted(owner: str, address: str, name: str) -> str:
+    del owner, address, name
+    return ""
 
 
 @dataclass(slots=True)
@@ -16,6 +27,7 @@ class BootMemory:
     unsaved: bool = False
     """Something was written that has not been stored (1010h) yet."""
     unanswered_stores: int = 0
+    count_write: CountWrite = _not_counted
     _not_kept: dict[tuple[int, int], bytes] = field(default_factory=dict[tuple[int, int], bytes])
     _commands: set[tuple[int, int, bytes]] = field(default_factory=set[tuple[int, int, bytes]])
 

@@ -24,7 +24,7 @@ from bridge.southbound.boot.emergency import read_emcy_id
 from bridge.southbound.boot.error_control import set_error_control
 from bridge.southbound.boot.identity import identify, look_for
 from bridge.southbound.boot.memory import BootMemory
-from bridge.southbound.boot.own_timeout import note_own_timeout
+from bridge.southbound.boot.own_supervision import set_own_supervision
 from bridge.southbound.boot.pdos import plan_drive, plan_node_tpdos, refuse_doubles
 from bridge.southbound.boot.scales import read_scales
 from bridge.southbound.boot.sdo_servers import open_sdo_servers
@@ -54,7 +54,7 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
         result.drives[drive.name] = yield from plan_drive(node, drive, result)
     refuse_doubles(result)
     yield from plan_node_tpdos(node, result)
-    yield from note_own_timeout(node, result)
+    yield from set_own_supervision(node, result)
     yield Step("reading the scaling parameters", "J")
     for drive in node.drives:
         result.scales[drive.name] = yield from read_scales(node, drive, result)

@@ -79,7 +79,8 @@ def test_every_object_of_the_drive_is_in_it(description: Description) -> None:
 
 def test_the_delivered_pdos_are_the_profiles(description: Description) -> None:
     found = {
-        (pdo.receives, pdo.number): [(one.index, one.bits) for one in pdo.mapped] for pdo in pdos(description, NODE)
+        (pdo.receives, pdo.number): [(one.index, one.bits) for one in pdo.mapped]
+        for pdo in pdos(description, NODE)
     }
     assert found[True, 1] == [(0x6040, 16)]
     assert found[True, 3] == [(0x6040, 16), (0x607A, 32)]

@@ -1,6 +1,8 @@
-"""Our own EDS of the SK TU4-CAO: other tools open it, and the simulated node has what it says."""
+"""Our own EDS files of the NORD nodes: other tools open them, and the simulated nodes have what they say."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import canopen
 import pytest
@@ -10,74 +12,133 @@ from bridge.eds.pdos import pdos
 from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
 from bridge.sim.dictionary import Number, Text
+from bridge.sim.nord_node import NordNode
+from bridge.sim.nord_single import NordSingle
+from bridge.sim.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
 from bridge.sim.nord_tu4 import NordTu4
 
-FILE = mappings_dir() / "nord" / "sk-tu4-cao.eds"
-PROFILE = range(0x6000, 0x6100)
-"""There only with P168 [-01] = 1 (BU 2500 §6.7.3), which the simulation leaves at 0."""
+PROFILE = range(0x6000, 0xA000)
+"""In sk-tu4-cao.eds and sk-cu4-cao.eds, though there only with P168 [-01] = 1 (BU 2500 §6.7.3)."""
 NODE = 5
-SIMULATED = NordTu4(NODE, layout="five")
-"""Numbered as §6.7.5 does."""
+NODES: dict[str, NordNode] = {
+    # Numbered as §6.7.5 does.
+    "sk-tu4-cao": NordTu4(NODE, layout="five"),
+    "sk-cu4-cao": NordTu4(NODE, kind="SK CU4-CAO", layout="five"),
+    "sk-tu4-cao-ds402": NordTu4(NODE, profile=True),
+    "sk-tu3-cao": NordSingle(NODE, TU3),
+    "sk-5xxe-rj45": NordSingle(NODE, RJ45_5XX),
+    "sk-54xe-rj45": NordSingle(NODE, RJ45_54X),
+}
+ON_DEMAND = {name for name in NODES if name in ("sk-tu4-cao", "sk-cu4-cao")}
+MAPPINGS = {
+    **{f"nord/{name}": name for name in NODES},
+    **{f"nord/sk-tu3-cao-{view}": "sk-tu3-cao" for view in ("pdo1", "pdo3", "pdo4")},
+    "nord/sk-5xxe-rj45-encoder": "sk-5xxe-rj45",
+    "nord/sk-54xe-rj45-encoder": "sk-54xe-rj45",
+}
 
 
-@pytest.fixture(scope="module")
-def description() -> Description:
-    return read_device_file(FILE)
+def path(name: str) -> Path:
+    return mappings_dir() / "nord" / f"{name}.eds"
 
 
-def simulated(entry: Entry) -> Number | Text:
-    found = SIMULATED.slave._dictionary.find(entry.index, entry.sub)
+@pytest.fixture(params=NODES)
+def name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def description(name: str) -> Description:
+    return read_device_file(path(name))
+
+
+def entries(name: str, description: Description) -> list[Entry]:
+    """Of the objects that a fresh node has."""
+    every = [entry for one in description.objects for entry in one.entries]
+    return [entry for entry in every if not (name in ON_DEMAND and entry.index in PROFILE)]
+
+
+def simulated(name: str, entry: Entry) -> Number | Text:
+    found = NODES[name].slave._dictionary.find(entry.index, entry.sub)
     assert isinstance(found, Number | Text)
     return found
 
 
-def test_it_has_no_findings(description: Description) -> None:
+def test_every_file_is_looked_at():
+    assert {file.stem for file in (mappings_dir() / "nord").glob("*.eds")} == set(NODES)
+
+
+def test_it_has_no_findings(description: Description):
     assert description.findings == ()
 
 
-def test_canopen_opens_it(description: Description) -> None:
-    other = canopen.import_od(str(FILE), NODE)
+def test_canopen_opens_it(name: str, description: Description):
+    other = canopen.import_od(str(path(name)), NODE)
     for one in description.objects:
         for entry in one.entries:
             member = other[one.index] if one.object_type == 7 else other[one.index][entry.sub]
             assert (member.data_type, member.access_type) == (entry.data_type, entry.access), one.name
-    assert other[0x1802][1].default == 0x40000385
+    assert other[0x1800][1].default == 0x40000185
 
 
-def test_the_simulated_node_has_every_object_with_the_same_type_and_access(description: Description) -> None:
+def test_the_simulated_node_has_every_object_with_the_same_type_and_access(
+    name: str, description: Description
+):
     checked = 0
-    for one in description.objects:
-        for entry in one.entries:
-            if entry.index in PROFILE:
-                continue
-            node = simulated(entry)
-            assert entry.data_type
-            if isinstance(node, Text):
-                assert entry.data_type.name == "VISIBLE_STRING"
-                continue
-            writable = node.write is not None
-            assert node.data_type.name == entry.data_type.name, entry
-            assert (node.read is not None, writable) == (entry.access.readable, entry.access.writable), entry
-            assert (node.in_tpdo or node.in_rpdo) == entry.pdo_mappable, entry
+    for entry in entries(name, description):
+        node = simulated(name, entry)
+        assert entry.data_type
+        if isinstance(node, Text):
+            assert entry.data_type.name == "VISIBLE_STRING"
+            continue
+        writable = node.write is not None
+        assert node.data_type.name == entry.data_type.name, entry
+        assert (node.read is not None, writable) == (entry.access.readable, entry.access.writable), entry
+        assert (node.in_tpdo or node.in_rpdo) == entry.pdo_mappable, entry
+        checked += 1
+    assert checked > 50
+
+
+def test_the_defaults_of_pdos_and_sdos_are_those_of_a_fresh_node(name: str, description: Description):
+    checked = 0
+    for entry in entries(name, description):
+        if entry.default and (0x1200 <= entry.index < 0x1B00 or entry.index in PROFILE):
+            node = simulated(name, entry)
+            assert isinstance(node, Number)
+            assert node.read
+            assert node.read() == entry.default.at(NODE), entry
             checked += 1
-    assert checked > 150
+    assert checked > 20
 
 
-def test_the_defaults_of_pdos_and_sdos_are_those_of_a_fresh_node(description: Description) -> None:
-    for one in description.objects:
-        for entry in one.entries:
-            if 0x1200 <= entry.index < 0x1B00 and entry.default:
-                node = simulated(entry)
-                assert isinstance(node, Number)
-                assert node.read
-                assert node.read() == entry.default.at(NODE), entry
+@pytest.mark.parametrize("mapping", MAPPINGS)
+def test_the_mapping_file_and_the_eds_agree_on_the_pdos(mapping: str):
+    """Where the mapping file has two layouts the EDS has the one of §6.7.5, the second."""
+    known = {(pdo.receives, pdo.number): pdo for pdo in pdos(read_device_file(path(MAPPINGS[mapping])), NODE)}
+    for slot in load_family(mapping).slot:
+        for receives, each in ((True, slot.rpdo), (False, slot.tpdo)):
+            for pdo in each:
+                summary = known[receives, pdo.number]
+                assert summary.cob_id == pdo.cob_id + NODE
+                if pdo.static or "ds402" in mapping:
+                    continue  # the object is not named; the mapping is left to the master
+                own = [refs[-1].parts[0] for refs in pdo.objects]
+                assert [(one.index, one.sub) for one in summary.mapped] == [(p.index, p.sub) for p in own]
 
 
-def test_the_mapping_file_and_the_eds_agree_on_the_pdos(description: Description) -> None:
-    known = {(pdo.receives, pdo.number): pdo for pdo in pdos(description, NODE)}
-    for slot in load_family("nord/sk-tu4-cao").slot:
-        for receives, pdo in ((True, slot.rpdo), (False, slot.tpdo)):
-            summary = known[receives, pdo.number]
-            assert summary.cob_id == pdo.cob_id + NODE
-            five = [(refs[-1].index, refs[-1].sub) for refs in pdo.objects]
-            assert [(one.index, one.sub) for one in summary.mapped] == five
+@pytest.mark.parametrize("mapping", MAPPINGS)
+def test_what_the_mapping_maps_and_writes_is_in_the_eds(mapping: str):
+    family = load_family(mapping)
+    description = read_device_file(path(MAPPINGS[mapping]))
+    known = {(entry.index, entry.sub) for one in description.objects for entry in one.entries}
+    refs = [poll.object for poll in family.poll]
+    for slot in family.slot:
+        refs += [
+            part
+            for pdo in (*slot.rpdo, *slot.tpdo)
+            for words in pdo.objects
+            for part in words[-1].parts
+            if not pdo.static
+        ]
+    wanted = {(ref.index, ref.sub) for ref in refs if ref.index >= 0x3000}
+    assert wanted <= known

@@ -30,7 +30,9 @@ STATES = {
 
 
 def test_there_is_one_file_for_each_mode_and_the_base_is_none():
-    assert {name for name in family_names() if name.startswith("cia402/")} == {f"cia402/{name}" for name in MAPPINGS}
+    assert {name for name in family_names() if name.startswith("cia402/")} == {
+        f"cia402/{name}" for name in MAPPINGS
+    }
     with pytest.raises(FileFaults, match="template"):
         load_family("cia402/base")
 
@@ -66,7 +68,10 @@ def test_the_words_are_the_commands_of_the_standard(name: str):
 
 
 def test_the_bits_of_the_modes():
-    runs = {name: f"{family.control_word.run | family.control_word.begin:04X}" for name, family in FAMILIES.items()}
+    runs = {
+        name: f"{family.control_word.run | family.control_word.begin:04X}"
+        for name, family in FAMILIES.items()
+    }
     assert runs == {
         "velocity": "007F",
         "profile-velocity": "000F",
@@ -129,7 +134,9 @@ def test_a_sites_own_units_are_a_small_file(tmp_path: Path):
     values = {value.leaf: value for value in family.value}
     assert values["command/velocity"].unit == "1/min"
     assert values["command/velocity"].word_names == ("setpoint_1", "setpoint_2")
-    assert values["actual/velocity"].scale.factor == 0.006
+    scale = values["actual/velocity"].scale
+    assert scale is not None
+    assert scale.factor == 0.006
 
 
 @pytest.mark.parametrize(

@@ -123,6 +123,11 @@ def test_one_table_stands_for_a_list_of_one(tmp_path: Path) -> None:
         ("states = { 0 =", "low = 1.0\nstates = { 0 =", "value[4].low: has no meaning with states"),
         ("states = { 0 =", "states = { x =", "must be a number in decimal, such as 3"),
         ("states = { 0 =", "states = { 70000 =", "value[4].states: 70000 is no uint16 (0…65535)"),
+        (
+            '["left", "right"]',
+            '["left", "left"]',
+            "value[8].bits[1]: bit 'left' is there twice (first in line",
+        ),
         ("bit = 0", "bit = 16", "value[5].bit: must be at most 15, not 16"),
         ("bit = 0", 'bit = 0\nbits = ["a"]', "value[5].bit: valve_a has bits already"),
         ("bit = 0", "bit = 0\nscale = {}", "value[5].bit: valve_a has scale already"),

@@ -12,7 +12,6 @@ from bridge.config import WordOrder
 from bridge.northbound.modbus.dispatch import EXCEPTIONS
 from bridge.northbound.modbus.pdu import Identify, identification_answer
 from bridge.northbound.modbus.registers import DriveMap, Table, Words32, bridge_rows, drive_maps
-from tests.support.rig import emergency
 from tests.support.modbus_site import (
     ENABLED,
     OTHER_PLC,
@@ -23,6 +22,7 @@ from tests.support.modbus_site import (
     float_words,
     make_plant,
 )
+from tests.support.rig import emergency
 
 NO_FUNCTION, NO_ADDRESS, BAD_VALUE, NOT_CONFIGURED, NOT_RESPONDING = -1, -2, -3, -0x0A, -0x0B
 

@@ -88,7 +88,14 @@ def test_the_name_comes_in_segments_and_in_a_block(make):
 
 @pytest.mark.parametrize(
     ("index", "sub", "value", "size"),
-    [(0x6060, 0, 4, 1), (0x605A, 0, 9, 2), (0x6007, 0, 4, 2), (0x6098, 0, 1, 1), (0x6083, 0, 0, 4), (0x60C2, 2, 1, 1)],
+    [
+        (0x6060, 0, 4, 1),
+        (0x605A, 0, 9, 2),
+        (0x6007, 0, 4, 2),
+        (0x6098, 0, 1, 1),
+        (0x6083, 0, 0, 4),
+        (0x60C2, 2, 1, 1),
+    ],
 )
 def test_a_value_out_of_range_is_refused(make, index: int, sub: int, value: int, size: int):
     bench = make(Mode.NONE)
@@ -286,7 +293,14 @@ def test_pp_within_the_software_limits(make):
 
 @pytest.mark.parametrize(
     ("method", "from_", "to"),
-    [(17, 0, -100_000), (18, 0, 100_000), (33, 25_000, 20_000), (34, 25_000, 30_000), (35, 123, 123), (37, 123, 123)],
+    [
+        (17, 0, -100_000),
+        (18, 0, 100_000),
+        (33, 25_000, 20_000),
+        (34, 25_000, 30_000),
+        (35, 123, 123),
+        (37, 123, 123),
+    ],
 )
 def test_hm_finds_its_place(make, method: int, from_: int, to: int):
     bench = make(Mode.HOMING, homing_method=method, home_offset=7)

@@ -148,7 +148,9 @@ def test_a_quick_stop_of_option_0_is_voltage_off() -> None:
     assert (one.state, one.taken[-2:]) == (State.SWITCH_ON_DISABLED, [11, 12])
 
 
-@pytest.mark.parametrize(("option", "ramp"), [(5, Ramp.SLOW_DOWN), (6, Ramp.QUICK), (7, Ramp.QUICK), (8, Ramp.QUICK)])
+@pytest.mark.parametrize(
+    ("option", "ramp"), [(5, Ramp.SLOW_DOWN), (6, Ramp.QUICK), (7, Ramp.QUICK), (8, Ramp.QUICK)]
+)
 def test_options_5_to_8_stay_and_know_16(option: int, ramp: Ramp) -> None:
     one = automaton(State.QUICK_STOP_ACTIVE, x605A=option)
     assert one.ramp is ramp

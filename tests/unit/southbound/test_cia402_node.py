@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import pytest
@@ -201,7 +202,7 @@ def test_pp_a_written_position_is_handed_over_and_reached(booted) -> None:
     assert bench.value("axis/drive/actual/target_reached") is True
     words = [word(frame) for frame in bench.sent(0x205) if frame.time >= begin]
     assert words[0] & 0x10, "with the position itself"
-    edges = sum(1 for one, two in zip(words, words[1:], strict=False) if two & ~one & 0x10)
+    edges = sum(1 for one, two in itertools.pairwise(words) if two & ~one & 0x10)
     assert not words[-1] & 0x10
     assert edges == 0, "raised once, and lowered when bit 12 said so"
 
@@ -212,7 +213,7 @@ def test_pp_the_same_position_written_cyclically_moves_nothing_twice(booted) -> 
     keep(bench, 1.5, control_word=0x002F, position=20_000)
     assert bench.value("axis/drive/actual/position") == 20_000
     words = [word(frame) for frame in bench.sent(0x205)]
-    assert sum(1 for one, two in zip(words, words[1:], strict=False) if two & ~one & 0x10) == 1
+    assert sum(1 for one, two in itertools.pairwise(words) if two & ~one & 0x10) == 1
     keep(bench, 1.5, control_word=0x002F, position=-20_000)
     assert bench.value("axis/drive/actual/position") == -20_000
 

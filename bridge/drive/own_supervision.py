@@ -1,0 +1,161 @@
+"""What a drive does by itself when the bridge falls silent: judged from what its objects hold.
+
+Which objects those are is in the mapping file (``own_supervision``). What they hold is given as numbers by
+index and sub-index; one that is missing is not known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from bridge.config import BusTable, NodeTable
+from bridge.mapping.model import Family, OwnReaction, OwnSupervision
+from bridge.mapping.own_places import LIFE_TIME_FACTOR, OwnPlace, Raw, place_of
+
+
+class OwnVerdict(StrEnum):
+    STOPS = "stops"
+    RUNS_ON = "runs on"
+    UNKNOWN = "not known"
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """One thing that the drive watches. ``verdict`` is None where it says nothing of the bridge."""
+
+    name: str
+    watches: str
+    setting: str
+    time_ms: float | None
+    """None where it is not known, 0 where nothing is watched."""
+    reaction: str
+    verdict: OwnVerdict | None
+    why: str = ""
+    """Why the drive would not stop by it."""
+    silent_ms: int = 0
+    """How long after the bridge hung the last sign of it may come."""
+
+    @property
+    def bridge_ms(self) -> float | None:
+        """Longest time from the bridge's hang to this reaction; None where there is none."""
+        stops = self.verdict is OwnVerdict.STOPS and self.time_ms is not None
+        return self.silent_ms + (self.time_ms or 0) if stops else None
+
+
+@dataclass(frozen=True, slots=True)
+class OwnJudgement:
+    """What one drive would do."""
+
+    watches: tuple[Watch, ...] = ()
+    accepted: str = ""
+    """Why the site file accepts that it would run on."""
+
+    @property
+    def first(self) -> Watch | None:
+        """The watch that stops it first."""
+        stops = [(one.bridge_ms, n) for n, one in enumerate(self.watches) if one.bridge_ms is not None]
+        return self.watches[min(stops)[1]] if stops else None
+
+    @property
+    def verdict(self) -> OwnVerdict:
+        if self.first is not None:
+            return OwnVerdict.STOPS
+        verdicts = [one.verdict for one in self.watches if one.verdict is not None]
+        is_known = bool(verdicts) and OwnVerdict.UNKNOWN not in verdicts
+        return OwnVerdict.RUNS_ON if is_known else OwnVerdict.UNKNOWN
+
+    @property
+    def own_ms(self) -> float:
+        """The drive's own time-out, 0 where it has none."""
+        return self.first.time_ms or 0 if self.first else 0
+
+    @property
+    def bridge_ms(self) -> int:
+        """Longest time from the bridge's hang to the drive's own reaction; 0 where there is none."""
+        return round(self.first.bridge_ms or 0) if self.first else 0
+
+    @property
+    def reason(self) -> str:
+        """Why it would not stop, or why that is not known; empty where it would."""
+        if self.verdict is OwnVerdict.STOPS:
+            return ""
+        if not any(one.verdict for one in self.watches):
+            return "the mapping says nothing of the drive's own supervision"
+        wanted = self.verdict
+        whys = dict.fromkeys(one.why for one in self.watches if one.verdict is wanted)
+        return "; ".join(whys)
+
+
+def judge(family: Family, raw: Raw, bus: BusTable, node: NodeTable, accepted: str = "") -> OwnJudgement:
+    """What one drive of this node would do, with ``raw`` in its objects."""
+    watches = [
+        _watch(family, entry, raw, bus, node)
+        for entry in family.own_supervision
+        if entry.watches != "link" or place_of(family, entry).key in raw
+    ]
+    return OwnJudgement(tuple(watches), accepted)
+
+
+def _watch(family: Family, entry: OwnSupervision, raw: Raw, bus: BusTable, node: NodeTable) -> Watch:
+    place = place_of(family, entry)
+    value = raw.get(place.key)
+    silent_ms = max(bus.deadman_ms, bus.heartbeat_ms if entry.watches == "heartbeat" else 0)
+    if value is None:
+        why = f"{place.name} is not known"
+        return Watch(entry.name, entry.watches, why, None, "", OwnVerdict.UNKNOWN, why)
+    if entry.watches == "link":
+        off = value in entry.off
+        why = "it does not notice when its bus interface is gone" if off else ""
+        return Watch(entry.name, entry.watches, place.shown(value), None, "", None, why)
+    time_ms, setting, why = _time(entry, place, value, raw, bus, node)
+    if time_ms is None:
+        return Watch(entry.name, entry.watches, setting, None, "", OwnVerdict.UNKNOWN, why)
+    if not time_ms:
+        return Watch(entry.name, entry.watches, setting, 0.0, "", OwnVerdict.RUNS_ON, why)
+    reaction, verdict, why = _reaction(family, entry.reaction, raw)
+    return Watch(entry.name, entry.watches, setting, time_ms, reaction, verdict, why, silent_ms)
+
+
+def _time(
+    entry: OwnSupervision, place: OwnPlace, value: int, raw: Raw, bus: BusTable, node: NodeTable
+) -> tuple[float | None, str, str]:
+    """Time-out in ms (0: nothing is watched, None: not known), the setting in words, and why it is off."""
+    if entry.watches == "guarding":
+        factor = raw.get(LIFE_TIME_FACTOR)
+        if factor is None:
+            return None, f"{place.name} = {value} ms", "100D:00 is not known"
+        setting = f"{place.name} × 100D:00 = {value} ms × {factor}"
+        if not value * factor:
+            return 0.0, setting, "life guarding is off (100C:00 × 100D:00 is 0)"
+        if node.supervision != "guarding":
+            return 0.0, setting, f'the bridge does not guard it (supervision = "{node.supervision}")'
+        return float(value * factor), setting, ""
+    if entry.watches == "heartbeat":
+        watched, time_ms = value >> 16 & 0x7F, value & 0xFFFF
+        if not watched or not time_ms:
+            return 0.0, f"{place.name} = 0", f"{place.name} is 0: it watches no heartbeat"
+        setting = f"{place.name} = node {watched}, {time_ms} ms"
+        if watched != bus.master_node_id:
+            return 0.0, setting, f"{place.name} watches node {watched}, the bridge is {bus.master_node_id}"
+        if not bus.heartbeat_ms:
+            return 0.0, setting, "the bridge sends no heartbeat (heartbeat_ms = 0)"
+        return float(time_ms), setting, ""
+    time_ms = value * entry.unit_ms
+    if value in entry.off:
+        return 0.0, f"{place.name} = {value} (off)", f"{place.name} is {value} (off)"
+    return time_ms, f"{place.name} = {time_ms:g} ms", ""
+
+
+def _reaction(family: Family, one: OwnReaction | None, raw: Raw) -> tuple[str, OwnVerdict, str]:
+    """The reaction in words, what the drive does then, and why that is not to stop."""
+    if one is None:
+        return "stops", OwnVerdict.STOPS, ""
+    place = place_of(family, one)
+    value = raw.get(place.key)
+    if value is None:
+        return f"{place.name} not known", OwnVerdict.UNKNOWN, f"{place.name} is not known"
+    text = place.shown(value)
+    if value in one.nothing:
+        return text, OwnVerdict.RUNS_ON, f"{text}: it runs on"
+    return text, OwnVerdict.STOPS, ""

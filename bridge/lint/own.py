@@ -1,0 +1,135 @@
+"""What drives do by themselves when the bridge falls silent, as far as the site file and the factory tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from bridge.command.drive import worst_case_stop_ms
+from bridge.drive import OwnJudgement, OwnVerdict
+from bridge.drive.own_supervision import judge
+from bridge.lint.bus import BusView, DriveView, NodeView
+from bridge.lint.report import LintReport
+from bridge.mapping.model import OwnSupervision
+from bridge.mapping.own_places import offline, place_of, settable, wanted
+from bridge.tomlfile import Key
+
+
+@dataclass(frozen=True, slots=True)
+class WorstCase:
+    """How long one drive may take. ``controller_ms`` is 0 where a silent controller does not stop it."""
+
+    drive: str
+    controller_ms: int
+    own: OwnJudgement
+
+    def __str__(self) -> str:
+        controller = f"{self.controller_ms} ms" if self.controller_ms else "never"
+        bridge = f"{self.own.bridge_ms} ms" if self.own.bridge_ms else str(self.own.verdict)
+        return f"{self.drive}: controller silent {controller}, bridge silent {bridge}"
+
+
+def worst_cases(bus: BusView) -> Iterator[WorstCase]:
+    """Every drive of the bus, with what is known without asking it."""
+    for node in bus.nodes:
+        for drive in node.drives:
+            timeout_ms = drive.table.fieldbus_timeout_ms or 0
+            controller_ms = worst_case_stop_ms(drive.table, timeout_ms, rpdo_period_ms(bus, drive))
+            yield WorstCase(drive.name, controller_ms, judged(bus, node, drive))
+
+
+def rpdo_period_ms(bus: BusView, drive: DriveView) -> int:
+    """How long a new control word may be on its way; one that waits for SYNC takes a period more."""
+    waits_ms = bus.table.sync_period_ms if drive.rpdos[0].is_synchronous else 0
+    return round(1000 * bus.table.rpdo_period_s) + waits_ms
+
+
+def judged(bus: BusView, node: NodeView, drive: DriveView) -> OwnJudgement:
+    family, table = node.family, node.table
+    slot = family.slot_named(drive.table.slot)
+    raw = offline(family, node.settings.values, bus.table, table, slot)
+    return judge(family, raw, bus.table, table, drive.table.accepts.runs_on or "")
+
+
+def check_own_supervision(bus: BusView, report: LintReport) -> None:
+    for node in bus.nodes:
+        if node.table.enabled:
+            _check_times(bus, node, report)
+            _check_reaction(bus, node, report)
+
+
+def _check_times(bus: BusView, node: NodeView, report: LintReport) -> None:
+    """Those that the site sets: not shorter than what a living bridge may be silent for."""
+    entry = settable(node.family)
+    if entry is None:
+        return
+    key, own_ms = _given(bus, node, entry)
+    if not own_ms:
+        return
+    place = place_of(node.family, entry)
+    name = f"the node's own time-out, {place.ref} = {own_ms:g} ms,"
+    if entry.watches == "heartbeat":
+        period_ms = float(bus.table.heartbeat_ms)
+        if not period_ms:
+            report.error(key, f"{name} waits for the bridge's heartbeat, and heartbeat_ms is 0")
+            return
+        every = "heartbeat periods"
+    else:
+        period_ms, every = 1000 * bus.table.rpdo_period_s, "RPDO periods"
+    if own_ms < 2 * period_ms:
+        report.error(
+            key,
+            f"{name} is less than two {every} of {period_ms:g} ms: one lost frame stops its drives",
+            f"at least {2 * period_ms:g} ms",
+        )
+    elif own_ms < bus.table.deadman_ms:
+        report.warning(
+            key,
+            f"{name} is shorter than deadman_ms = {bus.table.deadman_ms}: it stops its drives over a pause "
+            "that the bridge gets over",
+            f"at least {bus.table.deadman_ms} ms, or a shorter deadman_ms",
+        )
+
+
+def _given(bus: BusView, node: NodeView, entry: OwnSupervision) -> tuple[Key, float]:
+    """The time that the site file gives, and where."""
+    if node.table.own_timeout_ms is not None:
+        return (*node.key, "own_timeout_ms"), float(node.table.own_timeout_ms)
+    setting = node.settings[place_of(node.family, entry).key]
+    if setting is None:
+        return node.key, 0.0
+    if entry.watches == "heartbeat":
+        is_bridge = setting.value >> 16 & 0x7F == bus.table.master_node_id
+        return setting.key, float(setting.value & 0xFFFF) if is_bridge and bus.table.heartbeat_ms else 0.0
+    return setting.key, setting.value * entry.unit_ms
+
+
+def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> None:
+    """A node that may do nothing when its time-out has run out, and does so at factory."""
+    entry = settable(node.family)
+    reaction = entry.reaction if entry else None
+    if entry is None or reaction is None or reaction.factory not in reaction.nothing:
+        return
+    if node.table.enforce and wanted(node.family, bus.table, node.table):
+        return
+    time, place = place_of(node.family, entry), place_of(node.family, reaction)
+    setting = node.settings[place.key]
+    if setting is not None and setting.value not in reaction.nothing:
+        return
+    key, own_ms = _given(bus, node, entry)
+    if own_ms:
+        is_set = f"{setting.value}" if setting is not None else "not set, and at factory nothing"
+        message = f"the node's own time-out, {time.ref}, has no effect: its reaction {place.ref} is {is_set}"
+        report.warning(key, message, f"write {place.ref} too")
+    elif setting is None and any(_runs_on(judged(bus, node, drive)) for drive in node.drives):
+        report.warning(
+            node.key,
+            f"{node.family.family.name} does nothing by itself when the bridge falls silent, unless "
+            f"{place.ref} has been set in it: at factory its drives run on",
+            f"own_timeout_ms and enforce = true, or a [[bus.node.configure]] for {place.ref}, and for "
+            f"{time.ref}, its time",
+        )
+
+
+def _runs_on(own: OwnJudgement) -> bool:
+    return own.verdict is not OwnVerdict.STOPS and not own.accepted

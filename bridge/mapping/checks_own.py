@@ -1,0 +1,43 @@
+"""What a mapping file says of the drives' own supervision."""
+
+from __future__ import annotations
+
+from bridge.config.download import INTEGERS
+from bridge.mapping.checks_process import twice
+from bridge.mapping.merge import Noted
+from bridge.mapping.model import Family, OwnObject
+from bridge.tomlfile import Key
+
+
+def check_own_supervision(family: Family, file: Noted) -> None:
+    entries = family.own_supervision
+    named = [(one.name, ("own_supervision", n, "name")) for n, one in enumerate(entries)]
+    twice(named, "own supervision", file)
+    for n, entry in enumerate(entries):
+        key: Key = ("own_supervision", n)
+        _check_object(entry, family, key, file)
+        if entry.watches in ("heartbeat", "guarding") and (entry.per_drive or entry.unit_ms != 1.0):
+            file.fault((*key, "watches"), f"{entry.watches} is of the node, and counts in ms (CiA 301)")
+        if entry.reaction is None:
+            continue
+        if entry.watches == "link":
+            file.fault((*key, "reaction"), "has no meaning: a link says nothing of the bridge")
+        _check_object(entry.reaction, family, (*key, "reaction"), file)
+        if entry.reaction.stop is not None and entry.reaction.stop in entry.reaction.nothing:
+            file.fault((*key, "reaction", "stop"), "is one of those with which the drive runs on")
+
+
+def _check_object(one: OwnObject, family: Family, key: Key, file: Noted) -> None:
+    if (one.parameter is None) is (one.object is None):
+        file.fault(key, "has a parameter or an object, one of the two")
+        return
+    data_type, where = one.data_type, "data_type"
+    if one.parameter is not None:
+        known = {parameter.name: parameter.data_type for parameter in family.parameter}
+        if one.parameter not in known:
+            message = f"there is no parameter {one.parameter!r}"
+            file.fault((*key, "parameter"), message, f"known: {', '.join(sorted(known))}")
+            return
+        data_type, where = known[one.parameter], "parameter"
+    if data_type not in INTEGERS:
+        file.fault((*key, where), f"is a {data_type}, no whole number")

@@ -1,0 +1,176 @@
+"""Where a family's own supervision is in the object dictionary, and what a site file asks it to hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.config import BusTable, NodeTable
+from bridge.config.download import INTEGERS
+from bridge.mapping.model import Family, ObjectRef, OwnObject, OwnSupervision, Slot
+
+LIFE_TIME_FACTOR: Final = (0x100D, 0)
+"""Guard time (100Ch) × this is the life time (CiA 301 §7.5.2.12)."""
+
+Raw = Mapping[tuple[int, int], int]
+"""By index and sub-index, signed where the object's type is."""
+
+
+@dataclass(frozen=True, slots=True)
+class OwnPlace:
+    """One object of the own supervision. ``low`` and ``high`` are what it can hold, as numbers on the wire."""
+
+    name: str
+    ref: ObjectRef
+    data_type: str
+    per_drive: bool
+    low: int
+    high: int
+    states: Mapping[int, str]
+
+    @property
+    def key(self) -> tuple[int, int]:
+        return self.ref.index, self.ref.sub
+
+    def encode(self, value: int) -> bytes:
+        size, signed = INTEGERS[self.data_type]
+        return value.to_bytes(size, "little", signed=signed)
+
+    def decode(self, data: bytes) -> int:
+        """Some servers answer every read with four bytes: those beyond the type's are left out."""
+        size, signed = INTEGERS[self.data_type]
+        return int.from_bytes(data[:size], "little", signed=signed)
+
+    def shown(self, value: int) -> str:
+        """``C00593/1 is 0 (no reaction)``."""
+        state = self.states.get(value)
+        return f"{self.name} is {value}{f' ({state})' if state else ''}"
+
+
+def place_of(family: Family, one: OwnObject) -> OwnPlace:
+    """Where a setting is. The mapping's checks have seen to it that there is one."""
+    if one.parameter is None:
+        ref = one.object or ObjectRef(index=0, sub=0)
+        low, high = _range(one.data_type)
+        return OwnPlace(str(ref), ref, one.data_type, one.per_drive, low, high, {})
+    parameter = family.parameter_named(one.parameter)
+    low, high = _range(parameter.data_type)
+    if parameter.low is not None:
+        low = max(low, round(parameter.low / parameter.factor))
+    if parameter.high is not None:
+        high = min(high, round(parameter.high / parameter.factor))
+    ref = family.object_of(parameter)
+    kind, states = parameter.data_type, parameter.states
+    return OwnPlace(parameter.name, ref, kind, one.per_drive, low, high, states)
+
+
+def _range(data_type: str) -> tuple[int, int]:
+    size, signed = INTEGERS[data_type]
+    bits = 8 * size
+    return (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
+
+
+def places(family: Family, *, link: bool = False) -> list[OwnPlace]:
+    """All objects that tell what a drive of the family would do, each once; with ``link`` also those of its
+    watch over its interface."""
+    found: dict[tuple[tuple[int, int], bool], OwnPlace] = {}
+    for entry in family.own_supervision:
+        if entry.watches == "link" and not link:
+            continue
+        one = place_of(family, entry)
+        found.setdefault((one.key, one.per_drive), one)
+        if entry.watches == "guarding":
+            ref = ObjectRef(index=LIFE_TIME_FACTOR[0], sub=LIFE_TIME_FACTOR[1])
+            factor = OwnPlace(str(ref), ref, "uint8", False, 0, 0xFF, {})
+            found.setdefault((factor.key, False), factor)
+        if entry.reaction is not None:
+            one = place_of(family, entry.reaction)
+            found.setdefault((one.key, one.per_drive), one)
+    return list(found.values())
+
+
+@dataclass(frozen=True, slots=True)
+class OwnWant:
+    """What an object is to hold. With ``only_if`` it is written where it holds one of these."""
+
+    place: OwnPlace
+    value: int
+    only_if: tuple[int, ...] = ()
+
+    def met_by(self, value: int) -> bool:
+        return value not in self.only_if if self.only_if else value == self.value
+
+
+def settable(family: Family) -> OwnSupervision | None:
+    """The watch whose time ``own_timeout_ms`` is; None where only ``supervision`` sets it."""
+    kinds = ("process_data", "heartbeat")
+    return next((entry for entry in family.own_supervision if entry.watches in kinds), None)
+
+
+def wanted(family: Family, bus: BusTable, node: NodeTable) -> list[OwnWant]:
+    """What ``own_timeout_ms`` of the node stands for: the time first, then the reaction."""
+    entry = settable(family)
+    if entry is None or node.own_timeout_ms is None:
+        return []
+    time_ms = node.own_timeout_ms
+    is_heartbeat = entry.watches == "heartbeat"
+    value = bus.master_node_id << 16 | time_ms if is_heartbeat else round(time_ms / entry.unit_ms)
+    wants = [OwnWant(place_of(family, entry), value)]
+    reaction = entry.reaction
+    if reaction is not None and reaction.stop is not None:
+        wants.append(OwnWant(place_of(family, reaction), reaction.stop, tuple(reaction.nothing)))
+    return wants
+
+
+def impossible(family: Family, time_ms: int) -> str:
+    """Why ``own_timeout_ms`` cannot be this, or an empty text."""
+    entry = settable(family)
+    name = family.family.name
+    if entry is None:
+        guards = any(one.watches == "guarding" for one in family.own_supervision)
+        own = 'it has life guarding alone: supervision = "guarding", supervision_ms × life_time_factor'
+        return f"cannot be set in {name}: {own if guards else 'its mapping names no object for it'}"
+    if time_ms % entry.unit_ms:
+        return f"{time_ms} is no multiple of {entry.unit_ms:g} ms, the steps of {entry.name} in {name}"
+    place = place_of(family, entry)
+    low, high = (1, 0xFFFF) if entry.watches == "heartbeat" else (max(1, place.low), place.high)
+    if not low <= time_ms / entry.unit_ms <= high:
+        return f"{time_ms} ms does not fit: {name} takes {low * entry.unit_ms:g}…{high * entry.unit_ms:g} ms"
+    return ""
+
+
+def offline(
+    family: Family, settings: Raw, bus: BusTable, node: NodeTable, slot: Slot
+) -> dict[tuple[int, int], int]:
+    """What the drive in ``slot`` will hold, by the site file and the factory alone.
+
+    ``settings`` are the node's downloads; they reach a drive's own objects where the first SDO channel
+    does.
+    """
+    raw: dict[tuple[int, int], int] = {}
+    for one in _objects(family.own_supervision):
+        place = place_of(family, one)
+        if one.factory is not None:
+            raw[place.key] = one.factory
+        reaches = not place.per_drive or slot.parameters_by_sdo
+        if place.key in settings and reaches:
+            data = settings[place.key] & (1 << 8 * INTEGERS[place.data_type][0]) - 1
+            raw[place.key] = place.decode(data.to_bytes(8, "little"))
+    guards = node.supervision == "guarding"
+    for entry in family.own_supervision:
+        if entry.watches == "guarding":
+            raw[place_of(family, entry).key] = node.supervision_ms if guards else 0
+            raw[LIFE_TIME_FACTOR] = node.life_time_factor if guards else 0
+    if node.enforce:
+        for want in wanted(family, bus, node):
+            if want.place.key not in raw or not want.met_by(raw[want.place.key]):
+                raw[want.place.key] = want.value
+    return raw
+
+
+def _objects(entries: Iterable[OwnSupervision]) -> Iterable[OwnObject]:
+    for entry in entries:
+        yield entry
+        if entry.reaction is not None:
+            yield entry.reaction

@@ -1,0 +1,165 @@
+"""Real clients of the three protocols that write telegrams to several drives."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any, Protocol
+
+from tests.proof.drives import PORTS, SERVERS, Drive
+
+_LIMIT_S = 1.0
+_CONNECT_S = 5.0
+
+
+class ClientFault(Exception):
+    """The connection is gone, or nobody answers: connect anew."""
+
+
+class Client(Protocol):
+    async def connect(self) -> None: ...
+
+    async def write(self, telegrams: Sequence[tuple[Drive, int, int]]) -> list[bool]:
+        """One telegram for each drive: control word and setpoint. Whether each was accepted."""
+        ...
+
+    async def close(self) -> None: ...
+
+
+class ModbusClient:
+    """pymodbus, one connection for all drives."""
+
+    def __init__(self) -> None:
+        from pymodbus.client import AsyncModbusTcpClient
+
+        self._client = AsyncModbusTcpClient(
+            SERVERS["modbus"], port=PORTS["modbus"], timeout=_LIMIT_S, retries=0, reconnect_delay=0
+        )
+
+    async def connect(self) -> None:
+        if not await self._client.connect():
+            raise ClientFault
+
+    async def write(self, telegrams: Sequence[tuple[Drive, int, int]]) -> list[bool]:
+        from pymodbus.exceptions import ModbusException
+
+        accepted: list[bool] = []
+        for drive, control_word, setpoint in telegrams:
+            try:
+                answer = await self._client.write_registers(
+                    0, [control_word, setpoint], device_id=drive.place + 1
+                )
+            except ModbusException as error:
+                raise ClientFault from error
+            accepted.append(not answer.isError())
+        return accepted
+
+    async def close(self) -> None:
+        self._client.close()
+
+
+class OpcUaClient:
+    """asyncua: all drives in one Write call."""
+
+    def __init__(self) -> None:
+        from asyncua import Client as UaClient
+
+        self._client = UaClient(f"opc.tcp://{SERVERS['opcua']}:{PORTS['opcua']}", timeout=_LIMIT_S)
+        self._client.session_timeout = 60_000
+        self._space = 0
+
+    async def connect(self) -> None:
+        from asyncua import ua
+
+        try:
+            async with asyncio.timeout(_CONNECT_S):
+                await self._client.connect()
+                self._space = await self._client.get_namespace_index("urn:drivebridge:points")
+        except (OSError, TimeoutError, ConnectionError, ua.UaError, ValueError) as error:
+            raise ClientFault from error
+
+    async def write(self, telegrams: Sequence[tuple[Drive, int, int]]) -> list[bool]:
+        from asyncua import ua
+
+        def item(drive: Drive, leaf: str, value: int) -> Any:
+            node = ua.NodeId(f"{drive.path}/command/{leaf}", self._space)
+            variant = ua.DataValue(ua.Variant(value, ua.VariantType.UInt16))
+            return ua.WriteValue(NodeId=node, AttributeId=ua.AttributeIds.Value, Value=variant)
+
+        items = [
+            item(drive, leaf, value)
+            for drive, control_word, setpoint in telegrams
+            for leaf, value in (("control_word", control_word), ("setpoint_1", setpoint))
+        ]
+        try:
+            results = await self._client.uaclient.write(ua.WriteParameters(NodesToWrite=items))
+        except (OSError, TimeoutError, ConnectionError, ua.UaError) as error:
+            raise ClientFault from error
+        good = [result.is_good() for result in results]
+        return [one and two for one, two in zip(good[::2], good[1::2], strict=True)]
+
+    async def close(self) -> None:
+        with suppress(Exception):
+            async with asyncio.timeout(0.2):
+                await self._client.disconnect()
+        with suppress(Exception):
+            self._client.disconnect_socket()
+
+
+class ZenohClient:
+    """A zenoh session; the queries of all drives are asked side by side."""
+
+    def __init__(self) -> None:
+        self._session: Any = None
+
+    async def connect(self) -> None:
+        import zenoh
+
+        settings = {
+            "mode": "client",
+            "connect": {"endpoints": [f"tcp/{SERVERS['zenoh']}:{PORTS['zenoh']}"], "timeout_ms": 1000},
+            "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        }
+        try:
+            self._session = await asyncio.to_thread(
+                zenoh.open, zenoh.Config.from_json5(json.dumps(settings))
+            )
+        except zenoh.ZError as error:
+            raise ClientFault from error
+
+    async def write(self, telegrams: Sequence[tuple[Drive, int, int]]) -> list[bool]:
+        return await asyncio.to_thread(self._ask, telegrams)
+
+    def _ask(self, telegrams: Sequence[tuple[Drive, int, int]]) -> list[bool]:
+        import zenoh
+
+        try:
+            answers = [
+                self._session.get(
+                    f"drives/proof/{drive.path}/command",
+                    payload=json.dumps({"control_word": control_word, "setpoint_1": setpoint}),
+                    timeout=_LIMIT_S,
+                )
+                for drive, control_word, setpoint in telegrams
+            ]
+            replies = [list(answer) for answer in answers]
+        except zenoh.ZError as error:
+            raise ClientFault from error
+        if not any(replies):
+            raise ClientFault
+        return [len(found) == 1 and found[0].ok is not None for found in replies]
+
+    async def close(self) -> None:
+        session, self._session = self._session, None
+        if session is not None:
+            with suppress(Exception):
+                await asyncio.to_thread(session.close)
+
+
+CLIENTS: dict[str, type[ModbusClient] | type[OpcUaClient] | type[ZenohClient]] = {
+    "modbus": ModbusClient,
+    "opcua": OpcUaClient,
+    "zenoh": ZenohClient,
+}

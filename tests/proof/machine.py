@@ -1,0 +1,146 @@
+"""What is done to the machine: gateway between the buses, cut networks, frozen threads, clock, full disk.
+
+Everything happens in the network (and mount) namespace of the proof. Needs root there, can-gw, and for the
+clock a kernel of one's own (``tests/lab/vcan-run -k uml``).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import fcntl
+import os
+import socket
+import struct
+import subprocess
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+from tests.proof.drives import BRIDGE_SIDE, DRIVE_SIDE
+
+_FRAME: Final = struct.Struct("=IB3x8s")
+_ERROR: Final = 0x2000_0000
+_BUS_OFF: Final = _ERROR | 0x040
+_RESTARTED: Final = _ERROR | 0x100
+_GET_FLAGS, _SET_FLAGS = 0x8913, 0x8914
+_IFF_UP: Final = 0x1
+_IFREQ: Final = struct.Struct("16sH14x")
+_SEIZE, _INTERRUPT, _DETACH = 0x4206, 0x4207, 17
+_WALL: Final = 0x4000_0000
+
+TO_DRIVES: Final = ("-s", BRIDGE_SIDE, "-d", DRIVE_SIDE, "-e")
+FROM_DRIVES: Final = ("-s", DRIVE_SIDE, "-d", BRIDGE_SIDE, "-e", "-f", "000~7FF")
+"""Everything but NMT commands, so that one that is sent here looks to the bridge like a drive's own reset."""
+
+
+def call(*command: str) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise OSError(f"{' '.join(command)}: {done.stderr.strip() or done.returncode}")
+
+
+def is_user_mode() -> bool:
+    """A kernel of our own, whose clock is nobody else's."""
+    return "User Mode Linux" in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+
+
+class Gateway:
+    """The wire between bridge and drives."""
+
+    def open(self) -> None:
+        call("cangw", "-F")
+        call("cangw", "-A", *TO_DRIVES)
+        call("cangw", "-A", *FROM_DRIVES)
+
+    def silence_drives(self) -> None:
+        call("cangw", "-D", *FROM_DRIVES)
+
+    def restore(self) -> None:
+        call("cangw", "-A", *FROM_DRIVES)
+
+
+def send(channel: str, can_id: int, data: bytes) -> float:
+    """Send a frame; gives the time before it."""
+    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as raw:
+        raw.bind((channel,))
+        now = time.monotonic()
+        raw.send(_FRAME.pack(can_id, len(data), data.ljust(8, b"\0")))
+    return now
+
+
+def bus_off() -> float:
+    """The bridge's controller says bus-off, as a driver would."""
+    return send(BRIDGE_SIDE, _BUS_OFF, bytes(8))
+
+
+def bus_restarted() -> None:
+    send(BRIDGE_SIDE, _RESTARTED, bytes(8))
+
+
+def set_link(channel: str, *, up: bool) -> float:
+    """``ip link set CHANNEL up`` or ``down``; gives the time before it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
+        name = channel.encode()
+        (_, flags) = _IFREQ.unpack(fcntl.ioctl(control, _GET_FLAGS, _IFREQ.pack(name, 0)))
+        flags = flags | _IFF_UP if up else flags & ~_IFF_UP
+        now = time.monotonic()
+        fcntl.ioctl(control, _SET_FLAGS, _IFREQ.pack(name, flags))
+    return now
+
+
+def cut_networks(addresses: Sequence[str]) -> None:
+    """Packets from and to these addresses of loopback are dropped; connections stay open."""
+    for address in addresses:
+        call("ip", "route", "add", "blackhole", f"{address}/32", "table", "local")
+
+
+def restore_networks(addresses: Sequence[str]) -> None:
+    for address in addresses:
+        with suppress(OSError):
+            call("ip", "route", "del", "blackhole", f"{address}/32", "table", "local")
+
+
+def step_clock(seconds: float) -> None:
+    time.clock_settime(time.CLOCK_REALTIME, time.time() + seconds)
+
+
+def _ptrace(request: int, thread: int) -> None:
+    trace = ctypes.CDLL(None, use_errno=True).ptrace
+    trace.restype = ctypes.c_long
+    trace.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
+    if trace(request, thread, None, None) < 0:
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+
+
+def block_thread(thread: int, seconds: float) -> float:
+    """Stop one thread of a child of ours, no other of its process. Gives the time before it."""
+    _ptrace(_SEIZE, thread)
+    now = time.monotonic()
+    _ptrace(_INTERRUPT, thread)
+    os.waitpid(thread, _WALL)
+    time.sleep(max(0.0, now + seconds - time.monotonic()))
+    _ptrace(_DETACH, thread)
+    return now
+
+
+class TinyDisk:
+    """A file system of few megabytes that can be filled up."""
+
+    def __init__(self, folder: Path, megabytes: int = 16) -> None:
+        self.folder = folder
+        self._ballast = folder / "ballast"
+        folder.mkdir()
+        call("mount", "-t", "tmpfs", "-o", f"size={megabytes}m", "tmpfs", str(folder))
+
+    def fill(self) -> None:
+        with self._ballast.open("wb", buffering=0) as file, suppress(OSError):
+            while file.write(bytes(1 << 16)):
+                pass
+
+    def empty(self) -> None:
+        self._ballast.unlink(missing_ok=True)
+
+    def close(self) -> None:
+        call("umount", "-l", str(self.folder))

@@ -1,0 +1,74 @@
+"""The controller of all drives of one protocol, as a process that can be stopped and killed.
+
+``python -m tests.proof.owner PROTOCOL BOARD``: this process only loads what a client needs. For each line
+on its standard input it forks an owner and prints its process id: a killed one is replaced at once.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+from tests.proof.board import NUMBERS, Board
+from tests.proof.clients import CLIENTS, Client, ClientFault
+from tests.proof.drives import DRIVES, drives_of
+
+PERIOD_S = 0.05
+_AGAIN_S = 0.1
+
+
+async def own(protocol: str, board: Board) -> None:
+    """Write the telegrams that the board asks for, for ever."""
+    while True:
+        client = CLIENTS[protocol]()
+        try:
+            await client.connect()
+            await _write(client, protocol, board)
+        except ClientFault:
+            await client.close()
+            await asyncio.sleep(_AGAIN_S)
+
+
+async def _write(client: Client, protocol: str, board: Board) -> None:
+    drives = drives_of(protocol)
+    number = 0
+    while True:
+        began = time.monotonic()
+        number = (number + 1) % NUMBERS
+        telegrams = [
+            (drive, board.control_word(drive.place), drive.family.setpoint + number) for drive in drives
+        ]
+        for drive in drives:
+            board.stamp(drive.place, number, time.monotonic())
+        for drive, accepted in zip(drives, await client.write(telegrams), strict=True):
+            if accepted:
+                board.accept(drive.place)
+        await asyncio.sleep(max(0.0, began + PERIOD_S - time.monotonic()))
+
+
+def main() -> None:
+    protocol, path = sys.argv[1:]
+    board = Board(Path(path), len(DRIVES))
+    match protocol:
+        case "modbus":
+            import pymodbus.client
+        case "opcua":
+            import asyncua
+        case _:
+            import zenoh
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    print("loaded", flush=True)
+    for _ in sys.stdin:
+        pid = os.fork()
+        if not pid:
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+            asyncio.run(own(protocol, board))
+            return
+        print(pid, flush=True)
+
+
+main()

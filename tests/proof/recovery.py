@@ -1,0 +1,57 @@
+"""How an owner brings a stopped drive back: acknowledge, a word that does not enable, a fresh enable."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from tests.proof.drives import Drive
+    from tests.proof.rig import Rig
+
+_ACKNOWLEDGE_S: Final = 0.13
+"""Two telegrams at the least."""
+_PATIENCE_S: Final = 1.0
+
+
+class Recovery:
+    """One drive; ``step`` again and again until it says that the drive moves."""
+
+    def __init__(self, rig: Rig, drive: Drive) -> None:
+        self._rig = rig
+        self._drive = drive
+        self._word = drive.family.run
+        self._since = float("-inf")
+
+    def step(self, now: float) -> bool:
+        family = self._drive.family
+        waited = now - self._since
+        if self._word == family.acknowledge and waited > _ACKNOWLEDGE_S:
+            self._tell(family.ready)
+        elif self._word == family.ready and waited > _ACKNOWLEDGE_S and self._is_ready():
+            self._tell(family.run)
+        elif self._word == family.run and self._rig.moves(self._drive):
+            return True
+        elif waited > _PATIENCE_S:
+            # Not yet: the node may still be booting. Once more from the start.
+            self._tell(family.acknowledge)
+        return False
+
+    def _tell(self, word: int) -> None:
+        self._word = word
+        self._since = time.monotonic()
+        self._rig.board.command(self._drive.place, word)
+
+    def _is_ready(self) -> bool:
+        """The bridge hands on what the owner writes."""
+        told = self._rig.told.last(self._drive.rpdo)
+        return told is not None and self._drive.control_word(told.data) == self._drive.family.ready
+
+    def __str__(self) -> str:
+        drive = self._drive
+        told, said = self._rig.told.last(drive.rpdo), self._rig.said.last(drive.tpdo)
+        return (
+            f"{drive.path} ({drive.protocol}) does not move: owner writes {self._word:04X}h, "
+            f"{self._rig.board.accepted(drive.place)} telegrams accepted, the bridge sends "
+            f"{told.data.hex(' ') if told else 'nothing'}, it says {said.data.hex(' ') if said else 'nothing'}"
+        )

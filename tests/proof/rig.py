@@ -1,0 +1,204 @@
+"""The whole plant as processes: bridge, drives, owners, witnesses; and what an operator would do to it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Final
+
+from pymodbus.client import ModbusTcpClient
+
+from tests.proof import machine
+from tests.proof.board import Board
+from tests.proof.drives import BRIDGE_SIDE, DRIVE_SIDE, DRIVES, PORTS, PROTOCOLS, SERVERS, Drive, write_site
+from tests.proof.recovery import Recovery
+from tests.proof.witness import Clock, Witness
+from tests.support.process import Process, drivebridge, running
+
+_WORST_CASE: Final = 42
+"""Input register of supervision/worst_case_stop_ms, 32 bits."""
+_FRESH_S: Final = 0.15
+_LIMIT_S: Final = 60.0
+
+
+class Stuck(Exception):
+    """The plant does not do what the proof waits for."""
+
+
+class Owner:
+    """The owner of one protocol's drives: a process that can be stopped, killed and replaced."""
+
+    def __init__(self, folder: Path, stack: ExitStack, protocol: str, board: Path) -> None:
+        command = [sys.executable, "-m", "tests.proof.owner", protocol, str(board)]
+        log = stack.enter_context((folder / f"owner_{protocol}.log").open("wb"))
+        self._nursery = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True, bufsize=1
+        )
+        stack.callback(self._end)
+        self.protocol = protocol
+        self.pid = 0
+
+    def wait_loaded(self) -> None:
+        assert self._nursery.stdout
+        if self._nursery.stdout.readline() != "loaded\n":
+            raise Stuck(f"the owner of {self.protocol} has not come up")
+
+    def start(self) -> None:
+        assert self._nursery.stdin
+        assert self._nursery.stdout
+        self._nursery.stdin.write("\n")
+        self.pid = int(self._nursery.stdout.readline())
+
+    def signal(self, number: signal.Signals) -> None:
+        os.kill(self.pid, number)
+
+    def _end(self) -> None:
+        if self.pid:
+            self.signal(signal.SIGKILL)
+        self._nursery.kill()
+        self._nursery.wait()
+
+
+class Rig:
+    """Everything that runs; ``folder`` is the proof's own."""
+
+    def __init__(self, folder: Path, stack: ExitStack) -> None:
+        self.folder = folder
+        self._stack = stack
+        self._bridges = ExitStack()
+        stack.enter_context(self._bridges)
+        self.disk = machine.TinyDisk(folder / "disk")
+        stack.callback(self.disk.close)
+        self.gateway = machine.Gateway()
+        self.clock = Clock()
+        self.pauses = folder / "pauses"
+        self.board = Board(folder / "board", len(DRIVES))
+        self.bridge: Process | None = None
+        self._starts = 0
+        state, run = self.disk.folder / "state", folder / "run"
+        self._site = write_site(folder / "site.toml", BRIDGE_SIDE, state, run)
+        self._drives = write_site(folder / "drives.toml", DRIVE_SIDE, folder / "unused", folder / "unused")
+        self.worst_case_ms: dict[Drive, int] = {}
+
+    def start(self) -> None:
+        for address in SERVERS.values():
+            machine.call("ip", "address", "add", f"{address}/8", "dev", "lo")
+        self.gateway.open()
+        self.told = Witness(BRIDGE_SIDE, [drive.rpdo for drive in DRIVES], self.clock)
+        self.heard = Witness(BRIDGE_SIDE, _from_nodes(DRIVES), self.clock)
+        self.said = Witness(DRIVE_SIDE, _from_nodes(DRIVES), self.clock)
+        for witness in (self.told, self.heard, self.said):
+            self._stack.callback(witness.close)
+        watch = running(self.folder, "pauses_log", sys.executable, "-m", "tests.proof.pauses", str(self.pauses))
+        self._stack.enter_context(watch)
+        self.pauses.touch()
+        simulate = _ahead("9", "simulate", str(self._drives))
+        self._stack.enter_context(running(self.folder, "simulate", *simulate)).wait_output("simulating")
+        self.owners = {
+            protocol: Owner(self.folder, self._stack, protocol, self.folder / "board")
+            for protocol in PROTOCOLS
+        }
+        self.start_bridge()
+        self._read_bounds()
+        for owner in self.owners.values():
+            owner.wait_loaded()
+            owner.start()
+
+    def start_bridge(self) -> None:
+        """Start the service and wait until all it serves is there."""
+        self._starts += 1
+        name = f"run_{self._starts}"
+        # As systemd/drivebridge.service starts it: ahead of what is not in a hurry, its children not.
+        command = _ahead("10", "run", str(self._site))
+        self.bridge = self._bridges.enter_context(running(self.disk.folder, name, *command))
+        self.bridge.wait_output("OPC UA on", _LIMIT_S)
+
+    def kill_bridge(self) -> float:
+        """The bus process dies; its front goes with it."""
+        assert self.bridge
+        now = time.monotonic()
+        self.bridge.signal(signal.SIGKILL)
+        self.bridge.popen.wait()
+        return now
+
+    def renew_bridge(self) -> None:
+        assert self.bridge
+        log = self.bridge.log
+        self._bridges.pop_all().close()
+        kept = self.folder / log.name
+        kept.write_bytes(log.read_bytes())
+        log.unlink()
+        self.start_bridge()
+
+    @property
+    def front(self) -> int:
+        """Process id of the OPC UA front."""
+        assert self.bridge
+        children = Path(f"/proc/{self.bridge.pid}/task/{self.bridge.pid}/children")
+        return int(children.read_text(encoding="ascii").split()[0])
+
+    def fronts_started(self) -> int:
+        assert self.bridge
+        return self.bridge.output().count("INFO    OPC UA on")
+
+    def _read_bounds(self) -> None:
+        with ModbusTcpClient(SERVERS["modbus"], port=PORTS["modbus"], timeout=10) as client:
+            for drive in DRIVES:
+                answer = client.read_input_registers(_WORST_CASE, count=2, device_id=drive.place + 1)
+                self.worst_case_ms[drive] = answer.registers[0] << 16 | answer.registers[1]
+
+    # what the drives do
+
+    def moves(self, drive: Drive) -> bool:
+        """It is enabled and turns, and its owner's telegrams are on the bus."""
+        said, told = self.said.last(drive.tpdo), self.told.last(drive.rpdo)
+        now = time.monotonic()
+        if said is None or told is None or now - min(said.last, told.last) > _FRESH_S:
+            return False
+        return drive.enabled(said.data) and drive.speed(said.data) != 0 and drive.enabling(told.data)
+
+    def talks(self, drive: Drive) -> bool:
+        """Process data go both ways."""
+        said, told = self.heard.last(drive.tpdo), self.told.last(drive.rpdo)
+        if said is None or told is None:
+            return False
+        return time.monotonic() - min(said.last, told.last) <= _FRESH_S
+
+    def wait(self, holds: Callable[[], bool], limit_s: float, what: str) -> float:
+        """Until it holds; how long that took, in seconds."""
+        begin = time.monotonic()
+        while not holds():
+            if time.monotonic() - begin > limit_s:
+                raise Stuck(f"not within {limit_s:g} s: {what}")
+            time.sleep(0.01)
+        return time.monotonic() - begin
+
+    def run_all(self, drives: Iterable[Drive] = DRIVES, limit_s: float = _LIMIT_S) -> None:
+        """Acknowledge, make ready, enable, each drive by its owner, until all of them move."""
+        going = [Recovery(self, drive) for drive in drives]
+        end = time.monotonic() + limit_s
+        while going:
+            now = time.monotonic()
+            going = [one for one in going if not one.step(now)]
+            if now > end:
+                raise Stuck("; ".join(str(one) for one in going))
+            time.sleep(0.01)
+
+
+def _from_nodes(drives: Iterable[Drive]) -> list[int]:
+    nodes = {drive.node_id for drive in drives}
+    tpdos = {drive.tpdo for drive in drives}
+    return sorted(tpdos | {base + node for node in nodes for base in (0x080, 0x700)})
+
+
+def _ahead(priority: str, *arguments: str) -> list[str]:
+    """``drivebridge ARGUMENTS`` with a real-time priority that its children do not inherit."""
+    command = [sys.executable, "-m", "bridge", *arguments]
+    may = not subprocess.run(["chrt", "-R", "-f", priority, "true"], capture_output=True).returncode
+    return ["chrt", "-R", "-f", priority, *command] if may else command

@@ -1,0 +1,169 @@
+"""What a DBC file says of a bus: the site file wins over the mapping file, and nothing overlaps."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+
+import cantools
+import pytest
+
+from bridge.config import Site
+from bridge.dbc import BusDescription, Message, Signal, describe
+from bridge.dbc.write import dbc_text
+from bridge.errors import OperationFailed
+from bridge.lint import family_dictionaries
+from bridge.lint.bus import view_bus
+from bridge.mapping import Family, load_family
+from tests.support import sites
+
+STATUS_BITS = 16
+
+
+def described(
+    text: str, *, words: bool = False, families: Mapping[str, Family] | None = None
+) -> BusDescription:
+    site = Site.model_validate(tomllib.loads(text))
+    names = {node.mapping for node in site.bus[0].node}
+    known = {name: load_family(name) for name in names} if families is None else families
+    view = view_bus(site.bus[0], ("bus", 0), known, family_dictionaries(names), {})
+    return describe(view, words=words)
+
+
+def site_of(mapping: str, slot: str, drive: str = "", *, node: str = "", bus: str = "") -> str:
+    table = sites.drive(slot, "modbus", 200, drive)
+    return sites.site(sites.bus(sites.node(table, mapping=mapping, more=node), more=bus), sites.modbus())
+
+
+def message(bus: BusDescription, name: str) -> Message:
+    return next(message for message in bus.messages if message.name == name)
+
+
+def signals(bus: BusDescription, name: str) -> dict[str, Signal]:
+    return {signal.name: signal for signal in message(bus, name).signals}
+
+
+NORD = site_of("nord/sk-tu4-cao", "fu1", sites.SCALED)
+
+
+def test_a_value_is_its_word_with_factor_range_and_unit() -> None:
+    found = signals(described(NORD), "conveyor_fu1_TPDO1")["frequency"]
+    assert (found.start, found.length, found.is_signed, found.unit) == (16, 16, True, "Hz")
+    assert found.factor == 50 / 16384
+    assert (found.low, round(found.high or 0)) == (-100, 100)
+
+
+def test_senders_and_receivers_are_nodes() -> None:
+    bus = described(NORD)
+    tpdo, rpdo = message(bus, "conveyor_fu1_TPDO1"), message(bus, "conveyor_fu1_RPDO1")
+    assert (tpdo.cob_id, tpdo.sender, tpdo.receivers) == (0x185, "conveyor", ("DRIVEBRIDGE",))
+    assert (rpdo.cob_id, rpdo.sender, rpdo.receivers) == (0x205, "DRIVEBRIDGE", ("conveyor",))
+    assert list(bus.nodes) == ["DRIVEBRIDGE", "conveyor"]
+
+
+def test_bits_are_in_a_group_with_the_words_name() -> None:
+    tpdo = message(described(NORD), "conveyor_fu1_TPDO1")
+    assert tpdo.groups.keys() == {"status_word"}
+    assert len(tpdo.groups["status_word"]) == STATUS_BITS
+    assert signals(described(NORD), "conveyor_fu1_TPDO1")["status_word_fault"].start == 3
+
+
+def test_words_are_there_on_demand() -> None:
+    tpdo = message(described(NORD, words=True), "conveyor_fu1_TPDO1")
+    assert [(one.name, one.start, one.length) for one in tpdo.signals] == [
+        ("status_word", 0, 16),
+        ("value_1", 16, 16),
+        ("value_2", 32, 16),
+        ("value_3", 48, 16),
+    ]
+    assert not tpdo.groups
+
+
+def test_a_scale_that_only_the_drive_knows_is_left_to_the_reader() -> None:
+    bus = described(site_of("nord/sk-tu4-cao", "fu1", ""))
+    found = signals(bus, "conveyor_fu1_TPDO1")["frequency"]
+    assert (found.factor, found.unit, found.low) == (1.0, "", None)
+    assert "P105 / 16384" in found.comment
+
+
+def test_32_bits_enumerations_and_single_bits() -> None:
+    found = signals(described(site_of("cia402/profile-position", "drive", "")), "conveyor_drive_TPDO1")
+    assert (found["position"].start, found["position"].length, found["position"].is_signed) == (16, 32, True)
+    assert (found["mode"].length, found["mode"].is_signed) == (8, True)
+    assert found["mode"].choices[1] == "profile position"
+    assert (found["following_error"].start, found["following_error"].length) == (13, 1)
+
+
+def test_objects_that_share_a_word_are_one_word() -> None:
+    found = signals(described(site_of("stoeber/5000", "axis1", ""), words=True), "conveyor_drive_TPDO1")
+    assert (found["status_word"].start, found["status_word"].length) == (0, 16)
+    rpdo = signals(described(site_of("stoeber/5000", "axis1", ""), words=True), "conveyor_drive_RPDO1")
+    assert (rpdo["control_word"].length, rpdo["setpoint_1"].start) == (8, 8)
+
+
+def test_the_site_files_mapping_and_identifier_win() -> None:
+    own = 'tpdo = { cob_id = 0x1C0, mapping = ["3001:01/16", "3003:02/16", "2FFF:01/8"] }'
+    bus = described(site_of("nord/sk-tu4-cao", "fu1", f"{sites.SCALED}\n{own}"))
+    tpdo = message(bus, "conveyor_fu1_TPDO1")
+    assert (tpdo.cob_id, tpdo.length) == (0x1C0, 5)
+    found = signals(bus, "conveyor_fu1_TPDO1")
+    assert found["current"].start == 16
+    assert (found["object_2fff_01"].start, found["object_2fff_01"].length) == (32, 8)
+    assert "frequency" not in found
+    assert "by the site file" in tpdo.comment
+
+
+def test_a_pdo_that_the_site_file_switches_off_is_left_out() -> None:
+    off = "rpdo = [{ number = 2, enable = false }]"
+    names = [one.name for one in described(site_of("lenze/8400-motec", "drive", off)).messages]
+    assert "conveyor_drive_RPDO1" in names
+    assert "conveyor_drive_RPDO2" not in names
+
+
+def test_what_is_off_at_factory_gives_way_and_two_that_are_on_are_refused() -> None:
+    # RPDO5 of node 5 is at 245h.
+    first = sites.node(sites.drive("fu1", "modbus", 200), name="conveyor")
+
+    def other(cob_id: int) -> str:
+        table = sites.drive("fu1", "modbus", 200, f"rpdo = {{ cob_id = {cob_id} }}")
+        return sites.site(sites.bus(first, sites.node(table, name="pump", node_id=6)), sites.modbus())
+
+    assert "off at factory" in message(described(NORD), "conveyor_fu1_RPDO5").comment
+    names = {one.cob_id: one.name for one in described(other(0x245)).messages}
+    assert names[0x245] == "pump_fu1_RPDO1"
+    with pytest.raises(OperationFailed, match="185h"):
+        described(other(0x185))
+
+
+def test_what_canopen_sends_by_itself() -> None:
+    bus = described(
+        site_of("stoeber/5000", "axis1", "", node='supervision = "guarding"', bus="sync_counter = 8")
+    )
+    assert signals(bus, "SYNC")["sync_counter"].high == 8
+    assert signals(bus, "conveyor_heartbeat")["nmt_state"].choices[5] == "operational"
+    assert signals(bus, "conveyor_heartbeat")["toggle"].start == 7
+    emcy = signals(bus, "conveyor_EMCY")
+    assert emcy["event"].start == 24
+    assert emcy["event"].choices[41] == "temperature of the motor, sensor"
+    assert emcy["error_code"].choices[0x4310] == "temperature of the motor"
+    assert message(bus, "DRIVEBRIDGE_heartbeat").cob_id == 0x77F
+
+
+def test_the_text_is_read_back_by_cantools_with_long_names_and_odd_characters() -> None:
+    name = "a_node_with_a_name_of_more_than_32_characters"
+    table = sites.drive("axis1", "modbus", 200, "")
+    text = sites.site(sites.bus(sites.node(table, name=name, mapping="stoeber/5000")), sites.modbus())
+    database = cantools.database.load_string(dbc_text(described(text)))
+    tpdo = database.get_message_by_name(f"{name}_drive_TPDO1")
+    assert tpdo.senders == [name]
+    event = database.get_message_by_name(f"{name}_EMCY").get_signal_by_name("event")
+    assert event.choices is not None
+    assert str(event.choices[39]) == "temperature of the device, I²t"
+
+
+@pytest.mark.parametrize("mapping", ["cia402/homing", "nord/sk-tu3-cao-pdo3", "stoeber/5000-four-axes"])
+def test_no_signals_of_a_message_overlap(mapping: str) -> None:
+    slot = load_family(mapping).slot[0].name
+    for words in (False, True):
+        text = dbc_text(described(site_of(mapping, slot, ""), words=words))
+        assert cantools.database.load_string(text, strict=True).messages

@@ -159,7 +159,7 @@ def _set_times(drive: Drive, bus: BusTable, rpdo: PdoPlan, tpdo: PdoPlan) -> Non
         )
     else:
         drive.channel.link.pdo_deadline_s = given_ms / 1000 or None
-    # A synchronous RPDO is taken over with the next SYNC (CiA 301 §7.5.2.36).
+    # A synchronous RPDO is taken over with the next SYNC (CiA 301 §7.5.2.35).
     waits_ms = bus.sync_period_ms if rpdo.transmission_type <= LAST_SYNCHRONOUS else 0
     drive.rpdo_period_ms = round(bus.rpdo_period_s * 1000) + waits_ms
 

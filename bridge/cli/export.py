@@ -17,8 +17,8 @@ from bridge.dbc import describe
 from bridge.errors import OperationFailed
 from bridge.image import Point
 from bridge.lint import family_dictionaries
-from bridge.mapping.loader import mapping_folders
 from bridge.lint.bus import view_bus
+from bridge.mapping.loader import mapping_folders
 from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row, bridge_rows, drive_maps
 from bridge.northbound.zenoh.keys import KeySpace
 from bridge.service import load_project

@@ -31,12 +31,12 @@ fieldbus_timeout_ms = {timeout_ms}
 """
 
 
-def node(*drives: str, name: str = "conveyor", more: str = "") -> str:
-    """A SK TU4-CAO, node 5 of its bus."""
+def node(*drives: str, name: str = "conveyor", node_id: int = 5, more: str = "") -> str:
+    """A SK TU4-CAO."""
     return f"""
 [[bus.node]]
 name = "{name}"
-id = 5
+id = {node_id}
 mapping = "{FAMILY}"
 {more}
 {"".join(drives)}"""

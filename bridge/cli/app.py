@@ -8,6 +8,7 @@ import typer
 
 from bridge import __version__
 from bridge.cli import eds, export, lss, monitor, nmt, parameter_sets, parameters, project, scan, sdo, serve
+from bridge.cli.terminal import printable_lines
 from bridge.errors import BridgeError
 
 app = typer.Typer(
@@ -48,5 +49,5 @@ def run_app() -> None:
     except BridgeError as error:
         # Empty where a child has told it already.
         if sentence := str(error):
-            print(sentence, file=sys.stderr)
+            print(printable_lines(sentence), file=sys.stderr)
         raise SystemExit(error.exit_code) from None

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Protocol, TypeVar
@@ -14,6 +13,7 @@ import typer
 
 from bridge import clock
 from bridge.cli.serve import until_stopped
+from bridge.cli.terminal import printable
 from bridge.config import BusTable
 from bridge.mapping import Family
 from bridge.mapping.model import SdoServer
@@ -193,22 +193,14 @@ def carry_out(
     return errand
 
 
-def with_status(text: str) -> AbstractContextManager[object]:
-    """Says on a terminal what is being done."""
-    if not sys.stderr.isatty():
-        return nullcontext()
-    from rich.console import Console
-
-    return Console(stderr=True).status(text)
-
-
 def tell(text: str) -> None:
     """A sentence beside the results."""
-    print(text, file=sys.stderr)
+    print(printable(text), file=sys.stderr)
 
 
 def print_table(rows: Sequence[Sequence[str]]) -> None:
     """Rows of cells, the first the heading, in columns as wide as they need."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
+    shown = [[printable(cell) for cell in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*shown, strict=True)]
+    for row in shown:
         print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from bridge.cli.terminal import printable
 from bridge.config.download import Download, to_concise_dcf
 from bridge.eds import Description, Entry, Finding, Value, configuration, read_device_file
 from bridge.eds.model import Report
@@ -38,7 +39,7 @@ def eds(
         print(json.dumps(_as_json(description, downloads, findings, node_id), indent=2))
         return
     for line in _lines(file, description, downloads, findings, node_id):
-        print(line)
+        print(printable(line))
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, TypeVar
@@ -23,6 +22,7 @@ from bridge.cli.bus import (
     print_table,
     tell,
 )
+from bridge.cli.terminal import progress
 from bridge.errors import OperationFailed
 from bridge.southbound import lss_errand
 from bridge.southbound.canopen.lss import BIT_RATES, NO_NODE_ID, Identity, LssError, Service
@@ -196,19 +196,8 @@ def _run(line: Line, service: Service[_T], timeout_ms: int) -> _T:
     def make(now: float) -> LssErrand[_T]:
         return LssErrand(service, now, timeout_ms / 1000)
 
-    if sys.stderr.isatty():
-        from rich.console import Console
-        from rich.progress import Progress
-
-        with Progress(console=Console(stderr=True), transient=True) as progress:
-            task = progress.add_task("LSS", total=None)
-
-            def watch(errand: LssErrand[_T]) -> None:
-                progress.update(task, description=errand.step, completed=errand.steps % _QUESTIONS)
-
-            errand = carry_out(line, make, watch)
-    else:
-        errand = carry_out(line, make)
+    with progress("LSS") as show:
+        errand = carry_out(line, make, lambda e: show(e.steps % _QUESTIONS, _QUESTIONS, e.step))
     if errand.late:
         tell(f"warning: answers came too late ({errand.late}): --timeout-ms gives more time")
     try:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Annotated, TextIO
+from typing import Annotated
 
 import typer
 
@@ -22,6 +23,8 @@ from bridge.cli.bus import (
     print_table,
     tell,
 )
+from bridge.cli.terminal import printable
+from bridge.errors import OperationFailed
 from bridge.southbound.bus.frame import EXTENDED, REMOTE, Frame
 from bridge.southbound.decode import Decoder, Kind, Meaning
 from bridge.southbound.statistics import Statistics
@@ -92,29 +95,26 @@ def monitor(
     kinds = set(kind or [])
     decoder = Decoder(line.table.node, line.families, line.own_id)
     tally = Statistics(line.table.bitrate)
-    record = log.open("w", encoding="ascii") if log else None
 
     def wanted(meaning: Meaning) -> bool:
         return (not ids or meaning.node in ids) and (not kinds or meaning.kind in kinds)
 
     def show(frame: Frame, meaning: Meaning, at: float) -> None:
         if record:
-            _write_candump(record, line.table.channel or "", frame)
+            record.write(line.table.channel or "", frame)
         if statistics:
             tally.on_frame(frame, meaning.label)
         elif as_json:
             print(json.dumps(_for_scripts(frame, meaning, at)), flush=True)
         else:
-            print(_for_people(frame, meaning, at), flush=True)
+            print(for_people(frame, meaning, at), flush=True)
 
-    try:
-        listener = carry_out(line, lambda now: _Listener(decoder, wanted, show, now, count, seconds))
-    except BrokenPipeError:
-        sys.stderr.close()  # whoever read us has had enough, as `head` does
-        return
-    finally:
-        if record:
-            record.close()
+    with Record(log) if log else nullcontext() as record:
+        try:
+            listener = carry_out(line, lambda now: _Listener(decoder, wanted, show, now, count, seconds))
+        except BrokenPipeError:
+            sys.stderr.close()  # whoever read us has had enough, as `head` does
+            return
     if statistics:
         _print_statistics(tally, listener.last - listener.started, as_json=as_json)
 
@@ -124,9 +124,11 @@ def _cob_id(frame: Frame) -> str:
     return f"{frame.can_id & _IDENTIFIER:0{digits}X}"
 
 
-def _for_people(frame: Frame, meaning: Meaning, at: float) -> str:
+def for_people(frame: Frame, meaning: Meaning, at: float) -> str:
+    """One line of the monitor."""
     data = "remote" if frame.can_id & REMOTE else frame.data.hex(" ").upper()
-    return f"{at:12.6f}  {_cob_id(frame)}  {data:<23}  {meaning.label:<22}  {meaning.text}".rstrip()
+    label, text = printable(meaning.label), printable(meaning.text)
+    return f"{at:12.6f}  {_cob_id(frame)}  {data:<23}  {label:<22}  {text}".rstrip()
 
 
 def _for_scripts(frame: Frame, meaning: Meaning, at: float) -> dict[str, object]:
@@ -143,11 +145,34 @@ def _for_scripts(frame: Frame, meaning: Meaning, at: float) -> dict[str, object]
     }
 
 
-def _write_candump(record: TextIO, channel: str, frame: Frame) -> None:
-    """One line of ``candump -L``: time since 1970, interface, frame."""
-    remote = bool(frame.can_id & REMOTE)
-    data = f"R{len(frame.data) or ''}" if remote else frame.data.hex().upper()
-    record.write(f"({clock.epoch_ns(frame.time) / 1e9:.6f}) {channel} {_cob_id(frame)}#{data}\n")
+class Record:
+    """A file of frames as ``candump -L`` writes it. All its methods raise ``OperationFailed``."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        with self._failing():
+            self._file = path.open("w", encoding="ascii")
+
+    def write(self, channel: str, frame: Frame) -> None:
+        """One line: time since 1970, interface, frame."""
+        remote = bool(frame.can_id & REMOTE)
+        data = f"R{len(frame.data) or ''}" if remote else frame.data.hex().upper()
+        with self._failing():
+            self._file.write(f"({clock.epoch_ns(frame.time) / 1e9:.6f}) {channel} {_cob_id(frame)}#{data}\n")
+
+    def __enter__(self) -> Record:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self._failing():
+            self._file.close()
+
+    @contextmanager
+    def _failing(self) -> Generator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise OperationFailed(f"{self._path} cannot be written: {error.strerror}") from None
 
 
 def _print_statistics(tally: Statistics, seconds: float, *, as_json: bool) -> None:

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from bridge.cli.bus import AsJson, Bitrate, BusName, Channel, Interface, carry_out, choose_line, split_site
+from bridge.cli.terminal import progress
 from bridge.errors import OperationFailed
 from bridge.southbound.canopen.nmt import NmtCommand
 from bridge.southbound.errand import NmtErrand
@@ -55,7 +56,12 @@ def nmt(
         raise typer.BadParameter(f"{name!r} is none of {', '.join(CommandName)}") from None
     line = choose_line(site, bus, interface, channel, bitrate)
     node_id = 0 if node == "all" else line.node_id(node)
-    errand = carry_out(line, lambda now: NmtErrand(command, node_id, now, seconds))
+    with progress(f"{name}: waiting up to {seconds:g} s") as show:
+
+        def watch(errand: NmtErrand) -> None:
+            show(0, None, f"{len(errand.states)} heard, {len(errand.reached)} there")
+
+        errand = carry_out(line, lambda now: NmtErrand(command, node_id, now, seconds), watch)
     # The master's own heartbeat goes on; a command to all is not for the one who gives it.
     states = {
         n: s for n, s in sorted(errand.states.items()) if n == node_id or n != line.table.master_node_id

@@ -10,7 +10,8 @@ from typing import Annotated, TypeVar
 import typer
 
 from bridge import clock
-from bridge.cli.bus import Line, carry_out, tell, with_status
+from bridge.cli.bus import Line, carry_out, tell
+from bridge.cli.terminal import progress
 from bridge.config import BusTable, NodeTable
 from bridge.errors import OperationFailed
 from bridge.mapping.model import Family, Slot
@@ -55,7 +56,7 @@ class Target:
         if writes:
             self.count()
         try:
-            with with_status(self.name):
+            with progress(self.name):
                 errand = carry_out(
                     self.line, lambda now: ParameterErrand(self.node, self.family, self.slot, make, now)
                 )

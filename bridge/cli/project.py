@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from bridge.cli.terminal import printable
 from bridge.errors import Fault, FileFaults
 from bridge.lint import Severity, Verdict, lint
 from bridge.service import Project, count, load_project
@@ -36,7 +37,7 @@ def check(
             raise typer.Exit(FileFaults.exit_code)
         return
     for warning in verdict.of(Severity.WARNING):
-        print(warning, file=sys.stderr)
+        print(printable(str(warning)), file=sys.stderr)
     for load in verdict.loads:
         print(load)
     if errors:

@@ -22,6 +22,7 @@ from bridge.cli.bus import (
     print_table,
     tell,
 )
+from bridge.cli.terminal import progress
 from bridge.mapping import Family, family_names, load_family
 from bridge.mapping.match import Found, Match, best_match
 from bridge.southbound.scan import FoundNode, Scanner
@@ -73,12 +74,8 @@ def _run(line: Line, *, passive: bool, listen_s: float, timeout_s: float) -> Sca
     if passive or not sys.stderr.isatty():
         tell(f"listening for {listen_s:g} s" if passive else "asking all 127 ids")
         return carry_out(line, make)
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("asking all 127 ids", total=None)
-        return carry_out(line, make, lambda s: progress.update(task, total=s.total, completed=s.done))
+    with progress("asking all 127 ids") as show:
+        return carry_out(line, make, lambda s: show(s.done, s.total, ""))
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,8 +22,8 @@ from bridge.cli.bus import (
     carry_out,
     choose_line,
     split_site,
-    with_status,
 )
+from bridge.cli.terminal import printable, progress
 from bridge.errors import OperationFailed
 from bridge.mapping.model import SdoServer
 from bridge.southbound.canopen.sdo import SdoError
@@ -107,7 +107,7 @@ def read(
         facts = {"node": line.node_id(node), "index": f"{index:04X}", "sub": sub, "data": data.hex()}
         print(json.dumps({"ok": True} | facts | {"type": kind, "value": value}))
         return
-    print(shown(data) if value is None else value)
+    print(for_people(value, data))
 
 
 @app.command(context_settings={"ignore_unknown_options": True})
@@ -183,6 +183,11 @@ def decode(kind: ValueType, data: bytes) -> int | float | str | bool:
     return form.unpack(data)[0]
 
 
+def for_people(value: int | float | str | bool | None, data: bytes) -> str:
+    """A value on the terminal; one without a type as what its bytes may be."""
+    return printable(shown(data) if value is None else str(value))
+
+
 @dataclass(frozen=True, slots=True)
 class _Way:
     """To which server of which node, and how patiently."""
@@ -211,8 +216,13 @@ def _transfer(line: Line, way: _Way, index: int, sub: int, data: bytes | None, *
             node_id, index, sub, data, now, way.timeout_s, retries=way.retries, server=way.server
         )
 
-    with with_status(f"{index:04X}h:{sub:02X} of node {node_id}"):
-        errand = carry_out(line, make)
+    with progress(f"{index:04X}h:{sub:02X} of node {node_id}") as show:
+
+        def watch(errand: SdoErrand) -> None:
+            done, total = errand.done_bytes, errand.total_bytes
+            show(done, total, f"{done} bytes" if total is None else f"{done} of {total} bytes")
+
+        errand = carry_out(line, make, watch)
     if isinstance(errand.result, bytes):
         return errand.result
     if errand.result is None:

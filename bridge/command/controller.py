@@ -128,9 +128,11 @@ class ControllerLeg:
             self.outcomes.append((reply, Outcome(refusal.code, refusal.message, forwarded=False)))
 
     def _check_authority(self, request: Request) -> None:
-        """Raises ``Refusal`` where somebody else controls the drive. Stopping it is every operator's."""
+        """Raises ``Refusal`` where somebody else controls the drive. Stopping it is every operator's, unless
+        the site file forbids it."""
         identity = request.identity
-        if request.action in STOP_ACTIONS and identity.role >= Role.OPERATOR:
+        is_stop = request.action in STOP_ACTIONS and self._settings.stop_by_anyone
+        if is_stop and identity.role >= Role.OPERATOR:
             return
         takes = request.action is Action.TAKE_CONTROL
         judge = self.authority.take_refusal if takes else self.authority.refusal
@@ -227,6 +229,9 @@ class ControllerLeg:
         low, high = _LEASE_MS
         if self.authority.control == "lease" and not low <= request.ttl_ms <= high:
             raise Refusal(Code.OUT_OF_RANGE, f"ttl_ms takes {low}…{high}")
+        owner, is_free = self.owner, self._owner_is_silent
+        if owner is not None and not is_free and not request.identity.is_same(owner):
+            self._tell(now, Kind.OWNER, 500, f"{request.identity} takes control away from {owner}")
         self._hand_over(request.identity, now, request.ttl_ms / 1000)
 
     def _release(self, request: Request, now: float) -> Outcome:

@@ -204,6 +204,7 @@ class DriveTable(Table):
     on_expiry: Reaction = Field(
         "disable_voltage", description="disable_voltage, quick_stop, stop, silence or hold"
     )
+    stop_by_anyone: bool = True
     then_silence_ms: int = Field(0, ge=0, le=600_000, description="0 (never) or a time in ms")
     parameters: dict[str, Full] = Field(
         default_factory=dict[str, float], description="scaling, where it is not read from the drive"

@@ -66,7 +66,7 @@ class ErrorControl:
         """The answer to a remote frame on 700h + id: state, with bit 7 toggling from 0.
 
         With a heartbeat time set the node does not answer: only one of the two may be in use
-        (CiA 301 §7.2.8.2.2.2).
+        (CiA 301 §7.2.8.3.2).
         """
         if self._store.current.heartbeat_ms:
             return None

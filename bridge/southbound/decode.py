@@ -17,8 +17,9 @@ from typing import Final
 from bridge.config import NodeTable
 from bridge.drive import EmergencyReader
 from bridge.mapping.model import Family
+from bridge.southbound import decode_lss
 from bridge.southbound.bus.frame import EXTENDED, REMOTE, STANDARD_MASK, Frame
-from bridge.southbound.canopen import cobid, emcy, nmt
+from bridge.southbound.canopen import cobid, emcy, lss, nmt
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
 from bridge.southbound.decode_pdo import PdoView, views
 from bridge.southbound.decode_sdo import SdoListener, Value
@@ -26,28 +27,7 @@ from bridge.southbound.decode_sdo import SdoListener, Value
 _TIME: Final = 0x100
 _TIME_OF_DAY: Final = struct.Struct("<IH")
 _EPOCH: Final = datetime(1984, 1, 1, tzinfo=UTC)
-_LSS: Final = {0x7E4: "LSS slave", 0x7E5: "LSS master"}
-# CiA 305, command specifiers.
-_LSS_COMMANDS: Final = {
-    0x04: "switch state global",
-    0x11: "configure node id",
-    0x13: "configure bit timing",
-    0x15: "activate bit timing",
-    0x17: "store configuration",
-    0x40: "switch selective: vendor id",
-    0x41: "switch selective: product code",
-    0x42: "switch selective: revision",
-    0x43: "switch selective: serial number",
-    0x44: "switch selective: selected",
-    0x4F: "identify slave",
-    0x50: "identify non-configured slave",
-    0x51: "fastscan",
-    0x5A: "inquire vendor id",
-    0x5B: "inquire product code",
-    0x5C: "inquire revision",
-    0x5D: "inquire serial number",
-    0x5E: "inquire node id",
-}
+_LSS: Final = {lss.REPLY_ID: "LSS slave", lss.REQUEST_ID: "LSS master"}
 _PDOS: Final = {
     0x180: "TPDO1",
     0x200: "RPDO1",
@@ -254,7 +234,7 @@ def _sync(data: bytes) -> Meaning:
 
 
 def _time(data: bytes) -> Meaning:
-    """Milliseconds after midnight in 28 bits, days since 1984-01-01 (CiA 301 §7.1.6.6)."""
+    """Milliseconds after midnight in 28 bits, days since 1984-01-01 (CiA 301 §7.1.6.5)."""
     if len(data) != _TIME_OF_DAY.size:
         return Meaning(Kind.TIME, 0, "TIME", f"{len(data)} bytes instead of 6")
     milliseconds, days = _TIME_OF_DAY.unpack(data)
@@ -265,5 +245,5 @@ def _time(data: bytes) -> Meaning:
 
 
 def _lss(cob_id: int, data: bytes) -> Meaning:
-    command = _LSS_COMMANDS.get(data[0], f"command {data[0]:02X}h") if data else "empty"
-    return Meaning(Kind.LSS, 0, _LSS[cob_id], f"{command}: {data[1:].hex(' ').upper()}")
+    text, values = decode_lss.said(data, by_master=cob_id == lss.REQUEST_ID)
+    return Meaning(Kind.LSS, 0, _LSS[cob_id], text, values)

@@ -9,7 +9,9 @@ from bridge.southbound.bus.frame import Frame
 from bridge.southbound.canopen import cobid, nmt
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
 from bridge.southbound.canopen.sdo import Result, SdoChannel
+from bridge.southbound.canopen.sdo_transfer import MUX, SEGMENT, U32
 
+_SDO_BYTES: Final = 8
 _EXPECTED: Final = {
     NmtCommand.START: NmtState.OPERATIONAL,
     NmtCommand.STOP: NmtState.STOPPED,
@@ -39,8 +41,13 @@ class SdoErrand:
         server: SdoServer | None = None,
     ) -> None:
         self.result: Result | None = None
-        self.received = 0
-        """Frames of the server so far: tells that a long transfer goes on."""
+        self.done_bytes = 0
+        """What has gone or come so far, by the frames: tells that a long transfer goes on."""
+        self.total_bytes = None if data is None else len(data)
+        """How much it is; of a read it is known once the server has announced it."""
+        self._mux = MUX.pack(index, sub)
+        self._writes = data is not None
+        self._begun = False
         request, reply = (server.request, server.reply) if server else (cobid.SDO_REQUEST, cobid.SDO_REPLY)
         self._channel = SdoChannel(request + node_id, reply + node_id, timeout_s, retries=retries)
         if data is None:
@@ -56,7 +63,7 @@ class SdoErrand:
 
     def on_frame(self, frame: Frame) -> None:
         if frame.can_id == self._channel.reply_id:
-            self.received += 1
+            self._count(frame.data)
             self._channel.on_frame(frame)
 
     def on_time(self, now: float) -> None:
@@ -66,7 +73,24 @@ class SdoErrand:
         return self._channel.next_deadline()
 
     def take_frames(self) -> list[Frame]:
-        return self._channel.take_frames()
+        frames = self._channel.take_frames()
+        if self._writes:
+            self._add(sum(frame.data[1:4] != self._mux for frame in frames))
+        return frames
+
+    def _count(self, data: bytes) -> None:
+        """An answer of a read: it announces the length, or is a segment."""
+        if self._writes or len(data) != _SDO_BYTES:
+            return
+        if data[1:4] != self._mux:
+            self._add(1)
+        elif self.total_bytes is None and data[0] & 0xE3 == 0x41:
+            self.total_bytes = U32.unpack_from(data, 4)[0]
+
+    def _add(self, segments: int) -> None:
+        self.done_bytes += SEGMENT * segments
+        if self.total_bytes is not None:
+            self.done_bytes = min(self.done_bytes, self.total_bytes)
 
 
 class NmtErrand:

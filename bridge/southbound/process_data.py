@@ -220,7 +220,7 @@ def connect(
 def _set_times(drive: Drive, bus: BusTable, rpdo: PdoPlan, tpdo: PdoPlan) -> None:
     """When the drive's TPDO is late, and how long its RPDO may take: those with status and control word."""
     drive.channel.link.pdo_deadline_s = _deadline_s(drive, tpdo)
-    # A synchronous RPDO is taken over with the next SYNC (CiA 301 §7.5.2.36).
+    # A synchronous RPDO is taken over with the next SYNC (CiA 301 §7.5.2.35).
     waits_ms = bus.sync_period_ms if rpdo.transmission_type <= LAST_SYNCHRONOUS else 0
     drive.rpdo_period_ms = round(bus.rpdo_period_s * 1000) + waits_ms
 

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 import can
 from can.interfaces.socketcan import SocketcanBus
 
+from bridge.southbound.bus.cansockets import CanSockets
 from bridge.southbound.bus.netlink import Link
 from bridge.southbound.bus.socketcan import SocketCanBus
 
@@ -33,28 +34,36 @@ def named(end: socket.socket) -> str:
     return f"fd:{end.fileno()}"
 
 
-class PairBus(SocketCanBus):
-    """Our SocketCAN bus on one end."""
+class PairSockets(CanSockets):
+    """One end in place of an interface."""
 
     def __init__(self, end: socket.socket) -> None:
-        super().__init__("can0", "pair")
+        super().__init__("pair")
         self._end = end
 
-    def _raw_socket(self) -> socket.socket:
+    def raw(self) -> socket.socket:
         raw = self._end.dup()
         raw.setblocking(False)
         return raw
 
-    def _bcm_socket(self) -> socket.socket:
+    def manager(self) -> socket.socket:
         """Nobody is behind it: the bus then sends the bursts itself."""
         manager, kernel = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         kernel.close()
         return manager
 
-    def _filter(self, raw: socket.socket) -> None: ...
+    def accept(self, can_ids: list[int], raw: socket.socket | None) -> None:
+        """Everything is let in."""
 
-    def _link(self) -> Link:
+    def link(self) -> Link:
         return Link(is_up=True)
+
+
+class PairBus(SocketCanBus):
+    """Our SocketCAN bus on one end."""
+
+    def __init__(self, end: socket.socket) -> None:
+        super().__init__("can0", "pair", sockets=PairSockets(end))
 
 
 class PairCan(SocketcanBus):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from tests.support import sites
-from tests.support.process import free_port
+from tests.support.process import REPOSITORY, free_port
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +28,20 @@ class LabSite:
         return f"tcp/127.0.0.1:{self.zenoh_port}"
 
 
+def ask(site: LabSite, *questions: str) -> list[list[dict[str, object]]]:
+    """Questions to zenoh from a second process: ``KEY=PAYLOAD``, or ``KEY=`` for the point itself."""
+    script = REPOSITORY / "tests" / "peers" / "zenoh_ask.py"
+    command = [sys.executable, str(script), site.zenoh_endpoint, *questions]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=Path("/"))
+    assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def values(site: LabSite, *points: str) -> list[object]:
+    """The values of points, such as ``conveyor/fu1/status/state``."""
+    return [answer["v"] for [answer] in ask(site, *(f"drives/lab/{point}=" for point in points))]
+
+
 def lab_site(
     folder: Path,
     *,
@@ -32,14 +49,20 @@ def lab_site(
     controls: tuple[str, ...] = ("modbus", "opcua", "zenoh"),
     bus: str = "",
     node: str = "",
+    drives: tuple[str, ...] = (),
+    more: str = "",
 ) -> LabSite:
-    """Write a site with fu1, fu2, fu3 controlled as ``controls`` says, on free ports."""
+    """Write a site with fu1, fu2, fu3 controlled as ``controls`` says, on free ports.
+
+    ``bus``, ``node`` and ``drives`` (for each) are further keys, ``more`` further nodes of the bus.
+    """
     ports = free_port(), free_port(), free_port()
-    drives = [
-        sites.drive(f"fu{n}", control, timeout_ms, f"unit_id = {n}\n{sites.SCALED}")
+    keys = (*drives, *[""] * len(controls))
+    tables = [
+        sites.drive(f"fu{n}", control, timeout_ms, f"unit_id = {n}\n{sites.SCALED}\n{keys[n - 1]}")
         for n, control in enumerate(controls, 1)
     ]
     servers = sites.modbus(ports[0]), sites.opcua(ports[1]), sites.zenoh(ports[2])
-    on_vcan0 = sites.socketcan(sites.node(*drives, more=node), more=bus)
+    on_vcan0 = sites.socketcan(sites.node(*tables, more=node), more, more=bus)
     path = sites.write(folder, on_vcan0, *servers, name="lab")
     return LabSite(path, *ports)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from asyncua import Client, ua
 
-from tests.lab.sites import LabSite, lab_site
-from tests.support.process import REPOSITORY, drivebridge, until
+from tests.lab.sites import LabSite, ask, lab_site
+from tests.support.process import drivebridge, until
 from tests.support.sniffer import Sniffer, sniffing, words_of
 
 RPDO = {"fu1": 0x205, "fu2": 0x305, "fu3": 0x405}
@@ -111,15 +108,6 @@ async def test_by_opcua_with_an_asyncua_client(site: LabSite, bus: Sniffer) -> N
         await write(control_word=0x047E)
         wait_for_status(bus, "fu2", 0x31, 0)
     check_frames(bus, "fu2")
-
-
-def ask(site: LabSite, *questions: str) -> list[list[dict[str, object]]]:
-    """Questions to zenoh from a second process."""
-    script = REPOSITORY / "tests" / "peers" / "zenoh_ask.py"
-    command = [sys.executable, str(script), site.zenoh_endpoint, *questions]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=Path("/"))
-    assert done.returncode == 0, done.stderr
-    return [json.loads(line) for line in done.stdout.splitlines()]
 
 
 def test_by_zenoh_with_a_second_process(site: LabSite, bus: Sniffer) -> None:

@@ -7,9 +7,10 @@ that of a ``Machine`` relative to its clock.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from itertools import pairwise
 from typing import Any, Protocol
 
 _OURS = "bridge.command."
@@ -19,11 +20,22 @@ _PLAIN = (int, float, str, bytes, tuple, Enum, type(None))
 class Parts:
     """The mutable state of ``root`` and of all objects of ``bridge.command`` that it is made of.
 
-    Tables (dicts) do not change while a drive is commanded and are left out; lists have to be empty. Times are
-    kept relative to the clock; how long ago something was counts up to ``memory_s``.
+    Tables (dicts) do not change while a drive is commanded and are left out; lists have to be empty. Times
+    are kept relative to the clock; how long ago something was counts up to ``memory_s`` of the attribute.
+    Attributes ``only_shown`` decide nothing; times in ``spent`` mean nothing when they are over.
     """
 
-    def __init__(self, root: object, epoch: float, memory_s: float) -> None:
+    def __init__(
+        self,
+        root: object,
+        epoch: float,
+        *,
+        memory_s: Mapping[str, float],
+        only_shown: Sequence[str] = (),
+        spent: Sequence[str] = (),
+    ) -> None:
+        self._only_shown = only_shown
+        self._spent = spent
         self._epoch = epoch
         self._memory_s = memory_s
         self._fields: list[tuple[object, str]] = []
@@ -36,6 +48,8 @@ class Parts:
         seen.add(id(part))
         for name in _attributes(part):
             value = getattr(part, name)
+            if name in self._only_shown or callable(value):
+                continue
             if isinstance(value, list):
                 self._lists.append(value)
             elif isinstance(value, _PLAIN) or _is_frozen(value):
@@ -46,22 +60,22 @@ class Parts:
     def take(self, now: float) -> tuple[Hashable, ...]:
         """The state as it is; equal ones have the same future."""
         assert not any(self._lists), "an outcome was not told"
-        return tuple([self._shown(getattr(part, name), now) for part, name in self._fields])
+        state: list[Hashable] = [getattr(part, name) for part, name in self._fields]
+        for place, value in enumerate(state):
+            if type(value) is float and self._epoch <= value < float("inf"):
+                state[place] = self._relative(self._fields[place][1], value, now)
+        return tuple(state)
 
-    def _shown(self, value: Any, now: float) -> Hashable:
-        if type(value) is not float or not self._epoch <= value < float("inf"):
-            return value
-        return ("at", round(max(value - now, -self._memory_s), 6))
+    def _relative(self, name: str, value: float, now: float) -> Hashable:
+        if name in self._spent and value <= now:
+            return None
+        return ("at", round(max(value - now, -self._memory_s.get(name, 0.0)), 6))
 
     def put(self, state: tuple[Hashable, ...], now: float) -> None:
         """Be in ``state`` at ``now``."""
         for (part, name), value in zip(self._fields, state, strict=True):
             is_time = type(value) is tuple and len(value) == 2 and value[0] == "at"
             setattr(part, name, now + value[1] if is_time else value)
-
-    @property
-    def names(self) -> list[str]:
-        return [f"{type(part).__name__}.{name}" for part, name in self._fields]
 
 
 def _attributes(part: object) -> Iterator[str]:
@@ -71,7 +85,7 @@ def _attributes(part: object) -> Iterator[str]:
 
 def _is_frozen(value: object) -> bool:
     parameters = getattr(type(value), "__dataclass_params__", None)
-    return bool(parameters and parameters.frozen) or callable(value)
+    return bool(parameters and parameters.frozen)
 
 
 class Machine(Protocol):
@@ -106,7 +120,7 @@ class Map:
             state = todo.popleft()
             for made, after in self.edges[state]:
                 pairs |= {(before, made[0]) for before in last[state]} if made else set()
-                pairs |= set(zip(made, made[1:], strict=False))
+                pairs |= set(pairwise(made))
                 brought = {made[-1]} if made else last[state]
                 if not brought <= last[after]:
                     last[after] |= brought

@@ -5,7 +5,7 @@ Nothing here is taken from ``bridge.command``: the exploration compares the two 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 
 from bridge.command import Identity, Role
@@ -14,7 +14,7 @@ START_LIMIT_S = 3.0
 
 
 class Stage(IntEnum):
-    """What is still missing before an enabling control word may leave the bridge, from the most to nothing."""
+    """What is still missing before an enabling control word may leave the bridge."""
 
     ACKNOWLEDGE = 0
     STOP_WORD = 1
@@ -47,9 +47,6 @@ class LegModel:
     """The acknowledge bit of the owner's last control word."""
     stage: Stage = Stage.STOP_WORD
 
-    def copy(self) -> LegModel:
-        return replace(self)
-
     # what it may do
 
     @property
@@ -59,12 +56,6 @@ class LegModel:
     @property
     def enables(self) -> bool:
         return self.held or self.stage is Stage.ENABLED
-
-    @property
-    def is_due(self) -> bool:
-        """A timer has run out that nobody has looked at."""
-        times = (self.deadline, self.lease_until, self.start_until)
-        return any(time is not None and self.now >= time for time in times)
 
     def may(self, who: Identity, *, take: bool = False) -> bool:
         """Whether ``who`` may command the drive, or take control of it."""
@@ -164,7 +155,7 @@ class LegModel:
             return
         if fault:
             self.stop()
-        elif ready:
+        elif ready and self.stage >= Stage.ENABLE:
             self.stage = Stage.ENABLED
         if enabled:
             self.start_until = None

@@ -16,7 +16,7 @@ from bridge.command import Kind, Plant
 from bridge.command.points import CONTROLLER_STATES, NMT_STATES
 from bridge.command.request import Code
 from bridge.command.watchdog import STATES as WATCHDOG_STATES
-from bridge.command.watchdog import TABLE, Effect, Stimulus, WatchdogState
+from bridge.command.watchdog import Stimulus
 from bridge.config import Reaction, Site
 from bridge.config.model import MappedObject
 from bridge.drive import STATES
@@ -37,6 +37,7 @@ from tests.support.docs import (
 )
 from tests.support.model_facts import KeyFacts, model_tables
 from tests.support.process import REPOSITORY
+from tools import state_table
 
 DEMO_SITE = REPOSITORY / "bridge" / "demo" / "site.toml"
 
@@ -259,18 +260,7 @@ def test_every_command_and_option_is_described() -> None:
 
 
 def test_the_state_table_is_that_of_the_watchdog() -> None:
+    text = state_table.PAGE.read_text(encoding="utf-8")
+    assert text == state_table.drawn(text), "draw it anew: python -m tools.state_table"
     shown = page("explanation/dead-man-chain.md").table("The controller leg as a table")
-    assert shown == watchdog_table()
-
-
-def watchdog_table() -> list[dict[str, str]]:
-    return [
-        {"event": stimulus.value} | {state.label: cell(state, stimulus) for state in WatchdogState}
-        for stimulus in Stimulus
-    ]
-
-
-def cell(state: WatchdogState, stimulus: Stimulus) -> str:
-    after, effect = TABLE[state, stimulus]
-    what = "–" if effect is Effect.NOTHING else effect.value
-    return what if after is state else f"→ **{after.label}**: {what}"
+    assert [row["event"] for row in shown] == [stimulus.value for stimulus in Stimulus], "one that is read"

@@ -1,10 +1,9 @@
-"""SocketCAN: the only file that opens a CAN socket.
+"""SocketCAN: a bus on one interface of the kernel.
 
 Receives on a raw socket in batches, each frame with its kernel time stamp; lets the broadcast manager
 send what is repeated, in bursts that end unless they are renewed. What passes on the bus is not counted
 frame by frame but asked of the kernel once a second: its counters see every node's frames and our own
-bursts, cost nothing while the bus is busy, and leave the receive filter closed. The constants are those
-of <linux/can.h> and <linux/can/raw.h>.
+bursts, cost nothing while the bus is busy, and leave the receive filter closed.
 """
 
 from __future__ import annotations
@@ -12,39 +11,25 @@ from __future__ import annotations
 import asyncio
 import errno
 import socket
-import struct
 import time
 from collections.abc import Callable
 from typing import Final
 
 from bridge.errors import Unavailable
 from bridge.southbound.bus import bcm
+from bridge.southbound.bus.cansockets import CanSockets
 from bridge.southbound.bus.errorframe import judge
 from bridge.southbound.bus.explain import WrongBitrate, explain
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import BusStatus, ControllerState
 from bridge.southbound.bus.kernelbeat import KernelBeat
-from bridge.southbound.bus.netlink import Link, look_at
+from bridge.southbound.bus.linkwatch import LinkWatch
+from bridge.southbound.bus.netlink import Link
 from bridge.southbound.bus.outbox import Outbox
 from bridge.southbound.bus.receiver import BATCH, Receiver, Stamps
 from bridge.southbound.bus.wirebits import WireBits
 
-_FILTER: Final = struct.Struct("=II")
-_SOL_CAN_RAW: Final = 101
-_CAN_RAW_FILTER: Final = 1
-_CAN_RAW_ERR_FILTER: Final = 2
-_CAN_ERR_MASK: Final = 0x1FFF_FFFF
-_CAN_BCM: Final = 2
-_MOST_FILTERS: Final = 512  # CAN_RAW_FILTER_MAX
-_EXACT: Final = 0xC000_07FF  # identifier, no extended frames, no remote frames
-_FUNCTION: Final = 0xC000_0780  # the same by function code, for more nodes than there are filters
-_RECEIVE_BUFFER: Final = 1 << 20
-# The kernel makes this its minimum, some six frames: what waits longer waits here, with its deadline.
-_SEND_BUFFER: Final = 1
-
 _MOST_PER_ROUND: Final = 2048
-_LOOK_S: Final = 1.0
-_REOPEN_S: Final = (0.2, 5.0)
 _BEAT_LIMIT_S: Final = 0.01
 _OUTAGES: Final = (ControllerState.BUS_OFF, ControllerState.PASSIVE)
 
@@ -52,8 +37,11 @@ _OUTAGES: Final = (ControllerState.BUS_OFF, ControllerState.PASSIVE)
 class SocketCanBus:
     """One SocketCAN interface."""
 
-    def __init__(self, name: str, channel: str, bitrate: int | None = None) -> None:
-        """``bitrate`` (bit/s) is compared with the interface's own, where it says one."""
+    def __init__(
+        self, name: str, channel: str, bitrate: int | None = None, sockets: CanSockets | None = None
+    ) -> None:
+        """``bitrate`` (bit/s) is compared with the interface's own, where it says one. ``sockets`` are those
+        of ``channel``, unless given."""
         self._name = name
         self._bitrate = bitrate
         self._channel = channel
@@ -62,17 +50,17 @@ class SocketCanBus:
         self._receiver: Receiver | None = None
         self._wake: Callable[[], None] = lambda: None
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._filters: bytes | None = None
+        self._sockets = sockets or CanSockets(channel)
+        self._watch = LinkWatch(self._sockets.link)
         self._beats = KernelBeat()
         self._outbox = Outbox()
+        self._accepted: frozenset[int] = frozenset()
+        self._own: list[Frame] = []
+        """Frames of bursts that we have sent ourselves: the kernel gives back only its own."""
         self._wire = WireBits()
         self._passed = (0, 0)
         self._drops = 0
         self._last_drain = 0.0
-        self._look_at = 0.0
-        self._looking: asyncio.Future[Link] | None = None
-        self._reopen_at: float | None = None
-        self._reopen_s = _REOPEN_S[0]
 
     @property
     def name(self) -> str:
@@ -87,8 +75,9 @@ class SocketCanBus:
     def open(self, wake: Callable[[], None]) -> None:
         self._loop = asyncio.get_running_loop()
         self._wake = wake
+        self._watch.begin(self._loop, wake)
         try:
-            self._open(self._link())
+            self._open(self._sockets.link())
         except OSError as error:
             self._close_sockets()
             raise Unavailable(f"bus {self._name}: {explain(error, self._channel)}") from error
@@ -96,50 +85,19 @@ class SocketCanBus:
     def _open(self, link: Link) -> None:
         # First: a socket binds to an interface that is down without complaint.
         self._check_link(link)
-        raw = self._raw = self._raw_socket()
+        raw = self._raw = self._sockets.raw()
         self._receiver = Receiver(raw)
         self._drops = 0
         self._open_manager()
         self._last_drain = time.monotonic()
-        self._look_at = self._last_drain + _LOOK_S
+        self._watch.opened(self._last_drain)
         self._status.state = ControllerState.OK
         if self._loop:
             self._loop.add_reader(raw.fileno(), self._wake)
 
-    def _raw_socket(self) -> socket.socket:
-        raw = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-        try:
-            raw.setblocking(False)
-            raw.setsockopt(_SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, struct.pack("=I", _CAN_ERR_MASK))
-            raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
-            raw.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
-            self._filter(raw)
-            raw.bind((self._channel,))
-        except OSError:
-            raw.close()
-            raise
-        return raw
-
     def _open_manager(self) -> None:
-        self._beats.open(self._bcm_socket())
+        self._beats.open(self._sockets.manager())
         self._status.bursts_refused = ""
-
-    def _bcm_socket(self) -> socket.socket:
-        broadcaster = socket.socket(socket.AF_CAN, socket.SOCK_DGRAM, _CAN_BCM)
-        try:
-            broadcaster.setblocking(False)
-            broadcaster.connect((self._channel,))
-        except OSError:
-            broadcaster.close()
-            raise
-        return broadcaster
-
-    def _filter(self, raw: socket.socket) -> None:
-        if self._filters is not None:
-            raw.setsockopt(_SOL_CAN_RAW, _CAN_RAW_FILTER, self._filters)
-
-    def _link(self) -> Link:
-        return look_at(self._channel)
 
     def _check_link(self, link: Link) -> None:
         if not link.is_up:
@@ -149,20 +107,16 @@ class SocketCanBus:
         self._passed = link.frames, link.data_bytes
 
     def accept(self, can_ids: list[int]) -> None:
-        wanted = {(can_id, _EXACT) for can_id in can_ids}
-        if len(wanted) > _MOST_FILTERS:
-            wanted = {(can_id & 0x780, _FUNCTION) for can_id in can_ids}
-        self._filters = b"".join(_FILTER.pack(*pair) for pair in sorted(wanted))
-        if self._raw:
-            self._filter(self._raw)
+        self._accepted = frozenset(can_ids)
+        self._sockets.accept(can_ids, self._raw)
 
     def close(self) -> None:
-        self._reopen_at = None
-        self._looking = None
+        self._watch.end()
         self._close_sockets()
 
     def _close_sockets(self) -> None:
         self._beats.close()
+        self._own.clear()
         self._drop_waiting()
         self._receiver = None
         if self._raw:
@@ -177,12 +131,7 @@ class SocketCanBus:
         self._status.outages += 1
         self._status.state = ControllerState.DOWN
         self._status.note_error(explain(error, self._channel))
-        self._looking = None
-        self._plan_reopening(now)
-
-    def _plan_reopening(self, now: float) -> None:
-        self._reopen_at = now + self._reopen_s
-        self._reopen_s = min(self._reopen_s * 2, _REOPEN_S[1])
+        self._watch.lost(now)
 
     # receiving
 
@@ -210,6 +159,9 @@ class SocketCanBus:
         if frames:
             self._status.frames_received += len(frames)
             self._wire.sample(frames[-1])
+        if self._own:
+            frames = self._own + frames
+            self._own = []
         if self._outbox:
             self._send_waiting(now)
         return frames
@@ -290,7 +242,7 @@ class SocketCanBus:
             self._break_down(error, now)
             return
         if first is not None:
-            self.send(first, now, now + _BEAT_LIMIT_S)
+            self._send_beat(first, now)
         self._wire.sample(frames[0])
 
     def silence(self, can_id: int) -> None:
@@ -308,37 +260,30 @@ class SocketCanBus:
             return
         self._status.bursts_refused = self._beats.refusal
         for frame in frames:
-            self.send(frame, now, now + _BEAT_LIMIT_S)
+            self._send_beat(frame, now)
+
+    def _send_beat(self, frame: Frame, now: float) -> None:
+        self.send(frame, now, now + _BEAT_LIMIT_S)
+        if frame.can_id in self._accepted and self._can_send:
+            self._own.append(frame._replace(time=now))
 
     # time
 
     def next_deadline(self) -> float | None:
-        waiting = [self._look_at, self._outbox.retry_at, self._beats.next_deadline()]
-        times = [self._reopen_at] if self._raw is None else waiting
+        times = [self._watch.next_deadline()]
+        if self._raw is not None:
+            times += [self._outbox.retry_at, self._beats.next_deadline()]
         return min((time for time in times if time is not None), default=None)
 
     def on_time(self, now: float) -> None:
         if self._outbox:
             self._send_waiting(now)
         self._send_beats(now)
-        if self._looking and self._looking.done():
-            self._take_look(self._looking, now)
-        if self._raw is not None and now >= self._look_at:
-            self._look_at = now + _LOOK_S
-            self._look()
-        if self._reopen_at is not None and now >= self._reopen_at:
-            self._plan_reopening(now)
-            self._look()
-
-    def _look(self) -> None:
-        """Ask the kernel about the interface, in a thread: it answers when nobody is changing any network
-        interface of the machine (rtnl_lock), and no bus may wait for that."""
-        if self._loop and self._looking is None:
-            self._looking = self._loop.run_in_executor(None, self._link)
-            self._looking.add_done_callback(lambda _: self._wake())
+        if (looking := self._watch.take()) is not None:
+            self._take_look(looking, now)
+        self._watch.on_time(now)
 
     def _take_look(self, looking: asyncio.Future[Link], now: float) -> None:
-        self._looking = None
         is_open = self._raw is not None
         try:
             link = looking.result()
@@ -346,8 +291,6 @@ class SocketCanBus:
                 self._see(link, now)
             else:
                 self._open(link)
-                self._reopen_at = None
-                self._reopen_s = _REOPEN_S[0]
         except OSError as error:
             if is_open:
                 self._break_down(error, now)

@@ -22,11 +22,11 @@ COB_ID_MASK: Final = 0x7FF
 
 
 def is_for_emcy(can_id: int) -> bool:
-    """Whether emergency messages may have this identifier (CiA 301 §7.3.5, table 39)."""
+    """Whether emergency messages may have this identifier (CiA 301 §7.3.5)."""
     return 0x081 <= can_id <= 0x0FF or is_for_pdos(can_id)
 
 
 def is_for_pdos(can_id: int) -> bool:
     """Whether a PDO may have this identifier: not one of those with a fixed or restricted use (CiA 301
-    §7.3.5, table 39)."""
+    §7.3.5)."""
     return 0x181 <= can_id <= 0x57F or 0x680 <= can_id <= 0x6DF

@@ -19,7 +19,7 @@ NO_NODE_ID: Final = 0xFF
 
 BIT_RATES: Final = (1_000_000, 800_000, 500_000, 250_000, 125_000, None, 50_000, 20_000, 10_000)
 """By table index of table 0 (CiA 305 §7.4; 5 is reserved)."""
-_AUTOMATIC: Final = 9
+AUTOMATIC: Final = 9
 
 _SWITCH_GLOBAL: Final = 0x04
 _NODE_ID: Final = 0x11
@@ -35,7 +35,7 @@ _INQUIRE: Final = (0x5A, 0x5B, 0x5C, 0x5D)
 _INQUIRE_NODE_ID: Final = 0x5E
 _CONFIRM: Final = 0x80
 
-_FIELDS: Final = ("vendor id", "product code", "revision number", "serial number")
+FIELDS: Final = ("vendor id", "product code", "revision number", "serial number")
 _U32: Final = struct.Struct("<I")
 _STANDARD_ERRORS: Final = {
     _NODE_ID: {1: "a node id must be 1…127 or 255"},
@@ -102,7 +102,7 @@ def to_waiting() -> Service[None]:
 
 def switch_selective(identity: Identity) -> Service[None]:
     """The one device with this identity to configuration state. Raises LssError where it is not there."""
-    for command, value, name in zip(_SELECT, identity, _FIELDS, strict=True):
+    for command, value, name in zip(_SELECT, identity, FIELDS, strict=True):
         last = command == _SELECT[-1]
         reply = _SELECTED if last else None
         answer = yield Exchange(
@@ -115,7 +115,7 @@ def switch_selective(identity: Identity) -> Service[None]:
 def inquire_identity() -> Service[Identity]:
     """What the device in configuration state is. Several of them would answer at once."""
     values: list[int] = []
-    for command, name in zip(_INQUIRE, _FIELDS, strict=True):
+    for command, name in zip(_INQUIRE, FIELDS, strict=True):
         answer = yield Exchange(_message(command), command, f"asking for its {name}")
         values.append(_U32.unpack_from(answer or bytes(8), 1)[0])
     return Identity(*values)
@@ -135,7 +135,7 @@ def configure_node_id(node_id: int) -> Service[None]:
 
 def configure_bit_rate(bit_rate: int | None) -> Service[None]:
     """Its bit rate in bit/s after activation or its next start; None: it finds out by itself."""
-    index = _AUTOMATIC if bit_rate is None else BIT_RATES.index(bit_rate)
+    index = AUTOMATIC if bit_rate is None else BIT_RATES.index(bit_rate)
     step = "setting automatic bit rate" if bit_rate is None else f"setting {bit_rate} bit/s"
     answer = yield Exchange(_message(_BIT_TIMING, bytes((0, index))), _BIT_TIMING, step)
     _check(answer)
@@ -155,13 +155,17 @@ def store() -> Service[None]:
 
 
 def _check(answer: bytes | None) -> None:
-    """The error code of a configuration service."""
-    if answer is None or not answer[1]:
-        return
+    """Raises LssError where a configuration service was refused."""
+    if answer and (text := error_text(answer)):
+        raise LssError(f"the device refused: {text}")
+
+
+def error_text(answer: bytes) -> str:
+    """What the error code of a configuration service says, empty where it is none."""
     if answer[1] == 0xFF:
-        raise LssError(f"the device refused: its own error {answer[2]}")
-    text = _STANDARD_ERRORS.get(answer[0], {}).get(answer[1], f"error {answer[1]}")
-    raise LssError(f"the device refused: {text}")
+        return f"its own error {answer[2]}"
+    default = f"error {answer[1]}" if answer[1] else ""
+    return _STANDARD_ERRORS.get(answer[0], {}).get(answer[1], default)
 
 
 def fastscan(known: Identity | None = None) -> Service[Identity | None]:
@@ -174,11 +178,11 @@ def fastscan(known: Identity | None = None) -> Service[Identity | None]:
     if (yield _question(request, "is anybody there?", is_first=True)) is None:
         return None
     found: list[int] = []
-    for sub, name in enumerate(_FIELDS):
+    for sub, name in enumerate(FIELDS):
         value = known[sub] if known else 0
         if not value:
             value = yield from _find_number(sub, name)
-        following = (sub + 1) % len(_FIELDS)
+        following = (sub + 1) % len(FIELDS)
         request = struct.pack("<IBBB", value, 0, sub, following)
         if (yield _question(request, f"{name} is {value:08X}h")) is None:
             raise LssError(f"a device answered and confirmed no {name} {value:08X}h: allow it more time")

@@ -1,4 +1,4 @@
-"""SYNC and the time-outs that follow from it (CiA 301 §7.2.5, §7.5.2.38)."""
+"""SYNC and the time-outs that follow from it (CiA 301 §7.2.5, §7.5.2.37)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def sync_frames(counter: int) -> tuple[Frame, ...]:
 
 
 class SyncWindow:
-    """Judges whether synchronous TPDOs come within the window after SYNC (1007h, CiA 301 §7.5.2.8).
+    """Judges whether synchronous TPDOs come within the window after SYNC (1007h, CiA 301 §7.5.2.7).
 
     Times are those of the frames: SYNC's own is known because the bus gives our bursts back.
     """

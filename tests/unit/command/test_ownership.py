@@ -146,6 +146,18 @@ class TestLease:
         leased.write(SHUT_DOWN, identity=ENGINEER)
         assert leased.sent_setpoints == (0, 0, 0, 0)
 
+    def test_that_it_was_broken_is_an_event(self, leased: Rig):
+        leased.ask(Action.TAKE_CONTROL, ENGINEER, ttl_ms=1000)
+        assert leased.told(Kind.OWNER)[-2:] == [
+            "opcua:eve takes control away from opcua:ann",
+            "controlled by opcua:eve",
+        ]
+
+    def test_one_that_nobody_has_is_not_broken(self, rig: Rig):
+        rig.ask(Action.TAKE_CONTROL, ENGINEER, ttl_ms=1000)
+        rig.ask(Action.TAKE_CONTROL, ENGINEER, ttl_ms=1000)
+        assert rig.told(Kind.OWNER) == ["controlled by opcua:eve"]
+
     def test_a_reader_gets_none(self, rig: Rig):
         assert rig.ask(Action.TAKE_CONTROL, OBSERVER, ttl_ms=1000).code is Code.NOT_ALLOWED
 
@@ -155,3 +167,26 @@ class TestLease:
         assert not leased.enables
         leased.wait(10)
         assert not [message for message in leased.told(Kind.OWNER) if "ran out" in message]
+
+
+class TestStops:
+    STOPS = (Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE)
+
+    @pytest.mark.parametrize("action", STOPS)
+    def test_they_are_taken_from_every_operator(self, running: Rig, action: Action):
+        assert running.ask(action, BOB).ok
+        assert not running.enables
+
+    @pytest.mark.parametrize("action", STOPS)
+    def test_where_the_site_file_forbids_it_from_the_owner_alone(self, action: Action):
+        rig = Rig(stop_by_anyone=False)
+        rig.run()
+        for stranger in (BOB, OTHER_PLC, ENGINEER):
+            assert rig.ask(action, stranger).code is Code.NOT_ALLOWED
+        assert rig.enables
+        assert rig.ask(action).ok
+        assert not rig.enables
+
+    def test_a_reader_stops_nothing(self, running: Rig):
+        assert running.ask(Action.STOP, OBSERVER).code is Code.NOT_ALLOWED
+        assert running.enables

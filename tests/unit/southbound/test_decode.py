@@ -37,16 +37,16 @@ def heard(decoder: Decoder, *frames: tuple[int, str]) -> Meaning:
 @pytest.mark.parametrize(
     ("frames", "text"),
     [
-        # Lenze EDS84DMOTCAN §9.2.6: C00061 of node 5 is 43 °C
+        # Lenze EDS84DMOTCAN §9.3.1: C00061 of node 5 is 43 °C
         ([(0x605, "40C25F0000000000")], "read 5FC2h:00"),
         ([(0x605, "40C25F0000000000"), (0x585, "43C25F002B000000")], "5FC2h:00 = 43 (0000002Bh)"),
-        # the same: C00088 of node 2 := 10.20 A
+        # Lenze EDS84DMOTCAN §9.3.2: C00088 of node 2 := 10.20 A
         ([(0x602, "23A75F00FC030000")], "write 5FA7h:00 := 1020 (000003FCh)"),
         ([(0x602, "23A75F00FC030000"), (0x582, "60A75F0000000000")], "5FA7h:00 written"),
         # BU 2500 §6.6.2: P102 in parameter set 1 := 1.03 s, and read back
         ([(0x605, "2B66200167000000")], "write 2066h:01 := 103 (0067h)"),
         ([(0x605, "4066200100000000"), (0x585, "4B66200167000000")], "2066h:01 = 103 (0067h)"),
-        # STÖBER §11.2: C01 := 2500
+        # STÖBER CAN 5000 §8.2.2: C01 := 2500
         ([(0x601, "23012400C4090000")], "write 2401h:00 := 2500 (000009C4h)"),
         # BU 2500 §8.3.2, DS-301: aborts in words
         (
@@ -61,7 +61,7 @@ def test_the_manuals_sdo_frames(frames: list[tuple[int, str]], text: str) -> Non
 
 
 def test_a_string_in_segments() -> None:
-    """Lenze §9.2.6: C00099 of node 12 is 01.00.00.00."""
+    """Lenze EDS84DMOTCAN §9.3.3: C00099 of node 12 is 01.00.00.00."""
     meaning = heard(
         Decoder(),
         (0x60C, "409C5F0000000000"),
@@ -124,7 +124,7 @@ def test_without_a_site_a_pdo_is_its_bytes() -> None:
         (0x705, "05", Kind.HEARTBEAT, "heartbeat conveyor", "operational"),
         (0x705, "FF", Kind.HEARTBEAT, "heartbeat conveyor", "pre operational, toggle bit 1"),
         (0x705 | REMOTE, "00", Kind.HEARTBEAT, "guarding conveyor", "asked for its NMT state"),
-        (0x7E5, "0401000000000000", Kind.LSS, "LSS master", "switch state global: 01 00 00 00 00 00 00"),
+        (0x7E5, "0401000000000000", Kind.LSS, "LSS master", "switch state global: configuration"),
         (0x6E0, "01", Kind.OTHER, "unknown", "01"),
     ],
 )

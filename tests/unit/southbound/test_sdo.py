@@ -10,85 +10,15 @@ from hypothesis import strategies as st
 
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.canopen import abort
-from bridge.southbound.canopen.sdo import Priority, Result, SdoChannel, SdoError, SdoJob
+from bridge.southbound.canopen.sdo import Priority, Result, SdoChannel, SdoError
 from bridge.southbound.canopen.sdo_queue import MOST_WAITING
 from bridge.southbound.canopen.sdo_transfer import MOST_BYTES
-
-REQUEST, REPLY = 0x605, 0x585
-
-
-class Client:
-    """A channel on a virtual clock, its requests and its results."""
-
-    def __init__(self, retries: int = 0) -> None:
-        self.channel = SdoChannel(REQUEST, REPLY, 0.5, retries=retries)
-        self.now = 0.0
-        self.results: list[Result] = []
-
-    def read(self, index: int, sub: int = 0, *, priority: Priority = Priority.COMMAND) -> SdoJob:
-        return self.channel.read(index, sub, self.now, self.results.append, priority=priority)
-
-    def write(self, index: int, sub: int, data: bytes) -> None:
-        self.channel.write(index, sub, data, self.now, self.results.append)
-
-    def wait(self, seconds: float) -> None:
-        """Let time pass; the channel is called whenever it asked for it."""
-        end = self.now + seconds
-        while (deadline := self.channel.next_deadline()) is not None and deadline <= end:
-            self.now = max(self.now, deadline)
-            self.channel.on_time(self.now)
-        self.now = end
-
-    def sent(self) -> list[str]:
-        return [frame.data.hex(" ").upper() for frame in self.channel.take_frames()]
-
-    def answer(self, text: str) -> None:
-        self.channel.on_frame(Frame(REPLY, bytes.fromhex(text), self.now))
-
-    @property
-    def result(self) -> Result:
-        assert len(self.results) == 1
-        return self.results[0]
+from tests.support.sdo_client import REPLY, Client
 
 
 @pytest.fixture
 def client() -> Client:
     return Client()
-
-
-def test_nord_write_of_p102(client: Client) -> None:
-    """BU 2500 §6.6.1: P102 = 1.03 s in parameter set 1."""
-    client.write(0x2066, 1, struct.pack("<H", 103))
-    assert client.sent() == ["2B 66 20 01 67 00 00 00"]
-    client.answer("60 66 20 01 00 00 00 00")
-    assert client.result == b""
-
-
-def test_nord_read_of_p102(client: Client) -> None:
-    """BU 2500 §6.6.2; index and sub-index in the order they really have on the wire."""
-    client.read(0x2066, 1)
-    assert client.sent() == ["40 66 20 01 00 00 00 00"]
-    client.answer("4B 66 20 01 67 00 00 00")
-    assert client.result == b"\x67\x00"
-
-
-def test_lenze_read_of_c00061(client: Client) -> None:
-    """EDS84DMOTCAN §9.3: heat sink temperature 43 °C."""
-    client.read(0x5FC2)
-    client.answer("43 C2 5F 00 2B 00 00 00")
-    assert client.result == b"\x2b\x00\x00\x00"
-
-
-def test_lenze_segmented_read_of_c00099(client: Client) -> None:
-    """EDS84DMOTCAN §9.3: the firmware version as a string of eleven characters."""
-    client.read(0x5F9C)
-    assert client.sent() == ["40 9C 5F 00 00 00 00 00"]
-    client.answer("41 9C 5F 00 0B 00 00 00")
-    assert client.sent() == ["60 00 00 00 00 00 00 00"]
-    client.answer("00 30 31 2E 30 30 2E 30")
-    assert client.sent() == ["70 00 00 00 00 00 00 00"]
-    client.answer("17 30 2E 30 30 00 00 00")
-    assert client.result == b"01.00.00.00"
 
 
 def test_segmented_write(client: Client) -> None:
@@ -360,7 +290,7 @@ def test_a_flush_ends_every_transfer_and_sends_nothing(client: Client) -> None:
 
 def serve(data: bytes, client: Client) -> None:
     """A server that sends ``data`` segmented."""
-    toggle, rest = 0, data
+    toggle, rest, pending = 0, data, b""
     for request in client.channel.take_frames():
         pending = request.data
     while client.results == []:

@@ -1,0 +1,150 @@
+"""The controller leg under every sequence of events, against a model of our own (shared design, watchdog).
+
+Breadth first with all states told apart, so no sequence is left out, however long. What must hold after
+each event stands in ``tests/support/leg_machine.py``: no enabling word later than the deadline after the
+owner's last valid telegram; none after a trip before an acknowledge, a word that does not enable and a fresh
+enable; refused telegrams and reads change nothing; while tripped the served status word says fault, the
+drive's own beside it.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any, Final
+
+import pytest
+
+from bridge.command.watchdog import TABLE, Effect, Stimulus, Watchdog, WatchdogState
+from tests.support.explorer import Map, explore
+from tests.support.leg_machine import GATES, LegMachine, recorded_table
+
+_MOST: Final = 10_000
+
+_PROFILES: Final[dict[str, dict[str, Any]]] = {
+    "disable_voltage": {},
+    "disable_voltage, started": {"starts": True, "answers": True},
+    "quick_stop": {"on_expiry": "quick_stop", "answers": True},
+    "stop, then silence": {"on_expiry": "stop", "then_silence_ms": 300},
+    "silence": {"on_expiry": "silence", "stops": True},
+    "hold": {"on_expiry": "hold", "answers": True},
+    "lease": {"control": "lease"},
+    "lease that ends before the watchdog": {"control": "lease", "ttl_ms": 1000},
+    "ignored": {"telegram_downtime_s": -0.1},
+    "ignored, started": {"telegram_downtime_s": -0.1, "starts": True, "answers": True},
+    "ignored, lease": {"telegram_downtime_s": -0.1, "control": "lease"},
+    "off": {"fieldbus_timeout_ms": 0},
+    "off, lease": {"fieldbus_timeout_ms": 0, "control": "lease"},
+}
+_WATCHED: Final = ("disable_voltage", "lease that ends before the watchdog")
+_OFF: Final = ("ignored", "ignored, lease", "off", "off, lease")
+"""Together each of these groups covers its part of the table."""
+
+
+def explored(profile: str) -> Map:
+    with recorded_table() as table:
+        machine = LegMachine(table, **_PROFILES[profile])
+        found = explore(machine, _MOST)
+    assert found.depth >= 6, "sequences that are long enough for a trip, its acknowledge and a fresh enable"
+    assert machine.enabled, "a drive that never moves proves nothing"
+    assert machine.refusals
+    is_watched = not {"telegram_downtime_s", "fieldbus_timeout_ms"} & _PROFILES[profile].keys()
+    assert bool(machine.trips) is is_watched
+    return found
+
+
+@pytest.mark.parametrize("profile", [name for name in _PROFILES if name not in _WATCHED + _OFF])
+def test_whatever_happens_in_whatever_order(profile: str) -> None:
+    explored(profile)
+
+
+# what was covered
+
+Row = tuple[WatchdogState, Stimulus]
+
+_NEVER: Final[dict[Row, str]] = {
+    (WatchdogState.IDLE, Stimulus.EXPIRED): "the timer runs from the first valid telegram",
+    (WatchdogState.TRIPPED, Stimulus.STARTED): "a trip outlives a gap; a bridge that starts has none",
+}
+"""Rows that a channel cannot come to; ``test_the_table_by_itself`` has them, too."""
+_STOPS_THE_TIMER: Final = (
+    Stimulus.EXPIRED,
+    Stimulus.RELEASED,
+    Stimulus.OWNER_CHANGED,
+    Stimulus.STARTED,
+)
+
+
+def rows(*states: WatchdogState) -> set[Row]:
+    return {row for row in TABLE if row[0] in states and row not in _NEVER}
+
+
+def pairs(wanted: set[Row]) -> set[tuple[Row, Row]]:
+    """Each row with each that can follow it: an expiry needs a timer that runs."""
+    return {
+        (first, second)
+        for first, second in product(wanted, wanted)
+        if second[0] is TABLE[first][0]
+        and not (first[1] in _STOPS_THE_TIMER and second[1] is Stimulus.EXPIRED)
+    }
+
+
+def gates(row: Row) -> set[str]:
+    """States of the way to the bus in which ``row`` can happen."""
+    if row[0] is WatchdogState.IDLE:
+        return set(GATES) - {
+            "open"
+        }  # whoever leaves closes the interlock, and a word that opens it is a telegram
+    if row == (WatchdogState.OFF, Stimulus.EXPIRED):
+        # A timer that only reports goes with ignoring lost nodes.
+        return set(GATES) - {"node gone"}
+    return set(GATES)
+
+
+@pytest.mark.parametrize(
+    ("profiles", "states"),
+    [
+        (_WATCHED, (WatchdogState.IDLE, WatchdogState.RUNNING, WatchdogState.TRIPPED)),
+        (_OFF, (WatchdogState.OFF,)),
+    ],
+)
+def test_whatever_happens_and_every_transition_and_pair_of_them_does(
+    profiles: tuple[str, ...], states: tuple[WatchdogState, ...]
+) -> None:
+    maps = [explored(profile) for profile in profiles]
+    transitions = {transition for found in maps for transition in found.transitions()}
+    successive = {(a[:2], b[:2]) for found in maps for a, b in found.pairs()}
+    wanted = rows(*states)
+    assert transitions == {(*row, gate) for row in wanted for gate in gates(row)}
+    assert successive == pairs(wanted)
+
+
+# the table alone
+
+
+def test_the_table_by_itself() -> None:
+    """What holds for every row, and so for every sequence."""
+    for (state, stimulus), (after, effect) in TABLE.items():
+        if after is WatchdogState.TRIPPED is not state:
+            assert (state, stimulus) == (WatchdogState.RUNNING, Stimulus.EXPIRED)
+            assert effect is Effect.REACT
+        if state is WatchdogState.TRIPPED is not after:
+            assert stimulus in (Stimulus.ACKNOWLEDGED, Stimulus.STARTED)
+        if stimulus is Stimulus.INVALID:
+            assert (after, effect) == (state, Effect.REFUSE)
+        if effect is Effect.FORWARD:
+            assert stimulus is Stimulus.TELEGRAM
+            assert state is not WatchdogState.TRIPPED
+        assert (state is WatchdogState.OFF) == (after is WatchdogState.OFF)
+
+
+def test_every_pair_of_rows_leads_where_the_table_says() -> None:
+    for (state, stimulus), second in product(TABLE, Stimulus):
+        watchdog = Watchdog(0 if state is WatchdogState.OFF else 200)
+        watchdog.state = state
+        after, effect = TABLE[state, stimulus]
+        assert (watchdog.apply(stimulus, 1.0), watchdog.state) == (effect, after)
+        after_both, second_effect = TABLE[after, second]
+        assert (watchdog.apply(second, 1.1), watchdog.state) == (second_effect, after_both)
+        if second in (Stimulus.TELEGRAM, Stimulus.ACKNOWLEDGED):
+            is_off = after_both is WatchdogState.OFF
+            assert watchdog.next_deadline() == (None if is_off else pytest.approx(1.3))

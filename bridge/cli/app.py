@@ -7,7 +7,21 @@ import sys
 import typer
 
 from bridge import __version__
-from bridge.cli import eds, export, lss, monitor, nmt, parameter_sets, parameters, project, scan, sdo, serve
+from bridge.cli import (
+    audit,
+    drop_test,
+    eds,
+    export,
+    lss,
+    monitor,
+    nmt,
+    parameter_sets,
+    parameters,
+    project,
+    scan,
+    sdo,
+    serve,
+)
 from bridge.cli.terminal import printable_lines
 from bridge.errors import BridgeError
 
@@ -23,6 +37,8 @@ app.command()(serve.run)
 app.command()(serve.simulate)
 app.command(hidden=True)(serve.demo_controller)
 app.command()(project.check)
+app.command()(audit.audit)
+app.command("drop-test")(drop_test.drop_test)
 app.command()(eds.eds)
 app.command("hash-password")(project.hash_password)
 app.command()(scan.scan)

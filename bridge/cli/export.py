@@ -79,7 +79,7 @@ def dbc(
     words: Annotated[bool, typer.Option("--words", help="raw words instead of values and bits")] = False,
 ) -> None:
     """A DBC file: PDOs with their signals, SYNC, NMT, heartbeats and emergency messages."""
-    from bridge.dbc.write import ENCODING, dbc_text
+    from bridge.dbc.write import dbc_text
 
     project = load_project(site)
     names = [table.name for table in project.site.bus]
@@ -92,11 +92,7 @@ def dbc(
     view = view_bus(
         project.site.bus[place], ("bus", place), project.families, dictionaries, project.downloads
     )
-    text = dbc_text(describe(view, words=words))
-    if sys.stdout.isatty():
-        print(text)
-    else:
-        sys.stdout.buffer.write(text.encode(ENCODING))
+    print(dbc_text(describe(view, words=words)), end="")
 
 
 def _point(point: Point) -> tuple[object, ...]:

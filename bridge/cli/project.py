@@ -40,6 +40,8 @@ def check(
         print(printable(str(warning)), file=sys.stderr)
     for load in verdict.loads:
         print(load)
+    for case in verdict.worst_cases:
+        print(case)
     if errors:
         raise FileFaults([finding.fault for finding in errors])
     drives, buses = count(len(_drives(project)), "drive"), count(len(project.site.bus), "bus")
@@ -64,6 +66,15 @@ def _as_json(project: Project, verdict: Verdict) -> dict[str, Any]:
         "ok": not found[Severity.ERROR],
         "drives": _drives(project),
         "buses": [asdict(load) for load in verdict.loads],
+        "worst_cases": [
+            {
+                "drive": case.drive,
+                "controller_ms": case.controller_ms,
+                "bridge_ms": case.own.bridge_ms,
+                "verdict": str(case.own.verdict),
+            }
+            for case in verdict.worst_cases
+        ],
         "faults": found[Severity.ERROR],
         "warnings": found[Severity.WARNING],
     }

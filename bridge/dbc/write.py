@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections import OrderedDict
 from typing import Final
 
@@ -14,8 +15,11 @@ from cantools.database.namedsignalvalue import NamedSignalValue
 
 from bridge.dbc.model import BusDescription, Message, Signal
 
-ENCODING: Final = "cp1252"
-"""What tools take a DBC file to be written in."""
+_DIGITS: Final = 9
+_SPELT: Final = str.maketrans(
+    {"Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"}
+    | {"°": "deg", "µ": "u", "×": "x", "…": "...", "–": "-", "−": "-", "→": "->"}
+)
 
 
 def dbc_text(bus: BusDescription) -> str:
@@ -51,8 +55,8 @@ def _signal(signal: Signal, receivers: tuple[str, ...]) -> DbcSignal:
         "little_endian",
         signal.is_signed,
         conversion=BaseConversion.factory(_number(signal.factor), _number(signal.offset), choices or None),
-        minimum=signal.low,
-        maximum=signal.high,
+        minimum=_limit(signal.low),
+        maximum=_limit(signal.high),
         unit=_plain(signal.unit) or None,
         comment=_plain(signal.comment),
         receivers=list(receivers),
@@ -64,7 +68,15 @@ def _number(value: float) -> float:
     return int(value) if value == int(value) else value
 
 
+def _limit(value: float | None) -> float | None:
+    """A limit without the digits that multiplying has left behind."""
+    return None if value is None else _number(float(f"{value:.{_DIGITS}g}"))
+
+
 def _plain(text: str) -> str | None:
-    """``text`` as it may stand between quotation marks, in the characters that the format has."""
-    known = text.encode(ENCODING, "replace").decode(ENCODING)
+    """``text`` as it may stand between quotation marks. In ASCII, which reads the same in every encoding
+    that tools take a DBC file to be in."""
+    spelt = unicodedata.normalize("NFKD", text.translate(_SPELT))
+    known = "".join(letter for letter in spelt if not unicodedata.combining(letter))
+    known = known.encode("ascii", "replace").decode("ascii")
     return " ".join(known.replace("\\", "/").replace('"', "'").split()) or None

@@ -111,9 +111,10 @@ def _watch(family: Family, entry: OwnSupervision, raw: Raw, bus: BusTable, node:
     time_ms, setting, why = _time(entry, place, value, raw, bus, node)
     if time_ms is None:
         return Watch(entry.name, entry.watches, setting, None, "", OwnVerdict.UNKNOWN, why)
+    reaction, verdict, why_not = _reaction(family, entry.reaction, raw)
     if not time_ms:
-        return Watch(entry.name, entry.watches, setting, 0.0, "", OwnVerdict.RUNS_ON, why)
-    reaction, verdict, why = _reaction(family, entry.reaction, raw)
+        return Watch(entry.name, entry.watches, setting, 0.0, reaction, OwnVerdict.RUNS_ON, why)
+    why = why_not
     return Watch(entry.name, entry.watches, setting, time_ms, reaction, verdict, why, silent_ms)
 
 

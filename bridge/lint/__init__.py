@@ -6,6 +6,15 @@ uses which COB-ID, how full the bus gets, which times cannot work together.
 
 from bridge.lint.lint import Verdict, family_dictionaries, lint
 from bridge.lint.load import BusLoad
+from bridge.lint.own import WorstCase
 from bridge.lint.report import LintFinding, Severity
 
-__all__ = ["BusLoad", "LintFinding", "Severity", "Verdict", "family_dictionaries", "lint"]
+__all__ = [
+    "BusLoad",
+    "LintFinding",
+    "Severity",
+    "Verdict",
+    "WorstCase",
+    "family_dictionaries",
+    "lint",
+]

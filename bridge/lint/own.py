@@ -26,7 +26,7 @@ class WorstCase:
     def __str__(self) -> str:
         controller = f"{self.controller_ms} ms" if self.controller_ms else "never"
         bridge = f"{self.own.bridge_ms} ms" if self.own.bridge_ms else str(self.own.verdict)
-        return f"{self.drive}: controller silent {controller}, bridge silent {bridge}"
+        return f"{self.drive}: dead controller: {controller}, dead bridge: {bridge}"
 
 
 def worst_cases(bus: BusView) -> Iterator[WorstCase]:

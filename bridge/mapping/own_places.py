@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -19,7 +20,7 @@ Raw = Mapping[tuple[int, int], int]
 
 @dataclass(frozen=True, slots=True)
 class OwnPlace:
-    """One object of the own supervision. ``low`` and ``high`` are what it can hold, as numbers on the wire."""
+    """One object of the own supervision. ``low`` and ``high`` are what it can hold, as on the wire."""
 
     name: str
     ref: ObjectRef
@@ -167,6 +168,25 @@ def offline(
             if want.place.key not in raw or not want.met_by(raw[want.place.key]):
                 raw[want.place.key] = want.value
     return raw
+
+
+_SUGGESTED_MS: Final = 300
+_LIVES: Final = 3
+
+
+def suggested_ms(family: Family, bus: BusTable, node: NodeTable) -> int:
+    """The site's own time-out, or one that a pause of the bridge does not reach."""
+    entry = settable(family)
+    if node.own_timeout_ms is not None or entry is None:
+        return node.own_timeout_ms or 0
+    least_ms = max(_SUGGESTED_MS, _LIVES * bus.deadman_ms, _LIVES * bus.heartbeat_ms)
+    return round(math.ceil(least_ms / entry.unit_ms) * entry.unit_ms)
+
+
+def suggested(family: Family, bus: BusTable, node: NodeTable) -> list[OwnWant]:
+    """What would make the drives of this node stop. Empty where nothing but ``supervision`` sets it."""
+    time_ms = suggested_ms(family, bus, node)
+    return wanted(family, bus, node.model_copy(update={"own_timeout_ms": time_ms}))
 
 
 def _objects(entries: Iterable[OwnSupervision]) -> Iterable[OwnObject]:

@@ -54,7 +54,7 @@ class Cia402Drive:
         objects.add_to(self.objects, self._emcy, pdos, Memory(self._save, self._load))
         servers = [SdoServer(self.objects, RULES.sdo_block_segments)]
         self.slave = CanopenSlave(node_id, self._communication, self.objects, servers, self._emcy, self)
-        self._heard = self._hears()
+        self.heard = self._hears()
 
     @property
     def settings(self) -> Cia402Settings:
@@ -74,11 +74,11 @@ class Cia402Drive:
         self._restart()
         self.powered = True
         self.slave.boot()
-        self._heard = self._hears()
+        self.heard = self._hears()
 
     def on_frame(self, frame: Frame, now: float) -> None:
         cob_id = frame.can_id & STANDARD_MASK
-        if not self.powered or cob_id not in self._heard or frame.can_id & (EXTENDED | ERROR):
+        if not self.powered or cob_id not in self.heard or frame.can_id & (EXTENDED | ERROR):
             return
         self._advance(now)
         if not self.powered:
@@ -90,7 +90,7 @@ class Cia402Drive:
             self.slave.on_frame(frame, self._now)
             self.axis.obey()  # a control word that came by SDO
         self.slave.poll(self._now)
-        self._heard = self._hears()
+        self.heard = self._hears()
 
     def on_time(self, now: float) -> None:
         self._advance(now)

@@ -54,7 +54,7 @@ class LenzeMotec:
         servers = [SdoServer(self.objects, RULES.sdo_block_segments) for _ in self._stack.current.sdo]
         self.slave = CanopenSlave(node_id, self._stack, self._process, servers, emcy, self)
         self._fill(emcy)
-        self._heard = self._hears()
+        self.heard = self._hears()
 
     @property
     def node_id(self) -> int:
@@ -82,11 +82,11 @@ class LenzeMotec:
         self._reset_communication()
         self.powered = True
         self.slave.boot()
-        self._heard = self._hears()
+        self.heard = self._hears()
 
     def on_frame(self, frame: Frame, now: float) -> None:
         cob_id = frame.can_id & STANDARD_MASK
-        if not self.powered or cob_id not in self._heard or frame.can_id & (EXTENDED | ERROR):
+        if not self.powered or cob_id not in self.heard or frame.can_id & (EXTENDED | ERROR):
             return
         self._advance(now)
         if frame.can_id & REMOTE:
@@ -95,7 +95,7 @@ class LenzeMotec:
             self._on_data(cob_id, frame)
         if self.powered:
             self._finish()
-        self._heard = self._hears()
+        self.heard = self._hears()
 
     def on_time(self, now: float) -> None:
         self._advance(now)

@@ -13,6 +13,11 @@ class SimulatedNode(Protocol):
     @property
     def node_id(self) -> int: ...
 
+    @property
+    def heard(self) -> frozenset[int]:
+        """The identifiers that ``on_frame`` does something with, as they are now."""
+        ...
+
     def start(self, now: float) -> None:
         """Power on."""
         ...

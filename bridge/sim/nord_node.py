@@ -45,7 +45,7 @@ class NordNode(ABC):
         self._watch: Final = watch
         self._emcy = EmcyProducer(communication, RULES)
         self._reporter = DriveFaultReporter(self._emcy, len(self.drives))
-        self._heard: frozenset[int] = frozenset()
+        self.heard: frozenset[int] = frozenset()
 
     def _build(self) -> None:
         """Make the CANopen slave with the family's objects."""
@@ -117,17 +117,17 @@ class NordNode(ABC):
             drive.power_on(now)
         self.powered = True
         self.slave.boot()
-        self._heard = self.slave.hears()
+        self.heard = self.slave.hears()
 
     def on_frame(self, frame: Frame, now: float) -> None:
-        if not self.powered or frame.can_id & STANDARD_MASK not in self._heard:
+        if not self.powered or frame.can_id & STANDARD_MASK not in self.heard:
             return
         self._advance(now)
         self.slave.on_frame(frame, self._now)
         self._words_by_sdo()
         if self.powered:
             self._finish()
-        self._heard = self.slave.hears()
+        self.heard = self.slave.hears()
 
     def on_time(self, now: float) -> None:
         self._advance(now)

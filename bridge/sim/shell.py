@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from bridge.sim.node import SimulatedNode
+from bridge.southbound.bus.frame import STANDARD_MASK
 from bridge.southbound.bus.interface import Bus
 
 _SEND_WITHIN_S: Final = 0.1
@@ -19,6 +20,9 @@ class Simulation:
         self._bus = bus
         self._nodes = tuple(nodes)
         self._work = asyncio.Event()
+        self._due: dict[SimulatedNode, float | None] = {}
+        """When each node wants to be looked at; one that is not in it, now. Asking all of them for every
+        frame of a busy bus would cost more than playing them."""
 
     async def run(self) -> None:
         """Open the bus, power the nodes on and keep them going until cancelled.
@@ -43,6 +47,7 @@ class Simulation:
 
     def poke(self) -> None:
         """Something was done to a node from outside: look at it now instead of at the next deadline."""
+        self._due.clear()
         self._work.set()
 
     def close(self) -> None:
@@ -52,13 +57,19 @@ class Simulation:
         # Frames first, by their own time of reception: a late loop must not look like a silent master.
         for frame in self._bus.drain(now):
             for node in self._nodes:
-                node.on_frame(frame, frame.time)
+                if frame.can_id & STANDARD_MASK in node.heard:
+                    node.on_frame(frame, frame.time)
+                    self._due.pop(node, None)
         self._bus.on_time(now)
         for node in self._nodes:
+            due = self._due.get(node, now)
+            if due is None or due > now:
+                continue
             node.on_time(now)
             for frame in node.take_frames():
                 self._bus.send(frame, now, now + _SEND_WITHIN_S)
+            self._due[node] = node.next_deadline()
 
     def _next_deadline(self) -> float | None:
-        deadlines = [self._bus.next_deadline(), *(node.next_deadline() for node in self._nodes)]
+        deadlines = [self._bus.next_deadline(), *self._due.values()]
         return min((deadline for deadline in deadlines if deadline is not None), default=None)

@@ -51,7 +51,7 @@ class Stoeber5000:
         self._emcy = EmcyProducer(self._communication, RULES)
         self.device = StoeberDevice(axes, self._settings, self._report)
         self.slave = self._build(rated_power_kw, name, bit_31_opens_sdo)
-        self._heard = self.slave.hears()
+        self.heard = self.slave.hears()
 
     @property
     def axes(self) -> tuple[StoeberAxis, ...]:
@@ -66,16 +66,16 @@ class Stoeber5000:
         self._restart()
         self.powered = True
         self.slave.boot()
-        self._heard = self.slave.hears()
+        self.heard = self.slave.hears()
 
     def on_frame(self, frame: Frame, now: float) -> None:
-        if not self.powered or frame.can_id & STANDARD_MASK not in self._heard:
+        if not self.powered or frame.can_id & STANDARD_MASK not in self.heard:
             return
         self._advance(now)
         self.slave.on_frame(frame, self._now)
         self.device.settle()
         self._poll()
-        self._heard = self.slave.hears()
+        self.heard = self.slave.hears()
 
     def on_time(self, now: float) -> None:
         self._advance(now)

@@ -17,16 +17,16 @@ PORTS: Final = {"modbus": 1502, "opcua": 4840, "zenoh": 7447}
 BRIDGE_SIDE: Final = "vcan0"
 DRIVE_SIDE: Final = "vcan1"
 
-RPDO_PERIOD_MS: Final = 20
+RPDO_PERIOD_MS: Final = 50
 REACTION_MS: Final = 20
 """How late the bridge may be (docs/explanation/dead-man-chain.md)."""
-FIELDBUS_TIMEOUT_MS: Final = 300
-DEADMAN_MS: Final = 200
-HEARTBEAT_MS: Final = 200
-GUARD_MS, LIFE_TIME_FACTOR = 100, 3
-TPDO_MS: Final = 50
+FIELDBUS_TIMEOUT_MS: Final = 500
+DEADMAN_MS: Final = 300
+HEARTBEAT_MS: Final = 400
+GUARD_MS, LIFE_TIME_FACTOR = 150, 3
+TPDO_MS: Final = 100
 """Event timer of every TPDO: what the drive does is on the bus so soon."""
-OWN_TIMEOUT_MS: Final = 300
+OWN_TIMEOUT_MS: Final = 500
 """Of each drive's own supervision."""
 
 
@@ -49,7 +49,9 @@ class Family:
     configure: tuple[str, ...] = ()
     parameters: str = ""
     lost_after_ms: int = HEARTBEAT_MS
-    """When the bridge knows that a node is silent."""
+    """When the bridge knows that a node is silent, from the node's last sign of life."""
+    own_timeout_ms: int = OWN_TIMEOUT_MS
+    """When the drive knows that the bridge is silent."""
 
 
 _HEARTBEAT_CONSUMER: Final = 0x7F_0000 | OWN_TIMEOUT_MS
@@ -94,6 +96,7 @@ STOEBER: Final = Family(
     supervision=f'supervision = "guarding"\nsupervision_ms = {GUARD_MS}\nlife_time_factor = {LIFE_TIME_FACTOR}',
     parameters="C01 = 3000.0",
     lost_after_ms=GUARD_MS * LIFE_TIME_FACTOR,
+    own_timeout_ms=GUARD_MS * LIFE_TIME_FACTOR,
 )
 CIA402: Final = Family(
     "CiA 402",

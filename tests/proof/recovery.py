@@ -9,9 +9,9 @@ if TYPE_CHECKING:
     from tests.proof.drives import Drive
     from tests.proof.rig import Rig
 
-_ACKNOWLEDGE_S: Final = 0.13
+_ACKNOWLEDGE_S: Final = 0.25
 """Two telegrams at the least."""
-_PATIENCE_S: Final = 1.0
+_PATIENCE_S: Final = 1.5
 
 
 class Recovery:

@@ -342,7 +342,7 @@ class LegMachine:
         if model.tripped:
             assert channel.status_word & _FAULT_BITS == _FAULT, "while tripped, the status word says fault"
             assert channel.status_word & ~_FAULT_BITS == drives & ~_FAULT_BITS
-            assert self._is_hold or rig.sent_setpoints == (0, 0, 0)
+            assert self._is_hold or not any(rig.sent_setpoints)
         else:
             assert channel.status_word == drives
         assert channel.owner or model.deadline is None, "a timer without an owner"

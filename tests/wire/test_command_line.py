@@ -188,3 +188,25 @@ def test_what_is_not_served_is_not_exported(tmp_path: Path) -> None:
     done = call("export", "zenoh", str(write_site(tmp_path)))
     assert done.returncode == 1
     assert "[zenoh]" in done.stderr
+
+
+def test_of_several_buses_one_is_exported_as_dbc(tmp_path: Path) -> None:
+    buses = [
+        sites.bus(sites.node(sites.drive("fu1", "none", 0), name=f"n{k}"), name=f"can{k}") for k in (0, 1)
+    ]
+    path = str(sites.write(tmp_path, *buses))
+    assert call("export", "dbc", path).returncode == 2
+    assert "can0, can1" in call("export", "dbc", path, "--bus", "can7").stderr
+    done = call("export", "dbc", path, "--bus", "can1")
+    assert done.returncode == 0
+    assert "BU_: DRIVEBRIDGE n1" in done.stdout
+
+
+def test_a_mapping_of_ones_own_is_simulated_by_the_family_it_extends(tmp_path: Path) -> None:
+    (tmp_path / "mappings").mkdir()
+    (tmp_path / "mappings" / "fan.toml").write_text('extends = "cia402/velocity"\n', encoding="utf-8")
+    node = sites.node(sites.drive("drive", "none", 0, ""), mapping="fan")
+    path = sites.write(tmp_path, sites.bus(node))
+    with drivebridge(tmp_path, "run", "run", str(path), notify=True) as bridge:
+        bridge.wait_ready()
+        bridge.wait_output("node operational")

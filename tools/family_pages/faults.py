@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from bridge.mapping import Family
+from bridge.mapping.model import OwnSupervision
+from bridge.mapping.own_places import OwnPlace, place_of
 from tools.family_pages.text import table
 
 
@@ -58,16 +60,39 @@ error number."
 
 
 def own_supervision(family: Family) -> Iterator[str]:
-    own = family.own_timeout
-    if own is None:
+    if not family.own_supervision:
         return
     yield "## Own supervision"
     yield ""
-    does = (
-        f"`{own.reaction.object}` is what it does then; {own.reaction.none}: nothing."
-        if own.reaction
-        else "It stops its drives then."
-    )
-    yield f"`{own.object}` is the time within which the device expects process data, in steps of \
-{own.unit_ms:g} ms; 0 is off. {does}"
+    yield "What the drive watches by itself, and what follows when the bridge falls silent. \
+`drivebridge audit` reads it."
     yield ""
+    rows = [
+        (entry.name, _WATCHES[entry.watches], *_setting(family, entry)) for entry in family.own_supervision
+    ]
+    yield from table(("name", "watches", "time", "off", "reaction", "runs on with"), rows)
+
+
+_WATCHES = {
+    "process_data": "process data",
+    "heartbeat": "the bridge's heartbeat",
+    "guarding": "node guarding",
+    "link": "its bus interface",
+}
+
+
+def _setting(family: Family, entry: OwnSupervision) -> tuple[str, str, str, str]:
+    time = place_of(family, entry)
+    factor = " × `100D:00`" if entry.watches == "guarding" else ""
+    steps = f", in steps of {entry.unit_ms:g} ms" if entry.watches == "process_data" else ""
+    off = ", ".join(map(str, entry.off))
+    if entry.reaction is None:
+        return f"{_named(time)}{factor}{steps}", off, "–" if entry.watches == "link" else "it stops", "–"
+    reaction = place_of(family, entry.reaction)
+    shown = [(one, reaction.states.get(one)) for one in entry.reaction.nothing]
+    nothing = ", ".join(f"{one} ({text})" if text else str(one) for one, text in shown)
+    return f"{_named(time)}{factor}{steps}", off, _named(reaction), nothing
+
+
+def _named(place: OwnPlace) -> str:
+    return f"`{place.ref}`" if place.name == str(place.ref) else f"{place.name} (`{place.ref}`)"

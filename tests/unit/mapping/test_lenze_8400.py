@@ -11,6 +11,7 @@ from bridge.errors import FileFaults
 from bridge.mapping import family_names, load_family
 from bridge.mapping.loader import mappings_dir
 from bridge.mapping.match import Found, best_match
+from bridge.mapping.own_places import place_of
 
 NAME = "lenze/8400-motec"
 LENZE = load_family(NAME)
@@ -55,12 +56,12 @@ def test_the_second_pdo_is_optional_and_nothing_is_written():
 
 def test_the_supervision_is_the_code_of_rpdo1_and_its_reaction():
     """§10.1, §12.2."""
-    own = LENZE.own_timeout
-    assert own is not None
+    own = LENZE.own_supervision[0]
     assert own.reaction is not None
-    assert own.object == LENZE.object_of(LENZE.parameter_named("C00357/1"))
-    assert own.reaction.object == LENZE.object_of(LENZE.parameter_named("C00593/1"))
-    assert LENZE.parameter_named("C00593/1").states[own.reaction.none] == "no reaction"
+    time, reaction = place_of(LENZE, own), place_of(LENZE, own.reaction)
+    assert (str(time.ref), str(reaction.ref)) == ("5E9A:01", "5DAE:01")
+    assert [reaction.states[value] for value in own.reaction.nothing] == ["no reaction", "warning locked"]
+    assert (own.factory, own.reaction.factory) == (3000, 0)
 
 
 def test_the_error_number_is_in_bytes_4_to_7_of_f000():

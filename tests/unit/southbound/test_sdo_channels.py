@@ -59,7 +59,7 @@ def test_a_channel_that_is_open_is_not_written_again(tmp_path: Path) -> None:
     again = [frame for frame in bench.sent(0x605) if frame.data[:3].hex() == "230112"]
     assert len(again) == 2
     asked = [frame.data[:4].hex() for frame in bench.sent(0x345)]
-    assert asked[0] == asked[len(asked) // 2] == "40692001", "and P105 has been read first a second time"
+    assert asked[0] == asked[len(asked) // 2] == "40012200", "and P513 has been read first a second time"
 
 
 def test_a_drive_that_is_away_leaves_the_others_in_service(tmp_path: Path) -> None:

@@ -1,0 +1,225 @@
+"""``audit``: what each drive would do if the bridge fell silent."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from bridge import __version__
+from bridge.cli.bus import AsJson, BusName, Line, carry_out, print_table, tell
+from bridge.cli.terminal import progress
+from bridge.command import Plant
+from bridge.command.plant import Node
+from bridge.drive import OwnJudgement, OwnVerdict
+from bridge.lint import WorstCase, lint
+from bridge.mapping.own_places import OwnWant, suggested, suggested_ms
+from bridge.service import Project, load_project
+from bridge.southbound.audit import AuditErrand
+
+_COLUMNS = ("drive", "watches", "setting", "reaction", "dead controller", "dead bridge", "verdict")
+_WATCHES = {
+    "process_data": "process data",
+    "heartbeat": "our heartbeat",
+    "guarding": "our guarding",
+    "link": "its interface",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Audited:
+    """One drive. ``failure``: why its node could not be asked."""
+
+    node: Node
+    case: WorstCase
+    was_read: bool
+    failure: str = ""
+
+    @property
+    def own(self) -> OwnJudgement:
+        return self.case.own
+
+    @property
+    def is_ok(self) -> bool:
+        stops = self.own.verdict is OwnVerdict.STOPS
+        return not self.failure and (stops or bool(self.own.accepted))
+
+    @property
+    def verdict(self) -> str:
+        if self.failure:
+            return "no answer"
+        is_accepted = self.own.accepted and self.own.verdict is not OwnVerdict.STOPS
+        return f"{self.own.verdict}, accepted" if is_accepted else str(self.own.verdict)
+
+
+def audit(
+    site: Annotated[Path, typer.Argument(metavar="SITE", help="the site file")],
+    bus: BusName = None,
+    offline: Annotated[
+        bool, typer.Option("--offline", help="ask no drive: take what site file and factory say")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Show what each drive would do if the bridge fell silent; exit code 1 where one would run on."""
+    project = load_project(site)
+    names = [table.name for table in project.site.bus]
+    if bus is not None and bus not in names:
+        raise typer.BadParameter(f"which bus? One of {', '.join(names)}")
+    found = list(_audit(project, bus, offline=offline))
+    if as_json:
+        print(json.dumps({"ok": all(one.is_ok for one in found), "drives": [*map(_facts, found)]}, indent=2))
+    else:
+        print_table([_COLUMNS, *(row for one in found for row in _rows(one))])
+        _explain(found, site)
+    if not all(one.is_ok for one in found):
+        raise typer.Exit(1)
+
+
+def _audit(project: Project, only: str | None, *, offline: bool) -> Iterator[Audited]:
+    verdict = lint(project.site, project.families, project.path, project.downloads)
+    cases = {case.drive: case for case in verdict.worst_cases}
+    plant = Plant(project.site, project.families, __version__)
+    for table in project.site.bus:
+        if only not in (None, table.name):
+            continue
+        nodes = [one for one in plant.nodes.values() if one.bus is table and one.table.enabled]
+        errand: AuditErrand | None = None
+        if not offline and table.interface == "virtual":
+            tell(f"bus {table.name} is virtual: by site file and factory settings alone")
+        elif not offline:
+            line = Line(table, project.families, is_of_site=True)
+            with progress(f"bus {table.name}"):
+                errand = carry_out(line, lambda now, nodes=nodes: AuditErrand(nodes, now))
+        for node in nodes:
+            for drive in node.drives:
+                case = cases[drive.name]
+                if errand is None:
+                    yield Audited(node, case, was_read=False)
+                    continue
+                own = errand.found.get(drive.name)
+                failure = errand.failed.get(node.name, "" if own else "interrupted")
+                unknown = OwnJudgement(accepted=case.own.accepted)
+                yield Audited(
+                    node, WorstCase(case.drive, case.controller_ms, own or unknown), own is not None, failure
+                )
+
+
+def _rows(one: Audited) -> Iterator[tuple[str, ...]]:
+    """A row for each thing that the drive watches; the first says what comes of them."""
+    controller = f"{one.case.controller_ms} ms" if one.case.controller_ms else "never"
+    bridge = f"{one.own.bridge_ms} ms" if one.own.bridge_ms else "never"
+    ends = (controller, bridge, one.verdict)
+    heads = (one.case.drive,)
+    if one.failure or not one.own.watches:
+        yield (
+            *heads,
+            "–",
+            one.failure or "its mapping says nothing",
+            "–",
+            controller,
+            "not known",
+            one.verdict,
+        )
+        return
+    for watch in one.own.watches:
+        yield (*heads, _WATCHES[watch.watches], watch.setting, watch.reaction or "–", *ends)
+        heads, ends = ("",), ("", "", "")
+
+
+def _explain(found: list[Audited], site: Path) -> None:
+    """Why drives are errors, and what would be right; or why they are accepted."""
+    for one in found:
+        for watch in one.own.watches:
+            if watch.verdict is None and watch.why:
+                print(f"warning: {one.case.drive}: {watch.setting}: {watch.why}")
+        if one.failure:
+            print(f"error: {one.case.drive} could not be asked: {one.failure}")
+        elif one.own.verdict is not OwnVerdict.STOPS:
+            _tell(one)
+    failing = [one for one in found if not one.is_ok and not one.failure]
+    for node in dict.fromkeys(one.node.name for one in failing):
+        print(f"in {site}, below [[bus.node]] {node}:")
+        for line in _remedy([one for one in failing if one.node.name == node]):
+            print(f"  {line}")
+
+
+def _tell(one: Audited) -> None:
+    runs_on = one.own.verdict is OwnVerdict.RUNS_ON
+    would = "would run on" if runs_on else "may run on"
+    word, why = ("accepted", one.own.accepted) if one.own.accepted else ("error", one.own.reason)
+    print(f"{word}: {one.case.drive} {would} when the bridge falls silent: {why}")
+
+
+def _remedy(drives: list[Audited]) -> Iterator[str]:
+    """What to write for these drives of one node."""
+    node = drives[0].node
+    names = {one.case.drive for one in drives}
+    slots = [drive.slot for drive in node.drives if drive.name in names]
+    wants = suggested(node.family, node.bus, node.table)
+    if not wants:
+        guards = any(entry.watches == "guarding" for entry in node.family.own_supervision)
+        yield 'supervision = "guarding"' if guards else "# its mapping needs an [[own_supervision]]"
+        return
+    reach = {server.slot: server.number for server in node.family.sdo}
+    hidden = {reach[slot.name] for slot in slots if not slot.parameters_by_sdo and slot.name in reach}
+    if any(want.place.per_drive for want in wants) and not hidden.issubset(node.table.sdo_channels):
+        channels = sorted(hidden.union(node.table.sdo_channels))
+        yield f"sdo_channels = {channels}    # to read each drive's own parameters"
+    for want in wants:
+        if not want.only_if or (not want.place.per_drive and any(_runs_on_by(one, want) for one in drives)):
+            yield from _configure(want)
+    time_ms = suggested_ms(node.family, node.bus, node.table)
+    yield f"# or, for the same: own_timeout_ms = {time_ms} and enforce = true"
+
+
+def _runs_on_by(one: Audited, want: OwnWant) -> bool:
+    """Whether this reaction is one with which the drive runs on, or not known."""
+    nothing = {want.place.shown(value) for value in want.only_if}
+    shown = [watch.reaction for watch in one.own.watches if watch.reaction.startswith(want.place.name)]
+    return any(text in nothing or text.endswith("not known") for text in shown)
+
+
+def _configure(want: OwnWant) -> Iterator[str]:
+    text = f"0x{want.value:X}" if want.place.data_type == "uint32" else str(want.value)
+    yield "[[bus.node.configure]]"
+    yield f'object = "{want.place.ref}"    # {want.place.name}'
+    yield f'type = "{want.place.data_type}"'
+    yield f"value = {text}"
+
+
+def _facts(one: Audited) -> dict[str, Any]:
+    own = one.own
+    wants = (
+        [] if own.verdict is OwnVerdict.STOPS else suggested(one.node.family, one.node.bus, one.node.table)
+    )
+    return {
+        "drive": one.case.drive,
+        "ok": one.is_ok,
+        "read": one.was_read,
+        "verdict": "no answer" if one.failure else str(own.verdict),
+        "reason": one.failure or own.reason,
+        "accepted": own.accepted or None,
+        "controller_ms": one.case.controller_ms,
+        "own_ms": own.own_ms,
+        "bridge_ms": own.bridge_ms,
+        "watches": [
+            {
+                "name": watch.name,
+                "watches": watch.watches,
+                "setting": watch.setting,
+                "time_ms": watch.time_ms,
+                "reaction": watch.reaction,
+                "verdict": None if watch.verdict is None else str(watch.verdict),
+                "why": watch.why,
+            }
+            for watch in own.watches
+        ],
+        "configure": [
+            {"object": str(want.place.ref), "type": want.place.data_type, "value": want.value}
+            for want in wants
+        ],
+    }

@@ -1,0 +1,135 @@
+"""The fault injection: ``make proof``, and a short one in ``make lab``.
+
+    python -m tests.proof run --cycles N --out RESULT.json [--faults NAME,NAME]
+    python -m tests.proof report --least N --page PAGE.md --out RESULT.json PART.json ...
+
+``run`` is for a machine with vcan0, vcan1 and a mount namespace of its own
+(``tests/lab/vcan-run -n 2 -- unshare --mount ...``). Both end with 1 where a bound is exceeded.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+import os
+import platform
+import sys
+import tempfile
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from tests.proof import report
+from tests.proof.faults import FAULTS, Fault
+from tests.proof.machine import is_user_mode
+from tests.proof.measure import Sample
+from tests.proof.rig import Rig, Stuck
+from tests.proof.rounds import run_round
+from tests.support.process import REPOSITORY
+
+
+def say(text: str) -> None:
+    print(f"{time.monotonic():8.1f}  {text}", flush=True)
+
+
+def run(cycles: int, names: list[str], out: Path, limit_s: float) -> int:
+    os.environ["PYTHONPATH"] = str(REPOSITORY)
+    faults = [fault for fault in FAULTS if (not names or fault.name in names)]
+    possible = [fault for fault in faults if fault.possible()]
+    began = time.monotonic()
+    samples: list[Sample] = []
+    errors: list[str] = []
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="proof-")))
+        rig = Rig(folder, stack)
+        done = 0
+        try:
+            rig.start()
+            say("everything is there")
+            rig.run_all()
+            while done < cycles and time.monotonic() - began < limit_s:
+                for fault in possible:
+                    samples += _round(rig, fault, errors)
+                done += 1
+                say(f"cycle {done} of {cycles}")
+        except (Stuck, AssertionError) as error:
+            errors.append(f"the plant is stuck: {error}")
+        finally:
+            _keep_logs(folder, out.parent / f"{out.stem}-logs")
+    result: dict[str, Any] = {
+        "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d"),
+        "machine": _machine(),
+        "machines": 1,
+        "faults": [fault.name for fault in FAULTS],
+        "faults_missing": [fault.name for fault in faults if fault not in possible],
+        "rounds": done,
+        "seconds": time.monotonic() - began,
+        "by_themselves": rig.by_themselves,
+        "stopped_in_vain": rig.stopped_in_vain,
+        "errors": errors,
+        "samples": [{**sample.record(), "over_ms": sample.over_ms} for sample in samples],
+    }
+    out.write_text(json.dumps(result, indent=1), encoding="utf-8")
+    return _verdict(result, min(done, cycles))
+
+
+def _round(rig: Rig, fault: Fault, errors: list[str]) -> list[Sample]:
+    try:
+        return run_round(rig, fault, say)
+    except Stuck as error:
+        errors.append(str(error))
+        say(f"FAILED: {error}")
+        rig.mend()
+        return []
+
+
+def _keep_logs(folder: Path, where: Path) -> None:
+    where.mkdir(exist_ok=True)
+    for log in [*folder.glob("*.log"), *folder.glob("disk/*.log")]:
+        (where / log.name).write_bytes(log.read_bytes())
+
+
+def _machine() -> str:
+    cpu = "a CPU"
+    for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
+        name, _, value = line.partition(":")
+        if name.strip() in ("model name", "host"):
+            cpu = value.strip()
+    kernel = f"Linux {platform.release()}{' as a user-mode kernel on one CPU' if is_user_mode() else ''}"
+    return f"{kernel}, {cpu}, Python {platform.python_version()}"
+
+
+def _verdict(result: dict[str, Any], least: int) -> int:
+    for cell in report.cells(result["samples"]):
+        print("  ".join(cell.row()))
+    found = report.failures(result, least)
+    for text in found:
+        print(f"FAILED: {text}")
+    return 1 if found else 0
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m tests.proof", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    one = commands.add_parser("run")
+    one.add_argument("--cycles", type=int, default=50)
+    one.add_argument("--faults", default="")
+    one.add_argument("--limit", type=float, default=1800.0, help="begin no cycle after so many seconds")
+    one.add_argument("--out", type=Path, required=True)
+    other = commands.add_parser("report")
+    other.add_argument("--least", type=int, default=50)
+    other.add_argument("--page", type=Path, required=True)
+    other.add_argument("--out", type=Path, required=True)
+    other.add_argument("parts", type=Path, nargs="+")
+    asked = parser.parse_args()
+    if asked.command == "run":
+        return run(asked.cycles, [name for name in asked.faults.split(",") if name], asked.out, asked.limit)
+    result = report.merge([report.load(part) for part in asked.parts])
+    asked.out.write_text(json.dumps(result, indent=1), encoding="utf-8")
+    report.put_into(asked.page, result)
+    return _verdict(result, asked.least)
+
+
+sys.exit(main())

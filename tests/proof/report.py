@@ -1,0 +1,146 @@
+"""The table of the proof: fault × family × protocol, as JSON and as a part of a Markdown page."""
+
+from __future__ import annotations
+
+import json
+import statistics
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+BEGIN: Final = "<!-- made by `make proof`: do not edit -->"
+END: Final = "<!-- end of what `make proof` makes -->"
+
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """All samples of one fault, family and protocol. Times in ms."""
+
+    fault: str
+    family: str
+    protocol: str
+    records: tuple[Record, ...]
+
+    def _values(self, key: str) -> list[float]:
+        return [float(record[key]) for record in self.records if record[key] is not None]
+
+    def _triple(self, what: str) -> list[str]:
+        values, bounds = self._values(f"{what}_ms"), self._values(f"{what}_bound_ms")
+        if not values:
+            return ["–", "–", "–"]
+        bound = f"{max(bounds):.0f}" if bounds else "–"
+        return [f"{statistics.median(values):.0f}", f"{max(values):.0f}", bound]
+
+    def count(self, verdict: str) -> int:
+        return sum(record["verdict"] == verdict for record in self.records)
+
+    def row(self) -> list[str]:
+        bad, paused = self.count("failed"), self.count("machine paused")
+        notes = [f"**{bad} failed**"] * bool(bad)
+        if paused:
+            over = max(record["over_ms"] for record in self.records if record["verdict"] == "machine paused")
+            notes.append(f"{paused} over by up to {over:.0f} ms: the machine stood still for that long")
+        return [
+            self.fault,
+            self.family,
+            self.protocol,
+            str(len(self.records)),
+            *self._triple("bus"),
+            *self._triple("drive"),
+            "; ".join(notes) or "ok",
+        ]
+
+
+def cells(records: Iterable[Record]) -> list[Cell]:
+    """In the order in which they first occur."""
+    found: dict[tuple[str, str, str], list[Record]] = {}
+    for record in records:
+        found.setdefault((record["fault"], record["family"], record["protocol"]), []).append(record)
+    return [Cell(*key, tuple(records)) for key, records in found.items()]
+
+
+def merge(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The results of several machines as one."""
+    merged = dict(parts[0])
+    merged["samples"] = [sample for part in parts for sample in part["samples"]]
+    merged["stopped_in_vain"] = [text for part in parts for text in part["stopped_in_vain"]]
+    for key in ("by_themselves", "seconds", "rounds"):
+        merged[key] = sum(part[key] for part in parts)
+    merged["faults_missing"] = sorted({name for part in parts for name in part["faults_missing"]})
+    merged["errors"] = [text for part in parts for text in part["errors"]]
+    merged["machines"] = len(parts)
+    order = {name: place for place, name in enumerate(merged["faults"])}
+    merged["samples"].sort(key=lambda sample: (order[sample["fault"]], sample["family"], sample["protocol"]))
+    return merged
+
+
+_HEAD: Final = (
+    "fault",
+    "family",
+    "protocol",
+    "n",
+    "bus: median",
+    "worst",
+    "bound",
+    "drive: median",
+    "worst",
+    "bound",
+    "",
+)
+
+
+def markdown(result: dict[str, Any]) -> str:
+    """The generated part of docs/explanation/proof.md, markers included."""
+    table = [cell.row() for cell in cells(result["samples"])]
+    failed = sum(sample["verdict"] == "failed" for sample in result["samples"])
+    paused = sum(sample["verdict"] == "machine paused" for sample in result["samples"])
+    lines = [
+        BEGIN,
+        "",
+        f"{result['date']}, {result['machine']}; {result['machines']} at a time, "
+        f"{result['rounds']} cycles, {result['seconds'] / 60:.0f} min of them together. Times in ms.",
+        "",
+        f"{len(result['samples'])} measurements: {failed} failed, {paused} exceeded a bound by no more than the "
+        f"machine itself stood still meanwhile. {result['by_themselves']} times a drive was found stopped before "
+        "a fault, and "
+        f"{len(result['stopped_in_vain'])} times one was stopped by a fault that did not concern it: the machine "
+        "was too slow for its controllers then.",
+        "",
+        *([f"Not possible on this machine: {', '.join(result['faults_missing'])}.", ""] * bool(result["faults_missing"])),
+        "| " + " | ".join(_HEAD) + " |",
+        "|---|---|---|" + "--:|" * 7 + "---|",
+        *("| " + " | ".join(row) + " |" for row in table),
+        "",
+        END,
+    ]
+    return "\n".join(lines)
+
+
+def put_into(page: Path, result: dict[str, Any]) -> None:
+    """Replace what stands between the markers of ``page``."""
+    text = page.read_text(encoding="utf-8")
+    before, found, rest = text.partition(BEGIN)
+    _, ended, after = rest.partition(END)
+    if not (found and ended):
+        raise ValueError(f"{page} has no markers: {BEGIN} … {END}")
+    page.write_text(before + markdown(result) + after, encoding="utf-8")
+
+
+def load(path: Path) -> dict[str, Any]:
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def failures(result: dict[str, Any], least: int) -> list[str]:
+    """Why the proof has not succeeded: one sentence each, none where it has. Every cell has ``least``
+    samples."""
+    found = list(result["errors"])
+    for cell in cells(result["samples"]):
+        name = f"{cell.fault}, {cell.family}, {cell.protocol}"
+        if bad := cell.count("failed"):
+            found.append(f"{name}: {bad} of {len(cell.records)} failed")
+        if len(cell.records) < least:
+            found.append(f"{name}: only {len(cell.records)} samples of {least}")
+    return found

@@ -1,0 +1,105 @@
+"""One round: all drives move, one fault, every drive it concerns is measured, and brought back."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Final
+
+from tests.proof import measure
+from tests.proof.drives import DRIVES, Drive
+from tests.proof.faults import Fault
+from tests.proof.measure import Sample
+from tests.proof.pauses import paused_ms
+from tests.proof.rig import Rig, Stuck
+
+_STOPPED_S: Final = 5.0
+_TALKS_S: Final = 60.0
+_HOLD_S: Final = 0.35
+"""How long the owners go on writing "run" after everything is back: nothing may start by that."""
+
+
+def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample]:
+    """The samples of one round. Raises ``Stuck`` where the plant does not come back."""
+    _all_move(rig, say)
+    if fault.steady:
+        fault.steady(rig)
+        _all_go_on(rig, DRIVES, fault, "whose owners were there")
+        _all_move(rig, say)
+    concerned = [drive for drive in DRIVES if drive.protocol in fault.protocols]
+    others = [drive for drive in DRIVES if drive.protocol not in fault.protocols]
+    began = time.monotonic()
+    moment = fault.inject(rig)
+    stopped = _wait_stopped(rig, fault, concerned, moment)
+    _all_go_on(rig, others, fault, "of another protocol")
+    fault.undo(rig)
+    _wait_talking(rig, concerned)
+    time.sleep(_HOLD_S)
+    restarted = {drive: measure.was_enabled(rig, drive, *times) for drive, times in stopped.items()}
+    samples = [_sample(rig, fault, drive, moment, restarted=restarted.get(drive, False)) for drive in concerned]
+    rig.run_all()
+    say(f"{fault.name}: {time.monotonic() - began:.1f} s")
+    return samples
+
+
+def _all_move(rig: Rig, say: Callable[[str], None]) -> None:
+    """A slow machine may have stopped some of them before: they are brought back, and it is told."""
+    still = [drive for drive in DRIVES if not rig.moves(drive)]
+    if still:
+        say(f"stopped by themselves: {', '.join(drive.path for drive in still)}")
+        rig.by_themselves += len(still)
+        rig.run_all()
+
+
+def _all_go_on(rig: Rig, drives: list[Drive] | tuple[Drive, ...], fault: Fault, which: str) -> None:
+    rig.stopped_in_vain += [
+        f"{fault.name}: {drive.path} ({drive.protocol}), {which}" for drive in drives if not rig.moves(drive)
+    ]
+
+
+def _wait_stopped(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> dict[Drive, tuple[float, float]]:
+    """When each drive was stopped for good, on the bus and in itself."""
+    stopped: dict[Drive, tuple[float, float]] = {}
+    end = time.monotonic() + _STOPPED_S
+    while len(stopped) < len(drives) and time.monotonic() < end:
+        for drive in drives:
+            bus = measure.bus_stop(rig, drive, moment)
+            own = measure.drive_stop(rig, drive, moment)
+            if fault.drive_bound is None:
+                own = measure.boot_up(rig, drive, moment)
+            if bus is not None and own is not None:
+                stopped.setdefault(drive, (bus[0], own))
+        time.sleep(0.02)
+    return stopped
+
+
+def _wait_talking(rig: Rig, drives: list[Drive]) -> None:
+    rig.wait(lambda: all(rig.talks(drive) for drive in drives), _TALKS_S, "process data flow again")
+
+
+def _sample(rig: Rig, fault: Fault, drive: Drive, moment: float, *, restarted: bool) -> Sample:
+    bus = measure.bus_stop(rig, drive, moment)
+    own = measure.drive_stop(rig, drive, moment) if fault.drive_bound else None
+    begin = moment
+    if bus is not None and fault.reference == "telegram":
+        begin = measure.telegram(rig, drive, bus[1])
+    elif fault.reference == "sign of life":
+        begin = measure.last_sign(rig, drive, moment)
+    elif fault.reference == "boot-up":
+        begin = measure.boot_up(rig, drive, moment) or moment
+    if bus is None or (fault.drive_bound and own is None):
+        raise Stuck(f"{fault.name}: {drive.path} ({drive.protocol}) was not stopped")
+    end = max(bus[0], own or bus[0])
+    return Sample(
+        fault.name,
+        drive.family.name,
+        drive.protocol,
+        drive.path,
+        bus_ms=(bus[0] - begin) * 1000,
+        bus_bound_ms=fault.bus_bound(rig, drive),
+        drive_ms=None if own is None else (own - begin) * 1000,
+        drive_bound_ms=fault.drive_bound(rig, drive) if fault.drive_bound else None,
+        paused_ms=paused_ms(rig.pauses, begin, end),
+        restarted=restarted,
+        recovered=True,
+    )

@@ -1,0 +1,35 @@
+"""Which mappings one is made of, the nearest first."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bridge.errors import FileFaults
+from bridge.mapping.loader import lineage, mappings_dir
+
+
+def test_a_mapping_without_a_base_is_alone() -> None:
+    assert lineage("stoeber/5000") == ["stoeber/5000"]
+
+
+def test_templates_count() -> None:
+    assert lineage("cia402/homing") == ["cia402/homing", "cia402/base"]
+
+
+def test_a_file_of_the_same_name_in_the_sites_folder_is_one_with_it(tmp_path: Path) -> None:
+    own = tmp_path / "stoeber" / "5000.toml"
+    own.parent.mkdir()
+    own.write_text('extends = "stoeber/5000"\n', encoding="utf-8")
+    assert lineage("stoeber/5000", (tmp_path, mappings_dir())) == ["stoeber/5000"]
+    assert lineage("stoeber/5000-four-axes", (tmp_path, mappings_dir())) == [
+        "stoeber/5000-four-axes",
+        "stoeber/5000",
+    ]
+
+
+def test_a_base_that_is_missing_is_named(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text('extends = "acme/none"\n', encoding="utf-8")
+    with pytest.raises(FileFaults, match="acme/none"):
+        lineage("own", (tmp_path, mappings_dir()))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridge import __version__, clock
+from bridge.auditlog import AuditLog
 from bridge.command import Plant
 from bridge.config import BusTable, Site
 from bridge.config.download import Download
@@ -80,6 +81,7 @@ class Service:
         site = project.site
         self.plant = Plant(site, project.families, __version__, clock.now())
         self.plant.on_event(EventLog())
+        self.audit = AuditLog(self.plant, site, clock.now, clock.epoch_ns)
         self.notifier = Notifier()
         networks = [
             (make_bus(table), Network(table, self.plant, clock.epoch_ns, project.downloads))
@@ -107,6 +109,8 @@ class Service:
         self._say_what_is_doubtful()
         async with AsyncExitStack() as stack:
             stack.callback(_log.info, "stopped")
+            self.audit.start()
+            stack.callback(self.audit.close)
             # Ports first: a service that cannot be reached has no business on the bus.
             if self.modbus:
                 await self.modbus.start()
@@ -130,6 +134,7 @@ class Service:
                 # Each waits until this task is cancelled, or tells that its part has failed.
                 tasks.create_task(self.master.failed(), name="master")
                 tasks.create_task(self.mirror.failed(), name="mirror")
+                tasks.create_task(self.audit.run(), name="audit log")
                 if self.zenoh:
                     tasks.create_task(self.zenoh.failed(), name="zenoh")
 

@@ -22,9 +22,7 @@ def table() -> str:
     """One row for each event, one column for each state; → names the next state where it is another."""
     states = [state.label for state in WatchdogState]
     rows = [["event", *states], ["---"] * (len(states) + 1)]
-    rows += [
-        [stimulus.value, *(_cell(state, stimulus) for state in WatchdogState)] for stimulus in Stimulus
-    ]
+    rows += [[stimulus.value, *(_cell(state, stimulus) for state in WatchdogState)] for stimulus in Stimulus]
     return "\n".join(f"| {' | '.join(row)} |" for row in rows).replace(" --- ", "---")
 
 

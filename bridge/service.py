@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridge import __version__, clock
+from bridge.auditlog import AuditLog
 from bridge.command import Plant
 from bridge.config import BusTable, Site
 from bridge.config.download import Download
@@ -82,6 +83,7 @@ class Service:
         self.plant = Plant(site, project.families, __version__, clock.now())
         self.plant.on_event(EventLog())
         self.wear = WearKeeper(self.plant.eeprom_writes, Path(site.site.state_dir))
+        self.audit = AuditLog(self.plant, site, clock.now, clock.epoch_ns)
         self.notifier = Notifier()
         networks = [
             (make_bus(table), Network(table, self.plant, clock.epoch_ns, project.downloads))
@@ -111,6 +113,8 @@ class Service:
             stack.callback(_log.info, "stopped")
             self.wear.load()
             stack.callback(self.wear.close)
+            self.audit.start()
+            stack.callback(self.audit.close)
             # Ports first: a service that cannot be reached has no business on the bus.
             if self.modbus:
                 await self.modbus.start()
@@ -135,6 +139,7 @@ class Service:
                 tasks.create_task(self.master.failed(), name="master")
                 tasks.create_task(self.mirror.failed(), name="mirror")
                 tasks.create_task(self.wear.run(), name="EEPROM counts")
+                tasks.create_task(self.audit.run(), name="audit log")
                 if self.zenoh:
                     tasks.create_task(self.zenoh.failed(), name="zenoh")
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 from bridge.command.request import Action, Code, Identity, Outcome, Reply, Request
 from bridge.image import Image, Value
@@ -25,6 +25,14 @@ _READS: Final = "read_"
 """Actions that only read begin with it."""
 
 
+class Ending(NamedTuple):
+    """An outcome, or what a protocol says that it has refused by itself."""
+
+    code: str
+    message: str = ""
+    forwarded: bool = False
+
+
 @dataclass(frozen=True, slots=True)
 class Entry:
     """One line. ``time`` is when the request came, in monotonic seconds; ``old`` and ``new`` have what it
@@ -34,7 +42,7 @@ class Entry:
     identity: Identity
     target: str
     action: str
-    outcome: Outcome
+    ending: Ending
     old: Values = field(default_factory=dict[str, Value])
     new: Values = field(default_factory=dict[str, Value])
     count: int = 1
@@ -46,10 +54,19 @@ class _Telegrams:
 
     identity: Identity
     new: Values
-    outcome: Outcome
+    ending: Ending
     told_at: float
+    begin: float
+    told: int
     repeated: int = 0
     waiting: Entry | None = None
+
+    def may_tell(self, now: float) -> bool:
+        """Whether one more entry of this second is told at once."""
+        if now - self.begin >= 1.0:
+            self.begin, self.told = now, 0
+        self.told += 1
+        return self.told <= _MOST_IN_A_SECOND
 
 
 @dataclass(slots=True)
@@ -83,16 +100,17 @@ class AuditTrail:
         old = self._held(request)
 
         def conclude(outcome: Outcome) -> None:
-            new = _asked(request)
-            self._note(Entry(now, request.identity, request.target, request.action, outcome, old, new))
+            ending = Ending(outcome.code, outcome.message, outcome.ok and outcome.forwarded)
+            who, new = request.identity, _asked(request)
+            self._note(Entry(now, who, request.target, request.action, ending, old, new))
             reply(outcome)
 
         return conclude
 
-    def refused(self, identity: Identity, target: str, action: str, code: Code, why: str, now: float) -> None:
-        """A protocol has refused by itself what never became a request."""
+    def refused(self, identity: Identity, target: str, code: str, why: str, now: float) -> None:
+        """A protocol has refused by itself a write that never became a request."""
         if self.tell is not None:
-            self._note(Entry(now, identity, target, action, Outcome(code, why, forwarded=False)))
+            self._note(Entry(now, identity, target, Action.WRITE, Ending(code, why)))
 
     def _held(self, request: Request) -> Values:
         """What the points hold that ``request`` is about to change."""
@@ -114,29 +132,41 @@ class AuditTrail:
     def _note(self, entry: Entry) -> None:
         if self.every_telegram:
             self._tell(entry)
-        elif entry.outcome.ok and entry.action in (Action.WRITE, Action.KEEP_ALIVE):
+        elif entry.ending.code == Code.OK and entry.action in (Action.WRITE, Action.KEEP_ALIVE):
             self._note_telegram(entry)
         else:
+            telegrams = self._telegrams.pop(entry.target, None) if entry.ending.code == Code.OK else None
+            if telegrams is not None:
+                # What follows a stop or a release is no repetition of what went before it.
+                self._tell_waiting(entry.target, telegrams)
             self._note_other(entry)
 
     def _note_telegram(self, entry: Entry) -> None:
         before = self._telegrams.get(entry.target)
-        new = {} if before is None else {**before.new, **entry.new}
-        if before is None or not _goes_on(before, entry):
+        if before is None or not before.identity.is_same(entry.identity):
             if before is not None:
                 self._tell_waiting(entry.target, before)
             self._tell(entry)
-            new = {**new, **entry.new}
-            self._telegrams[entry.target] = _Telegrams(entry.identity, new, entry.outcome, entry.time)
-        elif new == before.new:
+            self._telegrams[entry.target] = _Telegrams(
+                entry.identity, entry.new, entry.ending, entry.time, begin=entry.time, told=1
+            )
+            return
+        goes_on = _goes_on(before, entry)
+        new = {**before.new, **entry.new}
+        if goes_on and new == before.new:
             before.repeated += 1
-        else:
-            before.new = new
-            if before.waiting is not None:
-                before.repeated += 1
-            before.waiting = entry
-            if entry.time - before.told_at >= SETPOINTS_S:
-                self._tell_waiting(entry.target, before)
+            return
+        before.new, before.ending = new, entry.ending
+        if not goes_on and before.may_tell(entry.time):
+            self._tell_waiting(entry.target, before)
+            self._tell(entry)
+            before.told_at = entry.time
+            return
+        if before.waiting is not None:
+            before.repeated += 1
+        before.waiting = entry
+        if entry.time - before.told_at >= SETPOINTS_S:
+            self._tell_waiting(entry.target, before)
 
     def _tell_waiting(self, target: str, telegrams: _Telegrams) -> None:
         """The newest setpoints, and how many telegrams went before them untold."""
@@ -145,14 +175,14 @@ class AuditTrail:
             self._tell(entry)
             telegrams.told_at = entry.time
         if telegrams.repeated:
-            who, outcome = telegrams.identity, telegrams.outcome
+            who, ending = telegrams.identity, telegrams.ending
             at = telegrams.told_at if entry is None else entry.time
-            self._tell(Entry(at, who, target, "telegrams", outcome, count=telegrams.repeated))
+            self._tell(Entry(at, who, target, "telegrams", ending, count=telegrams.repeated))
             telegrams.repeated = 0
 
     def _note_other(self, entry: Entry) -> None:
         identity = entry.identity
-        kind = entry.action if entry.outcome.ok else "refused"
+        kind = entry.action if entry.ending.code == Code.OK else f"{entry.action} refused"
         key = (identity.source.label, identity.user, entry.target, kind)
         if key not in self._others and len(self._others) >= _MOST_KEYS:
             key = ("", "", "", kind)  # somebody who invents names
@@ -168,7 +198,7 @@ class AuditTrail:
 
     def on_time(self, now: float) -> None:
         """Tell what has waited long enough; call it about once a second."""
-        for target, telegrams in self._telegrams.items():
+        for telegrams in self._telegrams.values():
             if telegrams.waiting is not None and now - telegrams.told_at >= SETPOINTS_S:
                 entry, telegrams.waiting = telegrams.waiting, None
                 self._tell(entry)
@@ -185,7 +215,7 @@ class AuditTrail:
             if others.left_out and others.last is not None:
                 last = others.last
                 left_out = Entry(
-                    now, last.identity, last.target, last.action, last.outcome, count=others.left_out
+                    now, last.identity, last.target, last.action, last.ending, count=others.left_out
                 )
                 self._tell(left_out)
         self._others.clear()
@@ -200,7 +230,7 @@ def _goes_on(before: _Telegrams, entry: Entry) -> bool:
     word = entry.new.get("control_word", before.new.get("control_word"))
     return (
         before.identity.is_same(entry.identity)
-        and before.outcome == entry.outcome
+        and before.ending == entry.ending
         and before.new.get("control_word") == word
         and entry.new.keys() <= before.new.keys()
     )
@@ -218,5 +248,7 @@ def _asked(request: Request) -> Values:
             return {"owner": ""}
         case Action.START:
             return {"direction": request.direction}
+        case Action.WRITE_PARAMETER:
+            return {} if request.value is None else {request.parameter: request.value}
         case _:
             return {}

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Final, Protocol
 
+from bridge.command.audit import AuditTrail
 from bridge.command.deadlines import Deadlines
 from bridge.command.drive import Drive
 from bridge.command.event import Event, EventGate, Kind
@@ -88,6 +89,7 @@ class Plant:
         self._deadlines = Deadlines(self._next_of_drives)
         self._listeners: list[Callable[[Event], None]] = []
         self._gate = EventGate()
+        self._refused_by_nodes = 0
         self._is_closing = False
         points = bridge_points()
         units = _unit_ids(site)
@@ -105,6 +107,7 @@ class Plant:
                     self.by_unit[unit_id] = drive
                     points += drive.points
         self.image = Image(points)
+        self.audit = AuditTrail(self.image)
         self._node_faults = {
             name: (
                 self.image.index[f"{name}/node/current_fault"],
@@ -145,6 +148,7 @@ class Plant:
 
     def submit(self, request: Request, now: float, reply: Reply) -> None:
         """Carry out ``request``; ``reply`` is called exactly once, now or later."""
+        reply = self.audit.follow(request, now, reply)
         if self._is_closing and request.action not in STOP_ACTIONS:
             reply(Outcome(Code.NOT_READY, "the bridge is being stopped", forwarded=False))
             return
@@ -155,7 +159,7 @@ class Plant:
             if command is None:
                 reply(Outcome(Code.UNKNOWN_TARGET, f"there is no node {request.target!r}"))
             else:
-                command(request, now, reply)
+                command(request, now, self._telling(request, now, reply))
                 self.outputs_changed()
             return
         drive = self.drives.get(request.target)
@@ -177,6 +181,19 @@ class Plant:
             if drive.channel.output != before or request.action in _BRINGS_TIMERS_FORWARD:
                 self.outputs_changed()
 
+    def _telling(self, request: Request, now: float, reply: Reply) -> Reply:
+        """``reply`` for a command on nodes, whose refusal is an event and counts as one of a drive does."""
+
+        def conclude(outcome: Outcome) -> None:
+            if not outcome.ok:
+                self._refused_by_nodes += 1
+                message = f"{request.action} by {request.identity} refused: {outcome.message}"
+                source = request.target.removeprefix("bus/")
+                self.report(Event(now, Kind.REFUSED, source, 300, message))
+            reply(outcome)
+
+        return conclude
+
     def on_time(self, now: float) -> None:
         """Let the timers of every channel run and bring the image up to date."""
         if not self._deadlines.is_due(now):
@@ -193,7 +210,7 @@ class Plant:
         good = sum(drive.quality is Quality.GOOD for drive in self.drives.values())
         self.set("bridge/drives_good", good, now)
         refused = sum(drive.channel.refused_writes for drive in self.drives.values())
-        self.set("bridge/refused_writes", refused, now)
+        self.set("bridge/refused_writes", refused + self._refused_by_nodes, now)
 
     def _settled(self, node: Node, drive: Drive, now: float) -> None:
         """Something about a drive has changed: show it, and with it the node's 102.0.

@@ -260,4 +260,5 @@ def bridge_points() -> list[Point]:
         Point(name="bridge/drives_configured", data_type=u32, description="drives in the site file"),
         Point(name="bridge/drives_good", data_type=u32, description="drives with good data"),
         Point(name="bridge/refused_writes", data_type=u32, description="refused requests since start"),
+        Point(name="bridge/audit_lost", data_type=u32, description="lines that are missing in the audit log"),
     ]

@@ -350,6 +350,14 @@ class ZenohTable(Table):
     password_file: str | None = Field(None, description="a file with user:password for each who may connect")
 
 
+class AuditTable(Table):
+    enabled: bool = True
+    file: str | None = None
+    max_bytes: int = Field(10_000_000, ge=10_000, le=10_000_000_000, description="10000…10000000000")
+    keep: int = Field(5, ge=0, le=1000, description="0…1000")
+    every_telegram: bool = False
+
+
 class Site(Table):
     """One site file, checked. Lists are in the order of the file."""
 
@@ -358,3 +366,4 @@ class Site(Table):
     modbus: ModbusTable | None = None
     opcua: OpcUaTable | None = None
     zenoh: ZenohTable | None = None
+    audit: AuditTable = Field(default_factory=lambda: AuditTable.model_validate({}))

@@ -91,4 +91,8 @@ def write(folder: Path, *tables: str, name: str = "hall") -> Path:
 
 def plant_of(text: str) -> Plant:
     """The plant of a site's text, without a bus."""
-    return Plant(Site.model_validate(tomllib.loads(text)), {FAMILY: family(FAMILY)}, "1.2.3")
+    return Plant(Site.model_validate(parsed(text)), {FAMILY: family(FAMILY)}, "1.2.3")
+
+
+def parsed(text: str) -> dict[str, object]:
+    return tomllib.loads(text)

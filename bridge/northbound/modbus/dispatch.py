@@ -59,6 +59,23 @@ EXCEPTIONS: Final = {
 }
 """How a request that did not succeed is told."""
 
+_CODES: Final = {
+    ExceptionCode.ILLEGAL_FUNCTION: Code.NOT_ALLOWED,
+    ExceptionCode.ILLEGAL_ADDRESS: Code.UNKNOWN_POINT,
+    ExceptionCode.ILLEGAL_VALUE: Code.OUT_OF_RANGE,
+    ExceptionCode.PATH_UNAVAILABLE: Code.UNKNOWN_TARGET,
+    ExceptionCode.NOT_RESPONDING: Code.NOT_READY,
+}
+"""What an exception that is found here means."""
+_WRITES: Final = (
+    Function.WRITE_COIL,
+    Function.WRITE_REGISTER,
+    Function.WRITE_COILS,
+    Function.WRITE_REGISTERS,
+    Function.MASK_WRITE,
+    Function.READ_WRITE,
+)
+
 _Write = WriteBits | WriteWords | MaskWrite | ReadWrite
 _TEXT_MOST: Final = 240  # an object of FC43/14 must fit into one PDU
 
@@ -89,7 +106,16 @@ class Dispatcher:
             given = self._read(unit, request, caller)
         except Refused as error:
             given = refusal(pdu[0], error.code)
+            if pdu[0] in _WRITES:
+                self._note_refusal(unit_id, pdu[0], caller, error.code)
         answer(given)
+
+    def _note_refusal(self, unit_id: int, function: int, caller: Identity, code: ExceptionCode) -> None:
+        """A write that was refused before it became a request, for the audit log."""
+        drive = self._plant.by_unit.get(unit_id)
+        target = drive.name if drive else f"unit {unit_id}"
+        message = f"function {function} refused with exception {code.value:02X}h"
+        self._plant.audit.refused(caller, target, _CODES.get(code, Code.NOT_READY), message, self._clock())
 
     def _read(
         self, unit: Unit, request: ReadWords | ReadBits | Identify | Loopback, caller: Identity

@@ -198,9 +198,18 @@ class ZenohServer:
         try:
             request = self._commands.reading(drive, name, self._identity(asked.attachment), cached=cached)
         except BadCommand as bad:
+            self._note_refusal(tail, asked.attachment, bad)
             _refuse(asked, bad)
             return
         self._plant.submit(request, self._clock(), reply)
+
+    def _note_refusal(self, tail: str, attachment: bytes | None, bad: BadCommand) -> None:
+        """A command that was refused before it became a request, for the audit log."""
+        try:
+            identity = identity_of(attachment)
+        except BadCommand:
+            identity = identity_of(None)
+        self._plant.audit.refused(identity, tail, bad.code, bad.message, self._clock())
 
     def _on_put(self, message: Message) -> None:
         """A plain put on a command key, where the site takes them. Nobody is there to be told."""
@@ -209,6 +218,7 @@ class ZenohServer:
             request = self._commands.request(self._keys.tail(message.key), message.payload, identity)
         except BadCommand as bad:
             _log.info("zenoh: a put on %s is no command: %s", message.key, bad.message)
+            self._note_refusal(self._keys.tail(message.key), message.attachment, bad)
             return
         self._plant.submit(request, self._clock(), lambda _: None)
 

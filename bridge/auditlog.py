@@ -1,0 +1,125 @@
+"""The audit log of the service: entries of the plant as JSON lines (``docs/reference/audit-log.md``)."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from bridge.auditfile import AuditFile
+from bridge.command import Event, Kind, Plant
+from bridge.command.audit import Entry
+from bridge.config import Site
+from bridge.image import Value
+
+_PERIOD_S: Final = 0.5
+_LONGEST_TEXT: Final = 300
+"""Callers on the network may send anything; their words are cut."""
+_encode = msgspec.json.Encoder().encode
+
+
+class _Line(msgspec.Struct, omit_defaults=True):
+    t: str
+    mono: float
+    source: str
+    user: str
+    role: str
+    target: str
+    action: str
+    code: str
+    forwarded: bool
+    address: str = ""
+    old: dict[str, Value] = {}
+    new: dict[str, Value] = {}
+    message: str = ""
+    count: int = 1
+
+
+def as_line(entry: Entry, epoch_ns: int) -> bytes:
+    """One line with its end, ASCII but for what clients call themselves."""
+    who, ending = entry.identity, entry.ending
+    seconds, ns = divmod(epoch_ns, 1_000_000_000)
+    at = datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%dT%H:%M:%S")
+    line = _Line(
+        t=f"{at}.{ns // 1000:06d}Z",
+        mono=round(entry.time, 6),
+        source=who.source.label,
+        user=_cut(who.user),
+        role=who.role.name.lower(),
+        target=_cut(entry.target),
+        action=_cut(entry.action),
+        code=ending.code,
+        forwarded=ending.forwarded,
+        address=_cut(who.address),
+        old={_cut(leaf): _shown(value) for leaf, value in entry.old.items()},
+        new={_cut(leaf): _shown(value) for leaf, value in entry.new.items()},
+        message=_cut(ending.message),
+        count=entry.count,
+    )
+    return _encode(line) + b"\n"
+
+
+def _cut(text: str) -> str:
+    # A lone surrogate has no UTF-8.
+    text = text.encode("utf-8", "replace").decode("utf-8")
+    return text if len(text) <= _LONGEST_TEXT else f"{text[:_LONGEST_TEXT]}…"
+
+
+def _shown(value: Value) -> Value:
+    return _cut(value) if isinstance(value, str) else value
+
+
+class AuditLog:
+    """Writes what ``plant`` is asked. ``clock`` is monotonic, ``epoch`` turns such a time into ns since
+    1970 UTC. What is lost is counted in ``bridge/audit_lost``."""
+
+    def __init__(
+        self, plant: Plant, site: Site, clock: Callable[[], float], epoch: Callable[[float], int]
+    ) -> None:
+        settings = site.audit
+        self._plant = plant
+        self._clock = clock
+        self._epoch = epoch
+        self._fault = ""
+        path = Path(settings.file) if settings.file else Path(site.site.state_dir) / "audit.jsonl"
+        self.file = AuditFile(path, settings.max_bytes, settings.keep)
+        self._is_enabled = settings.enabled
+        plant.audit.every_telegram = settings.every_telegram
+        plant.set("bridge/audit_lost", 0, plant.began)
+
+    def start(self) -> None:
+        if self._is_enabled:
+            self.file.start()
+            self._plant.audit.tell = self._on_entry
+
+    def close(self) -> None:
+        if self._is_enabled:
+            self._plant.audit.sum_up(self._clock())
+            self._plant.audit.tell = None
+            self.file.close()
+
+    async def run(self) -> None:
+        """Until cancelled: summaries, and whether lines are lost."""
+        while True:
+            await asyncio.sleep(_PERIOD_S)
+            self.look(self._clock())
+
+    def look(self, now: float) -> None:
+        self._plant.audit.on_time(now)
+        lost, fault = self.file.all_lost, self.file.fault
+        self._plant.set("bridge/audit_lost", lost, now)
+        if fault != self._fault:
+            self._fault = fault
+            if fault:
+                message = f"the audit log is not written: {self.file.path}: {fault}"
+                self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", 600, message))
+            else:
+                message = f"the audit log is written again; {lost} lines are missing"
+                self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", 300, message))
+
+    def _on_entry(self, entry: Entry) -> None:
+        self.file.put(as_line(entry, self._epoch(entry.time)))

@@ -186,8 +186,7 @@ class Drive:
     def on_own_supervision(self, own: OwnJudgement, now: float) -> None:
         """What the drive does by itself when the bridge falls silent, as the boot-up has read it."""
         self.own = own
-        accepted = own.verdict is OwnVerdict.RUNS_ON and own.accepted
-        if own.verdict is OwnVerdict.STOPS or accepted:
+        if own.verdict is OwnVerdict.STOPS or own.accepted:
             self._image.set(self._bridge_ms, own.bridge_ms, now, Quality.GOOD, own.accepted)
             return
         verdict = "the drive runs on" if own.verdict is OwnVerdict.RUNS_ON else "not known"

@@ -121,9 +121,7 @@ class Booting:
                 self._sdo[channel].read(index, sub, now, self._answers.append, priority=Priority.BOOT)
                 return True
             case boot.Write(index, sub, data, channel):
-                self._sdo[channel].write(
-                    index, sub, data, now, self._answers.append, priority=Priority.BOOT
-                )
+                self._sdo[channel].write(index, sub, data, now, self._answers.append, priority=Priority.BOOT)
                 return True
             case boot.Await(state, timeout_s):
                 if not self._host.begin_await(state):

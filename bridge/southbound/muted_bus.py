@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bridge.southbound.bus import Bus
 from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.interface import BusStatus
+from bridge.southbound.bus.interface import Bus, BusStatus
 
 
 class MutableBus:
@@ -17,6 +16,7 @@ class MutableBus:
     def __init__(self, bus: Bus, heard: Callable[[Frame], None]) -> None:
         self._bus = bus
         self._heard = heard
+        self._accepted: list[int] = []
         self._beating: set[int] = set()
         self.is_muted = False
         self.last_sent = float("-inf")
@@ -81,5 +81,3 @@ class MutableBus:
 
     def close(self) -> None:
         self._bus.close()
-
-    _accepted: list[int] = []  # noqa: RUF012 - replaced, never changed

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final
 
-from bridge.command import Action, Code, Drive, Event, Kind, Outcome, Plant, Reply, Request
+from bridge.command import Action, Code, Drive, Event, Identity, Kind, Outcome, Plant, Reply, Request, Role
 from bridge.command.link import NodeState
 from bridge.command.plant import Node
 from bridge.parameter import (
@@ -116,8 +116,9 @@ class NodeParameters:
 
     def _refusal(self, request: Request, drive: Drive) -> Outcome | None:
         """Why this is not even asked of the drive."""
-        if request.action is not Action.READ_PARAMETER and not request.identity.may_set_parameters:
-            return _no(Code.NOT_ALLOWED, f"{request.identity} may not set parameters: an engineer may")
+        why = "" if request.action is Action.READ_PARAMETER else _why_not_set(request.identity, drive)
+        if why:
+            return _no(Code.NOT_ALLOWED, why)
         if self._state not in _REACHABLE:
             return _no(Code.NOT_READY, f"the drive's node is {self._state.value}")
         if request.action is not Action.SAVE_PARAMETERS and channel_of(self._node, drive.slot) is None:
@@ -260,6 +261,16 @@ class NodeParameters:
         if name in self._scaling and entry.address == self._names.resolve(name).address:
             # It scales the process data, which follow at once.
             drive.on_scale(name, float(result.value))
+
+
+def _why_not_set(identity: Identity, drive: Drive) -> str:
+    """Why ``identity`` may not set parameters: an engineer may, and where its protocol knows no roles, who
+    controls the drive or could."""
+    if identity.role >= Role.ENGINEER:
+        return ""
+    if not identity.may_set_parameters:
+        return f"{identity} may not set parameters: an engineer may"
+    return drive.channel.authority.refusal(identity, owner_is_silent=False) or ""
 
 
 def _failed(error: ParameterError) -> Outcome:

@@ -41,10 +41,26 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float) -> int:
     began = time.monotonic()
     samples: list[Sample] = []
     errors: list[str] = []
+    done = 0
+
+    def collect() -> dict[str, Any]:
+        return {
+            "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d"),
+            "machine": _machine(),
+            "machines": 1,
+            "faults": [fault.name for fault in FAULTS],
+            "faults_missing": [fault.name for fault in faults if fault not in possible],
+            "rounds": done,
+            "seconds": time.monotonic() - began,
+            "by_themselves": rig.by_themselves,
+            "stopped_in_vain": rig.stopped_in_vain,
+            "errors": errors,
+            "samples": [{**sample.record(), "over_ms": sample.over_ms} for sample in samples],
+        }
+
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="proof-")))
         rig = Rig(folder, stack)
-        done = 0
         try:
             rig.start()
             say("everything is there")
@@ -52,25 +68,14 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float) -> int:
             while done < cycles and time.monotonic() - began < limit_s:
                 for fault in possible:
                     samples += _round(rig, fault, errors)
+                    out.write_text(json.dumps(collect(), indent=1), encoding="utf-8")
                 done += 1
                 say(f"cycle {done} of {cycles}")
         except (Stuck, AssertionError) as error:
             errors.append(f"the plant is stuck: {error}")
         finally:
             _keep_logs(folder, out.parent / f"{out.stem}-logs")
-    result: dict[str, Any] = {
-        "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d"),
-        "machine": _machine(),
-        "machines": 1,
-        "faults": [fault.name for fault in FAULTS],
-        "faults_missing": [fault.name for fault in faults if fault not in possible],
-        "rounds": done,
-        "seconds": time.monotonic() - began,
-        "by_themselves": rig.by_themselves,
-        "stopped_in_vain": rig.stopped_in_vain,
-        "errors": errors,
-        "samples": [{**sample.record(), "over_ms": sample.over_ms} for sample in samples],
-    }
+    result = collect()
     out.write_text(json.dumps(result, indent=1), encoding="utf-8")
     return _verdict(result, min(done, cycles))
 
@@ -87,7 +92,7 @@ def _round(rig: Rig, fault: Fault, errors: list[str]) -> list[Sample]:
 
 def _keep_logs(folder: Path, where: Path) -> None:
     where.mkdir(exist_ok=True)
-    for log in [*folder.glob("*.log"), *folder.glob("disk/*.log")]:
+    for log in [*folder.glob("*.log"), *folder.glob("disk/*.log"), folder / "pauses"]:
         (where / log.name).write_bytes(log.read_bytes())
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
-from tests.proof.drives import PORTS, SERVERS, Drive
+from tests.proof.drives import PORTS, SERVERS, Drive, drives_of
 
 _LIMIT_S = 1.0
 _CONNECT_S = 5.0
@@ -29,35 +29,38 @@ class Client(Protocol):
 
 
 class ModbusClient:
-    """pymodbus, one connection for all drives."""
+    """pymodbus, a connection for each drive."""
 
     def __init__(self) -> None:
-        from pymodbus.client import AsyncModbusTcpClient
-
-        self._client = AsyncModbusTcpClient(
-            SERVERS["modbus"], port=PORTS["modbus"], timeout=_LIMIT_S, retries=0, reconnect_delay=0
-        )
+        self._clients: dict[Drive, Any] = {}
 
     async def connect(self) -> None:
-        if not await self._client.connect():
-            raise ClientFault
+        from pymodbus.client import AsyncModbusTcpClient
+
+        for drive in drives_of("modbus"):
+            client = self._clients[drive] = AsyncModbusTcpClient(
+                SERVERS["modbus"], port=PORTS["modbus"], timeout=_LIMIT_S, retries=0, reconnect_delay=0
+            )
+            if not await client.connect():
+                raise ClientFault
 
     async def write(self, telegrams: Sequence[tuple[Drive, int, int]]) -> list[bool]:
+        return await asyncio.gather(*(self._write(*telegram) for telegram in telegrams))
+
+    async def _write(self, drive: Drive, control_word: int, setpoint: int) -> bool:
         from pymodbus.exceptions import ModbusException
 
-        accepted: list[bool] = []
-        for drive, control_word, setpoint in telegrams:
-            try:
-                answer = await self._client.write_registers(
-                    0, [control_word, setpoint], device_id=drive.place + 1
-                )
-            except ModbusException as error:
-                raise ClientFault from error
-            accepted.append(not answer.isError())
-        return accepted
+        try:
+            answer = await self._clients[drive].write_registers(
+                0, [control_word, setpoint], device_id=drive.place + 1
+            )
+        except ModbusException as error:
+            raise ClientFault from error
+        return not answer.isError()
 
     async def close(self) -> None:
-        self._client.close()
+        for client in self._clients.values():
+            client.close()
 
 
 class OpcUaClient:

@@ -24,7 +24,7 @@ FIELDBUS_TIMEOUT_MS: Final = 500
 DEADMAN_MS: Final = 300
 HEARTBEAT_MS: Final = 400
 GUARD_MS, LIFE_TIME_FACTOR = 150, 3
-TPDO_MS: Final = 100
+TPDO_MS: Final = 150
 """Event timer of every TPDO: what the drive does is on the bus so soon."""
 OWN_TIMEOUT_MS: Final = 500
 """Of each drive's own supervision."""
@@ -187,7 +187,7 @@ def write_site(path: Path, channel: str, state: Path, run: Path) -> Path:
     text = [
         f'[site]\nname = "proof"\nstate_dir = "{state}"\nruntime_dir = "{run}"',
         f'[[bus]]\nname = "can0"\ninterface = "socketcan"\nchannel = "{channel}"\nbitrate = 1000000',
-        f"sync_period_ms = {RPDO_PERIOD_MS}\ndeadman_ms = {DEADMAN_MS}",
+        f"sync_period_ms = 0\nrpdo_period_ms = {RPDO_PERIOD_MS}\ndeadman_ms = {DEADMAN_MS}",
         *(_node(drives) for drives in nodes.values()),
         f'[modbus]\nlisten = "{SERVERS["modbus"]}:{PORTS["modbus"]}"',
         f'[opcua]\nlisten = "{SERVERS["opcua"]}:{PORTS["opcua"]}"\nno_security = true\nanonymous = "operator"',

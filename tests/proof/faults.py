@@ -250,6 +250,7 @@ FAULTS: Final = (
     Fault("node silent", "sign of life", _silence, _speak, _lost, _lost_drive),
     Fault("bus process stopped", "moment", _stop_bridge, _continue_bridge, _dead, _dead_drive),
     Fault("event loop blocked for 1 s", "moment", _block_loop, _nothing, _dead, _dead_drive),
+    Fault("bus process killed", "moment", Rig.kill_bridge, Rig.renew_bridge, _dead, _dead_drive),
     Fault("interface down", "moment", _link_down, _link_up, _at_once, _at_once_drive),
     Fault("bus-off", "moment", _bus_off, _bus_restarted, _at_once, _at_once_drive),
     Fault("node rebooting", "boot-up", _reboot, _nothing, _at_once, None),
@@ -262,6 +263,6 @@ FAULTS: Final = (
         _controller_drive,
         protocols=("opcua",),
     ),
-    Fault("bus process killed", "moment", Rig.kill_bridge, Rig.renew_bridge, _dead, _dead_drive),
 )
-"""In the order of a cycle: what loses nodes stands far apart, and what starts the service anew, last."""
+"""In the order of a cycle. A service that is started anew in the middle has forgotten which nodes it has lost
+again and again, and how often its front has ended: it waits for neither longer than it has to."""

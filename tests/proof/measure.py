@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Final
 
+from tests.proof.board import NUMBERS
 from tests.proof.drives import RPDO_PERIOD_MS, TPDO_MS, Drive
 from tests.proof.rig import Rig
+from tests.proof.witness import Run
 
 _SILENT_S: Final = 3 * RPDO_PERIOD_MS / 1000
 _BOOT_UP: Final = b"\0"
@@ -26,6 +28,8 @@ class Sample:
     bus_bound_ms: float | None
     drive_ms: float | None
     drive_bound_ms: float | None
+    way_ms: float | None
+    """From the client's sending its last telegram to the RPDO by which the bridge handed it on."""
     paused_ms: float
     """How long the machine itself stood still from the reference to the stop in the drive."""
     restarted: bool
@@ -49,9 +53,9 @@ class Sample:
         return {**asdict(self), "verdict": self.verdict}
 
 
-def bus_stop(rig: Rig, drive: Drive, since: float) -> tuple[float, bytes] | None:
+def bus_stop(rig: Rig, drive: Drive, since: float) -> tuple[float, Run] | None:
     """When the bus began to stop the drive, after ``since``: the first RPDO that does not enable, or the last
-    one that does where it falls silent. With it the last RPDO that enabled. None while it goes on."""
+    one that does where it falls silent. With it the last words that enabled. None while it goes on."""
     enabling = None
     for run in rig.told.runs(drive.rpdo, since - _BEFORE_S):
         if drive.enabling(run.data):
@@ -62,11 +66,11 @@ def bus_stop(rig: Rig, drive: Drive, since: float) -> tuple[float, bytes] | None
             is_answer = run.first - enabling.last <= _SILENT_S
             at = run.first if is_answer else enabling.last
             if at >= since or run.first >= since:
-                return at, enabling.data
+                return at, enabling
             enabling = None
     if enabling is None or rig.now() - enabling.last <= 2 * _SILENT_S:
         return None
-    return enabling.last, enabling.data
+    return enabling.last, enabling
 
 
 def drive_stop(rig: Rig, drive: Drive, since: float) -> float | None:
@@ -79,9 +83,17 @@ def drive_stop(rig: Rig, drive: Drive, since: float) -> float | None:
     return min(times, default=None)
 
 
-def telegram(rig: Rig, drive: Drive, data: bytes) -> float:
-    """When the telegram was sent whose words the bus has carried last."""
-    return rig.board.sent_at(drive.place, drive.telegram(data))
+def was_moving(rig: Rig, drive: Drive, at: float) -> bool:
+    """The drive was enabled just then, on the bus and by its own word."""
+    told = [run for run in rig.told.runs(drive.rpdo, at - _BEFORE_S) if run.first <= at]
+    said = [run for run in rig.said.runs(drive.tpdo, at - _BEFORE_S) if run.first <= at]
+    return bool(told and said) and drive.enabling(told[-1].data) and drive.enabled(said[-1].data)
+
+
+def way(rig: Rig, drive: Drive, run: Run) -> float:
+    """How long the telegram was on its way whose words these are, in seconds: from its client's sending it
+    until the bridge sent them (a change goes out at once)."""
+    return run.first - rig.board.sent_at(drive.place, drive.telegram(run.data) % NUMBERS)
 
 
 def last_sign(rig: Rig, drive: Drive, until: float) -> float:

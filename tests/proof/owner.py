@@ -17,7 +17,7 @@ from tests.proof.board import NUMBERS, Board
 from tests.proof.clients import CLIENTS, Client, ClientFault
 from tests.proof.drives import DRIVES, drives_of
 
-PERIOD_S = 0.1
+PERIOD_S = 0.12
 _AGAIN_S = 0.1
 
 

@@ -1,4 +1,4 @@
-"""How long the machine itself stood still: a process that only sleeps 5 ms, ahead of all others.
+"""How long the machine itself stood still: a process that only sleeps 10 ms, ahead of all others.
 
 ``python -m tests.proof.pauses FILE`` appends a line ``begin end`` for each sleep that took longer than
 ``FROM_S``, in seconds of the monotonic clock.
@@ -13,8 +13,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-FROM_S: Final = 0.010
-_SLEEP_S: Final = 0.005
+FROM_S: Final = 0.015
+_SLEEP_S: Final = 0.01
 _PRIORITY: Final = 90
 
 

@@ -30,13 +30,18 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     others = [drive for drive in DRIVES if drive.protocol not in fault.protocols]
     began = time.monotonic()
     moment = fault.inject(rig)
-    stopped = _wait_stopped(rig, fault, concerned, moment)
+    still = [drive for drive in concerned if not measure.was_moving(rig, drive, moment)]
+    rig.by_themselves += len(still)
+    stopped = _wait_stopped(rig, fault, [drive for drive in concerned if drive not in still], moment)
     _all_go_on(rig, others, fault, "of another protocol")
     fault.undo(rig)
     _wait_talking(rig, concerned)
     time.sleep(_HOLD_S)
     restarted = {drive: measure.was_enabled(rig, drive, *times) for drive, times in stopped.items()}
-    samples = [_sample(rig, fault, drive, moment, restarted=restarted.get(drive, False)) for drive in concerned]
+    samples = [_sample(rig, fault, drive, moment, restarted=restarted[drive]) for drive in stopped]
+    missing = [drive for drive in concerned if drive not in stopped and drive not in still]
+    if missing:
+        raise Stuck(f"{fault.name}: not stopped: {', '.join(f'{one.path} ({one.protocol})' for one in missing)}")
     rig.run_all()
     say(f"{fault.name}: {time.monotonic() - began:.1f} s")
     return samples
@@ -80,15 +85,15 @@ def _wait_talking(rig: Rig, drives: list[Drive]) -> None:
 def _sample(rig: Rig, fault: Fault, drive: Drive, moment: float, *, restarted: bool) -> Sample:
     bus = measure.bus_stop(rig, drive, moment)
     own = measure.drive_stop(rig, drive, moment) if fault.drive_bound else None
-    begin = moment
+    begin, way_ms = moment, None
     if bus is not None and fault.reference == "telegram":
-        begin = measure.telegram(rig, drive, bus[1])
+        begin = bus[1].first
+        way_ms = measure.way(rig, drive, bus[1]) * 1000
     elif fault.reference == "sign of life":
         begin = measure.last_sign(rig, drive, moment)
     elif fault.reference == "boot-up":
         begin = measure.boot_up(rig, drive, moment) or moment
-    if bus is None or (fault.drive_bound and own is None):
-        raise Stuck(f"{fault.name}: {drive.path} ({drive.protocol}) was not stopped")
+    assert bus is not None
     end = max(bus[0], own or bus[0])
     return Sample(
         fault.name,
@@ -99,6 +104,7 @@ def _sample(rig: Rig, fault: Fault, drive: Drive, moment: float, *, restarted: b
         bus_bound_ms=fault.bus_bound(rig, drive),
         drive_ms=None if own is None else (own - begin) * 1000,
         drive_bound_ms=fault.drive_bound(rig, drive) if fault.drive_bound else None,
+        way_ms=way_ms,
         paused_ms=paused_ms(rig.pauses, begin, end),
         restarted=restarted,
         recovered=True,

@@ -24,7 +24,7 @@ _FILTERS: Final = 1
 _EXACT: Final = 0xC000_07FF
 _OLDEST_S: Final = 10.0
 _MOST_RUNS: Final = 20_000
-_LOOK_S: Final = 0.01
+_LOOK_S: Final = 0.03
 """The kernel has stamped and kept the frames: they are fetched together, which costs the machine less."""
 _AS_STAMPED: Final = Stamps(0.0, 0.0, float("inf"))
 

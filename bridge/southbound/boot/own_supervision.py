@@ -103,9 +103,7 @@ def _bring(node: Node, want: OwnWant, raw: Raws, channel: int, owner: str, resul
     kept = None if read is None else place.decode(read)
     if kept != want.value:
         memory.note_not_kept(tried, place.ref.sub, data)
-        raise BootError(
-            "J", f"{owner}: {place.name} is {kept} after {want.value} was written; {NOT_AGAIN}"
-        )
+        raise BootError("J", f"{owner}: {place.name} is {kept} after {want.value} was written; {NOT_AGAIN}")
     raw[place.key] = want.value
     result.notes.append(f"{owner}: {place.name} was {have}, is {want.value} now (enforced)")
 

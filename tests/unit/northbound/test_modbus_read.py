@@ -9,6 +9,7 @@ import pytest
 from bridge.command import Code, Identification
 from bridge.command.link import NodeState
 from bridge.config import WordOrder
+from bridge.drive import OwnJudgement
 from bridge.northbound.modbus.dispatch import EXCEPTIONS
 from bridge.northbound.modbus.pdu import Identify, identification_answer
 from bridge.northbound.modbus.registers import DriveMap, Table, Words32, bridge_rows, drive_maps
@@ -386,6 +387,7 @@ def test_every_listed_register_can_be_read():
     rig = Rig()
     rig.runs(ENABLED, drive="fu2")
     rig.drive("fu2").on_identification(Identification(1, 2, 3, 4, "x"), rig.now)
+    rig.drive("fu2").on_own_supervision(OwnJudgement(accepted="a test of registers"), rig.now)
     functions = {
         Table.COIL: 1,
         Table.DISCRETE_INPUT: 2,

@@ -160,6 +160,15 @@ def test_a_client_of_a_protocol_without_roles_may_be_let(parameters: Parameters)
     assert parameters.ask(WRITE, plc, parameter="P102", value=1.0).ok
 
 
+def test_without_roles_only_who_controls_the_drive_sets_its_parameters(parameters: Parameters) -> None:
+    fleet = Identity(Source.ZENOH, "fleet", sets_parameters=True)
+    for action, more in ((WRITE, {"parameter": "P102", "value": 1.0}), (SAVE, {})):
+        outcome = parameters.ask(action, fleet, **more)
+        assert (outcome.code, outcome.message) == (Code.NOT_ALLOWED, "the drive is controlled by modbus")
+    assert not parameters.downloads(0x2066)
+    assert parameters.ask(WRITE, ENGINEER, parameter="P102", value=1.0).ok, "an engineer may all the same"
+
+
 @pytest.mark.parametrize(
     ("name", "value", "code"),
     [

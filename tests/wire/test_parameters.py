@@ -40,10 +40,14 @@ sdo_channels = [2]
 [[bus.node.drive]]
 slot = "fu1"
 unit_id = 1
+control = "modbus"
+fieldbus_timeout_ms = 0
 parameters = {{ P105 = 50.0, P112 = 10.0 }}
 [[bus.node.drive]]
 slot = "fu2"
 unit_id = 2
+control = "zenoh"
+fieldbus_timeout_ms = 0
 parameters = {{ P105 = 50.0, P112 = 10.0 }}
 [modbus]
 listen = "127.0.0.1:{modbus}"
@@ -269,7 +273,7 @@ async def test_opcua_an_operator_reads_and_does_not_write(shop: Shop) -> None:
 
 
 def test_zenoh_reads_writes_and_tells_what_is_wrong(shop: Shop) -> None:
-    top = "drives/shop/conveyor/fu1/parameter"
+    top = "drives/shop/conveyor/fu2/parameter"
     answers = shop.ask(
         f"{top}/P543[2]",
         f"{top}/P543%5B2%5D.3",
@@ -280,7 +284,7 @@ def test_zenoh_reads_writes_and_tells_what_is_wrong(shop: Shop) -> None:
         f"{top}/P1002",
         f"{top}/P102=fast",
         f"{top}/P700[1]=1",
-        "drives/shop/conveyor/fu1/command/save_parameters={}",
+        "drives/shop/conveyor/fu2/command/save_parameters={}",
     )
     array, coded, by_object, written, cached, state, unknown, no_value, read_only, saved = [
         a for (a,) in answers
@@ -299,7 +303,7 @@ def test_zenoh_reads_writes_and_tells_what_is_wrong(shop: Shop) -> None:
 
 
 def test_zenoh_a_wildcard_gives_what_was_read(shop: Shop) -> None:
-    (answers,) = shop.ask("drives/shop/conveyor/fu1/parameter/*")
+    (answers,) = shop.ask("drives/shop/conveyor/fu2/parameter/*")
     found = {answer["key"].rpartition("/")[2]: answer["v"] for answer in answers}
     assert {"p102", "p105", "p560", "p700_1"} <= found.keys()
     assert found["p560"] == 1
@@ -309,13 +313,13 @@ def test_zenoh_a_wildcard_gives_what_was_read(shop: Shop) -> None:
 
 
 def test_writes_are_counted_in_the_sites_state_folder(shop: Shop) -> None:
-    shop.ask("drives/shop/conveyor/fu1/parameter/P104=3.5")
+    shop.ask("drives/shop/conveyor/fu2/parameter/P104=3.5")
     file = shop.folder / "state" / "eeprom.json"
 
     def counted() -> int:
         if not file.exists():
             return 0
         drives = json.loads(file.read_text("utf-8"))["writes"]
-        return drives.get("conveyor/fu1", {}).get("2068:01", {}).get("writes", 0)
+        return drives.get("conveyor/fu2", {}).get("2068:01", {}).get("writes", 0)
 
     until(lambda: counted() == 1, SECONDS, "the write is kept")

@@ -57,7 +57,7 @@ def test_the_families_come_along(installed: Path) -> None:
 def test_the_demo_site_is_there_and_right(installed: Path) -> None:
     done = call(installed, "-m", "bridge", "check", str(installed / "bridge" / "demo" / "site.toml"))
     assert done.returncode == 0, done.stderr
-    assert "4 drives on 1 bus" in done.stdout
+    assert "7 drives on 1 bus" in done.stdout
 
 
 def test_nothing_of_the_tests_comes_along(installed: Path) -> None:

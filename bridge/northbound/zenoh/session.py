@@ -165,6 +165,7 @@ class ZenohServer:
         try:
             request = self._commands.request(tail, asked.payload or b"", self._identity(asked.attachment))
         except BadCommand as bad:
+            self._note_refusal(tail, asked.attachment, bad)
             _refuse(asked, bad)
             return
         self._plant.submit(request, self._clock(), reply)
@@ -198,7 +199,6 @@ class ZenohServer:
         try:
             request = self._commands.reading(drive, name, self._identity(asked.attachment), cached=cached)
         except BadCommand as bad:
-            self._note_refusal(tail, asked.attachment, bad)
             _refuse(asked, bad)
             return
         self._plant.submit(request, self._clock(), reply)

@@ -102,5 +102,6 @@ def find(site: Path, drive: str) -> Target:
     (name,) = found
     bus, node, slot = targets[name]
     family = project.families[node.mapping]
-    access = DriveParameters(name, node.name, family, Names(family), ledger)
+    on_first = slot.parameters_by_sdo or not any(server.slot == slot.name for server in family.sdo)
+    access = DriveParameters(name, node.name, family, Names(family), ledger, on_first=on_first)
     return Target(Line(bus, project.families, is_of_site=True), node, family, slot, access, ledger, file)

@@ -86,6 +86,8 @@ def restore(
         raise
     for warning in (one.warning for one in done.written if one.warning):
         tell(f"warning: {warning}")
+    if done.warning:
+        tell(f"warning: {done.warning}")
     if as_json:
         print(json.dumps(_as_json(done)))
     else:

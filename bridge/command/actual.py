@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from bridge.command.channel import DriveChannel
-from bridge.drive import LinearScale, ValueCodec
+from bridge.drive import LinearScale, ParameterSet, ValueCodec
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Family, Slot
 
@@ -38,12 +38,16 @@ class FurtherTpdo:
 
     def on_time(self, now: float) -> bool:
         """True where it is late from now on."""
-        if self.quality is not Quality.GOOD or self.last is None or self.deadline_s is None:
-            return False
-        if now < self.last + self.deadline_s:
+        if self.quality is not Quality.GOOD or self.is_fresh(now):
             return False
         self.quality = Quality.STALE
         return True
+
+    def is_fresh(self, now: float) -> bool:
+        """It has come since the boot-up, and is not late."""
+        if self.quality is not Quality.GOOD or self.last is None:
+            return False
+        return self.deadline_s is None or now < self.last + self.deadline_s
 
 
 class _Plain(NamedTuple):
@@ -61,6 +65,8 @@ class _Judged:
     index: int
     why: str = ""
     further: FurtherTpdo | None = None
+    scaled_by: str = ""
+    """The parameter that scales it, where that depends on the parameter set."""
 
 
 class ActualData:
@@ -69,7 +75,9 @@ class ActualData:
     def __init__(self, name: str, family: Family, slot: Slot, channel: DriveChannel) -> None:
         self._name = name
         self._channel = channel
+        self._family = family
         self._process = family.process.tpdo
+        self._set = ParameterSet(family.status_word.parameter_set_bits)
         self.words: list[int] = [0] * len(self._process)
         """The words of the last TPDOs, the status word first."""
         self.quality = Quality.WAITING
@@ -121,7 +129,8 @@ class ActualData:
             yield _Judged(next(rest), unserved.get(f"actual/{word}", ""), self._further_of((place,)))
         for codec in self._codecs:
             why = unserved.get(codec.model.leaf) or codec.why_unknown
-            yield _Judged(next(rest), why, self._further_of(codec.places))
+            scaled_by = codec.model.full if self._family.depends_on_set(codec.model) else None
+            yield _Judged(next(rest), why, self._further_of(codec.places), scaled_by or "")
 
     def _further_of(self, places: Sequence[int]) -> FurtherTpdo | None:
         return next((pdo for pdo in self._further if not pdo.places.isdisjoint(places)), None)
@@ -129,6 +138,12 @@ class ActualData:
     def set_further(self, further: Sequence[FurtherTpdo]) -> None:
         """The TPDOs beside the one with the status word; ``compile`` follows."""
         self._further = list(further)
+
+    def why_lacking(self, places: frozenset[int], now: float) -> str:
+        """Why these words, by their places in ``process.tpdo``, are not known; empty where they are. The
+        TPDO with the status word is the link's to judge."""
+        late = [pdo.name for pdo in self._further if not (pdo.places.isdisjoint(places) or pdo.is_fresh(now))]
+        return f"no {late[0]} from the drive" if late else ""
 
     def on_further(self, pdo: FurtherTpdo, now: float) -> None:
         """One of them has brought words."""
@@ -147,6 +162,8 @@ class ActualData:
         """The TPDO with the status word has brought these."""
         held, channel = self.words, self._channel
         has_new_status = words[0] != held[0]
+        if (words[0] ^ held[0]) & self._set.mask:
+            self._shown = None
         held[:] = words
         channel.on_pdo(now)
         channel.on_status_word(words[0], now)
@@ -195,10 +212,15 @@ class ActualData:
         self._shown = _GOOD if quality is Quality.GOOD else (quality, reason)
         for point in self._judged:
             own, why = quality, reason
-            if quality.has_value and point.why:
-                own, why = Quality.CONFIG_ERROR, point.why
+            unknown = point.why or self._why_unknown(point)
+            if quality.has_value and unknown:
+                own, why = Quality.CONFIG_ERROR, unknown
             elif quality.has_value and point.further and point.further.quality is not Quality.GOOD:
                 is_worse = quality is Quality.GOOD or point.further.quality is Quality.WAITING
                 if is_worse:
                     own, why = point.further.quality, f"no {point.further.name} from the drive"
             self._image.judge((point.index,), own, now, why)
+
+    def _why_unknown(self, point: _Judged) -> str:
+        """Why a scaled value is not known with the parameter set that the drive tells."""
+        return self._set.why_unknown(self.words[0], point.scaled_by) if point.scaled_by else ""

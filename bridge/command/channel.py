@@ -63,6 +63,11 @@ class DriveChannel:
         self.words = leg.words
         self._gate = leg.gate
 
+    def look_up(self, why_lacking: Callable[[frozenset[int], float], str]) -> None:
+        """Ask this why actual words, by their places in ``process.tpdo``, are not known at a time; it says
+        nothing where they are."""
+        self._leg.why_lacking = why_lacking
+
     # what others may see
 
     @property
@@ -243,12 +248,19 @@ class DriveChannel:
     def _settle(self, now: float) -> None:
         """The end of every entry: what is sent and seen is brought up to date, then outcomes are told."""
         leg = self._leg
-        may_enable = self.link.may_enable
+        may_enable = leg.may_enable(now)
         if not may_enable:
             self._gate.interlocked = True
             if leg.start.is_going_on:
-                leg.start.end(Outcome(Code.NOT_READY, leg.why_blocked()))
+                leg.start.end(Outcome(Code.NOT_READY, leg.why_blocked(now)))
         self._gate.compute(now, may_enable=may_enable)
+        if self._gate.take_untaken():
+            self._tell(
+                now,
+                Kind.REFUSED,
+                500,
+                "the drive has not taken the position that was written: no answer within 1 s",
+            )
         self.settled(now)
         while leg.outcomes:
             reply, outcome = leg.outcomes.pop(0)

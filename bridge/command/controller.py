@@ -65,6 +65,8 @@ class ControllerLeg:
         self.outcomes: list[tuple[Reply, Outcome]] = []
         self.start = StartSequence(self.words, self.gate, self.outcomes)
         self._decoder = TelegramDecoder(name, family, slot, scales, unserved)
+        self.why_lacking: Callable[[frozenset[int], float], str] = lambda places, now: ""
+        """Why these actual words are not known at this time, empty where they are; set by the drive."""
         self.trips = 0
         self.refused_writes = 0
 
@@ -174,7 +176,7 @@ class ControllerLeg:
         is_owner = request.identity.is_same(self.owner)
         # A new owner inherits no setpoints.
         kept = self.gate.setpoints if is_owner else self.gate.rest
-        telegram = self._decoder.decode(request.values, kept)
+        telegram = self._decoder.decode(request.values, kept, self.gate.control_word)
         word = telegram.control_word
         if word is not None and not self.words.is_valid(word):
             self.watchdog.apply(Stimulus.INVALID, now)
@@ -189,18 +191,36 @@ class ControllerLeg:
                 return Outcome(Code.OK, "acknowledged; the drive stays stopped", forwarded=False)
         self.watchdog.apply(Stimulus.TELEGRAM, now)
         position = self._handshake is not None and self._handshake.value in request.values
-        may_enable = self._link.may_enable
+        may_enable = self.may_enable(now)
         if self.gate.take(word, telegram.setpoints, may_enable=may_enable, position=position):
             return DONE
-        return Outcome(Code.OK, self.why_blocked(), forwarded=False)
+        return Outcome(Code.OK, self.why_blocked(now), forwarded=False)
 
-    def why_blocked(self) -> str:
+    def may_enable(self, now: float) -> bool:
+        """Whether enabling commands may go to the drive, or go on: a drive that is enabled already needs
+        nothing to follow."""
+        return self._link.may_enable and not self._why_no_follow(now)
+
+    def _why_no_follow(self, now: float) -> str:
+        """A target that is to follow the drive until it is enabled must know where that is: without the
+        actual value it would be 0 or an old one, and the drive would go there."""
+        places = self.gate.awaits_actual
+        if not places:
+            return ""
+        quality = self._link.quality(now)
+        why = self.why_lacking(places, now) if quality is Quality.GOOD else self._link.reason(quality)
+        return f"the drive's own position is not known: {why}" if why else ""
+
+    def why_blocked(self, now: float) -> str:
         if self.is_tripped:
             return "tripped: acknowledge first"
         if self._link.is_expired:
             return self._link.reason(Quality.LOST)
         if not self._link.may_enable:
             return f"the drive's node is {self._link.node.value}"
+        why = self._why_no_follow(now)
+        if why:
+            return why
         return "restart interlock: send a control word that does not enable first"
 
     def _own(self, identity: Identity, now: float) -> None:
@@ -282,8 +302,8 @@ class ControllerLeg:
             raise Refusal(Code.OUT_OF_RANGE, "direction -1: here the sign of the setpoint is the direction")
         if self.is_tripped or self._status.state in FAULTED:
             raise Refusal(Code.ACKNOWLEDGE_FIRST, "acknowledge first")
-        if not self._link.may_enable:
-            raise Refusal(Code.NOT_READY, self.why_blocked())
+        if not self.may_enable(now):
+            raise Refusal(Code.NOT_READY, self.why_blocked(now))
         self._own(request.identity, now)
         self.watchdog.apply(Stimulus.TELEGRAM, now)
         self.start.begin(bits, self._status.state, now, reply)

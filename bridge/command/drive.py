@@ -12,7 +12,7 @@ from bridge.command.event import Event
 from bridge.command.parameter_points import parameter_points
 from bridge.command.points import drive_points
 from bridge.config import IGNORE_ALL_S, BusTable, DriveTable, NodeTable
-from bridge.drive import OwnJudgement, OwnVerdict, ValueCodec, scale_of
+from bridge.drive import OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, scale_of
 from bridge.image import Image, Point, Quality, Value
 from bridge.mapping.model import Family, Slot
 
@@ -90,6 +90,7 @@ class Drive:
         self._commands = [
             ValueCodec(value, words) for value in family.values_of(self.slot) if value.group == "command"
         ]
+        self._set = ParameterSet(family.control_word.parameter_set_bits)
         self._setpoints = [
             (words.index(word), f"command/{word}") for word in family.carried(self.slot)[0][1:]
         ]
@@ -97,6 +98,7 @@ class Drive:
         for parameter, full in table.parameters.items():
             self._learn(parameter, full)
         self._actual = ActualData(self.name, family, self.slot, self.channel)
+        self.channel.look_up(self._actual.why_lacking)
         self.points: list[Point] = [
             *drive_points(self.name, family, self.slot, self.channel.scales),
             *parameter_points(self.name, family),
@@ -193,6 +195,11 @@ class Drive:
         reason = f"{verdict}: {own.reason}"
         self._image.set(self._bridge_ms, 0, now, Quality.CONFIG_ERROR, reason)
 
+    def on_own_supervision_changed(self, why: str, now: float) -> None:
+        """What the boot-up has read of it is not true any more."""
+        self.own = None
+        self._image.set(self._bridge_ms, 0, now, Quality.CONFIG_ERROR, why)
+
     def on_identification(self, identification: Identification, now: float) -> None:
         self.identification = identification
         self._show(self._identity, [getattr(identification, leaf) for leaf in _IDENTITY], now)
@@ -216,6 +223,8 @@ class Drive:
         for index, codec in zip(self._value_indices, self._commands, strict=True):
             codec.scale = channel.scales.get(codec.model.leaf)
             why = unserved.get(codec.model.leaf) or codec.why_unknown
+            if not why and self.family.depends_on_set(codec.model):
+                why = self._set.why_unknown(channel.control_word, codec.model.full)
             quality = Quality.CONFIG_ERROR if why else Quality.GOOD
             image.set(index, codec.from_words(setpoints), now, quality, why)
 

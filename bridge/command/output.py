@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from bridge.config import Reaction
-from bridge.drive import MOVING, ControlWords, DriveState, Handshake
+from bridge.drive import FAULTED, MOVING, ControlWords, DriveState, Handshake
 
 _ACKNOWLEDGE_PULSE_S = 0.1
 """How long a generated acknowledge edge stays on the bus: longer than any cycle we send with."""
@@ -43,6 +43,7 @@ class Gate:
         self._reaction: Reaction = reaction
         self._then_silence_s = then_silence_ms / 1000
         self._follows = tuple(follows)
+        self._followed = frozenset(source for _, source in self._follows)
         self._handshake = handshake
         self._is_enabled = False
         self._status_word = 0
@@ -75,6 +76,11 @@ class Gate:
         """The drive is enabled, and what it gets does not stop it."""
         return self._is_enabled and self._words.enables(self.sent.words[0])
 
+    @property
+    def awaits_actual(self) -> frozenset[int]:
+        """The actual words without which the drive must not be enabled now: its setpoints follow them."""
+        return frozenset() if self._is_commanded else self._followed
+
     def follow(self, actual: Sequence[int]) -> bool:
         """The drive's actual words, the status word first. True where that changes what is to be sent."""
         if not self._follows:
@@ -106,15 +112,19 @@ class Gate:
         """A telegram of the owner; True if it goes to the drive as it is. ``position``: it has the value
         that is handed over with a handshake.
 
-        A control word that does not enable opens the interlock, or ends a "hold".
+        A control word that does not enable opens the interlock, or ends a "hold". What was ordered before
+        it is not gone to any more, nor what comes with a stop of a running drive.
         """
         self.setpoints = setpoints
         self._keep_at_rest()
-        if position and self._handshake is not None:
-            self._handshake.order(setpoints)
+        is_stop = control_word is not None and not self._words.enables(control_word)
+        if self._handshake is not None:
+            if is_stop:
+                self._handshake.reset()
+            if position and not (is_stop and self._is_enabled):
+                self._handshake.order(setpoints)
         if control_word is not None:
             self.control_word = control_word
-        is_stop = control_word is not None and not self._words.enables(control_word)
         if self._tripped_at is not None:
             if is_stop:
                 self._held = None
@@ -122,6 +132,13 @@ class Gate:
         if is_stop and may_enable:
             self.interlocked = False
         return is_stop or (may_enable and not self.interlocked)
+
+    def lead(self, control_word: int) -> None:
+        """The next word of a start, for a drive that may be enabled; what the owner has ordered stays."""
+        self.control_word = control_word
+        self._keep_at_rest()
+        if not self._words.enables(control_word):
+            self.interlocked = False
 
     def stop(self, control_word: int) -> None:
         """Stop with this word in place of the owner's, and wait for a fresh enable."""
@@ -158,7 +175,9 @@ class Gate:
 
     def on_state(self, state: DriveState) -> None:
         """The drive reported this state."""
-        self._is_enabled = state is DriveState.OPERATION_ENABLED
+        was_enabled, self._is_enabled = self._is_enabled, state is DriveState.OPERATION_ENABLED
+        if self._handshake is not None and (state in FAULTED or (was_enabled and not self._is_enabled)):
+            self._handshake.reset()
         if state not in MOVING and state is not DriveState.UNKNOWN:
             self.awaits_rest = False
 
@@ -169,17 +188,26 @@ class Gate:
         self._status_word = word
         return True
 
+    def take_untaken(self) -> bool:
+        """Whether the drive has not taken a position in time; asked and forgotten."""
+        return self._handshake is not None and self._handshake.take_untaken()
+
     def next_deadline(self) -> float | None:
         """When what is sent changes by itself, beyond what ``compute`` has seen."""
-        times = [t for t in (self._silence_at, self._acknowledge_until) if t is not None and t > self._now]
+        times = [self._silence_at, self._acknowledge_until]
+        if self._handshake is not None:
+            times += self._handshake.next_deadlines()
+        times = [time for time in times if time is not None and time > self._now]
         return min(times) if times else None
 
     def compute(self, now: float, *, may_enable: bool) -> Output:
         """What the drive gets from now on; also kept as ``sent``."""
         self._now = max(now, self._now)
+        if self._handshake is not None and not may_enable:
+            self._handshake.reset()
         self.sent = self._compute(may_enable)
         if self._handshake is not None:
-            self._handshake.step(self.setpoints, self._status_word, enabled=self._is_commanded)
+            self._handshake.step(self.setpoints, self._status_word, self._now, enabled=self._is_commanded)
             self.sent = self._compute(may_enable)
         return self.sent
 

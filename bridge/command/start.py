@@ -9,13 +9,25 @@ from bridge.command.request import DONE, Code, Outcome, Reply
 from bridge.drive import FAULTED, ControlWords, DriveState
 
 _LIMIT_S: Final = 3.0
+_QUICK_STOP_S: Final = 1.0
+"""How long a quick stop may still take. A drive that stays in it afterwards (605Ah = 5 … 8) leaves it with
+disable voltage only; at once, that would let a motor coast that is still being stopped."""
 _CAN_BE_ENABLED: Final = (DriveState.READY, DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED)
 
 
 class StartSequence:
     """At most one start at a time; each one's outcome is handed to ``conclude`` exactly once."""
 
-    __slots__ = ("_control_word", "_deadline", "_gate", "_outcomes", "_reply", "_words")
+    __slots__ = (
+        "_control_word",
+        "_deadline",
+        "_gate",
+        "_is_leaving",
+        "_leaves_at",
+        "_outcomes",
+        "_reply",
+        "_words",
+    )
 
     def __init__(self, words: ControlWords, gate: Gate, outcomes: list[tuple[Reply, Outcome]]) -> None:
         self._words = words
@@ -24,6 +36,10 @@ class StartSequence:
         self._reply: Reply | None = None
         self._control_word = 0
         self._deadline = 0.0
+        self._leaves_at: float | None = None
+        """While the drive is in its quick stop: when it is led out of it."""
+        self._is_leaving = False
+        """It is being led out of it."""
 
     @property
     def is_going_on(self) -> bool:
@@ -36,7 +52,9 @@ class StartSequence:
         self._control_word = self._words.run | direction_bits
         self._deadline = now + _LIMIT_S
         if state is not DriveState.OPERATION_ENABLED or self._gate.interlocked:
-            self._gate.take(self._words.ready, self._gate.setpoints, may_enable=True)
+            self._gate.lead(self._words.ready)
+        self._is_leaving = False
+        self._leaves_at = now + _QUICK_STOP_S if state is DriveState.QUICK_STOP_ACTIVE else None
         self.on_state(state)
 
     def on_state(self, state: DriveState, fault_text: str = "") -> None:
@@ -46,21 +64,34 @@ class StartSequence:
         if state in FAULTED:
             self._give_up(Code.NOT_READY, f"the drive went into fault: {fault_text}")
             return
+        if state is not DriveState.QUICK_STOP_ACTIVE:
+            self._leaves_at = None
+            if self._is_leaving:
+                self._is_leaving = False
+                self._gate.lead(self._words.ready)
         if state in _CAN_BE_ENABLED:
-            self._gate.take(self._control_word, self._gate.setpoints, may_enable=True)
+            self._gate.lead(self._control_word)
         if state is DriveState.OPERATION_ENABLED:
             if self._words.begin:
-                word = self._control_word | self._words.begin
-                self._gate.take(word, self._gate.setpoints, may_enable=True)
+                self._gate.lead(self._control_word | self._words.begin)
             self.end(DONE)
 
     def on_time(self, state: DriveState, now: float) -> None:
-        if self._reply is not None and now >= self._deadline:
+        if self._reply is None:
+            return
+        if now >= self._deadline:
             label = state.label.replace("_", " ")
             self._give_up(Code.TIMED_OUT, f"the drive did not start, it is {label}")
+        elif self._leaves_at is not None and now >= self._leaves_at:
+            self._leaves_at = None
+            self._is_leaving = True
+            self._gate.lead(self._words.disable_voltage(self._words.ready))
 
     def next_deadline(self) -> float | None:
-        return None if self._reply is None else self._deadline
+        """When ``on_time`` is to be called."""
+        if self._reply is None:
+            return None
+        return self._deadline if self._leaves_at is None else self._leaves_at
 
     def _give_up(self, code: Code, message: str) -> None:
         self._gate.stop(self._words.ready)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from bridge.command.request import Code
-from bridge.drive import LinearScale, ValueCodec, Written
+from bridge.drive import LinearScale, ParameterSet, ValueCodec, Written
 from bridge.image import Value
 from bridge.mapping.model import Family, Slot
 
@@ -76,9 +76,14 @@ class TelegramDecoder:
             for value in family.values_of(slot)
             if value.group == "command"
         }
+        self._set = ParameterSet(family.control_word.parameter_set_bits)
+        self._set_values = {
+            name for name, codec in self._values.items() if family.depends_on_set(codec.model)
+        }
 
-    def decode(self, values: Mapping[str, Value], before: tuple[int, ...]) -> Telegram:
-        """The words to be sent; setpoints that are not written stay as ``before``. Raises ``Refusal``."""
+    def decode(self, values: Mapping[str, Value], before: tuple[int, ...], held: int = 0) -> Telegram:
+        """The words to be sent; setpoints that are not written stay as ``before``. ``held`` is the control
+        word that counts where none is written. Raises ``Refusal``."""
         control_word: int | None = None
         setpoints = _Setpoints()
         for leaf, value in values.items():
@@ -87,7 +92,17 @@ class TelegramDecoder:
                 continue
             for written in self._written(leaf, value):
                 setpoints.put(leaf, written)
+        self._check_set(values, held if control_word is None else control_word)
         return Telegram(control_word, setpoints.over(before))
+
+    def _check_set(self, values: Mapping[str, Value], control_word: int) -> None:
+        """Nobody knows what a scaled value would be in another parameter set; raw words are as they are."""
+        if not control_word & self._set.mask:
+            return
+        for leaf in values:
+            if leaf in self._set_values:
+                why = self._set.why_unknown(control_word, self._values[leaf].model.full)
+                raise Refusal(Code.NOT_CONFIGURED, f"{leaf}: {why}")
 
     def _written(self, leaf: str, value: Value) -> tuple[Written, ...]:
         place, codec = self._setpoints.get(leaf), self._values.get(leaf)

@@ -3,6 +3,7 @@
 from bridge.drive.emergency import EmergencyReader, Told
 from bridge.drive.handshake import Handshake
 from bridge.drive.own_supervision import OwnJudgement, OwnVerdict
+from bridge.drive.parameter_set import ParameterSet
 from bridge.drive.scaling import LinearScale, scale_of, signed
 from bridge.drive.values import ValueCodec, Written
 from bridge.drive.words import FAULTED, MOVING, STATES, ControlWords, DriveState, StatusWords
@@ -18,6 +19,7 @@ __all__ = [
     "LinearScale",
     "OwnJudgement",
     "OwnVerdict",
+    "ParameterSet",
     "StatusWords",
     "Told",
     "ValueCodec",

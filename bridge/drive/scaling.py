@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final
 
 from bridge.image import DataType
 from bridge.image.point import INTEGER_RANGE
 from bridge.mapping.model import ProcessValue
+
+_WORD_BITS: Final = 32
+_EXACT: Final = 1 << 53
+"""Up to here every whole number is a float."""
 
 
 def signed(word: int) -> int:
@@ -65,6 +71,14 @@ def number_of(word: int, raw: DataType) -> int:
     return word - (high - low + 1) if word > high else word
 
 
+def _ratio(factor: float) -> tuple[float, float]:
+    """A decimal factor as full / at: 0.006 as 3 / 500. So a word's value is the nearest number there is:
+    2800758 × 0.001 is 2800.7580000000003, and 2800758 / 1000 is 2800.758."""
+    ratio = Fraction(repr(factor))
+    is_exact = abs(ratio.numerator) <= _EXACT >> _WORD_BITS and ratio.denominator <= _EXACT
+    return (float(ratio.numerator), float(ratio.denominator)) if is_exact else (factor, 1.0)
+
+
 def scale_of(value: ProcessValue, full: float | None = None) -> LinearScale | None:
     """The scale of a value, ``full`` being what its parameter holds; None where it has none, or where
     that is not known."""
@@ -74,5 +88,6 @@ def scale_of(value: ProcessValue, full: float | None = None) -> LinearScale | No
     least = -math.inf if value.low is None else value.low
     most = math.inf if value.high is None else value.high
     if scale.full is None or full is None:
-        return LinearScale(scale.factor, 1, math.inf, scale.offset, value.raw_type, least, most)
+        over, under = _ratio(scale.factor)
+        return LinearScale(over, under, math.inf, scale.offset, value.raw_type, least, most)
     return LinearScale(full, scale.at or 1, scale.limit, 0.0, value.raw_type, least, most)

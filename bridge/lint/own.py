@@ -10,7 +10,7 @@ from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_supervision import judge
 from bridge.lint.bus import BusView, DriveView, NodeView
 from bridge.lint.report import LintReport
-from bridge.mapping.model import OwnSupervision
+from bridge.mapping.model import Family, OwnSupervision
 from bridge.mapping.own_places import offline, place_of, settable, wanted
 from bridge.tomlfile import Key
 
@@ -55,7 +55,8 @@ def check_own_supervision(bus: BusView, report: LintReport) -> None:
     for node in bus.nodes:
         if node.table.enabled:
             _check_times(bus, node, report)
-            _check_reaction(bus, node, report)
+            if not _check_reaction(bus, node, report):
+                _check_runs_on(bus, node, report)
 
 
 def _check_times(bus: BusView, node: NodeView, report: LintReport) -> None:
@@ -104,24 +105,25 @@ def _given(bus: BusView, node: NodeView, entry: OwnSupervision) -> tuple[Key, fl
     return setting.key, setting.value * entry.unit_ms
 
 
-def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> None:
-    """A node that may do nothing when its time-out has run out, and does so at factory."""
+def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> bool:
+    """A node that may do nothing when its time-out has run out, and does so at factory. True if told."""
     entry = settable(node.family)
     reaction = entry.reaction if entry else None
     if entry is None or reaction is None or reaction.factory not in reaction.nothing:
-        return
+        return False
     if node.table.enforce and wanted(node.family, bus.table, node.table):
-        return
+        return False
     time, place = place_of(node.family, entry), place_of(node.family, reaction)
     setting = node.settings[place.key]
     if setting is not None and setting.value not in reaction.nothing:
-        return
+        return False
     key, own_ms = _given(bus, node, entry)
     if own_ms:
         is_set = f"{setting.value}" if setting is not None else "not set, and at factory nothing"
         message = f"the node's own time-out, {time.ref}, has no effect: its reaction {place.ref} is {is_set}"
         report.warning(key, message, f"write {place.ref} too")
-    elif setting is None and any(_runs_on(judged(bus, node, drive)) for drive in node.drives):
+        return True
+    if setting is None and any(_runs_on(judged(bus, node, drive)) for drive in node.drives):
         report.warning(
             node.key,
             f"{node.family.family.name} does nothing by itself when the bridge falls silent, unless "
@@ -129,6 +131,33 @@ def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> None:
             f"own_timeout_ms and enforce = true, or a [[bus.node.configure]] for {place.ref}, and for "
             f"{time.ref}, its time",
         )
+        return True
+    return False
+
+
+def _check_runs_on(bus: BusView, node: NodeView, report: LintReport) -> None:
+    """Drives of which nobody knows that they stop when the bridge falls silent, one warning for those of a
+    node that have the same reason."""
+    drives: dict[tuple[OwnVerdict, str], list[str]] = {}
+    for drive in node.drives:
+        own = judged(bus, node, drive)
+        if _runs_on(own):
+            drives.setdefault((own.verdict, own.reason), []).append(drive.name)
+    for (verdict, reason), names in drives.items():
+        runs_on = "runs on" if verdict is OwnVerdict.RUNS_ON else "may run on"
+        message = f"{', '.join(names)}: {runs_on} when the bridge falls silent: {reason}"
+        report.warning(node.key, message, _remedy(node.family))
+
+
+def _remedy(family: Family) -> str:
+    """What a site can do about drives that would run on."""
+    if settable(family) is not None:
+        what = "own_timeout_ms and enforce = true"
+    elif any(entry.watches == "guarding" for entry in family.own_supervision):
+        what = 'supervision = "guarding"'
+    else:
+        what = "a time-out in the drive itself"
+    return f'{what}; or say why it may run on, accepts = {{ runs_on = "…" }} of the drive'
 
 
 def _runs_on(own: OwnJudgement) -> bool:

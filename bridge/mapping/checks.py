@@ -161,9 +161,13 @@ def _check_handshake(family: Family, file: Noted) -> None:
 
 
 def _check_states(family: Family, file: Noted) -> None:
-    """The word that is served while tripped must decode as *fault*."""
+    """The word that is served while tripped must decode as *fault*, and every state be told at all."""
     states = family.status_word.state
+    if not any(state.name == "operation_enabled" for state in states):
+        hint = "without it the bridge never knows that the drive moves"
+        file.fault(("status_word", "state"), 'needs a state named "operation_enabled"', hint)
     faults = [s for s, state in enumerate(states) if state.name == "fault"]
+    _check_shadows(family, faults[:1], file)
     if not faults:
         file.fault(("status_word", "state"), 'needs a state named "fault"')
         return
@@ -176,6 +180,23 @@ def _check_states(family: Family, file: Noted) -> None:
                 f"{state.name} takes words that are a fault too",
                 "the first state that matches counts",
             )
+
+
+def _check_shadows(family: Family, told: list[int], file: Noted) -> None:
+    """A pattern all of whose words match an earlier one is never told. ``told`` are checked already."""
+    states = family.status_word.state
+    bits = [pattern_bits(state.pattern) for state in states]
+    for s, (mask, value) in enumerate(bits):
+        if s in told:
+            continue
+        for earlier, (other_mask, other_value) in enumerate(bits[:s]):
+            if other_mask & ~mask == 0 and value & other_mask == other_value:
+                file.fault(
+                    ("status_word", "state", s, "pattern"),
+                    f"{states[s].name} is never told: {states[earlier].name} takes all its words",
+                    "the first state that matches counts: put the narrower pattern first",
+                )
+                break
 
 
 def _check_faults(family: Family, file: Noted) -> None:

@@ -5,10 +5,9 @@ Mappings are looked up in the folder ``mappings/`` beside the site file first, t
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final, cast
+from typing import Final
 
 from bridge.errors import Fault, FileFaults
 from bridge.mapping.checks import check
@@ -46,10 +45,10 @@ def _files(folders: Sequence[Path]) -> dict[str, list[Path]]:
 def is_template(path: Path) -> bool:
     """Whether a mapping file says that it can only be extended. What cannot be read is none."""
     try:
-        family: object = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("family")
-    except (OSError, ValueError):
+        family = TomlFile(path).root.table("family")
+    except FileFaults:
         return False
-    return isinstance(family, dict) and cast("dict[str, object]", family).get("template") is True
+    return family.content.get("template") is True
 
 
 def family_names(folders: Sequence[Path] = ()) -> list[str]:

@@ -34,10 +34,10 @@ class Match:
 def best_match(found: Found, families: Mapping[str, Family]) -> Match | None:
     """The family most of whose identity rules fit, all of them; None where no family says anything.
 
-    The first in the order of the names where two fit equally well.
+    Where two fit equally well, one that is ``preferred``, then the first in the order of the names.
     """
     best: Match | None = None
-    for name in sorted(families):
+    for name in sorted(families, key=lambda name: (not families[name].family.preferred, name)):
         by = _fits(found, families[name].identity)
         if by and (best is None or len(by) > len(best.by)):
             best = Match(name, by)

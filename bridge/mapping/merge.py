@@ -1,7 +1,8 @@
 """A mapping file merged over those it extends, which still knows where each of its keys stands.
 
 Tables are merged key by key. The lists ``value``, ``parameter``, ``poll``, ``slot`` and ``own_supervision``
-are merged item by item, by ``name`` (values by ``group`` too); every other list is replaced.
+are merged item by item, by ``name`` (values by ``group`` too), the PDOs of a slot by ``number``; every other
+list is replaced. ``without`` leaves items of those lists out first.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ _BY_NAME: Final = {
     "value": ("name", "group"),
     **dict.fromkeys(("parameter", "poll", "slot", "own_supervision"), ("name",)),
 }
+_PDOS: Final = ("rpdo", "tpdo")
 _Place = tuple[TomlFile, Key]
 
 
@@ -47,6 +49,7 @@ class MergedFile:
         self.data: dict[str, Any] = {}
         for file in files:
             self._forget_own()
+            self._leave_out(file)
             self.data = self._table(self.data, file.data, (), (), file)
 
     @property
@@ -54,12 +57,46 @@ class MergedFile:
         return self._last.path
 
     def _forget_own(self) -> None:
-        """What a file says of itself is not inherited: what it extends, and that it is a template."""
+        """What a file says of itself is not inherited: what it extends and leaves out, and that it is a
+        template or preferred."""
         self.data.pop("extends", None)
+        self.data.pop("without", None)
         family = self.data.get("family")
         if isinstance(family, dict):
             self.data["family"] = {**cast("dict[str, Any]", family)}
             self.data["family"].pop("template", None)
+            self.data["family"].pop("preferred", None)
+
+    def _leave_out(self, file: TomlFile) -> None:
+        """Take what ``file`` is ``without`` out of what it extends."""
+        without: object = file.data.get("without")
+        for n, entry in enumerate(cast("list[object]", without) if isinstance(without, list) else []):
+            if not isinstance(entry, str):
+                continue  # the model tells
+            kind, _, name = entry.partition(":")
+            known = [_label(item, kind) for item in self._items(kind)]
+            if kind in _BY_NAME and name in known:
+                self._remove(kind, known.index(name))
+                continue
+            key: Key = ("without", n)
+            message = f"there is no {entry!r} in what this file extends"
+            names = [name for name in known if name]
+            hint = (
+                f"known: {', '.join(names)}" if names else f"it is one of {', '.join(_BY_NAME)}, : and a name"
+            )
+            self.faults.append(Fault(str(file.path), file.line(key), dotted(key), message, hint))
+
+    def _items(self, kind: str) -> list[Any]:
+        items: object = self.data.get(kind) if kind in _BY_NAME else None
+        return cast("list[Any]", items) if isinstance(items, list) else []
+
+    def _remove(self, kind: str, place: int) -> None:
+        """One item of a list; those behind it move up."""
+        items = self._items(kind)
+        self.data = {**self.data, kind: items[:place] + items[place + 1 :]}
+        self._drop((kind, place))
+        for n in range(place + 1, len(items)):
+            self._move((kind, n), (kind, n - 1))
 
     def _put(self, value: Any, at: Key, source: Key, file: TomlFile) -> Any:
         """``value``, all of it from ``file``."""
@@ -77,6 +114,11 @@ class MergedFile:
         for key in [key for key in self._places if key[: len(at)] == at]:
             del self._places[key]
 
+    def _move(self, at: Key, to: Key) -> None:
+        """What stood at and below ``at`` stands at ``to``."""
+        for key in [key for key in self._places if key[: len(at)] == at]:
+            self._places[(*to, *key[len(at) :])] = self._places.pop(key)
+
     def _table(
         self, base: dict[str, Any], over: dict[str, Any], at: Key, source: Key, file: TomlFile
     ) -> dict[str, Any]:
@@ -93,6 +135,8 @@ class MergedFile:
             elif not at and name in _BY_NAME and isinstance(have, list) and isinstance(value, list):
                 lists = cast("tuple[list[Any], list[Any]]", (have, value))
                 merged[name] = self._named(*lists, name, file)
+            elif len(at) == 2 and at[0] == "slot" and name in _PDOS and _same_pdos(have, value):
+                merged[name] = self._pdos(have, value, here, there, file)
             else:
                 self._drop(here)
                 merged[name] = self._put(value, here, there, file)
@@ -109,6 +153,25 @@ class MergedFile:
                 merged.append(self._put(item, (name, len(merged)), (name, n), file))
             else:
                 merged[place] = self._table(merged[place], item, (name, place), (name, n), file)
+        return merged
+
+    def _pdos(self, base: Any, over: Any, here: Key, there: Key, file: TomlFile) -> list[Any]:
+        """PDOs are told apart by their numbers; one without a number is the first."""
+        if isinstance(base, dict):
+            place = self._places.get(here)
+            self._move(here, (*here, 0))
+            if place:
+                self._places[here] = place
+        merged = _listed(base)
+        numbers = _numbers(merged)
+        for n, item in enumerate(_listed(over)):
+            source = (*there, n) if isinstance(over, list) else there
+            place_of = _place_in(item, numbers)
+            if place_of is None:
+                merged.append(self._put(item, (*here, len(merged)), source, file))
+            else:
+                numbers[place_of] = None
+                merged[place_of] = self._table(merged[place_of], item, (*here, place_of), source, file)
         return merged
 
     def place(self, key: Sequence[int | str]) -> _Place:
@@ -153,3 +216,34 @@ def _identity(item: Any, name: str) -> object:
     table = cast("dict[str, Any]", item)
     values = tuple(table.get(key) for key in _BY_NAME[name])
     return id(table) if None in values or not all(isinstance(value, str) for value in values) else values
+
+
+def _label(item: Any, kind: str) -> str:
+    """What ``without`` calls an item of the list ``kind``; empty where it has no name."""
+    identity = _identity(item, kind)
+    return "/".join(reversed(cast("tuple[str, ...]", identity))) if isinstance(identity, tuple) else ""
+
+
+def _listed(pdos: Any) -> list[Any]:
+    """One table stands for a list of one."""
+    return list(cast("list[Any]", pdos)) if isinstance(pdos, list) else [pdos]
+
+
+def _numbers(pdos: list[Any]) -> list[object]:
+    return [cast("dict[str, object]", pdo).get("number") if isinstance(pdo, dict) else None for pdo in pdos]
+
+
+def _place_in(pdo: Any, numbers: list[object]) -> int | None:
+    """Where the PDO stands that this one changes; None where it is a further one."""
+    if not isinstance(pdo, dict):
+        return None
+    number = cast("dict[str, object]", pdo).get("number")
+    if number is None:
+        return 0 if numbers and numbers[0] is not None else None
+    return numbers.index(number) if number in numbers else None
+
+
+def _same_pdos(base: Any, over: Any) -> bool:
+    """Whether one of them changes a PDO that is there; else they take their place."""
+    numbers = _numbers(_listed(base))
+    return any(_place_in(pdo, numbers) is not None for pdo in _listed(over))

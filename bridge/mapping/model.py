@@ -80,6 +80,9 @@ class FamilyTable(Table):
     vendor: str
     source: str = Field(description="the manual that the facts of this file are taken from")
     template: bool = Field(False, description="true: it can only be extended, no site can use it")
+    preferred: bool = Field(
+        False, description="true: `scan` names it where other mappings fit equally well; not inherited"
+    )
     node_id_low: int = Field(1, ge=1, le=127)
     node_id_high: int = Field(127, ge=1, le=127)
 
@@ -118,6 +121,10 @@ class ControlWord(Table):
     bits: Bits
     valid_bit: Bit | None = Field(None, description="must be 1 or the drive ignores the telegram")
     acknowledge_bit: Bit
+    parameter_set_bits: list[Bit] = Field(
+        default_factory=list[int],
+        description="they choose the drive's parameter set, low bit first; all 0 is set 1",
+    )
     enabling: Command = Field(description="a word with these bits makes the drive move")
     stopped: Word = Field(description="valid, and moves nothing: what the bridge starts with")
     ready: Word = Field(description="leads from switch-on inhibited to ready")
@@ -147,6 +154,10 @@ class State(Table):
 
 class StatusWord(Table):
     bits: Bits
+    parameter_set_bits: list[Bit] = Field(
+        default_factory=list[int],
+        description="they tell the drive's parameter set, low bit first; all 0 is set 1",
+    )
     state: list[State]
 
 
@@ -165,6 +176,10 @@ class Family(Table):
     """One mapping file, merged with those it extends."""
 
     extends: str | None = Field(None, description='another mapping, such as "nord/sk-tu4-cao"')
+    without: list[str] = Field(
+        default_factory=list[str],
+        description="what this file leaves out of the one it extends, such as `parameter:P150`",
+    )
     family: FamilyTable
     identity: IdentityRule = Field(default_factory=lambda: IdentityRule.model_validate({}))
     process: Process
@@ -200,6 +215,10 @@ class Family(Table):
             if parameter.name == name:
                 return parameter
         raise KeyError(name)
+
+    def depends_on_set(self, value: ProcessValue) -> bool:
+        """Whether the parameter that scales it differs between the drive's parameter sets."""
+        return value.full is not None and self.parameter_named(value.full).sets > 0
 
     def object_of(self, parameter: Parameter) -> ObjectRef:
         """Where a parameter is in the object dictionary."""

@@ -11,12 +11,14 @@ from bridge.mapping.fields import ObjectRef, ObjectType, Ref, States, Table
 
 GROUPS: Final = ("number", "letter", "element", "set")
 """What the pattern of parameter names may name."""
+IndexRange = Annotated[str, Field(pattern=r"^[0-9A-F]{4}(-[0-9A-F]{4})?$")]
+Protection = Literal["command", "communication", "while_enabled"]
 _PUNCTUATION: Final = re.compile(r"[^a-z0-9]+")
 
 
 def _name_pattern(text: str) -> str:
     try:
-        pattern = re.compile(text)
+        pattern = re.compile(text, re.ASCII)
     except re.error as error:
         raise ValueError(f"must be a regular expression: {error}") from None
     unknown = sorted(set(pattern.groupindex) - set(GROUPS))
@@ -43,6 +45,10 @@ class ParameterNames(Table):
     element_step: int = 1
     element_first: int = Field(0, ge=0)
     set_step: int = 0
+    protected: list[IndexRange] = Field(
+        default_factory=list[str],
+        description="objects that command the drive, such as 6040 or 3000-300F: never written as parameters",
+    )
 
 
 class Parameter(Table):
@@ -64,6 +70,14 @@ class Parameter(Table):
     every_ms: int = Field(0, ge=0, le=3_600_000, description="how often a point is read; 0: on demand")
     read: bool = Field(True, description="false where it can only be given in the site file")
     volatile: bool = Field(False, description="true where a write does not go to the EEPROM")
+
+    protected: Protection | None = Field(
+        None,
+        description="command: never written as a parameter; communication: by an engineer, while the drive "
+        "is not enabled; while_enabled: not written while the drive is enabled",
+    )
+    backup: bool = Field(True, description="false: identity, addresses and commands, in no parameter set")
+    of_node: bool = Field(False, description="true: the node's own, over its first SDO channel")
 
     @property
     def leaf(self) -> str:
@@ -94,7 +108,7 @@ def object_of(names: ParameterNames, name: str, sets: int = 0, elements: int = 0
     ``elements`` the first too; elsewhere the sub-index is ``names.sub``. Where elements and sets share
     the sub-index, an element of a parameter without sets is in the first set (BU 2500 §6.6.1).
     """
-    match = re.fullmatch(names.pattern, name)
+    match = re.fullmatch(names.pattern, name, re.ASCII)
     if match is None:
         raise ValueError(f"{name!r} is no parameter; they are written as {names.example}")
     groups = match.groupdict()

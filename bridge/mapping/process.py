@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal, cast
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
-from bridge.config.download import Download, encode
+from bridge.config.download import INTEGERS, Download, encode
 from bridge.image import DataType
 from bridge.image.point import INTEGER_RANGE
 from bridge.mapping.fields import Bit, Mapped, Name, ObjectRef, ObjectType, Ref, States, Table
@@ -62,10 +62,18 @@ class NodeTpdo(Table):
     number: int = Field(ge=1, le=512)
 
 
+SYNC_PERIOD: Final = "sync_period_ms"
+"""Stands in a start write for what the bus of the site has under this name."""
+
+
 def _plain(value: object) -> object:
     if not isinstance(value, bool | int | float | str):
         raise ValueError("must be a number, true or false, or a text in quotes")
     return value
+
+
+def _is_sync_period(kind: str, value: object) -> bool:
+    return value == SYNC_PERIOD and kind in INTEGERS and kind != "bool"
 
 
 class StartWrite(Table):
@@ -73,7 +81,9 @@ class StartWrite(Table):
 
     object: Ref
     type: ObjectType = Field(description="the object's data type, such as int8")
-    value: Annotated[bool | int | float | str, BeforeValidator(_plain)]
+    value: Annotated[bool | int | float | str, BeforeValidator(_plain)] = Field(
+        description='"sync_period_ms" with an integer type: what the bus has, in ms'
+    )
     read_back: bool = Field(True, description="false writes it blindly, as a command")
 
     @field_validator("value")
@@ -81,13 +91,22 @@ class StartWrite(Table):
     def _encodes(cls, value: bool | int | float | str, info: ValidationInfo) -> bool | int | float | str:
         """The fault is the value's, with its line. Without a type there is a fault already."""
         kind = info.data.get("type")
-        if kind is not None:
+        if kind is not None and not _is_sync_period(kind, value):
             encode(kind, value)
         return value
 
     @property
-    def download(self) -> Download:
-        data = encode(self.type, self.value)
+    def is_sync_period(self) -> bool:
+        """The value is the period of SYNC of the bus."""
+        return _is_sync_period(self.type, self.value)
+
+    def value_with(self, sync_period_ms: int) -> bool | int | float | str:
+        """The value on a bus with this period."""
+        return sync_period_ms if self.is_sync_period else self.value
+
+    def download(self, sync_period_ms: int) -> Download:
+        """Raises ValueError where the period of SYNC does not fit the type."""
+        data = encode(self.type, self.value_with(sync_period_ms))
         return Download(self.object.index, self.object.sub, data, self.read_back)
 
 

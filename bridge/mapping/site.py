@@ -11,6 +11,7 @@ from bridge.errors import Fault, FileFaults
 from bridge.mapping.loader import family_names, load_family, mapping_folders, missing, template_names
 from bridge.mapping.model import Family
 from bridge.mapping.own_places import impossible
+from bridge.mapping.process import SYNC_PERIOD
 from bridge.tomlfile import RawTable, TomlFile
 
 
@@ -47,12 +48,14 @@ def _nodes(file: TomlFile) -> list[RawTable]:
 
 
 def _check(file: TomlFile, families: dict[str, Family]) -> None:
-    for node in _nodes(file):
-        family = families.get(node.text("mapping") or "")
-        if family is not None:
-            _check_node(node, family, file)
-            for drive in node.tables("drive"):
-                _check_drive(drive, family, file)
+    for bus in file.root.tables("bus"):
+        for node in bus.tables("node"):
+            family = families.get(node.text("mapping") or "")
+            if family is not None:
+                _check_node(node, family, file)
+                for drive in node.tables("drive"):
+                    _check_drive(drive, family, file)
+                    _check_sync_period(bus, drive, family, file)
 
 
 def _check_node(node: RawTable, family: Family, file: TomlFile) -> None:
@@ -99,6 +102,23 @@ def _check_drive(drive: RawTable, family: Family, file: TomlFile) -> None:
             message = f"{family.family.name} does not scale with {name!r}"
             hint = f"it scales with {', '.join(sorted(scales))}" if scales else ""
             file.fault((*given.key, name), message, hint)
+
+
+def _check_sync_period(bus: RawTable, drive: RawTable, family: Family, file: TomlFile) -> None:
+    """The period of SYNC must be one that can be written into the drive, where its family asks for that."""
+    period_ms = bus.whole(SYNC_PERIOD)
+    if period_ms is None:
+        return
+    for start in (start for slot in family.slot if slot.name == drive.text("slot") for start in slot.start):
+        if not start.is_sync_period:
+            continue
+        written = f"{family.family.name} writes it into {start.object} of {start.type}"
+        try:
+            start.download(period_ms)
+        except ValueError as error:
+            file.fault((*bus.key, SYNC_PERIOD), f"{written}: {error}")
+        if period_ms == 0:
+            file.fault((*bus.key, SYNC_PERIOD), f"must not be 0: {written}")
 
 
 def _check_pdos(drive: RawTable, family: Family, slot: str, file: TomlFile) -> None:

@@ -70,11 +70,21 @@ class DriveParameters:
     """The parameters of the drive called ``name`` of the node ``node_name``; its cache and its counts.
 
     Every procedure raises ``ParameterError``; of ``TransferFailed``, which is thrown into it, it makes
-    one.
+    one. ``on_first`` is false for a drive behind another SDO channel than the node's first.
     """
 
-    def __init__(self, name: str, node_name: str, family: Family, names: Names, ledger: Ledger) -> None:
+    def __init__(
+        self,
+        name: str,
+        node_name: str,
+        family: Family,
+        names: Names,
+        ledger: Ledger,
+        *,
+        on_first: bool = True,
+    ) -> None:
         self.name = name
+        self.on_first = on_first
         self.names = names
         self._node_name = node_name
         self._eeprom = family.eeprom
@@ -114,7 +124,7 @@ class DriveParameters:
         if held and now - held[1] < max_age_s:
             return held
         try:
-            held = yield Transfer(entry.address)
+            held = yield Transfer(entry.address, of_node=_is_of_node(entry))
         except TransferFailed as failure:
             raise self._error(entry, failure) from None
         self._cache[entry.address] = held
@@ -133,7 +143,7 @@ class DriveParameters:
 
     def write(self, entry: Entry, value: Value, now: float) -> Writes:
         """Write ``value`` where the drive does not hold it yet, and read it back."""
-        self._check_writable(entry)
+        self.check_writable(entry)
         definition = entry.definition
         blind = definition is not None and not definition.readable
         before: bytes | None = None
@@ -142,15 +152,17 @@ class DriveParameters:
             now = max(now, time)
         data = encode_value(entry, value, before)
         if before is not None and matches(entry, before, data):
-            return Written(Reading(entry, decode(entry, before), now), decode(entry, before), changed=False)
+            return Written(
+                Reading(entry, _held(entry, before, value), now), decode(entry, before), changed=False
+            )
         wears = yield from self._wears(entry, now)
-        key = (self.name, str(entry.address))
+        key = (self._node_name if _is_of_node(entry) else self.name, str(entry.address))
         if wears:
-            self._ledger.check(key, entry.name, now)
+            self._check(key, entry.name, now)
         self._cache.pop(entry.address, None)
         lost: TransferFailed | None = None
         try:
-            _, now = yield Transfer(entry.address, data)
+            _, now = yield Transfer(entry.address, data, of_node=_is_of_node(entry))
         except TransferFailed as failure:
             if failure.by_drive or blind:
                 raise self._error(entry, failure) from None
@@ -158,7 +170,7 @@ class DriveParameters:
         # Also where the answer was lost: it may have been written.
         warning = self._count(key, entry.name, now) if wears else ""
         if blind:
-            return Written(Reading(entry, decode(entry, data), now), None, True, wears, warning)
+            return Written(Reading(entry, _held(entry, data, value), now), None, True, wears, warning)
         try:
             held, now = yield from self._fetch(entry, now, 0.0)
         except ParameterError as error:
@@ -169,12 +181,17 @@ class DriveParameters:
             found = shown(entry, decode(entry, held))
             raise ParameterError(Why.NOT_TAKEN, f"{entry.name}: the drive took the value and holds {found}")
         was = None if before is None else decode(entry, before)
-        return Written(Reading(entry, decode(entry, held), now), was, True, wears, warning)
+        return Written(Reading(entry, _held(entry, held, value), now), was, True, wears, warning)
 
-    def _check_writable(self, entry: Entry) -> None:
+    def check_writable(self, entry: Entry) -> None:
         """Raises ``ParameterError`` for what nobody writes by this way."""
         if entry.definition and not entry.definition.writable:
             raise ParameterError(Why.READ_ONLY, f"{entry.name} is read-only")
+        if self.names.protection(entry.address) == "command":
+            raise ParameterError(
+                Why.PROTECTED,
+                f"{entry.name} commands the drive: its controller alone does, by process data",
+            )
         if entry.address.index in _COMMUNICATION:
             raise ParameterError(
                 Why.PROTECTED,
@@ -196,7 +213,7 @@ class DriveParameters:
             raise ParameterError(Why.NOT_CONFIGURED, f"{self.name} has no command that saves its parameters")
         entry = Entry("save", Address(eeprom.save.index, eeprom.save.sub))
         key = (self._node_name, str(entry.address))
-        self._ledger.check(key, entry.name, now)
+        self._check(key, entry.name, now)
         try:
             _, now = yield Transfer(entry.address, _SAVE, of_node=True)
         except TransferFailed as failure:
@@ -207,7 +224,31 @@ class DriveParameters:
 
     def writes(self, entry: Entry) -> int:
         """How often this parameter was written to the EEPROM, as far as is known."""
-        return self._ledger.writes((self.name, str(entry.address)))
+        owner = self._node_name if _is_of_node(entry) else self.name
+        return self._ledger.writes((owner, str(entry.address)))
+
+    def keeps_in_ram(self, entry: Entry) -> bool:
+        """Whether what is written is lost at power-off because of the family's switch, as last read."""
+        switch, reading = self.ram_switch, None
+        if switch is not None and not (entry.definition and entry.definition.volatile):
+            reading = self.cached(switch)
+        return reading is not None and self.means_ram(reading.value)
+
+    @property
+    def ram_switch(self) -> Entry | None:
+        """The parameter that keeps writes out of the EEPROM, where the family has one."""
+        ram_only = self._eeprom.ram_only if self._eeprom else None
+        return self.names.resolve(ram_only.parameter) if ram_only else None
+
+    def means_ram(self, value: Value) -> bool:
+        """Whether ``value`` of ``ram_switch``, a number or the text of a state, keeps writes in the RAM."""
+        switch, eeprom = self.ram_switch, self._eeprom
+        if switch is None or eeprom is None or eeprom.ram_only is None:
+            return False
+        return decode(switch, encode_value(switch, value, None)) == eeprom.ram_only.value
+
+    def _check(self, key: Key, name: str, now: float) -> None:
+        self._ledger.check(key, name, now, self._eeprom.cycles if self._eeprom else None)
 
     def _count(self, key: Key, name: str, now: float) -> str:
         return self._ledger.count(key, name, self._eeprom.cycles if self._eeprom else None, now)
@@ -230,5 +271,17 @@ class DriveParameters:
 
     def _error(self, entry: Entry, failure: TransferFailed) -> ParameterError:
         hint = self.names.hint(entry.name) if failure.abort_code in MISSING and not entry.definition else ""
+        if failure.abort_code in MISSING and not entry.definition:
+            hint += self.names.set_hint(entry.name)
         why = Why.REFUSED if failure.by_drive else Why.NO_ANSWER
         return ParameterError(why, f"{entry.name}: {failure}{hint}", failure.abort_code)
+
+
+def _is_of_node(entry: Entry) -> bool:
+    return entry.definition is not None and entry.definition.of_node
+
+
+def _held(entry: Entry, data: bytes, written: Value) -> Value:
+    """What ``data`` says; of an object that no file describes with the sign that was written."""
+    negative = entry.definition is None and not isinstance(written, str) and written < 0
+    return written if negative else decode(entry, data)

@@ -17,6 +17,7 @@ from bridge.parameter.error import ParameterError, Why
 
 _REALS: Final = {"real32": "<f", "real64": "<d"}
 _RAW_SIZES: Final = (1, 2, 4, 8)
+_SIGN: Final = 0x80
 _DIGITS: Final = 9
 """Behind the point: what a factor such as 0.01 makes of a whole number is that number of hundredths."""
 
@@ -82,7 +83,12 @@ def matches(entry: Entry, held: bytes, wanted: bytes) -> bool:
     """Whether the drive holds what was to be written."""
     if entry.definition and entry.definition.data_type == "string":
         return held.split(b"\0", 1)[0] == wanted.split(b"\0", 1)[0]
-    return held[: len(wanted)] == wanted and not any(held[len(wanted) :])
+    kind = entry.definition.data_type if entry.definition else ""
+    beyond = held[len(wanted) :]
+    # Some servers answer every read with four bytes, and a negative number with its sign.
+    is_negative = kind in INTEGERS and INTEGERS[kind][1] and bool(wanted) and wanted[-1] >= _SIGN
+    extended = not any(beyond) or (is_negative and set(beyond) == {0xFF})
+    return held[: len(wanted)] == wanted and extended
 
 
 def parse(entry: Entry, text: str) -> Value:

@@ -44,7 +44,9 @@ class Definition:
 
     ``data_type`` is CiA 301's, such as ``int16`` or ``real32``. ``base`` is the object of its first
     element in its first set, or None where the family's naming rule gives it. ``elements`` and ``sets``
-    are 0 where the parameter has none.
+    are 0 where the parameter has none. ``protected`` is empty or says who may write it and when, ``backup``
+    is false for what no parameter set holds, ``of_node`` true for what only the node's first SDO channel
+    reaches.
     """
 
     name: str
@@ -62,6 +64,9 @@ class Definition:
     point: bool = False
     every_ms: int = 0
     volatile: bool = False
+    protected: str = ""
+    backup: bool = True
+    of_node: bool = False
 
     @property
     def readable(self) -> bool:

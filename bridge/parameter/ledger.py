@@ -2,8 +2,9 @@
 
 An EEPROM wears out by being written: NORD's stands 100,000 times (BU 2500 §6.6). Each write is counted
 by drive and object, kept across restarts (``ledger_file``), and told of at every tenth of what the
-family stands. Who writes one parameter more than ``MOST_WRITES`` times within ``WINDOW_S`` writes in a
-cycle, which no EEPROM is made for, and is refused.
+family stands. Who writes one parameter more than ``MOST_WRITES`` times within ``WINDOW_S``, or more than
+``MOST_A_DAY`` times within a day, writes in a cycle, which no EEPROM is made for, and is refused; so is
+every write beyond what the EEPROM stands.
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from bridge.parameter.error import ParameterError, Why
 
 MOST_WRITES: Final = 10
 WINDOW_S: Final = 600.0
+MOST_A_DAY: Final = 100
+DAY_S: Final = 86_400.0
+_WINDOWS: Final = ((MOST_WRITES, WINDOW_S, "10 min"), (MOST_A_DAY, DAY_S, "24 h"))
 
 Key = tuple[str, str]
 """The drive's or the node's name, and the object such as ``2066:01``."""
@@ -33,7 +37,7 @@ class Saved:
 @dataclass(slots=True)
 class _Count:
     writes: int = 0
-    recent: deque[float] = field(default_factory=lambda: deque[float](maxlen=MOST_WRITES))
+    recent: deque[float] = field(default_factory=lambda: deque[float](maxlen=MOST_A_DAY))
 
 
 class Ledger:
@@ -49,18 +53,27 @@ class Ledger:
         count = self._counts.get(key)
         return count.writes if count else 0
 
-    def check(self, key: Key, name: str, now: float) -> None:
-        """Raises ``ParameterError`` where one more write would be one too many."""
+    def check(self, key: Key, name: str, now: float, cycles: int | None = None) -> None:
+        """Raises ``ParameterError`` where one more write would be one too many; ``cycles`` is what the
+        EEPROM stands."""
         count = self._counts.get(key)
-        if count is None or len(count.recent) < MOST_WRITES:
+        if count is None:
             return
-        left_s = count.recent[0] + WINDOW_S - now
-        if left_s > 0:
+        if cycles and count.writes >= cycles:
             raise ParameterError(
                 Why.TOO_OFTEN,
-                f"{name} was written {MOST_WRITES} times within {WINDOW_S / 60:g} min, and the EEPROM wears "
-                f"out; try again in {left_s:.0f} s, or have the drive write to its RAM only",
+                f"{name} of {key[0]} was written {count.writes} times, and its EEPROM stands {cycles} "
+                f"writes: exchange the drive, then remove {key[1]} of {key[0]} from eeprom.json in the "
+                "state_dir while the service is stopped; or have the drive write to its RAM only",
             )
+        for most, window_s, within in _WINDOWS:
+            left_s = count.recent[-most] + window_s - now if len(count.recent) >= most else 0.0
+            if left_s > 0:
+                raise ParameterError(
+                    Why.TOO_OFTEN,
+                    f"{name} was written {most} times within {within}, and the EEPROM wears out; try again "
+                    f"in {left_s:.0f} s, or have the drive write to its RAM only",
+                )
 
     def count(self, key: Key, name: str, cycles: int | None, now: float) -> str:
         """One more write. The warning where it is one of the tenths of ``cycles``, or nothing."""
@@ -91,7 +104,7 @@ class Ledger:
         for key, record in saved.items():
             unsaved = self._unsaved.get(key, [])
             times = [time - epoch_s for time in record.last]
-            recent = sorted([*(time for time in times if time <= now), *unsaved])[-MOST_WRITES:]
+            recent = sorted([*(time for time in times if time <= now), *unsaved])[-MOST_A_DAY:]
             count = self._counts.setdefault(key, _Count())
             count.writes = record.writes + len(unsaved)
-            count.recent = deque(recent, maxlen=MOST_WRITES)
+            count.recent = deque(recent, maxlen=MOST_A_DAY)

@@ -17,7 +17,7 @@ from typing import Final
 
 import msgspec
 
-from bridge.parameter.ledger import MOST_WRITES, Key, Ledger, Saved
+from bridge.parameter.ledger import MOST_A_DAY, Key, Ledger, Saved
 
 NAME: Final = "eeprom.json"
 _VERSION: Final = 1
@@ -62,7 +62,7 @@ class LedgerFile:
             totals = self._read()
             for key, times in writes.items():
                 before = totals.get(key, Saved(0))
-                last = sorted([*before.last, *times])[-MOST_WRITES:]
+                last = sorted([*before.last, *times])[-MOST_A_DAY:]
                 totals[key] = Saved(before.writes + len(times), tuple(last))
             if writes:
                 self._write(totals)

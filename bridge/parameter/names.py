@@ -12,11 +12,12 @@ from collections.abc import Iterator
 from typing import Final
 
 from bridge.mapping.model import Family, Parameter
+from bridge.mapping.own_places import places
 from bridge.mapping.parameters import object_of
 from bridge.parameter.definition import Address, Definition, Entry, leaf_of
 from bridge.parameter.error import ParameterError, Why
 
-_OBJECT: Final = re.compile(r"(?:0x)?([0-9a-f]{4})h?:(?:0x)?([0-9a-f]{1,2})h?", re.IGNORECASE)
+_OBJECT: Final = re.compile(r"(?:0x)?([0-9a-f]{4})h?:(?:0x)?([0-9a-f]{1,2})h?", re.IGNORECASE | re.ASCII)
 _SPELLINGS: Final = (
     "{name}[{element}].{set}", "{name}[{element}]", "{name}.{set}", "{name}/{element}", "{name}.{element}",
 )  # fmt: skip
@@ -34,7 +35,7 @@ class Names:
 
     def __init__(self, family: Family) -> None:
         rule = self._rule = family.parameter_names
-        self._pattern = re.compile(rule.pattern, re.IGNORECASE) if rule else None
+        self._pattern = re.compile(rule.pattern, re.IGNORECASE | re.ASCII) if rule else None
         self._first = rule.element_first if rule else 1
         self.definitions = tuple(_definition(parameter) for parameter in family.parameter)
         self._by_name = {definition.name.upper(): definition for definition in self.definitions}
@@ -46,6 +47,23 @@ class Names:
         for definition in self.definitions:
             # Without element and set it is the first of each.
             self._by_leaf.setdefault(leaf_of(definition.name), self._entry(definition, None, None))
+
+        self._commands = [_span(one) for one in rule.protected] if rule else []
+        self._own = {place.ref.index for place in places(family, link=True)}
+        flags = ((one, self._entry(one, None, None).address.index) for one in self.definitions)
+        self._protected = {index: one.protected for one, index in flags if one.protected}
+
+    def protection(self, address: Address) -> str:
+        """Who may write an object and when (``Definition.protected``); what stands beside a protected
+        parameter under the same index is protected like it, and so is what the drive watches the
+        bridge by."""
+        if any(address.index in span for span in self._commands):
+            return "command"
+        return self._protected.get(address.index) or ("communication" if address.index in self._own else "")
+
+    def tells_own_supervision(self, address: Address) -> bool:
+        """Whether an object says what the drive does when the bridge falls silent."""
+        return address.index in self._own
 
     def resolve(self, text: str) -> Entry:
         """The entry that ``text`` means. Raises ``ParameterError`` with the nearest names."""
@@ -84,6 +102,13 @@ class Names:
         if self._rule:
             parts.append(f"names look like {self._rule.example}")
         return f"; {'; '.join([*parts, 'an object such as 1018:01 is taken too'])}"
+
+    def set_hint(self, name: str) -> str:
+        """How a parameter that the file does not list is written where each parameter set has its own."""
+        if self._rule is None or not self._rule.set_step or self._pattern is None:
+            return ""
+        example = f"{name}.1"
+        return f"; if it depends on the parameter set: {example}" if self._pattern.fullmatch(example) else ""
 
     def _elements(self, definition: Definition) -> range | tuple[None]:
         return range(self._first, self._first + definition.elements) if definition.elements else (None,)
@@ -144,6 +169,11 @@ class Names:
         return "_".join(str(part) for part in (name, element, number) if part is not None)
 
 
+def _span(text: str) -> range:
+    first, _, last = text.partition("-")
+    return range(int(first, 16), int(last or first, 16) + 1)
+
+
 def _number(text: str | None) -> int | None:
     return None if text is None else int(text)
 
@@ -168,4 +198,7 @@ def _definition(parameter: Parameter) -> Definition:
         point=parameter.point,
         every_ms=parameter.every_ms,
         volatile=parameter.volatile,
+        protected=parameter.protected or "",
+        backup=parameter.backup,
+        of_node=parameter.of_node,
     )

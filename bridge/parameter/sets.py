@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 
 from bridge.image import Value
 from bridge.parameter.access import MISSING, DriveParameters, Transfer, Written
-from bridge.parameter.definition import Entry
-from bridge.parameter.error import ParameterError
+from bridge.parameter.codec import encode_value
+from bridge.parameter.definition import Address, Entry
+from bridge.parameter.error import ParameterError, Why
 from bridge.parameter.names import Names
 
 Told = Callable[[str], None]
@@ -53,33 +54,55 @@ class Restored:
     failed: str = ""
     error: ParameterError | None = None
     left: list[str] = field(default_factory=list[str])
+    warning: str = ""
 
 
 Steps = Generator[Transfer, tuple[bytes, float], None]
 
 
-def settings(names: Names) -> list[Entry]:
-    """What belongs into a set, in the order of the mapping file."""
+def settings(names: Names, *, on_first: bool = True) -> list[Entry]:
+    """What belongs into a set, in the order of the mapping file; the node's own parameters are in the set
+    of the drive on its first SDO channel."""
     return [
         entry
         for entry in names.entries()
-        if entry.definition and entry.definition.readable and entry.definition.writable
+        if entry.definition
+        and entry.definition.readable
+        and entry.definition.writable
+        and entry.definition.backup
+        and (on_first or not entry.definition.of_node)
+        and names.protection(entry.address) != "command"
     ]
 
 
 def in_order(names: Names, values: Mapping[str, Value]) -> list[tuple[Entry, Value]]:
     """The entries of a set in the order of the mapping file, then those that it does not list.
 
-    Raises ``ParameterError`` for a name that the family does not have, before anything is done.
+    Raises ``ParameterError`` for a name that the family does not have, for what no set holds and for two
+    names of one parameter, before anything is done.
     """
     places = {entry.address: place for place, entry in enumerate(settings(names))}
     found = [(names.resolve(name), value) for name, value in values.items()]
+    seen: dict[Address, str] = {}
+    for name, (entry, _) in zip(values, found, strict=True):
+        if entry.address in seen:
+            other = seen[entry.address]
+            raise ParameterError(
+                Why.OUT_OF_RANGE, f"{other} and {name} are the same parameter: leave one of them out"
+            )
+        seen[entry.address] = name
+        if entry.definition and not entry.definition.backup:
+            raise ParameterError(
+                Why.PROTECTED,
+                f"{name} is an address, an identity or a command, and no set holds it: remove it, and write "
+                "it by itself where it is to be changed",
+            )
     return sorted(found, key=lambda pair: places.get(pair[0].address, len(places)))
 
 
 def back_up(access: DriveParameters, into: Backup, now: float, tell: Told = lambda _: None) -> Steps:
     """Read every setting into ``into``. Raises ``ParameterError`` where one cannot be read."""
-    for entry in settings(access.names):
+    for entry in settings(access.names, on_first=access.on_first):
         tell(entry.name)
         try:
             reading = yield from access.read(entry, now)
@@ -127,7 +150,7 @@ def restore(
 
     Raises ``ParameterError`` only for a set that does not fit, before anything is written.
     """
-    wanted = in_order(access.names, values)
+    wanted = _checked(access, values)
     for place, (entry, value) in enumerate(wanted):
         tell(entry.name)
         try:
@@ -142,5 +165,33 @@ def restore(
         now = written.reading.time
         if written.changed:
             into.written.append(written)
+            if access.keeps_in_ram(entry):
+                into.warning = _in_ram(access)
         else:
             into.same.append(entry.name)
+
+
+def _checked(access: DriveParameters, values: Mapping[str, Value]) -> list[tuple[Entry, Value]]:
+    """The set in the order in which it is written. The switch of the EEPROM comes first where what follows
+    is to be kept, and last where it is not. Raises ``ParameterError`` where an entry cannot be written."""
+    wanted = in_order(access.names, values)
+    for entry, value in wanted:
+        access.check_writable(entry)
+        if entry.definition is not None:  # of others only the drive knows how long they are
+            encode_value(entry, value, None)
+    switch = access.ram_switch
+
+    def place(pair: tuple[Entry, Value]) -> int:
+        if switch is None or pair[0].address != switch.address:
+            return 0
+        return 1 if access.means_ram(pair[1]) else -1
+
+    return sorted(wanted, key=place)
+
+
+def _in_ram(access: DriveParameters) -> str:
+    switch = access.ram_switch
+    name = switch.name if switch else ""
+    return (
+        f"the drive keeps changes in its RAM alone ({name}): what was written is lost when it is switched off"
+    )

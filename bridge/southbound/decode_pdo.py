@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.config import NodeTable
-from bridge.drive import StatusWords, ValueCodec, scale_of
+from bridge.drive import ParameterSet, StatusWords, ValueCodec, scale_of
 from bridge.mapping.model import Family, Pdo, Slot
 from bridge.southbound.boot import factory_entries, layouts, match_words
 from bridge.southbound.canopen.pdo import PdoCodec
@@ -32,6 +32,9 @@ class PdoView:
     map: WordMap
     states: StatusWords | None
     values: tuple[ValueCodec, ...]
+    set: ParameterSet
+    of_set: frozenset[str]
+    """Values whose scale is known of parameter set 1 alone."""
 
     def said(self, data: bytes) -> tuple[str, tuple[tuple[str, Value | float], ...]]:
         """A sentence and the values by name. Data of any length is taken as far as it goes."""
@@ -49,7 +52,10 @@ class PdoView:
             state = self.states.state(words[0]).label
             parts[0] += f" {state.replace('_', ' ')}"
             values.append(("state", state))
+        is_other_set = 0 in there and words[0] & self.set.mask
         for codec in self.values:
+            if is_other_set and codec.model.name in self.of_set:
+                continue
             if there.keys() >= set(codec.places):
                 value = codec.from_words(words)
                 value = round(value, _DIGITS) if isinstance(value, float) else value
@@ -114,6 +120,8 @@ def _view(
         WordMap(entries, places, len(process)),
         states,
         _values(family, slot, group, process, scales),
+        ParameterSet((family.control_word if is_command else family.status_word).parameter_set_bits),
+        frozenset(one.name for one in family.value if one.group == group and family.depends_on_set(one)),
     )
 
 

@@ -332,8 +332,9 @@ class NodeCore:
     def _count_write(self, owner: str, address: str, name: str) -> str:
         """The boot-up writes to an EEPROM: counted as of its beginning."""
         ledger, eeprom = self.plant.eeprom_writes, self.node.family.eeprom
-        ledger.check((owner, address), name, self._last_boot)
-        return ledger.count((owner, address), name, eeprom.cycles if eeprom else None, self._last_boot)
+        cycles = eeprom.cycles if eeprom else None
+        ledger.check((owner, address), name, self._last_boot, cycles)
+        return ledger.count((owner, address), name, cycles, self._last_boot)
 
     def carry_out_command(self, action: Action, who: str, now: float, *, send: bool = True) -> None:
         """A command that may be given; ``send`` is false where one frame has told all nodes."""

@@ -14,6 +14,8 @@ from typing import Final
 from bridge.command import Action, Code, Drive, Event, Identity, Kind, Outcome, Plant, Reply, Request, Role
 from bridge.command.link import NodeState
 from bridge.command.plant import Node
+from bridge.drive import MOVING
+from bridge.mapping.own_places import places
 from bridge.parameter import (
     Address,
     DriveParameters,
@@ -61,7 +63,14 @@ class NodeParameters:
         self._state = NodeState.ABSENT
         names = self._names = Names(node.family)
         self._drives = {
-            drive.name: DriveParameters(drive.name, node.name, node.family, names, plant.eeprom_writes)
+            drive.name: DriveParameters(
+                drive.name,
+                node.name,
+                node.family,
+                names,
+                plant.eeprom_writes,
+                on_first=drive.slot.parameters_by_sdo,
+            )
             for drive in node.drives
         }
         self._view = ParameterView(node, plant.image, names)
@@ -139,6 +148,10 @@ class NodeParameters:
         if request.action is Action.READ_PARAMETER:
             self._read(drive, entry, request.max_age_ms / 1000, partial(self._on_read, conclude))
             return
+        refusal = _why_protected(access.names.protection(entry.address), entry, request.identity, drive)
+        if refusal:
+            conclude(_no(Code.NOT_ALLOWED, refusal))
+            return
         key = (drive.name, entry.address)
         if request.value is None:
             conclude(_no(Code.OUT_OF_RANGE, f"{entry.name}: there is no value to write"))
@@ -208,12 +221,23 @@ class NodeParameters:
             return
         reading = result.reading
         self._show(drive, entry, reading)
+        if result.changed and self._names.tells_own_supervision(entry.address):
+            self._forget_own_supervision(drive, entry)
         if result.changed:
             was = "" if result.before is None else f" (was {shown(entry, result.before)})"
             self._tell(drive.name, 400, f"{reading}{was}, by {request.identity}")
         self._warn(drive.name, result.warning)
         message = "" if result.changed else "the drive holds this value already: not written again"
         conclude(Outcome(Code.OK, message, value=reading.value, time=reading.time))
+
+    def _forget_own_supervision(self, drive: Drive, entry: Entry) -> None:
+        """What the boot-up has read of it is not true any more; the next boot-up reads it again."""
+        is_of_drive = any(
+            place.per_drive and place.ref.index == entry.address.index for place in places(self._node.family)
+        )
+        why = f"{entry.name} was changed since boot: boot the node to have it read again"
+        for one in [drive] if is_of_drive else self._node.drives:
+            one.on_own_supervision_changed(why, self._now)
 
     def _on_saved(self, conclude: Reply, result: str | ParameterError) -> None:
         if isinstance(result, ParameterError):
@@ -271,6 +295,15 @@ def _why_not_set(identity: Identity, drive: Drive) -> str:
     if not identity.may_set_parameters:
         return f"{identity} may not set parameters: an engineer may"
     return drive.channel.authority.refusal(identity, owner_is_silent=False) or ""
+
+
+def _why_protected(protection: str, entry: Entry, identity: Identity, drive: Drive) -> str:
+    """Why a parameter that more depends on than its own value is not written now."""
+    if protection == "communication" and identity.role < Role.ENGINEER:
+        return f"{entry.name} decides who commands the drive and what supervises it: an engineer may set it"
+    if protection in ("communication", "while_enabled") and drive.channel.state in MOVING:
+        return f"{entry.name} is not written while the drive is enabled: stop and disable it first"
+    return ""
 
 
 def _failed(error: ParameterError) -> Outcome:

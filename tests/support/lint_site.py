@@ -30,6 +30,7 @@ mapping = "nord/sk-tu4-cao"
 [[bus.node.drive]]
 slot = "fu1"
 control = "modbus"
+accepts = {{ runs_on = "nothing moves in a test" }}
 {drive}
 {more}
 [modbus]
@@ -42,6 +43,7 @@ id = {id}
 mapping = "{family}"
 [[bus.node.drive]]
 slot = "fu1"
+accepts = {{ runs_on = "nothing moves in a test" }}
 """
 TIMEOUT = "fieldbus_timeout_ms = 200"
 

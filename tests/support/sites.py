@@ -89,9 +89,9 @@ def write(folder: Path, *tables: str, name: str = "hall") -> Path:
     return path
 
 
-def plant_of(text: str) -> Plant:
-    """The plant of a site's text, without a bus."""
-    return Plant(Site.model_validate(parsed(text)), {FAMILY: family(FAMILY)}, "1.2.3")
+def plant_of(text: str, mapping: str = FAMILY) -> Plant:
+    """The plant of a site's text, all of whose nodes have this mapping, without a bus."""
+    return Plant(Site.model_validate(parsed(text)), {mapping: family(mapping)}, "1.2.3")
 
 
 def parsed(text: str) -> dict[str, object]:

@@ -16,8 +16,10 @@ def write_start(drive: Drive, result: BootResult) -> Do:
     """
     for start in drive.slot.start:
         try:
-            written = yield from download(start.download, result.memory)
+            written = yield from download(start.download(drive.sync_period_ms), result.memory)
         except BootError as error:
             raise MappingError(f"J: {error.detail}") from None
         if written and start.read_back:
-            result.notes.append(f"{drive.slot.name}: {start.object} = {start.value}")
+            result.notes.append(
+                f"{drive.slot.name}: {start.object} = {start.value_with(drive.sync_period_ms)}"
+            )

@@ -14,6 +14,7 @@ from tests.support.rig import (
     OPERATOR,
     OTHER_PLC,
     PLC,
+    QUICK_STOPPING,
     READY,
     SHUT_DOWN,
     SWITCHED_ON,
@@ -205,3 +206,38 @@ def test_who_asks_on_on_the_outcome_finds_everything_settled(rig: Rig):
     rig.drive_says(READY)
     rig.ask(Action.DISABLE_VOLTAGE, OPERATOR)
     assert seen == [(0x0474, 1)]
+
+
+def test_a_drive_that_stays_in_quick_stop_is_led_out_of_it(rig: Rig):
+    """605Ah = 5 … 8: the word to become ready leads out of *quick stop active* nowhere."""
+    rig.drive_says(QUICK_STOPPING)
+    outcomes = rig.submit(Action.START)
+    rig.wait(0.9)
+    assert rig.sent == SHUT_DOWN, "the ramp of the quick stop is let run"
+    rig.wait(0.2)
+    assert rig.sent & 0x0002 == 0, "disable voltage"
+    rig.drive_says(INHIBITED)
+    assert rig.sent == SHUT_DOWN
+    rig.drive_says(READY)
+    assert rig.enables
+    rig.drive_says(ENABLED)
+    assert codes(outcomes) == [Code.OK]
+
+
+def test_a_quick_stop_that_ends_by_itself_is_not_cut_short(rig: Rig):
+    rig.drive_says(QUICK_STOPPING)
+    rig.submit(Action.START)
+    rig.wait(0.5)
+    rig.drive_says(INHIBITED)
+    rig.wait(1.0)
+    assert rig.sent == SHUT_DOWN
+    rig.drive_says(READY)
+    assert rig.enables
+
+
+def test_a_drive_that_does_not_leave_the_quick_stop_is_told(rig: Rig):
+    rig.drive_says(QUICK_STOPPING)
+    outcomes = rig.submit(Action.START)
+    rig.wait(3.0)
+    assert codes(outcomes) == [Code.TIMED_OUT]
+    assert "quick stop active" in outcomes[0].message

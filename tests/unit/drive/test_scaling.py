@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.drive import LinearScale, signed
+from bridge.drive import LinearScale, scale_of, signed
+from bridge.mapping.model import ProcessValue
 
 HZ = LinearScale(50.0, 16384, 2.0)
 """P105 = 50 Hz."""
@@ -66,3 +67,24 @@ def test_a_value_is_rounded_to_the_nearest_word(value: float):
 @given(st.integers(-0x8000, 0x7FFF))
 def test_a_signed_word_is_its_twos_complement(number: int):
     assert signed(number & 0xFFFF) == number
+
+
+@pytest.mark.parametrize(
+    ("factor", "number", "value"),
+    [
+        (0.001, 2800758, 2800.758),
+        (0.006, 12345, 74.07),
+        (-0.1, 3, -0.3),
+        (1e-9, 7, 7e-9),
+        (2.5, 3, 7.5),
+        (1.0, 5, 5.0),
+        (0.7071067811865476, 3, 3 * 0.7071067811865476),
+    ],
+)
+def test_a_decimal_factor_gives_the_nearest_number(factor: float, number: int, value: float) -> None:
+    table = {"name": "way", "group": "actual", "words": ["low", "high"], "scale": {"factor": factor}}
+    model = ProcessValue.model_validate(table)
+    scale = scale_of(model)
+    assert scale is not None
+    assert scale.from_word(number) == value
+    assert scale.to_word(value) == number

@@ -99,3 +99,47 @@ def test_running_on_is_accepted_with_a_reason_only(tmp_path):
     assert case.own.accepted == "an exhaust fan"
     with pytest.raises(FileFaults, match="must say why, in 10 characters or more"):
         load_project(site_of(tmp_path, "nord/sk-tu4-cao", "", drive='accepts = { runs_on = "fan" }'))
+
+
+def warnings_of(path: Path) -> list[str]:
+    project = load_project(path)
+    verdict = lint(project.site, project.families, path, project.downloads)
+    return [str(one) for one in verdict.of(Severity.WARNING) if "silent" in str(one)]
+
+
+@pytest.mark.parametrize(
+    ("mapping", "node", "message", "remedy"),
+    [
+        ("stoeber/5000", 'supervision = "heartbeat"', "runs on when the bridge", 'supervision = "guarding"'),
+        ("nord/sk-tu4-cao", "", "runs on when the bridge falls silent: P151 is 0", "own_timeout_ms and"),
+        (
+            "nord/sk-tu4-cao",
+            'configure = [{ object = "2097:01", type = "uint16", value = 250 }]',
+            "may run on when the bridge falls silent: P513 is not known",
+            "own_timeout_ms and enforce",
+        ),
+        ("nord/sk-tu3-cao", "", "may run on", "own_timeout_ms and enforce"),
+        ("cia402/velocity", "", "runs on when the bridge falls silent: 1016:01 is 0", "own_timeout_ms and"),
+        ("lenze/8400-motec", "", "does nothing by itself when the bridge falls silent", "own_timeout_ms and"),
+    ],
+)
+def test_a_drive_that_nothing_stops_is_a_warning_with_a_remedy(
+    tmp_path: Path, mapping: str, node: str, message: str, remedy: str
+) -> None:
+    (warning,) = warnings_of(site_of(tmp_path, mapping, node))
+    assert message in warning
+    assert remedy in warning
+    accepted = 'accepts = { runs_on = "an exhaust fan" }'
+    assert warnings_of(site_of(tmp_path, mapping, node, drive=accepted)) == []
+
+
+@pytest.mark.parametrize(
+    ("mapping", "node"),
+    [
+        ("stoeber/5000", 'supervision = "guarding"'),
+        ("nord/sk-tu4-cao", "own_timeout_ms = 250\nenforce = true"),
+        ("cia402/velocity", "own_timeout_ms = 300\nenforce = true"),
+    ],
+)
+def test_a_drive_that_stops_by_itself_is_none(tmp_path: Path, mapping: str, node: str) -> None:
+    assert warnings_of(site_of(tmp_path, mapping, node)) == []

@@ -11,9 +11,11 @@ from bridge.errors import FileFaults
 from bridge.mapping import family_names, load_family
 from bridge.mapping.loader import mapping_folders, read_family
 from bridge.mapping.match import Found, best_match
+from bridge.mapping.site import load_site_and_families
 from bridge.parameter import Names
 from bridge.sim.cia402_catalogue import MAPPINGS
 from bridge.sim.cia402_states import Command, State, command_of
+from tests.support import sites
 
 FAMILIES = {name: load_family(f"cia402/{name}") for name in MAPPINGS}
 ANY = FAMILIES["profile-velocity"]
@@ -165,3 +167,33 @@ def test_a_handshake_must_have_its_value_and_its_own_bit(tmp_path: Path, handsha
     head = 'extends = "cia402/profile-position"\n[control_word]\n'
     with pytest.raises(FileFaults, match=message):
         site_family(tmp_path, f"{head}handshake = {handshake}\n")
+
+
+def test_scan_names_the_preferred_mode() -> None:
+    """1000h is the same whatever mode a drive is used in."""
+    families = {name: load_family(name) for name in family_names()}
+    match = best_match(Found(device_type=0x0002_0192), families)
+    assert match is not None
+    assert match.mapping == "cia402/profile-velocity"
+
+
+@pytest.mark.parametrize(
+    ("period_ms", "message"),
+    [
+        (0, "must not be 0: CiA 402, cyclic synchronous position writes it into 60C2:01 of uint8"),
+        (300, "writes it into 60C2:01 of uint8: a uint8 is 0…255"),
+    ],
+)
+def test_a_sync_period_that_60c2h_cannot_hold_is_a_fault(tmp_path: Path, period_ms: int, message: str):
+    axis = sites.node(sites.drive("drive", "modbus", 500, ""), name="axis", mapping="cia402/cyclic-position")
+    path = sites.write(tmp_path, sites.bus(axis, more=f"sync_period_ms = {period_ms}"), sites.modbus())
+    with pytest.raises(FileFaults, match=f"bus.0..sync_period_ms: .*{message}"):
+        load_site_and_families(path)
+
+
+@pytest.mark.parametrize("kind", ["bool", "real32"])
+def test_the_sync_period_needs_an_integer(tmp_path: Path, kind: str):
+    head = 'extends = "cia402/cyclic-velocity"\n[[slot]]\nname = "drive"\n'
+    start = f'start = [{{ object = "60C2:01", type = "{kind}", value = "sync_period_ms" }}]\n'
+    with pytest.raises(FileFaults, match="value: "):
+        site_family(tmp_path, head + start)

@@ -335,6 +335,55 @@ class TestExtends:
         assert len(spin.slot[0].tpdo) == 3
         assert [value.name for value in spin.values_of(spin.slot[0]) if value.group == "command"] == []
 
+    def test_one_setting_of_a_pdo_is_changed_by_its_number(self, folder: Folder) -> None:
+        head = 'extends = "acme/base"\n[[slot]]\nname = "axis"\n'
+        folder.add("acme/4000", f"{head}[[slot.tpdo]]\nnumber = 2\nevent_ms = 20\n")
+        slot = folder.load("acme/4000").slot[0]
+        assert [one.number for one in slot.tpdo] == [1, 2, 3]
+        assert (slot.tpdo[1].event_ms, slot.tpdo[1].cob_id, slot.tpdo[1].write) == (20, 0x280, True)
+        folder.add("acme/4000", f"{head}[slot.rpdo]\ncob_id = 0x220\n")
+        slot = folder.load("acme/4000").slot[0]
+        assert [(one.number, one.cob_id) for one in slot.rpdo] == [(1, 0x220), (2, 0x300), (3, 0x400)]
+
+    def test_a_fault_in_a_pdo_that_is_changed_has_its_line(self, folder: Folder) -> None:
+        text = 'extends = "acme/base"\n[[slot]]\nname = "axis"\n[[slot.tpdo]]\nnumber = 2\nevent_ms = -1\n'
+        folder.add("acme/4000", text)
+        assert folder.told("acme/4000")[0].startswith("acme/4000.toml:6: slot[0].tpdo[0].event_ms: must be")
+
+    def test_a_single_pdo_and_a_list_are_one(self, folder: Folder) -> None:
+        head = 'extends = "cia402/velocity"\n[[slot]]\nname = "drive"\n'
+        base = f"{head}[[slot.tpdo]]\nnumber = 1\nevent_ms = 50\n"
+        folder.add("acme/fan", base)
+        (pdo,) = folder.load("acme/fan").slot[0].tpdo
+        assert (pdo.event_ms, pdo.cob_id, pdo.inhibit_ms) == (50, 0x180, 10.0)
+        folder.add("acme/fan", base.replace("[[slot.tpdo]]\nnumber = 1", "[slot.tpdo]"))
+        assert folder.load("acme/fan").slot[0].tpdo == [pdo]
+
+    def test_what_a_variant_has_not_is_left_out(self, folder: Folder) -> None:
+        without = '["value:command/valve_b", "value:actual/probes", "parameter:P90"]'
+        more = '[[value]]\nname = "in_position"\ngroup = "actual"\nbit = 99\n'
+        folder.add("acme/base", BASE.replace('current = { parameter = "P90" }\n', ""))
+        folder.add("acme/4000", f'extends = "acme/base"\nwithout = {without}\n')
+        spin = folder.load("acme/4000")
+        leaves = {value.leaf for value in spin.value}
+        assert "command/valve_a" in leaves
+        assert leaves.isdisjoint({"command/valve_b", "actual/probes"})
+        assert [one.name for one in spin.parameter] == ["P7", "P91"]
+        folder.add("acme/4000", f'extends = "acme/base"\nwithout = {without}\n{more}')
+        assert folder.told("acme/4000")[0].startswith("acme/4000.toml:6: value[0].bit: must be")
+        folder.add("acme/5000", 'extends = "acme/4000"\nwithout = []\n')
+        folder.add("acme/4000", f'extends = "acme/base"\nwithout = {without}\n')
+        assert [one.name for one in folder.load("acme/5000").parameter] == ["P7", "P91"]
+
+    def test_what_is_left_out_must_be_there(self, folder: Folder) -> None:
+        folder.add("acme/4000", 'extends = "acme/base"\nwithout = ["parameter:P5", "pdo:2"]\n')
+        first, second = folder.told("acme/4000")
+        assert "acme/4000.toml:2: without[0]: there is no 'parameter:P5'" in first
+        assert "known: P7, P90, P91" in first
+        assert "it is one of value, parameter, poll, slot, own_supervision" in second
+        folder.add("acme/4000", 'extends = "acme/base"\nwithout = ["parameter:P7"]\n')
+        assert "there is no parameter 'P7'" in folder.told("acme/4000")[0]
+
     def test_a_fault_is_told_with_the_file_where_it_stands(self, folder: Folder) -> None:
         folder.add("acme/4000", VARIANT.replace('word = "modes_now"', 'word = "modes_then"'))
         assert folder.told("acme/4000")[0].startswith(

@@ -60,7 +60,7 @@ disable_voltage = { mask = 2, value = 0 }
 bits = []
 state = [
   { name = "ready", pattern = "01X0001" },
-  { name = "fault", pattern = "0XX1000" },
+  { name = "fault", pattern = "0XX1000" }, { name = "operation_enabled", pattern = "01X0111" },
 ]
 [emcy.codes]
 0000 = "no fault"
@@ -166,6 +166,16 @@ def test_the_sample_is_a_family(tmp_path: Path):
             '"01X0001"',
             '"XXX10XX"',
             "47: status_word.state[0].pattern: ready takes words that are a fault too",
+        ),
+        (
+            '"operation_enabled"',
+            '"switched_on"',
+            '46: status_word.state: needs a state named "operation_enabled"',
+        ),
+        (
+            '"01X0001"',
+            '"01X0XX1"',
+            "48: status_word.state[2].pattern: operation_enabled is never told: ready takes all its words",
         ),
         ("0000 = ", "000 = ", "51: emcy.codes.000"),
         ('"1.0" = "silent"', '"1" = "silent"', "58: faults.texts.1"),
@@ -296,3 +306,11 @@ def test_an_sdo_server_leaves_room_for_the_node_id(tmp_path: Path):
     server = "[[sdo]]\nnumber = 2\nrequest = 0x7FF\nreply = 0x2C0\n[control_word]"
     [fault] = told(tmp_path, FAMILY.replace("[control_word]", server))
     assert "sdo[0].request: 7FFh leaves no room for the node id" in fault
+
+
+def test_a_file_that_is_nested_too_deeply_is_a_fault(tmp_path: Path):
+    """It counts among the names; to use it is a fault with the file's name."""
+    (tmp_path / "deep.toml").write_text(f"a = {'[' * 5000}", encoding="utf-8")
+    assert family_names((tmp_path,)) == ["deep"]
+    with pytest.raises(FileFaults, match=r"deep\.toml.*nested too deeply"):
+        load_family("deep", (tmp_path,))

@@ -187,3 +187,16 @@ def test_the_drive_is_asked_for_p700_and_p701(name: str):
     last = family.parameter_named(family.faults.last.parameter)
     assert (str(family.object_of(current)), str(family.object_of(last))) == ("22BC:01", "22BD:01")
     assert current.factor == last.factor == 0.1
+
+
+def test_the_cu4_has_no_outputs_and_two_inputs() -> None:
+    """BU 2500 §7.1.1 P150, §7.1.3 P174 and P175."""
+    small, large = FAMILIES["nord/sk-cu4-cao"], FAMILIES["nord/sk-tu4-cao"]
+    gone = {one.name for one in large.parameter} - {one.name for one in small.parameter}
+    assert gone == {"P150", "P175"}
+    assert {one.leaf for one in large.value} - {one.leaf for one in small.value} == {
+        "command/digital_outputs"
+    }
+    polls = {poll.name: poll.bits for poll in small.poll}
+    assert polls["digital_inputs"] == ["input_1", "input_2"]
+    assert "digital_outputs" not in polls

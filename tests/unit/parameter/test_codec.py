@@ -146,3 +146,11 @@ def test_what_is_typed_is_read_as_the_parameter_takes_it(one: Entry, text: str, 
 def test_what_is_typed_and_is_no_value_is_refused() -> None:
     with pytest.raises(ParameterError, match="takes a number, not 'much'"):
         parse(entry("int16"), "much")
+
+
+def test_a_negative_number_in_four_bytes_is_the_same_number() -> None:
+    number = entry("int16")
+    assert matches(number, bytes.fromhex("FB FF FF FF"), encode_value(number, -5, None))
+    assert matches(number, bytes.fromhex("05 00 00 00"), encode_value(number, 5, None))
+    assert not matches(number, bytes.fromhex("05 00 FF FF"), encode_value(number, 5, None))
+    assert not matches(entry("uint16"), bytes.fromhex("FB FF FF FF"), bytes.fromhex("FB FF"))

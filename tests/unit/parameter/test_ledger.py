@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.parameter import Ledger, ParameterError, Why
-from bridge.parameter.ledger import MOST_WRITES, WINDOW_S, Saved
+from bridge.parameter.ledger import DAY_S, MOST_A_DAY, MOST_WRITES, WINDOW_S, Saved
 from bridge.parameter.ledger_file import LedgerFile
 
 KEY = ("conveyor/fu1", "2066:01")
@@ -106,3 +106,29 @@ def test_a_clock_that_was_set_back_holds_nobody_up() -> None:
     ledger.restore({KEY: Saved(MOST_WRITES, (EPOCH_S + 1e6,) * MOST_WRITES)}, EPOCH_S, 5.0)
     ledger.check(KEY, "P102", 5.0)
     assert ledger.writes(KEY) == MOST_WRITES
+
+
+def test_a_parameter_that_is_written_all_day_is_refused_in_the_long_window() -> None:
+    ledger = Ledger()
+    for one in range(MOST_A_DAY):
+        write(ledger, one * 70.0)
+    with pytest.raises(ParameterError, match=f"{MOST_A_DAY} times within 24 h"):
+        write(ledger, 7100.0)
+    write(ledger, DAY_S + 1.0)
+
+
+def test_the_long_window_outlives_a_restart(tmp_path: Path) -> None:
+    ledger, file, again = Ledger(), LedgerFile(tmp_path), Ledger()
+    for one in range(MOST_A_DAY):
+        write(ledger, one * 70.0)
+    file.add(ledger, EPOCH_S, 7000.0)
+    file.add(again, EPOCH_S, 7000.0)
+    with pytest.raises(ParameterError, match="within 24 h"):
+        again.check(KEY, "P102", 7700.0)
+
+
+def test_nothing_is_written_beyond_what_the_eeprom_stands() -> None:
+    ledger = Ledger()
+    ledger.restore({KEY: Saved(100_000)}, EPOCH_S, 5.0)
+    with pytest.raises(ParameterError, match=r"exchange the drive, then remove 2066:01 of conveyor/fu1"):
+        ledger.check(KEY, "P102", 5.0, 100_000)

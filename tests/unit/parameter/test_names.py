@@ -80,7 +80,7 @@ def _with(rule: dict[str, object], parameters: list[dict[str, object]]) -> Names
         "parameter_names": ParameterNames.model_validate(rule),
         "parameter": [Parameter.model_validate(parameter) for parameter in parameters],
     }
-    return Names(NORD.model_copy(update=given))
+    return Names(NORD.model_copy(update={**given, "own_supervision": []}))
 
 
 def test_lenze_codes_count_downwards_and_their_subcode_is_the_sub_index() -> None:
@@ -109,3 +109,8 @@ def test_stoeber_coordinates_have_a_letter() -> None:
     names = _with(rule, [])
     found = [str(names.resolve(text).address) for text in ("C01", "E08", "A180", "I10.2", "e08")]
     assert found == ["2401:00", "2808:00", "20B4:00", "300A:02", "2808:00"]
+
+
+def test_digits_of_other_scripts_are_no_numbers() -> None:
+    with pytest.raises(ParameterError):
+        NAMES.resolve("P١٠٢")

@@ -25,6 +25,7 @@ name = "bench"
 [[bus]]
 name = "can0"
 interface = "virtual"
+{bus}
 [[bus.node]]
 name = "axis"
 id = 5
@@ -48,10 +49,10 @@ SHUTDOWN, RUN, RESET = 0x0006, 0x000F, 0x0080
 
 @pytest.fixture
 def booted(tmp_path: Path):
-    def boot(mode: str, node: str = "", drive: str = "", **settings) -> Bench:
+    def boot(mode: str, node: str = "", drive: str = "", bus: str = "", **settings) -> Bench:
         mapping = f"cia402/{mode}"
         path = tmp_path / "site.toml"
-        path.write_text(SITE.format(mapping=mapping, node=node, drive=drive), encoding="utf-8")
+        path.write_text(SITE.format(mapping=mapping, node=node, drive=drive, bus=bus), encoding="utf-8")
         simulated = Cia402Drive(5, Cia402Settings(**settings))
         bench = Bench(load_site(path), family=load_family(mapping), mapping=mapping, node=simulated)
         bench.run(2.0)
@@ -426,3 +427,43 @@ def test_the_mode_can_be_another_for_a_while(booted) -> None:
     bench.write(DRIVE, control_word=0x001F)
     bench.run(0.1)
     assert bench.value("axis/drive/actual/position") == -7
+
+
+@pytest.mark.parametrize("option", [2, 6])
+def test_a_start_after_a_quick_stop_enables_again(booted, option: int) -> None:
+    """605Ah = 6 stays in *quick stop active* at standstill."""
+    bench = booted("velocity", options={0x605A: option, 0x605B: 0, 0x605C: 1, 0x605D: 1, 0x605E: 2})
+    start(bench)
+    keep(bench, 0.5, velocity=600.0)
+    bench.ask(Action.QUICK_STOP, DRIVE)
+    keep_alive(bench, 2.0)
+    outcomes: list[Outcome] = []
+    bench.plant.submit(Request(PLC, DRIVE, Action.START), bench.now, outcomes.append)
+    keep_alive(bench, 2.0)
+    assert [outcome.code for outcome in outcomes] == [Code.OK]
+    assert state(bench) is DriveState.OPERATION_ENABLED
+
+
+def test_pp_a_position_that_the_drive_does_not_take_is_told_and_the_next_has_its_edge(booted) -> None:
+    bench = booted("profile-position")
+    start(bench)
+    bench.node.settings.mode = Mode.VELOCITY  # no bit 12 there
+    bench.node.axis.set_mode()
+    bench.write(DRIVE, position=10_000)
+    keep_alive(bench, 1.5)
+    untaken = [event.message for event in bench.events if "has not taken" in event.message]
+    assert untaken == ["the drive has not taken the position that was written: no answer within 1 s"]
+    assert not word(bench.sent(0x205)[-1]) & 0x10
+    bench.node.settings.mode = Mode.PROFILE_POSITION
+    bench.node.axis.set_mode()
+    bench.write(DRIVE, position=20_000)
+    keep_alive(bench, 1.5)
+    assert bench.value("axis/drive/actual/position") == 20_000
+
+
+@pytest.mark.parametrize("mode", ["cyclic-position", "cyclic-velocity"])
+@pytest.mark.parametrize("period_ms", [4, 10, 40])
+def test_the_interpolation_time_is_the_period_of_sync(booted, mode: str, period_ms: int) -> None:
+    bench = booted(mode, bus=f"sync_period_ms = {period_ms}")
+    assert boot_status(bench).startswith("ok"), boot_status(bench)
+    assert bench.node.settings.interpolation == [period_ms, -3]

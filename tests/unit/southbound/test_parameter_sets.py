@@ -15,6 +15,7 @@ from bridge.errors import FileFaults
 from bridge.image import Value
 from bridge.mapping import load_family
 from bridge.parameter import DriveParameters, Ledger, Names, ParameterError, sets
+from bridge.parameter.ledger import Saved
 from bridge.parameter.set_file import SetFile, read_set
 from bridge.sim.nord_supervision import Presence
 from bridge.sim.nord_tu4 import NordTu4
@@ -123,11 +124,12 @@ def test_only_what_differs_is_restored_in_the_order_of_the_mapping(workshop: Wor
 
 
 def test_a_refusal_ends_it_and_says_what_was_done(workshop: Workshop) -> None:
-    values: dict[str, Value] = {"P102.1": 1.0, "P104.1": 400.1, "P105.1": 60.0}
+    values: dict[str, Value] = {"P102.1": 1.0, "P104.1": 5.0, "P105.1": 60.0}
+    workshop.ledger.restore({("conveyor/fu1", "2068:01"): Saved(100_000)}, 0.0, workshop.now)
     done = workshop.restore(values)
     assert [one.reading.entry.name for one in done.written] == ["P102.1"]
     assert (done.failed, done.left) == ("P104.1", ["P105.1"])
-    assert "takes 0…400 Hz" in str(done.error)
+    assert "EEPROM stands 100000 writes" in str(done.error)
 
 
 def test_a_drive_that_goes_away_ends_it(workshop: Workshop) -> None:
@@ -179,3 +181,59 @@ def test_a_file_that_is_none_says_what_is_wrong(tmp_path: Path, text: str, messa
     with pytest.raises(FileFaults) as told:
         read_set(path)
     assert message in str(told.value)
+
+
+def _refusal(workshop: Workshop, values: dict[str, Value]) -> str:
+    done = sets.Restored()
+    error = workshop.run(lambda now: sets.restore(workshop.access, values, done, now))
+    assert isinstance(error, ParameterError)
+    assert workshop.eeprom_writes == 0
+    return str(error)
+
+
+def test_nothing_is_written_of_a_set_with_one_wrong_entry(workshop: Workshop) -> None:
+    assert "P103.1" in _refusal(workshop, {"P102.1": 1.0, "P103.1": 999.0})
+    assert "read-only" in _refusal(workshop, {"P102.1": 1.0, "P700[1]": 1})
+    assert "commands the drive" in _refusal(workshop, {"P102.1": 1.0, "6040:00": 1})
+
+
+def test_two_names_of_one_parameter_are_refused(workshop: Workshop) -> None:
+    assert "P102 and 2066:01 are the same parameter" in _refusal(workshop, {"P102": 1.0, "2066:01": 3.0})
+
+
+def test_a_command_is_in_no_set(workshop: Workshop) -> None:
+    assert "no set holds it" in _refusal(workshop, {"P102.1": 1.0, "P152": 1})
+
+
+def test_the_switch_of_the_eeprom_is_written_first_where_what_follows_is_to_be_kept(
+    workshop: Workshop,
+) -> None:
+    workshop.restore({"P560": 0})
+    done = workshop.restore({"P102.1": 1.0, "P560": 1})
+    assert [one.reading.entry.name for one in done.written] == ["P560", "P102.1"]
+    assert (done.written[1].in_eeprom, done.warning) == (True, "")
+
+
+def test_a_restore_into_the_ram_alone_says_so(workshop: Workshop) -> None:
+    workshop.restore({"P560": 0})
+    assert "P560" in workshop.restore({"P102.1": 1.0}).warning
+
+
+def test_the_nodes_own_parameters_are_in_the_set_of_its_first_drive_only() -> None:
+    names = Names(NORD)
+    first = {entry.name for entry in sets.settings(names)}
+    second = {entry.name for entry in sets.settings(names, on_first=False)}
+    assert first - second >= {"P151", "P150"}
+    assert not any(name.startswith("P15") for name in second)
+
+
+def test_an_object_that_no_file_lists_echoes_the_sign_that_was_written() -> None:
+    access = DriveParameters("n/d", "n", NORD, Names(NORD), Ledger())
+    steps = access.write(access.names.resolve("2FF0:00"), -5, 0.0)
+    next(steps)
+    steps.send((b"\x01\x00", 0.0))  # held; then P560
+    steps.send((b"\x00\x00", 0.0))  # P560: RAM alone; then the write
+    steps.send((b"", 0.0))
+    with pytest.raises(StopIteration) as end:
+        steps.send((b"\xfb\xff", 0.0))
+    assert end.value.value.reading.value == -5

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from bridge.command import Action, Code, Identity, Kind, Outcome, Request, Role, Source
+from bridge.drive import DriveState
 from bridge.image import Quality
 from bridge.parameter.ledger import MOST_WRITES, Saved
 from bridge.sim.nord_tu4 import NordTu4
@@ -321,3 +322,46 @@ def test_what_was_read_is_not_a_present_value_once_the_node_is_gone(parameters: 
     parameters.bench.cut = False
     parameters.bench.run(15.0)
     assert parameters.point("p102") == (2.0, Quality.GOOD)
+
+
+# what commands or supervises a drive
+
+
+@pytest.mark.parametrize("name", ["3000:00", "3005:01", "6040:00", "6042:00", "6060:00"])
+def test_what_commands_a_drive_is_no_parameter(parameters: Parameters, name: str) -> None:
+    outcome = parameters.write(name, 1)
+    assert outcome.code is Code.NOT_ALLOWED
+    assert not parameters.downloads(int(name[:4], 16))
+
+
+@pytest.mark.parametrize("name", ["P509", "P510", "P513", "P151", "2201:00", "P120[1]"])
+def test_only_an_engineer_sets_what_supervises_a_drive(parameters: Parameters, name: str) -> None:
+    plc = Identity(Source.MODBUS, "10.0.0.1", sets_parameters=True)
+    outcome = parameters.ask(WRITE, plc, parameter=name, value=1)
+    assert outcome.code is Code.NOT_ALLOWED
+    assert "an engineer may set it" in outcome.message
+
+
+def test_what_supervises_a_drive_is_not_set_while_it_is_enabled(parameters: Parameters) -> None:
+    drive = parameters.bench.plant.drives["conveyor/fu1"]
+    drive.channel._status.state = DriveState.OPERATION_ENABLED  # pyright: ignore[reportPrivateUsage]
+    drive_word = parameters.begin(WRITE, parameter="P513", value=2.5)
+    assert drive_word[0].code is Code.NOT_ALLOWED
+    assert "while the drive is enabled" in drive_word[0].message
+
+
+def test_own_supervision_is_not_known_any_more_when_it_was_written(parameters: Parameters) -> None:
+    assert parameters.write("P151", 500).ok
+    reading = parameters.bench.plant.image.read("conveyor/fu1/supervision/worst_case_bridge_ms")
+    assert reading.quality is Quality.CONFIG_ERROR
+    assert parameters.bench.plant.drives["conveyor/fu1"].own is None
+
+
+def test_the_nodes_own_parameters_go_over_its_first_channel(parameters: Parameters) -> None:
+    before = len(parameters.bench.sent(0x605))
+    assert parameters.ask(READ, target="conveyor/fu2", parameter="P151").ok
+    assert b"\x40\x97\x20\x01" in [frame.data[:4] for frame in parameters.bench.sent(0x605)[before:]]
+
+
+def test_a_parameter_without_its_set_is_told_how_it_is_written(parameters: Parameters) -> None:
+    assert "P999.1" in parameters.ask(READ, parameter="P999").message

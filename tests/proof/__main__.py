@@ -34,7 +34,7 @@ def say(text: str) -> None:
     print(f"{time.monotonic():8.1f}  {text}", flush=True)
 
 
-def run(cycles: int, names: list[str], out: Path, limit_s: float) -> int:
+def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: float) -> int:
     os.environ["PYTHONPATH"] = str(REPOSITORY)
     faults = [fault for fault in FAULTS if (not names or fault.name in names)]
     possible = [fault for fault in faults if fault.possible()]
@@ -62,6 +62,7 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float) -> int:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="proof-")))
         rig = Rig(folder, stack)
         try:
+            rig.noise_ms = noise_ms
             rig.start()
             say("everything is there")
             rig.run_all()
@@ -122,6 +123,7 @@ def main() -> int:
     one.add_argument("--cycles", type=int, default=50)
     one.add_argument("--faults", default="")
     one.add_argument("--limit", type=float, default=1800.0, help="begin no cycle after so many seconds")
+    one.add_argument("--noise", type=float, default=0.0, help="ms allowed on a machine that is busy")
     one.add_argument("--out", type=Path, required=True)
     other = commands.add_parser("report")
     other.add_argument("--least", type=int, default=50)
@@ -130,7 +132,13 @@ def main() -> int:
     other.add_argument("parts", type=Path, nargs="+")
     asked = parser.parse_args()
     if asked.command == "run":
-        return run(asked.cycles, [name for name in asked.faults.split(",") if name], asked.out, asked.limit)
+        return run(
+            asked.cycles,
+            [name for name in asked.faults.split(",") if name],
+            asked.out,
+            asked.limit,
+            asked.noise,
+        )
     result = report.merge([report.load(part) for part in asked.parts])
     asked.out.write_text(json.dumps(result, indent=1), encoding="utf-8")
     report.put_into(asked.page, result)

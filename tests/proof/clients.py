@@ -126,9 +126,7 @@ class ZenohClient:
             "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
         }
         try:
-            self._session = await asyncio.to_thread(
-                zenoh.open, zenoh.Config.from_json5(json.dumps(settings))
-            )
+            self._session = await asyncio.to_thread(zenoh.open, zenoh.Config.from_json5(json.dumps(settings)))
         except zenoh.ZError as error:
             raise ClientFault from error
 

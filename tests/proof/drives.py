@@ -26,6 +26,8 @@ HEARTBEAT_MS: Final = 400
 GUARD_MS, LIFE_TIME_FACTOR = 150, 3
 TPDO_MS: Final = 150
 """Event timer of every TPDO: what the drive does is on the bus so soon."""
+INHIBIT_MS: Final = 50
+"""A ramp would fill the bus otherwise, and a slow machine's time."""
 OWN_TIMEOUT_MS: Final = 500
 """Of each drive's own supervision."""
 
@@ -40,6 +42,8 @@ class Family:
     run: int
     acknowledge: int
     setpoint: int
+    speed: int
+    """What the drive says of its speed at this setpoint."""
     enabling: tuple[int, int]
     """Mask and value of a control word that enables operation."""
     enabled: tuple[int, int]
@@ -63,8 +67,11 @@ NORD: Final = Family(
     run=0x047F,
     acknowledge=0x04FE,
     setpoint=0x2000,
+    speed=0x2000,
     enabling=(0x000F, 0x000F),  # BU 2500 §6.5.1
     enabled=(0x007F, 0x0037),  # §6.5.2
+    # SDO2 … 4 reach the parameters of fu2 … fu4, P513 among them.
+    supervision=f'supervision = "heartbeat"\nsupervision_ms = {HEARTBEAT_MS}\nsdo_channels = [2, 3, 4]',
     configure=(f'{{ object = "2097:01", type = "uint16", value = {OWN_TIMEOUT_MS} }}',),  # P151
     parameters="P105 = 50.0, P112 = 10.0",
 )
@@ -75,6 +82,7 @@ LENZE: Final = Family(
     run=0x0009,
     acknowledge=0x0081,
     setpoint=0x2000,
+    speed=0x2000,
     enabling=(0x000F, 0x0009),
     enabled=(0x0F00, 0x0500),
     configure=(  # EDS84DMOTCAN §10.1: C00357/1, C00593/1
@@ -90,10 +98,12 @@ STOEBER: Final = Family(
     run=0x0001,
     acknowledge=0x0002,
     setpoint=500,
+    speed=1500,
     enabling=(0x0005, 0x0001),
     enabled=(0x00FF, 0x0004),  # E48 in the low byte
     control_bytes=1,
-    supervision=f'supervision = "guarding"\nsupervision_ms = {GUARD_MS}\nlife_time_factor = {LIFE_TIME_FACTOR}',
+    supervision=f'supervision = "guarding"\nsupervision_ms = {GUARD_MS}\n'
+    f"life_time_factor = {LIFE_TIME_FACTOR}",
     parameters="C01 = 3000.0",
     lost_after_ms=GUARD_MS * LIFE_TIME_FACTOR,
     own_timeout_ms=GUARD_MS * LIFE_TIME_FACTOR,
@@ -105,6 +115,7 @@ CIA402: Final = Family(
     run=0x007F,
     acknowledge=0x0086,
     setpoint=1000,
+    speed=1000,
     enabling=(0x000F, 0x000F),
     enabled=(0x006F, 0x0027),
     configure=(
@@ -190,7 +201,8 @@ def write_site(path: Path, channel: str, state: Path, run: Path) -> Path:
         f"sync_period_ms = 0\nrpdo_period_ms = {RPDO_PERIOD_MS}\ndeadman_ms = {DEADMAN_MS}",
         *(_node(drives) for drives in nodes.values()),
         f'[modbus]\nlisten = "{SERVERS["modbus"]}:{PORTS["modbus"]}"',
-        f'[opcua]\nlisten = "{SERVERS["opcua"]}:{PORTS["opcua"]}"\nno_security = true\nanonymous = "operator"',
+        f'[opcua]\nlisten = "{SERVERS["opcua"]}:{PORTS["opcua"]}"',
+        'no_security = true\nanonymous = "operator"',
         f'[zenoh]\nlisten = ["tcp/{SERVERS["zenoh"]}:{PORTS["zenoh"]}"]',
     ]
     path.write_text("\n".join(text) + "\n", encoding="utf-8")
@@ -210,7 +222,7 @@ def _node(drives: list[Drive]) -> str:
         lines += [
             f'[[bus.node.drive]]\nslot = "{slot}"\nunit_id = {drive.place + 1}',
             f'control = "{drive.protocol}"\nfieldbus_timeout_ms = {FIELDBUS_TIMEOUT_MS}',
-            f"tpdo = {{ event_ms = {TPDO_MS} }}",
+            f"tpdo = {{ event_ms = {TPDO_MS}, inhibit_ms = {INHIBIT_MS} }}",
             f"parameters = {{ {family.parameters} }}" if family.parameters else "",
         ]
     return "\n".join(lines)

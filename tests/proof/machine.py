@@ -54,6 +54,9 @@ class Gateway:
         call("cangw", "-A", *TO_DRIVES)
         call("cangw", "-A", *FROM_DRIVES)
 
+    def close(self) -> None:
+        call("cangw", "-F")
+
     def silence_drives(self) -> None:
         call("cangw", "-D", *FROM_DRIVES)
 

@@ -7,6 +7,7 @@ on its standard input it forks an owner and prints its process id: a killed one 
 from __future__ import annotations
 
 import asyncio
+import importlib
 import os
 import signal
 import sys
@@ -17,7 +18,7 @@ from tests.proof.board import NUMBERS, Board
 from tests.proof.clients import CLIENTS, Client, ClientFault
 from tests.proof.drives import DRIVES, drives_of
 
-PERIOD_S = 0.12
+PERIOD_S = 0.15
 _AGAIN_S = 0.1
 
 
@@ -53,13 +54,7 @@ async def _write(client: Client, protocol: str, board: Board) -> None:
 def main() -> None:
     protocol, path = sys.argv[1:]
     board = Board(Path(path), len(DRIVES))
-    match protocol:
-        case "modbus":
-            import pymodbus.client
-        case "opcua":
-            import asyncua
-        case _:
-            import zenoh
+    importlib.import_module({"modbus": "pymodbus.client", "opcua": "asyncua", "zenoh": "zenoh"}[protocol])
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     print("loaded", flush=True)
     for _ in sys.stdin:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     from tests.proof.drives import Drive
     from tests.proof.rig import Rig
+    from tests.proof.witness import Run
 
-_ACKNOWLEDGE_S: Final = 0.25
+_ACKNOWLEDGE_S: Final = 0.32
 """Two telegrams at the least."""
 _PATIENCE_S: Final = 1.5
 
@@ -52,6 +53,10 @@ class Recovery:
         told, said = self._rig.told.last(drive.rpdo), self._rig.said.last(drive.tpdo)
         return (
             f"{drive.path} ({drive.protocol}) does not move: owner writes {self._word:04X}h, "
-            f"{self._rig.board.accepted(drive.place)} telegrams accepted, the bridge sends "
-            f"{told.data.hex(' ') if told else 'nothing'}, it says {said.data.hex(' ') if said else 'nothing'}"
+            f"{self._rig.board.accepted(drive.place)} telegrams accepted, "
+            f"the bridge sends {_hex(told)}, it says {_hex(said)}"
         )
+
+
+def _hex(run: Run | None) -> str:
+    return run.data.hex(" ") if run else "nothing"

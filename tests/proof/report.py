@@ -25,7 +25,7 @@ class Cell:
     records: tuple[Record, ...]
 
     def _values(self, key: str) -> list[float]:
-        return [float(record[key]) for record in self.records if record[key] is not None]
+        return [float(record[key]) for record in self.records if record.get(key) is not None]
 
     def _triple(self, what: str) -> list[str]:
         values, bounds = self._values(f"{what}_ms"), self._values(f"{what}_bound_ms")
@@ -105,13 +105,16 @@ def markdown(result: dict[str, Any]) -> str:
         f"{result['date']}, {result['machine']}; {result['machines']} at a time, "
         f"{result['rounds']} cycles, {result['seconds'] / 60:.0f} min of them together. Times in ms.",
         "",
-        f"{len(result['samples'])} measurements: {failed} failed, {paused} exceeded a bound by no more than the "
-        f"machine itself stood still meanwhile. {result['by_themselves']} times a drive was found stopped before "
-        "a fault, and "
-        f"{len(result['stopped_in_vain'])} times one was stopped by a fault that did not concern it: the machine "
-        "was too slow for its controllers then.",
+        f"{len(result['samples'])} measurements: {failed} failed, {paused} exceeded a bound by no more than "
+        "the machine itself stood still meanwhile. "
+        f"{result['by_themselves']} times a drive was found stopped before a fault, and "
+        f"{len(result['stopped_in_vain'])} times one was stopped by a fault that did not concern it: the "
+        "machine was too slow for its controllers then.",
         "",
-        *([f"Not possible on this machine: {', '.join(result['faults_missing'])}.", ""] * bool(result["faults_missing"])),
+        *(
+            [f"Not possible on this machine: {', '.join(result['faults_missing'])}.", ""]
+            * bool(result["faults_missing"])
+        ),
         "| " + " | ".join(_HEAD) + " |",
         "|---|---|---|" + "--:|" * 8 + "---|",
         *("| " + " | ".join(row) + " |" for row in table),

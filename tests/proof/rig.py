@@ -21,7 +21,11 @@ from tests.proof.witness import Clock, Witness
 from tests.support.process import REPOSITORY, Process, drivebridge, running
 
 _FRESH_S: Final = 0.35
-_LIMIT_S: Final = 60.0
+_LIMIT_S: Final = 120.0
+_HOUR_S: Final = 3600.0
+_AHEAD: Final = ("nice", "-n", "-5")
+"""The bridge shares one CPU with thirteen drives, their owners and the witness, which elsewhere have their
+own. As in systemd/drivebridge.service it goes first; without the right to do so ``nice`` only says so."""
 
 
 class Stuck(Exception):
@@ -86,8 +90,11 @@ class Rig:
         self._site = write_site(folder / "site.toml", BRIDGE_SIDE, state, run)
         self._drives = write_site(folder / "drives.toml", DRIVE_SIDE, folder / "unused", folder / "unused")
         self.worst_case_ms: dict[Drive, int] = {}
+        """What the bridge publishes: its own bound, and that of a drive without a bridge."""
+        self.worst_case_bridge_ms: dict[Drive, int] = {}
         self.hours = -1
         """Which way the clock was stepped last."""
+        self.noise_ms = 0.0
         self.by_themselves = 0
         """Drives that stood still before a fault: what a slow machine has done."""
         self.stopped_in_vain: list[str] = []
@@ -98,13 +105,16 @@ class Rig:
         return time.monotonic()
 
     def start(self) -> None:
+        self._stack.callback(self._restore)
         self.gateway.open()
         self.told = Witness(BRIDGE_SIDE, [drive.rpdo for drive in DRIVES], self.clock)
         self.heard = Witness(BRIDGE_SIDE, _from_nodes(DRIVES), self.clock)
         self.said = Witness(DRIVE_SIDE, _from_nodes(DRIVES), self.clock)
         for witness in (self.told, self.heard, self.said):
             self._stack.callback(witness.close)
-        watch = running(self.folder, "pauses_log", sys.executable, "-m", "tests.proof.pauses", str(self.pauses))
+        watch = running(
+            self.folder, "pauses_log", sys.executable, "-m", "tests.proof.pauses", str(self.pauses)
+        )
         self._stack.enter_context(watch)
         self.pauses.touch()
         simulate = drivebridge(self.folder, "simulate", "simulate", str(self._drives))
@@ -123,7 +133,8 @@ class Rig:
         """Start the service and wait until all it serves is there."""
         self._starts += 1
         name = f"run_{self._starts}"
-        self.bridge = self._bridges.enter_context(drivebridge(self.disk.folder, name, "run", str(self._site)))
+        command = [*_AHEAD, sys.executable, "-m", "bridge", "run", str(self._site)]
+        self.bridge = self._bridges.enter_context(running(self.disk.folder, name, *command))
         self.bridge.wait_output("OPC UA on", _LIMIT_S)
 
     def kill_bridge(self) -> float:
@@ -156,12 +167,25 @@ class Rig:
 
     def _read_bounds(self) -> None:
         script = str(REPOSITORY / "tests" / "peers" / "zenoh_ask.py")
-        points = [f"drives/proof/{drive.path}/supervision/worst_case_stop_ms=" for drive in DRIVES]
+        leaves = {"worst_case_stop_ms": self.worst_case_ms, "worst_case_bridge_ms": self.worst_case_bridge_ms}
+        points = [f"drives/proof/{drive.path}/supervision/{leaf}=" for drive in DRIVES for leaf in leaves]
         command = [sys.executable, script, f"tcp/{SERVERS['zenoh']}:{PORTS['zenoh']}", *points]
         done = subprocess.run(command, capture_output=True, text=True, check=True)
-        for drive, line in zip(DRIVES, done.stdout.splitlines(), strict=True):
-            [answer] = json.loads(line)
-            self.worst_case_ms[drive] = int(answer["v"])
+        answers = iter(done.stdout.splitlines())
+        for drive in DRIVES:
+            for leaf, bounds in leaves.items():
+                [answer] = json.loads(next(answers))
+                if not answer["v"]:
+                    raise Stuck(f"{drive.path} has no {leaf}: {answer}")
+                bounds[drive] = int(answer["v"])
+
+    def _restore(self) -> None:
+        """The machine as it was."""
+        machine.restore_networks(list(SERVERS.values()))
+        machine.set_link(BRIDGE_SIDE, up=True)
+        self.gateway.close()
+        if self.hours > 0:
+            machine.step_clock(-_HOUR_S)
 
     def mend(self) -> None:
         """Whatever a round that failed has left: everything is as it was at the start."""
@@ -218,4 +242,3 @@ def _from_nodes(drives: Iterable[Drive]) -> list[int]:
     nodes = {drive.node_id for drive in drives}
     tpdos = {drive.tpdo for drive in drives}
     return sorted(tpdos | {base + node for node in nodes for base in (0x080, 0x700)})
-

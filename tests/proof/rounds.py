@@ -39,9 +39,14 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     time.sleep(_HOLD_S)
     restarted = {drive: measure.was_enabled(rig, drive, *times) for drive, times in stopped.items()}
     samples = [_sample(rig, fault, drive, moment, restarted=restarted[drive]) for drive in stopped]
+    for drive, sample in zip(stopped, samples, strict=True):
+        if sample.verdict == "failed":
+            say(f"FAILED: {sample}\n{measure.trace(rig, drive, moment)}")
     missing = [drive for drive in concerned if drive not in stopped and drive not in still]
     if missing:
-        raise Stuck(f"{fault.name}: not stopped: {', '.join(f'{one.path} ({one.protocol})' for one in missing)}")
+        raise Stuck(
+            f"{fault.name}: not stopped: {', '.join(f'{one.path} ({one.protocol})' for one in missing)}"
+        )
     rig.run_all()
     say(f"{fault.name}: {time.monotonic() - began:.1f} s")
     return samples
@@ -62,13 +67,15 @@ def _all_go_on(rig: Rig, drives: list[Drive] | tuple[Drive, ...], fault: Fault, 
     ]
 
 
-def _wait_stopped(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> dict[Drive, tuple[float, float]]:
+def _wait_stopped(
+    rig: Rig, fault: Fault, drives: list[Drive], moment: float
+) -> dict[Drive, tuple[float, float]]:
     """When each drive was stopped for good, on the bus and in itself."""
     stopped: dict[Drive, tuple[float, float]] = {}
     end = time.monotonic() + _STOPPED_S
     while len(stopped) < len(drives) and time.monotonic() < end:
         for drive in drives:
-            bus = measure.bus_stop(rig, drive, moment)
+            bus = measure.bus_stop(rig, drive, moment, silent=fault.leaves_silence)
             own = measure.drive_stop(rig, drive, moment)
             if fault.drive_bound is None:
                 own = measure.boot_up(rig, drive, moment)
@@ -83,7 +90,7 @@ def _wait_talking(rig: Rig, drives: list[Drive]) -> None:
 
 
 def _sample(rig: Rig, fault: Fault, drive: Drive, moment: float, *, restarted: bool) -> Sample:
-    bus = measure.bus_stop(rig, drive, moment)
+    bus = measure.bus_stop(rig, drive, moment, silent=fault.leaves_silence)
     own = measure.drive_stop(rig, drive, moment) if fault.drive_bound else None
     begin, way_ms = moment, None
     if bus is not None and fault.reference == "telegram":
@@ -106,6 +113,7 @@ def _sample(rig: Rig, fault: Fault, drive: Drive, moment: float, *, restarted: b
         drive_bound_ms=fault.drive_bound(rig, drive) if fault.drive_bound else None,
         way_ms=way_ms,
         paused_ms=paused_ms(rig.pauses, begin, end),
+        noise_ms=rig.noise_ms,
         restarted=restarted,
         recovered=True,
     )

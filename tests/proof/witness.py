@@ -24,6 +24,7 @@ _FILTERS: Final = 1
 _EXACT: Final = 0xC000_07FF
 _OLDEST_S: Final = 10.0
 _MOST_RUNS: Final = 20_000
+_MOST_TIMES: Final = 500
 _LOOK_S: Final = 0.03
 """The kernel has stamped and kept the frames: they are fetched together, which costs the machine less."""
 _AS_STAMPED: Final = Stamps(0.0, 0.0, float("inf"))
@@ -64,6 +65,7 @@ class Witness:
 
     def __init__(self, channel: str, can_ids: list[int], clock: Clock) -> None:
         self._tracks: dict[int, deque[Run]] = {can_id: deque(maxlen=_MOST_RUNS) for can_id in can_ids}
+        self._times: dict[int, deque[float]] = {can_id: deque(maxlen=_MOST_TIMES) for can_id in can_ids}
         self._clock = clock
         self._channel = channel
         self._socket = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
@@ -92,7 +94,8 @@ class Witness:
         return self._receiver.drops
 
     def _note(self, can_id: int, data: bytes, at: float) -> None:
-        track = self._tracks[can_id & 0x7FF]
+        self._times[can_id].append(at)
+        track = self._tracks[can_id]
         if track and track[-1].data == data:
             track[-1].last = at
         else:
@@ -101,6 +104,10 @@ class Witness:
     def runs(self, can_id: int, since: float) -> list[Run]:
         """Everything that was seen after ``since``, oldest first, begun or still going on then."""
         return [run for run in list(self._tracks[can_id]) if run.last >= since]
+
+    def last_before(self, can_id: int, moment: float) -> float | None:
+        """When this identifier was seen last before ``moment``, within the last seconds."""
+        return max((at for at in list(self._times[can_id]) if at <= moment), default=None)
 
     def last(self, can_id: int) -> Run | None:
         track = self._tracks[can_id]

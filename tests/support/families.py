@@ -65,12 +65,13 @@ class FamilySite:
         scaled = ", ".join(f"{parameter} = {_PARAMETERS[parameter]}" for parameter in full)
         own = [text for maker, text in _MORE.items() if mapping.startswith(maker)]
         more = [f"unit_id = {node_id}", "telegram_downtime_s = 0", f"parameters = {{ {scaled} }}", *own]
+        kind = "guarding" if mapping.startswith("stoeber/") else "heartbeat"
         return sites.node(
             sites.drive(slot, self.protocol, 20_000, "\n".join(more)),
             name=name,
             node_id=node_id,
             mapping=mapping,
-            more=f'supervision = "{"guarding" if mapping.startswith("stoeber/") else "heartbeat"}"',
+            more=f'supervision = "{kind}"\nsupervision_ms = 2000',
         )
 
 
@@ -172,8 +173,11 @@ class FamilyBridge:
 
     def cut(self) -> None:
         """Nobody hears anybody any more; what is on its way arrives."""
+        self.call(self._cut)
+
+    def _cut(self) -> None:
+        self._wire.cut = True
         self.records = False
-        self.call(lambda: setattr(self._wire, "cut", True))
 
     def start(self) -> None:
         """Until every node is operational and all servers are there."""

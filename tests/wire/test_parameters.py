@@ -172,9 +172,13 @@ def test_modbus_says_what_the_drive_and_the_bridge_refuse(shop: Shop, plc: Modbu
     assert plc.write_registers(place, as_words(1.0) * 2, device_id=1).exception_code == 2
     assert plc.write_register(place, 1, device_id=1).exception_code == 2
     assert plc.read_holding_registers(990, count=20, device_id=1).exception_code == 2
+    memory = shop.map("parameter/p560", "holding register")
+    assert plc.read_holding_registers(memory, count=2, device_id=1).registers == [0, 1]
+    assert plc.write_registers(memory, [0, 11], device_id=1).exception_code == 3
+    # the source of the control word: nobody but an engineer
     source = shop.map("parameter/p509", "holding register")
     assert plc.read_holding_registers(source, count=2, device_id=1).registers == [0, 3]
-    assert plc.write_registers(source, [0, 11], device_id=1).exception_code == 3
+    assert plc.write_registers(source, [0, 0], device_id=1).exception_code == 1
 
 
 def test_modbus_brings_the_drives_abort_code(shop: Shop, plc: ModbusTcpClient) -> None:

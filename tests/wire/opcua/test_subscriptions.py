@@ -17,6 +17,7 @@ from bridge.image import Image, Point, Quality
 from bridge.image.point import DataType
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support.opcua_site import OPEN, LocalView, connected, make_plant, namespace, serving
+from tests.support.rig import emergency
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 Codes = ua.StatusCodes
@@ -227,7 +228,7 @@ class TestEvents:
             told = heard[where] = Told()
             source = client.nodes.server if where == "server" else await node(client, where)
             await (await subscribe(client, told)).subscribe_events(source, kind)
-        view.plant.drives["conveyor/fu1"].channel.on_emcy(0x4310, time.monotonic())
+        view.plant.drives["conveyor/fu1"].channel.on_emcy(emergency(0x4310), time.monotonic())
         for where in ("server", "conveyor", "conveyor/fu1"):
             await heard[where].until(1)
         (event,) = heard["server"].events

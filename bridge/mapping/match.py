@@ -39,9 +39,14 @@ def best_match(found: Found, families: Mapping[str, Family]) -> Match | None:
     best: Match | None = None
     for name in sorted(families, key=lambda name: (not families[name].family.preferred, name)):
         by = _fits(found, families[name].identity)
-        if by and (best is None or len(by) > len(best.by)):
+        if by and (best is None or _weight(by) > _weight(best.by)):
             best = Match(name, by)
     return best
+
+
+def _weight(by: tuple[str, ...]) -> tuple[int, bool]:
+    """A profile that many makers' devices have says less than anything else."""
+    return len(by), by != ("device_type",)
 
 
 def _fits(found: Found, rule: IdentityRule) -> tuple[str, ...]:

@@ -245,3 +245,10 @@ def test_whatever_is_heard_the_scan_ends(heard: list[tuple[int, bytes]]) -> None
     assert set(air.run()) <= {
         can_id - 0x700 for can_id, data in heard if can_id > 0x700 and len(data) == 1
     } | {can_id - 0x580 for can_id, _ in heard}
+
+
+def test_a_name_says_more_than_a_profile() -> None:
+    names = ("cia402/profile-velocity", "nord/sk-tu4-cao")
+    match = best_match(Found(0x10192, device_name="SK TU4-CAO"), {name: load_family(name) for name in names})
+    assert match is not None
+    assert match.mapping == "nord/sk-tu4-cao"

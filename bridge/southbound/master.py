@@ -173,6 +173,10 @@ class Master:
             self._plant.refresh(now)
             for line in self._lines:
                 line.network.refresh(line.bus.status, now)
+        # A process that was stopped since the round began must not send what was right then.
+        self._last_round = now
+        now = self._clock()
+        self._check_gap(now)
         for line in self._lines:
             self._flush(line, now)
             line.bus.on_time(now)

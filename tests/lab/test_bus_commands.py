@@ -90,7 +90,7 @@ def test_scan_finds_a_foreign_slave(tmp_path: Path) -> None:
     with peer(tmp_path, "foreign_slave", "vcan0", "6") as slave:
         slave.wait_output("is there")
         [node] = answer("scan", *DIRECT)
-    assert (node["id"], node["name"], node["mapping"]) == (6, "canopen.LocalNode", None)
+    assert (node["id"], node["name"], node["mapping"]) == (6, "canopen.LocalNode", "cia402/profile-velocity")
     assert node["identity"]["vendor"] == 0x1234
 
 

@@ -36,8 +36,7 @@ async def test_a_pdo_from_the_socket_to_the_image(tmp_path: Path) -> None:
     show("a PDO from the socket to the image", f"{ours_us:6.2f} µs of CPU")
     show("a PDO from the socket to canopen's values", f"{theirs_us:6.2f} µs of CPU")
     show("canopen : ours", f"{ratio:6.2f}")
-    # Four is what was asked for; a user-mode kernel on a busy machine counts foreign time as ours.
-    assert ratio >= 2
+    assert ratio >= 4
 
 
 async def measure_ours(folder: Path) -> float:

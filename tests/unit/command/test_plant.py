@@ -125,10 +125,11 @@ class TestPoints:
     def test_nodes_and_buses_too(self, hall: Hall, name: str):
         assert name in hall.plant.image.index
 
-    def test_only_commands_and_parameters_are_writable(self, hall: Hall):
+    def test_commands_are_writable_and_parameters_but_for_those_the_drive_only_shows(self, hall: Hall):
+        faults = ("/parameter/p700_", "/parameter/p701_")  # P700, P701: information parameters
         for point in hall.plant.image.points:
-            if "/parameter/" not in point.name:
-                assert point.writable is ("/command/" in point.name)
+            parameter = "/parameter/" in point.name and not any(leaf in point.name for leaf in faults)
+            assert point.writable is (parameter or "/command/" in point.name), point.name
 
     def test_a_known_scale_gives_a_range(self, hall: Hall):
         points = {point.name: point for point in hall.plant.image.points}

@@ -191,6 +191,25 @@ def test_a_telegram_from_before_the_hang_saves_no_drive(bench: Bench) -> None:
     assert bench.value("conveyor/fu1/supervision/trips") == 1
 
 
+def test_a_process_stopped_within_a_round_sends_nothing_that_was_right_before(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    running(bench)
+    judge = bench.plant.on_time
+
+    def judge_and_stand_still(now: float) -> None:
+        judge(now)
+        bench.now += 1.0
+
+    bench.log.clear()
+    with monkeypatch.context() as patched:
+        patched.setattr(type(bench.plant), "on_time", lambda _, now: judge_and_stand_still(now))
+        bench.write(control_word=0x047F, setpoint_1=0x2100)
+    bench.run(0.5)
+    assert bench.sent(RPDO1)
+    assert not [frame.data.hex() for frame in bench.sent(RPDO1) if frame.data[0] & 0x0F == 0x0F]
+
+
 def test_the_bus_going_down_loses_all_and_brings_back_stopped_drives(bench: Bench) -> None:
     running(bench)
     bench.bus.status.state = ControllerState.DOWN

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import canopen
 import pytest
 
-from bridge.eds import Description, Entry, read_device_file
+from bridge.eds import Description, read_device_file
 from bridge.eds.pdos import pdos
 from bridge.mapping import family_names, load_family
 from bridge.mapping.loader import mappings_dir
 from bridge.sim.cia402_drive import Cia402Drive
-from bridge.sim.dictionary import Number, Text
+from tests.support.eds_checks import compare_defaults, compare_types_and_access, entries, open_with_canopen
 
 FILE = mappings_dir() / "cia402" / "cia402.eds"
 NODE = 5
 SIMULATED = Cia402Drive(NODE)
+FIND = SIMULATED.objects.find
 FAMILIES = [name for name in family_names() if name.startswith("cia402/")]
 
 
@@ -23,53 +23,21 @@ def description() -> Description:
     return read_device_file(FILE)
 
 
-def simulated(entry: Entry) -> Number | Text:
-    found = SIMULATED.objects.find(entry.index, entry.sub)
-    assert isinstance(found, Number | Text)
-    return found
-
-
 def test_it_has_no_findings(description: Description) -> None:
     assert description.findings == ()
 
 
 def test_canopen_opens_it(description: Description) -> None:
-    other = canopen.import_od(str(FILE), NODE)
-    for one in description.objects:
-        for entry in one.entries:
-            member = other[one.index] if one.object_type == 7 else other[one.index][entry.sub]
-            assert (member.data_type, member.access_type) == (entry.data_type, entry.access), one.name
+    other = open_with_canopen(FILE, description, NODE)
     assert other[0x1400][1].default == 0x205
 
 
 def test_the_simulated_drive_has_every_object_with_the_same_type_and_access(description: Description) -> None:
-    checked = 0
-    for one in description.objects:
-        for entry in one.entries:
-            node = simulated(entry)
-            assert entry.data_type
-            if isinstance(node, Text):
-                assert entry.data_type.name == "VISIBLE_STRING"
-                continue
-            assert node.data_type.name == entry.data_type.name, entry
-            access = (entry.access.readable, entry.access.writable)
-            assert (node.read is not None, node.write is not None) == access, entry
-            assert (node.in_tpdo or node.in_rpdo) == entry.pdo_mappable, entry
-            checked += 1
-    assert checked > 190
+    assert compare_types_and_access(entries(description), FIND) > 190
 
 
 def test_the_defaults_are_those_of_a_fresh_drive(description: Description) -> None:
-    checked = 0
-    for one in description.objects:
-        for entry in one.entries:
-            if entry.default:
-                node = simulated(entry)
-                assert isinstance(node, Number)
-                assert node.read
-                assert node.read() == entry.default.at(NODE), entry
-                checked += 1
-    assert checked > 140
+    assert compare_defaults(entries(description), FIND, NODE) > 140
 
 
 def test_every_object_of_the_drive_is_in_it(description: Description) -> None:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import canopen
 import pytest
 
-from bridge.eds import Description, Entry, read_device_file
+from bridge.eds import Description, read_device_file
 from bridge.eds.pdos import pdos
 from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
 from bridge.sim.dictionary import Number
 from bridge.sim.lenze_motec import LenzeMotec
+from tests.support.eds_checks import compare_defaults, compare_types_and_access, entries, open_with_canopen
 
 FILE = mappings_dir() / "lenze" / "8400-motec.eds"
 FAMILY = load_family("lenze/8400-motec")
 NODE = 5
 SIMULATED = LenzeMotec(NODE)
+FIND = SIMULATED.objects.find
 INTEGERS = {"uint8": "UNSIGNED8", "uint16": "UNSIGNED16", "uint32": "UNSIGNED32", "int32": "INTEGER32"}
 
 
@@ -24,36 +25,21 @@ def description() -> Description:
     return read_device_file(FILE)
 
 
-def simulated(entry: Entry) -> Number:
-    found = SIMULATED.objects.find(entry.index, entry.sub)
-    assert isinstance(found, Number)
-    return found
-
-
 def test_it_has_no_findings(description: Description) -> None:
     assert description.findings == ()
 
 
 def test_canopen_opens_it(description: Description) -> None:
-    other = canopen.import_od(str(FILE), NODE)
-    for one in description.objects:
-        for entry in one.entries:
-            member = other[one.index] if one.object_type == 7 else other[one.index][entry.sub]
-            assert (member.data_type, member.access_type) == (entry.data_type, entry.access), one.name
+    other = open_with_canopen(FILE, description, NODE)
     assert other[0x1401][1].default == 0x40000305
 
 
 def test_the_simulated_node_has_every_object_with_the_same_type_and_access(description: Description) -> None:
-    checked = 0
-    for one in description.objects:
-        for entry in one.entries:
-            node = simulated(entry)
-            assert entry.data_type
-            assert node.data_type.name == entry.data_type.name, entry
-            access = (entry.access.readable, entry.access.writable)
-            assert (node.read is not None, node.write is not None) == access, entry
-            checked += 1
-    assert checked > 150
+    assert compare_types_and_access(entries(description), FIND, static=True) > 150
+
+
+def test_the_defaults_are_those_of_a_fresh_node(description: Description) -> None:
+    assert compare_defaults(entries(description), FIND, NODE) > 100
 
 
 def test_no_object_can_be_mapped(description: Description) -> None:
@@ -61,23 +47,12 @@ def test_no_object_can_be_mapped(description: Description) -> None:
     assert not any(entry.pdo_mappable for one in description.objects for entry in one.entries)
 
 
-def test_the_defaults_are_those_of_a_fresh_node(description: Description) -> None:
-    checked = 0
-    for one in description.objects:
-        for entry in one.entries:
-            if entry.default:
-                node = simulated(entry)
-                assert node.read
-                assert node.read() == entry.default.at(NODE), entry
-                checked += 1
-    assert checked > 100
-
-
 def test_limits_are_those_of_the_simulated_node(description: Description) -> None:
     checked = 0
     for one in description.objects:
         for entry in one.entries:
-            node = simulated(entry)
+            node = FIND(entry.index, entry.sub)
+            assert isinstance(node, Number)
             if entry.index >= 0x2000 and entry.low is not None and node.low is not None:
                 assert (entry.low.at(NODE), entry.high and entry.high.at(NODE)) == (node.low, node.high), (
                     entry

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import canopen
 import pytest
 
 from bridge.eds import Description, Entry, read_device_file
 from bridge.eds.pdos import pdos
 from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
-from bridge.sim.dictionary import Number, Text
 from bridge.sim.nord_node import NordNode
 from bridge.sim.nord_single import NordSingle
 from bridge.sim.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
 from bridge.sim.nord_tu4 import NordTu4
+from tests.support.eds_checks import compare_defaults, compare_types_and_access, entries, open_with_canopen
 
 PROFILE = range(0x6000, 0xA000)
 """In sk-tu4-cao.eds and sk-cu4-cao.eds, though there only with P168 [-01] = 1 (BU 2500 §6.7.3)."""
@@ -52,16 +51,8 @@ def description(name: str) -> Description:
     return read_device_file(path(name))
 
 
-def entries(name: str, description: Description) -> list[Entry]:
-    """Of the objects that a fresh node has."""
-    every = [entry for one in description.objects for entry in one.entries]
-    return [entry for entry in every if not (name in ON_DEMAND and entry.index in PROFILE)]
-
-
-def simulated(name: str, entry: Entry) -> Number | Text:
-    found = NODES[name].slave._dictionary.find(entry.index, entry.sub)
-    assert isinstance(found, Number | Text)
-    return found
+def of_a_fresh_node(name: str, description: Description) -> list[Entry]:
+    return [entry for entry in entries(description) if not (name in ON_DEMAND and entry.index in PROFILE)]
 
 
 def test_every_file_is_looked_at():
@@ -73,42 +64,24 @@ def test_it_has_no_findings(description: Description):
 
 
 def test_canopen_opens_it(name: str, description: Description):
-    other = canopen.import_od(str(path(name)), NODE)
-    for one in description.objects:
-        for entry in one.entries:
-            member = other[one.index] if one.object_type == 7 else other[one.index][entry.sub]
-            assert (member.data_type, member.access_type) == (entry.data_type, entry.access), one.name
+    other = open_with_canopen(path(name), description, NODE)
     assert other[0x1800][1].default == 0x40000185
 
 
 def test_the_simulated_node_has_every_object_with_the_same_type_and_access(
     name: str, description: Description
 ):
-    checked = 0
-    for entry in entries(name, description):
-        node = simulated(name, entry)
-        assert entry.data_type
-        if isinstance(node, Text):
-            assert entry.data_type.name == "VISIBLE_STRING"
-            continue
-        writable = node.write is not None
-        assert node.data_type.name == entry.data_type.name, entry
-        assert (node.read is not None, writable) == (entry.access.readable, entry.access.writable), entry
-        assert (node.in_tpdo or node.in_rpdo) == entry.pdo_mappable, entry
-        checked += 1
-    assert checked > 50
+    find = NODES[name].slave._dictionary.find
+    assert compare_types_and_access(of_a_fresh_node(name, description), find) > 50
 
 
 def test_the_defaults_of_pdos_and_sdos_are_those_of_a_fresh_node(name: str, description: Description):
-    checked = 0
-    for entry in entries(name, description):
-        if entry.default and (0x1200 <= entry.index < 0x1B00 or entry.index in PROFILE):
-            node = simulated(name, entry)
-            assert isinstance(node, Number)
-            assert node.read
-            assert node.read() == entry.default.at(NODE), entry
-            checked += 1
-    assert checked > 20
+    listed = [
+        entry
+        for entry in of_a_fresh_node(name, description)
+        if 0x1200 <= entry.index < 0x1B00 or entry.index in PROFILE
+    ]
+    assert compare_defaults(listed, NODES[name].slave._dictionary.find, NODE) > 20
 
 
 @pytest.mark.parametrize("mapping", MAPPINGS)

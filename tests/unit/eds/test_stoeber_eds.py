@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import canopen
 import pytest
 
-from bridge.eds import Description, Entry, read_device_file
+from bridge.eds import Description, read_device_file
 from bridge.eds.pdos import pdos
 from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
-from bridge.sim.dictionary import Number, Text
 from bridge.sim.stoeber_5000 import Stoeber5000
+from tests.support.eds_checks import compare_defaults, compare_types_and_access, entries, open_with_canopen
 
 FILE = mappings_dir() / "stoeber" / "5000.eds"
 NODE = 5
 SIMULATED = Stoeber5000(NODE, mapped=False)
 """As delivered: no application has mapped anything yet."""
+FIND = SIMULATED.slave._views[0].find
 
 
 @pytest.fixture(scope="module")
@@ -23,53 +23,23 @@ def description() -> Description:
     return read_device_file(FILE)
 
 
-def simulated(entry: Entry) -> Number | Text:
-    found = SIMULATED.slave._views[0].find(entry.index, entry.sub)
-    assert isinstance(found, Number | Text)
-    return found
-
-
 def test_it_has_no_findings(description: Description) -> None:
     assert description.findings == ()
 
 
 def test_canopen_opens_it(description: Description) -> None:
-    other = canopen.import_od(str(FILE), NODE)
-    for one in description.objects:
-        for entry in one.entries:
-            member = other[one.index] if one.object_type == 7 else other[one.index][entry.sub]
-            assert (member.data_type, member.access_type) == (entry.data_type, entry.access), one.name
+    other = open_with_canopen(FILE, description, NODE)
     assert other[0x1201][1].default == 0x80000625
 
 
 def test_the_simulated_drive_has_every_object_with_the_same_type_and_access(description: Description) -> None:
-    checked = 0
-    for one in description.objects:
-        for entry in one.entries:
-            node = simulated(entry)
-            assert entry.data_type
-            if isinstance(node, Text):
-                assert entry.data_type.name == "VISIBLE_STRING"
-                continue
-            assert node.data_type.name == entry.data_type.name, entry
-            access = (entry.access.readable, entry.access.writable)
-            assert (node.read is not None, node.write is not None) == access, entry
-            assert (node.in_tpdo or node.in_rpdo) == entry.pdo_mappable, entry
-            checked += 1
-    assert checked > 150
+    assert compare_types_and_access(entries(description), FIND) > 150
 
 
 def test_the_defaults_are_those_of_a_fresh_drive(description: Description) -> None:
-    checked = 0
-    for one in description.objects:
-        for entry in one.entries:
-            if entry.default and entry.index >= 0x1005:
-                node = simulated(entry)
-                assert isinstance(node, Number)
-                assert node.read
-                assert node.read() == entry.default.at(NODE), entry
-                checked += 1
-    assert checked > 80
+    assert (
+        compare_defaults([entry for entry in entries(description) if entry.index >= 0x1005], FIND, NODE) > 80
+    )
 
 
 def test_a_drive_as_delivered_maps_nothing(description: Description) -> None:

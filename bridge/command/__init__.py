@@ -1,5 +1,6 @@
 """Who may command which drive, what is sent to it, and what happens when the controller falls silent."""
 
+from bridge.command.audit import Rejection
 from bridge.command.drive import Drive, Identification
 from bridge.command.event import Event, Kind
 from bridge.command.plant import Node, Plant
@@ -16,6 +17,7 @@ __all__ = [
     "Node",
     "Outcome",
     "Plant",
+    "Rejection",
     "Reply",
     "Request",
     "Role",

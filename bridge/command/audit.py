@@ -25,6 +25,21 @@ _READS: Final = "read_"
 """Actions that only read begin with it."""
 
 
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """A write or command that a protocol has refused by itself, so that it never became a request.
+
+    ``code`` is one of the outcomes' where one says it, ``target`` what was addressed, as far as it is known.
+    """
+
+    identity: Identity
+    target: str
+    action: str
+    code: str
+    message: str
+    values: Values = field(default_factory=dict[str, Value])
+
+
 class Ending(NamedTuple):
     """An outcome, or what a protocol says that it has refused by itself."""
 
@@ -107,10 +122,12 @@ class AuditTrail:
 
         return conclude
 
-    def refused(self, identity: Identity, target: str, code: str, why: str, now: float) -> None:
-        """A protocol has refused by itself a write that never became a request."""
+    def rejected(self, rejection: Rejection, now: float, count: int = 1) -> None:
+        """``count`` of this kind, the last of them ``now``."""
         if self.tell is not None:
-            self._note(Entry(now, identity, target, Action.WRITE, Ending(code, why)))
+            who, ending = rejection.identity, Ending(rejection.code, rejection.message)
+            new = rejection.values
+            self._note(Entry(now, who, rejection.target, rejection.action, ending, new=new, count=count))
 
     def _held(self, request: Request) -> Values:
         """What the points hold that ``request`` is about to change."""
@@ -193,7 +210,7 @@ class AuditTrail:
             others.told += 1
             self._tell(entry)
         else:
-            others.left_out += 1
+            others.left_out += entry.count
             others.last = entry
 
     def on_time(self, now: float) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Final, Protocol
 
-from bridge.command.audit import AuditTrail
+from bridge.command.audit import AuditTrail, Rejection
 from bridge.command.deadlines import Deadlines
 from bridge.command.drive import Drive
 from bridge.command.event import Event, EventGate, Kind
@@ -22,6 +22,7 @@ from bridge.command.request import (
     STOP_ACTIONS,
     Action,
     Code,
+    Identity,
     Outcome,
     Reply,
     Request,
@@ -62,6 +63,8 @@ class Node:
         return self.table.name
 
 
+_LONGEST_NAME: Final = 80
+"""Clients may call anything a drive."""
 _BRINGS_TIMERS_FORWARD: Final = (Action.SET_TIMEOUT, Action.TAKE_CONTROL)
 
 
@@ -89,7 +92,7 @@ class Plant:
         self._deadlines = Deadlines(self._next_of_drives)
         self._listeners: list[Callable[[Event], None]] = []
         self._gate = EventGate()
-        self._refused_by_nodes = 0
+        self._refused_by_others = 0
         self._is_closing = False
         points = bridge_points()
         units = _unit_ids(site)
@@ -181,15 +184,29 @@ class Plant:
             if drive.channel.output != before or request.action in _BRINGS_TIMERS_FORWARD:
                 self.outputs_changed()
 
+    def rejected(self, rejection: Rejection, now: float, count: int = 1) -> None:
+        """What a protocol has refused by itself, ``count`` times: counted, told and written to the audit log
+        as what a drive refuses."""
+        self.audit.rejected(rejection, now, count)
+        target = rejection.target
+        is_known = target in self.drives or target in self.nodes
+        what = rejection.action if is_known else f"{rejection.action} on {target[:_LONGEST_NAME]!r}"
+        source = target if is_known else "bridge"
+        self._tell_refusal(what, rejection.identity, source, rejection.message, now, count)
+
+    def _tell_refusal(
+        self, what: str, identity: Identity, source: str, why: str, now: float, count: int = 1
+    ) -> None:
+        self._refused_by_others += count
+        self.report(Event(now, Kind.REFUSED, source, 300, f"{what} by {identity} refused: {why}"))
+
     def _telling(self, request: Request, now: float, reply: Reply) -> Reply:
         """``reply`` for a command on nodes, whose refusal is an event and counts as one of a drive does."""
 
         def conclude(outcome: Outcome) -> None:
             if not outcome.ok:
-                self._refused_by_nodes += 1
-                message = f"{request.action} by {request.identity} refused: {outcome.message}"
                 source = request.target.removeprefix("bus/")
-                self.report(Event(now, Kind.REFUSED, source, 300, message))
+                self._tell_refusal(request.action, request.identity, source, outcome.message, now)
             reply(outcome)
 
         return conclude
@@ -210,7 +227,7 @@ class Plant:
         good = sum(drive.quality is Quality.GOOD for drive in self.drives.values())
         self.set("bridge/drives_good", good, now)
         refused = sum(drive.channel.refused_writes for drive in self.drives.values())
-        self.set("bridge/refused_writes", refused + self._refused_by_nodes, now)
+        self.set("bridge/refused_writes", refused + self._refused_by_others, now)
 
     def _settled(self, node: Node, drive: Drive, now: float) -> None:
         """Something about a drive has changed: show it, and with it the node's 102.0.

@@ -8,11 +8,12 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from bridge.command import Code, Event, Outcome, Request
+from bridge.command import Code, Event, Outcome, Rejection, Request
 from bridge.errors import OperationFailed
 from bridge.image import Image, Quality
 from bridge.mirror import protocol
 from bridge.mirror.protocol import Asked, Changed, Delta, Malformed, Snapshot
+from bridge.mirror.rejections import Rejections
 from bridge.zenohlink import Message, ZenohLink, zenoh_config
 
 _log = logging.getLogger(__name__)
@@ -52,6 +53,7 @@ class MirrorClient:
         self._is_dead = False
         self._points_changed = False
         self._listeners: list[Callable[[Event], None]] = []
+        self._rejections = Rejections()
 
     # what a northbound sees
 
@@ -85,6 +87,14 @@ class MirrorClient:
                 except Malformed as error:
                     self._count_malformed(error)
         return Outcome(Code.TIMED_OUT, "the bus process did not answer", forwarded=False)
+
+    def rejected(self, rejection: Rejection) -> None:
+        """Told to the bus process within 0.1 s. While that is away nobody keeps a log, and it is lost."""
+        self._rejections.add(rejection, self._clock())
+
+    def _tell_rejections(self) -> None:
+        for rejected in self._rejections.take():
+            self._link.send(Message(protocol.REJECTED, protocol.encode(rejected)))
 
     # life
 
@@ -124,6 +134,7 @@ class MirrorClient:
         while True:
             if self._clock() - self._last_sign > SILENCE_S:
                 self._mark_dead()
+            self._tell_rejections()
             await asyncio.sleep(_LOOK_EVERY_S)
 
     async def close(self) -> None:

@@ -1,7 +1,7 @@
 """What goes over the link between the bus process and its fronts, in MessagePack. Pure.
 
-Times are ns since 1970 UTC, except a request's deadline, which is in seconds of the monotonic clock:
-both ends run on one machine, and a stepped wall clock must not make a request old.
+Times are ns since 1970 UTC, except those in ``Asked`` and ``Rejected``, which are in seconds of the
+monotonic clock: both ends run on one machine, and a stepped wall clock must not make a request old.
 """
 
 from __future__ import annotations
@@ -10,13 +10,14 @@ from typing import Final, TypeVar
 
 import msgspec
 
-from bridge.command import Event, Kind, Outcome, Request
+from bridge.command import Event, Kind, Outcome, Rejection, Request
 from bridge.image import Point, Quality, Reading, Value
 
 SNAPSHOT: Final = "mirror/snapshot"
 DELTA: Final = "mirror/delta"
 EVENT: Final = "mirror/event"
 REQUEST: Final = "mirror/request"
+REJECTED: Final = "mirror/rejected"
 TOKEN: Final = "mirror/@/bus"
 
 _Model = TypeVar("_Model")
@@ -83,15 +84,24 @@ class Asked(msgspec.Struct, array_like=True, frozen=True):
     request: Request
 
 
+class Rejected(msgspec.Struct, array_like=True, frozen=True):
+    """What a front has refused by itself, ``count`` times since it last said so."""
+
+    time_s: float
+    count: int
+    rejection: Rejection
+
+
 _encoder = msgspec.msgpack.Encoder()
 _snapshot = msgspec.msgpack.Decoder(Snapshot)
 _delta = msgspec.msgpack.Decoder(Delta)
 _told = msgspec.msgpack.Decoder(Told)
 _asked = msgspec.msgpack.Decoder(Asked)
 _outcome = msgspec.msgpack.Decoder(Outcome)
+_rejected = msgspec.msgpack.Decoder(Rejected)
 
 
-def encode(message: Snapshot | Delta | Told | Asked | Outcome) -> bytes:
+def encode(message: Snapshot | Delta | Told | Asked | Rejected | Outcome) -> bytes:
     return _encoder.encode(message)
 
 
@@ -115,6 +125,10 @@ def decode_event(data: bytes) -> Event:
 
 def decode_request(data: bytes) -> Asked:
     return _decode(_asked, data)
+
+
+def decode_rejected(data: bytes) -> Rejected:
+    return _decode(_rejected, data)
 
 
 def decode_outcome(data: bytes) -> Outcome:

@@ -40,7 +40,7 @@ class MirrorPublisher:
         period_s: float = 0.01,
     ) -> None:
         self.malformed = 0
-        """Requests that could not be read."""
+        """Messages of fronts that could not be read."""
         self._plant = plant
         self._endpoint = endpoint
         self._clock = clock
@@ -64,6 +64,7 @@ class MirrorPublisher:
         close_to_others(self._endpoint)
         self._link.declare_queryable(protocol.SNAPSHOT, self._on_snapshot)
         self._link.declare_queryable(protocol.REQUEST, self._on_request)
+        self._link.declare_subscriber(protocol.REJECTED, self._on_rejected)
         self._link.declare_token(protocol.TOKEN)
         self._plant.on_event(self._on_event)
         self._tick()
@@ -128,6 +129,14 @@ class MirrorPublisher:
         snapshot = Snapshot(self._instance, sequence, points, tuple(readings))
         asked.send([Message(protocol.SNAPSHOT, protocol.encode(snapshot))])
         asked.finish()
+
+    def _on_rejected(self, message: Message) -> None:
+        try:
+            told = protocol.decode_rejected(message.payload)
+        except Malformed:
+            self.malformed += 1
+            return
+        self._plant.rejected(told.rejection, told.time_s, told.count)
 
     def _on_request(self, asked: Asked) -> None:
         def reply(outcome: Outcome) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from bridge.command import Event, Outcome, Request
+from bridge.command import Event, Outcome, Rejection, Request
 from bridge.image import Image
 
 
@@ -20,5 +20,9 @@ class View(Protocol):
         ...
 
     async def request(self, request: Request) -> Outcome: ...
+
+    def rejected(self, rejection: Rejection) -> None:
+        """Say that the server has refused something by itself; it is answered already."""
+        ...
 
     def on_event(self, listener: Callable[[Event], None]) -> None: ...

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from asyncua import Client, ua
 
-from bridge.command import Event, Identification, Outcome, Plant, Request, Role
+from bridge.command import Event, Identification, Outcome, Plant, Rejection, Request, Role
 from bridge.command.link import NodeState
 from bridge.command.request import DONE, Code, Reply
 from bridge.config import OpcUaTable
@@ -49,7 +49,8 @@ def make_plant() -> Plant:
 
 
 class LocalView:
-    """A ``View`` on a plant of this process; ``requests`` keeps what was asked.
+    """A ``View`` on a plant of this process; ``requests`` and ``rejections`` keep what was
+    asked.
 
     With ``answers`` False the drives say nothing to what they are sent.
     """
@@ -57,6 +58,7 @@ class LocalView:
     def __init__(self, plant: Plant) -> None:
         self.plant = plant
         self.requests: list[Request] = []
+        self.rejections: list[Rejection] = []
         self.answers = True
         self._offset_ns = time.time_ns() - time.monotonic_ns()
         for node in plant.nodes.values():
@@ -83,6 +85,10 @@ class LocalView:
 
         self.plant.submit(request, time.monotonic(), reply)
         return await outcome
+
+    def rejected(self, rejection: Rejection) -> None:
+        self.rejections.append(rejection)
+        self.plant.rejected(rejection, time.monotonic())
 
     def _node_command(self, request: Request, now: float, reply: Reply) -> None:
         allowed = request.identity.role >= Role.OPERATOR

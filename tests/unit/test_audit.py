@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from bridge.cli.app import app
 from tests.support import sites
+from tests.support.process import REPOSITORY
 
 ACCEPTED = 'accepts = { runs_on = "a fan, which may turn" }'
 
@@ -41,6 +42,15 @@ def test_lenzes_factory_setting_is_an_error_that_says_what_to_set(tmp_path):
         'type = "uint8"',
         "value = 1",
     ]
+
+
+def test_the_demo_shows_what_a_drive_as_delivered_does():
+    done = call("audit", str(REPOSITORY / "bridge" / "demo" / "site.toml"), "--json")
+    answer = json.loads(done.stdout)
+    verdicts = {drive["drive"]: drive["verdict"] for drive in answer["drives"]}
+    assert {name for name, verdict in verdicts.items() if verdict != "stops"} == {"pump/drive"}
+    assert verdicts["pump/drive"] == "runs on"
+    assert (done.exit_code, answer["ok"]) == (1, False)
 
 
 def test_what_it_says_to_set_makes_it_content(tmp_path):

@@ -174,6 +174,9 @@ async def test_a_drive_never_sees_a_mix(tmp_path: Path) -> None:
     async with arena(tmp_path) as a:
         assert (await a.modbus.write_register(999, 1, device_id=1)).isError()
         assert not (await a.zenoh.command("drives/hall/conveyor/fu1/command", "no JSON", "robot"))["ok"]
+        shown = ua.NodeId("conveyor/fu1/status/status_word", await namespace(a.opcua))
+        assert all(await write_all(a.opcua, [write_value(shown, word(1))] * 3))
+        assert await call(a.opcua, "conveyor/fu1", "conveyor/fu1/Start", [])
         assert await a.write_modbus("conveyor/fu1", PAIRS[Source.MODBUS][0])
         a.forget()
         fixed = await asyncio.gather(
@@ -203,7 +206,12 @@ async def test_a_drive_never_sees_a_mix(tmp_path: Path) -> None:
         *((source.label, code) for source in PAIRS for code in ("ok", "not_allowed")),
         ("modbus", "unknown_point"),
         ("zenoh", "malformed"),
+        ("opcua", "read_only"),
+        ("opcua", "not_valid"),
     }
+    (read_only,) = [line for line in a.audit() if line["code"] == "read_only"]
+    assert read_only["target"] == "conveyor/fu1"
+    assert (read_only["count"], read_only["new"]) == (3, {"status_word": 1})
     refused = [line for line in a.audit() if line["code"] == "not_allowed"]
     expected = fixed[1][False] + fixed[2][False] + sum(outcomes[False] for outcomes in leased)
     assert sum(line.get("count", 1) for line in refused if line["action"] == "write") == expected

@@ -6,7 +6,7 @@ import unicodedata
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from bridge.command import Code, Identity, Outcome, Plant, Request
+from bridge.command import Action, Code, Identity, Outcome, Plant, Rejection, Request
 from bridge.config import WordOrder
 from bridge.northbound.modbus.drive_unit import DriveUnit
 from bridge.northbound.modbus.pdu import (
@@ -115,7 +115,8 @@ class Dispatcher:
         drive = self._plant.by_unit.get(unit_id)
         target = drive.name if drive else f"unit {unit_id}"
         message = f"function {function} refused with exception {code.value:02X}h"
-        self._plant.audit.refused(caller, target, _CODES.get(code, Code.NOT_READY), message, self._clock())
+        ending = _CODES.get(code, Code.NOT_READY)
+        self._plant.rejected(Rejection(caller, target, Action.WRITE, ending, message), self._clock())
 
     def _read(
         self, unit: Unit, request: ReadWords | ReadBits | Identify | Loopback, caller: Identity

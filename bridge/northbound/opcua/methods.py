@@ -13,7 +13,13 @@ from bridge.command.request import PARAMETER_ACTIONS, Action, Code, Identity, Re
 from bridge.image import Value
 from bridge.northbound.opcua.library import AttributeIds, StatusCodes, get, make, status, ua
 from bridge.northbound.opcua.nodes import Argument, ArgumentType, MethodNode
-from bridge.northbound.opcua.values import INTEGER_TYPES, outcome_status, plain_value, plain_variant
+from bridge.northbound.opcua.values import (
+    INTEGER_TYPES,
+    outcome_status,
+    plain_value,
+    plain_variant,
+    rejection,
+)
 from bridge.northbound.opcua.writes import ask
 from bridge.northbound.view import View
 
@@ -45,18 +51,19 @@ class Caller:
 
     async def _call(self, identity: Identity, call: ua.CallMethodRequest) -> ua.CallMethodResult:
         method_id: ua.NodeId = get(call, "MethodId")
+        method = self._methods.get(method_id)
         refusal = self._refusal(call, method_id)
-        if refusal is not None:
-            return _result(refusal)
-        method = self._methods[method_id]
+        if refusal is not None or method is None:
+            return self._rejected(identity, call, refusal or StatusCodes.BadMethodInvalid)
         given: list[ua.Variant] = get(call, "InputArguments") or []
         if len(given) != len(method.arguments):
             few = len(given) < len(method.arguments)
-            return _result(StatusCodes.BadArgumentsMissing if few else StatusCodes.BadTooManyArguments)
+            code = StatusCodes.BadArgumentsMissing if few else StatusCodes.BadTooManyArguments
+            return self._rejected(identity, call, code)
         checked = [_argument(method, *pair) for pair in zip(method.arguments, given, strict=True)]
         faults = [one.code if isinstance(one, _Fault) else StatusCodes.Good for one in checked]
         if any(faults):
-            return _result(StatusCodes.BadInvalidArgument, faults)
+            return self._rejected(identity, call, StatusCodes.BadInvalidArgument, faults)
         values = [one for one in checked if not isinstance(one, _Fault)]
         outcome = await ask(self._view, _request(identity, method, values))
         place = _AT_FAULT.get(outcome.code) if method.action in PARAMETER_ACTIONS else None
@@ -65,6 +72,17 @@ class Caller:
             return _result(StatusCodes.BadInvalidArgument, faults)
         results = [] if outcome.value is None or not method.results else [plain_variant(outcome.value)]
         return _result(outcome_status(outcome).value, faults, results)
+
+    def _rejected(
+        self, identity: Identity, call: ua.CallMethodRequest, code: int, faults: Sequence[int] = ()
+    ) -> ua.CallMethodResult:
+        """The result of a call that becomes no request, once it was told."""
+        method = self._methods.get(get(call, "MethodId"))
+        action = method.action if method else "call"
+        target = method.target if method else str(get(call, "ObjectId").Identifier)
+        if action != Action.READ_PARAMETER:
+            self._view.rejected(rejection(identity, target, action, code, {}))
+        return _result(code, faults)
 
     def _refusal(self, call: ua.CallMethodRequest, method_id: ua.NodeId) -> int | None:
         node = self._space.get(method_id)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Final
 
-from bridge.command.request import Code, Outcome
+from bridge.command import Rejection
+from bridge.command.request import Code, Identity, Outcome
 from bridge.image import DataType, Point, Quality, Reading, Value
 from bridge.northbound.opcua.library import GOOD, StatusCodes, data_value, status, ua, variant
 
@@ -41,6 +43,16 @@ OUTCOME_STATUS: Final = {
     Code.TOO_OFTEN: StatusCodes.BadRequestNotAllowed,
     Code.REFUSED_BY_DRIVE: StatusCodes.BadDeviceFailure,
 }
+
+_REJECTION_CODE: Final = {
+    StatusCodes.BadNodeIdUnknown: Code.UNKNOWN_POINT,
+    StatusCodes.BadAttributeIdInvalid: Code.UNKNOWN_POINT,
+    StatusCodes.BadMethodInvalid: Code.UNKNOWN_POINT,
+    StatusCodes.BadNotWritable: Code.READ_ONLY,
+    StatusCodes.BadNotExecutable: Code.NOT_CONFIGURED,
+    StatusCodes.BadOutOfRange: Code.OUT_OF_RANGE,
+}
+"""Outcomes that say what the server itself refuses; all else is ``NOT_VALID``."""
 
 VARIANT_TYPE: Final = {
     DataType.BOOL: ua.VariantType.Boolean,
@@ -93,6 +105,14 @@ def outcome_status(outcome: Outcome) -> ua.StatusCode:
     if outcome.code is Code.REFUSED_BY_DRIVE:
         code = ABORT_STATUS.get(outcome.abort_code, code)
     return status(code)
+
+
+def rejection(
+    identity: Identity, target: str, action: str, code: int, values: Mapping[str, Value]
+) -> Rejection:
+    """For the audit log: a write or call that the server has answered with ``code`` by itself."""
+    ending = _REJECTION_CODE.get(code, Code.NOT_VALID)
+    return Rejection(identity, target, action, ending, status(code).name, dict(values))
 
 
 def source_time(epoch_ns: int) -> datetime:

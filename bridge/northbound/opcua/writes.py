@@ -11,7 +11,7 @@ import asyncio
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import ClassVar, Final
 
 from asyncua.server.address_space import AddressSpace
 
@@ -19,7 +19,7 @@ from bridge.command.request import Action, Code, Identity, Outcome, Request
 from bridge.image import Value
 from bridge.northbound.opcua.library import GOOD, AttributeIds, StatusCodes, get, status, ua
 from bridge.northbound.opcua.nodes import VariableNode
-from bridge.northbound.opcua.values import outcome_status, point_value
+from bridge.northbound.opcua.values import outcome_status, plain_value, point_value, rejection
 from bridge.northbound.view import View
 
 _log = logging.getLogger(__name__)
@@ -33,9 +33,12 @@ class _Telegram:
     """What one drive is told. ``places`` are the positions in the call that it answers."""
 
     target: str
+    action: ClassVar[Action] = Action.WRITE
     values: dict[str, Value] = field(default_factory=dict[str, Value])
     places: list[int] = field(default_factory=list[int])
     fault: int = StatusCodes.Good
+    misfits: dict[str, Value] = field(default_factory=dict[str, Value])
+    """What was written that is the fault, as far as it is a value at all."""
 
     def request(self, identity: Identity) -> Request:
         return Request(identity, self.target, Action.WRITE, self.values)
@@ -44,6 +47,8 @@ class _Telegram:
 @dataclass(slots=True)
 class _Parameter(_Telegram):
     """One parameter that is written: a request of its own, which the drive answers."""
+
+    action: ClassVar[Action] = Action.WRITE_PARAMETER
 
     def request(self, identity: Identity) -> Request:
         ((name, value),) = self.values.items()
@@ -76,7 +81,9 @@ class Writer:
         for place, write in enumerate(writes):
             node = self._writable.get(get(write, "NodeId"))
             if node is None or get(write, "AttributeId") != AttributeIds.Value:
-                results[place] = status(self._refusal(write))
+                code = self._refusal(write)
+                results[place] = status(code)
+                self._reject(identity, write, code)
                 continue
             owner, _, leaf = node.point.name.rpartition("/")
             target, _, group = owner.rpartition("/")
@@ -92,6 +99,7 @@ class Writer:
             value = _value(node, write)
             if isinstance(value, _Refusal):
                 telegram.fault = telegram.fault or value.code
+                telegram.misfits |= _shown(leaf, write)
             else:
                 telegram.values[leaf] = value
         by_drive: dict[str, list[_Telegram]] = {}
@@ -109,8 +117,20 @@ class Writer:
             code = status(telegram.fault)
             if code.is_good():
                 code = outcome_status(await ask(self._view, telegram.request(identity)))
+            else:
+                values = telegram.values | telegram.misfits
+                told = rejection(identity, telegram.target, telegram.action, code.value, values)
+                self._view.rejected(told)
             for place in telegram.places:
                 results[place] = code
+
+    def _reject(self, identity: Identity, write: ua.WriteValue, code: int) -> None:
+        """Tell of a write that is none to any command point."""
+        name = str(get(write, "NodeId").Identifier)
+        node_name, _, rest = name.partition("/")
+        drive, _, point = rest.partition("/")
+        target, leaf = (f"{node_name}/{drive}", point.rpartition("/")[2]) if point else (name, "")
+        self._view.rejected(rejection(identity, target, Action.WRITE, code, _shown(leaf, write)))
 
     def _refusal(self, write: ua.WriteValue) -> int:
         """Why this cannot be written by anyone."""
@@ -120,6 +140,15 @@ class Writer:
         if get(write, "AttributeId") not in node.attributes:
             return StatusCodes.BadAttributeIdInvalid
         return StatusCodes.BadNotWritable
+
+
+def _shown(leaf: str, write: ua.WriteValue) -> dict[str, Value]:
+    """What was written, where it is a single value."""
+    written: ua.DataValue = get(write, "Value")
+    try:
+        return {} if written.Value is None else {leaf: plain_value(written.Value)}
+    except TypeError:
+        return {}
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from typing import Final
 
 import zenoh
 
-from bridge.command import Code, Event, Identity, Outcome, Plant
+from bridge.command import Action, Code, Event, Identity, Outcome, Plant, Rejection
 from bridge.command.link import NodeState
 from bridge.config import ZenohTable
 from bridge.errors import Unavailable
@@ -209,7 +209,7 @@ class ZenohServer:
             identity = identity_of(attachment)
         except BadCommand:
             identity = identity_of(None)
-        self._plant.audit.refused(identity, tail, bad.code, bad.message, self._clock())
+        self._plant.rejected(Rejection(identity, tail, Action.WRITE, bad.code, bad.message), self._clock())
 
     def _on_put(self, message: Message) -> None:
         """A plain put on a command key, where the site takes them. Nobody is there to be told."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Request, Source
+from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Rejection, Request, Source
 from bridge.command.audit import SUMMARY_S, Entry
 from bridge.command.link import NodeState
 from bridge.image import Value
@@ -138,6 +138,19 @@ def test_a_refused_command_of_a_node_is_an_event_and_counts(hall: Hall) -> None:
     assert (event.source, event.message) == ("conveyor", "reset by opcua:guest refused: may only read")
     hall.plant.refresh(hall.now)
     assert hall.plant.image.read("bridge/refused_writes").value == 1
+
+
+def test_what_a_protocol_refuses_by_itself_is_told_as_an_event_and_counts(hall: Hall) -> None:
+    hall.plant.rejected(Rejection(OBSERVER, FU1, Action.WRITE, Code.READ_ONLY, "BadNotWritable"), hall.now, 3)
+    hall.plant.rejected(Rejection(OBSERVER, "attic/fu9", "call", Code.UNKNOWN_POINT, "no such"), hall.now)
+    assert hall.told() == [("write", "read_only", 3), ("call", "unknown_point", 1)]
+    events = [(event.source, event.message) for event in hall.events if event.kind is Kind.REFUSED]
+    assert events == [
+        (FU1, "write by opcua:guest refused: BadNotWritable"),
+        ("bridge", "call on 'attic/fu9' by opcua:guest refused: no such"),
+    ]
+    hall.plant.refresh(hall.now)
+    assert hall.plant.image.read("bridge/refused_writes").value == 4
 
 
 def test_without_a_listener_nothing_is_followed(hall: Hall) -> None:

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Request, Role, Source
+from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Rejection, Request, Role, Source
 from bridge.errors import Unavailable
 from bridge.image import DataType, Point, Quality
 from bridge.mirror import protocol, socket_endpoint
 from bridge.mirror.endpoint import prepare_folder
-from bridge.mirror.protocol import Asked, Changed, Delta, Malformed, Snapshot, Told
+from bridge.mirror.protocol import Asked, Changed, Delta, Malformed, Rejected, Snapshot, Told
 from tests.support.zenoh_site import make_plant
 
 values = st.booleans() | st.integers(-(2**31), 2**32 - 1) | st.floats(allow_nan=False) | st.text(max_size=20)
@@ -49,6 +49,12 @@ def test_deltas_read_back(readings: list[Changed]) -> None:
 @given(requests, st.floats(0, 1e9))
 def test_requests_read_back_with_their_identity(request: Request, deadline: float) -> None:
     assert protocol.decode_request(protocol.encode(Asked(deadline, request))) == Asked(deadline, request)
+
+
+@given(identities, st.text(max_size=20), st.dictionaries(st.text(max_size=10), values, max_size=4))
+def test_rejections_read_back(identity: Identity, target: str, written: dict[str, bool | int | float | str]):
+    told = Rejected(12.5, 3, Rejection(identity, target, Action.WRITE, Code.READ_ONLY, "why", written))
+    assert protocol.decode_rejected(protocol.encode(told)) == told
 
 
 @given(st.builds(Outcome, st.sampled_from(Code), st.text(), st.booleans()))

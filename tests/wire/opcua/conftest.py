@@ -27,4 +27,5 @@ async def client(served: tuple[OpcUaServer, LocalView]) -> AsyncIterator[Client]
 @pytest.fixture
 def view(served: tuple[OpcUaServer, LocalView]) -> LocalView:
     served[1].requests.clear()
+    served[1].rejections.clear()
     return served[1]

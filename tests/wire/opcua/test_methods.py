@@ -107,11 +107,15 @@ class TestMethods:
     ) -> None:
         assert await call(client, "conveyor/fu1", "conveyor/fu1/Start", arguments) == code
         assert view.requests == []
+        (told,) = view.rejections
+        assert (told.target, told.action, told.code) == ("conveyor/fu1", "start", "not_valid")
 
     async def test_a_method_belongs_to_its_object(self, client: Client, view: LocalView) -> None:
         assert await call(client, "conveyor/fu1", "conveyor/fu2/Stop", []) == Codes.BadMethodInvalid
         assert await call(client, "conveyor/fu1", "conveyor/fu1/Fly", []) == Codes.BadNodeIdUnknown
         assert view.requests == []
+        told = [(one.target, one.action, one.code) for one in view.rejections]
+        assert told == [("conveyor/fu2", "stop", "unknown_point"), ("conveyor/fu1", "call", "unknown_point")]
 
     async def test_a_start_that_takes_long_holds_nobody_up(self, client: Client, view: LocalView) -> None:
         """Not even the session that called it: its keep-alives are what keeps the drive going."""

@@ -196,6 +196,10 @@ class TestWrites:
         wrong = ua.Variant("fast", ua.VariantType.String)
         assert await write(client, control_word=word(0x047F), frequency=wrong) == [Codes.BadTypeMismatch] * 2
         assert view.requests == []
+        (told,) = view.rejections
+        assert (told.target, told.action, told.code) == ("conveyor/fu1", "write", "not_valid")
+        assert told.message == "BadTypeMismatch"
+        assert told.values == {"control_word": 0x047F, "frequency": "fast"}
 
     @pytest.mark.parametrize(
         ("name", "attribute", "code"),
@@ -220,6 +224,9 @@ class TestWrites:
         wanted = ua.WriteValue(NodeId=where, AttributeId=attribute, Value=ua.DataValue(word(1)))
         assert await write_all(client, [wanted]) == [code]
         assert view.requests == []
+        (told,) = view.rejections
+        assert told.target == "/".join(name.split("/")[:2])
+        assert told.values == {name.rpartition("/")[2]: 1}
 
     async def test_a_client_sets_neither_status_nor_server_time_nor_a_part(self, client: Client) -> None:
         uncertain = ua.DataValue(word(0x047E), ua.StatusCode(Codes.UncertainLastUsableValue))

@@ -1,0 +1,31 @@
+"""Rejections of a front: however many there are, few are told."""
+
+from __future__ import annotations
+
+from bridge.command import Action, Code, Identity, Rejection, Source
+from bridge.mirror.rejections import Rejections
+
+GUEST = Identity(Source.OPCUA, "guest")
+
+
+def rejection(target: str = "conveyor/fu1", value: int = 1) -> Rejection:
+    return Rejection(GUEST, target, Action.WRITE, Code.READ_ONLY, "BadNotWritable", {"status_word": value})
+
+
+def test_those_of_one_kind_are_told_once_with_the_last_of_them() -> None:
+    waiting = Rejections()
+    for value in range(5):
+        waiting.add(rejection(value=value), 10.0 + value)
+    (told,) = waiting.take()
+    assert (told.time_s, told.count) == (14.0, 5)
+    assert told.rejection.values == {"status_word": 4}
+    assert waiting.take() == []
+
+
+def test_who_invents_targets_is_told_in_sum() -> None:
+    waiting = Rejections()
+    for number in range(10_000):
+        waiting.add(rejection(f"attic/{number}"), 10.0)
+    told = waiting.take()
+    assert len(told) <= 21
+    assert sum(one.count for one in told) == 10_000

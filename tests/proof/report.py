@@ -139,10 +139,12 @@ def load(path: Path) -> dict[str, Any]:
 
 
 def failures(result: dict[str, Any], least: int) -> list[str]:
-    """Why the proof has not succeeded: one sentence each, none where it has. Every cell has ``least``
-    samples."""
+    """Why the proof has not succeeded: one sentence each, none where it has. Every one of the result's
+    ``cells`` (fault, family, protocol) needs ``least`` samples."""
     found = list(result["errors"])
-    for cell in cells(result["samples"]):
+    seen = {(cell.fault, cell.family, cell.protocol): cell for cell in cells(result["samples"])}
+    empty = [Cell(*key, ()) for key in map(tuple, result["cells"]) if key not in seen]
+    for cell in [*seen.values(), *empty]:
         name = f"{cell.fault}, {cell.family}, {cell.protocol}"
         if bad := cell.count("failed"):
             found.append(f"{name}: {bad} of {len(cell.records)} failed")

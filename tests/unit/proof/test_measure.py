@@ -1,0 +1,150 @@
+"""The judge of the fault injection: it sees a stop that was late, and does not see one that was none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
+
+import pytest
+
+from tests.proof.drives import DRIVES, NORD, Drive
+from tests.proof.measure import Sample, bus_stop, drive_stop, was_enabled, was_moving
+from tests.proof.rig import Rig
+from tests.proof.witness import Run
+
+FU1 = next(drive for drive in DRIVES if drive.path == "conveyor/fu1")
+PUMP = next(drive for drive in DRIVES if drive.path == "pump_modbus/drive")
+ENABLE, STOP = bytes.fromhex("7f04002000000000"), bytes.fromhex("7e04000000000000")
+RUNNING, READY = bytes.fromhex("3704002000000000"), bytes.fromhex("3104000000000000")
+BRAKING = bytes.fromhex("3704001000000000")
+
+
+@dataclass
+class Seen:
+    """A witness that tells what it was given."""
+
+    frames: dict[int, list[Run]] = field(default_factory=dict[int, list[Run]])
+
+    def runs(self, can_id: int, since: float) -> list[Run]:
+        return [run for run in self.frames.get(can_id, []) if run.last >= since]
+
+
+@dataclass
+class Scene:
+    """What a round left behind, up to ``time``."""
+
+    told: Seen = field(default_factory=Seen)
+    said: Seen = field(default_factory=Seen)
+    time: float = 20.0
+
+    def now(self) -> float:
+        return self.time
+
+
+def scene(*, told: list[Run] | None = None, said: list[Run] | None = None, drive: Drive = FU1) -> Any:
+    return cast(Rig, Scene(Seen({drive.rpdo: told or []}), Seen({drive.tpdo: said or []})))
+
+
+def test_the_stop_on_the_bus_is_the_first_word_that_does_not_enable() -> None:
+    last = Run(9.0, 10.4, ENABLE)
+    found = bus_stop(scene(told=[last, Run(10.45, 11.0, STOP)]), FU1, 10.0, silent=False)
+    assert found == (10.45, last)
+
+
+def test_a_bus_that_goes_on_enabling_has_not_stopped() -> None:
+    assert bus_stop(scene(told=[Run(9.0, 20.0, ENABLE)]), FU1, 10.0, silent=False) is None
+    assert bus_stop(scene(told=[Run(9.0, 20.0, ENABLE)]), FU1, 10.0, silent=True) is None
+
+
+def test_a_stop_before_the_fault_is_not_its_effect() -> None:
+    told = [Run(8.5, 9.0, ENABLE), Run(9.1, 9.2, STOP), Run(9.3, 20.0, ENABLE)]
+    assert bus_stop(scene(told=told), FU1, 10.0, silent=False) is None
+
+
+def test_where_nobody_sends_the_last_enabling_word_counts() -> None:
+    last = Run(9.0, 10.03, ENABLE)
+    assert bus_stop(scene(told=[last]), FU1, 10.0, silent=True) == (10.03, last)
+    # It speaks again later, and stops: that ends nothing that has not ended before.
+    assert bus_stop(scene(told=[last, Run(12.0, 12.5, STOP)]), FU1, 10.0, silent=True) == (10.03, last)
+
+
+def test_one_that_enables_again_after_a_short_gap_was_not_silent() -> None:
+    told = [Run(9.0, 10.0, ENABLE), Run(10.1, 19.99, replace_setpoint(ENABLE))]
+    assert bus_stop(scene(told=told), FU1, 10.0, silent=True) is None
+
+
+def replace_setpoint(data: bytes) -> bytes:
+    return data[:2] + b"\x01\x20" + data[4:]
+
+
+@pytest.mark.parametrize("word", [READY, BRAKING])
+def test_a_drive_stops_when_it_says_so_or_gets_slower(word: bytes) -> None:
+    said = [Run(9.0, 10.2, RUNNING), Run(10.3, 11.0, word)]
+    assert drive_stop(scene(said=said), FU1, 10.0) == 10.3
+
+
+def test_a_drive_that_runs_on_has_not_stopped() -> None:
+    assert drive_stop(scene(said=[Run(9.0, 20.0, RUNNING)]), FU1, 10.0) is None
+
+
+def test_an_emergency_is_a_stop_where_it_is_about_this_drive_alone() -> None:
+    assert PUMP.emcy
+    running = bytes.fromhex("0005002000000000")
+    rig = scene(said=[Run(9.0, 12.0, running)], drive=PUMP)
+    before, after = b"\x10\x81" + bytes(6), b"\x00\x81" + bytes(6)
+    rig.said.frames[PUMP.emcy] = [Run(9.0, 9.0, before), Run(10.1, 10.1, after)]
+    assert drive_stop(rig, PUMP, 10.0) == 10.1
+
+
+def test_moving_is_enabled_on_the_bus_and_by_its_own_word() -> None:
+    told, said = [Run(9.0, 12.0, ENABLE)], [Run(9.0, 12.0, RUNNING)]
+    assert was_moving(scene(told=told, said=said), FU1, 10.0)
+    assert not was_moving(scene(told=told, said=[Run(9.0, 12.0, READY)]), FU1, 10.0)
+    assert not was_moving(scene(told=[Run(9.0, 12.0, STOP)], said=said), FU1, 10.0)
+
+
+def test_an_enabling_word_or_a_turn_after_the_stop_is_a_restart() -> None:
+    stopped = [Run(9.0, 10.2, RUNNING), Run(10.3, 20.0, READY)]
+    told = [Run(9.0, 10.4, ENABLE), Run(10.5, 20.0, STOP)]
+    assert not was_enabled(scene(told=told, said=stopped), FU1, 10.45, 10.3)
+    again = [*told, Run(11.0, 11.0, ENABLE)]
+    assert was_enabled(scene(told=again, said=stopped), FU1, 10.45, 10.3)
+    turns = [*stopped, Run(11.0, 11.0, RUNNING)]
+    assert was_enabled(scene(told=told, said=turns), FU1, 10.45, 10.3)
+
+
+SAMPLE = Sample(
+    fault="owner killed",
+    family=NORD.name,
+    protocol="modbus",
+    drive="conveyor/fu1",
+    bus_ms=500.0,
+    bus_bound_ms=570.0,
+    drive_ms=620.0,
+    drive_bound_ms=720.0,
+    way_ms=3.0,
+    paused_ms=0.0,
+    noise_ms=0.0,
+    restarted=False,
+    recovered=True,
+)
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict"),
+    [
+        ({}, "ok"),
+        ({"bus_ms": 570.1}, "failed"),
+        ({"drive_ms": 721.0}, "failed"),
+        ({"bus_ms": 600.0, "paused_ms": 40.0}, "machine paused"),
+        ({"bus_ms": 600.0, "paused_ms": 29.0}, "failed"),
+        ({"bus_ms": 600.0, "noise_ms": 150.0}, "machine paused"),
+        ({"restarted": True}, "failed"),
+        ({"recovered": False}, "failed"),
+        ({"drive_ms": None, "drive_bound_ms": None}, "ok"),
+    ],
+)
+def test_what_exceeds_its_bound_by_more_than_the_machine_stood_still_has_failed(
+    change: dict[str, Any], verdict: str
+) -> None:
+    assert replace(SAMPLE, **change).verdict == verdict

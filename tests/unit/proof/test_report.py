@@ -1,0 +1,90 @@
+"""The table of the fault injection: nothing that failed or is missing looks like a success."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.proof.report import BEGIN, END, cells, failures, markdown, merge, put_into
+
+
+def record(**change: Any) -> dict[str, Any]:
+    return {
+        "fault": "owner killed",
+        "family": "NORD SK TU4-CAO",
+        "protocol": "modbus",
+        "bus_ms": 500.0,
+        "bus_bound_ms": 570.0,
+        "drive_ms": 600.0,
+        "drive_bound_ms": 720.0,
+        "way_ms": 3.0,
+        "over_ms": 0.0,
+        "verdict": "ok",
+        **change,
+    }
+
+
+def result(*samples: dict[str, Any], **change: Any) -> dict[str, Any]:
+    return {
+        "date": "2026-11-21",
+        "machine": "a machine",
+        "machines": 1,
+        "faults": ["owner killed", "bus-off"],
+        "faults_missing": [],
+        "cells": [["owner killed", "NORD SK TU4-CAO", "modbus"]],
+        "rounds": 1,
+        "seconds": 60.0,
+        "by_themselves": 0,
+        "stopped_in_vain": [],
+        "errors": [],
+        "samples": list(samples),
+        **change,
+    }
+
+
+def test_a_row_has_median_worst_and_bound() -> None:
+    (cell,) = cells([record(bus_ms=400.0), record(), record(bus_ms=560.0)])
+    assert cell.row()[3:] == ["3", "3", "500", "560", "570", "600", "600", "720", "ok"]
+
+
+def test_what_failed_is_named_and_fails_the_proof() -> None:
+    found = result(record(), record(verdict="failed"))
+    assert "**1 failed**" in markdown(found)
+    assert failures(found, 2) == ["owner killed, NORD SK TU4-CAO, modbus: 1 of 2 failed"]
+
+
+def test_too_few_samples_fail_the_proof() -> None:
+    assert failures(result(record()), 2) == ["owner killed, NORD SK TU4-CAO, modbus: only 1 samples of 2"]
+    assert failures(result(record(), record()), 2) == []
+
+
+def test_a_cell_without_any_sample_fails_the_proof() -> None:
+    cells = [["owner killed", "NORD SK TU4-CAO", "modbus"], ["bus-off", "CiA 402", "zenoh"]]
+    found = failures(result(record(), cells=cells), 1)
+    assert found == ["bus-off, CiA 402, zenoh: only 0 samples of 1"]
+
+
+def test_errors_of_any_machine_fail_the_proof() -> None:
+    both = merge([result(record()), result(record(), errors=["bus-off: not stopped"])])
+    assert (both["machines"], len(both["samples"])) == (2, 2)
+    assert failures(both, 2) == ["bus-off: not stopped"]
+
+
+def test_the_page_keeps_what_is_not_between_the_marks(tmp_path: Path) -> None:
+    page = tmp_path / "proof.md"
+    page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n", encoding="utf-8")
+    put_into(page, result(record()))
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("before\n")
+    assert text.endswith(f"{END}\nafter\n")
+    assert "old" not in text
+    assert "| owner killed | NORD SK TU4-CAO | modbus |" in text
+
+
+def test_a_page_without_marks_is_an_error(tmp_path: Path) -> None:
+    page = tmp_path / "proof.md"
+    page.write_text("nothing\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="has no markers"):
+        put_into(page, result(record()))

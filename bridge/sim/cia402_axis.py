@@ -21,9 +21,9 @@ from bridge.sim.cia402_modes import (
 from bridge.sim.cia402_motion import Motor
 from bridge.sim.cia402_settings import INCREMENTS, Cia402Settings, Mode
 from bridge.sim.cia402_states import ENABLE_VOLTAGE, QUICK_STOP, Automaton, Ramp, State
+from bridge.sim.ticks import next_tick
 
 INIT_S: Final = 0.1
-TICK_S: Final = 0.01
 FOLLOWING_ERROR: Final = 0x8611
 _STEP_S: Final = 0.005
 _MOST_STEPS: Final = 2000
@@ -169,7 +169,7 @@ class Cia402Axis:
     def next_deadline(self) -> float | None:
         if self.state is State.NOT_READY:
             return self._ready_at
-        return self._time + TICK_S if self._is_busy else None
+        return next_tick(self._time) if self._is_busy else None
 
     @property
     def _is_busy(self) -> bool:

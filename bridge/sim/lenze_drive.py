@@ -12,10 +12,10 @@ from typing import Final
 
 from bridge.sim.lenze_settings import LenzeCodes
 from bridge.sim.nord_ramp import step
+from bridge.sim.ticks import next_tick
 
 INIT_S: Final = 0.2
 """How long the initialisation lasts; the manual gives no time."""
-TICK_S: Final = 0.01
 COAST_S: Final = 1.0
 """The motor's run-down from C00011 to standstill without voltage."""
 HUNDRED_PERCENT: Final = 0x4000
@@ -134,7 +134,7 @@ class LenzeDrive:
     def next_deadline(self) -> float | None:
         if self.state is DeviceState.INIT:
             return self._ready_at
-        return None if self.speed_rpm == self._target_rpm() else self._time + TICK_S
+        return None if self.speed_rpm == self._target_rpm() else next_tick(self._time)
 
     def _settle(self) -> None:
         """Take every change of state that errors and control word ask for."""

@@ -12,6 +12,7 @@ from bridge.sim.nord_faults import INTERFACE_MISSING
 from bridge.sim.nord_parameters import PARAMETERS, DriveParameters, Parameter, add_display
 from bridge.sim.nord_ramp import Demand, step, turned
 from bridge.sim.nord_states import STATE_BITS, State, commanded
+from bridge.sim.ticks import next_tick
 
 CHARGING_S: Final = 0.2
 """Power-on until the charging relay closes (transition 1); the manual gives no time."""
@@ -19,7 +20,6 @@ FAULT_REACTION_S: Final = 0.02
 """How long state G lasts: long enough to be seen on the wire (TPDO inhibit time 10 ms)."""
 COAST_S: Final = 1.0
 """The motor's run-down from P105 to standstill without voltage."""
-TICK_S: Final = 0.01
 
 SET_POINTS: Final = 5
 HUNDRED_PERCENT: Final = 0x4000
@@ -187,7 +187,7 @@ class NordDrive:
         if self.state not in (State.ENABLED, State.QUICK_STOP):
             return None
         restless = self._ripple > 0 and self.output_hz != 0
-        return self._time + TICK_S if restless or self.output_hz != self._ramp_target_hz() else None
+        return next_tick(self._time) if restless or self.output_hz != self._ramp_target_hz() else None
 
     # How it works inside.
 

@@ -11,6 +11,7 @@ from enum import IntEnum
 from typing import Final
 
 from bridge.sim.nord_ramp import step
+from bridge.sim.ticks import next_tick
 
 SELF_TEST_S: Final = 0.2
 CLOSING_S: Final = 0.02
@@ -18,7 +19,6 @@ CLOSING_S: Final = 0.02
 FAULT_REACTION_S: Final = 0.02
 COAST_S: Final = 1.0
 """Run-down from C01 to standstill without voltage."""
-TICK_S: Final = 0.01
 
 ENABLE: Final = 0x01
 ACKNOWLEDGE: Final = 0x02
@@ -135,8 +135,8 @@ class StoeberAxis:
     def next_deadline(self) -> float | None:
         timed = (AxisState.SELF_TEST, AxisState.SWITCHED_ON, AxisState.FAULT_REACTION)
         if self.state in timed and self._time < self._until:
-            return min(self._until, self._time + TICK_S) if self.speed_rpm else self._until
-        return self._time + TICK_S if self.speed_rpm != self._target_rpm() else None
+            return min(self._until, next_tick(self._time)) if self.speed_rpm else self._until
+        return next_tick(self._time) if self.speed_rpm != self._target_rpm() else None
 
     def _next_state(self) -> AxisState:
         enable, stop = bool(self.control & ENABLE), bool(self.control & QUICK_STOP)

@@ -179,10 +179,16 @@ class Master:
         self._check_gap(now)
         for line in self._lines:
             self._flush(line, now)
-            line.bus.on_time(now)
+            if not self._stood_still(line, now):
+                line.bus.on_time(now)
         self._last_round = now
         self._alive(now)
         self._arm(now)
+
+    def _stood_still(self, line: _Line, since: float) -> bool:
+        """The process was stopped after ``since``, for so long that nothing of then may be sent any more. The
+        next round finds the gap."""
+        return (self._clock() - since) * 1000 > line.network.bus.deadman_ms
 
     def _check_gap(self, now: float) -> None:
         """The process was not there for longer than the dead-man time: its bursts have ended meanwhile,
@@ -268,6 +274,8 @@ class Master:
         for can_id, (frames, period_s) in beats.items():
             changed = line.beating.get(can_id) != frames
             if changed or renew:
+                if self._stood_still(line, now):
+                    return
                 count = burst_length(period_s, network.bus.deadman_ms)
                 bus.beat(frames, now, period_s, count, at_once=changed)
                 line.beating[can_id] = frames

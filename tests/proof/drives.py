@@ -17,14 +17,14 @@ PORTS: Final = {"modbus": 1502, "opcua": 4840, "zenoh": 7447}
 BRIDGE_SIDE: Final = "vcan0"
 DRIVE_SIDE: Final = "vcan1"
 
-RPDO_PERIOD_MS: Final = 50
+RPDO_PERIOD_MS: Final = 60
 REACTION_MS: Final = 20
 """How late the bridge may be (docs/explanation/dead-man-chain.md)."""
 FIELDBUS_TIMEOUT_MS: Final = 500
 DEADMAN_MS: Final = 300
 HEARTBEAT_MS: Final = 400
 GUARD_MS, LIFE_TIME_FACTOR = 150, 3
-TPDO_MS: Final = 150
+TPDO_MS: Final = 200
 """Event timer of every TPDO: what the drive does is on the bus so soon."""
 INHIBIT_MS: Final = 50
 """A ramp would fill the bus otherwise, and a slow machine's time."""

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from tests.proof.rig import Rig
     from tests.proof.witness import Run
 
-_ACKNOWLEDGE_S: Final = 0.32
+_ACKNOWLEDGE_S: Final = 0.42
 """Two telegrams at the least."""
 _PATIENCE_S: Final = 1.5
 

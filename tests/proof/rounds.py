@@ -15,7 +15,7 @@ from tests.proof.rig import Rig, Stuck
 
 _STOPPED_S: Final = 5.0
 _TALKS_S: Final = 60.0
-_HOLD_S: Final = 0.35
+_HOLD_S: Final = 0.45
 """How long the owners go on writing "run" after everything is back: nothing may start by that."""
 
 

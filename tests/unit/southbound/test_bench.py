@@ -15,6 +15,7 @@ from bridge.southbound.canopen.nmt import NmtState
 from tests.support.bench import NORD, PLC, Bench, write_site
 
 RPDO1 = 0x205
+HEARTBEAT = 0x77F
 TPDO1 = 0x185
 
 
@@ -204,6 +205,29 @@ def test_a_process_stopped_within_a_round_sends_nothing_that_was_right_before(
     bench.log.clear()
     with monkeypatch.context() as patched:
         patched.setattr(type(bench.plant), "on_time", lambda _, now: judge_and_stand_still(now))
+        bench.write(control_word=0x047F, setpoint_1=0x2100)
+    bench.run(0.5)
+    assert bench.sent(RPDO1)
+    assert not [frame.data.hex() for frame in bench.sent(RPDO1) if frame.data[0] & 0x0F == 0x0F]
+
+
+def test_a_process_stopped_while_it_sends_sends_nothing_that_was_right_before(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    running(bench)
+    send = bench.bus.beat
+
+    def stand_still_after(frames: tuple[Frame, ...], now: float, period_s: float, count: int, **more: bool):
+        send(frames, now, period_s, count, **more)
+        if frames[0].can_id == HEARTBEAT:
+            bench.now += 1.0
+
+    # A telegram that comes when all bursts are renewed, the heartbeat's first.
+    (line,) = bench.master._lines
+    line.renew_at = bench.now
+    bench.log.clear()
+    with monkeypatch.context() as patched:
+        patched.setattr(bench.bus, "beat", stand_still_after)
         bench.write(control_word=0x047F, setpoint_1=0x2100)
     bench.run(0.5)
     assert bench.sent(RPDO1)

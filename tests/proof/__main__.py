@@ -1,4 +1,4 @@
-"""The fault injection: ``make proof``, and a short one in ``make lab``.
+"""The fault injection: ``make proof``.
 
     python -m tests.proof run --cycles N --out RESULT.json [--faults NAME,NAME]
     python -m tests.proof report --least N --page PAGE.md --out RESULT.json PART.json ...

@@ -24,8 +24,8 @@ _FRESH_S: Final = 0.5
 _LIMIT_S: Final = 120.0
 _HOUR_S: Final = 3600.0
 _BRIDGE_AHEAD: Final = ("nice", "-n", "-5")
-"""As in systemd/drivebridge.service it goes first; without the right to do so ``nice`` only says so. Everything
-shares one CPU here, and in the service's real-time class it would starve its own clients there."""
+"""As in systemd/drivebridge.service it goes first; without the right to do so ``nice`` only says so. All
+shares one CPU here, where the service's real-time class would starve its clients."""
 _DRIVES_AHEAD: Final = ("nice", "-n", "-2")
 """They react late where the machine is busy with other things; elsewhere they have a CPU of their own."""
 

@@ -45,6 +45,7 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
     began = time.monotonic()
     samples: list[Sample] = []
     errors: list[str] = []
+    rounds = Counter[str]()
     done = 0
 
     def collect() -> dict[str, Any]:
@@ -62,7 +63,8 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
                 }
             ),
             "faults_missing": [fault.name for fault in faults if fault not in possible],
-            "rounds": done,
+            "cycles": done,
+            "at_once": {fault.name: fault.at_once for fault in FAULTS},
             "seconds": time.monotonic() - began,
             "by_themselves": rig.by_themselves,
             "stopped_in_vain": rig.stopped_in_vain,
@@ -79,13 +81,14 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
             say("everything is there")
             rig.run_all()
             while done < cycles and time.monotonic() - began < limit_s:
-                for fault in possible:
+                for fault in (fault for fault in possible if fault.is_due(done, cycles)):
                     samples += _round(rig, fault, errors)
+                    rounds[fault.name] += 1
                     out.write_text(json.dumps(collect(), indent=1), encoding="utf-8")
                 done += 1
                 say(f"cycle {done} of {cycles}")
             for _ in range(_MOST_EXTRA_ROUNDS):
-                for fault in (fault for fault in possible if _lacks(samples, fault, done)):
+                for fault in (fault for fault in possible if _lacks(samples, fault, rounds[fault.name])):
                     say(f"{fault.name}: once more, drives stood still before it")
                     samples += _round(rig, fault, errors)
         except (Stuck, AssertionError) as error:

@@ -14,6 +14,7 @@ from tests.proof.drives import (
     BRIDGE_SIDE,
     DEADMAN_MS,
     DRIVE_SIDE,
+    DRIVES,
     PROTOCOLS,
     REACTION_MS,
     RPDO_PERIOD_MS,
@@ -35,7 +36,8 @@ _FRONT_S: Final = 90.0
 @dataclass(frozen=True, slots=True)
 class Fault:
     """``inject`` gives the moment of the fault, in seconds of the monotonic clock. Drives of other protocols
-    than ``protocols`` are to go on. ``steady``: what of the fault is to stop no drive comes first."""
+    than ``protocols`` are to go on. ``steady``: what of the fault is to stop no drive comes first.
+    ``at_once``: to how many owners, connections or nodes a round does it; each of them counts."""
 
     name: str
     reference: Reference
@@ -46,6 +48,16 @@ class Fault:
     protocols: tuple[str, ...] = PROTOCOLS
     steady: Callable[[Rig], None] | None = None
     possible: Callable[[], bool] = lambda: True
+    at_once: int = 1
+
+    def rounds(self, times: int) -> int:
+        """How many rounds inject it at least ``times`` times."""
+        return -(-times // self.at_once)
+
+    def is_due(self, cycle: int, cycles: int) -> bool:
+        """Whether it has a round in this one of ``cycles``, over which its rounds are spread evenly."""
+        rounds = self.rounds(cycles)
+        return (cycle + 1) * rounds // cycles > cycle * rounds // cycles
 
     @property
     def leaves_silence(self) -> bool:
@@ -235,19 +247,21 @@ def _reboot(rig: Rig) -> float:
 
 
 _KILL: Final = signal.SIGKILL
+_OF_OWNERS: Final = (_controller, _controller_drive)
+_OWNERS: Final = len(PROTOCOLS)
+_NODES: Final = len({drive.node for drive in DRIVES})
 FAULTS: Final = (
-    Fault("owner stopped", "telegram", _stop_owners, _continue_owners, _controller, _controller_drive),
-    Fault("owner killed", "telegram", _signal_owners(_KILL), _new_owners, _controller, _controller_drive),
-    Fault("network cut", "telegram", _cut, _uncut, _controller, _controller_drive),
-    Fault("half-open connection", "telegram", _vanish, _come_back, _controller, _controller_drive),
-    Fault("disk full", "telegram", _stop_owners, _empty, _controller, _controller_drive, steady=_full),
+    Fault("owner stopped", "telegram", _stop_owners, _continue_owners, *_OF_OWNERS, at_once=_OWNERS),
+    Fault("owner killed", "telegram", _signal_owners(_KILL), _new_owners, *_OF_OWNERS, at_once=_OWNERS),
+    Fault("network cut", "telegram", _cut, _uncut, *_OF_OWNERS, at_once=_OWNERS),
+    Fault("half-open connection", "telegram", _vanish, _come_back, *_OF_OWNERS, at_once=_OWNERS),
+    Fault("disk full", "telegram", _stop_owners, _empty, *_OF_OWNERS, steady=_full),
     Fault(
         "clock stepped by an hour",
         "telegram",
         _stop_owners,
         _continue_owners,
-        _controller,
-        _controller_drive,
+        *_OF_OWNERS,
         steady=_step_clock,
         possible=machine.is_user_mode,
     ),
@@ -256,24 +270,22 @@ FAULTS: Final = (
         "telegram",
         _signal_front(signal.SIGSTOP),
         _continue_front,
-        _controller,
-        _controller_drive,
+        *_OF_OWNERS,
         protocols=("opcua",),
     ),
-    Fault("node silent", "sign of life", _silence, _speak, _lost, _lost_drive),
+    Fault("node silent", "sign of life", _silence, _speak, _lost, _lost_drive, at_once=_NODES),
     Fault("bus process stopped", "moment", _stop_bridge, _continue_bridge, _dead, _dead_drive),
     Fault("event loop blocked for 1 s", "moment", _block_loop, _nothing, _dead, _dead_drive),
     Fault("bus process killed", "moment", Rig.kill_bridge, _renew_bridge, _dead, _dead_drive),
     Fault("interface down", "moment", _link_down, _link_up, _at_once, _at_once_drive),
     Fault("bus-off", "moment", _bus_off, _bus_restarted, _at_once, _at_once_drive),
-    Fault("node rebooting", "boot-up", _reboot, _nothing, _lost, None),
+    Fault("node rebooting", "boot-up", _reboot, _nothing, _lost, None, at_once=_NODES),
     Fault(
         "front killed",
         "telegram",
         _signal_front(_KILL),
         _wait_front,
-        _controller,
-        _controller_drive,
+        *_OF_OWNERS,
         protocols=("opcua",),
     ),
 )

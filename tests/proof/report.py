@@ -38,11 +38,11 @@ class Cell:
         return sum(record["verdict"] == verdict for record in self.records)
 
     def row(self) -> list[str]:
-        bad, paused = self.count("failed"), self.count("machine paused")
+        bad, paused = self.count("failed"), self.count("machine busy")
         notes = [f"**{bad} failed**"] * bool(bad)
         if paused:
-            over = max(record["over_ms"] for record in self.records if record["verdict"] == "machine paused")
-            notes.append(f"{paused} over by up to {over:.0f} ms: the machine stood still for that long")
+            over = max(record["over_ms"] for record in self.records if record["verdict"] == "machine busy")
+            notes.append(f"{paused} over by up to {over:.0f} ms: the machine was busy for that long")
         return [
             self.fault,
             self.family,
@@ -68,7 +68,7 @@ def merge(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
     merged = dict(parts[0])
     merged["samples"] = [sample for part in parts for sample in part["samples"]]
     merged["stopped_in_vain"] = [text for part in parts for text in part["stopped_in_vain"]]
-    for key in ("by_themselves", "seconds", "rounds"):
+    for key in ("by_themselves", "seconds", "cycles"):
         merged[key] = sum(part[key] for part in parts)
     merged["faults_missing"] = sorted({name for part in parts for name in part["faults_missing"]})
     merged["errors"] = [text for part in parts for text in part["errors"]]
@@ -98,15 +98,15 @@ def markdown(result: dict[str, Any]) -> str:
     """The generated part of docs/explanation/proof.md, markers included."""
     table = [cell.row() for cell in cells(result["samples"])]
     failed = sum(sample["verdict"] == "failed" for sample in result["samples"])
-    paused = sum(sample["verdict"] == "machine paused" for sample in result["samples"])
+    paused = sum(sample["verdict"] == "machine busy" for sample in result["samples"])
     lines = [
         BEGIN,
         "",
         f"{result['date']}, {result['machine']}; {result['machines']} at a time, "
-        f"{result['rounds']} cycles, {result['seconds'] / 60:.0f} min of them together. Times in ms.",
+        f"{result['cycles']} cycles, {result['seconds'] / 60:.0f} min of them together. Times in ms.",
         "",
         f"{len(result['samples'])} measurements: {failed} failed, {paused} exceeded a bound by no more than "
-        "the machine itself stood still meanwhile. "
+        "the machine stood still, or bridge and drives waited for the CPU that they share here. "
         f"{result['by_themselves']} times a drive was found stopped before a fault, and "
         f"{len(result['stopped_in_vain'])} times one was stopped by a fault that did not concern it: the "
         "machine was too slow for its controllers then.",
@@ -139,8 +139,10 @@ def load(path: Path) -> dict[str, Any]:
 
 
 def failures(result: dict[str, Any], least: int) -> list[str]:
-    """Why the proof has not succeeded: one sentence each, none where it has. Every one of the result's
-    ``cells`` (fault, family, protocol) needs ``least`` samples."""
+    """Why the proof has not succeeded: one sentence each, none where it has.
+
+    Each of the result's ``cells`` (fault, family, protocol) needs samples of as many rounds as inject its
+    fault ``least`` times."""
     found = list(result["errors"])
     seen = {(cell.fault, cell.family, cell.protocol): cell for cell in cells(result["samples"])}
     empty = [Cell(*key, ()) for key in map(tuple, result["cells"]) if key not in seen]
@@ -148,6 +150,7 @@ def failures(result: dict[str, Any], least: int) -> list[str]:
         name = f"{cell.fault}, {cell.family}, {cell.protocol}"
         if bad := cell.count("failed"):
             found.append(f"{name}: {bad} of {len(cell.records)} failed")
-        if len(cell.records) < least:
-            found.append(f"{name}: only {len(cell.records)} samples of {least}")
+        needed = -(-least // result["at_once"][cell.fault])
+        if len(cell.records) < needed:
+            found.append(f"{name}: only {len(cell.records)} samples of {needed}")
     return found

@@ -17,6 +17,7 @@ from tests.proof import machine
 from tests.proof.board import Board
 from tests.proof.drives import BRIDGE_SIDE, DRIVE_SIDE, DRIVES, PORTS, PROTOCOLS, SERVERS, Drive, write_site
 from tests.proof.recovery import Recovery
+from tests.proof.waits import Waits, Watch
 from tests.proof.witness import Clock, Witness
 from tests.support.process import REPOSITORY, Process, running
 
@@ -88,6 +89,8 @@ class Rig:
         self.board = Board(folder / "board", len(DRIVES))
         self.bridge: Process | None = None
         self._starts = 0
+        self.waits: list[Waits] = []
+        """Of the bridge and of the drives."""
         state, run = self.disk.folder / "state", folder / "run"
         self._site = write_site(folder / "site.toml", BRIDGE_SIDE, state, run)
         self._drives = write_site(folder / "drives.toml", DRIVE_SIDE, folder / "unused", folder / "unused")
@@ -121,12 +124,16 @@ class Rig:
         self.pauses.touch()
         drives = [sys.executable, "-m", "bridge", "simulate", str(self._drives)]
         simulate = running(self.folder, "simulate", *_DRIVES_AHEAD, *drives)
-        self._stack.enter_context(simulate).wait_output("simulating")
+        simulation = self._stack.enter_context(simulate)
+        simulation.wait_output("simulating")
         self.owners = {
             protocol: Owner(self.folder, self._stack, protocol, self.folder / "board")
             for protocol in PROTOCOLS
         }
         self.start_bridge()
+        assert self.bridge
+        self.waits = [Waits(self.bridge.pid), Waits(simulation.pid)]
+        self._stack.callback(Watch(*self.waits).close)
         self._read_bounds()
         for owner in self.owners.values():
             owner.wait_loaded()
@@ -139,6 +146,8 @@ class Rig:
         command = [*_BRIDGE_AHEAD, sys.executable, "-m", "bridge", "run", str(self._site)]
         self.bridge = self._bridges.enter_context(running(self.disk.folder, name, *command))
         self.bridge.wait_output("OPC UA on", _LIMIT_S)
+        if self.waits:
+            self.waits[0].pid = self.bridge.pid
 
     def kill_bridge(self) -> float:
         """The bus process dies; its front goes with it."""

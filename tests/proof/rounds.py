@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Final
 
 from tests.proof import measure
-from tests.proof.drives import DRIVES, Drive
+from tests.proof.drives import DRIVES, REACTION_MS, RPDO_PERIOD_MS, Drive
 from tests.proof.faults import Fault
 from tests.proof.measure import Sample
 from tests.proof.pauses import paused_ms
@@ -15,6 +15,8 @@ from tests.proof.rig import Rig, Stuck
 
 _STOPPED_S: Final = 5.0
 _TALKS_S: Final = 60.0
+_BEFORE_MS: Final = RPDO_PERIOD_MS + REACTION_MS
+"""The bridge, or the drive, begins to stop that long before its bound at the latest."""
 _HOLD_S: Final = 0.45
 """How long the owners go on writing "run" after everything is back: nothing may start by that."""
 
@@ -102,18 +104,34 @@ def _sample(rig: Rig, fault: Fault, drive: Drive, moment: float, *, restarted: b
         begin = measure.boot_up(rig, drive, moment) or moment
     assert bus is not None
     end = max(bus[0], own or bus[0])
+    bus_bound_ms = fault.bus_bound(rig, drive)
+    drive_bound_ms = fault.drive_bound(rig, drive) if fault.drive_bound else None
     return Sample(
         fault.name,
         drive.family.name,
         drive.protocol,
         drive.path,
         bus_ms=(bus[0] - begin) * 1000,
-        bus_bound_ms=fault.bus_bound(rig, drive),
+        bus_bound_ms=bus_bound_ms,
         drive_ms=None if own is None else (own - begin) * 1000,
-        drive_bound_ms=fault.drive_bound(rig, drive) if fault.drive_bound else None,
+        drive_bound_ms=drive_bound_ms,
         way_ms=way_ms,
         paused_ms=paused_ms(rig.pauses, begin, end),
+        waited_ms=_waited_ms(rig, begin, (bus[0], bus_bound_ms), (own, drive_bound_ms)),
         noise_ms=rig.noise_ms,
         restarted=restarted,
         recovered=True,
     )
+
+
+def _waited_ms(
+    rig: Rig, begin: float, bus: tuple[float, float], drive: tuple[float | None, float | None]
+) -> float:
+    """From ``_BEFORE_MS`` before a bound that was exceeded until the stop; 0 where none was."""
+    waited = 0.0
+    for stop, bound_ms, watched in ((*bus, rig.waits[:1]), (*drive, rig.waits)):
+        if stop is None or bound_ms is None or (stop - begin) * 1000 <= bound_ms:
+            continue
+        since = begin + (bound_ms - _BEFORE_MS) / 1000
+        waited = max(waited, sum(one.between(since, stop) for one in watched) * 1000)
+    return waited

@@ -34,7 +34,8 @@ def result(*samples: dict[str, Any], **change: Any) -> dict[str, Any]:
         "faults": ["owner killed", "bus-off"],
         "faults_missing": [],
         "cells": [["owner killed", "NORD SK TU4-CAO", "modbus"]],
-        "rounds": 1,
+        "cycles": 1,
+        "at_once": {"owner killed": 1, "bus-off": 1},
         "seconds": 60.0,
         "by_themselves": 0,
         "stopped_in_vain": [],
@@ -64,6 +65,12 @@ def test_a_cell_without_any_sample_fails_the_proof() -> None:
     cells = [["owner killed", "NORD SK TU4-CAO", "modbus"], ["bus-off", "CiA 402", "zenoh"]]
     found = failures(result(record(), cells=cells), 1)
     assert found == ["bus-off, CiA 402, zenoh: only 0 samples of 1"]
+
+
+def test_a_round_that_injects_a_fault_several_times_counts_as_often() -> None:
+    found = result(record(), record(), at_once={"owner killed": 3, "bus-off": 1})
+    assert failures(found, 6) == []
+    assert failures(found, 7) == ["owner killed, NORD SK TU4-CAO, modbus: only 2 samples of 3"]
 
 
 def test_errors_of_any_machine_fail_the_proof() -> None:

@@ -53,6 +53,7 @@ _REJECTION_CODE: Final = {
     StatusCodes.BadOutOfRange: Code.OUT_OF_RANGE,
 }
 """Outcomes that say what the server itself refuses; all else is ``NOT_VALID``."""
+_LONGEST: Final = 200
 
 VARIANT_TYPE: Final = {
     DataType.BOOL: ua.VariantType.Boolean,
@@ -110,9 +111,15 @@ def outcome_status(outcome: Outcome) -> ua.StatusCode:
 def rejection(
     identity: Identity, target: str, action: str, code: int, values: Mapping[str, Value]
 ) -> Rejection:
-    """For the audit log: a write or call that the server has answered with ``code`` by itself."""
+    """For the audit log: a write or call that the server has answered with ``code`` by itself. Names and
+    texts, which are the client's, are cut."""
     ending = _REJECTION_CODE.get(code, Code.NOT_VALID)
-    return Rejection(identity, target, action, ending, status(code).name, dict(values))
+    shown = {name[:_LONGEST]: _cut(value) for name, value in values.items()}
+    return Rejection(identity, target[:_LONGEST], action, ending, status(code).name, shown)
+
+
+def _cut(value: Value) -> Value:
+    return value[:_LONGEST] if isinstance(value, str) else value
 
 
 def source_time(epoch_ns: int) -> datetime:

@@ -7,7 +7,7 @@ import math
 import pytest
 from asyncua import ua
 
-from bridge.command.request import Code, Outcome
+from bridge.command.request import Code, Identity, Outcome, Source
 from bridge.image import DataType, Point, Quality, Reading
 from bridge.northbound.opcua.events import Bound
 from bridge.northbound.opcua.subscriptions import is_reported
@@ -18,6 +18,7 @@ from bridge.northbound.opcua.values import (
     outcome_status,
     point_value,
     reading_value,
+    rejection,
 )
 
 Codes, Kind = ua.StatusCodes, ua.VariantType
@@ -133,3 +134,11 @@ def test_events_are_bounded_to_a_burst_and_a_rate() -> None:
     assert sum(bound.take(5.0) for _ in range(1000)) == 20
     assert bound.held_back == 980
     assert sum(bound.take(5.5) for _ in range(1000)) == 5
+
+
+def test_a_clients_words_are_cut_before_they_are_told():
+    guest = Identity(Source.OPCUA, "guest")
+    told = rejection(guest, "x" * 10_000, "call", Codes.BadNodeIdUnknown, {"y" * 10_000: "z" * 10_000})
+    assert (told.code, told.message) == ("unknown_point", "BadNodeIdUnknown")
+    assert len(told.target) == 200
+    assert [(len(name), len(str(value))) for name, value in told.values.items()] == [(200, 200)]

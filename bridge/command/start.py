@@ -71,6 +71,9 @@ class StartSequence:
                 self._gate.lead(self._words.ready)
         if state in _CAN_BE_ENABLED:
             self._gate.lead(self._control_word)
+        elif state is DriveState.SWITCH_ON_INHIBITED:
+            # Where a stop was on its way, what was known of the drive was out of date.
+            self._gate.lead(self._words.ready)
         if state is DriveState.OPERATION_ENABLED:
             if self._words.begin:
                 self._gate.lead(self._control_word | self._words.begin)

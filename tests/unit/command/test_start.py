@@ -83,6 +83,18 @@ def test_after_a_stop_is_a_fresh_enable(rig: Rig):
     assert rig.enables
 
 
+def test_right_after_disable_voltage_makes_the_drive_ready_that_is_about_to_be_inhibited(rig: Rig):
+    rig.drive_says(READY)
+    rig.ask(Action.DISABLE_VOLTAGE)
+    outcomes = rig.submit(Action.START)  # before the drive has said what became of it
+    rig.drive_says(INHIBITED)
+    assert rig.sent == SHUT_DOWN
+    rig.drive_says(READY)
+    assert rig.enables
+    rig.drive_says(ENABLED)
+    assert codes(outcomes) == [Code.OK]
+
+
 @pytest.mark.parametrize("direction", [2, -2])
 def test_knows_two_directions(rig: Rig, direction: int):
     assert codes(rig.submit(Action.START, direction=direction)) == [Code.OUT_OF_RANGE]

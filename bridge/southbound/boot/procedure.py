@@ -68,8 +68,10 @@ def _start(table: NodeTable) -> Do:
     not_heard = "F" if table.supervision == "guarding" else "K"
     yield Step(f"waiting for {table.supervision}", not_heard)
     yield StartSupervision()
-    yield Await(None, max(_GOES_OPERATIONAL_S, 3 * table.supervision_ms / 1000))
+    # It says its state when it is asked, or every so often.
+    limit_s = max(_GOES_OPERATIONAL_S, 3 * table.supervision_ms / 1000)
+    yield Await(None, limit_s)
     yield AwaitRelease()
     yield Step("starting", "J")
     yield Nmt(NmtCommand.START)
-    yield Await(NmtState.OPERATIONAL, _GOES_OPERATIONAL_S)
+    yield Await(NmtState.OPERATIONAL, limit_s)

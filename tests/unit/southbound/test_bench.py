@@ -145,6 +145,13 @@ def test_a_node_that_appears_later_is_booted_then(tmp_path: Path) -> None:
     assert bench.plant.drives["conveyor/fu1"].quality is Quality.GOOD
 
 
+def test_a_node_that_is_guarded_slowly_is_given_the_time_to_say_that_it_is_operational(tmp_path: Path) -> None:
+    bench = Bench(write_site(tmp_path, node='supervision = "guarding"\nsupervision_ms = 3000'))
+    bench.run(8.0)
+    assert str(bench.value("conveyor/node/boot_status")).startswith("ok")
+    assert not [event.message for event in bench.events if "boot-up failed" in event.message]
+
+
 def test_another_device_at_the_address_is_left_alone(tmp_path: Path) -> None:
     site = write_site(tmp_path, node="[bus.node.identity]\nvendor_id = 0x12345678")
     bench = Bench(site)

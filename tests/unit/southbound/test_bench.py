@@ -145,7 +145,7 @@ def test_a_node_that_appears_later_is_booted_then(tmp_path: Path) -> None:
     assert bench.plant.drives["conveyor/fu1"].quality is Quality.GOOD
 
 
-def test_a_node_that_is_guarded_slowly_is_given_the_time_to_say_that_it_is_operational(tmp_path: Path) -> None:
+def test_a_slowly_guarded_node_has_the_time_to_say_that_it_is_operational(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path, node='supervision = "guarding"\nsupervision_ms = 3000'))
     bench.run(8.0)
     assert str(bench.value("conveyor/node/boot_status")).startswith("ok")

@@ -24,8 +24,10 @@ MOVES = (
     ("lift/drive", "velocity", 600.0),
     ("fan/drive", "velocity", 300.0),
 )
-SUPERVISED = {"pump": 0x086, "lift": 0x087, "fan": 0x088}
-"""Emergency messages of the nodes that watch the bridge as the demo's site sets them up."""
+SUPERVISED = {"conveyor": 0x085, "pump": 0x086, "lift": 0x087, "fan": 0x088}
+"""Emergency messages of the nodes: all of them watch the bridge."""
+AS_AUDIT_SAYS = 'mapping = "lenze/8400-motec"\nown_timeout_ms = 300\nenforce = true'
+"""The demo's site leaves the pump as it is delivered, which does nothing."""
 NOTICE_S = 3.0
 
 
@@ -37,6 +39,7 @@ class Lab:
         places = f'name = "demo"\nstate_dir = "{folder}/state"\nruntime_dir = "{folder}/run"'
         text = text.replace('name = "demo"', places, 1)
         text = text.replace('interface = "virtual"', 'interface = "socketcan"\nchannel = "vcan0"')
+        text = text.replace('mapping = "lenze/8400-motec"', AS_AUDIT_SAYS, 1)
         servers = (
             f'[modbus]\nlisten = "127.0.0.1:{free_port()}"\n[opcua]\n[zenoh]\nlisten = ["{self.endpoint}"]\n'
         )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -123,6 +125,14 @@ def drivebridge(
 ) -> AbstractContextManager[Process]:
     """``drivebridge ARGUMENTS``, as this Python has it installed."""
     return running(folder, name, sys.executable, "-m", "bridge", *arguments, notify=notify)
+
+
+@contextmanager
+def only_demo() -> Iterator[None]:
+    """The demo's ports are fixed: of all tests that start it, in whichever process, one at a time."""
+    with (Path(tempfile.gettempdir()) / "drivebridge-tests-demo.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def peer(

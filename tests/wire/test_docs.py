@@ -21,22 +21,23 @@ from tests.support.docs import (
     with_blocks,
 )
 from tests.support.docs_reader import Reader
-from tests.support.process import Process, drivebridge
+from tests.support.process import Process, drivebridge, only_demo
 
 DEMO_PORTS = {1502: "Modbus TCP", 4840: "OPC UA", 7447: "zenoh"}
 
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Process]:
-    for port, name in DEMO_PORTS.items():
-        with socket.socket() as probe:
-            if probe.connect_ex(("127.0.0.1", port)) == 0:
-                pytest.fail(f"port {port} ({name}) is taken: end the demo or bridge that runs here")
-    with drivebridge(tmp_path_factory.mktemp("demo"), "demo", "demo", notify=True) as process:
-        process.wait_ready()
-        process.wait_output("node operational")
-        process.wait_output("OPC UA on")
-        yield process
+    with only_demo():
+        for port, name in DEMO_PORTS.items():
+            with socket.socket() as probe:
+                if probe.connect_ex(("127.0.0.1", port)) == 0:
+                    pytest.fail(f"port {port} ({name}) is taken: end the demo or bridge that runs here")
+        with drivebridge(tmp_path_factory.mktemp("demo"), "demo", "demo", notify=True) as process:
+            process.wait_ready()
+            process.wait_output("node operational")
+            process.wait_output("OPC UA on")
+            yield process
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from asyncua import Client
 from pymodbus.client import AsyncModbusTcpClient
 
 from tests.support import sites
-from tests.support.process import Process, drivebridge, free_port, until
+from tests.support.process import Process, drivebridge, free_port, only_demo, until
 
 BACK_S = 5.0
 NOISE_S = 5.0
@@ -92,8 +92,9 @@ def test_a_front_does_not_outlive_the_bus_process(tmp_path: Path, ports: tuple[i
         until(lambda: not Path(f"/proc/{front}").exists(), 10.0, "the front ends too")
 
 
+@pytest.mark.timeout(300)  # the tests of the documentation may have the demo
 def test_the_demo_stops_without_leaving_anything_behind(tmp_path: Path) -> None:
-    with drivebridge(tmp_path, "demo", "demo", notify=True) as demo:
+    with only_demo(), drivebridge(tmp_path, "demo", "demo", notify=True) as demo:
         demo.wait_ready()
         wait_for_front(demo)
         demo.wait_output("conveyor/fu4: controlled by zenoh:demo")

@@ -279,7 +279,8 @@ class TestWhatDoesNotGoTogether:
         assert fault.startswith(f"13: bus[0].node[0].drive[0].control: the drive is controlled by {control}")
 
     def test_a_lease_needs_no_protocol_of_its_own(self, tmp_path: Path):
-        load(tmp_path, f'{SMALL}control = "lease"\nfieldbus_timeout_ms = 0\n')
+        site = load(tmp_path, f'{SMALL}control = "lease"\nfieldbus_timeout_ms = 0\n')
+        assert site.bus[0].node[0].drive[0].control == "lease"
 
     def test_names_and_numbers_are_unique_where_they_have_to_be(self, tmp_path: Path):
         second_bus = SMALL.replace('[site]\nname = "hall"\n', "")
@@ -289,7 +290,8 @@ class TestWhatDoesNotGoTogether:
 
     def test_a_node_id_may_come_again_on_another_bus(self, tmp_path: Path):
         second_bus = SMALL.replace('[site]\nname = "hall"\n', "").replace("can0", "can1")
-        load(tmp_path, SMALL + second_bus.replace("conveyor", "lift"))
+        site = load(tmp_path, SMALL + second_bus.replace("conveyor", "lift"))
+        assert [bus.node[0].id for bus in site.bus] == [site.bus[0].node[0].id] * 2
 
     def test_a_drive_named_as_another_drives_slot(self, tmp_path: Path):
         drive = '[[bus.node.drive]]\nslot = "{}"\n'
@@ -393,4 +395,6 @@ def test_an_endpoint_is_an_ip_address_and_a_port(tmp_path: Path, listen: str):
 
 @pytest.mark.parametrize("listen", ["0.0.0.0:502", "[::1]:502", "192.168.1.5:0"])
 def test_these_are_endpoints(tmp_path: Path, listen: str):
-    load(tmp_path, f'{SMALL}[modbus]\nlisten = "{listen}"\n')
+    site = load(tmp_path, f'{SMALL}[modbus]\nlisten = "{listen}"\n')
+    assert site.modbus
+    assert site.modbus.listen == listen

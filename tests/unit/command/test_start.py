@@ -32,6 +32,15 @@ def rig() -> Rig:
     return rig
 
 
+def is_led_from_inhibited(rig: Rig, outcomes: list[Outcome]) -> None:
+    rig.drive_says(INHIBITED)
+    assert rig.sent == SHUT_DOWN
+    rig.drive_says(READY)
+    assert rig.enables
+    rig.drive_says(ENABLED)
+    assert codes(outcomes) == [Code.OK]
+
+
 def codes(outcomes: list[Outcome]) -> list[Code]:
     return [outcome.code for outcome in outcomes]
 
@@ -87,12 +96,7 @@ def test_right_after_disable_voltage_makes_the_drive_ready_that_is_about_to_be_i
     rig.drive_says(READY)
     rig.ask(Action.DISABLE_VOLTAGE)
     outcomes = rig.submit(Action.START)  # before the drive has said what became of it
-    rig.drive_says(INHIBITED)
-    assert rig.sent == SHUT_DOWN
-    rig.drive_says(READY)
-    assert rig.enables
-    rig.drive_says(ENABLED)
-    assert codes(outcomes) == [Code.OK]
+    is_led_from_inhibited(rig, outcomes)
 
 
 @pytest.mark.parametrize("direction", [2, -2])
@@ -228,12 +232,7 @@ def test_a_drive_that_stays_in_quick_stop_is_led_out_of_it(rig: Rig):
     assert rig.sent == SHUT_DOWN, "the ramp of the quick stop is let run"
     rig.wait(0.2)
     assert rig.sent & 0x0002 == 0, "disable voltage"
-    rig.drive_says(INHIBITED)
-    assert rig.sent == SHUT_DOWN
-    rig.drive_says(READY)
-    assert rig.enables
-    rig.drive_says(ENABLED)
-    assert codes(outcomes) == [Code.OK]
+    is_led_from_inhibited(rig, outcomes)
 
 
 def test_a_quick_stop_that_ends_by_itself_is_not_cut_short(rig: Rig):

@@ -119,7 +119,7 @@ def _round(rig: Rig, fault: Fault, errors: list[str]) -> list[Sample]:
 
 def _keep_logs(folder: Path, where: Path) -> None:
     where.mkdir(exist_ok=True)
-    for log in [*folder.glob("*.log"), *folder.glob("disk/*.log"), folder / "pauses"]:
+    for log in [*folder.glob("*.log"), *folder.glob("disk/*.log"), *(folder / "watched").glob("*s")]:
         (where / log.name).write_bytes(log.read_bytes())
 
 

@@ -17,11 +17,11 @@ PORTS: Final = {"modbus": 1502, "opcua": 4840, "zenoh": 7447}
 BRIDGE_SIDE: Final = "vcan0"
 DRIVE_SIDE: Final = "vcan1"
 
-RPDO_PERIOD_MS: Final = 60
+RPDO_PERIOD_MS: Final = 100
 REACTION_MS: Final = 20
 """How late the bridge may be (docs/explanation/dead-man-chain.md)."""
-FIELDBUS_TIMEOUT_MS: Final = 500
-DEADMAN_MS: Final = 300
+FIELDBUS_TIMEOUT_MS: Final = 600
+DEADMAN_MS: Final = 400
 HEARTBEAT_MS: Final = 400
 GUARD_MS, LIFE_TIME_FACTOR = 150, 3
 TPDO_MS: Final = 200

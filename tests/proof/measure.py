@@ -34,10 +34,10 @@ class Sample:
     way_ms: float | None
     """From the client's sending its last telegram to the RPDO by which the bridge handed it on."""
     paused_ms: float
-    """How long the machine itself stood still from the reference to the stop in the drive."""
+    """How long the machine itself stood still, from shortly before a bound that was exceeded until the stop.
+    What was before that did not make it late."""
     waited_ms: float
-    """How long the bridge, and for the drive's bound the drives too, waited for the CPU from shortly before a
-    bound that was exceeded until the stop. What was waited before did not make it late."""
+    """How long the bridge, and for the drive's bound the drives too, waited for the CPU in this time."""
     noise_ms: float
     """What is allowed beyond that on a machine that is busy with other things; 0 in the long proof."""
     restarted: bool

@@ -18,7 +18,7 @@ from tests.proof.board import NUMBERS, Board
 from tests.proof.clients import CLIENTS, Client, ClientFault
 from tests.proof.drives import DRIVES, drives_of
 
-PERIOD_S = 0.2
+PERIOD_S = 0.25
 _AGAIN_S = 0.1
 
 

@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from tests.proof.rig import Rig
     from tests.proof.witness import Run
 
-_ACKNOWLEDGE_S: Final = 0.42
-"""Two telegrams at the least."""
+_ACKNOWLEDGED: Final = 2
+"""Telegrams that were answered: the first of them may have been sent before."""
 _PATIENCE_S: Final = 1.5
 
 
@@ -23,13 +23,14 @@ class Recovery:
         self._drive = drive
         self._word = drive.family.run
         self._since = float("-inf")
+        self._accepted = 0
 
     def step(self, now: float) -> bool:
         family = self._drive.family
         waited = now - self._since
-        if self._word == family.acknowledge and waited > _ACKNOWLEDGE_S:
+        if self._word == family.acknowledge and self._is_acknowledged():
             self._tell(family.ready)
-        elif self._word == family.ready and waited > _ACKNOWLEDGE_S and self._is_ready():
+        elif self._word == family.ready and self._is_ready():
             self._tell(family.run)
         elif self._word == family.run and self._rig.moves(self._drive):
             return True
@@ -41,7 +42,11 @@ class Recovery:
     def _tell(self, word: int) -> None:
         self._word = word
         self._since = time.monotonic()
+        self._accepted = self._rig.board.accepted(self._drive.place)
         self._rig.board.command(self._drive.place, word)
+
+    def _is_acknowledged(self) -> bool:
+        return self._rig.board.accepted(self._drive.place) - self._accepted >= _ACKNOWLEDGED
 
     def _is_ready(self) -> bool:
         """The bridge hands on what the owner writes."""

@@ -17,13 +17,15 @@ from tests.proof import machine
 from tests.proof.board import Board
 from tests.proof.drives import BRIDGE_SIDE, DRIVE_SIDE, DRIVES, PORTS, PROTOCOLS, SERVERS, Drive, write_site
 from tests.proof.recovery import Recovery
-from tests.proof.waits import Waits, Watch
+from tests.proof.waits import follow
 from tests.proof.witness import Clock, Witness
 from tests.support.process import REPOSITORY, Process, running
 
 _FRESH_S: Final = 0.5
 _LIMIT_S: Final = 120.0
 _HOUR_S: Final = 3600.0
+BRIDGE: Final = "bridge"
+SIMULATION: Final = "drives"
 _BRIDGE_AHEAD: Final = ("nice", "-n", "-5")
 """As in systemd/drivebridge.service it goes first; without the right to do so ``nice`` only says so. All
 shares one CPU here, where the service's real-time class would starve its clients."""
@@ -85,12 +87,11 @@ class Rig:
         stack.callback(self.disk.close)
         self.gateway = machine.Gateway()
         self.clock = Clock()
-        self.pauses = folder / "pauses"
+        self.watched = folder / "watched"
+        """What held bridge and drives up (``tests.proof.waits``)."""
         self.board = Board(folder / "board", len(DRIVES))
         self.bridge: Process | None = None
         self._starts = 0
-        self.waits: list[Waits] = []
-        """Of the bridge and of the drives."""
         state, run = self.disk.folder / "state", folder / "run"
         self._site = write_site(folder / "site.toml", BRIDGE_SIDE, state, run)
         self._drives = write_site(folder / "drives.toml", DRIVE_SIDE, folder / "unused", folder / "unused")
@@ -117,23 +118,19 @@ class Rig:
         self.said = Witness(DRIVE_SIDE, _from_nodes(DRIVES), self.clock)
         for witness in (self.told, self.heard, self.said):
             self._stack.callback(witness.close)
-        watch = running(
-            self.folder, "pauses_log", sys.executable, "-m", "tests.proof.pauses", str(self.pauses)
-        )
-        self._stack.enter_context(watch)
-        self.pauses.touch()
+        self.watched.mkdir()
+        watch = [sys.executable, "-m", "tests.proof.waits", str(self.watched), BRIDGE, SIMULATION]
+        self._stack.enter_context(running(self.folder, "watch", *watch))
         drives = [sys.executable, "-m", "bridge", "simulate", str(self._drives)]
         simulate = running(self.folder, "simulate", *_DRIVES_AHEAD, *drives)
         simulation = self._stack.enter_context(simulate)
         simulation.wait_output("simulating")
+        follow(self.watched, SIMULATION, simulation.pid)
         self.owners = {
             protocol: Owner(self.folder, self._stack, protocol, self.folder / "board")
             for protocol in PROTOCOLS
         }
         self.start_bridge()
-        assert self.bridge
-        self.waits = [Waits(self.bridge.pid), Waits(simulation.pid)]
-        self._stack.callback(Watch(*self.waits).close)
         self._read_bounds()
         for owner in self.owners.values():
             owner.wait_loaded()
@@ -146,8 +143,7 @@ class Rig:
         command = [*_BRIDGE_AHEAD, sys.executable, "-m", "bridge", "run", str(self._site)]
         self.bridge = self._bridges.enter_context(running(self.disk.folder, name, *command))
         self.bridge.wait_output("OPC UA on", _LIMIT_S)
-        if self.waits:
-            self.waits[0].pid = self.bridge.pid
+        follow(self.watched, BRIDGE, self.bridge.pid)
 
     def kill_bridge(self) -> float:
         """The bus process dies; its front goes with it."""

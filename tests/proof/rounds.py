@@ -10,13 +10,13 @@ from tests.proof import measure
 from tests.proof.drives import DRIVES, REACTION_MS, RPDO_PERIOD_MS, Drive
 from tests.proof.faults import Fault
 from tests.proof.measure import Sample
-from tests.proof.pauses import paused_ms
-from tests.proof.rig import Rig, Stuck
+from tests.proof.rig import BRIDGE, SIMULATION, Rig, Stuck
+from tests.proof.waits import paused_ms, waited_ms
 
 _STOPPED_S: Final = 5.0
 _TALKS_S: Final = 60.0
 _BEFORE_MS: Final = RPDO_PERIOD_MS + REACTION_MS
-"""The bridge, or the drive, begins to stop that long before its bound at the latest."""
+"""The bridge, or the drive, has to begin its stop that long before its bound."""
 _HOLD_S: Final = 0.45
 """How long the owners go on writing "run" after everything is back: nothing may start by that."""
 
@@ -72,8 +72,14 @@ def _all_go_on(rig: Rig, drives: list[Drive] | tuple[Drive, ...], fault: Fault, 
 def _wait_stopped(
     rig: Rig, fault: Fault, drives: list[Drive], moment: float
 ) -> dict[Drive, tuple[float, float]]:
-    """When each drive was stopped for good, on the bus and in itself."""
+    """When each drive was stopped for good, on the bus and in itself.
+
+    Who looks takes time from those who are to stop: so nobody looks before the last bound.
+    """
     stopped: dict[Drive, tuple[float, float]] = {}
+    bounds = [fault.drive_bound or fault.bus_bound] if drives else []
+    last_ms = max((bound(rig, drive) for bound in bounds for drive in drives), default=0.0)
+    time.sleep(max(0.0, moment + last_ms / 1000 - time.monotonic()))
     end = time.monotonic() + _STOPPED_S
     while len(stopped) < len(drives) and time.monotonic() < end:
         for drive in drives:
@@ -83,7 +89,7 @@ def _wait_stopped(
                 own = measure.boot_up(rig, drive, moment)
             if bus is not None and own is not None:
                 stopped.setdefault(drive, (bus[0], own))
-        time.sleep(0.02)
+        time.sleep(0.1)
     return stopped
 
 
@@ -103,9 +109,9 @@ def _sample(rig: Rig, fault: Fault, drive: Drive, moment: float, *, restarted: b
     elif fault.reference == "boot-up":
         begin = measure.boot_up(rig, drive, moment) or moment
     assert bus is not None
-    end = max(bus[0], own or bus[0])
     bus_bound_ms = fault.bus_bound(rig, drive)
     drive_bound_ms = fault.drive_bound(rig, drive) if fault.drive_bound else None
+    paused, waited = _held_up_ms(rig, begin, (bus[0], bus_bound_ms), (own, drive_bound_ms))
     return Sample(
         fault.name,
         drive.family.name,
@@ -116,22 +122,24 @@ def _sample(rig: Rig, fault: Fault, drive: Drive, moment: float, *, restarted: b
         drive_ms=None if own is None else (own - begin) * 1000,
         drive_bound_ms=drive_bound_ms,
         way_ms=way_ms,
-        paused_ms=paused_ms(rig.pauses, begin, end),
-        waited_ms=_waited_ms(rig, begin, (bus[0], bus_bound_ms), (own, drive_bound_ms)),
+        paused_ms=paused,
+        waited_ms=waited,
         noise_ms=rig.noise_ms,
         restarted=restarted,
         recovered=True,
     )
 
 
-def _waited_ms(
+def _held_up_ms(
     rig: Rig, begin: float, bus: tuple[float, float], drive: tuple[float | None, float | None]
-) -> float:
-    """From ``_BEFORE_MS`` before a bound that was exceeded until the stop; 0 where none was."""
-    waited = 0.0
-    for stop, bound_ms, watched in ((*bus, rig.waits[:1]), (*drive, rig.waits)):
+) -> tuple[float, float]:
+    """The pauses of the machine, and the waiting of bridge and drives, from ``_BEFORE_MS`` before a bound
+    that was exceeded until the stop; 0 where none was."""
+    paused = waited = 0.0
+    for stop, bound_ms, watched in ((*bus, (BRIDGE,)), (*drive, (BRIDGE, SIMULATION))):
         if stop is None or bound_ms is None or (stop - begin) * 1000 <= bound_ms:
             continue
         since = begin + (bound_ms - _BEFORE_MS) / 1000
-        waited = max(waited, sum(one.between(since, stop) for one in watched) * 1000)
-    return waited
+        paused = max(paused, paused_ms(rig.watched, since, stop))
+        waited = max(waited, sum(waited_ms(rig.watched, name, since, stop) for name in watched))
+    return paused, waited

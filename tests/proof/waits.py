@@ -1,65 +1,100 @@
-"""How long the bridge and the drives waited for the CPU, which they share here with their owners.
+"""How long bridge and drives waited for the CPU, which they share here with their owners; and how long the
+machine itself stood still.
 
-The kernel's own account (``/proc/PID/schedstat``: ns that the main thread was ready and another ran), looked
-at every few ms. On a user-mode kernel it goes by ticks of 10 ms.
+``python -m tests.proof.waits FOLDER NAME ...`` is a process that only sleeps 10 ms at a time, ahead of all
+others. To ``FOLDER/pauses`` it appends ``begin end`` for each sleep that took over ``FROM_S`` too long: from
+when it was due until it ended. ``FOLDER/NAME.pid`` is a link to the folder of a process in /proc; to
+``FOLDER/NAME.waits`` it appends ``now waited`` whenever the kernel's account of its main thread's waiting
+(``schedstat``: ready while another ran) has grown. All in seconds of the monotonic clock; the account of a
+user-mode kernel goes by ticks of 10 ms.
 """
 
 from __future__ import annotations
 
-import threading
+import os
+import sys
 import time
-from bisect import bisect_left
-from collections import deque
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-_LOOK_S: Final = 0.01
-_MOST: Final = 12_000
+FROM_S: Final = 0.002
+SLEEP_S: Final = 0.01
+_PRIORITY: Final = 90
 
 
-class Waits:
+def watch(folder: Path, names: list[str]) -> None:
+    with suppress(OSError):  # without the right to do so it counts the waiting for others, too
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+    accounts = [Account(folder, name) for name in names]
+    with (folder / "pauses").open("a", encoding="ascii", buffering=1) as pauses:
+        before = time.monotonic()
+        while True:
+            time.sleep(SLEEP_S)
+            now = time.monotonic()
+            due = before + SLEEP_S
+            if now - due > FROM_S:
+                pauses.write(f"{due:.6f} {now:.6f}\n")
+            before = now
+            for account in accounts:
+                account.look(now)
+
+
+class Account:
     """Of one process, whose number may change: a bridge is killed and started anew."""
 
-    def __init__(self, pid: int) -> None:
-        self.pid = pid
-        self._seen: deque[tuple[float, float]] = deque(maxlen=_MOST)
-        """When, and what was waited until then, both in seconds."""
+    def __init__(self, folder: Path, name: str) -> None:
+        self._source = folder / f"{name}.pid" / "schedstat"
+        self._path = folder / f"{name}.waits"
+        self._path.touch()
+        self._before = 0.0
 
     def look(self, now: float) -> None:
         try:
-            words = Path(f"/proc/{self.pid}/schedstat").read_text(encoding="ascii").split()
+            words = self._source.read_text(encoding="ascii").split()
         except OSError:
             return
-        if len(words) > 1:
-            self._seen.append((now, int(words[1]) / 1e9))
-
-    def between(self, begin: float, end: float) -> float:
-        """Seconds of waiting from ``begin`` to ``end``; what stands at their edges is left out."""
-        seen = list(self._seen)
-        first, last = bisect_left(seen, (begin, 0.0)), bisect_left(seen, (end, float("inf"))) - 1
-        if first >= last:
-            return 0.0
-        # A new process begins its account at nothing.
-        steps = zip(seen[first:last], seen[first + 1 : last + 1], strict=True)
-        return sum(max(0.0, after[1] - before[1]) for before, after in steps)
+        waited = int(words[1]) / 1e9 if len(words) > 1 else 0.0
+        if waited != self._before:
+            # A new process begins its account at nothing.
+            grown, self._before = max(0.0, waited - self._before), waited
+            with self._path.open("a", encoding="ascii") as log:
+                log.write(f"{now:.6f} {grown:.6f}\n")
 
 
-class Watch:
-    """Looks at several of them from a thread."""
+def follow(folder: Path, name: str, pid: int) -> None:
+    """The process ``name`` is this one from now on."""
+    fresh = folder / f"{name}.new"
+    fresh.symlink_to(f"/proc/{pid}")
+    fresh.replace(folder / f"{name}.pid")
 
-    def __init__(self, *waits: Waits) -> None:
-        self._waits = waits
-        self._running = True
-        self._thread = threading.Thread(target=self._run, daemon=True, name="waits")
-        self._thread.start()
 
-    def _run(self) -> None:
-        while self._running:
-            now = time.monotonic()
-            for waits in self._waits:
-                waits.look(now)
-            time.sleep(_LOOK_S)
+def waited_ms(folder: Path, name: str, begin: float, end: float) -> float:
+    """What this process waited from ``begin`` to ``end``, in ms.
 
-    def close(self) -> None:
-        self._running = False
-        self._thread.join(1.0)
+    The kernel adds a wait to its account when it is over, and it is seen there at the next look.
+    """
+    found = sum(grown for at, grown in _lines(folder / f"{name}.waits", begin) if begin < at <= end + SLEEP_S)
+    return min(found, max(0.0, end - begin)) * 1000
+
+
+def paused_ms(folder: Path, begin: float, end: float) -> float:
+    """The pauses within this time, in ms."""
+    pauses = _lines(folder / "pauses", begin)
+    return sum(max(0.0, min(last, end) - max(first, begin)) for first, last in pauses) * 1000
+
+
+def _lines(path: Path, since: float) -> Iterator[tuple[float, float]]:
+    """The two numbers of each line, the youngest first, back to one that begins before ``since``."""
+    for line in reversed(path.read_text(encoding="ascii").splitlines(keepends=True)):
+        if not line.endswith("\n"):  # it is being written
+            continue
+        first, second = (float(word) for word in line.split())
+        yield first, second
+        if first < since:
+            return
+
+
+if __name__ == "__main__":
+    watch(Path(sys.argv[1]), sys.argv[2:])

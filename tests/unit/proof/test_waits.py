@@ -3,32 +3,65 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
+import time
+from pathlib import Path
 
-from tests.proof.waits import Waits
+import pytest
 
-
-def account(*seen: tuple[float, float]) -> Waits:
-    waits = Waits(os.getpid())
-    waits._seen.extend(seen)
-    return waits
-
-
-def test_what_was_waited_between_two_moments() -> None:
-    waits = account((1.0, 0.1), (1.01, 0.1), (1.02, 0.11), (1.03, 0.12), (1.04, 0.2))
-    assert round(waits.between(1.005, 1.03), 6) == 0.02
-    assert waits.between(0.0, 0.9) == 0.0
-    assert waits.between(1.021, 1.029) == 0.0
+from tests.proof.waits import Account, follow, paused_ms, waited_ms
+from tests.support.process import REPOSITORY
 
 
-def test_a_new_process_has_not_waited_less_than_nothing() -> None:
-    assert round(account((1.0, 5.0), (1.01, 0.0), (1.02, 0.03)).between(0.9, 1.1), 6) == 0.03
+def put(path: Path, *lines: str) -> None:
+    path.write_text("".join(f"{line}\n" for line in lines), encoding="ascii")
 
 
-def test_the_kernel_tells_it_of_a_process() -> None:
-    waits = Waits(os.getpid())
-    waits.look(1.0)
-    waits.look(2.0)
-    assert len(waits._seen) == 2
-    gone = Waits(2**22 + 1)
-    gone.look(1.0)
-    assert not gone._seen
+def test_what_was_waited_between_two_moments(tmp_path: Path) -> None:
+    put(tmp_path / "bridge.waits", "1.010 0.02", "1.030 0.01", "1.050 0.03", "1.070 0.01")
+    assert waited_ms(tmp_path, "bridge", 1.01, 1.05) == pytest.approx(40)
+    assert waited_ms(tmp_path, "bridge", 1.08, 2.0) == 0.0
+    # Seen a look later; but nobody waits longer than there was time.
+    assert waited_ms(tmp_path, "bridge", 1.031, 1.041) == pytest.approx(10)
+
+
+def test_pauses_count_where_they_lie_between_two_moments(tmp_path: Path) -> None:
+    put(tmp_path / "pauses", "0.500 0.600", "1.000 1.040", "1.100 1.150")
+    assert paused_ms(tmp_path, 1.02, 1.11) == pytest.approx(30)
+    assert paused_ms(tmp_path, 1.2, 1.3) == 0.0
+
+
+def test_a_line_that_is_being_written_does_not_count(tmp_path: Path) -> None:
+    (tmp_path / "pauses").write_text("1.000 1.040\n1.100 1.1", encoding="ascii")
+    assert paused_ms(tmp_path, 0.0, 2.0) == pytest.approx(40)
+
+
+def test_the_account_of_one_process_after_the_other(tmp_path: Path) -> None:
+    account = Account(tmp_path, "bridge")
+    for now, pid, waited_s in ((1.0, 1, 5), (1.1, 1, 5), (1.2, 2, 1), (1.3, 2, 3)):
+        process = tmp_path / str(pid)
+        process.mkdir(exist_ok=True)
+        (process / "schedstat").write_text(f"7 {waited_s}000000000 9\n", encoding="ascii")
+        (tmp_path / "bridge.pid").unlink(missing_ok=True)
+        (tmp_path / "bridge.pid").symlink_to(process)
+        account.look(now)
+    grown = [line.split()[1] for line in (tmp_path / "bridge.waits").read_text().splitlines()]
+    assert [float(text) for text in grown] == [5, 0, 2]
+
+
+def test_the_kernel_tells_it_of_a_process(tmp_path: Path) -> None:
+    follow(tmp_path, "bridge", 2**22 + 1)  # is not there
+    follow(tmp_path, "bridge", os.getpid())
+    watch = subprocess.Popen(
+        [sys.executable, "-m", "tests.proof.waits", str(tmp_path), "bridge"], cwd=REPOSITORY
+    )
+    try:
+        end = time.monotonic() + 20
+        while not (tmp_path / "bridge.waits").exists() or not waited_ms(tmp_path, "bridge", 0.0, 1e9):
+            assert time.monotonic() < end
+            assert watch.poll() is None
+            time.sleep(0.01)
+    finally:
+        watch.kill()
+        watch.wait()

@@ -193,6 +193,7 @@ class DriveChannel:
             if state is NodeState.OPERATIONAL:
                 # It may have been switched off and on: whatever it was told before does not count.
                 self._gate.interlocked = True
+                self._leg.start.end(Outcome(Code.CANCELLED, "the node has restarted"))
             if state in (NodeState.OPERATIONAL, NodeState.DISABLED):
                 self._status.link_fault = 0.0
             if state is NodeState.LOST:

@@ -7,12 +7,12 @@ watchdog has tripped, the restart interlock is set or the drive's node is not th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from bridge.config import Reaction
 from bridge.drive import FAULTED, MOVING, ControlWords, DriveState, Handshake
 
-_ACKNOWLEDGE_PULSE_S = 0.1
+_ACKNOWLEDGE_PULSE_S: Final = 0.1
 """How long a generated acknowledge edge stays on the bus: longer than any cycle we send with."""
 
 
@@ -46,6 +46,8 @@ class Gate:
         self._followed = frozenset(source for _, source in self._follows)
         self._handshake = handshake
         self._is_enabled = False
+        self._may_move = True
+        """As far as is known, the drive may be turning its motor, or holding it."""
         self._status_word = 0
         self.rest: tuple[int, ...] = (0,) * setpoints
         """The setpoints of a drive that nobody commands."""
@@ -70,6 +72,11 @@ class Gate:
         if self._reaction == "silence":
             return self._tripped_at
         return self._tripped_at + self._then_silence_s if self._then_silence_s else None
+
+    @property
+    def is_stopping(self) -> bool:
+        """What is sent, or is about to be, does not enable the drive."""
+        return self.interlocked or not self._words.enables(self.sent.words[0])
 
     @property
     def _is_commanded(self) -> bool:
@@ -165,20 +172,23 @@ class Gate:
         if self._tripped_at is not None:
             self._tripped_at = None
             self.awaits_rest = False
-            self.stop(self._at_rest(self.sent.words[0]))
+            self.stop(self.word_at_rest)
         if pulse:
             self._acknowledge_until = now + _ACKNOWLEDGE_PULSE_S
 
-    def _at_rest(self, word: int) -> int:
-        """``word`` if it is a stop of some kind: an acknowledge turns no ramp into coasting."""
+    @property
+    def word_at_rest(self) -> int:
+        """What is sent if it is a stop of some kind: an acknowledge turns no ramp into coasting."""
+        word = self.sent.words[0]
         return self._words.stop(word) if self._words.enables(word) else word & ~self._words.acknowledge_mask
 
     def on_state(self, state: DriveState) -> None:
         """The drive reported this state."""
         was_enabled, self._is_enabled = self._is_enabled, state is DriveState.OPERATION_ENABLED
+        self._may_move = state in MOVING or state is DriveState.UNKNOWN
         if self._handshake is not None and (state in FAULTED or (was_enabled and not self._is_enabled)):
             self._handshake.reset()
-        if state not in MOVING and state is not DriveState.UNKNOWN:
+        if not self._may_move:
             self.awaits_rest = False
 
     def on_status_word(self, word: int) -> bool:
@@ -223,7 +233,8 @@ class Gate:
         word = self.control_word
         blocked = not may_enable or self.interlocked or self._tripped_at is not None
         if blocked and self._words.enables(word):
-            word = self._words.stop(word) | word & self._words.acknowledge_mask
+            stop = self._words.stop if self._may_move else self._words.withhold
+            word = stop(word) | word & self._words.acknowledge_mask
         if self._acknowledge_until is not None and self._now < self._acknowledge_until:
             word |= self._words.acknowledge_mask
         if self._handshake is not None and self._words.enables(word):

@@ -12,6 +12,9 @@ _LIMIT_S: Final = 3.0
 _QUICK_STOP_S: Final = 1.0
 """How long a quick stop may still take. A drive that stays in it afterwards (605Ah = 5 … 8) leaves it with
 disable voltage only; at once, that would let a motor coast that is still being stopped."""
+_SETTLE_S: Final = 0.2
+"""How long a drive that is being stopped may take to say what became of it. One that is still enabled then is
+on its ramp."""
 _CAN_BE_ENABLED: Final = (DriveState.READY, DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED)
 
 
@@ -26,6 +29,7 @@ class StartSequence:
         "_leaves_at",
         "_outcomes",
         "_reply",
+        "_settles_at",
         "_words",
     )
 
@@ -38,6 +42,8 @@ class StartSequence:
         self._deadline = 0.0
         self._leaves_at: float | None = None
         """While the drive is in its quick stop: when it is led out of it."""
+        self._settles_at: float | None = None
+        """While a stop is on its way to a drive that said it was enabled: when it is believed."""
         self._is_leaving = False
         """It is being led out of it."""
 
@@ -51,10 +57,17 @@ class StartSequence:
         self._reply = reply
         self._control_word = self._words.run | direction_bits
         self._deadline = now + _LIMIT_S
-        if state is not DriveState.OPERATION_ENABLED or self._gate.interlocked:
-            self._gate.lead(self._words.ready)
+        is_enabled = state is DriveState.OPERATION_ENABLED
+        is_stopped = is_enabled and self._gate.is_stopping
         self._is_leaving = False
-        self._leaves_at = now + _QUICK_STOP_S if state is DriveState.QUICK_STOP_ACTIVE else None
+        self._settles_at = now + _SETTLE_S if is_stopped else None
+        is_quick = is_stopped or state is DriveState.QUICK_STOP_ACTIVE
+        self._leaves_at = now + _QUICK_STOP_S if is_quick else None
+        if is_stopped:
+            self._gate.lead(self._gate.word_at_rest)
+            return
+        if not is_enabled:
+            self._gate.lead(self._words.ready)
         self.on_state(state)
 
     def on_state(self, state: DriveState, fault_text: str = "") -> None:
@@ -64,6 +77,11 @@ class StartSequence:
         if state in FAULTED:
             self._give_up(Code.NOT_READY, f"the drive went into fault: {fault_text}")
             return
+        if self._settles_at is not None:
+            if state is DriveState.OPERATION_ENABLED:
+                return
+            self._settles_at = None
+            self._gate.lead(self._words.ready)
         if state is not DriveState.QUICK_STOP_ACTIVE:
             self._leaves_at = None
             if self._is_leaving:
@@ -85,6 +103,10 @@ class StartSequence:
         if now >= self._deadline:
             label = state.label.replace("_", " ")
             self._give_up(Code.TIMED_OUT, f"the drive did not start, it is {label}")
+        elif self._settles_at is not None and now >= self._settles_at:
+            self._settles_at = None
+            self._gate.lead(self._words.ready)
+            self.on_state(state)
         elif self._leaves_at is not None and now >= self._leaves_at:
             self._leaves_at = None
             self._is_leaving = True
@@ -94,7 +116,8 @@ class StartSequence:
         """When ``on_time`` is to be called."""
         if self._reply is None:
             return None
-        return self._deadline if self._leaves_at is None else self._leaves_at
+        times = (self._settles_at, self._leaves_at, self._deadline)
+        return min(time for time in times if time is not None)
 
     def _give_up(self, code: Code, message: str) -> None:
         self._gate.stop(self._words.ready)
@@ -103,5 +126,6 @@ class StartSequence:
     def end(self, outcome: Outcome) -> None:
         """End a start that is going on with this outcome; the words stay as they are."""
         reply, self._reply = self._reply, None
+        self._settles_at = self._leaves_at = None
         if reply is not None:
             self._outcomes.append((reply, outcome))

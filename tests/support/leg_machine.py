@@ -39,7 +39,7 @@ _FAULT_BITS, _FAULT = 0b1001111, 0b0001000
 
 _MODEL_FIELDS: Final = tuple(field.name for field in fields(LegModel))
 _MODEL_TIMES: Final = tuple(
-    map(_MODEL_FIELDS.index, ("now", "deadline", "lease_until", "start_until")),
+    map(_MODEL_FIELDS.index, ("now", "deadline", "lease_until", "start_until", "settles_at")),
 )
 
 Transition = tuple[WatchdogState, Stimulus, str]

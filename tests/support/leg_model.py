@@ -11,6 +11,7 @@ from enum import IntEnum
 from bridge.command import Identity, Role
 
 START_LIMIT_S = 3.0
+SETTLE_S = 0.2
 
 
 class Stage(IntEnum):
@@ -39,6 +40,8 @@ class LegModel:
     lease_until: float | None = None
     ttl_s: float = 0.0
     start_until: float | None = None
+    settles_at: float | None = None
+    """A start waits for what becomes of a stop that is on its way."""
     silent: bool = False
     tripped: bool = False
     held: bool = False
@@ -80,7 +83,7 @@ class LegModel:
                 self.held = self.holds and self.stage is Stage.ENABLED
                 self.tripped = True
                 self.stage = Stage.ACKNOWLEDGE
-                self.start_until = None
+                self.end_start()
         if self.lease_until is not None and self.now >= self.lease_until:
             self.leave()
 
@@ -89,6 +92,9 @@ class LegModel:
         self.judge()
         if self.start_until is not None and self.now >= self.start_until:
             self.stop()
+        elif self.settles_at is not None and self.now >= self.settles_at:
+            self.stage = Stage.ENABLED
+            self.end_start()
 
     # what happens
 
@@ -96,7 +102,10 @@ class LegModel:
         """Whatever was enabled has to be enabled anew."""
         self.stage = min(self.stage, Stage.STOP_WORD)
         self.held = self.acknowledges = False
-        self.start_until = None
+        self.end_start()
+
+    def end_start(self) -> None:
+        self.start_until = self.settles_at = None
 
     def leave(self) -> None:
         self.stop()
@@ -131,7 +140,7 @@ class LegModel:
     def word(self, who: Identity, *, enables: bool, acknowledges: bool) -> None:
         """A valid control word."""
         self.telegram(who)
-        self.start_until = None
+        self.end_start()
         is_edge = acknowledges and not self.acknowledges
         if self.tripped and is_edge:
             self.acknowledge(who)
@@ -146,28 +155,33 @@ class LegModel:
     def start(self, who: Identity, *, ready: bool, enabled: bool) -> None:
         """A start that was taken, of a drive that is in this state."""
         self.telegram(who)
-        self.stage = Stage.ENABLED if ready else Stage.ENABLE
+        self.end_start()
+        is_stopped = enabled and self.stage is not Stage.ENABLED
+        self.stage = Stage.ENABLED if ready and not is_stopped else Stage.ENABLE
         self.acknowledges = False
-        self.start_until = None if enabled else self.now + START_LIMIT_S
+        if is_stopped:
+            self.settles_at = self.now + SETTLE_S
+        if is_stopped or not enabled:
+            self.start_until = self.now + START_LIMIT_S
 
     def drive_is(self, *, fault: bool, ready: bool, enabled: bool) -> None:
         if self.start_until is None:
             return
+        self.settles_at = None
         if fault:
             self.stop()
         elif ready and self.stage >= Stage.ENABLE:
             self.stage = Stage.ENABLED
         if enabled:
-            self.start_until = None
+            self.end_start()
 
     def node(self, *, is_there: bool) -> None:
         was_there = self.is_there
         self.is_there = is_there or (self.ignores and was_there)
         if is_there or not self.is_there:
-            start_until = self.start_until if self.is_there else None
             acknowledges, held = self.acknowledges, self.held and self.is_there
             self.stop()
-            self.acknowledges, self.held, self.start_until = acknowledges, held, start_until
+            self.acknowledges, self.held = acknowledges, held
 
     def gap(self) -> None:
         """The bridge itself hung."""

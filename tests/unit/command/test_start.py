@@ -32,6 +32,13 @@ def rig() -> Rig:
     return rig
 
 
+@pytest.fixture
+def running() -> Rig:
+    rig = Rig(fieldbus_timeout_ms=10_000)
+    rig.run()
+    return rig
+
+
 def is_led_from_inhibited(rig: Rig, outcomes: list[Outcome]) -> None:
     rig.drive_says(INHIBITED)
     assert rig.sent == SHUT_DOWN
@@ -74,11 +81,9 @@ def test_is_a_telegram_and_makes_its_sender_the_owner(rig: Rig):
     assert rig.channel.owner is not None
 
 
-def test_of_a_running_drive_is_done_at_once_and_changes_its_direction():
-    rig = Rig(fieldbus_timeout_ms=10_000)
-    rig.run()
-    assert codes(rig.submit(Action.START, direction=-1)) == [Code.OK]
-    assert rig.sent == 0x147F
+def test_of_a_running_drive_is_done_at_once_and_changes_its_direction(running: Rig):
+    assert codes(running.submit(Action.START, direction=-1)) == [Code.OK]
+    assert running.sent == 0x147F
 
 
 def test_after_a_stop_is_a_fresh_enable(rig: Rig):
@@ -97,6 +102,58 @@ def test_right_after_disable_voltage_makes_the_drive_ready_that_is_about_to_be_i
     rig.ask(Action.DISABLE_VOLTAGE)
     outcomes = rig.submit(Action.START)  # before the drive has said what became of it
     is_led_from_inhibited(rig, outcomes)
+
+
+@pytest.mark.parametrize("action", [Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE])
+def test_right_after_a_stop_of_a_running_drive_waits_for_what_becomes_of_it(running: Rig, action: Action):
+    running.ask(action)
+    stopping = running.sent
+    outcomes = running.submit(Action.START)  # the drive's last word is still "enabled"
+    assert (outcomes, running.sent) == ([], stopping)
+    is_led_from_inhibited(running, outcomes)
+
+
+def test_of_a_drive_on_its_ramp_lets_it_turn_again(running: Rig):
+    running.write(SHUT_DOWN)
+    outcomes = running.submit(Action.START)
+    running.wait(0.19)
+    assert (outcomes, running.enables) == ([], False)
+    running.wait(0.01)
+    assert running.enables
+    assert codes(outcomes) == [Code.OK]
+
+
+def test_of_a_drive_that_was_released_while_it_turned_stops_it_first(running: Rig):
+    running.ask(Action.RELEASE_CONTROL)
+    outcomes = running.submit(Action.START)
+    assert (outcomes, running.enables) == ([], False)
+    running.drive_says(READY)
+    assert running.enables
+    running.drive_says(ENABLED)
+    assert codes(outcomes) == [Code.OK]
+
+
+def test_is_cancelled_by_a_restart_of_the_node_where_its_loss_is_ignored():
+    rig = Rig(fieldbus_timeout_ms=10_000, telegram_downtime_s=-0.1)
+    rig.run()
+    rig.ask(Action.STOP)
+    outcomes = rig.submit(Action.START)
+    rig.node(NodeState.LOST)
+    rig.node(NodeState.OPERATIONAL)
+    assert codes(outcomes) == [Code.CANCELLED]
+    rig.wait(1)
+    assert not rig.enables
+
+
+def test_of_a_drive_that_has_just_begun_its_quick_stop_leads_it_out_of_it(running: Rig):
+    running.ask(Action.QUICK_STOP)
+    outcomes = running.submit(Action.START)
+    running.drive_says(QUICK_STOPPING)
+    running.wait(0.9)
+    assert running.sent & 0x0002, "the ramp of the quick stop is let run"
+    running.wait(0.1)
+    assert running.sent & 0x0002 == 0, "disable voltage"
+    is_led_from_inhibited(running, outcomes)
 
 
 @pytest.mark.parametrize("direction", [2, -2])

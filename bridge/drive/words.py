@@ -98,8 +98,8 @@ class ControlWords:
         return self._changed(word, self._disable_voltage)
 
     def withhold(self, word: int) -> int:
-        """``word`` without what it enables, for a drive that is not enabled: where a family's stop is one that
-        holds the motor (Lenze's quick stop), it would bring the motor under current."""
+        """``word`` without what it enables, for a drive that is not enabled: where a family's stop is one
+        that holds the motor (Lenze's quick stop), it would bring the motor under current."""
         return self._changed(word, (self._enable_mask, self.ready & self._enable_mask))
 
     def _changed(self, word: int, bits: tuple[int, int]) -> int:

@@ -139,10 +139,13 @@ class AuditTrail:
                 names = {"fieldbus_timeout_ms": f"{request.target}/supervision/fieldbus_timeout_ms"}
             case Action.TAKE_CONTROL | Action.RELEASE_CONTROL:
                 names = {"owner": f"{request.target}/supervision/owner"}
+            case Action.WRITE_PARAMETER:  # what was read of it last
+                names = {request.parameter: f"{request.target}/parameter/{request.parameter}"}
             case _:
                 return {}
         index = self._image.index
-        return {leaf: self._image[index[name]].value for leaf, name in names.items() if name in index}
+        held = {leaf: self._image[index[name]] for leaf, name in names.items() if name in index}
+        return {leaf: reading.value for leaf, reading in held.items() if reading.quality.has_value}
 
     # what is told, and what is counted
 

@@ -156,11 +156,23 @@ class DriveChannel:
         state = status.words.state(word)
         is_awaited = self._gate.on_status_word(word)
         if state is status.state and not (is_awaited or self._gate.awaits_rest):
+            self._on_same_state(now)
             return
         status.state = state
         self._gate.on_state(state)
         self._leg.start.on_state(state, self.fault_text)
         self._settle(now)
+
+    def _on_same_state(self, now: float) -> None:
+        start = self._leg.start
+        if start.awaits_report:
+            start.on_report(self._status.state, now)
+            self._settle(now)
+
+    def on_unchanged(self, now: float) -> None:
+        """A TPDO arrived that says what the last one said."""
+        self.on_pdo(now)
+        self._on_same_state(now)
 
     def on_actual_words(self, words: Sequence[int], now: float) -> None:
         """What TPDOs have brought, the status word first, in the order of ``process.tpdo``."""
@@ -168,7 +180,7 @@ class DriveChannel:
             self._settle(now)
 
     def on_pdo(self, now: float) -> None:
-        """A TPDO arrived, changed or not."""
+        """A TPDO arrived; what it says comes after this."""
         if self.link.on_pdo(now):
             self._status.link_fault = 0.0
             self._settle(now)
@@ -232,11 +244,14 @@ class DriveChannel:
             self._leg.leave(Stimulus.STARTED, now)
         self._settle(now)
 
-    def start_anew(self, now: float) -> None:
+    def start_anew(self, now: float, *, has_restarted: bool = False) -> None:
         """The bus was gone, or the node was stopped or has restarted: whatever the drive was told does not
         count any more, not even where communication errors are ignored."""
         self._leg.start.end(Outcome(Code.CANCELLED, "the drive has to be enabled anew"))
-        self._gate.stop(self.words.stop(self._gate.sent.words[0]))
+        if has_restarted:
+            self._gate.restart()
+        else:
+            self._gate.stop(self.words.stop(self._gate.sent.words[0]))
         self._settle(now)
 
     # requests

@@ -241,7 +241,7 @@ class ControllerLeg:
     def _acknowledge(self, now: float, *, pulse: bool) -> None:
         was_tripped = self.is_tripped
         self.watchdog.apply(Stimulus.ACKNOWLEDGED, now)
-        self.gate.clear(now, pulse=pulse)
+        self.gate.clear(now, self._status.state, pulse=pulse)
         if was_tripped:
             self._tell(now, Kind.WATCHDOG, 200, f"acknowledged by {self.owner}; the drive stays stopped")
 
@@ -290,7 +290,7 @@ class ControllerLeg:
             Action.QUICK_STOP: self.words.quick_stop,
             Action.DISABLE_VOLTAGE: self.words.disable_voltage,
         }[request.action]
-        self.gate.stop(change(self.gate.sent.words[0]))
+        self.gate.stop(change(self.gate.sent.words[0]), is_asked=True)
         self.start.end(Outcome(Code.CANCELLED, f"{request.action} by {request.identity}"))
 
     def _begin_start(self, request: Request, now: float, reply: Reply) -> None:
@@ -306,4 +306,4 @@ class ControllerLeg:
             raise Refusal(Code.NOT_READY, self.why_blocked(now))
         self._own(request.identity, now)
         self.watchdog.apply(Stimulus.TELEGRAM, now)
-        self.start.begin(bits, self._status.state, now, reply)
+        self.start.begin(bits, self._status.state, now, reply, is_known=self._link.is_heard)

@@ -144,7 +144,7 @@ class Drive:
 
     def on_unchanged_data(self, now: float) -> None:
         """A TPDO that says what the last one said."""
-        self.channel.on_pdo(now)
+        self.channel.on_unchanged(now)
         if self._actual.quality is not Quality.GOOD:
             self._actual.refresh(now)
 

@@ -61,6 +61,11 @@ class Link:
         return self._expired_at is not None
 
     @property
+    def is_heard(self) -> bool:
+        """A TPDO came since the node is operational."""
+        return self.last_pdo is not None and self.last_pdo >= self._since
+
+    @property
     def may_enable(self) -> bool:
         """Whether enabling commands may go to the drive."""
         if self.ignores_errors:

@@ -14,6 +14,9 @@ from bridge.drive import FAULTED, MOVING, ControlWords, DriveState, Handshake
 
 _ACKNOWLEDGE_PULSE_S: Final = 0.1
 """How long a generated acknowledge edge stays on the bus: longer than any cycle we send with."""
+_QUICK_STOP_LIMIT_S: Final = 10.0
+"""After that a quick stop by the watchdog is followed by disable voltage in any case: Lenze's holds the motor
+for ever, and so does CiA 402's with 605Ah = 5 … 8."""
 
 
 class Output(NamedTuple):
@@ -46,8 +49,15 @@ class Gate:
         self._followed = frozenset(source for _, source in self._follows)
         self._handshake = handshake
         self._is_enabled = False
-        self._may_move = True
-        """As far as is known, the drive may be turning its motor, or holding it."""
+        self._has_moved = True
+        """The drive has said that it follows the last word that enabled it: what it said before that does not
+        say that it rests."""
+        self._rests = False
+        """The drive has said that it is not enabled, and nothing enabling was sent since."""
+        self._is_ours = True
+        """The control word is a stop by the bridge, not the owner's."""
+        self._is_asked = False
+        """The stop in force is one that somebody has asked for: it stays as it is."""
         self._status_word = 0
         self.rest: tuple[int, ...] = (0,) * setpoints
         """The setpoints of a drive that nobody commands."""
@@ -56,8 +66,8 @@ class Gate:
         self._held: Output | None = None
         """With the reaction "hold": what goes on being sent after a trip, until somebody stops the drive."""
         self._acknowledge_until: float | None = None
-        self.awaits_rest = False
-        """Tripped, and a quick stop is on its way that is followed by disable voltage."""
+        self._rest_limit: float | None = None
+        """Tripped, and a quick stop is on its way: by then at the latest disable voltage follows."""
         self.control_word = words.stopped
         """The owner's control word, as it would like it."""
         self.setpoints = self.rest
@@ -72,6 +82,11 @@ class Gate:
         if self._reaction == "silence":
             return self._tripped_at
         return self._tripped_at + self._then_silence_s if self._then_silence_s else None
+
+    @property
+    def awaits_rest(self) -> bool:
+        """The drive is to come to rest, and gets disable voltage then."""
+        return self._rest_limit is not None
 
     @property
     def is_stopping(self) -> bool:
@@ -132,6 +147,7 @@ class Gate:
                 self._handshake.order(setpoints)
         if control_word is not None:
             self.control_word = control_word
+            self._is_ours = False
         if self._tripped_at is not None:
             if is_stop:
                 self._held = None
@@ -143,16 +159,25 @@ class Gate:
     def lead(self, control_word: int) -> None:
         """The next word of a start, for a drive that may be enabled; what the owner has ordered stays."""
         self.control_word = control_word
+        self._is_ours = False
         self._keep_at_rest()
         if not self._words.enables(control_word):
             self.interlocked = False
 
-    def stop(self, control_word: int) -> None:
-        """Stop with this word in place of the owner's, and wait for a fresh enable."""
+    def stop(self, control_word: int, *, is_asked: bool = False) -> None:
+        """Stop with this word in place of the owner's, and wait for a fresh enable. ``is_asked``: by a
+        command, and not because the bridge has to."""
         self.control_word = control_word
+        self._is_ours = True
+        self._is_asked = is_asked
         self._drop_setpoints()
         self.interlocked = True
         self._held = None
+
+    def restart(self) -> None:
+        """The drive itself has restarted: it is not enabled, and whatever it was told does not count."""
+        self.stop(self._words.stopped)
+        self._has_moved = self._rests = True
 
     def _drop_setpoints(self) -> None:
         self.setpoints = self.rest
@@ -161,19 +186,23 @@ class Gate:
 
     def trip(self, now: float) -> None:
         self._tripped_at = now
-        self.awaits_rest = self._reaction == "quick_stop"
+        self._rest_limit = now + _QUICK_STOP_LIMIT_S if self._reaction == "quick_stop" else None
         if self._reaction == "hold":
             self._held = self.sent
         else:
             self._drop_setpoints()
 
-    def clear(self, now: float, *, pulse: bool) -> None:
-        """Leave the trip, stopped. With ``pulse`` an acknowledge edge is sent to the drive."""
+    def clear(self, now: float, state: DriveState, *, pulse: bool) -> None:
+        """Acknowledge: leave the trip, and stop what would go on after a fault of the drive itself. With
+        ``pulse`` an acknowledge edge is sent to the drive."""
         if self._tripped_at is not None:
             self._tripped_at = None
-            self.awaits_rest = False
+            self._rest_limit = None
             self.stop(self.word_at_rest)
         if pulse:
+            if state in FAULTED:
+                self.stop(self.word_at_rest)
+                self._rests |= state is DriveState.FAULT  # which nothing but this ends
             self._acknowledge_until = now + _ACKNOWLEDGE_PULSE_S
 
     @property
@@ -185,11 +214,14 @@ class Gate:
     def on_state(self, state: DriveState) -> None:
         """The drive reported this state."""
         was_enabled, self._is_enabled = self._is_enabled, state is DriveState.OPERATION_ENABLED
-        self._may_move = state in MOVING or state is DriveState.UNKNOWN
         if self._handshake is not None and (state in FAULTED or (was_enabled and not self._is_enabled)):
             self._handshake.reset()
-        if not self._may_move:
-            self.awaits_rest = False
+        if state in MOVING:
+            self._has_moved = True
+        elif state is not DriveState.UNKNOWN:
+            self._rest_limit = None
+            has_followed = self._has_moved or state is DriveState.FAULT
+            self._rests = has_followed and not self._words.enables(self.sent.words[0])
 
     def on_status_word(self, word: int) -> bool:
         """The drive's status word, before the state it says. True where one of its bits is waited for."""
@@ -204,7 +236,7 @@ class Gate:
 
     def next_deadline(self) -> float | None:
         """When what is sent changes by itself, beyond what ``compute`` has seen."""
-        times = [self._silence_at, self._acknowledge_until]
+        times = [self._silence_at, self._acknowledge_until, self._rest_limit]
         if self._handshake is not None:
             times += self._handshake.next_deadlines()
         times = [time for time in times if time is not None and time > self._now]
@@ -215,10 +247,16 @@ class Gate:
         self._now = max(now, self._now)
         if self._handshake is not None and not may_enable:
             self._handshake.reset()
+        if self._rest_limit is not None and self._now >= self._rest_limit:
+            self._rest_limit = None
+        was_enabling = self._words.enables(self.sent.words[0])
         self.sent = self._compute(may_enable)
         if self._handshake is not None:
             self._handshake.step(self.setpoints, self._status_word, self._now, enabled=self._is_commanded)
             self.sent = self._compute(may_enable)
+        if self._words.enables(self.sent.words[0]):
+            self._has_moved = self._is_enabled or (was_enabling and self._has_moved)
+            self._rests = self._is_asked = False
         return self.sent
 
     def _compute(self, may_enable: bool) -> Output:
@@ -232,9 +270,13 @@ class Gate:
             self._held = None
         word = self.control_word
         blocked = not may_enable or self.interlocked or self._tripped_at is not None
+        is_ours = self._is_ours
         if blocked and self._words.enables(word):
-            stop = self._words.stop if self._may_move else self._words.withhold
-            word = stop(word) | word & self._words.acknowledge_mask
+            # The stop that is in force, by whomever: what the owner goes on writing does not weaken it.
+            word = self.word_at_rest | word & self._words.acknowledge_mask
+            is_ours = True
+        if is_ours and self._rests and not self._is_asked:
+            word = self._words.withhold(word) | word & self._words.acknowledge_mask
         if self._acknowledge_until is not None and self._now < self._acknowledge_until:
             word |= self._words.acknowledge_mask
         if self._handshake is not None and self._words.enables(word):

@@ -189,9 +189,9 @@ class Plant:
         as what a drive refuses."""
         self.audit.rejected(rejection, now, count)
         target = rejection.target
-        is_known = target in self.drives or target in self.nodes
+        is_known = target in self.drives or target in self.nodes or target in self.bus_commands
         what = rejection.action if is_known else f"{rejection.action} on {target[:_LONGEST_NAME]!r}"
-        source = target if is_known else "bridge"
+        source = target.removeprefix("bus/") if is_known else "bridge"
         self._tell_refusal(what, rejection.identity, source, rejection.message, now, count)
 
     def _tell_refusal(

@@ -13,8 +13,10 @@ _QUICK_STOP_S: Final = 1.0
 """How long a quick stop may still take. A drive that stays in it afterwards (605Ah = 5 … 8) leaves it with
 disable voltage only; at once, that would let a motor coast that is still being stopped."""
 _SETTLE_S: Final = 0.2
-"""How long a drive that is being stopped may take to say what became of it. One that is still enabled then is
-on its ramp."""
+"""How long what a drive says may be from before a stop. One that says "enabled" later than that is on its
+ramp, or is held."""
+_BELIEVED_S: Final = 1.0
+"""Without a word from a drive that sends only changes, what it said last is believed after this time."""
 _CAN_BE_ENABLED: Final = (DriveState.READY, DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED)
 
 
@@ -22,6 +24,8 @@ class StartSequence:
     """At most one start at a time; each one's outcome is handed to ``conclude`` exactly once."""
 
     __slots__ = (
+        "_believed_at",
+        "_believes_from",
         "_control_word",
         "_deadline",
         "_gate",
@@ -29,7 +33,6 @@ class StartSequence:
         "_leaves_at",
         "_outcomes",
         "_reply",
-        "_settles_at",
         "_words",
     )
 
@@ -42,8 +45,10 @@ class StartSequence:
         self._deadline = 0.0
         self._leaves_at: float | None = None
         """While the drive is in its quick stop: when it is led out of it."""
-        self._settles_at: float | None = None
-        """While a stop is on its way to a drive that said it was enabled: when it is believed."""
+        self._believes_from: float | None = None
+        """While what the drive has said may be out of date: from when on its reports are believed."""
+        self._believed_at: float | None = None
+        """When its last one is, though nothing came."""
         self._is_leaving = False
         """It is being led out of it."""
 
@@ -51,42 +56,64 @@ class StartSequence:
     def is_going_on(self) -> bool:
         return self._reply is not None
 
-    def begin(self, direction_bits: int, state: DriveState, now: float, reply: Reply) -> None:
-        """Start; the drive may be enabled and has no fault."""
+    @property
+    def awaits_report(self) -> bool:
+        """What the drive says next counts, also where it says nothing new."""
+        return self._believes_from is not None
+
+    def begin(
+        self, direction_bits: int, state: DriveState, now: float, reply: Reply, *, is_known: bool = True
+    ) -> None:
+        """Start; the drive may be enabled and has no fault. ``is_known``: it has said so since its node is
+        operational."""
+        believes_from, believed_at = self._believes_from, self._believed_at
         self.end(Outcome(Code.CANCELLED, "started anew"))
         self._reply = reply
         self._control_word = self._words.run | direction_bits
         self._deadline = now + _LIMIT_S
-        is_enabled = state is DriveState.OPERATION_ENABLED
-        is_stopped = is_enabled and self._gate.is_stopping
         self._is_leaving = False
-        self._settles_at = now + _SETTLE_S if is_stopped else None
-        is_quick = is_stopped or state is DriveState.QUICK_STOP_ACTIVE
-        self._leaves_at = now + _QUICK_STOP_S if is_quick else None
-        if is_stopped:
+        is_stopped = state is DriveState.OPERATION_ENABLED and self._gate.is_stopping
+        if is_stopped or not is_known:
+            self._believes_from = believes_from or now + (_SETTLE_S if is_known else 0.0)
+            if is_known:
+                self._believed_at = believed_at or now + _BELIEVED_S
+        if self.awaits_report or state is DriveState.QUICK_STOP_ACTIVE:
+            # What stops it goes on until it is known to be over: to become ready may mean to coast.
+            self._leaves_at = now + _QUICK_STOP_S
             self._gate.lead(self._gate.word_at_rest)
             return
-        if not is_enabled:
+        if state is not DriveState.OPERATION_ENABLED:
             self._gate.lead(self._words.ready)
         self.on_state(state)
 
+    def on_report(self, state: DriveState, now: float) -> None:
+        """A report of the drive, while one is awaited: it is in this state, as it was before."""
+        if self._believes_from is not None and now >= self._believes_from:
+            self._believe(state)
+
     def on_state(self, state: DriveState, fault_text: str = "") -> None:
-        """The drive is in this state: take the next step."""
+        """The drive is in this state now: take the next step."""
         if self._reply is None:
             return
         if state in FAULTED:
             self._give_up(Code.NOT_READY, f"the drive went into fault: {fault_text}")
-            return
-        if self._settles_at is not None:
-            if state is DriveState.OPERATION_ENABLED:
-                return
-            self._settles_at = None
-            self._gate.lead(self._words.ready)
+        elif self._believes_from is None:
+            self._go_on(state)
+        elif state is not DriveState.OPERATION_ENABLED:
+            self._believe(state)
+
+    def _believe(self, state: DriveState) -> None:
+        self._believes_from = self._believed_at = None
         if state is not DriveState.QUICK_STOP_ACTIVE:
             self._leaves_at = None
-            if self._is_leaving:
-                self._is_leaving = False
-                self._gate.lead(self._words.ready)
+            self._gate.lead(self._words.ready)
+        self._go_on(state)
+
+    def _go_on(self, state: DriveState) -> None:
+        if state is not DriveState.QUICK_STOP_ACTIVE and (self._is_leaving or self._leaves_at is not None):
+            self._is_leaving = False
+            self._leaves_at = None
+            self._gate.lead(self._words.ready)
         if state in _CAN_BE_ENABLED:
             self._gate.lead(self._control_word)
         elif state is DriveState.SWITCH_ON_INHIBITED:
@@ -103,10 +130,8 @@ class StartSequence:
         if now >= self._deadline:
             label = state.label.replace("_", " ")
             self._give_up(Code.TIMED_OUT, f"the drive did not start, it is {label}")
-        elif self._settles_at is not None and now >= self._settles_at:
-            self._settles_at = None
-            self._gate.lead(self._words.ready)
-            self.on_state(state)
+        elif self._believed_at is not None and now >= self._believed_at:
+            self._believe(state)
         elif self._leaves_at is not None and now >= self._leaves_at:
             self._leaves_at = None
             self._is_leaving = True
@@ -116,7 +141,7 @@ class StartSequence:
         """When ``on_time`` is to be called."""
         if self._reply is None:
             return None
-        times = (self._settles_at, self._leaves_at, self._deadline)
+        times = (self._believed_at, self._leaves_at, self._deadline)
         return min(time for time in times if time is not None)
 
     def _give_up(self, code: Code, message: str) -> None:
@@ -126,6 +151,6 @@ class StartSequence:
     def end(self, outcome: Outcome) -> None:
         """End a start that is going on with this outcome; the words stay as they are."""
         reply, self._reply = self._reply, None
-        self._settles_at = self._leaves_at = None
+        self._believes_from = self._believed_at = self._leaves_at = None
         if reply is not None:
             self._outcomes.append((reply, outcome))

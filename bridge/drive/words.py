@@ -47,6 +47,7 @@ class ControlWords:
         "_quick_stop",
         "_stop",
         "_valid_mask",
+        "_withhold",
         "acknowledge_mask",
         "begin",
         "forward",
@@ -70,6 +71,7 @@ class ControlWords:
         self._stop = self._bits(model.stop)
         self._quick_stop = self._bits(model.quick_stop)
         self._disable_voltage = self._bits(model.disable_voltage)
+        self._withhold = self._bits(Command(mask=self._enable_mask, value=model.ready & self._enable_mask))
 
     def _bits(self, command: Command) -> tuple[int, int]:
         """Mask and value of a command, without the bits that it would bring to where enabling needs
@@ -98,9 +100,9 @@ class ControlWords:
         return self._changed(word, self._disable_voltage)
 
     def withhold(self, word: int) -> int:
-        """``word`` without what it enables, for a drive that is not enabled: where a family's stop is one
-        that holds the motor (Lenze's quick stop), it would bring the motor under current."""
-        return self._changed(word, (self._enable_mask, self.ready & self._enable_mask))
+        """A stop for a drive that is not enabled: ``word`` without what it enables. Where a family's stop
+        holds the motor (Lenze's quick stop), it would bring the motor under current."""
+        return self._changed(word, self._withhold)
 
     def _changed(self, word: int, bits: tuple[int, int]) -> int:
         """``word`` with these bits. What is not about moving stays (parameter set, functions), but the

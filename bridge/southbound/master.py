@@ -225,7 +225,11 @@ class Master:
         line.was_up = is_up
         line.beating.clear()
         line.renew_at = now
-        if not is_up:
+        if is_up:
+            # What was written meanwhile does not go out first.
+            for node in line.network.nodes:
+                node.stop_drives(now)
+        else:
             line.network.bus_is_gone(now)
 
     def _tell_state(self, line: _Line, now: float) -> None:

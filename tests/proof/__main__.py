@@ -4,7 +4,8 @@
     python -m tests.proof report --least N --page PAGE.md --out RESULT.json PART.json ...
 
 ``run`` is for a machine with vcan0, vcan1 and a mount namespace of its own
-(``tests/lab/vcan-run -n 2 -- unshare --mount ...``). Both end with 1 where a bound is exceeded.
+(``tests/lab/vcan-run -n 2 -- unshare --mount ...``); the lab has a short one (``tests/lab/test_proof.py``).
+Both end with 1 where a bound is exceeded.
 """
 
 from __future__ import annotations

@@ -35,12 +35,16 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     still = [drive for drive in concerned if not measure.was_moving(rig, drive, moment)]
     rig.by_themselves += len(still)
     stopped = _wait_stopped(rig, fault, [drive for drive in concerned if drive not in still], moment)
+    ways_ms = _ways_ms(rig, fault, list(stopped), moment)
     _all_go_on(rig, others, fault, "of another protocol")
     fault.undo(rig)
     _wait_talking(rig, concerned)
     time.sleep(_HOLD_S)
     restarted = {drive: measure.was_enabled(rig, drive, *times) for drive, times in stopped.items()}
-    samples = [_sample(rig, fault, drive, moment, restarted=restarted[drive]) for drive in stopped]
+    samples = [
+        _sample(rig, fault, drive, moment, ways_ms.get(drive), restarted=restarted[drive])
+        for drive in stopped
+    ]
     for drive, sample in zip(stopped, samples, strict=True):
         if sample.verdict == "failed":
             say(f"FAILED: {sample}\n{measure.trace(rig, drive, moment)}")
@@ -97,13 +101,22 @@ def _wait_talking(rig: Rig, drives: list[Drive]) -> None:
     rig.wait(lambda: all(rig.talks(drive) for drive in drives), _TALKS_S, "process data flow again")
 
 
-def _sample(rig: Rig, fault: Fault, drive: Drive, moment: float, *, restarted: bool) -> Sample:
+def _ways_ms(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> dict[Drive, float]:
+    """How long each last telegram was on its way: before new owners number theirs from the start."""
+    if fault.reference != "telegram":
+        return {}
+    stops = {drive: measure.bus_stop(rig, drive, moment, silent=False) for drive in drives}
+    return {drive: measure.way(rig, drive, stop[1]) * 1000 for drive, stop in stops.items() if stop}
+
+
+def _sample(
+    rig: Rig, fault: Fault, drive: Drive, moment: float, way_ms: float | None, *, restarted: bool
+) -> Sample:
     bus = measure.bus_stop(rig, drive, moment, silent=fault.leaves_silence)
     own = measure.drive_stop(rig, drive, moment) if fault.drive_bound else None
-    begin, way_ms = moment, None
+    begin = moment
     if bus is not None and fault.reference == "telegram":
         begin = bus[1].first
-        way_ms = measure.way(rig, drive, bus[1]) * 1000
     elif fault.reference == "sign of life":
         begin = measure.last_sign(rig, drive, moment)
     elif fault.reference == "boot-up":

@@ -39,7 +39,7 @@ _FAULT_BITS, _FAULT = 0b1001111, 0b0001000
 
 _MODEL_FIELDS: Final = tuple(field.name for field in fields(LegModel))
 _MODEL_TIMES: Final = tuple(
-    map(_MODEL_FIELDS.index, ("now", "deadline", "lease_until", "start_until", "settles_at")),
+    map(_MODEL_FIELDS.index, ("now", "deadline", "lease_until", "start_until", "believed_at")),
 )
 
 Transition = tuple[WatchdogState, Stimulus, str]
@@ -228,7 +228,7 @@ class LegMachine:
             case Action.KEEP_ALIVE:
                 model.telegram(who)
             case Action.RESET_FAULT:
-                model.acknowledge(who)
+                model.acknowledge(who, fault=self._channel.state is DriveState.FAULT)
             case Action.START:
                 state = self._channel.state
                 if model.tripped or state is DriveState.FAULT or not model.is_there:

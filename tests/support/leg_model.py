@@ -11,7 +11,7 @@ from enum import IntEnum
 from bridge.command import Identity, Role
 
 START_LIMIT_S = 3.0
-SETTLE_S = 0.2
+BELIEVED_S = 1.0
 
 
 class Stage(IntEnum):
@@ -40,7 +40,7 @@ class LegModel:
     lease_until: float | None = None
     ttl_s: float = 0.0
     start_until: float | None = None
-    settles_at: float | None = None
+    believed_at: float | None = None
     """A start waits for what becomes of a stop that is on its way."""
     silent: bool = False
     tripped: bool = False
@@ -92,7 +92,7 @@ class LegModel:
         self.judge()
         if self.start_until is not None and self.now >= self.start_until:
             self.stop()
-        elif self.settles_at is not None and self.now >= self.settles_at:
+        elif self.believed_at is not None and self.now >= self.believed_at:
             self.stage = Stage.ENABLED
             self.end_start()
 
@@ -105,7 +105,7 @@ class LegModel:
         self.end_start()
 
     def end_start(self) -> None:
-        self.start_until = self.settles_at = None
+        self.start_until = self.believed_at = None
 
     def leave(self) -> None:
         self.stop()
@@ -130,8 +130,11 @@ class LegModel:
             self.ttl_s = ttl_s
         self.own(who)
 
-    def acknowledge(self, who: Identity) -> None:
+    def acknowledge(self, who: Identity, *, fault: bool = False) -> None:
+        """``fault``: the drive has one of its own, and is reset."""
         self.telegram(who)
+        if fault and not self.tripped:
+            self.stop()
         if self.tripped:
             self.tripped = False
             self.stop()
@@ -155,19 +158,20 @@ class LegModel:
     def start(self, who: Identity, *, ready: bool, enabled: bool) -> None:
         """A start that was taken, of a drive that is in this state."""
         self.telegram(who)
+        believed_at = self.believed_at
         self.end_start()
         is_stopped = enabled and self.stage is not Stage.ENABLED
         self.stage = Stage.ENABLED if ready and not is_stopped else Stage.ENABLE
         self.acknowledges = False
         if is_stopped:
-            self.settles_at = self.now + SETTLE_S
+            self.believed_at = believed_at or self.now + BELIEVED_S
         if is_stopped or not enabled:
             self.start_until = self.now + START_LIMIT_S
 
     def drive_is(self, *, fault: bool, ready: bool, enabled: bool) -> None:
         if self.start_until is None:
             return
-        self.settles_at = None
+        self.believed_at = None
         if fault:
             self.stop()
         elif ready and self.stage >= Stage.ENABLE:

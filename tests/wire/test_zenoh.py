@@ -106,6 +106,24 @@ async def test_what_is_no_command_is_answered_with_a_sentence(key: str, payload:
         assert r.fu3.channel.owner is None
 
 
+async def test_what_is_no_command_is_told_as_an_event_of_the_drive_it_was_for() -> None:
+    async with rig() as r:
+        await r.peer.do("subscribe", f"{TOP}/@/event/**")
+        await r.peer.command(f"{FU3}/command/control_word", "on")
+        await until(lambda: r.peer.latest(f"{TOP}/@/event/refused"), "the refusal as an event")
+        event = r.peer.latest(f"{TOP}/@/event/refused") or {}
+        assert event["source"] == "conveyor/fu3"
+        assert "write by zenoh:" in event["message"]
+
+
+async def test_a_command_with_a_wildcard_is_told_as_an_event() -> None:
+    async with rig() as r:
+        await r.peer.do("subscribe", f"{TOP}/@/event/**")
+        await r.peer.command(f"{FU3}/command/*", "1")
+        await until(lambda: r.peer.latest(f"{TOP}/@/event/refused"), "the refusal as an event")
+        assert "without wildcards" in (r.peer.latest(f"{TOP}/@/event/refused") or {})["message"]
+
+
 async def test_a_wrong_attachment_is_answered_with_a_sentence() -> None:
     async with rig() as r:
         said = await r.peer.do("get", f"{FU3}/command/stop", attachment="me")

@@ -149,6 +149,18 @@ class Commands:
         drive, found, name = tail.partition(_PARAMETER)
         return (drive, unquote(name)) if found and drive in self._drives else ("", "")
 
+    def meant(self, tail: str) -> tuple[str, Action]:
+        """The drive, node or bus that a key is about which is no command, or the key itself where it is about
+        none; and what would have been done."""
+        drive, name = self.parameter(tail)
+        if name:
+            return drive, Action.WRITE_PARAMETER
+        action = Action(tail.rpartition("/")[2]) if self.is_method(tail) else Action.WRITE
+        target = tail
+        while target and not (target in self._drives or target in self._nodes or target in self._buses):
+            target = target.rpartition("/")[0]
+        return target or tail, action
+
     def reading(self, drive: str, name: str, identity: Identity, *, cached: bool) -> Request:
         """The request for the value of a parameter, from the drive or as it was last read."""
         age_ms = _CACHED_MS if cached else 0

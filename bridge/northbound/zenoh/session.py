@@ -16,7 +16,7 @@ from typing import Final
 
 import zenoh
 
-from bridge.command import Action, Code, Event, Identity, Outcome, Plant, Rejection
+from bridge.command import Code, Event, Identity, Outcome, Plant, Rejection
 from bridge.command.link import NodeState
 from bridge.config import ZenohTable
 from bridge.errors import Unavailable
@@ -122,7 +122,9 @@ class ZenohServer:
         is_pattern = "*" in asked.key
         tail = "" if is_pattern else self._keys.tail(asked.key)
         if is_pattern and asked.payload is not None:
-            _refuse(asked, BadCommand(MALFORMED, "a command goes to one key, without wildcards"))
+            bad = BadCommand(MALFORMED, "a command goes to one key, without wildcards")
+            self._note_refusal(asked.key, asked.attachment, bad)
+            _refuse(asked, bad)
         elif asked.payload is not None or self._commands.is_method(tail):
             self._command(asked, tail)
         elif self._commands.parameter(tail)[1]:
@@ -209,7 +211,8 @@ class ZenohServer:
             identity = identity_of(attachment)
         except BadCommand:
             identity = identity_of(None)
-        self._plant.rejected(Rejection(identity, tail, Action.WRITE, bad.code, bad.message), self._clock())
+        target, action = self._commands.meant(tail)
+        self._plant.rejected(Rejection(identity, target, action, bad.code, bad.message), self._clock())
 
     def _on_put(self, message: Message) -> None:
         """A plain put on a command key, where the site takes them. Nobody is there to be told."""

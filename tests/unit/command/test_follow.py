@@ -84,7 +84,7 @@ def test_a_trip_sends_the_position_and_no_zero(reaction: Reaction) -> None:
     gate.follow((0, *ELSEWHERE))
     gate.trip(1.0)
     assert gate.compute(1.0, may_enable=True).words[1:] == (*ELSEWHERE, 0)
-    gate.clear(2.0, pulse=False)
+    gate.clear(2.0, DriveState.READY, pulse=False)
     assert gate.compute(2.0, may_enable=True).words[1:] == (*ELSEWHERE, 0)
 
 

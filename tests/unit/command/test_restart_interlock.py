@@ -8,9 +8,6 @@ import pytest
 
 from bridge.command import Action, Code, Kind
 from bridge.command.link import NodeState
-from bridge.command.output import Gate
-from bridge.drive import ControlWords, DriveState
-from bridge.mapping import load_family
 from tests.support.rig import ENABLE, ENABLED, HALF_SPEED, OBSERVER, OPERATOR, PLC, READY, SHUT_DOWN, Rig
 
 
@@ -173,31 +170,3 @@ class TestStopCommands:
         assert rig.ask(Action.QUICK_STOP, OPERATOR).ok
         assert rig.channel.owner is None
         assert rig.watchdog == "idle"
-
-
-@pytest.mark.parametrize(
-    ("family", "run", "stop", "withheld"),
-    [
-        # EDS84DMOTCAN: bit 2 is the quick stop, which holds the motor, bit 3 enables operation.
-        ("lenze/8400-motec", 0x0009, 0x000D, 0x0001),
-        ("stoeber/5000", 0x0001, 0x0005, 0x0000),
-        ("cia402/velocity", 0x007F, 0x0077, 0x0076),
-        ("nord/sk-tu4-cao", 0x047F, 0x047E, 0x047E),
-    ],
-)
-def test_an_interlocked_drive_that_stands_does_not_come_under_current(
-    family: str, run: int, stop: int, withheld: int
-):
-    gate = Gate(ControlWords(load_family(family).control_word), 1, "stop", 0)
-
-    def sent(state: DriveState) -> int:
-        gate.on_state(state)
-        return gate.compute(1.0, may_enable=True).words[0]
-
-    gate.take(run, (0,), may_enable=True)
-    assert gate.interlocked
-    assert sent(DriveState.UNKNOWN) == stop, "nobody knows whether it turns"
-    for state in (DriveState.READY, DriveState.SWITCHED_ON, DriveState.FAULT, DriveState.SWITCH_ON_INHIBITED):
-        assert sent(state) == withheld
-    for state in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE):
-        assert sent(state) == stop

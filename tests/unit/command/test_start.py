@@ -117,10 +117,51 @@ def test_of_a_drive_on_its_ramp_lets_it_turn_again(running: Rig):
     running.write(SHUT_DOWN)
     outcomes = running.submit(Action.START)
     running.wait(0.19)
+    running.drive_says(ENABLED)
     assert (outcomes, running.enables) == ([], False)
     running.wait(0.01)
+    running.drive_says(ENABLED)
     assert running.enables
     assert codes(outcomes) == [Code.OK]
+
+
+def test_of_a_drive_that_has_nothing_new_to_say_believes_its_last_word(running: Rig):
+    running.write(SHUT_DOWN)
+    outcomes = running.submit(Action.START)
+    running.wait(0.999)
+    assert (outcomes, running.enables) == ([], False)
+    running.wait(0.001)
+    assert running.enables
+    assert codes(outcomes) == [Code.OK]
+
+
+def test_asked_again_and_again_does_not_take_longer(running: Rig):
+    running.write(SHUT_DOWN)
+    for _ in range(3):
+        running.submit(Action.START)
+        running.wait(0.1)
+    running.drive_says(ENABLED)
+    assert running.enables
+
+
+def test_after_a_restart_of_the_node_waits_for_what_the_drive_says(running: Rig):
+    running.channel.start_anew(running.now, has_restarted=True)
+    running.node(NodeState.BOOTING)
+    running.wait(0.5)
+    running.node(NodeState.OPERATIONAL)
+    outcomes = running.submit(Action.START)  # the last word is the one from before
+    running.wait(1.5)
+    assert (outcomes, running.enables) == ([], False)
+    is_led_from_inhibited(running, outcomes)
+
+
+def test_of_a_drive_that_says_the_same_as_before_its_node_restarted(rig: Rig):
+    rig.wait(0.5)
+    rig.node(NodeState.BOOTING)
+    rig.node(NodeState.OPERATIONAL)
+    outcomes = rig.submit(Action.START)
+    rig.wait(0.1)
+    is_led_from_inhibited(rig, outcomes)
 
 
 def test_of_a_drive_that_was_released_while_it_turned_stops_it_first(running: Rig):
@@ -284,9 +325,10 @@ def test_who_asks_on_on_the_outcome_finds_everything_settled(rig: Rig):
 def test_a_drive_that_stays_in_quick_stop_is_led_out_of_it(rig: Rig):
     """605Ah = 5 … 8: the word to become ready leads out of *quick stop active* nowhere."""
     rig.drive_says(QUICK_STOPPING)
+    before = rig.sent
     outcomes = rig.submit(Action.START)
     rig.wait(0.9)
-    assert rig.sent == SHUT_DOWN, "the ramp of the quick stop is let run"
+    assert rig.sent == before, "the ramp of the quick stop is let run"
     rig.wait(0.2)
     assert rig.sent & 0x0002 == 0, "disable voltage"
     is_led_from_inhibited(rig, outcomes)

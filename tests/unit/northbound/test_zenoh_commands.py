@@ -115,6 +115,23 @@ def test_methods_are_told_from_values() -> None:
         assert not COMMANDS.is_method(tail)
 
 
+@pytest.mark.parametrize(
+    ("tail", "target", "action"),
+    [
+        ("conveyor/fu3/command/no_such", "conveyor/fu3", Action.WRITE),
+        ("conveyor/fu3/command/start", "conveyor/fu3", Action.START),
+        ("conveyor/fu3/parameter/P102", "conveyor/fu3", Action.WRITE_PARAMETER),
+        ("conveyor/fu3", "conveyor/fu3", Action.WRITE),
+        ("conveyor/fu33/command/start", "conveyor", Action.WRITE),
+        ("conveyor/node/no_such", "conveyor", Action.WRITE),
+        ("no_such/fu3/command/start", "no_such/fu3/command/start", Action.WRITE),
+        ("", "", Action.WRITE),
+    ],
+)
+def test_what_is_no_command_may_still_be_about_somebody(tail: str, target: str, action: Action) -> None:
+    assert COMMANDS.meant(tail) == (target, action)
+
+
 def test_the_controller_names_itself() -> None:
     assert identity_of(None) == Identity(Source.ZENOH, "anonymous")
     assert identity_of(b'{"controller": "plc-7"}') == Identity(Source.ZENOH, "plc-7")

@@ -381,6 +381,25 @@ def test_errors_ignored_or_not_an_outage_between_two_rounds_ends_the_enable(tmp_
     assert not moves(bench)
 
 
+def test_errors_ignored_or_not_what_is_written_while_the_bus_is_gone_does_not_go_out_first(
+    tmp_path: Path,
+) -> None:
+    bench = Bench(write_site(tmp_path, drive=IGNORE))
+    bench.run(1.0)
+    running(bench)
+    bench.bus.status.state = ControllerState.DOWN
+    bench.bus.clear()
+    bench.run(0.1)
+    for word in (0x047E, 0x047F):
+        bench.write(control_word=word, setpoint_1=0x2000)
+    bench.run(0.1)
+    bench.bus.status.state = ControllerState.OK
+    bench.log.clear()
+    bench.keep_writing(1.0, control_word=0x047F, setpoint_1=0x2000)
+    assert bench.sent(RPDO1)
+    assert not moves(bench)
+
+
 def test_errors_ignored_or_not_a_node_that_restarts_again_and_again_is_not_enabled(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path, drive=IGNORE))
     bench.run(1.0)

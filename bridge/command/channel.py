@@ -244,14 +244,11 @@ class DriveChannel:
             self._leg.leave(Stimulus.STARTED, now)
         self._settle(now)
 
-    def start_anew(self, now: float, *, has_restarted: bool = False) -> None:
+    def start_anew(self, now: float) -> None:
         """The bus was gone, or the node was stopped or has restarted: whatever the drive was told does not
         count any more, not even where communication errors are ignored."""
         self._leg.start.end(Outcome(Code.CANCELLED, "the drive has to be enabled anew"))
-        if has_restarted:
-            self._gate.restart()
-        else:
-            self._gate.stop(self.words.stop(self._gate.sent.words[0]))
+        self._gate.stop(self.words.stop(self._gate.sent.words[0]))
         self._settle(now)
 
     # requests

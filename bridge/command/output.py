@@ -53,7 +53,7 @@ class Gate:
         """The drive has said that it follows the last word that enabled it: what it said before that does not
         say that it rests."""
         self._rests = False
-        """The drive has said that it is not enabled, and nothing enabling was sent since."""
+        """After that it has said that it is not enabled, and nothing that enables was sent anew since."""
         self._is_ours = True
         """The control word is a stop by the bridge, not the owner's."""
         self._is_asked = False
@@ -92,6 +92,11 @@ class Gate:
     def is_stopping(self) -> bool:
         """What is sent, or is about to be, does not enable the drive."""
         return self.interlocked or not self._words.enables(self.sent.words[0])
+
+    @property
+    def may_follow_late(self) -> bool:
+        """The drive has not said yet that it follows the last word that enabled it."""
+        return not self._has_moved
 
     @property
     def _is_commanded(self) -> bool:
@@ -174,11 +179,6 @@ class Gate:
         self.interlocked = True
         self._held = None
 
-    def restart(self) -> None:
-        """The drive itself has restarted: it is not enabled, and whatever it was told does not count."""
-        self.stop(self._words.stopped)
-        self._has_moved = self._rests = True
-
     def _drop_setpoints(self) -> None:
         self.setpoints = self.rest
         if self._handshake is not None:
@@ -202,7 +202,6 @@ class Gate:
         if pulse:
             if state in FAULTED:
                 self.stop(self.word_at_rest)
-                self._rests |= state is DriveState.FAULT  # which nothing but this ends
             self._acknowledge_until = now + _ACKNOWLEDGE_PULSE_S
 
     @property
@@ -216,12 +215,16 @@ class Gate:
         was_enabled, self._is_enabled = self._is_enabled, state is DriveState.OPERATION_ENABLED
         if self._handshake is not None and (state in FAULTED or (was_enabled and not self._is_enabled)):
             self._handshake.reset()
+        enables = self._words.enables(self.sent.words[0])
         if state in MOVING:
             self._has_moved = True
+            # Said late, of a drive that has nothing to move it any more, it does not count.
+            self._rests &= not enables
         elif state is not DriveState.UNKNOWN:
             self._rest_limit = None
-            has_followed = self._has_moved or state is DriveState.FAULT
-            self._rests = has_followed and not self._words.enables(self.sent.words[0])
+            self._rests |= self._has_moved or state is DriveState.FAULT
+        if state is DriveState.FAULT:
+            self._is_asked = False
 
     def on_status_word(self, word: int) -> bool:
         """The drive's status word, before the state it says. True where one of its bits is waited for."""
@@ -255,8 +258,10 @@ class Gate:
             self._handshake.step(self.setpoints, self._status_word, self._now, enabled=self._is_commanded)
             self.sent = self._compute(may_enable)
         if self._words.enables(self.sent.words[0]):
-            self._has_moved = self._is_enabled or (was_enabling and self._has_moved)
-            self._rests = self._is_asked = False
+            if not was_enabling:
+                self._has_moved = self._is_enabled
+                self._rests = False
+            self._is_asked = False
         return self.sent
 
     def _compute(self, may_enable: bool) -> Output:
@@ -286,7 +291,8 @@ class Gate:
     def _reaction_word(self) -> int:
         word = self.sent.words[0]
         if self._reaction == "stop":
-            return self._words.stop(word)
+            stop = self._words.stop(word)
+            return self._words.withhold(stop) if self._rests else stop
         if self.awaits_rest:
             return self._words.quick_stop(word)
         return self._words.disable_voltage(word)

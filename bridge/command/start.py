@@ -29,7 +29,9 @@ class StartSequence:
         "_control_word",
         "_deadline",
         "_gate",
+        "_is_known",
         "_is_leaving",
+        "_is_led",
         "_leaves_at",
         "_outcomes",
         "_reply",
@@ -49,6 +51,10 @@ class StartSequence:
         """While what the drive has said may be out of date: from when on its reports are believed."""
         self._believed_at: float | None = None
         """When its last one is, though nothing came."""
+        self._is_known = True
+        """The drive has said something since its node is operational."""
+        self._is_led = False
+        """One that has not is made ready."""
         self._is_leaving = False
         """It is being led out of it."""
 
@@ -66,23 +72,25 @@ class StartSequence:
     ) -> None:
         """Start; the drive may be enabled and has no fault. ``is_known``: it has said so since its node is
         operational."""
-        believes_from, believed_at = self._believes_from, self._believed_at
+        times = self._believes_from, self._believed_at, self._leaves_at
         self.end(Outcome(Code.CANCELLED, "started anew"))
+        believes_from, believed_at, leaves_at = times
         self._reply = reply
         self._control_word = self._words.run | direction_bits
         self._deadline = now + _LIMIT_S
         self._is_leaving = False
-        is_stopped = state is DriveState.OPERATION_ENABLED and self._gate.is_stopping
+        self._is_known = is_known
+        is_enabled = state is DriveState.OPERATION_ENABLED
+        is_stopped = self._gate.is_stopping and (is_enabled or self._gate.may_follow_late)
         if is_stopped or not is_known:
             self._believes_from = believes_from or now + (_SETTLE_S if is_known else 0.0)
-            if is_known:
-                self._believed_at = believed_at or now + _BELIEVED_S
+            self._believed_at = believed_at or now + _BELIEVED_S
         if self.awaits_report or state is DriveState.QUICK_STOP_ACTIVE:
             # What stops it goes on until it is known to be over: to become ready may mean to coast.
-            self._leaves_at = now + _QUICK_STOP_S
+            self._leaves_at = leaves_at or now + _QUICK_STOP_S
             self._gate.lead(self._gate.word_at_rest)
             return
-        if state is not DriveState.OPERATION_ENABLED:
+        if not is_enabled:
             self._gate.lead(self._words.ready)
         self.on_state(state)
 
@@ -93,21 +101,37 @@ class StartSequence:
 
     def on_state(self, state: DriveState, fault_text: str = "") -> None:
         """The drive is in this state now: take the next step."""
-        if self._reply is None:
+        if self._reply is None or state is DriveState.UNKNOWN:
             return
         if state in FAULTED:
             self._give_up(Code.NOT_READY, f"the drive went into fault: {fault_text}")
         elif self._believes_from is None:
             self._go_on(state)
-        elif state is not DriveState.OPERATION_ENABLED:
+        elif state is not DriveState.OPERATION_ENABLED or not self._is_known:
             self._believe(state)
 
     def _believe(self, state: DriveState) -> None:
+        if state is DriveState.UNKNOWN:
+            return
         self._believes_from = self._believed_at = None
         if state is not DriveState.QUICK_STOP_ACTIVE:
             self._leaves_at = None
             self._gate.lead(self._words.ready)
         self._go_on(state)
+
+    def _believe_without_report(self, state: DriveState, now: float) -> None:
+        """The drive has said nothing in time. Of one that has said nothing since its node is operational
+        nothing is believed: it is made ready and then enabled, and has to say that it is."""
+        self._believed_at = None
+        if self._is_known:
+            self._believe(state)
+        elif not self._is_led:
+            self._is_led = True
+            self._leaves_at = None
+            self._gate.lead(self._words.ready)
+            self._believed_at = now + _BELIEVED_S
+        else:
+            self._gate.lead(self._control_word)
 
     def _go_on(self, state: DriveState) -> None:
         if state is not DriveState.QUICK_STOP_ACTIVE and (self._is_leaving or self._leaves_at is not None):
@@ -131,7 +155,7 @@ class StartSequence:
             label = state.label.replace("_", " ")
             self._give_up(Code.TIMED_OUT, f"the drive did not start, it is {label}")
         elif self._believed_at is not None and now >= self._believed_at:
-            self._believe(state)
+            self._believe_without_report(state, now)
         elif self._leaves_at is not None and now >= self._leaves_at:
             self._leaves_at = None
             self._is_leaving = True
@@ -152,5 +176,6 @@ class StartSequence:
         """End a start that is going on with this outcome; the words stay as they are."""
         reply, self._reply = self._reply, None
         self._believes_from = self._believed_at = self._leaves_at = None
+        self._is_known, self._is_led = True, False
         if reply is not None:
             self._outcomes.append((reply, outcome))

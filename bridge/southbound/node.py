@@ -86,8 +86,7 @@ class NodeCore:
         if self.is_operational:
             self._view.restarted(now)
         self.leave_operation(now)
-        for drive in self.node.drives:
-            drive.channel.start_anew(now, has_restarted=True)
+        self.stop_drives(now)
         if pause_s:
             self.say(f"starts again and again; asked again in {pause_s:g} s", now)
         self.set_state(NodeState.LOST if pause_s else NodeState.BOOTING, now)

@@ -39,7 +39,9 @@ _FAULT_BITS, _FAULT = 0b1001111, 0b0001000
 
 _MODEL_FIELDS: Final = tuple(field.name for field in fields(LegModel))
 _MODEL_TIMES: Final = tuple(
-    map(_MODEL_FIELDS.index, ("now", "deadline", "lease_until", "start_until", "believed_at")),
+    map(
+        _MODEL_FIELDS.index, ("now", "deadline", "lease_until", "start_until", "believed_at", "believes_from")
+    ),
 )
 
 Transition = tuple[WatchdogState, Stimulus, str]
@@ -165,6 +167,7 @@ class LegMachine:
         start = self._channel._leg.start
         if not start.is_going_on:
             start._deadline = 0.0  # that of one that is over
+        self._see()
         if not self._hung:
             self._check()
         return seen
@@ -307,7 +310,13 @@ class LegMachine:
                 channel.on_status_word(word, now)
                 if channel.state is not state:
                     model.drive_is(fault=word == FAULT, ready=word != FAULT, enabled=word == ENABLED)
+                else:
+                    model.drive_is_still(ready=word != FAULT)
+                self._see()
         self._round()
+
+    def _see(self) -> None:
+        self._model.see(sent=self._rig.enables, enabled=self._channel.state is DriveState.OPERATION_ENABLED)
 
     def _read(self) -> None:
         """Everything that others may see is looked at, which must change nothing."""

@@ -12,6 +12,7 @@ from bridge.command import Identity, Role
 
 START_LIMIT_S = 3.0
 BELIEVED_S = 1.0
+SETTLE_S = 0.2
 
 
 class Stage(IntEnum):
@@ -41,7 +42,15 @@ class LegModel:
     ttl_s: float = 0.0
     start_until: float | None = None
     believed_at: float | None = None
-    """A start waits for what becomes of a stop that is on its way."""
+    """A start waits for what becomes of a stop that is on its way, until then."""
+    believes_from: float | None = None
+    """And takes from then on what the drive says, though it is nothing new."""
+    sent: bool = False
+    """What is sent enables the drive."""
+    is_enabled: bool = False
+    """The drive says that it is."""
+    followed: bool = True
+    """The drive has said that it follows the last word that enabled it."""
     silent: bool = False
     tripped: bool = False
     held: bool = False
@@ -94,7 +103,9 @@ class LegModel:
             self.stop()
         elif self.believed_at is not None and self.now >= self.believed_at:
             self.stage = Stage.ENABLED
-            self.end_start()
+            self.believed_at = self.believes_from = None
+            if self.is_enabled:
+                self.end_start()
 
     # what happens
 
@@ -105,7 +116,7 @@ class LegModel:
         self.end_start()
 
     def end_start(self) -> None:
-        self.start_until = self.believed_at = None
+        self.start_until = self.believed_at = self.believes_from = None
 
     def leave(self) -> None:
         self.stop()
@@ -155,29 +166,43 @@ class LegModel:
             self.stage = Stage.ENABLE
         self.acknowledges = acknowledges
 
+    def see(self, *, sent: bool, enabled: bool) -> None:
+        """What is on the bus after an event: whether an enabling word, and the drive's word that it is."""
+        if sent and not self.sent:
+            self.followed = False
+        self.sent, self.is_enabled = sent, enabled
+        self.followed |= enabled
+
     def start(self, who: Identity, *, ready: bool, enabled: bool) -> None:
         """A start that was taken, of a drive that is in this state."""
         self.telegram(who)
-        believed_at = self.believed_at
+        believed_at, believes_from = self.believed_at, self.believes_from
         self.end_start()
-        is_stopped = enabled and self.stage is not Stage.ENABLED
+        is_stopped = self.stage is not Stage.ENABLED and (enabled or not self.followed)
         self.stage = Stage.ENABLED if ready and not is_stopped else Stage.ENABLE
         self.acknowledges = False
         if is_stopped:
             self.believed_at = believed_at or self.now + BELIEVED_S
+            self.believes_from = believes_from or self.now + SETTLE_S
         if is_stopped or not enabled:
             self.start_until = self.now + START_LIMIT_S
 
     def drive_is(self, *, fault: bool, ready: bool, enabled: bool) -> None:
         if self.start_until is None:
             return
-        self.believed_at = None
+        self.believed_at = self.believes_from = None
         if fault:
             self.stop()
         elif ready and self.stage >= Stage.ENABLE:
             self.stage = Stage.ENABLED
         if enabled:
             self.end_start()
+
+    def drive_is_still(self, *, ready: bool) -> None:
+        """The drive has said once more what it said before."""
+        if ready and self.believes_from is not None and self.now >= self.believes_from:
+            self.stage = Stage.ENABLED
+            self.believed_at = self.believes_from = None
 
     def node(self, *, is_there: bool) -> None:
         was_there = self.is_there

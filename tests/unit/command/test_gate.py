@@ -113,12 +113,37 @@ def test_the_owners_acknowledge_goes_on_to_a_drive_that_is_interlocked(way: Way)
     assert way.writes(way.run | acknowledge) == way.withheld | acknowledge
 
 
-def test_a_drive_that_has_restarted_is_told_nothing_of_before(way: Way) -> None:
+def test_an_acknowledge_brings_no_current_after_a_stop_that_was_asked_for(way: Way) -> None:
+    acknowledge = way.words.acknowledge_mask
     way.runs()
-    way.gate.restart()
-    assert way.sent == way.words.stopped
-    assert way.writes(way.run) == way.words.stopped
-    assert way.says(ENABLED) == way.words.stopped, "its last word from before"
+    way.says(DriveState.FAULT)
+    way.gate.stop(way.stop, is_asked=True)
+    way.says(DriveState.FAULT)
+    assert way.writes(way.run | acknowledge) == way.withheld | acknowledge
+
+
+def test_a_drive_that_had_stopped_by_itself_before_it_is_stopped_gets_no_current(way: Way) -> None:
+    way.runs()
+    way.says(DriveState.SWITCH_ON_INHIBITED)
+    way.gate.interlocked = True
+    assert way.sent == way.withheld
+    assert way.says(READY) == way.withheld
+
+
+def test_one_that_turned_again_after_that_is_stopped_by_its_ramp(way: Way) -> None:
+    way.runs()
+    way.says(READY)
+    way.says(ENABLED)
+    way.gate.interlocked = True
+    assert way.sent == way.stop
+
+
+def test_a_stop_by_the_watchdog_brings_no_current_either(way: Way) -> None:
+    way.runs()
+    way.gate.trip(way.now)
+    assert way.sent == way.stop
+    assert way.says(READY) == way.withheld
+    assert way.says(ENABLED, 0.003) == way.withheld
 
 
 def test_a_fault_that_is_reset_moves_nothing(way: Way) -> None:

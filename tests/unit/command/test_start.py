@@ -6,6 +6,7 @@ import pytest
 
 from bridge.command import Action, Code, Outcome, Request
 from bridge.command.link import NodeState
+from bridge.drive import DriveState
 from tests.support.rig import (
     ENABLED,
     FAULT,
@@ -37,6 +38,16 @@ def running() -> Rig:
     rig = Rig(fieldbus_timeout_ms=10_000)
     rig.run()
     return rig
+
+
+UNKNOWN = 0x0B1A
+"""Bits 6 … 0 of no state (BU 2500 §6.5.2)."""
+
+
+def restart_the_node(rig: Rig) -> None:
+    rig.wait(0.5)
+    rig.node(NodeState.BOOTING)
+    rig.node(NodeState.OPERATIONAL)
 
 
 def is_led_from_inhibited(rig: Rig, outcomes: list[Outcome]) -> None:
@@ -145,22 +156,63 @@ def test_asked_again_and_again_does_not_take_longer(running: Rig):
 
 
 def test_after_a_restart_of_the_node_waits_for_what_the_drive_says(running: Rig):
-    running.channel.start_anew(running.now, has_restarted=True)
-    running.node(NodeState.BOOTING)
-    running.wait(0.5)
-    running.node(NodeState.OPERATIONAL)
+    restart_the_node(running)
     outcomes = running.submit(Action.START)  # the last word is the one from before
-    running.wait(1.5)
+    running.wait(0.9)
     assert (outcomes, running.enables) == ([], False)
     is_led_from_inhibited(running, outcomes)
 
 
 def test_of_a_drive_that_says_the_same_as_before_its_node_restarted(rig: Rig):
-    rig.wait(0.5)
-    rig.node(NodeState.BOOTING)
-    rig.node(NodeState.OPERATIONAL)
+    restart_the_node(rig)
     outcomes = rig.submit(Action.START)
     rig.wait(0.1)
+    is_led_from_inhibited(rig, outcomes)
+
+
+def test_of_a_drive_that_says_nothing_after_a_restart_makes_it_ready_and_enables_it(rig: Rig):
+    """One that sends only changes: what it sent before its node was operational is lost."""
+    restart_the_node(rig)
+    outcomes = rig.submit(Action.START)
+    rig.wait(0.999)
+    assert not rig.enables
+    rig.wait(0.001)
+    assert rig.sent == SHUT_DOWN
+    rig.wait(1.0)
+    assert rig.enables
+    assert outcomes == [], "nothing says so yet"
+    rig.drive_says(ENABLED)
+    assert codes(outcomes) == [Code.OK]
+
+
+def test_of_a_drive_that_is_enabled_late_waits_for_what_becomes_of_the_stop(rig: Rig):
+    rig.submit(Action.START)
+    rig.drive_says(READY)
+    assert rig.enables
+    rig.ask(Action.DISABLE_VOLTAGE)
+    outcomes = rig.submit(Action.START)
+    assert not rig.enables
+    rig.drive_says(ENABLED)  # by the first start
+    assert (outcomes, rig.enables) == ([], False)
+    is_led_from_inhibited(rig, outcomes)
+
+
+def test_a_word_that_means_no_state_leads_to_nothing(running: Rig):
+    running.ask(Action.QUICK_STOP)
+    stopping = running.sent
+    outcomes = running.submit(Action.START)
+    running.drive_says(UNKNOWN)
+    assert running.channel.state is DriveState.UNKNOWN
+    assert (outcomes, running.sent) == ([], stopping)
+
+
+def test_asked_again_and_again_still_leads_out_of_a_quick_stop(rig: Rig):
+    rig.drive_says(QUICK_STOPPING)
+    rig.submit(Action.START)
+    rig.wait(0.6)
+    outcomes = rig.submit(Action.START)
+    rig.wait(0.4)
+    assert rig.sent & 0x0002 == 0, "disable voltage"
     is_led_from_inhibited(rig, outcomes)
 
 

@@ -86,7 +86,7 @@ def test_the_boot_up_takes_the_mapping_as_the_drive_has_it(bench: Bench):
     assert bench.node.slave.state is NmtState.OPERATIONAL
     status = bench.value("lift/node/boot_status")
     assert "not" not in str(status), status
-    assert bench.value("lift/drive/status/state") == DriveState.READY, "without the enable"
+    assert bench.value("lift/drive/status/state") == DriveState.SWITCH_ON_INHIBITED, "by the quick stop"
     assert bench.value("lift/drive/identity/vendor") == 0xB9
     assert downloads(bench) == {"0c10", "0d10"}, "guard time and factor alone"
 

@@ -160,7 +160,7 @@ class DriveChannel:
             return
         status.state = state
         self._gate.on_state(state)
-        self._leg.start.on_state(state, self.fault_text)
+        self._leg.start.on_state(state, now, self.fault_text)
         self._settle(now)
 
     def _on_same_state(self, now: float) -> None:
@@ -250,6 +250,7 @@ class DriveChannel:
         self._leg.start.end(Outcome(Code.CANCELLED, "the drive has to be enabled anew"))
         self._gate.stop(self.words.stop(self._gate.sent.words[0]))
         self._settle(now)
+        self._gate.forget()
 
     # requests
 

@@ -49,6 +49,7 @@ class Gate:
         self._followed = frozenset(source for _, source in self._follows)
         self._handshake = handshake
         self._is_enabled = False
+        self._is_in_fault = False
         self._has_moved = True
         """The drive has said that it follows the last word that enabled it: what it said before that does not
         say that it rests."""
@@ -215,16 +216,19 @@ class Gate:
         was_enabled, self._is_enabled = self._is_enabled, state is DriveState.OPERATION_ENABLED
         if self._handshake is not None and (state in FAULTED or (was_enabled and not self._is_enabled)):
             self._handshake.reset()
-        enables = self._words.enables(self.sent.words[0])
+        self._is_in_fault = state is DriveState.FAULT
         if state in MOVING:
             self._has_moved = True
             # Said late, of a drive that has nothing to move it any more, it does not count.
-            self._rests &= not enables
+            self._rests &= not self._words.enables(self.sent.words[0])
         elif state is not DriveState.UNKNOWN:
             self._rest_limit = None
-            self._rests |= self._has_moved or state is DriveState.FAULT
-        if state is DriveState.FAULT:
-            self._is_asked = False
+            self._rests |= self._has_moved or self._is_in_fault
+
+    def forget(self) -> None:
+        """What the drive says from now on is from after all that it was told: its node has restarted, or the
+        bus was gone."""
+        self._has_moved = True
 
     def on_status_word(self, word: int) -> bool:
         """The drive's status word, before the state it says. True where one of its bits is waited for."""
@@ -280,6 +284,9 @@ class Gate:
             # The stop that is in force, by whomever: what the owner goes on writing does not weaken it.
             word = self.word_at_rest | word & self._words.acknowledge_mask
             is_ours = True
+        if self._is_in_fault and word & self._words.acknowledge_mask:
+            # It ends with the fault: what was asked for then would hold the motor after it.
+            self._is_asked = False
         if is_ours and self._rests and not self._is_asked:
             word = self._words.withhold(word) | word & self._words.acknowledge_mask
         if self._acknowledge_until is not None and self._now < self._acknowledge_until:
@@ -290,9 +297,7 @@ class Gate:
 
     def _reaction_word(self) -> int:
         word = self.sent.words[0]
-        if self._reaction == "stop":
-            stop = self._words.stop(word)
-            return self._words.withhold(stop) if self._rests else stop
-        if self.awaits_rest:
-            return self._words.quick_stop(word)
-        return self._words.disable_voltage(word)
+        if self._reaction != "stop" and not self.awaits_rest:
+            return self._words.disable_voltage(word)
+        stop = self._words.stop if self._reaction == "stop" else self._words.quick_stop
+        return self._words.withhold(stop(word)) if self._rests else stop(word)

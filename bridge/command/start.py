@@ -30,6 +30,7 @@ class StartSequence:
         "_deadline",
         "_gate",
         "_is_known",
+        "_is_late",
         "_is_leaving",
         "_is_led",
         "_leaves_at",
@@ -55,6 +56,8 @@ class StartSequence:
         """The drive has said something since its node is operational."""
         self._is_led = False
         """One that has not is made ready."""
+        self._is_late = False
+        """It may follow the last word that enabled it, after the stop that came since."""
         self._is_leaving = False
         """It is being led out of it."""
 
@@ -72,16 +75,18 @@ class StartSequence:
     ) -> None:
         """Start; the drive may be enabled and has no fault. ``is_known``: it has said so since its node is
         operational."""
-        times = self._believes_from, self._believed_at, self._leaves_at
+        before = self._believes_from, self._believed_at, self._leaves_at, self._is_led
         self.end(Outcome(Code.CANCELLED, "started anew"))
-        believes_from, believed_at, leaves_at = times
+        believes_from, believed_at, leaves_at, is_led = before
         self._reply = reply
         self._control_word = self._words.run | direction_bits
         self._deadline = now + _LIMIT_S
         self._is_leaving = False
         self._is_known = is_known
+        self._is_led = is_led and not is_known
+        self._is_late = self._gate.may_follow_late
         is_enabled = state is DriveState.OPERATION_ENABLED
-        is_stopped = self._gate.is_stopping and (is_enabled or self._gate.may_follow_late)
+        is_stopped = self._gate.is_stopping and (is_enabled or self._is_late)
         if is_stopped or not is_known:
             self._believes_from = believes_from or now + (_SETTLE_S if is_known else 0.0)
             self._believed_at = believed_at or now + _BELIEVED_S
@@ -92,14 +97,14 @@ class StartSequence:
             return
         if not is_enabled:
             self._gate.lead(self._words.ready)
-        self.on_state(state)
+        self.on_state(state, now)
 
     def on_report(self, state: DriveState, now: float) -> None:
         """A report of the drive, while one is awaited: it is in this state, as it was before."""
         if self._believes_from is not None and now >= self._believes_from:
             self._believe(state)
 
-    def on_state(self, state: DriveState, fault_text: str = "") -> None:
+    def on_state(self, state: DriveState, now: float, fault_text: str = "") -> None:
         """The drive is in this state now: take the next step."""
         if self._reply is None or state is DriveState.UNKNOWN:
             return
@@ -107,8 +112,17 @@ class StartSequence:
             self._give_up(Code.NOT_READY, f"the drive went into fault: {fault_text}")
         elif self._believes_from is None:
             self._go_on(state)
-        elif state is not DriveState.OPERATION_ENABLED or not self._is_known:
+        elif not self._may_be_old(state, now):
             self._believe(state)
+
+    def _may_be_old(self, state: DriveState, now: float) -> bool:
+        """While a stop is on its way: what the drive says now may still come from the enable before it."""
+        if not self._is_known:
+            return False
+        is_early = self._believes_from is not None and now < self._believes_from
+        return state is DriveState.OPERATION_ENABLED or (
+            self._is_late and is_early and state in _CAN_BE_ENABLED
+        )
 
     def _believe(self, state: DriveState) -> None:
         if state is DriveState.UNKNOWN:
@@ -154,12 +168,14 @@ class StartSequence:
         if now >= self._deadline:
             label = state.label.replace("_", " ")
             self._give_up(Code.TIMED_OUT, f"the drive did not start, it is {label}")
-        elif self._believed_at is not None and now >= self._believed_at:
+            return
+        if self._believed_at is not None and now >= self._believed_at:
             self._believe_without_report(state, now)
-        elif self._leaves_at is not None and now >= self._leaves_at:
+        if self._leaves_at is not None and now >= self._leaves_at:
             self._leaves_at = None
-            self._is_leaving = True
-            self._gate.lead(self._words.disable_voltage(self._words.ready))
+            if state is DriveState.QUICK_STOP_ACTIVE:
+                self._is_leaving = True
+                self._gate.lead(self._words.disable_voltage(self._words.ready))
 
     def next_deadline(self) -> float | None:
         """When ``on_time`` is to be called."""
@@ -169,13 +185,13 @@ class StartSequence:
         return min(time for time in times if time is not None)
 
     def _give_up(self, code: Code, message: str) -> None:
-        self._gate.stop(self._words.ready)
+        self._gate.stop(self._gate.word_at_rest)
         self.end(Outcome(code, message))
 
     def end(self, outcome: Outcome) -> None:
         """End a start that is going on with this outcome; the words stay as they are."""
         reply, self._reply = self._reply, None
         self._believes_from = self._believed_at = self._leaves_at = None
-        self._is_known, self._is_led = True, False
+        self._is_known, self._is_led, self._is_late = True, False, False
         if reply is not None:
             self._outcomes.append((reply, outcome))

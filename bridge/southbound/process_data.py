@@ -242,14 +242,16 @@ def _without_effect(bus: BusTable, rpdos: Sequence[PdoPlan], tpdos: Sequence[Pdo
 
 
 def stopped_frames(node: Node, connected: Mapping[str, DrivePdos]) -> list[Frame]:
-    """A stopped word for every drive and no setpoints, by its PDOs where those are known, else by the
-    factory's COB-IDs of those that are on at factory."""
+    """A stop for every drive and no setpoints: by its PDOs what stops it at present, which may be a ramp;
+    where they are not known a stopped word, by the factory's COB-IDs of those that are on at factory."""
     frames: list[Frame] = []
     for drive in node.drives:
-        words = (drive.channel.words.stopped, *([0] * (len(drive.family.process.rpdo) - 1)))
+        channel = drive.channel
+        words = (channel.words.stopped, *([0] * (len(drive.family.process.rpdo) - 1)))
         pdos = connected.get(drive.name)
         if pdos:
-            frames += pdos.frames_with(words)
+            is_stop = not channel.output.silent and not channel.words.enables(channel.output.words[0])
+            frames += pdos.frames_with(channel.output.words if is_stop else words)
             continue
         factory = [pdo for pdo in drive.slot.rpdo if not pdo.optional]
         frames += [_factory_rpdo(drive, pdo, node.table.id).frame(words) for pdo in factory]

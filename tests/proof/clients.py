@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Sequence
+from collections.abc import Coroutine, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
@@ -64,6 +64,17 @@ class ModbusClient:
             client.close()
 
 
+async def _within(seconds: float, doing: Coroutine[Any, Any, Any]) -> Any:
+    """What it gives. Raises ``TimeoutError``, also where a task swallows its cancellation, as asyncua's may:
+    it is left to itself then."""
+    task = asyncio.ensure_future(doing)
+    done, _ = await asyncio.wait({task}, timeout=seconds)
+    if not done:
+        task.cancel()
+        raise TimeoutError
+    return task.result()
+
+
 class OpcUaClient:
     """asyncua: all drives in one Write call."""
 
@@ -78,9 +89,10 @@ class OpcUaClient:
         from asyncua import ua
 
         try:
-            async with asyncio.timeout(_CONNECT_S):
-                await self._client.connect()
-                self._space = await self._client.get_namespace_index("urn:drivebridge:points")
+            await _within(_CONNECT_S, self._client.connect())
+            self._space = await _within(
+                _CONNECT_S, self._client.get_namespace_index("urn:drivebridge:points")
+            )
         except (OSError, TimeoutError, ConnectionError, ua.UaError, ValueError) as error:
             raise ClientFault from error
 
@@ -98,7 +110,8 @@ class OpcUaClient:
             for leaf, value in (("control_word", control_word), ("setpoint_1", setpoint))
         ]
         try:
-            results = await self._client.uaclient.write(ua.WriteParameters(NodesToWrite=items))
+            parameters = ua.WriteParameters(NodesToWrite=items)
+            results = await _within(2 * _LIMIT_S, self._client.uaclient.write(parameters))
         except (OSError, TimeoutError, ConnectionError, ua.UaError) as error:
             raise ClientFault from error
         good = [result.is_good() for result in results]
@@ -106,8 +119,7 @@ class OpcUaClient:
 
     async def close(self) -> None:
         with suppress(Exception):
-            async with asyncio.timeout(0.2):
-                await self._client.disconnect()
+            await _within(0.2, self._client.disconnect())
         with suppress(Exception):
             self._client.disconnect_socket()
 

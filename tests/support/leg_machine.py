@@ -299,6 +299,7 @@ class LegMachine:
                 channel.on_node(state, now)
             case "bus down":
                 model.stop()
+                model.followed = True
                 channel.start_anew(now)
             case "bridge gap":
                 model.gap()

@@ -20,7 +20,7 @@ from bridge.command.watchdog import TABLE, Effect, Stimulus, Watchdog, WatchdogS
 from tests.support.explorer import Map, explore
 from tests.support.leg_machine import GATES, TIMEOUT_MS, LegMachine, recorded_table
 
-_MOST: Final = 20_000
+_MOST: Final = 40_000
 
 _PROFILES: Final[dict[str, dict[str, Any]]] = {
     "disable_voltage": {},

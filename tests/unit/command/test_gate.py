@@ -118,8 +118,9 @@ def test_an_acknowledge_brings_no_current_after_a_stop_that_was_asked_for(way: W
     way.runs()
     way.says(DriveState.FAULT)
     way.gate.stop(way.stop, is_asked=True)
-    way.says(DriveState.FAULT)
+    assert way.sent == way.stop
     assert way.writes(way.run | acknowledge) == way.withheld | acknowledge
+    assert way.writes(way.run) == way.withheld
 
 
 def test_a_drive_that_had_stopped_by_itself_before_it_is_stopped_gets_no_current(way: Way) -> None:
@@ -136,6 +137,16 @@ def test_one_that_turned_again_after_that_is_stopped_by_its_ramp(way: Way) -> No
     way.says(ENABLED)
     way.gate.interlocked = True
     assert way.sent == way.stop
+
+
+def test_what_a_drive_says_after_its_node_has_restarted_is_believed_at_once(way: Way) -> None:
+    way.writes(way.words.ready)
+    way.says(READY)
+    way.writes(way.run)
+    way.gate.stop(way.stop)
+    assert way.sent == way.stop
+    way.gate.forget()
+    assert way.says(READY, 0.01) == way.withheld
 
 
 def test_a_stop_by_the_watchdog_brings_no_current_either(way: Way) -> None:

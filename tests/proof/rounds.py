@@ -32,6 +32,7 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     others = [drive for drive in DRIVES if drive.protocol not in fault.protocols]
     began = time.monotonic()
     moment = fault.inject(rig)
+    _let_pass(rig, fault, concerned, moment)
     still = [drive for drive in concerned if not measure.was_moving(rig, drive, moment)]
     rig.by_themselves += len(still)
     stopped = _wait_stopped(rig, fault, [drive for drive in concerned if drive not in still], moment)
@@ -73,17 +74,19 @@ def _all_go_on(rig: Rig, drives: list[Drive] | tuple[Drive, ...], fault: Fault, 
     ]
 
 
+def _let_pass(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> None:
+    """The last bound. Who looks takes time from those who are to stop, and does not see yet what happened
+    just before the fault: so nobody looks before that."""
+    bound = fault.drive_bound or fault.bus_bound
+    last_ms = max(bound(rig, drive) for drive in drives)
+    time.sleep(max(0.0, moment + last_ms / 1000 - time.monotonic()))
+
+
 def _wait_stopped(
     rig: Rig, fault: Fault, drives: list[Drive], moment: float
 ) -> dict[Drive, tuple[float, float]]:
-    """When each drive was stopped for good, on the bus and in itself.
-
-    Who looks takes time from those who are to stop: so nobody looks before the last bound.
-    """
+    """When each drive was stopped for good, on the bus and in itself."""
     stopped: dict[Drive, tuple[float, float]] = {}
-    bounds = [fault.drive_bound or fault.bus_bound] if drives else []
-    last_ms = max((bound(rig, drive) for bound in bounds for drive in drives), default=0.0)
-    time.sleep(max(0.0, moment + last_ms / 1000 - time.monotonic()))
     end = time.monotonic() + _STOPPED_S
     while len(stopped) < len(drives) and time.monotonic() < end:
         for drive in drives:

@@ -196,13 +196,11 @@ class Gate:
     def clear(self, now: float, state: DriveState, *, pulse: bool) -> None:
         """Acknowledge: leave the trip, and stop what would go on after a fault of the drive itself. With
         ``pulse`` an acknowledge edge is sent to the drive."""
-        if self._tripped_at is not None:
-            self._tripped_at = None
-            self._rest_limit = None
+        is_tripped = self._tripped_at is not None
+        self._tripped_at = self._rest_limit = None
+        if is_tripped or (pulse and state in FAULTED):
             self.stop(self.word_at_rest)
         if pulse:
-            if state in FAULTED:
-                self.stop(self.word_at_rest)
             self._acknowledge_until = now + _ACKNOWLEDGE_PULSE_S
 
     @property

@@ -226,9 +226,7 @@ class Master:
         line.beating.clear()
         line.renew_at = now
         if is_up:
-            # What was written meanwhile does not go out first.
-            for node in line.network.nodes:
-                node.stop_drives(now)
+            line.network.bus_is_back(now)
         else:
             line.network.bus_is_gone(now)
 

@@ -263,6 +263,11 @@ class Network:
             node.bus_is_gone(now)
             self._schedule.touch(node)
 
+    def bus_is_back(self, now: float) -> None:
+        """What was written while the bus was gone does not go out first."""
+        for node in self.nodes:
+            node.stop_drives(now)
+
     def refresh(self, status: BusStatus, now: float) -> None:
         """Bring the points of the bus and its nodes up to date; a few times a second."""
         top = f"bus/{self.bus.name}"

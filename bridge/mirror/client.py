@@ -19,7 +19,7 @@ from bridge.zenohlink import Message, ZenohLink, zenoh_config
 _log = logging.getLogger(__name__)
 
 SILENCE_S: Final = 1.0
-"""Without a delta for so long, the bus process counts as gone."""
+"""Not in step for so long, the bus process counts as gone."""
 _LOOK_EVERY_S: Final = 0.1
 _SNAPSHOT_TIMEOUT_S: Final = 2.0
 _MOST_PENDING: Final = 2000
@@ -49,7 +49,7 @@ class MirrorClient:
         self._sequence = 0
         self._in_step = False
         self._pending: list[Delta] = []
-        self._last_sign = float("-inf")
+        self._last_in_step = float("-inf")
         self._is_dead = False
         self._points_changed = False
         self._listeners: list[Callable[[Event], None]] = []
@@ -132,7 +132,7 @@ class MirrorClient:
 
     async def _watch_silence(self) -> None:
         while True:
-            if self._clock() - self._last_sign > SILENCE_S:
+            if self._clock() - self._last_in_step > SILENCE_S:
                 self._mark_dead()
             self._tell_rejections()
             await asyncio.sleep(_LOOK_EVERY_S)
@@ -161,7 +161,7 @@ class MirrorClient:
         elif self._image.points != snapshot.points:
             self._points_changed = True
             return
-        self._last_sign = self._clock()
+        self._last_in_step = self._clock()
         self._is_dead = False
         self._instance, self._sequence = snapshot.instance, snapshot.sequence
         self._apply(snapshot.readings)
@@ -182,7 +182,6 @@ class MirrorClient:
             self._count_malformed(error)
             self._in_step = False
             return
-        self._last_sign = self._clock()
         if self._in_step:
             self._follow(delta)
         elif len(self._pending) < _MOST_PENDING:
@@ -196,6 +195,7 @@ class MirrorClient:
             self.gaps += 1
             self._in_step = False
             return
+        self._last_in_step = self._clock()
         self._sequence = delta.sequence
         self._apply(delta.readings)
 

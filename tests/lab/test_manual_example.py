@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import subprocess
 from collections.abc import Iterator
 
@@ -104,6 +105,7 @@ async def test_by_opcua_with_an_asyncua_client(site: LabSite, bus: Sniffer) -> N
             frequency_hz = await node("actual/frequency").read_value()  # type: ignore[attr-defined]
             if frequency_hz == 25.0:
                 break
+            await asyncio.sleep(0.02)
         assert frequency_hz == 25.0
         await write(control_word=0x047E)
         wait_for_status(bus, "fu2", 0x31, 0)

@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -23,7 +24,7 @@ from bridge.mirror import MirrorClient, MirrorPublisher, PointsChanged, protocol
 from bridge.mirror.client import UNREACHABLE
 from bridge.mirror.endpoint import socket_path
 from bridge.northbound.view import View
-from bridge.zenohlink import Message, ZenohLink, zenoh_config
+from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 from tests.support.zenoh_peer import until
 from tests.support.zenoh_site import ENABLED, READY, drive_says, epoch, make_plant, node_is
 
@@ -198,6 +199,25 @@ async def test_a_missed_delta_is_made_good_by_a_snapshot(endpoint: str) -> None:
         await until(
             lambda: client.is_connected and shown(client.image) == shown(plant.image), "in step again"
         )
+
+
+async def test_a_front_that_gets_no_snapshot_after_a_gap_passes_no_old_value_off_as_good(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plant = make_plant()
+    async with publishing(endpoint, plant) as publisher, front(endpoint) as client:
+
+        async def no_answer(asked: Asked) -> None:
+            asked.finish()
+
+        monkeypatch.setattr(publisher, "_answer_snapshot", no_answer)
+        publisher._sequence += 1  # as if one had been dropped on the way; those after it do arrive
+        plant.set("bridge/drives_good", 2, time.monotonic())
+        drives_good = partial(client.image.read, "bridge/drives_good")
+        await until(lambda: drives_good().quality is Quality.DEAD, "dead", 2.5)
+        assert not client.is_connected
+        monkeypatch.undo()
+        await until(lambda: shown(client.image) == shown(plant.image), "in step again")
 
 
 async def test_garbage_on_the_link_does_no_harm(endpoint: str) -> None:

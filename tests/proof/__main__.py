@@ -85,8 +85,8 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
                 for fault in (fault for fault in possible if fault.is_due(done, cycles)):
                     samples += _round(rig, fault, errors)
                     rounds[fault.name] += 1
-                    out.write_text(json.dumps(collect(), indent=1), encoding="utf-8")
                 done += 1
+                out.write_text(json.dumps(collect(), indent=1), encoding="utf-8")
                 say(f"cycle {done} of {cycles}")
             for _ in range(_MOST_EXTRA_ROUNDS):
                 for fault in (fault for fault in possible if _lacks(samples, fault, rounds[fault.name])):

@@ -15,9 +15,10 @@ NUMBERS: Final = 32
 """Telegrams are numbered modulo this: more than an owner sends within a time-out."""
 _WORD: Final = struct.Struct("=q")
 _STAMP: Final = struct.Struct("=d")
+_PAIR: Final = struct.Struct("=qq")
 _BYTES: Final = 1024
 _ACCEPTED: Final = 8
-_STAMPS: Final = 16
+_STAMPS: Final = 24
 
 
 class Board:
@@ -43,9 +44,12 @@ class Board:
     def sent_at(self, place: int, number: int) -> float:
         return float(_STAMP.unpack_from(self._memory, _BYTES * place + _STAMPS + 8 * number)[0])
 
-    def accept(self, place: int) -> None:
-        """A telegram was answered without an error."""
-        _WORD.pack_into(self._memory, _BYTES * place + _ACCEPTED, self.accepted(place) + 1)
+    def accept(self, place: int, control_word: int) -> None:
+        """A telegram with this word was answered without an error."""
+        count, _ = self.accepted(place)
+        _PAIR.pack_into(self._memory, _BYTES * place + _ACCEPTED, count + 1, control_word)
 
-    def accepted(self, place: int) -> int:
-        return int(_WORD.unpack_from(self._memory, _BYTES * place + _ACCEPTED)[0])
+    def accepted(self, place: int) -> tuple[int, int]:
+        """How many telegrams, and the word of the last one."""
+        count, control_word = _PAIR.unpack_from(self._memory, _BYTES * place + _ACCEPTED)
+        return int(count), int(control_word)

@@ -81,7 +81,9 @@ class OpcUaClient:
     def __init__(self) -> None:
         from asyncua import Client as UaClient
 
-        self._client = UaClient(f"opc.tcp://{SERVERS['opcua']}:{PORTS['opcua']}", timeout=_LIMIT_S)
+        url = f"opc.tcp://{SERVERS['opcua']}:{PORTS['opcua']}"
+        # Its own look at the server would give the connection up after a second.
+        self._client = UaClient(url, timeout=_LIMIT_S, watchdog_intervall=_CONNECT_S)
         self._client.session_timeout = 60_000
         self._space = 0
 

@@ -16,14 +16,15 @@ from pathlib import Path
 
 from tests.proof.board import NUMBERS, Board
 from tests.proof.clients import CLIENTS, Client, ClientFault
-from tests.proof.drives import DRIVES, drives_of
+from tests.proof.drives import DRIVES, Drive, drives_of
 
 PERIOD_S = 0.25
+_LOOK_S = 0.05
 _AGAIN_S = 0.1
 
 
 async def own(protocol: str, board: Board) -> None:
-    """Write the telegrams that the board asks for, for ever."""
+    """Write the telegrams that the board asks for, for ever: in a period, and at once where they change."""
     while True:
         client = CLIENTS[protocol]()
         try:
@@ -40,15 +41,23 @@ async def _write(client: Client, protocol: str, board: Board) -> None:
     while True:
         began = time.monotonic()
         number = (number + 1) % NUMBERS
+        words = _words(board, drives)
         telegrams = [
-            (drive, board.control_word(drive.place), drive.family.setpoint + number) for drive in drives
+            (drive, word, drive.family.setpoint + number) for drive, word in zip(drives, words, strict=True)
         ]
         for drive in drives:
             board.stamp(drive.place, number, time.monotonic())
-        for drive, accepted in zip(drives, await client.write(telegrams), strict=True):
+        for (drive, word, _), accepted in zip(telegrams, await client.write(telegrams), strict=True):
             if accepted:
-                board.accept(drive.place)
-        await asyncio.sleep(max(0.0, began + PERIOD_S - time.monotonic()))
+                board.accept(drive.place, word)
+        due = began + PERIOD_S
+        # Another process changes the words: there is nothing to wait for.
+        while time.monotonic() < due and words == _words(board, drives):  # noqa: ASYNC110
+            await asyncio.sleep(max(0.0, min(_LOOK_S, due - time.monotonic())))
+
+
+def _words(board: Board, drives: list[Drive]) -> list[int]:
+    return [board.control_word(drive.place) for drive in drives]
 
 
 def main() -> None:

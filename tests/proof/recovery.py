@@ -10,8 +10,6 @@ if TYPE_CHECKING:
     from tests.proof.rig import Rig
     from tests.proof.witness import Run
 
-_ACKNOWLEDGED: Final = 2
-"""Telegrams that were answered: the first of them may have been sent before."""
 _PATIENCE_S: Final = 1.5
 
 
@@ -42,11 +40,12 @@ class Recovery:
     def _tell(self, word: int) -> None:
         self._word = word
         self._since = time.monotonic()
-        self._accepted = self._rig.board.accepted(self._drive.place)
+        self._accepted, _ = self._rig.board.accepted(self._drive.place)
         self._rig.board.command(self._drive.place, word)
 
     def _is_acknowledged(self) -> bool:
-        return self._rig.board.accepted(self._drive.place) - self._accepted >= _ACKNOWLEDGED
+        accepted, word = self._rig.board.accepted(self._drive.place)
+        return accepted > self._accepted and word == self._word
 
     def _is_ready(self) -> bool:
         """The bridge hands on what the owner writes."""
@@ -58,7 +57,7 @@ class Recovery:
         told, said = self._rig.told.last(drive.rpdo), self._rig.said.last(drive.tpdo)
         return (
             f"{drive.path} ({drive.protocol}) does not move: owner writes {self._word:04X}h, "
-            f"{self._rig.board.accepted(drive.place)} telegrams accepted, "
+            f"{self._rig.board.accepted(drive.place)[0]} telegrams accepted, "
             f"the bridge sends {_hex(told)}, it says {_hex(said)}"
         )
 

@@ -37,6 +37,26 @@ async def test_a_late_renewal_ends_no_burst_for_good(period_ms: int, late_ms: in
     assert len(after) >= 0.5 * 0.6 / period_s
 
 
+async def test_a_renewal_that_was_held_up_on_its_way_ends_no_burst_for_good() -> None:
+    period_s = 0.01
+    count = burst_length(period_s, DEADMAN_MS)
+    bus = SocketCanBus("can0", "vcan0")
+    with sniffing() as sniffer:
+        bus.open(lambda: None)
+        bus.accept([])
+        try:
+            await renew(bus, period_s, count, 0.2)
+            decided_at = time.monotonic()
+            await asyncio.sleep(0.15)
+            late = time.time()
+            bus.beat((RPDO,), decided_at, period_s, count)
+            await asyncio.sleep(0.05)
+        finally:
+            bus.close()
+        after = sniffer.of(RPDO.can_id, late)
+    assert len(after) >= 3
+
+
 async def renew(bus: SocketCanBus, period_s: float, count: int, seconds: float) -> None:
     """What the master does: renew three times in the dead-man time, and look at the timers."""
     end = time.monotonic() + seconds

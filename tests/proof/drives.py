@@ -21,6 +21,7 @@ RPDO_PERIOD_MS: Final = 100
 REACTION_MS: Final = 20
 """How late the bridge may be (docs/explanation/dead-man-chain.md)."""
 FIELDBUS_TIMEOUT_MS: Final = 600
+OWNER_PERIOD_S: Final = 0.25
 DEADMAN_MS: Final = 400
 HEARTBEAT_MS: Final = 400
 GUARD_MS, LIFE_TIME_FACTOR = 150, 3

@@ -69,7 +69,8 @@ def bus_stop(rig: Rig, drive: Drive, since: float, *, silent: bool) -> tuple[flo
     enabling = None
     for run in rig.told.runs(drive.rpdo, since - _BEFORE_S):
         if drive.enabling(run.data):
-            if silent and enabling is not None and run.first - enabling.last > _SILENT_S:
+            fell_silent = silent and enabling is not None and run.first - enabling.last > _SILENT_S
+            if fell_silent and run.first > since:
                 break
             enabling = run
         elif enabling is not None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import random
 import time
 from collections.abc import Callable
 from typing import Final
 
 from tests.proof import measure
-from tests.proof.drives import DRIVES, REACTION_MS, RPDO_PERIOD_MS, Drive
+from tests.proof.drives import DRIVES, OWNER_PERIOD_S, REACTION_MS, RPDO_PERIOD_MS, Drive
 from tests.proof.faults import Fault
 from tests.proof.measure import Sample
 from tests.proof.rig import BRIDGE, SIMULATION, Rig, Stuck
@@ -31,6 +32,8 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     concerned = [drive for drive in DRIVES if drive.protocol in fault.protocols]
     others = [drive for drive in DRIVES if drive.protocol not in fault.protocols]
     began = time.monotonic()
+    # At any time between two telegrams.
+    time.sleep(random.uniform(0.0, OWNER_PERIOD_S))
     moment = fault.inject(rig)
     _let_pass(rig, fault, concerned, moment)
     still = [drive for drive in concerned if not measure.was_moving(rig, drive, moment)]

@@ -4,6 +4,7 @@ the message to the manager."""
 from __future__ import annotations
 
 import errno
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -47,7 +48,7 @@ class _Wish:
 
 
 class KernelBeat:
-    """Finite bursts by COB-ID. Times are monotonic seconds.
+    """Finite bursts by COB-ID. Times are monotonic seconds; ``clock`` tells how late a message went out.
 
     A message that the manager refuses (no memory, no room) leaves the old data on the bus, so it is sent
     again every millisecond. After ten the bursts are given up: the manager is closed, which ends all of
@@ -56,7 +57,8 @@ class KernelBeat:
     ``beat``, ``silence``, ``silence_all`` and ``on_time`` raise OSError where the interface is gone or down.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
         self.refusal = ""
         """Why the bursts have been given up; empty while the kernel takes them."""
         self._manager: Manager | None = None
@@ -130,8 +132,14 @@ class KernelBeat:
         """Tell the kernel; False where it does not take it now."""
         if self._manager is None:
             return False
+        job = self._jobs.get(can_id)
+        # Refilling keeps the phase of a burst that runs and cannot wake one that has ended.
+        runs = job is not None and job.period_s == wish.period_s and now < job.until
         try:
-            self._manager.send(self._message(can_id, wish, now))
+            self._manager.send(_message(can_id, wish, start=not runs))
+            if job is not None and runs and self._clock() >= job.until:
+                # It may have ended between ``now`` and the refill.
+                self._manager.send(_message(can_id, wish, start=True))
         except OSError as error:
             if error.errno in _LINK_IS_GONE:
                 raise
@@ -152,14 +160,6 @@ class KernelBeat:
             self._jobs.pop(can_id, None)
         return True
 
-    def _message(self, can_id: int, wish: _Wish, now: float) -> bytes:
-        if not wish.frames:
-            return bcm.delete(can_id)
-        # Refilling keeps the phase of a burst that runs and cannot wake one that has ended.
-        job = self._jobs.get(can_id)
-        runs = job is not None and job.period_s == wish.period_s and now < job.until
-        return bcm.setup(wish.frames, wish.period_s, wish.count, start=not runs, at_once=wish.at_once)
-
     def _give_up(self, error: OSError, now: float) -> None:
         going = {can_id: (job.frames, job.period_s, job.count) for can_id, job in self._jobs.items()}
         going |= {can_id: (wish.frames, wish.period_s, wish.count) for can_id, wish in self._wishes.items()}
@@ -169,3 +169,9 @@ class KernelBeat:
             if frames:
                 first = self._soft.beat(frames, now, period_s, count, at_once=True)
                 self._first += [first] if first else []
+
+
+def _message(can_id: int, wish: _Wish, *, start: bool) -> bytes:
+    if not wish.frames:
+        return bcm.delete(can_id)
+    return bcm.setup(wish.frames, wish.period_s, wish.count, start=start, at_once=wish.at_once)

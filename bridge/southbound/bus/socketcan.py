@@ -52,7 +52,7 @@ class SocketCanBus:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._sockets = sockets or CanSockets(channel)
         self._watch = LinkWatch(self._sockets.link)
-        self._beats = KernelBeat()
+        self._beats = KernelBeat(time.monotonic)
         self._outbox = Outbox()
         self._accepted: frozenset[int] = frozenset()
         self._own: list[Frame] = []

@@ -56,6 +56,12 @@ def test_a_bus_that_goes_on_enabling_has_not_stopped() -> None:
     assert bus_stop(scene(told=[Run(9.0, 20.0, ENABLE)]), FU1, 10.0, silent=True) is None
 
 
+def test_a_gap_before_the_fault_is_not_its_silence() -> None:
+    last = Run(9.9, 10.3, ENABLE)
+    found = bus_stop(scene(told=[Run(9.0, 9.2, ENABLE), last]), FU1, 10.0, silent=True)
+    assert found == (10.3, last)
+
+
 def test_a_stop_before_the_fault_is_not_its_effect() -> None:
     told = [Run(8.5, 9.0, ENABLE), Run(9.1, 9.2, STOP), Run(9.3, 20.0, ENABLE)]
     assert bus_stop(scene(told=told), FU1, 10.0, silent=False) is None

@@ -22,6 +22,7 @@ class Kernel:
     """The broadcast manager's end of the socket: what it holds, and whether it takes messages now."""
 
     def __init__(self) -> None:
+        self.now = 0.0
         self.refuses: int | None = None
         self.said: list[tuple[int, int, int]] = []
         self.holds: dict[int, bytes] = {}
@@ -51,7 +52,7 @@ def kernel() -> Kernel:
 
 @pytest.fixture
 def beats(kernel: Kernel) -> KernelBeat:
-    beats = KernelBeat()
+    beats = KernelBeat(lambda: kernel.now)
     beats.open(kernel)
     assert beats.beat((RUN,), 0.0, PERIOD_S, 10, at_once=True) is None
     assert beats.beat((OTHER,), 0.0, PERIOD_S, 10, at_once=True) is None
@@ -88,13 +89,24 @@ def test_the_newest_words_are_those_that_are_tried_again(kernel: Kernel, beats: 
 
 
 def test_a_burst_that_the_kernel_never_took_is_started_not_refilled(kernel: Kernel) -> None:
-    beats = KernelBeat()
+    beats = KernelBeat(lambda: kernel.now)
     beats.open(kernel)
     kernel.refuses = errno.ENOMEM
     beats.beat((RUN,), 0.0, PERIOD_S, 10, at_once=True)
     kernel.refuses = None
     beats.on_time(0.001)
     assert control_word(kernel) == RUN.data
+
+
+def test_a_burst_that_may_have_ended_while_its_renewal_was_on_its_way_is_started_anew(
+    kernel: Kernel, beats: KernelBeat
+) -> None:
+    kernel.now = 0.0799
+    beats.beat((STOP,), 0.079, PERIOD_S, 10, at_once=True)
+    assert kernel.said[-1] == (SETUP, 1 | 8, 0x205), "it runs: its phase is kept"
+    kernel.now = 0.081
+    beats.beat((OTHER,), 0.079, PERIOD_S, 10, at_once=False)
+    assert kernel.said[-2:] == [(SETUP, 1, 0x305), (SETUP, 1 | START, 0x305)]
 
 
 def test_a_kernel_that_goes_on_refusing_loses_every_burst_and_we_send_them(

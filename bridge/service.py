@@ -30,6 +30,7 @@ from bridge.notify import Notifier
 from bridge.southbound.bus import Bus, open_bus
 from bridge.southbound.master import Master
 from bridge.southbound.network import Network
+from bridge.southbound.standstill import Alarm
 from bridge.wear import WearKeeper
 
 _log = logging.getLogger(__name__)
@@ -74,10 +75,17 @@ class Service:
     """The bus process of one site.
 
     ``make_bus`` gives the buses; without ``fronts`` this process serves Modbus and zenoh alone, and
-    whoever started it looks after the fronts.
+    whoever started it looks after the fronts. ``alarm`` is the master's.
     """
 
-    def __init__(self, project: Project, make_bus: MakeBus = make_bus, *, fronts: bool = True) -> None:
+    def __init__(
+        self,
+        project: Project,
+        make_bus: MakeBus = make_bus,
+        *,
+        fronts: bool = True,
+        alarm: Alarm | None = None,
+    ) -> None:
         self.project = project
         site = project.site
         self.plant = Plant(site, project.families, __version__, clock.now())
@@ -89,7 +97,7 @@ class Service:
             (make_bus(table), Network(table, self.plant, clock.epoch_ns, project.downloads))
             for table in site.bus
         ]
-        self.master = Master(networks, self.plant, clock.now, self.notifier.alive)
+        self.master = Master(networks, self.plant, clock.now, self.notifier.alive, alarm)
         self.modbus = ModbusServer(self.plant, site.modbus, clock.now) if site.modbus else None
         self.zenoh = (
             ZenohServer(self.plant, site.zenoh, site.site.name, clock.now, clock.epoch_ns)

@@ -23,6 +23,7 @@ from bridge.sim.node import SimulatedNode
 from bridge.sim.shell import Simulation
 from bridge.southbound.bus import Bus
 from bridge.southbound.bus.virtual import VirtualWire
+from bridge.southbound.standstill import SignalAlarm
 
 SiteArgument = Annotated[Path, typer.Argument(metavar="SITE", help="the site file")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="log more")]
@@ -110,7 +111,7 @@ async def _serve(
         simulations.append(_simulation(wire.end(f"{table.name}-simulation"), table, project.path))
         return wire.end(table.name)
 
-    service = Service(project, open_bus, fronts=fronts)
+    service = Service(project, open_bus, fronts=fronts, alarm=SignalAlarm())
     if controller and project.site.zenoh:
         service.fronts.append(_demo_controller(project.site.zenoh, project.site.site.name))
     async with asyncio.TaskGroup() as tasks:

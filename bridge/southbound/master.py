@@ -18,6 +18,7 @@ from bridge.southbound.bus.interface import Bus, ControllerState
 from bridge.southbound.canopen.sync import burst_length
 from bridge.southbound.network import Beats, Network
 from bridge.southbound.ratelimit import RateLimit
+from bridge.southbound.standstill import Alarm
 from bridge.southbound.timer import LoopTimer
 
 _log = logging.getLogger(__name__)
@@ -60,7 +61,8 @@ class _Line:
 class Master:
     """Runs any number of networks on their buses in one event loop.
 
-    ``clock`` gives monotonic seconds; ``alive`` is called at the end of every complete round.
+    ``clock`` gives monotonic seconds; ``alive`` is called at the end of every complete round; ``alarm`` tells
+    of a standstill while frames are handed to the bus.
     """
 
     def __init__(
@@ -69,11 +71,13 @@ class Master:
         plant: Plant,
         clock: Callable[[], float],
         alive: Callable[[float], None] = lambda now: None,
+        alarm: Alarm | None = None,
     ) -> None:
         self._lines = [_Line(bus, network) for bus, network in lines]
         self._plant = plant
         self._clock = clock
         self._alive = alive
+        self._alarm = alarm or Alarm()
         self._timer: LoopTimer | None = None
         self._set_timer: Callable[[float], None] = lambda at: None
         self._refresh_at = 0.0
@@ -115,6 +119,7 @@ class Master:
     async def close(self) -> None:
         """Stop every drive's process data and close the buses."""
         self._running = False
+        self._alarm.set(0.0)
         self._plant.outputs_changed = lambda: None
         if self._timer:
             self._timer.close()
@@ -270,13 +275,16 @@ class Master:
         if beats is line.beats and not renew:
             return
         line.beats = beats
+        self._alarm.set(network.bus.deadman_ms / 1000)
         for can_id in [can_id for can_id in line.beating if can_id not in beats]:
             bus.silence(can_id)
             del line.beating[can_id]
         for can_id, (frames, period_s) in beats.items():
             changed = line.beating.get(can_id) != frames
             if changed or renew:
-                if self._stood_still(line, now):
+                # In this order: the process may be stopped at the end of the look at the clock.
+                if self._stood_still(line, now) or self._alarm.rang:
+                    line.beats = None
                     return
                 count = burst_length(period_s, network.bus.deadman_ms)
                 bus.beat(frames, now, period_s, count, at_once=changed)

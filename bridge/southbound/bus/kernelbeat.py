@@ -137,8 +137,9 @@ class KernelBeat:
         runs = job is not None and job.period_s == wish.period_s and now < job.until
         try:
             self._manager.send(_message(can_id, wish, start=not runs))
-            if job is not None and runs and self._clock() >= job.until:
-                # It may have ended between ``now`` and the refill.
+            if job is not None and runs and job.until <= self._clock() < now + wish.count * wish.period_s:
+                # It may have ended between ``now`` and the refill. After a longer time nothing that was right
+                # then may go on.
                 self._manager.send(_message(can_id, wish, start=True))
         except OSError as error:
             if error.errno in _LINK_IS_GONE:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,6 +13,7 @@ from bridge.mapping.model import IdentityRule
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import ControllerState
 from bridge.southbound.canopen.nmt import NmtState
+from bridge.southbound.standstill import Alarm
 from tests.support.bench import NORD, PLC, Bench, write_site
 
 RPDO1 = 0x205
@@ -236,6 +238,33 @@ def test_a_process_stopped_while_it_sends_sends_nothing_that_was_right_before(
     with monkeypatch.context() as patched:
         patched.setattr(bench.bus, "beat", stand_still_after)
         bench.write(control_word=0x047F, setpoint_1=0x2100)
+    bench.run(0.5)
+    assert bench.sent(RPDO1)
+    assert not [frame.data.hex() for frame in bench.sent(RPDO1) if frame.data[0] & 0x0F == 0x0F]
+
+
+def test_a_process_stopped_at_the_end_of_its_last_look_at_the_clock_sends_nothing_that_was_right_before(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The time that it has read is right, and a second old."""
+    running(bench)
+    alarm, look = Alarm(), bench.master._stood_still
+
+    def stand_still_after(line: Any, since: float) -> bool:
+        found = look(line, since)
+        if alarm_is_set and not alarm.rang:
+            bench.now += 1.0
+            alarm.rang = True
+        return found
+
+    alarm_is_set: list[float] = []
+    bench.log.clear()
+    with monkeypatch.context() as patched:
+        patched.setattr(alarm, "set", alarm_is_set.append)
+        patched.setattr(bench.master, "_alarm", alarm)
+        patched.setattr(bench.master, "_stood_still", stand_still_after)
+        bench.write(control_word=0x047F, setpoint_1=0x2100)
+    assert alarm_is_set == [0.1], "the dead-man time"
     bench.run(0.5)
     assert bench.sent(RPDO1)
     assert not [frame.data.hex() for frame in bench.sent(RPDO1) if frame.data[0] & 0x0F == 0x0F]

@@ -82,7 +82,11 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
             say("everything is there")
             rig.run_all()
             while done < cycles and time.monotonic() - began < limit_s:
-                for fault in (fault for fault in possible if fault.is_due(done, cycles)):
+                # Staggered: nodes that were lost are asked again sooner where half a minute has passed since.
+                due = [
+                    fault for at, fault in enumerate(possible) if fault.is_due((done + at) % cycles, cycles)
+                ]
+                for fault in due:
                     samples += _round(rig, fault, errors)
                     rounds[fault.name] += 1
                 done += 1

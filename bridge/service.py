@@ -7,26 +7,22 @@ import gc
 import logging
 from collections.abc import Callable
 from contextlib import AsyncExitStack
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridge import __version__, clock
 from bridge.auditlog import AuditLog
 from bridge.command import Plant
-from bridge.config import BusTable, Site
-from bridge.config.download import Download
-from bridge.eds import read_configurations
+from bridge.config import BusTable
 from bridge.errors import BridgeError
 from bridge.eventlog import EventLog
 from bridge.fronts import Front
 from bridge.lint import Severity, lint
-from bridge.mapping import Family
-from bridge.mapping.site import load_site_and_families
 from bridge.mirror.endpoint import socket_endpoint
 from bridge.mirror.publisher import MirrorPublisher
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.zenoh.session import ZenohServer
 from bridge.notify import Notifier
+from bridge.project import Project, count
 from bridge.southbound.bus import Bus, open_bus
 from bridge.southbound.master import Master
 from bridge.southbound.network import Network
@@ -36,30 +32,6 @@ from bridge.wear import WearKeeper
 _log = logging.getLogger(__name__)
 
 MakeBus = Callable[[BusTable], Bus]
-
-
-@dataclass(frozen=True, slots=True)
-class Project:
-    """A checked site with the families it uses, and the file it came from. ``downloads`` has what
-    configuration files ask of their nodes, by the node's name."""
-
-    path: Path
-    site: Site
-    families: dict[str, Family]
-    downloads: dict[str, tuple[Download, ...]] = field(default_factory=dict[str, tuple[Download, ...]])
-
-
-def load_project(path: Path) -> Project:
-    """Read a site file and every file it names. Raises ``FileFaults`` with all faults of the site file and
-    its mappings, or else of its configuration files."""
-    site, families = load_site_and_families(path)
-    return Project(path, site, families, read_configurations(site, path))
-
-
-def count(number: int, what: str) -> str:
-    """``1 bus``, ``2 buses``, ``4 drives``."""
-    ending = "" if number == 1 else "es" if what.endswith("s") else "s"
-    return f"{number} {what}{ending}"
 
 
 def make_bus(table: BusTable) -> Bus:

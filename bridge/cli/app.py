@@ -2,57 +2,61 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
+from typing import Final
 
 import typer
 
 from bridge import __version__
-from bridge.cli import (
-    audit,
-    drop_test,
-    eds,
-    export,
-    lss,
-    monitor,
-    nmt,
-    parameter_sets,
-    parameters,
-    project,
-    scan,
-    sdo,
-    serve,
-)
 from bridge.cli.terminal import printable_lines
 from bridge.errors import BridgeError
 
-app = typer.Typer(
-    name="drivebridge",
-    help="CANopen master for industrial drives, served as OPC UA, Modbus TCP and zenoh.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
-app.command()(serve.demo)
-app.command()(serve.run)
-app.command()(serve.simulate)
-app.command(hidden=True)(serve.demo_controller)
-app.command()(project.check)
-app.command()(audit.audit)
-app.command("drop-test")(drop_test.drop_test)
-app.command()(eds.eds)
-app.command("hash-password")(project.hash_password)
-app.command()(scan.scan)
-app.command()(nmt.nmt)
-app.command()(monitor.monitor)
-app.add_typer(sdo.app, name="sdo")
-app.add_typer(parameters.app, name="parameters")
-for command in (parameter_sets.backup, parameter_sets.compare, parameter_sets.restore):
-    parameters.app.command()(command)
-app.add_typer(lss.app, name="lss")
-app.add_typer(export.app, name="export")
+_COMMANDS: Final = {
+    "demo": "serve.demo",
+    "run": "serve.run",
+    "simulate": "serve.simulate",
+    "demo-controller": "serve.demo_controller",
+    "check": "project.check",
+    "audit": "audit.audit",
+    "drop-test": "drop_test.drop_test",
+    "eds": "eds.eds",
+    "hash-password": "project.hash_password",
+    "scan": "scan.scan",
+    "nmt": "nmt.nmt",
+    "monitor": "monitor.monitor",
+    "version": "app.version",
+    "sdo": "sdo.app",
+    "parameters": "parameters.app",
+    "lss": "lss.app",
+    "export": "export.app",
+}
+"""Where in ``bridge.cli`` each command, or group of commands, is."""
+_HIDDEN: Final = ("demo-controller",)
 
 
-@app.command()
+def make_app(word: str = "") -> typer.Typer:
+    """The command line. Where ``word`` is a command there is nothing else in it: the libraries of all of them
+    take longer to import than most commands run."""
+    app = typer.Typer(
+        name="drivebridge",
+        help="CANopen master for industrial drives, served as OPC UA, Modbus TCP and zenoh.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+    )
+    # Without it a single command would have no name.
+    app.callback()(lambda: None)
+    for name in [word] if word in _COMMANDS else _COMMANDS:
+        module, _, what = _COMMANDS[name].partition(".")
+        command = getattr(importlib.import_module(f"bridge.cli.{module}"), what)
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=name)
+        else:
+            app.command(name, hidden=name in _HIDDEN)(command)
+    return app
+
+
 def version() -> None:
     """Print the version."""
     print(__version__)
@@ -61,7 +65,7 @@ def version() -> None:
 def run_app() -> None:
     """Run the command line. Exit codes: 0 done, 1 failed, 2 bad usage or file, 3 bus or port."""
     try:
-        app()
+        make_app(*sys.argv[1:2])()
     except BridgeError as error:
         # Empty where a child has told it already.
         if sentence := str(error):

@@ -18,7 +18,7 @@ from bridge.command.plant import Node
 from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.lint import WorstCase, lint
 from bridge.mapping.own_places import OwnWant, suggested, suggested_ms
-from bridge.service import Project, load_project
+from bridge.project import Project, load_project
 from bridge.southbound.audit import AuditErrand
 
 _COLUMNS = ("drive", "watches", "setting", "reaction", "dead controller", "dead bridge", "verdict")

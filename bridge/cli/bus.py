@@ -12,12 +12,12 @@ from typing import Annotated, Protocol, TypeVar
 import typer
 
 from bridge import clock
-from bridge.cli.serve import until_stopped
+from bridge.cli.stopping import until_stopped
 from bridge.cli.terminal import printable
 from bridge.config import BusTable
 from bridge.mapping import Family
 from bridge.mapping.model import SdoServer
-from bridge.service import load_project
+from bridge.project import load_project
 from bridge.southbound.bus import Bus, open_bus
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import ControllerState

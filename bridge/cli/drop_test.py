@@ -16,13 +16,14 @@ import typer
 from bridge import __version__, clock
 from bridge.cli import drop_report
 from bridge.cli.bus import AsJson, Line, carry_out, tell
-from bridge.cli.serve import until_stopped
+from bridge.cli.stopping import until_stopped
 from bridge.command import Plant
 from bridge.config import BusTable, NodeTable, Site
 from bridge.errors import OperationFailed
 from bridge.mapping import Family
 from bridge.parameter.ledger_file import LedgerFile
-from bridge.service import Project, load_project, make_bus
+from bridge.project import Project, load_project
+from bridge.service import make_bus
 from bridge.southbound.drop_test import DropTest, ForeignMaster, Phase
 from bridge.southbound.master import Master
 from bridge.southbound.muted_bus import MutableBus

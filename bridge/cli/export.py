@@ -21,7 +21,7 @@ from bridge.lint.bus import view_bus
 from bridge.mapping.loader import mapping_folders
 from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row, bridge_rows, drive_maps
 from bridge.northbound.zenoh.keys import KeySpace
-from bridge.service import load_project
+from bridge.project import load_project
 
 app = typer.Typer(
     help="Print what a site serves, for PLC, SCADA and fleet programmers.", no_args_is_help=True

@@ -17,7 +17,7 @@ from bridge.errors import OperationFailed
 from bridge.mapping.model import Family, Slot
 from bridge.parameter import DriveParameters, Ledger, Names, ParameterError
 from bridge.parameter.ledger_file import LedgerFile
-from bridge.service import load_project
+from bridge.project import load_project
 from bridge.southbound.parameter_errand import ParameterErrand
 from bridge.southbound.parameter_run import Procedure
 

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from bridge.cli import parameter_sets
 from bridge.cli.bus import AsJson, print_table, tell
 from bridge.cli.parameter_drive import DriveArgument, SiteArgument, Yes, find
 from bridge.errors import OperationFailed
@@ -157,3 +158,7 @@ def _range(low: float | None, high: float | None, unit: str) -> str:
         return unit
     ends = ["" if end is None else f"{end:g}" for end in (low, high)]
     return f"{'…'.join(ends)} {unit}".rstrip()
+
+
+for _command in (parameter_sets.backup, parameter_sets.compare, parameter_sets.restore):
+    app.command()(_command)

@@ -13,7 +13,7 @@ import typer
 from bridge.cli.terminal import printable
 from bridge.errors import Fault, FileFaults
 from bridge.lint import Severity, Verdict, lint
-from bridge.service import Project, count, load_project
+from bridge.project import Project, count, load_project
 
 
 def check(

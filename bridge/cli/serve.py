@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import asyncio
-import signal
 import tempfile
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from bridge.cli import logs
-from bridge.config import BusTable, ZenohTable
+from bridge.cli.stopping import until_stopped
+from bridge.config import BusTable, ZenohTable, load_site
 from bridge.errors import OperationFailed
 from bridge.fronts import Front, become_front
-from bridge.mapping.loader import lineage, mapping_folders
-from bridge.service import Project, Service, load_project, make_bus
-from bridge.sim.catalogue import SIMULATED, simulate_node
-from bridge.sim.node import SimulatedNode
-from bridge.sim.shell import Simulation
-from bridge.southbound.bus import Bus
-from bridge.southbound.bus.virtual import VirtualWire
-from bridge.southbound.standstill import SignalAlarm
+
+# Nothing else is imported before it is needed: where a front has ended, its clients wait for the next one.
+if TYPE_CHECKING:
+    from bridge.project import Project
+    from bridge.sim.shell import Simulation
+    from bridge.southbound.bus import Bus
 
 SiteArgument = Annotated[Path, typer.Argument(metavar="SITE", help="the site file")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="log more")]
@@ -47,18 +45,21 @@ def run(
 ) -> None:
     """Run the bridge for SITE. Nodes of a virtual bus are simulated in the same process."""
     logs.set_up(verbose=verbose)
-    project = load_project(site)
     if role == "opcua":
         from bridge.front import run_opcua
 
         become_front(parent)
-        until_stopped(run_opcua(project.site, signs))
+        until_stopped(run_opcua(load_site(site), signs))
         return
-    until_stopped(_serve(project, fronts=role == "all"))
+    from bridge.project import load_project
+
+    until_stopped(_serve(load_project(site), fronts=role == "all"))
 
 
 def demo(verbose: Verbose = False) -> None:
     """Serve simulated drives on loopback: no root, no CAN, nothing to configure."""
+    from bridge.project import load_project
+
     logs.set_up(verbose=verbose)
     with tempfile.TemporaryDirectory(prefix="drivebridge-") as folder:
         project = load_project(_demo_site(Path(folder)))
@@ -67,20 +68,24 @@ def demo(verbose: Verbose = False) -> None:
 
 def simulate(site: SiteArgument, verbose: Verbose = False) -> None:
     """Play every node of SITE on its buses, for a bridge that runs as another process."""
+    from bridge.cli.simulation import simulation
+    from bridge.project import load_project
+    from bridge.service import make_bus
+
     logs.set_up(verbose=verbose)
     project = load_project(site)
 
     async def play() -> None:
-        simulations = [_simulation(make_bus(table), table, project.path) for table in project.site.bus]
+        simulations = [simulation(make_bus(table), table, project.path) for table in project.site.bus]
         try:
             async with asyncio.TaskGroup() as tasks:
-                for simulation in simulations:
-                    tasks.create_task(simulation.run())
+                for one in simulations:
+                    tasks.create_task(one.run())
                 names = ", ".join(node.name for table in project.site.bus for node in table.node)
                 print(f"simulating {names}; Ctrl-C ends it", flush=True)
         finally:
-            for simulation in simulations:
-                simulation.close()
+            for one in simulations:
+                one.close()
 
     until_stopped(play())
 
@@ -102,13 +107,19 @@ async def _serve(
     ready: Callable[[], None] = lambda: None,
 ) -> None:
     """The service, with simulated nodes on its virtual buses."""
+    from bridge.service import Service, make_bus
+    from bridge.southbound.standstill import SignalAlarm
+
     simulations: list[Simulation] = []
 
     def open_bus(table: BusTable) -> Bus:
         if table.interface != "virtual":
             return make_bus(table)
+        from bridge.cli.simulation import simulation
+        from bridge.southbound.bus.virtual import VirtualWire
+
         wire = VirtualWire()
-        simulations.append(_simulation(wire.end(f"{table.name}-simulation"), table, project.path))
+        simulations.append(simulation(wire.end(f"{table.name}-simulation"), table, project.path))
         return wire.end(table.name)
 
     service = Service(project, open_bus, fronts=fronts, alarm=SignalAlarm())
@@ -128,20 +139,6 @@ def _demo_controller(table: ZenohTable, site: str) -> Front:
 
     moves = [str(Move(f"{table.prefix}/{site}/{drive}", value, most)) for drive, value, most in _DEMO_MOVES]
     return Front("demo controller", ["demo-controller", table.listen[0], *moves])
-
-
-def _simulation(bus: Bus, table: BusTable, site: Path) -> Simulation:
-    """All nodes of one bus, with the parameters that the site file gives their drives. A mapping that has
-    no simulation of its own is played by the nearest that it extends."""
-    nodes: list[SimulatedNode] = []
-    folders = mapping_folders(site)
-    for node in table.node:
-        parameters: dict[str, float] = {}
-        for drive in node.drive:
-            parameters |= {f"{drive.slot}/{name}": value for name, value in drive.parameters.items()}
-        known = [name for name in lineage(node.mapping, folders) if name in SIMULATED]
-        nodes.append(simulate_node(known[0] if known else node.mapping, node.id, parameters))
-    return Simulation(bus, nodes)
 
 
 def _demo_site(folder: Path) -> Path:
@@ -177,38 +174,3 @@ Keep writing: a drive whose controller is silent for 1000 ms stops. Ctrl-C ends 
 """,
         flush=True,
     )
-
-
-def until_stopped(work: Coroutine[Any, Any, None]) -> None:
-    """Run ``work`` until it ends or SIGINT or SIGTERM arrives. Its one error is raised bare."""
-
-    async def supervised() -> None:
-        task = asyncio.ensure_future(work)
-        loop = asyncio.get_running_loop()
-        loop.set_exception_handler(logs.LoopFaults())
-        stopped = False
-
-        def stop() -> None:
-            nonlocal stopped
-            stopped = True
-            task.cancel()
-
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, stop)
-        try:
-            await task
-        except asyncio.CancelledError:
-            if not stopped:
-                raise
-
-    try:
-        asyncio.run(supervised())
-    except BaseExceptionGroup as group:
-        raise _first(cast("BaseException", group)) from None
-
-
-def _first(error: BaseException) -> BaseException:
-    """The first error of nested groups: what a user is told."""
-    while isinstance(error, BaseExceptionGroup):
-        error = cast("BaseExceptionGroup[BaseException]", error).exceptions[0]
-    return error

@@ -92,14 +92,16 @@ class MirrorPublisher:
 
     def _publish_delta(self) -> None:
         self._sequence += 1
-        readings = tuple(self._changed(index) for index in self._feed.take(_POINTS_PER_DELTA))
+        at_zero_ns = self._epoch(0.0)
+        readings = tuple(self._changed(index, at_zero_ns) for index in self._feed.take(_POINTS_PER_DELTA))
         # Where a front or the worker cannot follow, a delta is lost; the gap makes the front ask for
         # a new snapshot.
         self._send(protocol.DELTA, Delta(self._instance, self._sequence, readings))
 
-    def _changed(self, index: int) -> Changed:
+    def _changed(self, index: int, at_zero_ns: int) -> Changed:
+        """``at_zero_ns``: the wall clock at monotonic 0, which is read once for many points."""
         reading = self._plant.image[index]
-        return Changed.of(index, reading, self._epoch(reading.time))
+        return Changed.of(index, reading, at_zero_ns + round(reading.time * 1e9))
 
     def _on_event(self, event: Event) -> None:
         self._send(protocol.EVENT, Told.of(event, self._epoch(event.time)))
@@ -122,8 +124,9 @@ class MirrorPublisher:
         sequence = self._sequence
         points = self._plant.image.points
         readings: list[Changed] = []
+        at_zero_ns = self._epoch(0.0)
         for index in range(len(points)):
-            readings.append(self._changed(index))
+            readings.append(self._changed(index, at_zero_ns))
             if index % _POINTS_PER_DELTA == 0:
                 await asyncio.sleep(0)
         snapshot = Snapshot(self._instance, sequence, points, tuple(readings))

@@ -31,6 +31,8 @@ class LoopTimer:
         self._clock = clock
         self._wake = wake
         self._handle: asyncio.TimerHandle | None = None
+        self._armed_ns = 0
+        """What the timerfd is set to, and has not come to yet; 0 where it is not."""
         self._libc = _library_with_timerfd()
         self._fd = -1
         if self._libc:
@@ -48,6 +50,9 @@ class LoopTimer:
             return
         # 0 would disarm the timer; a time in the past expires at once.
         nanoseconds = round(max(at, _FLOOR_S) * 1e9)
+        if nanoseconds == self._armed_ns:
+            return
+        self._armed_ns = nanoseconds
         spec = _ITIMERSPEC.pack(0, 0, nanoseconds // 1_000_000_000, nanoseconds % 1_000_000_000)
         self._libc.timerfd_settime(self._fd, _TFD_TIMER_ABSTIME, spec, None)
 
@@ -56,6 +61,7 @@ class LoopTimer:
             os.read(self._fd, 8)
         except BlockingIOError:
             return  # re-armed between the poll and this call
+        self._armed_ns = 0
         self._wake()
 
     def close(self) -> None:

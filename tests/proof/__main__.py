@@ -94,7 +94,7 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
                 say(f"cycle {done} of {cycles}")
             for _ in range(_MOST_EXTRA_ROUNDS):
                 for fault in (fault for fault in possible if _lacks(samples, fault, rounds[fault.name])):
-                    say(f"{fault.name}: once more, drives stood still before it")
+                    say(f"{fault.name}: once more, measurements of it are missing")
                     samples += _round(rig, fault, errors)
         except (Stuck, AssertionError) as error:
             errors.append(f"the plant is stuck: {error}")
@@ -106,8 +106,12 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
 
 
 def _lacks(samples: list[Sample], fault: Fault, least: int) -> bool:
-    """A slow machine had stopped drives before the fault could, so that samples of it are missing."""
-    counts = Counter((sample.family, sample.protocol) for sample in samples if sample.fault == fault.name)
+    """A slow machine had stopped drives before the fault could, or made a measurement void."""
+    counts = Counter(
+        (sample.family, sample.protocol)
+        for sample in samples
+        if sample.fault == fault.name and sample.verdict != "void"
+    )
     concerned = [drive for drive in DRIVES if drive.protocol in fault.protocols]
     return any(counts[drive.family.name, drive.protocol] < least for drive in concerned)
 

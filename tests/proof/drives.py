@@ -20,14 +20,14 @@ DRIVE_SIDE: Final = "vcan1"
 RPDO_PERIOD_MS: Final = 100
 REACTION_MS: Final = 20
 """How late the bridge may be (docs/explanation/dead-man-chain.md)."""
-FIELDBUS_TIMEOUT_MS: Final = 600
-OWNER_PERIOD_S: Final = 0.25
+FIELDBUS_TIMEOUT_MS: Final = 800
+OWNER_PERIOD_S: Final = 0.35
 DEADMAN_MS: Final = 400
-HEARTBEAT_MS: Final = 400
-GUARD_MS, LIFE_TIME_FACTOR = 150, 3
-TPDO_MS: Final = 200
+HEARTBEAT_MS: Final = 600
+GUARD_MS, LIFE_TIME_FACTOR = 200, 3
+TPDO_MS: Final = 300
 """Event timer of every TPDO: what the drive does is on the bus so soon."""
-INHIBIT_MS: Final = 50
+INHIBIT_MS: Final = 100
 """A ramp would fill the bus otherwise, and a slow machine's time."""
 OWN_TIMEOUT_MS: Final = 500
 """Of each drive's own supervision."""

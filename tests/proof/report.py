@@ -17,12 +17,13 @@ Record = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """All samples of one fault, family and protocol. Times in ms."""
+    """All samples of one fault, family and protocol; void ones apart. Times in ms."""
 
     fault: str
     family: str
     protocol: str
     records: tuple[Record, ...]
+    void: tuple[Record, ...] = ()
 
     def _values(self, key: str) -> list[float]:
         return [float(record[key]) for record in self.records if record.get(key) is not None]
@@ -38,11 +39,11 @@ class Cell:
         return sum(record["verdict"] == verdict for record in self.records)
 
     def row(self) -> list[str]:
-        bad, paused = self.count("failed"), self.count("machine busy")
+        bad = self.count("failed")
         notes = [f"**{bad} failed**"] * bool(bad)
-        if paused:
-            over = max(record["over_ms"] for record in self.records if record["verdict"] == "machine busy")
-            notes.append(f"{paused} over by up to {over:.0f} ms: the machine was busy for that long")
+        if self.void:
+            over = max(record["over_ms"] for record in self.void)
+            notes.append(f"{len(self.void)} void: the machine was busy for the {over:.0f} ms they were late")
         return [
             self.fault,
             self.family,
@@ -60,7 +61,14 @@ def cells(records: Iterable[Record]) -> list[Cell]:
     found: dict[tuple[str, str, str], list[Record]] = {}
     for record in records:
         found.setdefault((record["fault"], record["family"], record["protocol"]), []).append(record)
-    return [Cell(*key, tuple(records)) for key, records in found.items()]
+    return [
+        Cell(
+            *key,
+            tuple(record for record in records if record["verdict"] != "void"),
+            tuple(record for record in records if record["verdict"] == "void"),
+        )
+        for key, records in found.items()
+    ]
 
 
 def merge(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -98,15 +106,16 @@ def markdown(result: dict[str, Any]) -> str:
     """The generated part of docs/explanation/proof.md, markers included."""
     table = [cell.row() for cell in cells(result["samples"])]
     failed = sum(sample["verdict"] == "failed" for sample in result["samples"])
-    paused = sum(sample["verdict"] == "machine busy" for sample in result["samples"])
+    void = sum(sample["verdict"] == "void" for sample in result["samples"])
     lines = [
         BEGIN,
         "",
         f"{result['date']}, {result['machine']}; {result['machines']} at a time, "
         f"{result['cycles']} cycles, {result['seconds'] / 60:.0f} min of them together. Times in ms.",
         "",
-        f"{len(result['samples'])} measurements: {failed} failed, {paused} exceeded a bound by no more than "
-        "the machine stood still, or bridge and drives waited for the CPU that they share here. "
+        f"{len(result['samples']) - void} measurements: {failed} failed. {void} further ones are void and "
+        "were made again: a bound was exceeded by no more than the machine stood still, or bridge and drives "
+        "waited for the CPU that they share here. "
         f"{result['by_themselves']} times a drive was found stopped before a fault, and "
         f"{len(result['stopped_in_vain'])} times one was stopped by a fault that did not concern it: the "
         "machine was too slow for its controllers then.",

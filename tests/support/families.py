@@ -13,7 +13,8 @@ from bridge.command import Action, Identity, Outcome, Request
 from bridge.config import BusTable
 from bridge.drive import DriveState
 from bridge.mapping import Family, load_family
-from bridge.service import Service, load_project
+from bridge.project import load_project
+from bridge.service import Service
 from bridge.sim.catalogue import simulate_node
 from bridge.sim.cia402_drive import Cia402Drive
 from bridge.sim.lenze_motec import LenzeMotec

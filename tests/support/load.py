@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridge.command import Action, Identity, Kind, Request, Source
-from bridge.service import Service, load_project
+from bridge.project import load_project
+from bridge.service import Service
 from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
 from bridge.southbound.bus.frame import Frame

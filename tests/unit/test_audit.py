@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from bridge.cli.app import app
+from bridge.cli.app import make_app
 from tests.support import sites
 from tests.support.process import REPOSITORY
 
@@ -16,7 +16,7 @@ ACCEPTED = 'accepts = { runs_on = "a fan, which may turn" }'
 
 
 def call(*arguments: str):
-    return CliRunner().invoke(app, list(arguments))
+    return CliRunner().invoke(make_app(), list(arguments))
 
 
 def site_of(folder: Path, mapping: str, slot: str = "drive", *, node: str = "", drive: str = "") -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from bridge.lint import lint
-from bridge.service import load_project
+from bridge.project import load_project
 
 ROOT = Path(__file__).parents[2]
 UNIT = ROOT / "systemd" / "drivebridge.service"

@@ -11,7 +11,7 @@ import typer.main
 from asyncua.ua.status_codes import get_name_and_doc
 
 from bridge import __version__
-from bridge.cli.app import app
+from bridge.cli.app import make_app
 from bridge.command import Kind, Plant
 from bridge.command.points import CONTROLLER_STATES, NMT_STATES
 from bridge.command.request import Code
@@ -30,7 +30,7 @@ from bridge.northbound.opcua.events import type_name
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, layout
 from bridge.northbound.opcua.values import OUTCOME_STATUS, QUALITY_STATUS
 from bridge.northbound.zenoh.commands import MALFORMED, METHODS, NODE_METHODS
-from bridge.service import load_project
+from bridge.project import load_project
 from bridge.southbound.boot.status import TEXTS as BOOT_TEXTS
 from tests.support.docs import (
     page,
@@ -237,7 +237,7 @@ def test_every_command_and_option_is_described() -> None:
         for heading in reference.headings
         if heading.startswith("`drivebridge ")
     }
-    expected = dict(leaf_commands(typer.main.get_command(app)))
+    expected = dict(leaf_commands(typer.main.get_command(make_app())))
     assert headings.keys() == expected.keys()
     for name, command in expected.items():
         shown = "\n".join(reference.section(headings[name]))

@@ -78,7 +78,7 @@ def test_an_error_is_shown_escaped_line_by_line(
     def fail() -> None:
         raise OperationFailed(f"first {CLEAR}\nsecond")
 
-    monkeypatch.setattr("bridge.cli.app.app", fail)
+    monkeypatch.setattr("bridge.cli.app.make_app", lambda *words: fail)
     with pytest.raises(SystemExit):
         run_app()
     assert capsys.readouterr().err == "first \\x1b[2J\nsecond\n"
@@ -104,9 +104,9 @@ def test_so_is_the_log(
 
 
 def run(words: list[str]) -> None:
-    from bridge.cli.app import app
+    from bridge.cli.app import make_app
 
-    app(words, standalone_mode=False)
+    make_app(*words[:1])(words, standalone_mode=False)
 
 
 # progress

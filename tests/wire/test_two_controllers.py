@@ -16,7 +16,8 @@ from asyncua import Client, ua
 from pymodbus.client import AsyncModbusTcpClient
 
 from bridge.command import Kind, Source
-from bridge.service import Service, load_project
+from bridge.project import load_project
+from bridge.service import Service
 from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
 from bridge.southbound.bus.frame import Frame

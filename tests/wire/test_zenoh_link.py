@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from bridge.errors import OperationFailed, Unavailable
-from bridge.service import Service, load_project
+from bridge.project import load_project
+from bridge.service import Service
 from bridge.southbound.bus.virtual import VirtualWire
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 from bridge.zenohlink import link as link_module

@@ -89,8 +89,9 @@ class ZenohServer:
 
     def _tick(self) -> None:
         self._tick_timer = asyncio.get_running_loop().call_later(self._settings.period_ms / 1000, self._tick)
+        at_zero_ns = self._epoch(0.0)
         for index in self._feed.take(_POINTS_PER_TICK):
-            self._link.put(self._render(index))
+            self._link.put(self._render(index, at_zero_ns))
         for node in self._plant.nodes.values():
             self._follow_node(node.name, node.drives[0].channel.link.node is NodeState.OPERATIONAL)
 
@@ -103,10 +104,11 @@ class ZenohServer:
             self._present.discard(name)
             self._link.drop_token(self._keys.node_token(name))
 
-    def _render(self, index: int) -> Message:
+    def _render(self, index: int, at_zero_ns: int) -> Message:
+        """``at_zero_ns``: the wall clock at monotonic 0, which is read once for many points."""
         reading = self._plant.image[index]
         key = self._keys.keys[index]
-        epoch_ns = self._epoch(reading.time)
+        epoch_ns = at_zero_ns + round(reading.time * 1e9)
         if self._settings.encoding == "json":
             return Message(key, self._keys.as_json(index, reading, epoch_ns), keys.JSON)
         value, attachment = self._keys.as_bare(index, reading, epoch_ns)
@@ -130,7 +132,7 @@ class ZenohServer:
         elif self._commands.parameter(tail)[1]:
             self._read_parameter(asked, tail)
         elif asked.key in self._keys.index:
-            asked.send([self._render(self._keys.index[asked.key])])
+            asked.send([self._render(self._keys.index[asked.key], self._epoch(0.0))])
             asked.finish()
         elif not is_pattern:
             _refuse(asked, BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}"))
@@ -145,7 +147,8 @@ class ZenohServer:
         """The present values of all points that match, a portion at a time."""
         try:
             for portion in self._matching(zenoh.KeyExpr(asked.key)):
-                asked.send([self._render(index) for index in portion])
+                at_zero_ns = self._epoch(0.0)
+                asked.send([self._render(index, at_zero_ns) for index in portion])
                 await self._link.settle()
         finally:
             asked.finish()
@@ -181,7 +184,7 @@ class ZenohServer:
         drive, name = self._commands.parameter(tail)
         cached = "cached" in re.split("[;&=]", asked.parameters)
         if cached and asked.key in self._keys.index:
-            asked.send([self._render(self._keys.index[asked.key])])
+            asked.send([self._render(self._keys.index[asked.key], self._epoch(0.0))])
             asked.finish()
             return
 

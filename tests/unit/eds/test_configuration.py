@@ -10,7 +10,7 @@ import pytest
 from bridge.config.download import to_concise_dcf
 from bridge.eds import configuration, read_configuration, read_device
 from bridge.errors import FileFaults
-from bridge.service import load_project
+from bridge.project import load_project
 
 DCF = """[DeviceComissioning]
 NodeID=5

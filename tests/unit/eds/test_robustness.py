@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from bridge.cli.app import app
+from bridge.cli.app import make_app
 from bridge.eds import configuration, read_device
 from bridge.eds.pdos import pdos
 from bridge.errors import FileFaults
@@ -66,7 +66,7 @@ def test_the_command_prints_what_it_read(content: bytes) -> None:
     with TemporaryDirectory() as folder:
         file = Path(folder) / "wild.eds"
         file.write_bytes(content)
-        result = CliRunner().invoke(app, ["eds", str(file), "--json"])
+        result = CliRunner().invoke(make_app(), ["eds", str(file), "--json"])
     if result.exit_code == 0:
         assert "findings" in json.loads(result.stdout)
     else:

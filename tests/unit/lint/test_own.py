@@ -8,7 +8,7 @@ import pytest
 
 from bridge.errors import FileFaults
 from bridge.lint import Severity, WorstCase, lint
-from bridge.service import load_project
+from bridge.project import load_project
 from tests.support import sites
 
 SLOTS = {"nord/sk-tu4-cao": "fu1", "stoeber/5000": "axis1"}

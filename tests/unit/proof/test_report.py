@@ -56,6 +56,22 @@ def test_what_failed_is_named_and_fails_the_proof() -> None:
     assert failures(found, 2) == ["owner killed, NORD SK TU4-CAO, modbus: 1 of 2 failed"]
 
 
+def test_what_is_void_is_counted_apart_and_is_none_of_those_that_are_needed() -> None:
+    late = record(bus_ms=580.0, over_ms=10.0, verdict="void")
+    (cell,) = cells([record(), late])
+    assert cell.row()[3] == "1"
+    assert cell.row()[6] == "500"
+    assert cell.row()[-1] == "1 void: the machine was busy for the 10 ms they were late"
+    found = result(record(), late)
+    assert failures(found, 2) == ["owner killed, NORD SK TU4-CAO, modbus: only 1 samples of 2"]
+    assert "1 measurements: 0 failed. 1 further ones are void" in markdown(found)
+
+
+def test_a_cell_with_nothing_but_void_samples_fails_the_proof() -> None:
+    found = failures(result(record(over_ms=10.0, verdict="void")), 1)
+    assert found == ["owner killed, NORD SK TU4-CAO, modbus: only 0 samples of 1"]
+
+
 def test_too_few_samples_fail_the_proof() -> None:
     assert failures(result(record()), 2) == ["owner killed, NORD SK TU4-CAO, modbus: only 1 samples of 2"]
     assert failures(result(record(), record()), 2) == []

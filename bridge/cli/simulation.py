@@ -1,0 +1,26 @@
+"""The nodes of a site file's bus, simulated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bridge.config import BusTable
+from bridge.mapping.loader import lineage, mapping_folders
+from bridge.sim.catalogue import SIMULATED, simulate_node
+from bridge.sim.node import SimulatedNode
+from bridge.sim.shell import Simulation
+from bridge.southbound.bus import Bus
+
+
+def simulation(bus: Bus, table: BusTable, site: Path) -> Simulation:
+    """All nodes of one bus, with the parameters that the site file gives their drives. A mapping that has
+    no simulation of its own is played by the nearest that it extends."""
+    nodes: list[SimulatedNode] = []
+    folders = mapping_folders(site)
+    for node in table.node:
+        parameters: dict[str, float] = {}
+        for drive in node.drive:
+            parameters |= {f"{drive.slot}/{name}": value for name, value in drive.parameters.items()}
+        known = [name for name in lineage(node.mapping, folders) if name in SIMULATED]
+        nodes.append(simulate_node(known[0] if known else node.mapping, node.id, parameters))
+    return Simulation(bus, nodes)

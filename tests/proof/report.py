@@ -43,7 +43,9 @@ class Cell:
         notes = [f"**{bad} failed**"] * bool(bad)
         if self.void:
             over = max(record["over_ms"] for record in self.void)
-            notes.append(f"{len(self.void)} void: the machine was busy for the {over:.0f} ms they were late")
+            notes.append(
+                f"{len(self.void)} void: late by up to {over:.1f} ms, and the machine was busy for longer"
+            )
         return [
             self.fault,
             self.family,
@@ -113,9 +115,9 @@ def markdown(result: dict[str, Any]) -> str:
         f"{result['date']}, {result['machine']}; {result['machines']} at a time, "
         f"{result['cycles']} cycles, {result['seconds'] / 60:.0f} min of them together. Times in ms.",
         "",
-        f"{len(result['samples']) - void} measurements: {failed} failed. {void} further ones are void and "
-        "were made again: a bound was exceeded by no more than the machine stood still, or bridge and drives "
-        "waited for the CPU that they share here. "
+        f"{len(result['samples']) - void} measurements: {failed} failed. Void, and made again: {void}, in "
+        "which a bound was exceeded by no more than the machine stood still, or bridge and drives waited for "
+        "the CPU that they share here. "
         f"{result['by_themselves']} times a drive was found stopped before a fault, and "
         f"{len(result['stopped_in_vain'])} times one was stopped by a fault that did not concern it: the "
         "machine was too slow for its controllers then.",

@@ -1,0 +1,29 @@
+"""A command imports what it needs: where the OPC UA front has ended, its clients wait for the next one."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+import typer.main
+
+from bridge.cli.app import make_app
+
+_OTHERS = ("bridge.service", "bridge.sim", "bridge.southbound", "bridge.lint", "bridge.eds", "bridge.dbc")
+
+
+@pytest.mark.parametrize(("word", "imported"), [("version", ""), ("run", "import bridge.front; ")])
+def test_a_command_does_not_import_the_others(word: str, imported: str) -> None:
+    script = (
+        f"import sys; from bridge.cli.app import make_app; make_app({word!r}); {imported}print(*sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert [name for name in done.stdout.split() if name.startswith(_OTHERS)] == []
+
+
+def test_where_no_command_is_named_there_are_all() -> None:
+    names = set(typer.main.get_command(make_app()).commands)  # type: ignore[attr-defined]
+    assert {"demo", "run", "version", "sdo", "parameters"} <= names
+    assert set(typer.main.get_command(make_app("chekc")).commands) == names  # type: ignore[attr-defined]
+    assert set(typer.main.get_command(make_app("sdo")).commands) == {"sdo"}  # type: ignore[attr-defined]

@@ -17,7 +17,7 @@ from bridge.config import BusTable, ZenohTable, load_site
 from bridge.errors import OperationFailed
 from bridge.fronts import Front, become_front
 
-# Nothing else is imported before it is needed: where a front has ended, its clients wait for the next one.
+# The service is not imported for a front: where one has ended, its clients wait for the next.
 if TYPE_CHECKING:
     from bridge.project import Project
     from bridge.sim.shell import Simulation

@@ -28,8 +28,6 @@ Reference = Literal["telegram", "moment", "sign of life", "boot-up"]
 
 _BLOCKED_S: Final = 1.0
 _HOUR_S: Final = 3600.0
-_QUIET_S: Final = 0.4
-"""How long is waited that something does *not* stop the drives."""
 _FRONT_S: Final = 90.0
 
 
@@ -200,7 +198,6 @@ def _nothing(rig: Rig) -> None:
 
 def _full(rig: Rig) -> None:
     rig.disk.fill()
-    time.sleep(_QUIET_S)
 
 
 def _empty(rig: Rig) -> None:
@@ -213,7 +210,6 @@ def _step_clock(rig: Rig) -> None:
     rig.hours = -rig.hours
     machine.step_clock(rig.hours * _HOUR_S)
     rig.clock.stepped()
-    time.sleep(_QUIET_S)
 
 
 def _link_down(rig: Rig) -> float:

@@ -113,7 +113,12 @@ def was_moving(rig: Rig, drive: Drive, at: float) -> bool:
 def way(rig: Rig, drive: Drive, run: Run) -> float:
     """How long the telegram was on its way whose words these are, in seconds: from its client's sending it
     until the bridge sent them (a change goes out at once)."""
-    return run.first - rig.board.sent_at(drive.place, drive.telegram(run.data) % NUMBERS)
+    return run.first - sent_at(rig, drive, run)
+
+
+def sent_at(rig: Rig, drive: Drive, run: Run) -> float:
+    """When its client sent the telegram whose words these are."""
+    return rig.board.sent_at(drive.place, drive.telegram(run.data) % NUMBERS)
 
 
 def last_sign(rig: Rig, drive: Drive, until: float) -> float:

@@ -44,7 +44,7 @@ class Cell:
         if self.void:
             over = max(record["over_ms"] for record in self.void)
             notes.append(
-                f"{len(self.void)} void: late by up to {over:.1f} ms, and the machine was busy for longer"
+                f"{len(self.void)} void: late by up to {over:.1f} ms, and the machine was in the way for that"
             )
         return [
             self.fault,

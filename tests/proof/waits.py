@@ -4,9 +4,9 @@ machine itself stood still.
 ``python -m tests.proof.waits FOLDER NAME ...`` is a process that only sleeps 10 ms at a time, ahead of all
 others. To ``FOLDER/pauses`` it appends ``begin end`` for each sleep that took over ``FROM_S`` too long: from
 when it was due until it ended. ``FOLDER/NAME.pid`` is a link to the folder of a process in /proc; to
-``FOLDER/NAME.waits`` it appends ``now waited`` where the kernel's account of its main thread's waiting
-(``schedstat``: ready while another ran) has grown in ``LOOK_S``. All in seconds of the monotonic clock; the
-account of a user-mode kernel goes by ticks of 10 ms.
+``FOLDER/NAME.waits`` it appends ``begin end waited`` where from one look to the next, ``LOOK_S`` later, the
+kernel's account of its main thread's waiting (``schedstat``: ready while another ran) has grown. All in
+seconds of the monotonic clock; the account of a user-mode kernel goes by ticks of 10 ms.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import Final
 FROM_S: Final = 0.002
 SLEEP_S: Final = 0.01
 LOOK_S: Final = 0.05
-"""A look at the accounts takes a millisecond from everybody else."""
+"""A look at the accounts takes a millisecond from everybody else, and is no pause of the machine."""
 _PRIORITY: Final = 90
 
 
@@ -38,11 +38,11 @@ def watch(folder: Path, names: list[str]) -> None:
             due = before + SLEEP_S
             if now - due > FROM_S:
                 pauses.write(f"{due:.6f} {now:.6f}\n")
-            before = now
             if now >= look_at:
                 look_at = now + LOOK_S
                 for account in accounts:
                     account.look(now)
+            before = time.monotonic()
 
 
 class Account:
@@ -53,18 +53,20 @@ class Account:
         self._path = folder / f"{name}.waits"
         self._path.touch()
         self._before = 0.0
+        self._looked = float("-inf")
 
     def look(self, now: float) -> None:
         try:
             words = self._source.read_text(encoding="ascii").split()
         except OSError:
             return
+        begin, self._looked = self._looked, now
         waited = int(words[1]) / 1e9 if len(words) > 1 else 0.0
         if waited != self._before:
-            # A new process begins its account at nothing.
+            # A new process begins its account at nothing; a wait is added when it is over.
             grown, self._before = max(0.0, waited - self._before), waited
             with self._path.open("a", encoding="ascii") as log:
-                log.write(f"{now:.6f} {grown:.6f}\n")
+                log.write(f"{min(begin, now - grown):.6f} {now:.6f} {grown:.6f}\n")
 
 
 def follow(folder: Path, name: str, pid: int) -> None:
@@ -75,12 +77,11 @@ def follow(folder: Path, name: str, pid: int) -> None:
 
 
 def waited_ms(folder: Path, name: str, begin: float, end: float) -> float:
-    """What this process waited from ``begin`` to ``end``, in ms.
-
-    The kernel adds a wait to its account when it is over, and it is seen there at the next look.
-    """
-    found = sum(grown for at, grown in _lines(folder / f"{name}.waits", begin) if begin < at <= end + LOOK_S)
-    return min(found, max(0.0, end - begin)) * 1000
+    """What this process can have waited from ``begin`` to ``end``, in ms."""
+    found = 0.0
+    for first, last, waited in _lines(folder / f"{name}.waits", begin):
+        found += min(waited, max(0.0, min(last, end) - max(first, begin)))
+    return found * 1000
 
 
 def paused_ms(folder: Path, begin: float, end: float) -> float:
@@ -89,14 +90,14 @@ def paused_ms(folder: Path, begin: float, end: float) -> float:
     return sum(max(0.0, min(last, end) - max(first, begin)) for first, last in pauses) * 1000
 
 
-def _lines(path: Path, since: float) -> Iterator[tuple[float, float]]:
-    """The two numbers of each line, the youngest first, back to one that begins before ``since``."""
+def _lines(path: Path, since: float) -> Iterator[list[float]]:
+    """The numbers of each line, the youngest first, back to one that begins before ``since``."""
     for line in reversed(path.read_text(encoding="ascii").splitlines(keepends=True)):
         if not line.endswith("\n"):  # it is being written
             continue
-        first, second = (float(word) for word in line.split())
-        yield first, second
-        if first < since:
+        numbers = [float(word) for word in line.split()]
+        yield numbers
+        if numbers[0] < since:
             return
 
 

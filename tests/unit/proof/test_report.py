@@ -61,7 +61,7 @@ def test_what_is_void_is_counted_apart_and_is_none_of_those_that_are_needed() ->
     (cell,) = cells([record(), late])
     assert cell.row()[3] == "1"
     assert cell.row()[6] == "500"
-    assert cell.row()[-1] == "1 void: late by up to 10.0 ms, and the machine was busy for longer"
+    assert cell.row()[-1] == "1 void: late by up to 10.0 ms, and the machine was in the way for that"
     found = result(record(), late)
     assert failures(found, 2) == ["owner killed, NORD SK TU4-CAO, modbus: only 1 samples of 2"]
     assert "1 measurements: 0 failed. Void, and made again: 1," in markdown(found)

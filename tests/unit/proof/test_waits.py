@@ -19,11 +19,12 @@ def put(path: Path, *lines: str) -> None:
 
 
 def test_what_was_waited_between_two_moments(tmp_path: Path) -> None:
-    put(tmp_path / "bridge.waits", "1.010 0.02", "1.030 0.01", "1.050 0.03", "1.070 0.01")
-    assert waited_ms(tmp_path, "bridge", 1.01, 1.05) == pytest.approx(40)
-    assert waited_ms(tmp_path, "bridge", 1.08, 2.0) == 0.0
-    # Seen a look later; but nobody waits longer than there was time.
-    assert waited_ms(tmp_path, "bridge", 1.031, 1.041) == pytest.approx(10)
+    put(tmp_path / "bridge.waits", "1.00 1.05 0.02", "1.05 1.10 0.01", "1.10 1.15 0.03", "1.15 1.20 0.01")
+    assert waited_ms(tmp_path, "bridge", 1.05, 1.15) == pytest.approx(40)
+    assert waited_ms(tmp_path, "bridge", 1.21, 2.0) == 0.0
+    # Of a look that lies outside in part, no more than can have been inside.
+    assert waited_ms(tmp_path, "bridge", 1.05, 1.11) == pytest.approx(20)
+    assert waited_ms(tmp_path, "bridge", 1.145, 1.149) == pytest.approx(4)
 
 
 def test_pauses_count_where_they_lie_between_two_moments(tmp_path: Path) -> None:
@@ -46,8 +47,10 @@ def test_the_account_of_one_process_after_the_other(tmp_path: Path) -> None:
         (tmp_path / "bridge.pid").unlink(missing_ok=True)
         (tmp_path / "bridge.pid").symlink_to(process)
         account.look(now)
-    grown = [line.split()[1] for line in (tmp_path / "bridge.waits").read_text().splitlines()]
-    assert [float(text) for text in grown] == [5, 0, 2]
+    lines = [line.split() for line in (tmp_path / "bridge.waits").read_text().splitlines()]
+    assert [float(grown) for _, _, grown in lines] == [5, 0, 2]
+    # One that ended between two looks may have begun before them.
+    assert [float(begin) for begin, _, _ in lines[1:]] == pytest.approx([1.1, -0.7])
 
 
 def test_the_kernel_tells_it_of_a_process(tmp_path: Path) -> None:

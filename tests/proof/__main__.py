@@ -5,8 +5,8 @@
 
 ``run`` is for a machine with vcan0, vcan1 and a mount namespace of its own
 (``tests/lab/vcan-run -n 2 -- unshare --mount ...``); the lab has a short one (``tests/lab/test_proof.py``).
-Both end with 1 where a bound is exceeded, but for measurements that are void: the machine itself was in the
-way. Their faults are injected once more.
+Both end with 1 where a bound is exceeded by more than the machine was in the way. Where it is not more, the
+measurement is void: it is shown, and its fault is injected once more.
 """
 
 from __future__ import annotations

@@ -53,8 +53,8 @@ class Sample:
 
     @property
     def verdict(self) -> str:
-        """``void``: the machine itself was in the way for as long as the bound was exceeded. Such a
-        measurement says nothing of the bridge, and is made again."""
+        """``void``: the machine stood still, or bridge and drives waited for its CPU, for as long as the
+        bound was exceeded. It is shown, and made again."""
         excused_ms = max(self.paused_ms, self.waited_ms) + self.noise_ms
         if self.restarted or not self.recovered or self.over_ms > excused_ms:
             return "failed"

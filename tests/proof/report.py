@@ -17,7 +17,8 @@ Record = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """All samples of one fault, family and protocol; void ones apart. Times in ms."""
+    """All samples of one fault, family and protocol. Times in ms. Void ones are none of those that are
+    needed, but the medians and the worst are of all: nothing that was late is hidden."""
 
     fault: str
     family: str
@@ -26,7 +27,8 @@ class Cell:
     void: tuple[Record, ...] = ()
 
     def _values(self, key: str) -> list[float]:
-        return [float(record[key]) for record in self.records if record.get(key) is not None]
+        measured = (*self.records, *self.void)
+        return [float(record[key]) for record in measured if record.get(key) is not None]
 
     def _triple(self, what: str) -> list[str]:
         values, bounds = self._values(f"{what}_ms"), self._values(f"{what}_bound_ms")

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 import typer.main
+from typer.core import TyperGroup
 
 from bridge.cli.app import make_app
 
@@ -22,8 +23,13 @@ def test_a_command_does_not_import_the_others(word: str, imported: str) -> None:
     assert [name for name in done.stdout.split() if name.startswith(_OTHERS)] == []
 
 
+def commands(word: str = "") -> set[str]:
+    group = typer.main.get_command(make_app(word))
+    assert isinstance(group, TyperGroup)
+    return set(group.commands)
+
+
 def test_where_no_command_is_named_there_are_all() -> None:
-    names = set(typer.main.get_command(make_app()).commands)  # type: ignore[attr-defined]
-    assert {"demo", "run", "version", "sdo", "parameters"} <= names
-    assert set(typer.main.get_command(make_app("chekc")).commands) == names  # type: ignore[attr-defined]
-    assert set(typer.main.get_command(make_app("sdo")).commands) == {"sdo"}  # type: ignore[attr-defined]
+    assert {"demo", "run", "version", "sdo", "parameters"} <= commands()
+    assert commands("chekc") == commands()
+    assert commands("sdo") == {"sdo"}

@@ -26,10 +26,12 @@ _LIMIT_S: Final = 120.0
 _HOUR_S: Final = 3600.0
 BRIDGE: Final = "bridge"
 SIMULATION: Final = "drives"
-_BRIDGE_AHEAD: Final = ("nice", "-n", "-5")
-"""As in systemd/drivebridge.service it goes first; without the right to do so ``nice`` only says so. All
-shares one CPU here, where the service's real-time class would starve its clients."""
-_DRIVES_AHEAD: Final = ("nice", "-n", "-2")
+_MAIN_THREAD: Final = ("chrt", "--reset-on-fork", "--other", "0")
+_BRIDGE_AHEAD: Final = (*_MAIN_THREAD, "nice", "-n", "-20")
+"""Its main thread goes first, its front and zenoh's threads do not, as in systemd/drivebridge.service; but
+not in the real-time class, which on one CPU would starve its clients. Without the right to do so ``nice`` only
+says so."""
+_DRIVES_AHEAD: Final = (*_MAIN_THREAD, "nice", "-n", "-5")
 """They react late where the machine is busy with other things; elsewhere they have a CPU of their own."""
 
 

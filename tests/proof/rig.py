@@ -29,8 +29,8 @@ SIMULATION: Final = "drives"
 _MAIN_THREAD: Final = ("chrt", "--reset-on-fork", "--other", "0")
 _BRIDGE_AHEAD: Final = (*_MAIN_THREAD, "nice", "-n", "-20")
 """Its main thread goes first, its front and zenoh's threads do not, as in systemd/drivebridge.service; but
-not in the real-time class, which on one CPU would starve its clients. Without the right to do so ``nice`` only
-says so."""
+not in the real-time class, which on one CPU would starve its clients. Without the right ``nice`` only says
+that it has none."""
 _DRIVES_AHEAD: Final = (*_MAIN_THREAD, "nice", "-n", "-5")
 """They react late where the machine is busy with other things; elsewhere they have a CPU of their own."""
 

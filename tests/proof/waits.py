@@ -1,7 +1,7 @@
 """How long bridge and drives waited for the CPU, which they share here with their owners; and how long the
 machine itself stood still.
 
-``python -m tests.proof.waits FOLDER NAME ...`` is a process that only sleeps 10 ms at a time, ahead of all
+``python -m tests.proof.waits FOLDER NAME ...`` is a process that only sleeps 20 ms at a time, ahead of all
 others. To ``FOLDER/pauses`` it appends ``begin end`` for each sleep that took over ``FROM_S`` too long: from
 when it was due until it ended. ``FOLDER/NAME.pid`` is a link to the folder of a process in /proc; to
 ``FOLDER/NAME.waits`` it appends ``begin end waited`` where from one look to the next, ``LOOK_S`` later, the
@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Final
 
 FROM_S: Final = 0.002
-SLEEP_S: Final = 0.01
+SLEEP_S: Final = 0.02
 LOOK_S: Final = 0.05
 """A look at the accounts takes a millisecond from everybody else, and is no pause of the machine."""
 _PRIORITY: Final = 90

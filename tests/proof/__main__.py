@@ -91,7 +91,6 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
                     samples += _round(rig, fault, errors)
                     rounds[fault.name] += 1
                 done += 1
-                out.write_text(json.dumps(collect(), indent=1), encoding="utf-8")
                 say(f"cycle {done} of {cycles}")
             for _ in range(_MOST_EXTRA_ROUNDS):
                 for fault in (fault for fault in possible if _lacks(samples, fault, rounds[fault.name])):
@@ -100,9 +99,10 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
         except (Stuck, AssertionError) as error:
             errors.append(f"the plant is stuck: {error}")
         finally:
+            # Not after each cycle: it would take a second from the owners.
+            result = collect()
+            out.write_text(json.dumps(result, indent=1), encoding="utf-8")
             _keep_logs(folder, out.parent / f"{out.stem}-logs")
-    result = collect()
-    out.write_text(json.dumps(result, indent=1), encoding="utf-8")
     return _verdict(result, min(done, cycles))
 
 

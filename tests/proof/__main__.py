@@ -96,13 +96,15 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
                 for fault in (fault for fault in possible if _lacks(samples, fault, rounds[fault.name])):
                     say(f"{fault.name}: once more, measurements of it are missing")
                     samples += _round(rig, fault, errors)
+            if rig.frames_lost:
+                errors.append(f"the witnesses have lost {rig.frames_lost} frames, and prove nothing")
         except (Stuck, AssertionError) as error:
             errors.append(f"the plant is stuck: {error}")
         finally:
-            # Not after each cycle: it would take a second from the owners.
+            _keep_logs(folder, out.parent / f"{out.stem}-logs")
+            # At the end: it takes a second of the CPU, in which no owner gets it.
             result = collect()
             out.write_text(json.dumps(result, indent=1), encoding="utf-8")
-            _keep_logs(folder, out.parent / f"{out.stem}-logs")
     return _verdict(result, min(done, cycles))
 
 

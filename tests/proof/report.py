@@ -35,7 +35,7 @@ class Cell:
         if not values:
             return ["–", "–", "–"]
         bound = f"{max(bounds):.0f}" if bounds else "–"
-        return [f"{statistics.median(values):.0f}", f"{max(values):.0f}", bound]
+        return [str(round(statistics.median(values))), str(round(max(values))), bound]
 
     def count(self, verdict: str) -> int:
         return sum(record["verdict"] == verdict for record in self.records)
@@ -95,7 +95,7 @@ _HEAD: Final = (
     "family",
     "protocol",
     "n",
-    "way",
+    "way: worst",
     "bus: median",
     "worst",
     "bound",
@@ -121,8 +121,8 @@ def markdown(result: dict[str, Any]) -> str:
         "which a bound was exceeded by no more than the machine stood still, or bridge and drives waited for "
         "the CPU that they share here. "
         f"{result['by_themselves']} times a drive was found stopped before a fault, and "
-        f"{len(result['stopped_in_vain'])} times one was stopped by a fault that did not concern it: the "
-        "machine was too slow for its controllers then.",
+        f"{len(result['stopped_in_vain'])} times beside one that did not concern it (some of them are both): "
+        "the machine was too slow for its controllers then.",
         "",
         *(
             [f"Not possible on this machine: {', '.join(result['faults_missing'])}.", ""]

@@ -210,6 +210,10 @@ class Rig:
         for owner in self.owners.values():
             owner.start()
 
+    @property
+    def frames_lost(self) -> int:
+        return sum(witness.lost for witness in (self.told, self.heard, self.said))
+
     # what the drives do
 
     def moves(self, drive: Drive) -> bool:

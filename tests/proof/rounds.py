@@ -34,8 +34,7 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
         fault.steady(rig)
         since = time.monotonic()
         time.sleep(_QUIET_S)
-        _all_go_on(rig, DRIVES, fault, "whose owners were there")
-        _wait_handed_on(rig, since, say)
+        _wait_handed_on(rig, fault, since, say)
     concerned = [drive for drive in DRIVES if drive.protocol in fault.protocols]
     others = [drive for drive in DRIVES if drive.protocol not in fault.protocols]
     began = time.monotonic()
@@ -84,10 +83,11 @@ def _all_go_on(rig: Rig, drives: list[Drive] | tuple[Drive, ...], fault: Fault, 
     ]
 
 
-def _wait_handed_on(rig: Rig, since: float, say: Callable[[str], None]) -> None:
-    """Every drive has a telegram that its owner sent after ``since``. One that a slow machine stops meanwhile
-    gets none: it is brought back."""
+def _wait_handed_on(rig: Rig, fault: Fault, since: float, say: Callable[[str], None]) -> None:
+    """Every drive moves by a telegram that its owner sent after ``since``. One that is stopped meanwhile,
+    be it by a slow machine, gets none: that is told, and it is brought back."""
     for _ in range(_LOOKS):
+        _all_go_on(rig, DRIVES, fault, "whose owners were there")
         _all_move(rig, say)
         with suppress(Stuck):
             rig.wait(lambda: all(_was_handed_on(rig, drive, since) for drive in DRIVES), _LOOK_S, "telegrams")
@@ -96,9 +96,9 @@ def _wait_handed_on(rig: Rig, since: float, say: Callable[[str], None]) -> None:
 
 
 def _was_handed_on(rig: Rig, drive: Drive, since: float) -> bool:
-    """The drive has a telegram that its owner sent after ``since``."""
+    """The drive is enabled by a telegram that its owner sent after ``since``."""
     told = rig.told.last(drive.rpdo)
-    return told is not None and measure.sent_at(rig, drive, told) > since
+    return told is not None and drive.enabling(told.data) and measure.sent_at(rig, drive, told) > since
 
 
 def _let_pass(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> None:

@@ -4,9 +4,9 @@ machine itself stood still.
 ``python -m tests.proof.waits FOLDER NAME ...`` is a process that only sleeps 20 ms at a time, ahead of all
 others. To ``FOLDER/pauses`` it appends ``begin end`` for each sleep that took over ``FROM_S`` too long: from
 when it was due until it ended. ``FOLDER/NAME.pid`` is a link to the folder of a process in /proc; to
-``FOLDER/NAME.waits`` it appends ``begin end waited`` where from one look to the next, ``LOOK_S`` later, the
-kernel's account of its main thread's waiting (``schedstat``: ready while another ran) has grown. All in
-seconds of the monotonic clock; the account of a user-mode kernel goes by ticks of 10 ms.
+``FOLDER/NAME.waits`` it appends ``begin end waited`` where from one look to the next, ``LOOK_S`` later or
+more, the kernel's account of its main thread's waiting (``schedstat``: ready while another ran) has grown.
+All in seconds of the monotonic clock; the account of a user-mode kernel goes by ticks of 10 ms.
 """
 
 from __future__ import annotations

@@ -91,7 +91,7 @@ class Witness:
 
     @property
     def lost(self) -> int:
-        """Frames that the kernel could not keep: a witness that has lost some proves nothing."""
+        """Frames that the kernel could not keep."""
         return self._receiver.drops
 
     def _note(self, can_id: int, data: bytes, at: float) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from bridge.command import Event, Kind
 from bridge.command.event import EventGate
 
@@ -24,6 +26,19 @@ def test_who_floods_hides_nobody_else():
     assert gate.admits(event(Kind.EMERGENCY, 5.0))
 
 
-def test_a_trip_is_always_told():
+REPEATING = (Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION)
+"""What somebody on the network or on the bus can bring about at will."""
+
+
+@pytest.mark.parametrize("kind", REPEATING)
+def test_what_anybody_can_repeat_is_told_ten_times_a_second(kind: Kind):
     gate = EventGate()
-    assert all(gate.admits(event(Kind.WATCHDOG, 5.0)) for _ in range(100))
+    assert [gate.admits(event(kind, 5.0)) for _ in range(11)] == [True] * 10 + [False]
+    assert not gate.admits(event(kind, 5.99))
+    assert gate.admits(event(kind, 6.0)), "another second"
+
+
+@pytest.mark.parametrize("kind", [kind for kind in Kind if kind not in REPEATING])
+def test_what_happens_to_a_drive_is_always_told(kind: Kind):
+    gate = EventGate()
+    assert all(gate.admits(event(kind, 5.0)) for _ in range(100))

@@ -258,6 +258,10 @@ class TestTrip:
         assert running.plant.image.read(last).value == 0.0
         running.at(100.21)
         running.now = 100.22
+        running.pdo(READY, 0)
+        running.pdo(ENABLED, 0x1000)
+        assert running.plant.image.read("conveyor/node/current_fault").value == 102.0
+        assert running.plant.image.read(last).value == 0.0, "a present fault is not the last one"
         running.write(control_word=SHUT_DOWN)
         assert running.plant.image.read("conveyor/node/current_fault").value == 0.0
         assert running.plant.image.read(last).value == 102.0

@@ -5,14 +5,18 @@ from __future__ import annotations
 import struct
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from bridge.command import Code, Identification
 from bridge.command.link import NodeState
 from bridge.config import WordOrder
 from bridge.drive import OwnJudgement
 from bridge.northbound.modbus.dispatch import EXCEPTIONS
-from bridge.northbound.modbus.pdu import Identify, identification_answer
+from bridge.northbound.modbus.pdu import PDU_MOST, Identify, identification_answer
 from bridge.northbound.modbus.registers import DriveMap, Table, Words32, bridge_rows, drive_maps
+from bridge.northbound.modbus.unit import BridgeUnit
+from tests.support import sites
 from tests.support.modbus_site import (
     ENABLED,
     OTHER_PLC,
@@ -257,6 +261,25 @@ def test_module_state_of_nodes_and_watchdogs():
     assert rig.read(4, 0, 1, unit=255) == [0x0C]
 
 
+def test_a_node_that_is_out_of_service_says_nothing_of_the_module():
+    plant = sites.plant_of(
+        sites.site(
+            sites.bus(
+                sites.node(sites.drive("fu1", "modbus", 200, ""), name="conveyor"),
+                sites.node(
+                    sites.drive("fu1", "modbus", 200, ""), name="spare", node_id=6, more="enabled = false"
+                ),
+            ),
+            sites.modbus(0),
+        )
+    )
+    plant.set("bus/can0/state", 0, 100.0)
+    plant.on_node(plant.nodes["conveyor"], NodeState.OPERATIONAL, 100.0)
+    plant.on_node(plant.nodes["spare"], NodeState.DISABLED, 100.0)
+    (state,) = BridgeUnit(plant).read_words(Table.INPUT_REGISTER, 0, 1, PLC, 100.0)
+    assert state == 0x02, "operational, and nothing else"
+
+
 # exceptions
 
 
@@ -349,6 +372,46 @@ def test_identification_object_by_object():
     assert rig.ask("2B 0E 04 03") == b"\xab\x02"
     assert rig.ask("2B 0E 04 FF") == b"\xab\x02"
     assert objects_of(rig.ask("2B 0E 01 00", unit=255)) == {0: b"drivebridge", 1: b"drivebridge", 2: b"1.2.3"}
+
+
+@given(st.dictionaries(st.integers(0, 255), st.binary(max_size=240), min_size=1))
+@example({0: bytes(122), 1: bytes(120)})  # together 253 bytes
+@example({0: bytes(122), 1: bytes(121)})
+def test_identification_of_any_length_comes_whole_in_answers_that_fit(objects: dict[int, bytes]):
+    """§6.21: asked again where an answer says that more follows, a client gets every object once."""
+    wanted = dict(sorted(objects.items()))
+    found: dict[int, bytes] = {}
+    at = 0
+    for _ in wanted:
+        answer = identification_answer(Identify(3, at), wanted)
+        assert len(answer) <= PDU_MOST
+        came = objects_of(answer)
+        assert came and not came.keys() & found.keys()
+        found |= came
+        more, at = answer[4], answer[5]
+        rest = [number for number in wanted if number not in found]
+        assert (more, at) == ((0xFF, rest[0]) if rest else (0, 0))
+        if rest:
+            # No answer is cut sooner than it has to be.
+            assert len(answer) + 2 + len(wanted[rest[0]]) > PDU_MOST
+        else:
+            break
+    assert found == wanted
+
+
+def test_a_name_of_any_length_fits_into_an_answer():
+    rig = Rig()
+    rig.fu1.on_identification(Identification(1, 2, 3, 4, "drive " * 100), rig.now)
+    rig.runs(ENABLED)
+    for number in range(256):
+        assert len(rig.ask(struct.pack(">BBBB", 0x2B, 0x0E, 4, number))) <= PDU_MOST
+    answer = rig.ask("2B 0E 03 00")
+    for _ in range(20):
+        assert objects_of(answer), "a stream comes to its end"
+        if not answer[4]:
+            break
+        answer = rig.ask(struct.pack(">BBBB", 0x2B, 0x0E, 3, answer[5]))
+    assert not answer[4]
 
 
 def test_long_identification_goes_on_where_it_says():

@@ -5,6 +5,8 @@ from __future__ import annotations
 import struct
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bridge.command import Code, Event, Kind, Outcome, Plant, Reply, Request
 from tests.support.modbus_site import (
@@ -203,11 +205,30 @@ def test_mask_write(rig: Rig):
     request = bytes.fromhex("16 0000 FFFE 0001")
     assert rig.ask(request) == request
     assert rig.fu1.channel.control_word == 0x047F
-    rig.ask("16 0001 00F2 0025")  # §6.16's example: 12h becomes 17h, here with 34h: 30h | 05h
-    assert rig.fu1.channel.setpoints[0] == 0x1234 & 0x00F2 | 0x0025 & 0xFF0D
+    rig.write(1, 0x0012)
+    rig.ask("16 0001 00F2 0025")  # §6.16's example
+    assert rig.fu1.channel.setpoints[0] == 0x0017
     assert rig.ask("16 0009 0000 0000") == b"\x96\x02"
     assert rig.ask("16 000A 0000 0001") == b"\x96\x02"
     assert rig.ask("16 0005 FFFF 0000") == b"\x96\x02", "a setpoint the drive does not have"
+
+
+WORD = st.integers(0, 0xFFFF)
+
+
+@given(WORD, WORD, WORD)
+def test_a_mask_write_keeps_the_bits_of_one_mask_and_takes_the_others_of_the_other(
+    held: int, and_mask: int, or_mask: int
+):
+    """Bit by bit, as §6.16 says: kept where the AND mask has a 1, else the bit of the OR mask."""
+    rig = Rig()
+    rig.runs(SWITCH_ON_INHIBITED)
+    rig.write(1, held)
+    rig.ask(struct.pack(">BHHH", 22, 1, and_mask, or_mask))
+    (word,) = rig.read(3, 1, 1)
+    for bit in range(16):
+        source = held if and_mask >> bit & 1 else or_mask
+        assert word >> bit & 1 == source >> bit & 1, f"bit {bit}"
 
 
 def test_a_word_that_another_drive_of_the_family_has_is_no_address(rig: Rig):

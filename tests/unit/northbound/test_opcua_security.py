@@ -104,6 +104,12 @@ class TestReadPassword:
         with pytest.raises(ServiceError):
             read_password(token, self.NONCE, own.private_key, encrypted=False)
 
+    @pytest.mark.parametrize("sent", [b"", NONCE])
+    def test_nothing_is_read_for_a_session_without_a_nonce(self, own: OwnCertificate, sent: bytes) -> None:
+        """What ends with nothing would fit any message that was ever heard."""
+        with pytest.raises(ServiceError):
+            read_password(self.encrypted(own, sent), b"", own.private_key, encrypted=False)
+
     def test_clear_text_is_read_on_an_encrypted_channel_only(self, own: OwnCertificate) -> None:
         token = self.token(b"swordfish")
         assert read_password(token, self.NONCE, own.private_key, encrypted=True) == "swordfish"

@@ -285,6 +285,28 @@ class TestFreshness:
         assert bench.plant.drives[DRIVE].quality is Quality.LOST
         assert quality(bench, "actual/position") is Quality.LOST
 
+    def test_the_worse_of_the_node_and_the_further_tpdo_is_told(self, tmp_path: Path) -> None:
+        """What never came still waits when the node is lost; what was late before is lost with it."""
+        bench = spin_bench(tmp_path, spindle())
+        bench.deaf_to = frozenset((0x289,))
+        bench.run(1.0)
+        bench.deaf_to = frozenset((0x189, 0x289))
+        bench.run(1.5)
+        assert quality(bench, "actual/speed") is Quality.LOST
+        assert quality(bench, "actual/position") is Quality.WAITING
+
+    def test_what_was_late_is_lost_with_its_node(self, tmp_path: Path) -> None:
+        node = spindle()
+        bench = running(tmp_path, node)
+        node.put("1801:05", 2, 0)
+        bench.run(0.5)
+        assert quality(bench, "actual/position") is Quality.STALE
+        bench.deaf_to = frozenset((0x189,))
+        bench.run(1.5)
+        assert quality(bench, "actual/speed") is Quality.LOST
+        assert quality(bench, "actual/position") is Quality.LOST
+        assert reason(bench, "actual/position") == reason(bench, "actual/speed")
+
     def test_before_its_first_tpdo_a_value_waits(self, tmp_path: Path) -> None:
         bench = spin_bench(tmp_path, spindle())
         bench.deaf_to = frozenset((0x289,))

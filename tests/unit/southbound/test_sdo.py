@@ -213,6 +213,50 @@ def test_after_a_retry_the_second_answer_is_not_taken_for_the_next_write() -> No
     assert isinstance(client.results[1], SdoError)
 
 
+def test_each_request_that_was_given_up_owes_an_answer() -> None:
+    """Three questions, three late answers: none of them passes for the answer to a fourth."""
+    client = Client(retries=2)
+    client.write(0x2066, 1, b"\x01\x00")
+    client.wait(1.6)
+    assert isinstance(client.result, SdoError)
+    client.sent()
+    client.write(0x2066, 1, b"\x02\x00")
+    for _ in range(3):
+        assert client.sent() == [], "an answer about 2066h:01 is still owed"
+        client.answer("60 66 20 01 00 00 00 00")
+        client.channel.on_time(client.now)
+    assert client.channel.late == 3
+    assert client.sent() == ["2B 66 20 01 02 00 00 00"]
+
+
+def test_a_server_that_was_asked_often_owes_eight_answers_at_the_most() -> None:
+    client = Client(retries=10)
+    client.write(0x2066, 1, b"\x01\x00")
+    client.wait(5.6)
+    client.sent()
+    client.write(0x2066, 1, b"\x02\x00")
+    for _ in range(8):
+        assert client.sent() == []
+        client.answer("60 66 20 01 00 00 00 00")
+        client.channel.on_time(client.now)
+    assert client.sent() == ["2B 66 20 01 02 00 00 00"]
+
+
+def test_the_time_for_the_second_answer_begins_with_the_first() -> None:
+    """A server that answers the first attempt late may take as long for the second."""
+    client = Client(retries=1)
+    client.write(0x2066, 1, b"\x01\x00")
+    client.wait(0.95)
+    client.answer("60 66 20 01 00 00 00 00")
+    assert client.result == b""
+    client.sent()
+    client.write(0x2066, 1, b"\x02\x00")
+    client.wait(0.4)
+    assert client.sent() == [], "the second answer may still come"
+    client.wait(0.11)
+    assert client.sent() == ["2B 66 20 01 02 00 00 00"]
+
+
 def test_an_owed_answer_that_never_comes_delays_only_its_own_object() -> None:
     client = Client()
     client.read(0x2066, 1)

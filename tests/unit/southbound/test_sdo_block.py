@@ -55,6 +55,19 @@ def test_a_server_that_answers_block_transfer_with_segments_is_served_by_segment
     assert asker.results == [bytes.fromhex("11223344556677")]
 
 
+def test_however_much_is_lost_a_block_has_four_segments_and_grows_again() -> None:
+    """A block of none would never end; one of a single segment is dearer than no block transfer."""
+    initiated = 0x41
+    link = Link(lose=lambda way, frame: way == "from" and 5 <= frame[0] <= 127 and frame[0] != initiated)
+    assert link.read() == LONG
+    asked = [int(line.split()[3], 16) for line in link.log if line.startswith("> a2")]
+    assert min(asked) == 4
+    link.lose = lambda way, frame: False
+    assert link.read() == LONG
+    asked = [int(line.split()[3], 16) for line in link.log if line.startswith("> a2")]
+    assert asked[-1] > 4
+
+
 def test_canopens_slave_is_read_and_written() -> None:
     """A server that we did not write."""
     node = canopen.LocalNode(5, canopen.ObjectDictionary())

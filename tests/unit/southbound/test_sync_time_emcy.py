@@ -165,6 +165,20 @@ def test_a_babbling_node_is_told_ten_times_a_second_and_its_last_word_arrives(tm
     assert bench.number("conveyor/node/emcy_suppressed") > 4900
 
 
+@given(st.integers(1, 40), st.integers(0, 120), st.floats(0, 0.05))
+def test_every_emergency_is_told_or_counted(drives: int, number: int, pause_s: float) -> None:
+    """A node may name drives that there are not: what waits is bounded, what is left out is counted."""
+    log, now, told = EmergencyLog(), 0.0, 0
+    arrivals = [place % drives for place in range(number)]
+    for drive in arrivals:
+        now += pause_s
+        told += len(log.on_time(now))
+        told += log.add(Emergency(0x1000, 0, b""), drive, now)
+    while (due := log.next_deadline()) is not None:
+        told += len(log.on_time(due))
+    assert told + log.suppressed == len(arrivals)
+
+
 @given(st.lists(st.tuples(st.floats(0, 0.3), st.sampled_from([None, 0, 1, 2, 99]), st.integers(0, 9))))
 def test_the_newest_of_every_drive_is_told_in_the_end(arrivals: list[tuple[float, int | None, int]]) -> None:
     log, now = EmergencyLog(), 0.0

@@ -11,6 +11,7 @@ from typing import Final
 
 from bridge.command.authority import Authority
 from bridge.command.event import Kind
+from bridge.command.freshness import arrival_of, is_stale, limit_ms_of
 from bridge.command.link import Link
 from bridge.command.output import Gate
 from bridge.command.request import DONE, STOP_ACTIONS, Action, Code, Identity, Outcome, Reply, Request, Role
@@ -25,6 +26,8 @@ from bridge.image import Quality
 from bridge.mapping.model import Family
 
 _LEASE_MS: Final = (100, 600_000)
+_TAKEN_STALE: Final = STOP_ACTIONS | {Action.WRITE, Action.RELEASE_CONTROL}
+"""Nothing is too old to stop a drive; whether a write does so is seen when it has been decoded."""
 _TIMEOUT_MS: Final = (0, 32767)
 
 Tell = Callable[[float, Kind, int, str], None]
@@ -119,6 +122,8 @@ class ControllerLeg:
         self.judge(now)
         try:
             self._check_authority(request)
+            if request.action not in _TAKEN_STALE and self._is_stale(request, now):
+                raise self._stale(request)
             if request.action is Action.START:
                 self._begin_start(request, now, reply)
             else:
@@ -142,6 +147,14 @@ class ControllerLeg:
         if why:
             raise Refusal(Code.NOT_ALLOWED, why)
 
+    def _is_stale(self, request: Request, now: float) -> bool:
+        return is_stale(request, now, self.watchdog.timeout_ms)
+
+    def _stale(self, request: Request) -> Refusal:
+        """Why it does not count that it can have waited for so long."""
+        limit_ms = limit_ms_of(request, self.watchdog.timeout_ms)
+        return Refusal(Code.STALE, f"may have waited on its way for longer than {limit_ms} ms")
+
     @property
     def _owner_is_silent(self) -> bool:
         """Without a lease, an owner that has sent no telegram yet holds nobody up either."""
@@ -155,11 +168,10 @@ class ControllerLeg:
             case Action.WRITE:
                 return self._write(request, now)
             case Action.KEEP_ALIVE:
-                self._own(request.identity, now)
-                self.watchdog.apply(Stimulus.TELEGRAM, now)
+                self._hear(request, now)
             case Action.RESET_FAULT:
-                self._own(request.identity, now)
-                self._acknowledge(now, pulse=True)
+                self._own(request, now)
+                self._acknowledge(request, now, pulse=True)
             case Action.STOP | Action.QUICK_STOP | Action.DISABLE_VOLTAGE:
                 self._stop(request, now)
             case Action.TAKE_CONTROL:
@@ -181,20 +193,32 @@ class ControllerLeg:
         if word is not None and not self.words.is_valid(word):
             self.watchdog.apply(Stimulus.INVALID, now)
             raise Refusal(Code.NOT_VALID, f"control word {word:04X}h: the bit 'control data valid' is 0")
-        self._own(request.identity, now)
+        if self._is_stale(request, now):
+            if word is None or not is_owner or self.words.enables(word):
+                raise self._stale(request)
+            return self._take_stale_stop(word)
+        self._own(request, now)
         if word is not None:
             self.start.end(Outcome(Code.CANCELLED, "a control word was written meanwhile"))
             if self.is_tripped and self.words.acknowledges(self.gate.control_word, word):
-                self._acknowledge(now, pulse=False)
+                self._acknowledge(request, now, pulse=False)
                 # The edge itself goes on to the drive; whatever else the word asks has to be asked anew.
                 self.gate.control_word |= self.words.acknowledge_mask
                 return Outcome(Code.OK, "acknowledged; the drive stays stopped", forwarded=False)
-        self.watchdog.apply(Stimulus.TELEGRAM, now)
+        self.watchdog.apply(Stimulus.TELEGRAM, arrival_of(request, now))
         position = self._handshake is not None and self._handshake.value in request.values
         may_enable = self.may_enable(now)
         if self.gate.take(word, telegram.setpoints, may_enable=may_enable, position=position):
             return DONE
         return Outcome(Code.OK, self.why_blocked(now), forwarded=False)
+
+    def _take_stale_stop(self, word: int) -> Outcome:
+        """The owner's stop, however long it has waited. It is no sign of life, acknowledges nothing and
+        brings no setpoints."""
+        self.start.end(Outcome(Code.CANCELLED, "a control word was written meanwhile"))
+        acknowledge = self.words.acknowledge_mask
+        self.gate.stop(word & ~acknowledge | self.gate.control_word & acknowledge, is_asked=True)
+        return Outcome(Code.OK, "came late, and counts as a stop only")
 
     def may_enable(self, now: float) -> bool:
         """Whether enabling commands may go to the drive, or go on: a drive that is enabled already needs
@@ -223,11 +247,16 @@ class ControllerLeg:
             return why
         return "restart interlock: send a control word that does not enable first"
 
-    def _own(self, identity: Identity, now: float) -> None:
-        """A valid telegram of ``identity``: it owns the drive from now on."""
-        if not identity.is_same(self.owner):
-            self._hand_over(identity, now)
-        self.authority.renew(now)
+    def _own(self, request: Request, now: float) -> None:
+        """A valid telegram: who sent it owns the drive from now on."""
+        if not request.identity.is_same(self.owner):
+            self._hand_over(request.identity, now)
+        self.authority.renew(arrival_of(request, now))
+
+    def _hear(self, request: Request, now: float) -> None:
+        """A valid telegram that says no more than that its sender is there."""
+        self._own(request, now)
+        self.watchdog.apply(Stimulus.TELEGRAM, arrival_of(request, now))
 
     def _hand_over(self, identity: Identity, now: float, lease_s: float | None = None) -> None:
         """Another owner, or a lease taken anew; the drive is stopped where the owner changes."""
@@ -238,9 +267,9 @@ class ControllerLeg:
         if changes:
             self._tell(now, Kind.OWNER, 200, f"controlled by {identity}")
 
-    def _acknowledge(self, now: float, *, pulse: bool) -> None:
+    def _acknowledge(self, request: Request, now: float, *, pulse: bool) -> None:
         was_tripped = self.is_tripped
-        self.watchdog.apply(Stimulus.ACKNOWLEDGED, now)
+        self.watchdog.apply(Stimulus.ACKNOWLEDGED, arrival_of(request, now))
         self.gate.clear(now, self._status.state, pulse=pulse)
         if was_tripped:
             self._tell(now, Kind.WATCHDOG, 200, f"acknowledged by {self.owner}; the drive stays stopped")
@@ -281,8 +310,8 @@ class ControllerLeg:
     def _stop(self, request: Request, now: float) -> None:
         """Stop, by whoever asks. The owner's telegrams go on counting, its old enable does not."""
         if request.identity.is_same(self.owner):
-            self._own(request.identity, now)
-            self.watchdog.apply(Stimulus.TELEGRAM, now)
+            if not self._is_stale(request, now):
+                self._hear(request, now)
         else:
             self._tell(now, Kind.OWNER, 400, f"{request.action} by {request.identity}")
         change = {
@@ -304,6 +333,5 @@ class ControllerLeg:
             raise Refusal(Code.ACKNOWLEDGE_FIRST, "acknowledge first")
         if not self.may_enable(now):
             raise Refusal(Code.NOT_READY, self.why_blocked(now))
-        self._own(request.identity, now)
-        self.watchdog.apply(Stimulus.TELEGRAM, now)
+        self._hear(request, now)
         self.start.begin(bits, self._status.state, now, reply, is_known=self._link.is_heard)

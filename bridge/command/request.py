@@ -109,6 +109,7 @@ class Code(StrEnum):
     NOT_ALLOWED = "not_allowed"
     ACKNOWLEDGE_FIRST = "acknowledge_first"
     NOT_READY = "not_ready"
+    STALE = "stale"
     NOT_CONFIGURED = "not_configured"
     TIMED_OUT = "timed_out"
     CANCELLED = "cancelled"
@@ -152,7 +153,8 @@ class Request:
     ``ttl_ms`` (TAKE_CONTROL) is the lease's length, ``direction`` (START) is 1 forward, -1 reverse, 0 as
     the drive's own setting, ``timeout_ms`` goes with SET_TIMEOUT. ``parameter`` is a vendor's name, an
     object or the name of a point, ``value`` what is to be written, ``max_age_ms`` how old a value read
-    earlier may be.
+    earlier may be. ``received_at`` is when it can have come at the earliest, in monotonic seconds of the bus
+    process's machine; None for one that was made in this process just now.
     """
 
     identity: Identity
@@ -165,6 +167,7 @@ class Request:
     parameter: str = ""
     value: Value | None = None
     max_age_ms: int = 0
+    received_at: float | None = None
 
 
 Reply = Callable[[Outcome], None]

@@ -131,13 +131,14 @@ class Watchdog:
     def next_deadline(self) -> float | None:
         return self._deadline
 
-    def apply(self, stimulus: Stimulus, now: float) -> Effect:
-        """Let ``stimulus`` happen at ``now`` and say what is to be done about it."""
+    def apply(self, stimulus: Stimulus, heard_at: float) -> Effect:
+        """Let ``stimulus`` happen and say what is to be done about it. ``heard_at`` is when a telegram came,
+        which may be a while ago: its time is up that much earlier. It takes none from a newer one."""
         self.state, effect = TABLE[self.state, stimulus]
         if stimulus in (Stimulus.TELEGRAM, Stimulus.ACKNOWLEDGED):
             self._silent = False
-            self._heard_at = now
-            self._deadline = now + self.timeout_ms / 1000 if self.timeout_ms else None
+            self._heard_at = heard_at if self._heard_at is None else max(heard_at, self._heard_at)
+            self._deadline = self._heard_at + self.timeout_ms / 1000 if self.timeout_ms else None
         elif stimulus in (Stimulus.RELEASED, Stimulus.OWNER_CHANGED, Stimulus.STARTED):
             self._silent = False
             self._heard_at = None

@@ -17,8 +17,9 @@ _BEFORE_LENGTH_COUNTS: Final = 6
 _LENGTHS: Final = range(2, 255)  # unit id and a PDU of 1 … 253 bytes
 _MOST_UNANSWERED: Final = 64  # requests whose outcome is still to come, per connection
 
-Handle = Callable[[int, bytes, Callable[[bytes], None]], None]
-"""(unit id, PDU, answer): ``answer`` is to be called exactly once with the PDU of the answer."""
+Handle = Callable[[int, bytes, Callable[[bytes], None], float], None]
+"""(unit id, PDU, answer, received at): ``answer`` is to be called exactly once with the answer's PDU, the
+time is that with which the end of the request was received."""
 
 
 class _Exchange:
@@ -36,16 +37,21 @@ class Conversation:
     """``handle`` gets the requests in order. ``on_late_answer`` is called when an answer comes after its
     request's turn, so that another ``advance`` is worth while.
 
+    A request keeps the time of the bytes that end it, however long it waits here.
+
     ``backlog``: there is more to handle at once. ``is_full``: no more is handled until an answer comes.
     ``fault``: why the stream cannot be followed any more, or empty.
     """
 
     __slots__ = (
         "_buffer",
+        "_dropped",
+        "_earlier",
         "_exchanges",
         "_handle",
         "_offset",
         "_on_late_answer",
+        "_received_at",
         "_working",
         "backlog",
         "fault",
@@ -56,6 +62,10 @@ class Conversation:
         self._on_late_answer = on_late_answer
         self._buffer = bytearray()
         self._offset = 0
+        self._dropped = 0  # bytes of the stream before the buffer
+        self._received_at = 0.0
+        # Where chunks before the last end in the stream, as far as they are not handled, with their times.
+        self._earlier: deque[tuple[int, float]] = deque()
         self._exchanges: deque[_Exchange] = deque()
         self._working = False
         self.backlog = False
@@ -65,8 +75,16 @@ class Conversation:
     def is_full(self) -> bool:
         return len(self._exchanges) >= _MOST_UNANSWERED
 
-    def receive(self, data: bytes) -> None:
+    @property
+    def waiting(self) -> int:
+        """Bytes that are not handled yet."""
+        return len(self._buffer)
+
+    def receive(self, data: bytes | bytearray | memoryview, received_at: float = 0.0) -> None:
+        if self._buffer:
+            self._earlier.append((self._dropped + len(self._buffer), self._received_at))
         self._buffer += data
+        self._received_at = received_at
 
     def advance(self, most: int) -> bytes:
         """Handle up to ``most`` requests; the answers that may be sent now, none before an earlier one."""
@@ -79,6 +97,7 @@ class Conversation:
         finally:
             self._working = False
             del self._buffer[: self._offset]
+            self._dropped += self._offset
             self._offset = 0
         answers = self._take()
         self.backlog = more and not self.is_full and len(self._buffer) >= _HEADER.size
@@ -109,8 +128,16 @@ class Conversation:
         self._offset = end
         exchange = _Exchange(transaction, unit_id)
         self._exchanges.append(exchange)
-        self._handle(unit_id, pdu, partial(self._on_answer, exchange))
+        received_at = self._arrival(self._dropped + end) if self._earlier else self._received_at
+        self._handle(unit_id, pdu, partial(self._on_answer, exchange), received_at)
         return True
+
+    def _arrival(self, place: int) -> float:
+        """When what ends at this place in the stream was received. Places are asked for in their order."""
+        earlier = self._earlier
+        while earlier and earlier[0][0] < place:
+            earlier.popleft()
+        return earlier[0][1] if earlier else self._received_at
 
     def _on_answer(self, exchange: _Exchange, answer: bytes) -> None:
         exchange.answer = answer

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import unicodedata
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final
 
 from bridge.command import Action, Code, Identity, Outcome, Plant, Rejection, Request
+from bridge.command.freshness import NOW_S
 from bridge.config import WordOrder
 from bridge.northbound.modbus.drive_unit import DriveUnit
 from bridge.northbound.modbus.pdu import (
@@ -48,6 +51,7 @@ EXCEPTIONS: Final = {
     Code.NOT_ALLOWED: ExceptionCode.ILLEGAL_FUNCTION,
     Code.ACKNOWLEDGE_FIRST: ExceptionCode.DEVICE_FAILURE,
     Code.NOT_READY: ExceptionCode.NOT_RESPONDING,
+    Code.STALE: ExceptionCode.BUSY,
     Code.NOT_CONFIGURED: ExceptionCode.PATH_UNAVAILABLE,
     Code.TIMED_OUT: ExceptionCode.DEVICE_FAILURE,
     Code.CANCELLED: ExceptionCode.DEVICE_FAILURE,
@@ -93,15 +97,20 @@ class Dispatcher:
         for unit_id in BRIDGE_UNITS:
             self._units[unit_id] = BridgeUnit(plant)
 
-    def handle(self, unit_id: int, pdu: bytes, caller: Identity, answer: Answer) -> None:
-        """Do what ``pdu`` (at least one byte) asks. ``answer`` is called exactly once, now or later."""
+    def handle(
+        self, unit_id: int, pdu: bytes, caller: Identity, answer: Answer, received_at: float = math.inf
+    ) -> None:
+        """Do what ``pdu`` (at least one byte) asks. ``answer`` is called exactly once, now or later.
+
+        ``received_at`` is when it can have come at the earliest.
+        """
         try:
             unit = self._units.get(unit_id)
             if unit is None:
                 raise Refused(ExceptionCode.PATH_UNAVAILABLE)
             request = parse(pdu)
             if isinstance(request, _Write):
-                self._write(unit, request, pdu[0], caller, answer)
+                self._write(unit, request, pdu[0], caller, answer, received_at)
                 return
             given = self._read(unit, request, caller)
         except Refused as error:
@@ -133,7 +142,15 @@ class Dispatcher:
             case Loopback(echo):
                 return echo
 
-    def _write(self, unit: Unit, request: _Write, function: int, caller: Identity, answer: Answer) -> None:
+    def _write(
+        self,
+        unit: Unit,
+        request: _Write,
+        function: int,
+        caller: Identity,
+        answer: Answer,
+        received_at: float,
+    ) -> None:
         """Plan the whole write, then submit it. Raises ``Refused`` before anything is submitted."""
         match request:
             case WriteWords(start, words):
@@ -158,6 +175,8 @@ class Dispatcher:
                     given = refusal(function, error.code)
                 answer(given)
 
+        if self._clock() - received_at > NOW_S:
+            plan = [replace(one, received_at=received_at) for one in plan]
         self._submit(plan, conclude)
 
     def _read_back(self, unit: Unit, request: ReadWrite, caller: Identity) -> bytes:

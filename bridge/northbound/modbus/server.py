@@ -15,12 +15,15 @@ from bridge.command import Identity, Plant, Role, Source
 from bridge.config import ModbusTable
 from bridge.errors import Unavailable
 from bridge.northbound.modbus.dispatch import Dispatcher
-from bridge.northbound.modbus.session import Session
+from bridge.northbound.modbus.session import READ_MOST, Session
+from bridge.northbound.pulse import Pulse
 
 _log = logging.getLogger(__name__)
 
 _LOG_PAUSE_S: Final = 60.0
 _BACKLOG: Final = 64
+_WINDOW: Final = 4 * READ_MOST
+"""Bytes that may wait in the kernel: more than are read at once, so that who fills it is noticed."""
 
 IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
@@ -34,6 +37,7 @@ class ModbusServer:
         self._dispatcher = Dispatcher(plant, settings.word_order, clock)
         self._allowed = [ipaddress.ip_network(network) for network in settings.allow]
         self._clock = clock
+        self._pulse = Pulse(clock)
         self._sessions: set[Session] = set()
         self._server: asyncio.Server | None = None
         self._logged: dict[str, float] = {}
@@ -57,8 +61,9 @@ class ModbusServer:
         """Listen. Raises ``Unavailable`` with the sentence that helps where that cannot be."""
         sock = _listen(self._settings.listen)
         loop = asyncio.get_running_loop()
+        self._pulse.start()
         self._server = await loop.create_server(
-            lambda: Session(self._dispatcher, self), sock=sock, backlog=_BACKLOG
+            lambda: Session(self._dispatcher, self, self._clock, self._pulse), sock=sock, backlog=_BACKLOG
         )
         _log.info("Modbus TCP on %s", self._settings.listen)
 
@@ -67,6 +72,7 @@ class ModbusServer:
         server, self._server = self._server, None
         if server is None:
             return
+        self._pulse.stop()
         server.close()
         for session in tuple(self._sessions):
             session.close()
@@ -135,12 +141,15 @@ def _listen(endpoint: str) -> socket.socket:
     host = host.strip("[]")
     is_v6 = ":" in host
     try:
-        return socket.create_server(
+        sock = socket.create_server(
             (host, int(port)),
             family=socket.AF_INET6 if is_v6 else socket.AF_INET,
             backlog=_BACKLOG,
             dualstack_ipv6=host == "::" and socket.has_dualstack_ipv6(),
         )
+        # Connections inherit it; set later, it would not narrow the window that they begin with.
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WINDOW)
+        return sock
     except OSError as error:
         raise Unavailable(f"modbus.listen = {endpoint!r}: {_advice(error, host, port)}") from error
 

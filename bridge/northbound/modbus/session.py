@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from collections.abc import Callable
 from typing import Any, Final, Protocol, cast
 
 from bridge.command import Identity
+from bridge.command.freshness import Inflow
 from bridge.northbound.modbus.conversation import Conversation
 from bridge.northbound.modbus.dispatch import Answer, Dispatcher
+from bridge.northbound.pulse import Pulse
 
 TURN: Final = 16
 """Requests of one connection that are handled before everything else gets its turn: about 0.3 ms."""
 
 STALL_LIMIT_S: Final = 5.0
 """How long a client may leave its answers unread before it is dropped."""
+
+READ_MOST: Final = 16 * 1024
+"""Bytes that are read at once, and that may wait here before no more are read: 64 requests of the longest."""
 
 _UNREAD_MOST: Final = 32 * 1024  # bytes of answers that wait for a client before it is not served further
 _KEEPALIVE: Final = (("TCP_KEEPIDLE", 30), ("TCP_KEEPINTVL", 10), ("TCP_KEEPCNT", 3))
@@ -34,21 +40,25 @@ class Hall(Protocol):
         ...
 
 
-class Session(asyncio.Protocol):
-    """Pumps bytes between a socket and a ``Conversation``.
+class Session(asyncio.BufferedProtocol):
+    """Pumps bytes between a socket and a ``Conversation``. ``clock`` is the plant's.
 
     A client that does not read its answers is not read from either, and dropped after a while; one that
-    floods is handled ``TURN`` requests at a time.
+    floods is handled ``TURN`` requests at a time, and what it writes does not count as fresh.
     """
 
-    def __init__(self, dispatcher: Dispatcher, hall: Hall) -> None:
+    def __init__(self, dispatcher: Dispatcher, hall: Hall, clock: Callable[[], float], pulse: Pulse) -> None:
         self._dispatcher = dispatcher
         self._hall = hall
+        self._clock = clock
+        self._pulse = pulse
+        self._inflow = Inflow(clock(), pulse.look)
+        self._room = bytearray(READ_MOST)
         self._conversation = Conversation(self._handle, self._go_on)
         self.identity: Identity | None = None
         """Who the hall says it is; None until it is admitted."""
         self.heard_at = float("-inf")
-        """When the client last sent something, or connected; in the event loop's time."""
+        """When the client last sent something, or connected; in the plant's time."""
         self._transport: asyncio.Transport | None = None
         self._stalled: asyncio.TimerHandle | None = None
         self._scheduled = False
@@ -72,7 +82,7 @@ class Session(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         stream = cast(asyncio.Transport, transport)
         self._transport = stream
-        self.heard_at = asyncio.get_running_loop().time()
+        self.heard_at = self._clock()
         peer: Any = stream.get_extra_info("peername")
         self.identity = self._hall.admit(self, peer[0], peer[1]) if peer else None
         if self.identity is None:
@@ -81,9 +91,13 @@ class Session(asyncio.Protocol):
         stream.set_write_buffer_limits(high=_UNREAD_MOST)
         _keep_alive(stream.get_extra_info("socket"))
 
-    def data_received(self, data: bytes) -> None:
-        self.heard_at = asyncio.get_running_loop().time()
-        self._conversation.receive(data)
+    def get_buffer(self, sizehint: int) -> bytearray:
+        return self._room
+
+    def buffer_updated(self, nbytes: int) -> None:
+        self.heard_at = now = self._clock()
+        received_at = self._inflow.arrive(now, self._pulse.look, crowded=nbytes == READ_MOST)
+        self._conversation.receive(memoryview(self._room)[:nbytes], received_at)
         self._go_on()
 
     def pause_writing(self) -> None:
@@ -105,9 +119,9 @@ class Session(asyncio.Protocol):
 
     # work
 
-    def _handle(self, unit_id: int, pdu: bytes, answer: Answer) -> None:
+    def _handle(self, unit_id: int, pdu: bytes, answer: Answer, received_at: float) -> None:
         if self.identity is not None:
-            self._dispatcher.handle(unit_id, pdu, self.identity, answer)
+            self._dispatcher.handle(unit_id, pdu, self.identity, answer, received_at)
 
     def _go_on(self) -> None:
         """There is something to do: now, unless a turn is coming anyway."""
@@ -132,13 +146,20 @@ class Session(asyncio.Protocol):
             self._hall.on_fault(self, conversation.fault)
             self.close()
             return
-        if conversation.backlog or conversation.is_full or self._stalled:
-            transport.pause_reading()
-        else:
-            transport.resume_reading()
+        self._read_on(transport)
         if conversation.backlog and not self._stalled:
             self._scheduled = True
             asyncio.get_running_loop().call_soon(self._advance)
+
+    def _read_on(self, transport: asyncio.Transport) -> None:
+        """Go on reading as long as it can be: what waits here has a time, what waits elsewhere has none."""
+        conversation, inflow = self._conversation, self._inflow
+        if conversation.is_full or self._stalled or conversation.waiting >= READ_MOST:
+            transport.pause_reading()
+            inflow.shut(self._clock())
+        elif not (inflow.is_open or conversation.backlog):
+            inflow.reopen(self._clock())
+            transport.resume_reading()
 
     def _drop_stalled(self) -> None:
         self._stalled = None

@@ -35,6 +35,7 @@ OUTCOME_STATUS: Final = {
     Code.ACKNOWLEDGE_FIRST: StatusCodes.BadInvalidState,
     Code.NOT_READY: StatusCodes.BadNoCommunication,
     Code.NOT_CONFIGURED: StatusCodes.BadConfigurationError,
+    Code.STALE: StatusCodes.BadTimeout,
     Code.TIMED_OUT: StatusCodes.BadTimeout,
     Code.CANCELLED: StatusCodes.BadRequestCancelledByRequest,
     Code.UNKNOWN_PARAMETER: StatusCodes.BadNodeIdUnknown,

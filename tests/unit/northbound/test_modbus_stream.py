@@ -38,7 +38,7 @@ def talk(chunks: list[bytes], turn: int = 16) -> tuple[bytes, str]:
     rig = Rig()
     rig.runs(READY)
     conversation = Conversation(
-        lambda unit, pdu, answer: rig.dispatcher.handle(unit, pdu, PLC, answer), never
+        lambda unit, pdu, answer, at: rig.dispatcher.handle(unit, pdu, PLC, answer), never
     )
     answers = b""
     for chunk in chunks:
@@ -106,7 +106,7 @@ def test_late_answers_keep_the_order():
     pending: list[Callable[[bytes], None]] = []
     late: list[bytes] = []
 
-    def handle(unit: int, pdu: bytes, answer: Callable[[bytes], None]) -> None:
+    def handle(unit: int, pdu: bytes, answer: Callable[[bytes], None], received_at: float) -> None:
         if pdu[0] == 3:
             answer(b"\x03now")
         else:
@@ -128,7 +128,7 @@ def test_late_answers_keep_the_order():
 
 def test_no_more_is_taken_in_than_can_be_remembered():
     pending: list[Callable[[bytes], None]] = []
-    conversation = Conversation(lambda unit, pdu, answer: pending.append(answer), lambda: None)
+    conversation = Conversation(lambda unit, pdu, answer, at: pending.append(answer), lambda: None)
     conversation.receive(b"".join(adu(i, 1, b"\x03") for i in range(100)))
     for _ in range(10):
         conversation.advance(16)

@@ -1,0 +1,167 @@
+"""How old a telegram can be: fresh means recent, not read just now.
+
+What a controller has sent may wait in the network's buffers, its own and ours, and is read long after
+it has hung. So each telegram carries the time at which it can have come at the earliest. Its drive's timer
+runs from then on, and one that can have waited for longer than ``BOUND_MS`` does not count at all.
+
+The rule for one connection:
+
+- What is read has come since the connection was last seen empty.
+- Who has more under way than somebody who waits for answers would have may have filled the buffers on
+  the way, also those that we cannot see. From then on nothing of it counts until it has been calm: too
+  few arrivals, for long enough, for what drains at full speed.
+
+Pure: times are monotonic seconds, given from outside.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from bridge.command.request import Request, Source
+
+GRAIN_MS: Final = 25
+"""A wait that is shorter is not told from none. A telegram can be so much older than it is taken for: this is
+its way through the bridge's front in ``worst_case_stop_ms``."""
+
+NOW_S: Final = 0.001
+"""What is handled so soon after it was read needs no time of its own; a part of the grain."""
+
+BOUND_MS: Final = {
+    Source.NONE: 100,
+    Source.OPCUA: 500,
+    Source.MODBUS: 100,
+    Source.ZENOH: 200,
+    Source.LOCAL: 100,
+}
+"""What can have waited for longer counts for nothing. An OPC UA server may be busy with other clients, for
+half a second with a large subscription; the time for which it was is none that the owner gains."""
+
+_GRAIN_S: Final = GRAIN_MS / 1000 - NOW_S
+
+CALM_S: Final = 0.1
+_CALM_MOST: Final = 32
+"""So few arrivals in ``CALM_S`` are no backlog: one drains at more than a thousand telegrams a second."""
+
+
+def way_ms(control: str) -> int:
+    """How much older than it is taken for a telegram of who controls a drive can be, at most.
+
+    The same for all protocols: what waits longer counts from when it came, or not at all.
+    """
+    return 0 if control == "none" else GRAIN_MS
+
+
+NEVER: Final = float("-inf")
+"""The time of a telegram of which nobody knows how long it has waited."""
+
+
+def arrival_of(request: Request, now: float) -> float:
+    """When ``request`` can have come at the earliest; one that was made in this process comes now."""
+    return now if request.received_at is None else min(request.received_at, now)
+
+
+def limit_ms_of(request: Request, timeout_ms: int) -> int:
+    """How long it may have waited to count for a drive with this time-out (0: none)."""
+    bound_ms = BOUND_MS[request.identity.source]
+    return min(bound_ms, timeout_ms) if timeout_ms else bound_ms
+
+
+def is_stale(request: Request, now: float, timeout_ms: int) -> bool:
+    """Whether it can have waited too long to count."""
+    received_at = request.received_at
+    return received_at is not None and now - received_at > limit_ms_of(request, timeout_ms) / 1000
+
+
+class Look(NamedTuple):
+    """What the event loop knows of itself (``bridge.northbound.pulse`` keeps it).
+
+    ``at``: it has looked at everything that is open after this time, and what it found has been read but
+    for what it is about to read. ``steady_since``: when it last went on after it had hung, or its process
+    was stopped.
+    """
+
+    at: float
+    steady_since: float
+
+
+class Inflow:
+    """What is known of the age of what comes through one connection.
+
+    ``is_hidden``: the connections cannot be seen, and this is all that comes from one asker. What
+    comes after a hang may have waited somewhere then, and cannot be told from what has not.
+    """
+
+    __slots__ = (
+        "_calm_since",
+        "_came",
+        "_empty_at",
+        "_is_crowded",
+        "_is_hidden",
+        "_is_open",
+        "_open_since",
+        "_steady_since",
+    )
+
+    def __init__(self, now: float, look: Look, *, is_hidden: bool = False) -> None:
+        # What comes first may have waited in the listening socket.
+        self._empty_at = look.at
+        self._open_since = now
+        self._is_hidden = is_hidden
+        self._is_open = True
+        self._is_crowded = False
+        self._calm_since = now
+        self._steady_since = look.steady_since
+        self._came = 0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it is read from, as far as this was told."""
+        return self._is_open
+
+    def shut(self, now: float) -> None:
+        """Nothing more is read for now, so the buffers on the way may fill."""
+        if self._is_open:
+            self._is_open = False
+            self._crowd(now)
+
+    def reopen(self, now: float) -> None:
+        if not self._is_open:
+            self._is_open = True
+            self._open_since = now
+            self._crowd(now)
+
+    def _crowd(self, now: float) -> None:
+        self._is_crowded = True
+        self._calm_since = now
+        self._came = 0
+
+    def arrive(self, now: float, look: Look, *, crowded: bool = False) -> float:
+        """Something was read ``now``: when it can have come at the earliest, or ``NEVER``.
+
+        ``crowded``: more may be left, or more is under way than there should be.
+        """
+        since = max(self._empty_at, look.at) if look.at > self._open_since else self._empty_at
+        if crowded:
+            self._open_since = now
+            self._crowd(now)
+            return NEVER
+        self._empty_at = now
+        if self._is_hidden and look.steady_since > self._steady_since:
+            self._crowd(now)
+        self._steady_since = look.steady_since
+        if self._is_crowded and not self._has_calmed(look):
+            return NEVER
+        return now if now - since <= _GRAIN_S else since
+
+    def _has_calmed(self, look: Look) -> bool:
+        """Judged over one span of ``CALM_S`` after the other, in which the loop has hung at no time."""
+        begin = max(self._calm_since, look.steady_since)
+        if look.at - begin < CALM_S:
+            self._came = self._came + 1 if begin == self._calm_since else 1
+            self._calm_since = begin
+            return False
+        self._is_crowded = self._came >= _CALM_MOST
+        self._calm_since = look.at
+        self._came = 1
+        return not self._is_crowded

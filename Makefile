@@ -94,6 +94,9 @@ PROOF ?= 50
 proof: compiled packages ## inject every fault 50 times, write docs/explanation/proof.md (half an hour)
 	@$(ON_VCAN) tests/proof/run-proof -j $(FEW_JOBS) -n $(PROOF) -o build/proof.json docs/explanation/proof.md
 
+proof-mutants: compiled packages ## seed faults in the chain, which the proof has to find (twenty minutes)
+	@$(ON_VCAN) tests/proof/run-proof -m -j $(FEW_JOBS) -o build/mutants.json docs/explanation/proof.md
+
 ##@ Check
 check: check-style check-format check-types check-imports ## style, format, types, import rules (-k: all of them even if one fails)
 
@@ -159,8 +162,8 @@ clean: ## remove .venv and everything that was built
 	@find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
 
 help: ## this list
-	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test unit wire lab packages clients compiled bench proof check check-style check-format check-types \
+.PHONY: demo test unit wire lab packages clients compiled bench proof proof-mutants check check-style check-format check-types \
   check-imports format docs setup lock wheel clean help

@@ -2,11 +2,14 @@
 
     python -m tests.proof run --cycles N --out RESULT.json [--faults NAME,NAME]
     python -m tests.proof report --least N --page PAGE.md --out RESULT.json PART.json ...
+    python -m tests.proof hunt --share FOLDER --out RESULT.json [--mutants NAME,NAME]
+    python -m tests.proof kills --page PAGE.md --out RESULT.json PART.json ...
 
-``run`` is for a machine with vcan0, vcan1 and a mount namespace of its own
-(``tests/lab/vcan-run -n 2 -- unshare --mount ...``); the lab has a short one (``tests/lab/test_proof.py``).
-Both end with 1 where a bound is exceeded by more than the machine was in the way. Where it is not more, the
-measurement is void: it is shown, and its fault is injected once more.
+``hunt`` and ``kills`` are those of ``make proof-mutants``. ``run`` and ``hunt`` are for a machine with vcan0,
+vcan1 and a mount namespace of its own (``tests/lab/vcan-run -n 2 -- unshare --mount ...``); the lab has short
+ones (``tests/lab/test_proof.py``). ``run`` and what makes the pages end with 1 where something has failed: a
+bound is exceeded by more than the machine was in the way. Where it is not more, the measurement is void: it
+is shown, and its fault is injected once more.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from tests.proof import report
+from tests.proof import hunt, kills, mutants, report
 from tests.proof.drives import DRIVES
 from tests.proof.faults import FAULTS, Fault
 from tests.proof.machine import is_user_mode
@@ -52,7 +55,7 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
 
     def collect() -> dict[str, Any]:
         return {
-            "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d"),
+            "date": _today(),
             "machine": _machine(),
             "machines": 1,
             "faults": [fault.name for fault in FAULTS],
@@ -145,10 +148,41 @@ def _machine() -> str:
 def _verdict(result: dict[str, Any], least: int) -> int:
     for cell in report.cells(result["samples"]):
         print("  ".join(cell.row()))
-    found = report.failures(result, least)
-    for text in found:
+    return _tell(report.failures(result, least))
+
+
+def _tell(failures: list[str]) -> int:
+    for text in failures:
         print(f"FAILED: {text}")
-    return 1 if found else 0
+    return 1 if failures else 0
+
+
+def _names(text: str) -> list[str]:
+    return [name for name in text.split(",") if name]
+
+
+def hunt_mutants(names: list[str], share: Path, out: Path, noise_ms: float) -> int:
+    os.environ["PYTHONPATH"] = str(REPOSITORY)
+    chosen = [mutant for mutant in mutants.load() if not names or mutant.name in names]
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mutants-")))
+        tree = mutants.Tree(folder / "tree")
+        rig = Rig(folder, stack, tree.folder)
+        rig.noise_ms = noise_ms
+        try:
+            rig.start()
+            say("everything is there")
+            rig.run_all()
+            found = hunt.hunt_all(rig, tree, chosen, hunt.Share(share), say)
+        finally:
+            _keep_logs(folder, out.parent / f"{out.stem}-logs")
+    found |= {"date": _today(), "machine": _machine()}
+    out.write_text(json.dumps(found, indent=1), encoding="utf-8")
+    return 0
+
+
+def _today() -> str:
+    return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d")
 
 
 def main() -> int:
@@ -159,17 +193,30 @@ def main() -> int:
     one.add_argument("--faults", default="")
     one.add_argument("--limit", type=float, default=1800.0, help="begin no cycle after so many seconds")
     one.add_argument("--noise", type=float, default=0.0, help="ms allowed on a machine that is busy")
-    one.add_argument("--out", type=Path, required=True)
     other = commands.add_parser("report")
     other.add_argument("--least", type=int, default=50)
-    other.add_argument("--page", type=Path, required=True)
-    other.add_argument("--out", type=Path, required=True)
-    other.add_argument("parts", type=Path, nargs="+")
+    third = commands.add_parser("hunt")
+    third.add_argument("--share", type=Path, required=True, help="a folder that all machines have")
+    third.add_argument("--mutants", default="", help="left out: all")
+    third.add_argument("--noise", type=float, default=0.0, help="ms allowed on a machine that is busy")
+    fourth = commands.add_parser("kills")
+    for command in (other, fourth):
+        command.add_argument("--page", type=Path, required=True)
+        command.add_argument("parts", type=Path, nargs="+")
+    for command in (one, other, third, fourth):
+        command.add_argument("--out", type=Path, required=True)
     asked = parser.parse_args()
+    if asked.command == "hunt":
+        return hunt_mutants(_names(asked.mutants), asked.share, asked.out, asked.noise)
+    if asked.command == "kills":
+        found = kills.merge([report.load(part) for part in asked.parts])
+        asked.out.write_text(json.dumps(found, indent=1), encoding="utf-8")
+        report.put_between(asked.page, kills.BEGIN, kills.END, kills.markdown(found))
+        return _tell(kills.failures(found))
     if asked.command == "run":
         return run(
             asked.cycles,
-            [name for name in asked.faults.split(",") if name],
+            _names(asked.faults),
             asked.out,
             asked.limit,
             asked.noise,

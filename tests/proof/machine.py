@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import fcntl
 import os
+import signal
 import socket
 import struct
 import subprocess
@@ -28,6 +29,13 @@ _GET_FLAGS, _SET_FLAGS = 0x8913, 0x8914
 _IFF_UP: Final = 0x1
 _IFREQ: Final = struct.Struct("16sH14x")
 _SEIZE, _INTERRUPT, _DETACH = 0x4206, 0x4207, 17
+_SYSCALL, _PEEK_USER = 24, 3
+_TRACE_SYSCALLS: Final = 1
+"""PTRACE_O_TRACESYSGOOD: stops at a system call have bit 7 in their signal."""
+_AT_SYSCALL: Final = signal.SIGTRAP | 0x80
+_NUMBER_AT: Final = 8 * 15
+"""orig_rax of struct user_regs_struct."""
+_SETITIMER: Final = 38
 _WALL: Final = 0x4000_0000
 
 TO_DRIVES: Final = ("-s", BRIDGE_SIDE, "-d", DRIVE_SIDE, "-e")
@@ -109,12 +117,15 @@ def step_clock(seconds: float) -> None:
     time.clock_settime(time.CLOCK_REALTIME, time.time() + seconds)
 
 
-def _ptrace(request: int, thread: int) -> None:
+def _ptrace(request: int, thread: int, address: int = 0, data: int = 0) -> int:
     trace = ctypes.CDLL(None, use_errno=True).ptrace
     trace.restype = ctypes.c_long
     trace.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
-    if trace(request, thread, None, None) < 0:
+    ctypes.set_errno(0)
+    result = int(trace(request, thread, address, data))
+    if result < 0 and ctypes.get_errno():
         raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+    return result
 
 
 def block_thread(thread: int, seconds: float) -> float:
@@ -124,6 +135,27 @@ def block_thread(thread: int, seconds: float) -> float:
     _ptrace(_INTERRUPT, thread)
     os.waitpid(thread, _WALL)
     time.sleep(max(0.0, now + seconds - time.monotonic()))
+    _ptrace(_DETACH, thread)
+    return now
+
+
+def block_at_timer(thread: int, seconds: float) -> float:
+    """As ``block_thread``, just when it has set its interval timer: the bridge does that before it hands
+    words to the kernel. Gives the time of that."""
+    _ptrace(_SEIZE, thread, 0, _TRACE_SYSCALLS)
+    _ptrace(_INTERRUPT, thread)
+    seen = 0
+    while seen < 2:  # the beginning of the call, and its end
+        _, status = os.waitpid(thread, _WALL)
+        number = os.WSTOPSIG(status)
+        if number == _AT_SYSCALL:
+            is_it = _ptrace(_PEEK_USER, thread, _NUMBER_AT) == _SETITIMER
+            seen = seen + 1 if is_it else 0
+        passed_on = 0 if number in (_AT_SYSCALL, signal.SIGTRAP) else number
+        if seen < 2:
+            _ptrace(_SYSCALL, thread, 0, passed_on)
+    now = time.monotonic()
+    time.sleep(seconds)
     _ptrace(_DETACH, thread)
     return now
 

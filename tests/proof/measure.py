@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Final
 
 from tests.proof.board import NUMBERS
@@ -27,27 +28,31 @@ class Sample:
     family: str
     protocol: str
     drive: str
-    bus_ms: float | None
-    bus_bound_ms: float | None
-    drive_ms: float | None
-    drive_bound_ms: float | None
-    way_ms: float | None
+    bus_ms: float | None = None
+    bus_bound_ms: float | None = None
+    drive_ms: float | None = None
+    drive_bound_ms: float | None = None
+    way_ms: float | None = None
     """From the client's sending its last telegram to the RPDO by which the bridge handed it on."""
-    paused_ms: float
+    way_bound_ms: float | None = None
+    paused_ms: float = 0.0
     """How long the machine itself stood still, from shortly before a bound that was exceeded until the stop.
     What was before that did not make it late."""
-    waited_ms: float
+    waited_ms: float = 0.0
     """How long the bridge, and for the drive's bound the drives too, waited for the CPU in this time."""
-    noise_ms: float
+    noise_ms: float = 0.0
     """What is allowed beyond that on a machine that is busy with other things; 0 in the long proof."""
-    restarted: bool
-    """Something enabled the drive before its owner had acknowledged and enabled it anew."""
-    recovered: bool
+    wrong: str = ""
+    """What happened that no time excuses: a wrong reaction, a restart. Empty where nothing did."""
 
     @property
     def over_ms(self) -> float:
         """By how much a bound is exceeded; 0 where none is."""
-        pairs = ((self.bus_ms, self.bus_bound_ms), (self.drive_ms, self.drive_bound_ms))
+        pairs = (
+            (self.way_ms, self.way_bound_ms),
+            (self.bus_ms, self.bus_bound_ms),
+            (self.drive_ms, self.drive_bound_ms),
+        )
         found = [value - bound for value, bound in pairs if value is not None and bound is not None]
         return max(0.0, *found, 0.0)
 
@@ -56,9 +61,26 @@ class Sample:
         """``void``: the machine stood still, or bridge and drives waited for its CPU, for as long as the
         bound was exceeded. It is shown, and made again."""
         excused_ms = max(self.paused_ms, self.waited_ms) + self.noise_ms
-        if self.restarted or not self.recovered or self.over_ms > excused_ms:
+        if self.wrong or self.over_ms > excused_ms:
             return "failed"
         return "void" if self.over_ms > self.noise_ms else "ok"
+
+    @property
+    def complaint(self) -> str:
+        """What is wrong with it, in a few words."""
+        if self.wrong:
+            return self.wrong
+        triples = (
+            ("on its way", self.way_ms, self.way_bound_ms),
+            ("on the bus", self.bus_ms, self.bus_bound_ms),
+            ("the drive", self.drive_ms, self.drive_bound_ms),
+        )
+        late = [
+            f"{name} after {value:.0f} ms, {bound:.0f} allowed"
+            for name, value, bound in triples
+            if value is not None and bound is not None and value > bound
+        ]
+        return "; ".join(late)
 
     def record(self) -> dict[str, object]:
         return {**asdict(self), "verdict": self.verdict}
@@ -110,15 +132,52 @@ def was_moving(rig: Rig, drive: Drive, at: float) -> bool:
     return bool(told and said) and drive.enabling(told[-1].data) and drive.enabled(said[-1].data)
 
 
-def way(rig: Rig, drive: Drive, run: Run) -> float:
-    """How long the telegram was on its way whose words these are, in seconds: from its client's sending it
-    until the bridge sent them (a change goes out at once)."""
-    return run.first - sent_at(rig, drive, run)
+def handed_on(rig: Rig, drive: Drive, enabling: Run) -> Run:
+    """The RPDO by which the bridge handed on the owner's last telegram: a change goes out at once. It is
+    ``enabling``, the last one that did; where its setpoint has an RPDO of its own, the number is in that."""
+    if not drive.setpoint_rpdo:
+        return enabling
+    runs = rig.told.runs(drive.setpoint_rpdo, enabling.first - _BEFORE_S)
+    carried = [run for run in runs if run.first <= enabling.last + _TINY_S and drive.setpoint(run.data)]
+    return carried[-1] if carried else enabling
 
 
 def sent_at(rig: Rig, drive: Drive, run: Run) -> float:
-    """When its client sent the telegram whose words these are."""
+    """When its client sent the telegram whose number this RPDO carries."""
     return rig.board.sent_at(drive.place, drive.telegram(run.data) % NUMBERS)
+
+
+def stopping(rig: Rig, drive: Drive, bus: float) -> bytes | None:
+    """The first RPDO that did not enable, from the moment ``bus`` on when the bus began to stop the drive."""
+    for run in rig.told.runs(drive.rpdo, bus):
+        if run.first >= bus and not drive.enabling(run.data):
+            return run.data
+    return None
+
+
+def keeps_setpoint(rig: Rig, drive: Drive, bus: float) -> bool:
+    """An RPDO of the setpoint alone has one, after the drive was stopped: it goes before the stop."""
+    runs = rig.told.runs(drive.setpoint_rpdo, bus) if drive.setpoint_rpdo else []
+    return any(run.last > bus + _TINY_S and drive.setpoint(run.data) for run in runs)
+
+
+def longest_pause(rig: Rig, drive: Drive, since: float) -> float:
+    """The longest time without process data of the drive on the bridge's side since then, in seconds."""
+    times = [since, *rig.heard.times(drive.tpdo, since), rig.now()]
+    return max(after - before for before, after in pairwise(times))
+
+
+def held(rig: Rig, drive: Drive, since: float) -> str:
+    """What a drive did since then that is to go on all the time; empty where it did."""
+    until = rig.now()
+    told = rig.told.runs(drive.rpdo, since)
+    if not all(drive.enabling(run.data) for run in told) or not told:
+        return "the bus has stopped it"
+    if until - told[-1].last > _SILENT_S:
+        return "the bus is silent"
+    if not all(drive.enabled(run.data) for run in rig.said.runs(drive.tpdo, since)):
+        return "it has stopped"
+    return ""
 
 
 def last_sign(rig: Rig, drive: Drive, until: float) -> float:

@@ -16,12 +16,15 @@ _PATIENCE_S: Final = 1.5
 class Recovery:
     """One drive; ``step`` again and again until it says that the drive moves."""
 
-    def __init__(self, rig: Rig, drive: Drive) -> None:
+    def __init__(self, rig: Rig, drive: Drive, *, anew: bool = False) -> None:
+        """``anew``: also where the drive moves, because its trip is only reported."""
         self._rig = rig
         self._drive = drive
         self._word = drive.family.run
         self._since = float("-inf")
         self._accepted = 0
+        if anew:
+            self._tell(drive.family.acknowledge)
 
     def step(self, now: float) -> bool:
         family = self._drive.family

@@ -12,6 +12,11 @@ from typing import Any, Final
 BEGIN: Final = "<!-- made by `make proof`: do not edit -->"
 END: Final = "<!-- end of what `make proof` makes -->"
 
+_MOST_PER_MEASUREMENT: Final = 0.01
+_MOST_AT_LEAST: Final = 3
+"""How many drives may stop without a fault of theirs: a slow machine's controllers are late. More than that
+is a bridge that stops what it should not."""
+
 Record = dict[str, Any]
 
 
@@ -138,13 +143,17 @@ def markdown(result: dict[str, Any]) -> str:
 
 
 def put_into(page: Path, result: dict[str, Any]) -> None:
-    """Replace what stands between the markers of ``page``."""
+    put_between(page, BEGIN, END, markdown(result))
+
+
+def put_between(page: Path, begin: str, end: str, made: str) -> None:
+    """Replace what stands between these markers of ``page``, them included."""
     text = page.read_text(encoding="utf-8")
-    before, found, rest = text.partition(BEGIN)
-    _, ended, after = rest.partition(END)
+    before, found, rest = text.partition(begin)
+    _, ended, after = rest.partition(end)
     if not (found and ended):
-        raise ValueError(f"{page} has no markers: {BEGIN} … {END}")
-    page.write_text(before + markdown(result) + after, encoding="utf-8")
+        raise ValueError(f"{page} has no markers: {begin} … {end}")
+    page.write_text(before + made + after, encoding="utf-8")
 
 
 def load(path: Path) -> dict[str, Any]:
@@ -157,6 +166,12 @@ def failures(result: dict[str, Any], least: int) -> list[str]:
     Each of the result's ``cells`` (fault, family, protocol) needs samples of as many rounds as inject its
     fault ``least`` times."""
     found = list(result["errors"])
+    most = max(_MOST_AT_LEAST, int(_MOST_PER_MEASUREMENT * len(result["samples"])))
+    in_vain = len(result["stopped_in_vain"])
+    if in_vain > most:
+        found.append(f"{in_vain} drives stopped beside a fault that did not concern them, {most} may")
+    if result["by_themselves"] > most:
+        found.append(f"{result['by_themselves']} drives were found stopped before a fault, {most} may be")
     seen = {(cell.fault, cell.family, cell.protocol): cell for cell in cells(result["samples"])}
     empty = [Cell(*key, ()) for key in map(tuple, result["cells"]) if key not in seen]
     for cell in [*seen.values(), *empty]:

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Final
@@ -17,6 +17,7 @@ from tests.proof import machine
 from tests.proof.board import Board
 from tests.proof.drives import BRIDGE_SIDE, DRIVE_SIDE, DRIVES, PORTS, PROTOCOLS, SERVERS, Drive, write_site
 from tests.proof.recovery import Recovery
+from tests.proof.strangers import Strangers
 from tests.proof.waits import follow
 from tests.proof.witness import Clock, Witness
 from tests.support.process import REPOSITORY, Process, running
@@ -26,6 +27,7 @@ _LIMIT_S: Final = 120.0
 _HOUR_S: Final = 3600.0
 BRIDGE: Final = "bridge"
 SIMULATION: Final = "drives"
+FRONT: Final = "front"
 _MAIN_THREAD: Final = ("chrt", "--reset-on-fork", "--other", "0")
 _BRIDGE_AHEAD: Final = (*_MAIN_THREAD, "nice", "-n", "-20")
 """Its main thread goes first, its front and zenoh's threads do not, as in systemd/drivebridge.service; but
@@ -42,7 +44,7 @@ class Stuck(Exception):
 class Owner:
     """The owner of one protocol's drives: a process that can be stopped, killed and replaced."""
 
-    def __init__(self, folder: Path, stack: ExitStack, protocol: str, board: Path) -> None:
+    def __init__(self, folder: Path, stack: ExitStack, protocol: str, board: Path, watched: Path) -> None:
         command = [sys.executable, "-m", "tests.proof.owner", protocol, str(board)]
         log = stack.enter_context((folder / f"owner_{protocol}.log").open("wb"))
         self._nursery = subprocess.Popen(
@@ -50,6 +52,7 @@ class Owner:
         )
         stack.callback(self._end)
         self.protocol = protocol
+        self._watched = watched
         self.pid = 0
 
     def wait_loaded(self) -> None:
@@ -62,6 +65,7 @@ class Owner:
         assert self._nursery.stdout
         self._nursery.stdin.write("\n")
         self.pid = int(self._nursery.stdout.readline())
+        follow(self._watched, self.protocol, self.pid)
 
     def signal(self, number: signal.Signals) -> None:
         os.kill(self.pid, number)
@@ -78,10 +82,13 @@ class Owner:
 
 
 class Rig:
-    """Everything that runs; ``folder`` is the proof's own."""
+    """Everything that runs; ``folder`` is the proof's own. The bridge alone is of the source ``tree``."""
 
-    def __init__(self, folder: Path, stack: ExitStack) -> None:
+    def __init__(self, folder: Path, stack: ExitStack, tree: Path = REPOSITORY) -> None:
         self.folder = folder
+        self.tree = tree
+        self.patience_s = 60.0
+        """How long is waited for what has to come back."""
         self._stack = stack
         self._bridges = ExitStack()
         stack.enter_context(self._bridges)
@@ -100,6 +107,8 @@ class Rig:
         self.worst_case_ms: dict[Drive, int] = {}
         """What the bridge publishes: its own bound, and that of a drive without a bridge."""
         self.worst_case_bridge_ms: dict[Drive, int] = {}
+        self.strangers: Strangers | None = None
+        """Clients that own nothing, while they are there."""
         self.hours = -1
         """Which way the clock was stepped last."""
         self.noise_ms = 0.0
@@ -115,13 +124,15 @@ class Rig:
     def start(self) -> None:
         self._stack.callback(self._restore)
         self.gateway.open()
-        self.told = Witness(BRIDGE_SIDE, [drive.rpdo for drive in DRIVES], self.clock)
+        rpdos = {can_id for drive in DRIVES for can_id in (drive.rpdo, drive.number_id)}
+        self.told = Witness(BRIDGE_SIDE, sorted(rpdos), self.clock)
         self.heard = Witness(BRIDGE_SIDE, _from_nodes(DRIVES), self.clock)
         self.said = Witness(DRIVE_SIDE, _from_nodes(DRIVES), self.clock)
         for witness in (self.told, self.heard, self.said):
             self._stack.callback(witness.close)
         self.watched.mkdir()
-        watch = [sys.executable, "-m", "tests.proof.waits", str(self.watched), BRIDGE, SIMULATION]
+        watch = [sys.executable, "-m", "tests.proof.waits", str(self.watched)]
+        watch += [BRIDGE, FRONT, SIMULATION, *PROTOCOLS]
         self._stack.enter_context(running(self.folder, "watch", *watch))
         drives = [sys.executable, "-m", "bridge", "simulate", str(self._drives)]
         simulate = running(self.folder, "simulate", *_DRIVES_AHEAD, *drives)
@@ -129,7 +140,7 @@ class Rig:
         simulation.wait_output("simulating")
         follow(self.watched, SIMULATION, simulation.pid)
         self.owners = {
-            protocol: Owner(self.folder, self._stack, protocol, self.folder / "board")
+            protocol: Owner(self.folder, self._stack, protocol, self.folder / "board", self.watched)
             for protocol in PROTOCOLS
         }
         self.start_bridge()
@@ -142,16 +153,22 @@ class Rig:
         """Start the service and wait until all it serves is there."""
         self._starts += 1
         name = f"run_{self._starts}"
-        command = [*_BRIDGE_AHEAD, sys.executable, "-m", "bridge", "run", str(self._site)]
+        source = ("env", f"PYTHONPATH={self.tree}")
+        command = [*source, *_BRIDGE_AHEAD, sys.executable, "-m", "bridge", "run", str(self._site)]
         self.bridge = self._bridges.enter_context(running(self.disk.folder, name, *command))
         self.bridge.wait_output("OPC UA on", _LIMIT_S)
         follow(self.watched, BRIDGE, self.bridge.pid)
+        self.follow_front()
+
+    def follow_front(self) -> None:
+        """It may be another one."""
+        follow(self.watched, FRONT, self.front)
 
     def kill_bridge(self) -> float:
         """The bus process dies; its front goes with it."""
         assert self.bridge
         now = time.monotonic()
-        self.bridge.signal(signal.SIGKILL)
+        self.bridge.popen.kill()
         self.bridge.popen.wait()
         return now
 
@@ -185,9 +202,9 @@ class Rig:
         for drive in DRIVES:
             for leaf, bounds in leaves.items():
                 [answer] = json.loads(next(answers))
-                if not answer["v"]:
+                if not answer["v"] and drive.reaction != "hold":
                     raise Stuck(f"{drive.path} has no {leaf}: {answer}")
-                bounds[drive] = int(answer["v"])
+                bounds[drive] = int(answer["v"] or 0)
 
     def _restore(self) -> None:
         """The machine as it was."""
@@ -201,6 +218,8 @@ class Rig:
         """Whatever a round that failed has left: everything is as it was at the start."""
         for owner in self.owners.values():
             owner.kill()
+        if self.strangers:
+            self.strangers.end()
         machine.restore_networks(list(SERVERS.values()))
         machine.set_link(BRIDGE_SIDE, up=True)
         self.gateway.open()
@@ -224,12 +243,15 @@ class Rig:
             return False
         return drive.enabled(said.data) and drive.speed(said.data) != 0 and drive.enabling(told.data)
 
+    def says(self, drive: Drive) -> bool:
+        """The bridge hears its process data."""
+        said = self.heard.last(drive.tpdo)
+        return said is not None and time.monotonic() - said.last <= _FRESH_S
+
     def talks(self, drive: Drive) -> bool:
         """Process data go both ways."""
-        said, told = self.heard.last(drive.tpdo), self.told.last(drive.rpdo)
-        if said is None or told is None:
-            return False
-        return time.monotonic() - min(said.last, told.last) <= _FRESH_S
+        told = self.told.last(drive.rpdo)
+        return self.says(drive) and told is not None and time.monotonic() - told.last <= _FRESH_S
 
     def wait(self, holds: Callable[[], bool], limit_s: float, what: str) -> float:
         """Until it holds; how long that took, in seconds."""
@@ -240,10 +262,11 @@ class Rig:
             time.sleep(0.03)
         return time.monotonic() - begin
 
-    def run_all(self, drives: Iterable[Drive] = DRIVES, limit_s: float = _LIMIT_S) -> None:
-        """Acknowledge, make ready, enable, each drive by its owner, until all of them move."""
-        going = [Recovery(self, drive) for drive in drives]
-        end = time.monotonic() + limit_s
+    def run_all(self, anew: Collection[Drive] = ()) -> None:
+        """Acknowledge, make ready, enable, each drive by its owner, until all of them move; those of ``anew``
+        also where they do."""
+        going = [Recovery(self, drive, anew=drive in anew) for drive in DRIVES]
+        end = time.monotonic() + 2 * self.patience_s
         while going:
             now = time.monotonic()
             going = [one for one in going if not one.step(now)]

@@ -6,25 +6,27 @@ import random
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Final
 
 from tests.proof import measure
-from tests.proof.drives import DRIVES, OWNER_PERIOD_S, REACTION_MS, RPDO_PERIOD_MS, Drive
+from tests.proof.drives import DEADMAN_MS, DRIVES, OWNER_PERIOD_S, REACTION_MS, RPDO_PERIOD_MS, WAY_MS, Drive
 from tests.proof.faults import Fault
 from tests.proof.measure import Sample
-from tests.proof.rig import BRIDGE, SIMULATION, Rig, Stuck
+from tests.proof.rig import BRIDGE, FRONT, SIMULATION, Rig, Stuck
 from tests.proof.waits import paused_ms, waited_ms
 
 _STOPPED_S: Final = 5.0
 _QUIET_S: Final = 0.4
 """How long is waited that something does *not* stop the drives."""
-_TALKS_S: Final = 60.0
 _LOOKS: Final = 5
 _LOOK_S: Final = 1.0
 _BEFORE_MS: Final = RPDO_PERIOD_MS + REACTION_MS
 """The bridge, or the drive, has to begin its stop that long before its bound."""
-_HOLD_S: Final = 0.45
-"""How long the owners go on writing "run" after everything is back: nothing may start by that."""
+_HOLD_S: Final = 3.0
+"""How long the owners go on writing "run" after everything is back and their telegrams are taken: nothing may
+start by that."""
+_WRITES_S: Final = 30.0
 
 
 def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample]:
@@ -35,37 +37,76 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
         since = time.monotonic()
         time.sleep(_QUIET_S)
         _wait_handed_on(rig, fault, since, say)
-    concerned = [drive for drive in DRIVES if drive.protocol in fault.protocols]
+    concerned = [drive for drive in DRIVES if not fault.goes_on(drive)]
     others = [drive for drive in DRIVES if drive.protocol not in fault.protocols]
+    holding = [drive for drive in DRIVES if fault.goes_on(drive) and drive not in others]
     began = time.monotonic()
     # At any time between two telegrams.
     time.sleep(random.uniform(0.0, OWNER_PERIOD_S))
     moment = fault.inject(rig)
     _let_pass(rig, fault, concerned, moment)
-    still = [drive for drive in concerned if not measure.was_moving(rig, drive, moment)]
+    still = [drive for drive in concerned + holding if not measure.was_moving(rig, drive, moment)]
     rig.by_themselves += len(still)
     stopped = _wait_stopped(rig, fault, [drive for drive in concerned if drive not in still], moment)
-    ways_ms = _ways_ms(rig, fault, list(stopped), moment)
+    ways = _ways(rig, fault, list(stopped), moment)
+    words = {drive: measure.stopping(rig, drive, times[0]) for drive, times in stopped.items()}
     _all_go_on(rig, others, fault, "of another protocol")
+    before = {drive: rig.board.accepted(drive.place)[0] for drive in concerned}
     fault.undo(rig)
     _wait_talking(rig, concerned)
+    _wait_writing(rig, before)
     time.sleep(_HOLD_S)
-    restarted = {drive: measure.was_enabled(rig, drive, *times) for drive, times in stopped.items()}
     samples = [
-        _sample(rig, fault, drive, moment, ways_ms.get(drive), restarted=restarted[drive])
-        for drive in stopped
+        _sample(rig, fault, drive, moment, ways.get(drive), _wrong(rig, fault, drive, times, words[drive]))
+        for drive, times in stopped.items()
     ]
-    for drive, sample in zip(stopped, samples, strict=True):
+    samples += _held(rig, fault, [drive for drive in holding if drive not in still], moment)
+    for sample in samples:
         if sample.verdict != "ok":
+            drive = next(drive for drive in DRIVES if drive.path == sample.drive)
             say(f"{sample.verdict.upper()}: {sample}\n{measure.trace(rig, drive, moment)}")
     missing = [drive for drive in concerned if drive not in stopped and drive not in still]
     if missing:
         raise Stuck(
             f"{fault.name}: not stopped: {', '.join(f'{one.path} ({one.protocol})' for one in missing)}"
         )
-    rig.run_all()
+    rig.run_all(anew=holding)
     say(f"{fault.name}: {time.monotonic() - began:.1f} s")
     return samples
+
+
+def _wrong(rig: Rig, fault: Fault, drive: Drive, times: tuple[float, float], word: bytes | None) -> str:
+    """What no time excuses. ``word`` is the first RPDO that did not enable, before the fault was undone."""
+    if measure.was_enabled(rig, drive, *times):
+        return "it was enabled again before its owner had acknowledged and enabled it anew"
+    if not fault.of_controller:
+        return ""
+    if drive.reaction == "silence":
+        return f"stopped by {word.hex()}, and not by silence" if word else ""
+    if not fault.leaves_silence and (word is None or not drive.reacts(word)):
+        return f"stopped by {word.hex() if word else 'nothing'}, and not by {drive.reaction}"
+    return "its setpoint goes on" if measure.keeps_setpoint(rig, drive, times[0]) else ""
+
+
+def _held(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> list[Sample]:
+    """Drives whose reaction is to hold. One that stops because the machine was slow for its bridge or itself
+    counts as stopped in vain."""
+    samples: list[Sample] = []
+    for drive in drives:
+        wrong = measure.held(rig, drive, moment)
+        if wrong and _was_slow(rig, drive, moment):
+            rig.stopped_in_vain.append(f"{fault.name}: {drive.path} ({drive.protocol}), which is to hold")
+            continue
+        text = f"it is to hold, and {wrong}" if wrong else ""
+        samples.append(Sample(fault.name, drive.family.name, drive.protocol, drive.path, wrong=text))
+    return samples
+
+
+def _was_slow(rig: Rig, drive: Drive, since: float) -> bool:
+    """The bridge hung for longer than its dead-man time, or the drive was not heard for as long."""
+    now = time.monotonic()
+    waited = max(paused_ms(rig.watched, since, now), waited_ms(rig.watched, BRIDGE, since, now))
+    return max(waited, measure.longest_pause(rig, drive, since) * 1000) >= DEADMAN_MS
 
 
 def _all_move(rig: Rig, say: Callable[[str], None]) -> None:
@@ -97,8 +138,10 @@ def _wait_handed_on(rig: Rig, fault: Fault, since: float, say: Callable[[str], N
 
 def _was_handed_on(rig: Rig, drive: Drive, since: float) -> bool:
     """The drive is enabled by a telegram that its owner sent after ``since``."""
-    told = rig.told.last(drive.rpdo)
-    return told is not None and drive.enabling(told.data) and measure.sent_at(rig, drive, told) > since
+    told, number = rig.told.last(drive.rpdo), rig.told.last(drive.number_id)
+    if told is None or number is None or not drive.enabling(told.data):
+        return False
+    return measure.sent_at(rig, drive, number) > since
 
 
 def _let_pass(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> None:
@@ -117,7 +160,7 @@ def _wait_stopped(
     end = time.monotonic() + _STOPPED_S
     while len(stopped) < len(drives) and time.monotonic() < end:
         for drive in drives:
-            bus = measure.bus_stop(rig, drive, moment, silent=fault.leaves_silence)
+            bus = measure.bus_stop(rig, drive, moment, silent=fault.falls_silent(drive))
             own = measure.drive_stop(rig, drive, moment)
             if fault.drive_bound is None:
                 own = measure.boot_up(rig, drive, moment)
@@ -128,61 +171,99 @@ def _wait_stopped(
 
 
 def _wait_talking(rig: Rig, drives: list[Drive]) -> None:
-    rig.wait(lambda: all(rig.talks(drive) for drive in drives), _TALKS_S, "process data flow again")
+    """One that has tripped into silence says nothing until it is acknowledged."""
+    rig.wait(
+        lambda: all(
+            rig.says(drive) and (drive.reaction == "silence" or rig.talks(drive)) for drive in drives
+        ),
+        rig.patience_s,
+        "process data flow again",
+    )
 
 
-def _ways_ms(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> dict[Drive, float]:
-    """How long each last telegram was on its way: before new owners number theirs from the start."""
-    if fault.reference != "telegram":
+def _wait_writing(rig: Rig, before: dict[Drive, int]) -> None:
+    """Every owner's telegrams are taken again, which move nothing."""
+    rig.wait(
+        lambda: all(rig.board.accepted(drive.place)[0] > count for drive, count in before.items()),
+        _WRITES_S,
+        "telegrams are taken again",
+    )
+
+
+def _ways(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> dict[Drive, tuple[float, float]]:
+    """When each last telegram was sent, and when it was handed on: before new owners number theirs from the
+    start."""
+    if not fault.of_controller:
         return {}
-    stops = {drive: measure.bus_stop(rig, drive, moment, silent=False) for drive in drives}
-    return {drive: measure.way(rig, drive, stop[1]) * 1000 for drive, stop in stops.items() if stop}
+    found: dict[Drive, tuple[float, float]] = {}
+    for drive in drives:
+        stop = measure.bus_stop(rig, drive, moment, silent=fault.falls_silent(drive))
+        if stop:
+            run = measure.handed_on(rig, drive, stop[1])
+            found[drive] = measure.sent_at(rig, drive, run), run.first
+    return found
 
 
 def _sample(
-    rig: Rig, fault: Fault, drive: Drive, moment: float, way_ms: float | None, *, restarted: bool
+    rig: Rig, fault: Fault, drive: Drive, moment: float, way: tuple[float, float] | None, wrong: str
 ) -> Sample:
-    bus = measure.bus_stop(rig, drive, moment, silent=fault.leaves_silence)
+    bus = measure.bus_stop(rig, drive, moment, silent=fault.falls_silent(drive))
     own = measure.drive_stop(rig, drive, moment) if fault.drive_bound else None
     begin = moment
-    if bus is not None and fault.reference == "telegram":
-        begin = bus[1].first
+    if way is not None:
+        begin = way[1]
     elif fault.reference == "sign of life":
         begin = measure.last_sign(rig, drive, moment)
     elif fault.reference == "boot-up":
         begin = measure.boot_up(rig, drive, moment) or moment
     assert bus is not None
-    bus_bound_ms = fault.bus_bound(rig, drive)
-    drive_bound_ms = fault.drive_bound(rig, drive) if fault.drive_bound else None
-    paused, waited = _held_up_ms(rig, begin, (bus[0], bus_bound_ms), (own, drive_bound_ms))
+    spans = [_Span(begin, bus[0], fault.bus_bound(rig, drive), (BRIDGE,))]
+    if own is not None and fault.drive_bound:
+        spans.append(_Span(begin, own, fault.drive_bound(rig, drive), (BRIDGE, SIMULATION)))
+    if way is not None:
+        busy = (BRIDGE, drive.protocol, *([FRONT] if drive.protocol == "opcua" else []))
+        spans.append(_Span(*way, WAY_MS[drive.protocol], busy))
+    paused, waited = _held_up_ms(rig, spans)
     return Sample(
         fault.name,
         drive.family.name,
         drive.protocol,
         drive.path,
-        bus_ms=(bus[0] - begin) * 1000,
-        bus_bound_ms=bus_bound_ms,
+        bus_ms=spans[0].ms,
+        bus_bound_ms=spans[0].bound_ms,
         drive_ms=None if own is None else (own - begin) * 1000,
-        drive_bound_ms=drive_bound_ms,
-        way_ms=way_ms,
+        drive_bound_ms=fault.drive_bound(rig, drive) if fault.drive_bound else None,
+        way_ms=None if way is None else (way[1] - way[0]) * 1000,
+        way_bound_ms=None if way is None else WAY_MS[drive.protocol],
         paused_ms=paused,
         waited_ms=waited,
         noise_ms=rig.noise_ms,
-        restarted=restarted,
-        recovered=True,
+        wrong=wrong,
     )
 
 
-def _held_up_ms(
-    rig: Rig, begin: float, bus: tuple[float, float], drive: tuple[float | None, float | None]
-) -> tuple[float, float]:
-    """The pauses of the machine, and the waiting of bridge and drives, from ``_BEFORE_MS`` before a bound
-    that was exceeded until the stop; the least of them where both bounds were, 0 where none was."""
+@dataclass(frozen=True, slots=True)
+class _Span:
+    """From ``begin`` to ``end``, which may take ``bound_ms``; ``busy`` may have waited for the CPU in it."""
+
+    begin: float
+    end: float
+    bound_ms: float
+    busy: tuple[str, ...]
+
+    @property
+    def ms(self) -> float:
+        return (self.end - self.begin) * 1000
+
+
+def _held_up_ms(rig: Rig, spans: list[_Span]) -> tuple[float, float]:
+    """The pauses of the machine, and the waiting of those who were busy, from ``_BEFORE_MS`` before a bound
+    that was exceeded until the end; the least of them where several were, 0 where none was."""
     found: list[tuple[float, float]] = []
-    for stop, bound_ms, watched in ((*bus, (BRIDGE,)), (*drive, (BRIDGE, SIMULATION))):
-        if stop is None or bound_ms is None or (stop - begin) * 1000 <= bound_ms:
+    for span in spans:
+        if span.ms <= span.bound_ms:
             continue
-        since = begin + (bound_ms - _BEFORE_MS) / 1000
-        waited = sum(waited_ms(rig.watched, name, since, stop) for name in watched)
-        found.append((paused_ms(rig.watched, since, stop), waited))
+        since = max(span.begin, span.begin + (span.bound_ms - _BEFORE_MS) / 1000)
+        waited = sum(waited_ms(rig.watched, name, since, span.end) for name in span.busy)
+        found.append((paused_ms(rig.watched, since, span.end), waited))
     return min(found, key=max, default=(0.0, 0.0))

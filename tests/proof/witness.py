@@ -16,9 +16,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.receiver import BATCH, Receiver, Stamps
-
+_FRAME: Final = struct.Struct("=IB3x8s")
+"""struct can_frame of <linux/can.h>: identifier with flags, length, data."""
+_ERROR_FRAME: Final = 0x2000_0000
 _FILTER: Final = struct.Struct("=II")
 _SOL_CAN_RAW: Final = 101
 _FILTERS: Final = 1
@@ -28,7 +28,11 @@ _MOST_RUNS: Final = 2_000
 _MOST_TIMES: Final = 500
 _LOOK_S: Final = 0.03
 """The kernel has stamped and kept the frames: they are fetched together, which costs the machine less."""
-_AS_STAMPED: Final = Stamps(0.0, 0.0, float("inf"))
+_TIMESTAMPNS, _OVERFLOW = 35, 40
+"""SO_TIMESTAMPNS and SO_RXQ_OVFL of <asm-generic/socket.h>; their control messages have the same numbers."""
+_STAMP: Final = struct.Struct("@ll")
+_COUNT: Final = struct.Struct("@I")
+_CONTROL_BYTES: Final = socket.CMSG_SPACE(_STAMP.size) + socket.CMSG_SPACE(_COUNT.size)
 
 
 @dataclass(slots=True)
@@ -73,26 +77,36 @@ class Witness:
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
         filters = b"".join(_FILTER.pack(can_id, _EXACT) for can_id in can_ids)
         self._socket.setsockopt(_SOL_CAN_RAW, _FILTERS, filters)
+        self._socket.setsockopt(socket.SOL_SOCKET, _TIMESTAMPNS, 1)
+        self._socket.setsockopt(socket.SOL_SOCKET, _OVERFLOW, 1)
         self._socket.bind((channel,))
-        self._receiver = Receiver(self._socket)
+        self._socket.setblocking(False)
+        self.lost = 0
+        """Frames that the kernel could not keep."""
         self._running = True
         self._thread = threading.Thread(target=self._run, daemon=True, name=f"witness {channel}")
         self._thread.start()
 
     def _run(self) -> None:
         while self._running:
-            frames: list[Frame] = []
-            with suppress(OSError):  # the interface is down for a while
-                while self._receiver.receive(frames, _AS_STAMPED)[0] == BATCH:
-                    pass
-            for frame in frames:
-                self._note(frame.can_id, frame.data, self._clock.monotonic(frame.time))
+            with suppress(OSError):  # nothing more is there, or the interface is down for a while
+                while True:
+                    self._receive()
             time.sleep(_LOOK_S)
 
-    @property
-    def lost(self) -> int:
-        """Frames that the kernel could not keep."""
-        return self._receiver.drops
+    def _receive(self) -> None:
+        frame, control, _, _ = self._socket.recvmsg(_FRAME.size, _CONTROL_BYTES)
+        can_id, length, data = _FRAME.unpack(frame)
+        if can_id & _ERROR_FRAME:
+            return
+        stamp = 0.0
+        for _, kind, message in control:
+            if kind == _TIMESTAMPNS:
+                seconds, nanoseconds = _STAMP.unpack(message)
+                stamp = seconds + nanoseconds * 1e-9
+            elif kind == _OVERFLOW:
+                (self.lost,) = _COUNT.unpack(message)
+        self._note(can_id, data[:length], self._clock.monotonic(stamp))
 
     def _note(self, can_id: int, data: bytes, at: float) -> None:
         self._times[can_id].append(at)
@@ -106,6 +120,10 @@ class Witness:
         """Everything that was seen after ``since``, oldest first, begun or still going on then."""
         seen = list(self._tracks[can_id])
         return seen[bisect_left(seen, since, key=lambda run: run.last) :]
+
+    def times(self, can_id: int, since: float) -> list[float]:
+        """When this identifier was seen after ``since``, as far as it is kept."""
+        return [at for at in list(self._times[can_id]) if at > since]
 
     def last_before(self, can_id: int, moment: float) -> float | None:
         """When this identifier was seen last before ``moment``, within the last seconds."""

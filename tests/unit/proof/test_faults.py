@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from itertools import pairwise
+from pathlib import Path
+from typing import get_args
 
 import pytest
 
+from bridge.config import Reaction
+from tests.proof.drives import DRIVES
 from tests.proof.faults import FAULTS, Fault
+from tests.support.process import REPOSITORY
+
+_PROOF = Path(REPOSITORY) / "tests" / "proof"
+_PROGRAMS = ("__main__", "owner", "__init__")
+"""They do something when they are imported."""
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
@@ -20,4 +31,20 @@ def test_every_fault_is_injected_as_often_as_there_are_cycles(fault: Fault, cycl
 
 
 def test_all_faults_of_the_plan_are_there() -> None:
-    assert len({fault.name for fault in FAULTS}) == len(FAULTS) == 15
+    assert len({fault.name for fault in FAULTS}) == len(FAULTS) >= 20
+
+
+def test_every_reaction_and_every_kind_of_rpdo_is_there() -> None:
+    assert {drive.reaction for drive in DRIVES} == set(get_args(Reaction))
+    assert any(drive.is_synchronous for drive in DRIVES)
+    assert any(drive.setpoint_rpdo for drive in DRIVES)
+
+
+def test_who_judges_imports_nothing_of_what_is_judged() -> None:
+    """The harness runs the program; it shares no code with it, not even by way of others."""
+    modules = [f"tests.proof.{path.stem}" for path in _PROOF.glob("*.py") if path.stem not in _PROGRAMS]
+    script = f"import sys; import {', '.join(modules)}; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], cwd=REPOSITORY, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert [name for name in done.stdout.split() if name.partition(".")[0] == "bridge"] == []
+    assert {"tests.proof.witness", "tests.proof.measure", "tests.proof.drives"} <= set(modules)

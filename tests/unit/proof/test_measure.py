@@ -7,8 +7,19 @@ from typing import Any, cast
 
 import pytest
 
-from tests.proof.drives import DRIVES, NORD, Drive
-from tests.proof.measure import Sample, bus_stop, drive_stop, was_enabled, was_moving
+from tests.proof.drives import DRIVES, Drive
+from tests.proof.families import NORD
+from tests.proof.measure import (
+    Sample,
+    bus_stop,
+    drive_stop,
+    handed_on,
+    held,
+    keeps_setpoint,
+    stopping,
+    was_enabled,
+    was_moving,
+)
 from tests.proof.rig import Rig
 from tests.proof.witness import Run
 
@@ -119,6 +130,44 @@ def test_an_enabling_word_or_a_turn_after_the_stop_is_a_restart() -> None:
     assert was_enabled(scene(told=told, said=turns), FU1, 10.45, 10.3)
 
 
+FAN = next(drive for drive in DRIVES if drive.setpoint_rpdo)
+RUN, QUICK_STOP = bytes.fromhex("7f00"), bytes.fromhex("0300")
+
+
+def test_where_the_setpoint_has_an_rpdo_of_its_own_the_telegram_is_told_by_that() -> None:
+    rig = scene(told=[Run(9.0, 12.0, RUN)], drive=FAN)
+    last = Run(11.0, 11.9, (FAN.family.setpoint + 7).to_bytes(2, "little"))
+    rig.told.frames[FAN.setpoint_rpdo] = [Run(9.0, 10.9, b"\xe8\x03"), last, Run(12.1, 13.0, bytes(2))]
+    found = handed_on(rig, FAN, Run(9.0, 12.0, RUN))
+    assert found == last
+    assert FAN.telegram(found.data) == 7
+
+
+def test_a_setpoint_that_goes_on_after_the_stop_is_seen() -> None:
+    rig = scene(told=[Run(9.0, 12.0, RUN), Run(12.1, 13.0, QUICK_STOP)], drive=FAN)
+    rig.told.frames[FAN.setpoint_rpdo] = [Run(9.0, 12.0, b"\xe8\x03"), Run(12.1, 13.0, bytes(2))]
+    assert not keeps_setpoint(rig, FAN, 12.1)
+    rig.told.frames[FAN.setpoint_rpdo] = [Run(9.0, 13.0, b"\xe8\x03")]
+    assert keeps_setpoint(rig, FAN, 12.1)
+
+
+def test_the_reaction_is_the_first_word_that_does_not_enable() -> None:
+    rig = scene(told=[Run(9.0, 12.0, ENABLE), Run(12.1, 13.0, bytes.fromhex("7d04000000000000"))])
+    assert stopping(rig, FU1, 12.1) == bytes.fromhex("7d04000000000000")
+    assert FU1.reaction == "disable_voltage"
+    assert FU1.reacts(bytes.fromhex("7d04000000000000"))
+    assert not FU1.reacts(STOP), "a ramp"
+    assert not FU1.reacts(bytes.fromhex("7d04010000000000")), "a setpoint"
+
+
+def test_a_drive_that_is_to_hold_goes_on_all_the_time() -> None:
+    told, said = [Run(9.0, 19.9, ENABLE)], [Run(9.0, 19.9, RUNNING)]
+    assert held(scene(told=told, said=said), FU1, 10.0) == ""
+    assert held(scene(told=[*told, Run(19.95, 20.0, STOP)], said=said), FU1, 10.0) == "the bus has stopped it"
+    assert held(scene(told=[Run(9.0, 19.0, ENABLE)], said=said), FU1, 10.0) == "the bus is silent"
+    assert held(scene(told=told, said=[*said, Run(19.95, 20.0, READY)]), FU1, 10.0) == "it has stopped"
+
+
 SAMPLE = Sample(
     fault="owner killed",
     family=NORD.name,
@@ -129,11 +178,10 @@ SAMPLE = Sample(
     drive_ms=620.0,
     drive_bound_ms=720.0,
     way_ms=3.0,
+    way_bound_ms=250.0,
     paused_ms=0.0,
     waited_ms=0.0,
     noise_ms=0.0,
-    restarted=False,
-    recovered=True,
 )
 
 
@@ -148,8 +196,9 @@ SAMPLE = Sample(
         ({"bus_ms": 600.0, "waited_ms": 30.0}, "void"),
         ({"bus_ms": 600.0, "waited_ms": 29.0}, "failed"),
         ({"bus_ms": 600.0, "noise_ms": 150.0}, "ok"),
-        ({"restarted": True}, "failed"),
-        ({"recovered": False}, "failed"),
+        ({"wrong": "it is to hold"}, "failed"),
+        ({"way_ms": 251.0}, "failed"),
+        ({"way_ms": 260.0, "waited_ms": 10.0}, "void"),
         ({"drive_ms": None, "drive_bound_ms": None}, "ok"),
     ],
 )

@@ -89,6 +89,16 @@ def test_a_round_that_injects_a_fault_several_times_counts_as_often() -> None:
     assert failures(found, 7) == ["owner killed, NORD SK TU4-CAO, modbus: only 2 samples of 3"]
 
 
+def test_drives_that_stop_without_a_fault_of_theirs_fail_the_proof_where_they_are_many() -> None:
+    some = [record() for _ in range(500)]
+    assert failures(result(*some, by_themselves=5, stopped_in_vain=["a"] * 5), 1) == []
+    found = failures(result(*some, by_themselves=6, stopped_in_vain=["a"] * 6), 1)
+    assert found == [
+        "6 drives stopped beside a fault that did not concern them, 5 may",
+        "6 drives were found stopped before a fault, 5 may be",
+    ]
+
+
 def test_errors_of_any_machine_fail_the_proof() -> None:
     both = merge([result(record()), result(record(), errors=["bus-off: not stopped"])])
     assert (both["machines"], len(both["samples"])) == (2, 2)

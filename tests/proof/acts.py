@@ -1,0 +1,241 @@
+"""What is done to the plant, and undone."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable
+from typing import Final
+
+from tests.proof import machine
+from tests.proof.drives import BRIDGE_SIDE, DRIVE_SIDE, DRIVES, FIELDBUS_TIMEOUT_MS, SERVERS, drives_of
+from tests.proof.rig import Rig
+from tests.proof.strangers import Strangers, release
+
+Inject = Callable[[Rig], float]
+"""Gives the moment of the fault, in seconds of the monotonic clock."""
+
+PAUSED_S: Final = 0.6
+"""Longer than the dead-man time, shorter than an owner may be silent."""
+_SHORT_S: Final = 0.35
+"""Shorter than the dead-man time."""
+_FLAP_S: Final = 0.05
+_BEFORE_S: Final = 0.03
+_HANDED_ON_S: Final = 0.15
+_BLOCKED_S: Final = 1.0
+_HOUR_S: Final = 3600.0
+_FRONT_S: Final = 90.0
+
+
+def signal_owners(number: signal.Signals) -> Inject:
+    def inject(rig: Rig) -> float:
+        now = time.monotonic()
+        for owner in rig.owners.values():
+            owner.signal(number)
+        return now
+
+    return inject
+
+
+def stop_owners(rig: Rig) -> float:
+    return signal_owners(signal.SIGSTOP)(rig)
+
+
+def continue_owners(rig: Rig) -> None:
+    signal_owners(signal.SIGCONT)(rig)
+
+
+def new_owners(rig: Rig) -> None:
+    for owner in rig.owners.values():
+        owner.start()
+
+
+def cut(rig: Rig) -> float:
+    now = time.monotonic()
+    machine.cut_networks(list(SERVERS.values()))
+    return now
+
+
+def uncut(rig: Rig) -> None:
+    machine.restore_networks(list(SERVERS.values()))
+
+
+def vanish(rig: Rig) -> float:
+    """The owners' machine is switched off: no FIN, no RST, nothing; the bridge keeps their connections."""
+    now = cut(rig)
+    signal_owners(signal.SIGKILL)(rig)
+    return now
+
+
+def come_back(rig: Rig) -> None:
+    uncut(rig)
+    new_owners(rig)
+
+
+def signal_front(number: signal.Signals) -> Inject:
+    def inject(rig: Rig) -> float:
+        now = time.monotonic()
+        os.kill(rig.front, number)
+        return now
+
+    return inject
+
+
+def wait_front(rig: Rig) -> None:
+    """The owners stand still meanwhile: on one CPU a front takes twice as long to start beside them."""
+    before = rig.fronts_started()
+    stop_owners(rig)
+    rig.wait(lambda: rig.fronts_started() > before, _FRONT_S, "the front is back")
+    rig.follow_front()
+    continue_owners(rig)
+
+
+def renew_bridge(rig: Rig) -> None:
+    stop_owners(rig)
+    rig.renew_bridge()
+    continue_owners(rig)
+
+
+def continue_front(rig: Rig) -> None:
+    signal_front(signal.SIGCONT)(rig)
+
+
+def stop_bridge(rig: Rig) -> float:
+    assert rig.bridge
+    now = time.monotonic()
+    rig.bridge.signal(signal.SIGSTOP)
+    time.sleep(_BLOCKED_S)
+    return now
+
+
+def continue_bridge(rig: Rig) -> None:
+    assert rig.bridge
+    rig.bridge.signal(signal.SIGCONT)
+
+
+def block_loop(rig: Rig) -> float:
+    """The thread of the event loop alone stands still; zenoh's threads and the front go on."""
+    assert rig.bridge
+    return machine.block_thread(rig.bridge.pid, _BLOCKED_S)
+
+
+def nothing(rig: Rig) -> None:
+    pass
+
+
+def full(rig: Rig) -> None:
+    rig.disk.fill()
+
+
+def empty(rig: Rig) -> None:
+    rig.disk.empty()
+    continue_owners(rig)
+
+
+def step_clock(rig: Rig) -> None:
+    """Forwards and backwards by turns."""
+    rig.hours = -rig.hours
+    machine.step_clock(rig.hours * _HOUR_S)
+    rig.clock.stepped()
+
+
+def link_down(rig: Rig) -> float:
+    return machine.set_link(BRIDGE_SIDE, up=False)
+
+
+def link_up(rig: Rig) -> None:
+    machine.set_link(BRIDGE_SIDE, up=True)
+
+
+def bus_off(rig: Rig) -> float:
+    return machine.bus_off()
+
+
+def bus_restarted(rig: Rig) -> None:
+    machine.bus_restarted()
+
+
+def silence(rig: Rig) -> float:
+    rig.gateway.silence_drives()
+    return time.monotonic()
+
+
+def speak(rig: Rig) -> None:
+    rig.gateway.restore()
+
+
+def reboot(rig: Rig) -> float:
+    """NMT reset node, to all; the bridge does not see it (``machine.FROM_DRIVES``)."""
+    return machine.send(DRIVE_SIDE, 0x000, bytes((0x81, 0x00)))
+
+
+def pause_bridge(rig: Rig) -> float:
+    """Stopped and continued before anything but the dead-man time is over."""
+    assert rig.bridge
+    now = time.monotonic()
+    rig.bridge.signal(signal.SIGSTOP)
+    time.sleep(PAUSED_S)
+    rig.bridge.signal(signal.SIGCONT)
+    return now
+
+
+def pause_as_it_sends(rig: Rig) -> float:
+    """The same, at the worst moment: between its look at the clock and what it sends."""
+    assert rig.bridge
+    return machine.block_at_timer(rig.bridge.pid, PAUSED_S)
+
+
+def flap(rig: Rig) -> float:
+    now = link_down(rig)
+    time.sleep(_FLAP_S)
+    link_up(rig)
+    return now
+
+
+def stop_owners_among_others(rig: Rig) -> float:
+    rig.strangers = Strangers()
+    time.sleep(_HANDED_ON_S)
+    return stop_owners(rig)
+
+
+def continue_owners_alone(rig: Rig) -> None:
+    if rig.strangers:
+        rig.strangers.end()
+    rig.strangers = None
+    continue_owners(rig)
+
+
+def release_drives(rig: Rig) -> float:
+    """Their owner gives them back, and goes."""
+    rig.owners["modbus"].signal(signal.SIGSTOP)
+    time.sleep(_HANDED_ON_S)
+    return release(drives_of("modbus"))
+
+
+def continue_modbus(rig: Rig) -> None:
+    rig.owners["modbus"].signal(signal.SIGCONT)
+
+
+def pause_across_deadline(rig: Rig) -> float:
+    """The owners fall silent, and the bridge stands still just when the first of them is to be judged."""
+    assert rig.bridge
+    now = stop_owners(rig)
+    time.sleep(_HANDED_ON_S)
+    handed_on = [run.first for drive in DRIVES if (run := rig.told.last(drive.number_id))]
+    first = min(at for at in handed_on if at > now - FIELDBUS_TIMEOUT_MS / 1000)
+    time.sleep(max(0.0, first + FIELDBUS_TIMEOUT_MS / 1000 - _BEFORE_S - time.monotonic()))
+    rig.bridge.signal(signal.SIGSTOP)
+    time.sleep(_SHORT_S)
+    rig.bridge.signal(signal.SIGCONT)
+    return now
+
+
+def end_bridge(number: signal.Signals) -> Inject:
+    def inject(rig: Rig) -> float:
+        assert rig.bridge
+        now = time.monotonic()
+        rig.bridge.signal(number)
+        return now
+
+    return inject

@@ -1,0 +1,77 @@
+"""Until when a drive has to be stopped, in ms: on the bus, and by its own word, which may be TPDO_MS late."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tests.proof.drives import (
+    DEADMAN_MS,
+    FIELDBUS_TIMEOUT_MS,
+    REACTION_MS,
+    RPDO_PERIOD_MS,
+    TPDO_MS,
+    WAY_MS,
+    Drive,
+)
+from tests.proof.rig import Rig
+
+Bound = Callable[[Rig, Drive], float]
+
+
+def controller(rig: Rig, drive: Drive) -> float:
+    """What is published; what comes after the RPDO, such as SYNC, is none of the bus's time."""
+    return min(rig.worst_case_ms[drive], FIELDBUS_TIMEOUT_MS + at_once(rig, drive))
+
+
+def controller_drive(rig: Rig, drive: Drive) -> float:
+    stopped_ms = rig.worst_case_ms[drive]
+    if drive.reaction == "silence":
+        stopped_ms = controller(rig, drive) + drive.family.own_timeout_ms
+    return stopped_ms + TPDO_MS
+
+
+def controller_and_bridge_drive(rig: Rig, drive: Drive) -> float:
+    """Both fall silent: the drive has to see it by itself."""
+    return controller(rig, drive) + drive.family.own_timeout_ms + TPDO_MS
+
+
+def dead(rig: Rig, drive: Drive) -> float:
+    return DEADMAN_MS
+
+
+def dead_drive(rig: Rig, drive: Drive) -> float:
+    return rig.worst_case_bridge_ms[drive] + TPDO_MS
+
+
+def at_once(rig: Rig, drive: Drive) -> float:
+    return RPDO_PERIOD_MS + REACTION_MS
+
+
+def at_once_drive(rig: Rig, drive: Drive) -> float:
+    return at_once(rig, drive) + TPDO_MS
+
+
+def asked(rig: Rig, drive: Drive) -> float:
+    """The way of what asks for it, and the stop."""
+    return WAY_MS[drive.protocol] + at_once(rig, drive)
+
+
+def asked_drive(rig: Rig, drive: Drive) -> float:
+    return asked(rig, drive) + TPDO_MS
+
+
+def gone_drive(rig: Rig, drive: Drive) -> float:
+    return at_once(rig, drive) + drive.family.own_timeout_ms + TPDO_MS
+
+
+def lost(rig: Rig, drive: Drive) -> float:
+    return drive.family.lost_after_ms + at_once(rig, drive)
+
+
+def lost_drive(rig: Rig, drive: Drive) -> float:
+    return lost(rig, drive) + TPDO_MS
+
+
+def after(seconds: float) -> Bound:
+    """The bridge is back then, and stops the drive."""
+    return lambda rig, drive: seconds * 1000 + at_once_drive(rig, drive)

@@ -1,0 +1,119 @@
+"""``make proof-mutants``: the proof has to find each seeded fault, and none in the program as it is.
+
+The bridge alone is of the tree with the mutant. It is started anew for each; drives, owners and witnesses
+stay. Several machines share the work by making folders in one that all of them have.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from tests.proof.faults import FAULTS, Fault
+from tests.proof.mutants import Mutant, Tree
+from tests.proof.rig import Rig, Stuck
+from tests.proof.rounds import run_round
+
+Say = Callable[[str], None]
+
+_FIRST_TIMES: Final = 3
+"""How often the fault is injected that is tried first: ``make proof`` injects each fault fifty times."""
+_MOST_IN_VAIN: Final = 3
+_PATIENCE_S: Final = 20.0
+_NONE: Final = "(none)"
+
+
+@dataclass(frozen=True, slots=True)
+class Kill:
+    """How a mutant was found: the fault, and the judgement; both empty where it was not."""
+
+    mutant: str
+    breaks: str
+    fault: str
+    judgement: str
+    seconds: float
+    rounds: int
+
+
+class Share:
+    """What one machine takes no other does."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def take(self, name: str) -> bool:
+        try:
+            (self._folder / name.replace("/", "_")).mkdir(parents=True)
+        except FileExistsError:
+            return False
+        return True
+
+
+def order(first: str, faults: Sequence[Fault] = FAULTS) -> Iterator[Fault]:
+    """The one that is tried first, several times; then all others."""
+    possible = [fault for fault in faults if fault.possible()]
+    yield from [fault for fault in possible if fault.name == first] * _FIRST_TIMES
+    # What takes a new process comes last.
+    rest = [fault for fault in possible if fault.name != first]
+    yield from sorted(rest, key=lambda fault: fault.new_process)
+
+
+def judge(rig: Rig, fault: Fault, say: Say) -> str:
+    """What one round of this fault finds; empty where it finds nothing."""
+    in_vain = len(rig.stopped_in_vain)
+    try:
+        samples = run_round(rig, fault, say)
+    except (Stuck, AssertionError, OSError) as error:
+        return str(error).splitlines()[0]
+    for sample in samples:
+        if sample.verdict == "failed":
+            return f"{sample.drive} ({sample.protocol}): {sample.complaint}"
+    if len(rig.stopped_in_vain) - in_vain > _MOST_IN_VAIN:
+        return f"{len(rig.stopped_in_vain) - in_vain} drives stopped that it does not concern"
+    return ""
+
+
+def hunt(rig: Rig, tree: Tree, mutant: Mutant, say: Say) -> Kill:
+    """Let the bridge have this fault, and try until it is found."""
+    began = time.monotonic()
+
+    def kill(fault: str, judgement: str, rounds: int) -> Kill:
+        seconds = time.monotonic() - began
+        say(f"{mutant.name}: {judgement or 'SURVIVED'} [{fault}]")
+        return Kill(mutant.name, mutant.breaks, fault, judgement, round(seconds, 1), rounds)
+
+    tree.hold(mutant)
+    try:
+        rig.mend()
+        rig.run_all()
+    except (Stuck, AssertionError) as error:
+        return kill("start", str(error).splitlines()[0], 0)
+    rounds = 0
+    for rounds, fault in enumerate(order(mutant.first), start=1):
+        judgement = judge(rig, fault, say)
+        if judgement:
+            return kill(fault.name, judgement, rounds)
+    return kill("", "", rounds)
+
+
+def hunt_all(rig: Rig, tree: Tree, mutants: Sequence[Mutant], share: Share, say: Say) -> dict[str, Any]:
+    """The program as it is first; then every mutant that no other machine takes."""
+    rig.patience_s = _PATIENCE_S
+    began = time.monotonic()
+    alarms: list[str] = []
+    for fault in order(_NONE):
+        if share.take(f"none, {fault.name}") and (found := judge(rig, fault, say)):
+            alarms.append(f"{fault.name}: {found}")
+            say(f"FALSE ALARM: {alarms[-1]}")
+            rig.mend()
+            rig.run_all()
+    kills = [hunt(rig, tree, mutant, say) for mutant in mutants if share.take(mutant.name)]
+    return {
+        "false_alarms": alarms,
+        "kills": [asdict(kill) for kill in kills],
+        "mutants": [mutant.name for mutant in mutants],
+        "seconds": time.monotonic() - began,
+    }

@@ -1,0 +1,54 @@
+"""The table of the seeded faults: which was found, by what, and how soon."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+BEGIN: Final = "<!-- made by `make proof-mutants`: do not edit -->"
+END: Final = "<!-- end of what `make proof-mutants` makes -->"
+
+
+def merge(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The results of several machines as one, in the order of the table of mutants."""
+    merged = dict(parts[0])
+    merged["false_alarms"] = [text for part in parts for text in part["false_alarms"]]
+    place = {name: number for number, name in enumerate(merged["mutants"])}
+    kills = [kill for part in parts for kill in part["kills"]]
+    merged["kills"] = sorted(kills, key=lambda kill: place[kill["mutant"]])
+    merged["seconds"] = max(part["seconds"] for part in parts)
+    merged["machines"] = len(parts)
+    return merged
+
+
+def markdown(result: dict[str, Any]) -> str:
+    kills = result["kills"]
+    found = sum(bool(kill["judgement"]) for kill in kills)
+    rows = [
+        f"| {kill['mutant']} | {kill['breaks']} | {kill['fault'] or '**survived**'} "
+        f"| {kill['judgement'].replace('|', '/')} | {kill['seconds']:.0f} |"
+        for kill in kills
+    ]
+    lines = [
+        BEGIN,
+        "",
+        f"{result['date']}, {result['machine']}; {result['machines']} at a time, "
+        f"{result['seconds'] / 60:.0f} min. {found} of {len(result['mutants'])} were found, and "
+        f"{len(result['false_alarms'])} faults in the program as it is.",
+        "",
+        "| seeded fault | what it breaks | found by | judgement | s |",
+        "|---|---|---|---|--:|",
+        *rows,
+        "",
+        END,
+    ]
+    return "\n".join(lines)
+
+
+def failures(result: dict[str, Any]) -> list[str]:
+    """Why the hunt has not succeeded: one sentence each."""
+    found = [f"false alarm: {text}" for text in result["false_alarms"]]
+    tried = {kill["mutant"] for kill in result["kills"]}
+    found += [f"not tried: {name}" for name in result["mutants"] if name not in tried]
+    found += [f"survived: {kill['mutant']}" for kill in result["kills"] if not kill["judgement"]]
+    return found

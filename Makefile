@@ -89,9 +89,9 @@ ifneq ($(LAB),0)
 endif
 
 # Half of the cycles on each of two machines. PROOF=n: how many times each fault is injected.
-PROOF ?= 50
+PROOF ?= 30
 
-proof: compiled packages ## inject every fault 50 times, write docs/explanation/proof.md (half an hour)
+proof: compiled packages ## inject every fault 30 times, write docs/explanation/proof.md (half an hour)
 	@$(ON_VCAN) tests/proof/run-proof -j $(FEW_JOBS) -n $(PROOF) -o build/proof.json docs/explanation/proof.md
 
 proof-mutants: compiled packages ## seed faults in the chain, which the proof has to find (twenty minutes)

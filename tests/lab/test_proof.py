@@ -1,37 +1,51 @@
-"""The proof in short (``make proof`` is the long one): every fault that needs no new process, once, with all
-families and all protocols on the bus."""
+"""The proof in short (``make proof`` and ``make proof-mutants`` are the long ones): every fault that needs no
+new process, once, with all families and all protocols on the bus; and two of the seeded faults, each day
+others."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.proof.faults import FAULTS
+from tests.proof.mutants import load as load_mutants
 from tests.proof.report import load
 from tests.support.process import REPOSITORY
 
 _NOISE_MS = "150"
 """For a machine that is busy, as in ``test_dead_man``. ``make proof`` allows nothing."""
-_LONG = ("front killed", "bus process killed")
-"""``test_dead_man`` and ``test_fronts`` kill them."""
+_MUTANTS = 2
+_DAY_S = 86_400
 
 
-@pytest.mark.timeout(300)
-def test_no_fault_keeps_a_drive_running_longer_than_published(tmp_path: Path) -> None:
-    names = [fault.name for fault in FAULTS if fault.possible() and fault.name not in _LONG]
-    out = tmp_path / "proof.json"
-    command = [sys.executable, "-m", "tests.proof", "run", "--cycles", "1", "--faults", ",".join(names)]
+def proof(*arguments: str, out: Path) -> dict[str, Any]:
+    """What ``python -m tests.proof`` has found."""
+    command = [sys.executable, "-m", "tests.proof", *arguments, "--noise", _NOISE_MS, "--out", str(out)]
     # A mount namespace of its own, for the disk that is filled up.
     done = subprocess.run(
-        ["unshare", "--mount", *command, "--noise", _NOISE_MS, "--out", str(out)],
-        cwd=REPOSITORY,
-        capture_output=True,
-        text=True,
-        check=False,
+        ["unshare", "--mount", *command], cwd=REPOSITORY, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    measured = {sample["fault"] for sample in load(out)["samples"]}
-    assert measured == set(names)
+    return load(out)
+
+
+@pytest.mark.timeout(480)
+def test_no_fault_keeps_a_drive_running_longer_than_published(tmp_path: Path) -> None:
+    names = [fault.name for fault in FAULTS if fault.possible() and not fault.new_process]
+    found = proof("run", "--cycles", "1", "--faults", ",".join(names), out=tmp_path / "proof.json")
+    assert {sample["fault"] for sample in found["samples"]} == set(names)
+
+
+@pytest.mark.timeout(480)
+def test_the_proof_finds_seeded_faults(tmp_path: Path) -> None:
+    names = [mutant.name for mutant in load_mutants()]
+    first = int(time.time() // _DAY_S) * _MUTANTS
+    chosen = [names[(first + n) % len(names)] for n in range(_MUTANTS)]
+    found = proof("hunt", "--mutants", ",".join(chosen), "--only", out=tmp_path / "kills.json")
+    assert {kill["mutant"] for kill in found["kills"]} == set(chosen)
+    assert [kill["mutant"] for kill in found["kills"] if not kill["judgement"]] == []

@@ -24,10 +24,12 @@ import tempfile
 import time
 from collections import Counter
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tests.proof import hunt, kills, mutants, report
+from tests.proof import hunt, mutants, report
+from tests.proof import kills as kill_table
 from tests.proof.drives import DRIVES
 from tests.proof.faults import FAULTS, Fault
 from tests.proof.machine import is_user_mode
@@ -69,7 +71,7 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
             ),
             "faults_missing": [fault.name for fault in faults if fault not in possible],
             "cycles": done,
-            "at_once": {fault.name: fault.at_once for fault in FAULTS},
+            "per_round": {fault.name: fault.per_round for fault in FAULTS},
             "seconds": time.monotonic() - began,
             "by_themselves": rig.by_themselves,
             "stopped_in_vain": rig.stopped_in_vain,
@@ -161,22 +163,34 @@ def _names(text: str) -> list[str]:
     return [name for name in text.split(",") if name]
 
 
-def hunt_mutants(names: list[str], share: Path, out: Path, noise_ms: float) -> int:
+def hunt_mutants(asked: argparse.Namespace) -> int:
     os.environ["PYTHONPATH"] = str(REPOSITORY)
+    names, out = _names(asked.mutants), asked.out
     chosen = [mutant for mutant in mutants.load() if not names or mutant.name in names]
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mutants-")))
         tree = mutants.Tree(folder / "tree")
+        began = time.monotonic()
         rig = Rig(folder, stack, tree.folder)
-        rig.noise_ms = noise_ms
+        rig.noise_ms = asked.noise
+        share = hunt.Share(asked.share or folder / "share")
         try:
             rig.start()
             say("everything is there")
             rig.run_all()
-            found = hunt.hunt_all(rig, tree, chosen, hunt.Share(share), say)
+            rig.patience_s = hunt.PATIENCE_S
+            alarms = [] if asked.only else hunt.try_unchanged(rig, share, say)
+            kills = [hunt.hunt(rig, tree, mutant, say) for mutant in chosen if share.take(mutant.name)]
         finally:
             _keep_logs(folder, out.parent / f"{out.stem}-logs")
-    found |= {"date": _today(), "machine": _machine()}
+    found = {
+        "date": _today(),
+        "machine": _machine(),
+        "seconds": time.monotonic() - began,
+        "mutants": [mutant.name for mutant in chosen],
+        "false_alarms": alarms,
+        "kills": [asdict(kill) for kill in kills],
+    }
     out.write_text(json.dumps(found, indent=1), encoding="utf-8")
     return 0
 
@@ -196,7 +210,8 @@ def main() -> int:
     other = commands.add_parser("report")
     other.add_argument("--least", type=int, default=50)
     third = commands.add_parser("hunt")
-    third.add_argument("--share", type=Path, required=True, help="a folder that all machines have")
+    third.add_argument("--share", type=Path, help="a folder that all machines have, which share the work")
+    third.add_argument("--only", action="store_true", help="do not try the program as it is")
     third.add_argument("--mutants", default="", help="left out: all")
     third.add_argument("--noise", type=float, default=0.0, help="ms allowed on a machine that is busy")
     fourth = commands.add_parser("kills")
@@ -207,12 +222,12 @@ def main() -> int:
         command.add_argument("--out", type=Path, required=True)
     asked = parser.parse_args()
     if asked.command == "hunt":
-        return hunt_mutants(_names(asked.mutants), asked.share, asked.out, asked.noise)
+        return hunt_mutants(asked)
     if asked.command == "kills":
-        found = kills.merge([report.load(part) for part in asked.parts])
+        found = kill_table.merge([report.load(part) for part in asked.parts])
         asked.out.write_text(json.dumps(found, indent=1), encoding="utf-8")
-        report.put_between(asked.page, kills.BEGIN, kills.END, kills.markdown(found))
-        return _tell(kills.failures(found))
+        report.put_between(asked.page, kill_table.BEGIN, kill_table.END, kill_table.markdown(found))
+        return _tell(kill_table.failures(found))
     if asked.command == "run":
         return run(
             asked.cycles,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
 
 from tests.proof.drives import (
     DEADMAN_MS,
@@ -14,6 +15,8 @@ from tests.proof.drives import (
     Drive,
 )
 from tests.proof.rig import Rig
+
+_BOOT_MS: Final = 1500.0
 
 Bound = Callable[[Rig, Drive], float]
 
@@ -62,6 +65,11 @@ def asked_drive(rig: Rig, drive: Drive) -> float:
 
 def gone_drive(rig: Rig, drive: Drive) -> float:
     return at_once(rig, drive) + drive.family.own_timeout_ms + TPDO_MS
+
+
+def booted_drive(rig: Rig, drive: Drive) -> float:
+    """The bridge boots it anew, and its TPDOs come after that."""
+    return gone_drive(rig, drive) + _BOOT_MS
 
 
 def lost(rig: Rig, drive: Drive) -> float:

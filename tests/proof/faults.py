@@ -12,6 +12,8 @@ from tests.proof.bounds import Bound
 from tests.proof.drives import DRIVES, PROTOCOLS, Drive
 from tests.proof.rig import Rig
 
+_SELDOM: Final = 3
+
 Reference = Literal["telegram", "moment", "sign of life", "boot-up"]
 
 
@@ -36,9 +38,14 @@ class Fault:
     leaves_silence: bool = False
     new_process: bool = False
 
+    @property
+    def per_round(self) -> int:
+        """What a round is worth: a new process takes its time, so such a fault is injected less often."""
+        return self.at_once * (_SELDOM if self.new_process else 1)
+
     def rounds(self, times: int) -> int:
-        """How many rounds inject it at least ``times`` times."""
-        return -(-times // self.at_once)
+        """How many rounds are needed for what is asked for as ``times``."""
+        return -(-times // self.per_round)
 
     def is_due(self, cycle: int, cycles: int) -> bool:
         """Whether it has a round in this one of ``cycles``, over which its rounds are spread evenly."""
@@ -152,7 +159,15 @@ FAULTS: Final = (
     ),
     Fault("event loop blocked for 1 s", "moment", acts.block_loop, acts.nothing, *_DEAD, leaves_silence=True),
     Fault("interface down", "moment", acts.link_down, acts.link_up, *_GONE, leaves_silence=True),
-    Fault("interface down for 50 ms", "moment", acts.flap, acts.nothing, *_GONE, leaves_silence=True),
+    Fault(
+        "interface down for 50 ms",
+        "moment",
+        acts.flap,
+        acts.nothing,
+        bounds.at_once,
+        bounds.booted_drive,
+        leaves_silence=True,
+    ),
     Fault("bus-off", "moment", acts.bus_off, acts.bus_restarted, *_GONE, leaves_silence=True),
     Fault("node rebooting", "boot-up", acts.reboot, acts.nothing, bounds.lost, None, at_once=_NODES),
     Fault(

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from tests.proof.witness import Run
 
 _PATIENCE_S: Final = 1.5
+_MOST_PATIENCE_S: Final = 12.0
+"""Twice as long each time: a slow machine may take seconds for a telegram."""
 
 
 class Recovery:
@@ -23,6 +25,7 @@ class Recovery:
         self._word = drive.family.run
         self._since = float("-inf")
         self._accepted = 0
+        self._patience_s = _PATIENCE_S
         if anew:
             self._tell(drive.family.acknowledge)
 
@@ -35,7 +38,8 @@ class Recovery:
             self._tell(family.run)
         elif self._word == family.run and self._rig.moves(self._drive):
             return True
-        elif waited > _PATIENCE_S:
+        elif waited > self._patience_s:
+            self._patience_s = min(2 * self._patience_s, _MOST_PATIENCE_S)
             # Not yet: the node may still be booting. Once more from the start.
             self._tell(family.acknowledge)
         return False

@@ -178,7 +178,7 @@ def failures(result: dict[str, Any], least: int) -> list[str]:
         name = f"{cell.fault}, {cell.family}, {cell.protocol}"
         if bad := cell.count("failed"):
             found.append(f"{name}: {bad} of {len(cell.records)} failed")
-        needed = -(-least // result["at_once"][cell.fault])
+        needed = -(-least // result["per_round"][cell.fault])
         if len(cell.records) < needed:
             found.append(f"{name}: only {len(cell.records)} samples of {needed}")
     return found

@@ -25,7 +25,7 @@ _PROGRAMS = ("__main__", "owner", "__init__")
 def test_every_fault_is_injected_as_often_as_there_are_cycles(fault: Fault, cycles: int) -> None:
     due = [cycle for cycle in range(cycles) if fault.is_due(cycle, cycles)]
     assert len(due) == fault.rounds(cycles)
-    assert len(due) * fault.at_once >= cycles > (len(due) - 1) * fault.at_once
+    assert len(due) * fault.per_round >= cycles > (len(due) - 1) * fault.per_round
     gaps = [after - before for before, after in pairwise(due)]
     assert not gaps or max(gaps) - min(gaps) <= 1
 

@@ -35,7 +35,7 @@ def result(*samples: dict[str, Any], **change: Any) -> dict[str, Any]:
         "faults_missing": [],
         "cells": [["owner killed", "NORD SK TU4-CAO", "modbus"]],
         "cycles": 1,
-        "at_once": {"owner killed": 1, "bus-off": 1},
+        "per_round": {"owner killed": 1, "bus-off": 1},
         "seconds": 60.0,
         "by_themselves": 0,
         "stopped_in_vain": [],
@@ -84,7 +84,7 @@ def test_a_cell_without_any_sample_fails_the_proof() -> None:
 
 
 def test_a_round_that_injects_a_fault_several_times_counts_as_often() -> None:
-    found = result(record(), record(), at_once={"owner killed": 3, "bus-off": 1})
+    found = result(record(), record(), per_round={"owner killed": 3, "bus-off": 1})
     assert failures(found, 6) == []
     assert failures(found, 7) == ["owner killed, NORD SK TU4-CAO, modbus: only 2 samples of 3"]
 

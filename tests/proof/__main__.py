@@ -31,7 +31,7 @@ from typing import Any
 from tests.proof import hunt, mutants, report
 from tests.proof import kills as kill_table
 from tests.proof.drives import DRIVES
-from tests.proof.faults import FAULTS, Fault
+from tests.proof.faults import AWAITED, FAULTS, Fault
 from tests.proof.machine import is_user_mode
 from tests.proof.measure import Sample
 from tests.proof.rig import Rig, Stuck
@@ -47,7 +47,9 @@ def say(text: str) -> None:
 
 def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: float) -> int:
     os.environ["PYTHONPATH"] = str(REPOSITORY)
-    faults = [fault for fault in FAULTS if (not names or fault.name in names)]
+    # Those that wait for the program are injected where they are asked for by name.
+    faults = [fault for fault in FAULTS if not names or fault.name in names]
+    faults += [fault for fault in AWAITED if fault.name in names]
     possible = [fault for fault in faults if fault.possible()]
     began = time.monotonic()
     samples: list[Sample] = []
@@ -60,18 +62,18 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
             "date": _today(),
             "machine": _machine(),
             "machines": 1,
-            "faults": [fault.name for fault in FAULTS],
+            "faults": [fault.name for fault in (*FAULTS, *AWAITED)],
             "cells": sorted(
                 {
                     (fault.name, drive.family.name, drive.protocol)
                     for fault in possible
                     for drive in DRIVES
-                    if drive.protocol in fault.protocols
+                    if fault.concerns(drive)
                 }
             ),
             "faults_missing": [fault.name for fault in faults if fault not in possible],
             "cycles": done,
-            "per_round": {fault.name: fault.per_round for fault in FAULTS},
+            "per_round": {fault.name: fault.per_round for fault in (*FAULTS, *AWAITED)},
             "seconds": time.monotonic() - began,
             "by_themselves": rig.by_themselves,
             "stopped_in_vain": rig.stopped_in_vain,
@@ -118,7 +120,7 @@ def _lacks(samples: list[Sample], fault: Fault, least: int) -> bool:
     counts = Counter(
         sample.drive for sample in samples if sample.fault == fault.name and sample.verdict != "void"
     )
-    return any(counts[drive.path] < least for drive in DRIVES if drive.protocol in fault.protocols)
+    return any(counts[drive.path] < least for drive in DRIVES if fault.concerns(drive))
 
 
 def _round(rig: Rig, fault: Fault, errors: list[str]) -> list[Sample]:

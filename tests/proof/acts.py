@@ -194,15 +194,13 @@ def flap(rig: Rig) -> float:
 
 
 def stop_owners_among_others(rig: Rig) -> float:
-    rig.strangers = Strangers()
+    rig.guests.callback(Strangers().end)
     time.sleep(_HANDED_ON_S)
     return stop_owners(rig)
 
 
 def continue_owners_alone(rig: Rig) -> None:
-    if rig.strangers:
-        rig.strangers.end()
-    rig.strangers = None
+    rig.send_guests_away()
     continue_owners(rig)
 
 

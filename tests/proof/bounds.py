@@ -14,6 +14,7 @@ from tests.proof.drives import (
     WAY_MS,
     Drive,
 )
+from tests.proof.families import HEARTBEAT_MS
 from tests.proof.rig import Rig
 
 _BOOT_MS: Final = 1500.0
@@ -52,6 +53,20 @@ def at_once(rig: Rig, drive: Drive) -> float:
 
 def at_once_drive(rig: Rig, drive: Drive) -> float:
     return at_once(rig, drive) + TPDO_MS
+
+
+def controller_sent(rig: Rig, drive: Drive) -> float:
+    """From the client's call, of a telegram whose number nobody can tell."""
+    return WAY_MS[drive.protocol] + controller(rig, drive)
+
+
+def controller_sent_drive(rig: Rig, drive: Drive) -> float:
+    return WAY_MS[drive.protocol] + controller_drive(rig, drive)
+
+
+def node_stopped(rig: Rig, drive: Drive) -> float:
+    """The bridge stops the node at once; its heartbeat says so."""
+    return at_once(rig, drive) + HEARTBEAT_MS
 
 
 def asked(rig: Rig, drive: Drive) -> float:

@@ -12,6 +12,7 @@ from tests.proof.families import CIA402, LENZE, NORD, STOEBER, Family
 PROTOCOLS: Final = ("modbus", "opcua", "zenoh")
 SERVERS: Final = {"modbus": "127.0.0.10", "opcua": "127.0.0.11", "zenoh": "127.0.0.12"}
 """An address of loopback for each server, so that the network to one of them can be cut."""
+_SECOND: Final = "127.0.0.30"
 PORTS: Final = {"modbus": 1502, "opcua": 4840, "zenoh": 7447}
 BRIDGE_SIDE: Final = "vcan0"
 DRIVE_SIDE: Final = "vcan1"
@@ -26,6 +27,8 @@ WAY_MS: Final = {"modbus": 250, "opcua": 350, "zenoh": 300}
 """How long a telegram may be on its way from its client's call to the bus. The machine that client, front and
 bridge share has the most part of it; a bridge that kept each telegram for so long would be seen."""
 DEADMAN_MS: Final = 400
+IGNORED_STOP_MS: Final = 1500
+"""How long after its bound a stop may go without being followed."""
 TPDO_MS: Final = 300
 """Event timer of every TPDO: what the drive does is on the bus so soon."""
 INHIBIT_MS: Final = 100
@@ -203,6 +206,17 @@ def write_site(path: Path, channel: str, state: Path, run: Path) -> Path:
     ]
     path.write_text("\n".join(text) + "\n", encoding="utf-8")
     return path
+
+
+def write_second_site(folder: Path) -> Path:
+    """The same bus for a second bridge, with ports and folders of its own."""
+    site = write_site(folder / "first.toml", BRIDGE_SIDE, folder / "second_state", folder / "second_run")
+    text = site.read_text(encoding="utf-8")
+    for protocol, server in SERVERS.items():
+        text = text.replace(f"{server}:{PORTS[protocol]}", f"{_SECOND}:{PORTS[protocol]}")
+    second = folder / "second.toml"
+    second.write_text(text, encoding="utf-8")
+    return second
 
 
 def _node(drives: list[Drive]) -> str:

@@ -7,31 +7,33 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from tests.proof import acts, bounds, machine
+from tests.proof import acts, bounds, machine, others
 from tests.proof.bounds import Bound
 from tests.proof.drives import DRIVES, PROTOCOLS, Drive
 from tests.proof.rig import Rig
 
 _SELDOM: Final = 3
 
-Reference = Literal["telegram", "moment", "sign of life", "boot-up"]
+Reference = Literal["telegram", "moment", "send", "sign of life", "boot-up"]
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Drives of other protocols than ``protocols`` are to go on. ``steady``: what of the fault is to stop no
-    drive comes first. ``at_once``: to how many owners, connections or nodes a round does it; each of them
-    counts. ``leaves_silence``: the bridge does not answer it with a stop: it is not there, or its bus is not.
-    ``of_controller``: the bridge answers with the drive's reaction. ``new_process``: a service is started
-    anew for it, which takes its time."""
+    """Drives of other protocols than ``protocols`` are to go on, and of other nodes than ``nodes`` where
+    there are any. ``steady``: what of the fault is to stop no drive comes first. ``at_once``: to how many
+    owners, connections or nodes a round does it; each of them counts. ``leaves_silence``: the bridge does not
+    answer it with a stop: it is not there, or its bus is not. ``new_process``: a process is started anew for
+    it, which takes its time. Without a ``bus_bound`` somebody else speaks there; without a ``drive_bound``
+    the drive says nothing."""
 
     name: str
     reference: Reference
     inject: acts.Inject
     undo: Callable[[Rig], None]
-    bus_bound: Bound
+    bus_bound: Bound | None
     drive_bound: Bound | None
     protocols: tuple[str, ...] = PROTOCOLS
+    nodes: tuple[str, ...] = ()
     steady: Callable[[Rig], None] | None = None
     possible: Callable[[], bool] = lambda: True
     at_once: int = 1
@@ -54,11 +56,14 @@ class Fault:
 
     @property
     def of_controller(self) -> bool:
-        return self.reference == "telegram"
+        return self.reference in ("telegram", "send")
+
+    def concerns(self, drive: Drive) -> bool:
+        return drive.protocol in self.protocols and (not self.nodes or drive.node in self.nodes)
 
     def goes_on(self, drive: Drive) -> bool:
         """The drive is to move on all the time: the fault is not its own, or is only reported."""
-        return drive.protocol not in self.protocols or (self.of_controller and drive.reaction == "hold")
+        return not self.concerns(drive) or (self.of_controller and drive.reaction == "hold")
 
     def falls_silent(self, drive: Drive) -> bool:
         """What stops the drive is that its RPDOs end."""
@@ -194,6 +199,42 @@ AWAITED: Final = (
         leaves_silence=True,
     ),
     Fault(
+        "client writes ahead and hangs",
+        "send",
+        others.write_ahead,
+        others.stop_writing_ahead,
+        bounds.controller_sent,
+        bounds.controller_sent_drive,
+        protocols=("modbus",),
+    ),
+    Fault(
+        "intruder on an RPDO",
+        "moment",
+        others.intrude,
+        others.end_intruder,
+        None,
+        bounds.node_stopped,
+        nodes=(others.SHARED.node,),
+    ),
+    Fault(
+        "second bridge",
+        "telegram",
+        acts.stop_owners,
+        others.end_second_bridge,
+        *_OF_OWNERS,
+        steady=others.start_second_bridge,
+        new_process=True,
+    ),
+    Fault(
+        "deaf drive",
+        "telegram",
+        acts.stop_owners,
+        others.let_hear,
+        bounds.controller,
+        others.ignored_drive,
+        steady=others.make_deaf,
+    ),
+    Fault(
         "SIGHUP to the bus process",
         "moment",
         acts.end_bridge(signal.SIGHUP),
@@ -207,6 +248,15 @@ AWAITED: Final = (
         acts.end_bridge(signal.SIGTERM),
         acts.renew_bridge,
         *_ENDING,
+        new_process=True,
+    ),
+    Fault(
+        "front killed and its port taken",
+        "telegram",
+        others.kill_front_and_take_port,
+        others.give_port_back,
+        *_OF_OWNERS,
+        protocols=("opcua",),
         new_process=True,
     ),
 )

@@ -12,6 +12,8 @@ from tests.proof.rig import Rig
 from tests.proof.witness import Run
 
 _SILENT_S: Final = 3 * RPDO_PERIOD_MS / 1000
+_STOPPED: Final = 0x04
+"""NMT state, in a heartbeat or, with the toggle bit, in an answer to node guarding."""
 _BOOT_UP: Final = b"\0"
 _BEFORE_S: Final = 2.0
 _TINY_S: Final = 1e-6
@@ -122,6 +124,9 @@ def drive_stop(rig: Rig, drive: Drive, since: float) -> float | None:
     if drive.emcy is not None:
         emergencies = rig.said.runs(drive.emcy, since)
         times += [run.first for run in emergencies if run.first >= since and run.data[:2] != b"\0\0"][:1]
+    # CiA 301 §7.3.2.2.4: no process data any more; CiA 402's 6007h says what the motor does.
+    signs = rig.said.runs(0x700 + drive.node_id, since)
+    times += [run.first for run in signs if run.first >= since and run.data[0] & 0x7F == _STOPPED][:1]
     return min(times, default=None)
 
 

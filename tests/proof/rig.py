@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Collection, Iterable
-from contextlib import ExitStack, suppress
+from contextlib import AbstractContextManager, ExitStack, suppress
 from pathlib import Path
 from typing import Final
 
@@ -17,7 +17,6 @@ from tests.proof import machine
 from tests.proof.board import Board
 from tests.proof.drives import BRIDGE_SIDE, DRIVE_SIDE, DRIVES, PORTS, PROTOCOLS, SERVERS, Drive, write_site
 from tests.proof.recovery import Recovery
-from tests.proof.strangers import Strangers
 from tests.proof.waits import follow
 from tests.proof.witness import Clock, Witness
 from tests.support.process import REPOSITORY, Process, running
@@ -107,8 +106,8 @@ class Rig:
         self.worst_case_ms: dict[Drive, int] = {}
         """What the bridge publishes: its own bound, and that of a drive without a bridge."""
         self.worst_case_bridge_ms: dict[Drive, int] = {}
-        self.strangers: Strangers | None = None
-        """Clients that own nothing, while they are there."""
+        self.guests = ExitStack()
+        """Whoever is there for one fault alone."""
         self.hours = -1
         """Which way the clock was stepped last."""
         self.noise_ms = 0.0
@@ -123,6 +122,7 @@ class Rig:
 
     def start(self) -> None:
         self._stack.callback(self._restore)
+        self._stack.callback(self.send_guests_away)
         self.gateway.open()
         rpdos = {can_id for drive in DRIVES for can_id in (drive.rpdo, drive.number_id)}
         self.told = Witness(BRIDGE_SIDE, sorted(rpdos), self.clock)
@@ -163,6 +163,14 @@ class Rig:
     def follow_front(self) -> None:
         """It may be another one."""
         follow(self.watched, FRONT, self.front)
+
+    def another_bridge(self, site: Path) -> AbstractContextManager[Process]:
+        """Beside the first one, on the same bus."""
+        command = ("env", f"PYTHONPATH={self.tree}", sys.executable, "-m", "bridge", "run", str(site))
+        return running(self.folder, "second", *command)
+
+    def send_guests_away(self) -> None:
+        self.guests.pop_all().close()
 
     def kill_bridge(self) -> float:
         """The bus process dies; its front goes with it."""
@@ -218,8 +226,7 @@ class Rig:
         """Whatever a round that failed has left: everything is as it was at the start."""
         for owner in self.owners.values():
             owner.kill()
-        if self.strangers:
-            self.strangers.end()
+        self.send_guests_away()
         machine.restore_networks(list(SERVERS.values()))
         machine.set_link(BRIDGE_SIDE, up=True)
         self.gateway.open()

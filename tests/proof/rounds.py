@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 import time
 from collections.abc import Callable
@@ -38,7 +39,7 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
         time.sleep(_QUIET_S)
         _wait_handed_on(rig, fault, since, say)
     concerned = [drive for drive in DRIVES if not fault.goes_on(drive)]
-    others = [drive for drive in DRIVES if drive.protocol not in fault.protocols]
+    others = [drive for drive in DRIVES if not fault.concerns(drive)]
     holding = [drive for drive in DRIVES if fault.goes_on(drive) and drive not in others]
     began = time.monotonic()
     # At any time between two telegrams.
@@ -50,7 +51,7 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     stopped = _wait_stopped(rig, fault, [drive for drive in concerned if drive not in still], moment)
     ways = _ways(rig, fault, list(stopped), moment)
     words = {drive: measure.stopping(rig, drive, times[0]) for drive, times in stopped.items()}
-    _all_go_on(rig, others, fault, "of another protocol")
+    _all_go_on(rig, others, fault, "which it does not concern")
     before = {drive: rig.board.accepted(drive.place)[0] for drive in concerned}
     fault.undo(rig)
     _wait_talking(rig, concerned)
@@ -148,6 +149,7 @@ def _let_pass(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> Non
     """The last bound. Who looks takes time from those who are to stop, and does not see yet what happened
     just before the fault: so nobody looks before that."""
     bound = fault.drive_bound or fault.bus_bound
+    assert bound
     last_ms = max(bound(rig, drive) for drive in drives)
     time.sleep(max(0.0, moment + last_ms / 1000 - time.monotonic()))
 
@@ -164,7 +166,10 @@ def _wait_stopped(
             own = measure.drive_stop(rig, drive, moment)
             if fault.drive_bound is None:
                 own = measure.boot_up(rig, drive, moment)
-            if bus is not None and own is not None:
+            if own is not None and fault.bus_bound is None:
+                # Somebody else speaks there.
+                stopped.setdefault(drive, (math.inf, own))
+            elif bus is not None and own is not None:
                 stopped.setdefault(drive, (bus[0], own))
         time.sleep(0.1)
     return stopped
@@ -183,17 +188,20 @@ def _wait_talking(rig: Rig, drives: list[Drive]) -> None:
 
 def _wait_writing(rig: Rig, before: dict[Drive, int]) -> None:
     """Every owner's telegrams are taken again, which move nothing."""
-    rig.wait(
-        lambda: all(rig.board.accepted(drive.place)[0] > count for drive, count in before.items()),
-        _WRITES_S,
-        "telegrams are taken again",
-    )
+
+    def waiting() -> list[str]:
+        return [drive.path for drive, count in before.items() if rig.board.accepted(drive.place)[0] <= count]
+
+    try:
+        rig.wait(lambda: not waiting(), _WRITES_S, "telegrams are taken again")
+    except Stuck as stuck:
+        raise Stuck(f"{stuck}: {', '.join(waiting())}") from None
 
 
 def _ways(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> dict[Drive, tuple[float, float]]:
     """When each last telegram was sent, and when it was handed on: before new owners number theirs from the
     start."""
-    if not fault.of_controller:
+    if fault.reference != "telegram":
         return {}
     found: dict[Drive, tuple[float, float]] = {}
     for drive in drives:
@@ -216,8 +224,10 @@ def _sample(
         begin = measure.last_sign(rig, drive, moment)
     elif fault.reference == "boot-up":
         begin = measure.boot_up(rig, drive, moment) or moment
-    assert bus is not None
-    spans = [_Span(begin, bus[0], fault.bus_bound(rig, drive), (BRIDGE,))]
+    spans: list[_Span] = []
+    if bus is not None and fault.bus_bound:
+        spans.append(_Span(begin, bus[0], fault.bus_bound(rig, drive), (BRIDGE,)))
+    on_bus = spans[0] if spans else None
     if own is not None and fault.drive_bound:
         spans.append(_Span(begin, own, fault.drive_bound(rig, drive), (BRIDGE, SIMULATION)))
     if way is not None:
@@ -229,8 +239,8 @@ def _sample(
         drive.family.name,
         drive.protocol,
         drive.path,
-        bus_ms=spans[0].ms,
-        bus_bound_ms=spans[0].bound_ms,
+        bus_ms=on_bus.ms if on_bus else None,
+        bus_bound_ms=on_bus.bound_ms if on_bus else None,
         drive_ms=None if own is None else (own - begin) * 1000,
         drive_bound_ms=fault.drive_bound(rig, drive) if fault.drive_bound else None,
         way_ms=None if way is None else (way[1] - way[0]) * 1000,

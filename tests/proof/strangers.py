@@ -34,6 +34,26 @@ class Connection:
         where = (SERVERS["modbus"], PORTS["modbus"])
         self._socket = socket.create_connection(where, _LIMIT_S, source_address=(address, 0))
 
+    @classmethod
+    def of_owner(cls) -> Connection:
+        """From the machine of the Modbus drives' owner."""
+        return cls(_OWNERS_MACHINE)
+
+    def write_ahead(self, drive: Drive, times: int) -> None:
+        """Write "run" so often, as far as there is room for it, and read no answer."""
+        self._socket.setblocking(False)
+        telegram = _WRITE.pack(_WRITE_HOLDING, 0, 2, 4) + struct.pack(
+            ">HH", drive.family.run, drive.family.setpoint
+        )
+        frame = _HEAD.pack(1, 0, len(telegram) + 1, drive.place + 1) + telegram
+        with suppress(BlockingIOError):
+            self._socket.sendall(frame * times)
+
+    def abandon(self) -> None:
+        """The machine is switched off, and what it has sent is gone with it."""
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        self._socket.close()
+
     def read(self, drive: Drive) -> None:
         self._send(drive, _READ.pack(_READ_HOLDING, 0, 2))
         self._socket.recv(_MOST_BYTES)

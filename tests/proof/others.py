@@ -1,0 +1,155 @@
+"""Others on the bus and at the ports: a second sender, a second bridge, a drive made deaf, a client that
+writes ahead, a port that is taken."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import struct
+import threading
+import time
+from contextlib import suppress
+from typing import Final
+
+from tests.proof import acts, bounds, machine
+from tests.proof.drives import (
+    BRIDGE_SIDE,
+    DRIVE_SIDE,
+    DRIVES,
+    IGNORED_STOP_MS,
+    PORTS,
+    SERVERS,
+    Drive,
+    drives_of,
+    write_second_site,
+)
+from tests.proof.families import HEARTBEAT_MS
+from tests.proof.rig import Rig, Stuck
+from tests.proof.strangers import Connection
+
+DEAF: Final = next(drive for drive in DRIVES if drive.node == "fan_opcua")
+"""Whose RPDO is switched off. It watches our heartbeat, and so does not stop by itself."""
+SHARED: Final = next(drive for drive in DRIVES if drive.node == "fan_modbus")
+"""Whose RPDO somebody else sends, too."""
+_INTRUDES_S: Final = 0.02
+_SECOND_S: Final = 8.0
+_PORT_S: Final = 20.0
+_BIND_S: Final = 5.0
+_AHEAD: Final = 3000
+_OFF: Final = 0x8000_0000
+_DOWNLOAD: Final = struct.Struct("<BHBI")
+_FOUR_BYTES: Final = 0x23
+"""Expedited SDO download (CiA 301 §7.2.4.3.3)."""
+_UNHEARD_S: Final = 0.02
+
+
+class Intruder:
+    """Sends a drive's RPDO with a word that enables, beside the bridge."""
+
+    def __init__(self, drive: Drive) -> None:
+        words = drive.family.run.to_bytes(2, "little") + drive.family.setpoint.to_bytes(2, "little")
+        self._frame = drive.rpdo, words
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True, name="intruder")
+        self.since = machine.send(BRIDGE_SIDE, *self._frame)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._ended.wait(_INTRUDES_S):
+            with suppress(OSError):
+                machine.send(BRIDGE_SIDE, *self._frame)
+
+    def end(self) -> None:
+        self._ended.set()
+        self._thread.join(1.0)
+
+
+def intrude(rig: Rig) -> float:
+    intruder = Intruder(SHARED)
+    rig.guests.callback(intruder.end)
+    return intruder.since
+
+
+def _reset(drive: Drive) -> None:
+    """The node is switched off and on."""
+    machine.send(DRIVE_SIDE, 0x000, bytes((0x81, drive.node_id)))
+
+
+def end_intruder(rig: Rig) -> None:
+    rig.send_guests_away()
+    _reset(SHARED)
+
+
+def make_deaf(rig: Rig) -> None:
+    """Its RPDO is switched off by SDO, and the bridge does not hear of it."""
+    rig.gateway.silence_drives()
+    request = _DOWNLOAD.pack(_FOUR_BYTES, 0x1400, 1, _OFF | DEAF.rpdo)
+    machine.send(DRIVE_SIDE, 0x600 + DEAF.node_id, request)
+    time.sleep(_UNHEARD_S)
+    rig.gateway.restore()
+
+
+def ignored_drive(rig: Rig, drive: Drive) -> float:
+    """The bridge stops the node of one that does not follow."""
+    ignored_ms = IGNORED_STOP_MS + HEARTBEAT_MS if drive is DEAF else 0.0
+    return bounds.controller_drive(rig, drive) + ignored_ms
+
+
+def let_hear(rig: Rig) -> None:
+    _reset(DEAF)
+    acts.continue_owners(rig)
+
+
+def start_second_bridge(rig: Rig) -> None:
+    """On the same bus, for the same drives, with ports of its own."""
+    rig.guests.enter_context(rig.another_bridge(write_second_site(rig.folder)))
+    time.sleep(_SECOND_S)
+
+
+def end_second_bridge(rig: Rig) -> None:
+    rig.send_guests_away()
+    acts.continue_owners(rig)
+
+
+def write_ahead(rig: Rig) -> float:
+    """A client of the Modbus owner's machine writes thousands of telegrams without waiting for an answer, and
+    hangs. Gives the time of the last one."""
+    rig.owners["modbus"].signal(signal.SIGSTOP)
+    moment = time.monotonic()
+    for drive in drives_of("modbus"):
+        if drive.reaction != "hold":
+            connection = Connection.of_owner()
+            rig.guests.callback(connection.abandon)
+            connection.write_ahead(drive, _AHEAD)
+            moment = time.monotonic()
+    return moment
+
+
+def stop_writing_ahead(rig: Rig) -> None:
+    rig.send_guests_away()
+    acts.continue_modbus(rig)
+
+
+def kill_front_and_take_port(rig: Rig) -> float:
+    moment = acts.signal_front(signal.SIGKILL)(rig)
+    taker = rig.guests.enter_context(socket.socket())
+    taker.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    while True:
+        try:
+            taker.bind((SERVERS["opcua"], PORTS["opcua"]))
+            taker.listen()
+            return moment
+        except OSError:
+            if time.monotonic() > moment + _BIND_S:
+                raise
+            time.sleep(0.002)
+
+
+def give_port_back(rig: Rig) -> None:
+    """After a while, in which the service may not end."""
+    assert rig.bridge
+    time.sleep(_PORT_S)
+    if rig.bridge.popen.poll() is not None:
+        raise Stuck("the service has ended: the port of a front was taken")
+    rig.send_guests_away()
+    acts.wait_front(rig)

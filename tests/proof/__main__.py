@@ -36,6 +36,7 @@ from tests.proof.machine import is_user_mode
 from tests.proof.measure import Sample
 from tests.proof.rig import Rig, Stuck
 from tests.proof.rounds import run_round
+from tests.proof.settings import PLANT
 from tests.support.process import REPOSITORY
 
 _MOST_EXTRA_ROUNDS = 3
@@ -65,7 +66,12 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
             "faults": [fault.name for fault in (*FAULTS, *AWAITED)],
             "cells": sorted(
                 {
-                    (fault.name, drive.family.name, drive.protocol)
+                    (
+                        fault.name,
+                        drive.family.name + PLANT.label,
+                        drive.protocol,
+                        fault.per_round * PLANT.share,
+                    )
                     for fault in possible
                     for drive in DRIVES
                     if fault.concerns(drive)
@@ -73,7 +79,6 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
             ),
             "faults_missing": [fault.name for fault in faults if fault not in possible],
             "cycles": done,
-            "per_round": {fault.name: fault.per_round for fault in (*FAULTS, *AWAITED)},
             "seconds": time.monotonic() - began,
             "by_themselves": rig.by_themselves,
             "stopped_in_vain": rig.stopped_in_vain,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import time
@@ -9,17 +10,15 @@ from collections.abc import Callable
 from typing import Final
 
 from tests.proof import machine
-from tests.proof.drives import BRIDGE_SIDE, DRIVE_SIDE, DRIVES, FIELDBUS_TIMEOUT_MS, SERVERS, drives_of
+from tests.proof.drives import BRIDGE_SIDE, DRIVE_SIDE, DRIVES, SERVERS, drives_of
 from tests.proof.rig import Rig
+from tests.proof.settings import PLANT
 from tests.proof.strangers import Strangers, release
 
 Inject = Callable[[Rig], float]
 """Gives the moment of the fault, in seconds of the monotonic clock."""
 
-PAUSED_S: Final = 0.6
-"""Longer than the dead-man time, shorter than an owner may be silent."""
-_SHORT_S: Final = 0.35
-"""Shorter than the dead-man time."""
+_TIMEOUT_S: Final = PLANT.fieldbus_timeout_ms / 1000
 _FLAP_S: Final = 0.05
 _BEFORE_S: Final = 0.03
 _HANDED_ON_S: Final = 0.15
@@ -175,15 +174,19 @@ def pause_bridge(rig: Rig) -> float:
     assert rig.bridge
     now = time.monotonic()
     rig.bridge.signal(signal.SIGSTOP)
-    time.sleep(PAUSED_S)
+    time.sleep(PLANT.paused_s)
     rig.bridge.signal(signal.SIGCONT)
     return now
 
 
 def pause_as_it_sends(rig: Rig) -> float:
-    """The same, at the worst moment: between its look at the clock and what it sends."""
+    """The same, at the worst moment: between its look at the clock and what it sends, when a telegram has come
+    that changes it."""
     assert rig.bridge
-    return machine.block_at_timer(rig.bridge.pid, PAUSED_S)
+    sent = max(rig.board.last_sent(drive.place) for drive in drives_of("modbus"))
+    periods = math.ceil((time.monotonic() + _BEFORE_S - sent) / PLANT.owner_period_s)
+    time.sleep(max(0.0, sent + periods * PLANT.owner_period_s - _BEFORE_S - time.monotonic()))
+    return machine.block_at_timer(rig.bridge.pid, PLANT.paused_s)
 
 
 def flap(rig: Rig) -> float:
@@ -221,10 +224,10 @@ def pause_across_deadline(rig: Rig) -> float:
     now = stop_owners(rig)
     time.sleep(_HANDED_ON_S)
     handed_on = [run.first for drive in DRIVES if (run := rig.told.last(drive.number_id))]
-    first = min(at for at in handed_on if at > now - FIELDBUS_TIMEOUT_MS / 1000)
-    time.sleep(max(0.0, first + FIELDBUS_TIMEOUT_MS / 1000 - _BEFORE_S - time.monotonic()))
+    first = min(at for at in handed_on if at > now - _TIMEOUT_S)
+    time.sleep(max(0.0, first + _TIMEOUT_S - _BEFORE_S - time.monotonic()))
     rig.bridge.signal(signal.SIGSTOP)
-    time.sleep(_SHORT_S)
+    time.sleep(PLANT.short_s)
     rig.bridge.signal(signal.SIGCONT)
     return now
 

@@ -44,6 +44,10 @@ class Board:
     def sent_at(self, place: int, number: int) -> float:
         return float(_STAMP.unpack_from(self._memory, _BYTES * place + _STAMPS + 8 * number)[0])
 
+    def last_sent(self, place: int) -> float:
+        """When the latest telegram was sent."""
+        return max(self.sent_at(place, number) for number in range(NUMBERS))
+
     def accept(self, place: int, control_word: int) -> None:
         """A telegram with this word was answered without an error."""
         count, _ = self.accepted(place)

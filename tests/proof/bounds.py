@@ -5,17 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from tests.proof.drives import (
-    DEADMAN_MS,
-    FIELDBUS_TIMEOUT_MS,
-    REACTION_MS,
-    RPDO_PERIOD_MS,
-    TPDO_MS,
-    WAY_MS,
-    Drive,
-)
-from tests.proof.families import HEARTBEAT_MS
+from tests.proof.drives import TPDO_MS, WAY_MS, Drive
 from tests.proof.rig import Rig
+from tests.proof.settings import PLANT, REACTION_MS
 
 _BOOT_MS: Final = 1500.0
 
@@ -24,7 +16,7 @@ Bound = Callable[[Rig, Drive], float]
 
 def controller(rig: Rig, drive: Drive) -> float:
     """What is published; what comes after the RPDO, such as SYNC, is none of the bus's time."""
-    return min(rig.worst_case_ms[drive], FIELDBUS_TIMEOUT_MS + at_once(rig, drive))
+    return min(rig.worst_case_ms[drive], PLANT.fieldbus_timeout_ms + at_once(rig, drive))
 
 
 def controller_drive(rig: Rig, drive: Drive) -> float:
@@ -40,7 +32,7 @@ def controller_and_bridge_drive(rig: Rig, drive: Drive) -> float:
 
 
 def dead(rig: Rig, drive: Drive) -> float:
-    return DEADMAN_MS
+    return PLANT.deadman_ms
 
 
 def dead_drive(rig: Rig, drive: Drive) -> float:
@@ -48,7 +40,7 @@ def dead_drive(rig: Rig, drive: Drive) -> float:
 
 
 def at_once(rig: Rig, drive: Drive) -> float:
-    return RPDO_PERIOD_MS + REACTION_MS
+    return PLANT.rpdo_period_ms + REACTION_MS
 
 
 def at_once_drive(rig: Rig, drive: Drive) -> float:
@@ -66,7 +58,7 @@ def controller_sent_drive(rig: Rig, drive: Drive) -> float:
 
 def node_stopped(rig: Rig, drive: Drive) -> float:
     """The bridge stops the node at once; its heartbeat says so."""
-    return at_once(rig, drive) + HEARTBEAT_MS
+    return at_once(rig, drive) + PLANT.heartbeat_ms
 
 
 def asked(rig: Rig, drive: Drive) -> float:

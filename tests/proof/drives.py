@@ -3,11 +3,12 @@ RPDOs that go by SYNC, and a drive with two of them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 from tests.proof.families import CIA402, LENZE, NORD, STOEBER, Family
+from tests.proof.settings import PLANT
 
 PROTOCOLS: Final = ("modbus", "opcua", "zenoh")
 SERVERS: Final = {"modbus": "127.0.0.10", "opcua": "127.0.0.11", "zenoh": "127.0.0.12"}
@@ -17,16 +18,9 @@ PORTS: Final = {"modbus": 1502, "opcua": 4840, "zenoh": 7447}
 BRIDGE_SIDE: Final = "vcan0"
 DRIVE_SIDE: Final = "vcan1"
 
-RPDO_PERIOD_MS: Final = 100
-SYNC_PERIOD_MS: Final = 100
-REACTION_MS: Final = 20
-"""How late the bridge may be (docs/explanation/dead-man-chain.md)."""
-FIELDBUS_TIMEOUT_MS: Final = 1000
-OWNER_PERIOD_S: Final = 0.35
 WAY_MS: Final = {"modbus": 250, "opcua": 350, "zenoh": 300}
 """How long a telegram may be on its way from its client's call to the bus. The machine that client, front and
 bridge share has the most part of it; a bridge that kept each telegram for so long would be seen."""
-DEADMAN_MS: Final = 400
 IGNORED_STOP_MS: Final = 1500
 """How long after its bound a stop may go without being followed."""
 TPDO_MS: Final = 300
@@ -177,7 +171,8 @@ def _drives() -> tuple[Drive, ...]:
             _single(len(drives) + n, family, protocol, name, first_id + n)
             for n, protocol in enumerate(PROTOCOLS)
         ]
-    return tuple(drives)
+    chosen = [drive for drive in drives if not PLANT.nodes or drive.node in PLANT.nodes]
+    return tuple(replace(drive, place=place) for place, drive in enumerate(chosen))
 
 
 DRIVES: Final = _drives()
@@ -197,7 +192,7 @@ def write_site(path: Path, channel: str, state: Path, run: Path) -> Path:
     text = [
         f'[site]\nname = "proof"\nstate_dir = "{state}"\nruntime_dir = "{run}"',
         f'[[bus]]\nname = "can0"\ninterface = "socketcan"\nchannel = "{channel}"\nbitrate = 1000000',
-        f"sync_period_ms = {SYNC_PERIOD_MS}\nrpdo_period_ms = {RPDO_PERIOD_MS}\ndeadman_ms = {DEADMAN_MS}",
+        PLANT.bus,
         *(_node(drives) for drives in nodes.values()),
         f'[modbus]\nlisten = "{SERVERS["modbus"]}:{PORTS["modbus"]}"',
         f'[opcua]\nlisten = "{SERVERS["opcua"]}:{PORTS["opcua"]}"',
@@ -232,7 +227,7 @@ def _node(drives: list[Drive]) -> str:
         slot = {"drive": "axis1"}.get(drive.slot, drive.slot) if family is STOEBER else drive.slot
         lines += [
             f'[[bus.node.drive]]\nslot = "{slot}"\nunit_id = {drive.place + 1}',
-            f'control = "{drive.protocol}"\nfieldbus_timeout_ms = {FIELDBUS_TIMEOUT_MS}',
+            f'control = "{drive.protocol}"\nfieldbus_timeout_ms = {PLANT.fieldbus_timeout_ms}',
             f'on_expiry = "{drive.reaction}"',
             drive.settings,
             f"tpdo = {{ event_ms = {TPDO_MS}, inhibit_ms = {INHIBIT_MS} }}",

@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-HEARTBEAT_MS: Final = 600
+from tests.proof.settings import PLANT
+
 GUARD_MS, LIFE_TIME_FACTOR = 200, 3
 OWN_TIMEOUT_MS: Final = 500
 """Of each drive's own supervision."""
@@ -36,10 +37,10 @@ class Family:
     stops: Mapping[str, Bits] = field(hash=False)
     """Of the control word of each reaction."""
     control_bytes: int = 2
-    supervision: str = f'supervision = "heartbeat"\nsupervision_ms = {HEARTBEAT_MS}'
+    supervision: str = f'supervision = "heartbeat"\nsupervision_ms = {PLANT.heartbeat_ms}'
     configure: tuple[str, ...] = ()
     parameters: str = ""
-    lost_after_ms: int = HEARTBEAT_MS
+    lost_after_ms: int = PLANT.heartbeat_ms
     """When the bridge knows that a node is silent, from the node's last sign of life."""
     own_timeout_ms: int = OWN_TIMEOUT_MS
     """When the drive knows that the bridge is silent."""
@@ -60,7 +61,7 @@ NORD: Final = Family(
     # §6.5.1: bits 0 … 2 are "on", "no disable voltage", "no quick stop".
     stops={"disable_voltage": (0x0002, 0), "quick_stop": (0x0006, 0x0002), "stop": (0x0007, 0x0006)},
     # SDO2 … 4 reach the parameters of fu2 … fu4, P513 among them.
-    supervision=f'supervision = "heartbeat"\nsupervision_ms = {HEARTBEAT_MS}\nsdo_channels = [2, 3, 4]',
+    supervision=f'supervision = "heartbeat"\nsupervision_ms = {PLANT.heartbeat_ms}\nsdo_channels = [2, 3, 4]',
     configure=(f'{{ object = "2097:01", type = "uint16", value = {OWN_TIMEOUT_MS} }}',),  # P151
     parameters="P105 = 50.0, P112 = 10.0",
 )

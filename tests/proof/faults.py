@@ -11,6 +11,7 @@ from tests.proof import acts, bounds, machine, others
 from tests.proof.bounds import Bound
 from tests.proof.drives import DRIVES, PROTOCOLS, Drive
 from tests.proof.rig import Rig
+from tests.proof.settings import PLANT
 
 _SELDOM: Final = 3
 
@@ -133,12 +134,12 @@ FAULTS: Final = (
         at_once=_NODES,
     ),
     Fault(
-        "bus process paused for 0.6 s",
+        "bus process paused",
         "moment",
         acts.pause_bridge,
         acts.nothing,
         bounds.dead,
-        bounds.after(acts.PAUSED_S),
+        bounds.after(PLANT.paused_s),
         leaves_silence=True,
     ),
     Fault(
@@ -147,7 +148,7 @@ FAULTS: Final = (
         acts.pause_as_it_sends,
         acts.nothing,
         bounds.dead,
-        bounds.after(acts.PAUSED_S),
+        bounds.after(PLANT.paused_s),
         leaves_silence=True,
     ),
     Fault(
@@ -214,7 +215,7 @@ AWAITED: Final = (
         others.end_intruder,
         None,
         bounds.node_stopped,
-        nodes=(others.SHARED.node,),
+        nodes=(others.VICTIM.node,),
     ),
     Fault(
         "second bridge",

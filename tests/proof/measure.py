@@ -7,11 +7,12 @@ from itertools import pairwise
 from typing import Final
 
 from tests.proof.board import NUMBERS
-from tests.proof.drives import RPDO_PERIOD_MS, Drive
+from tests.proof.drives import Drive
 from tests.proof.rig import Rig
+from tests.proof.settings import PLANT
 from tests.proof.witness import Run
 
-_SILENT_S: Final = 3 * RPDO_PERIOD_MS / 1000
+_SILENT_S: Final = max(0.1, 3 * PLANT.rpdo_period_ms / 1000)
 _STOPPED: Final = 0x04
 """NMT state, in a heartbeat or, with the toggle bit, in an answer to node guarding."""
 _BOOT_UP: Final = b"\0"

@@ -23,14 +23,13 @@ from tests.proof.drives import (
     drives_of,
     write_second_site,
 )
-from tests.proof.families import HEARTBEAT_MS
+from tests.proof.families import CIA402
 from tests.proof.rig import Rig, Stuck
+from tests.proof.settings import PLANT
 from tests.proof.strangers import Connection
 
-DEAF: Final = next(drive for drive in DRIVES if drive.node == "fan_opcua")
-"""Whose RPDO is switched off. It watches our heartbeat, and so does not stop by itself."""
-SHARED: Final = next(drive for drive in DRIVES if drive.node == "fan_modbus")
-"""Whose RPDO somebody else sends, too."""
+VICTIM: Final = next(drive for drive in DRIVES if drive.family is CIA402)
+"""Whose RPDO is switched off, or sent by somebody else. It watches our heartbeat, so it goes on."""
 _INTRUDES_S: Final = 0.02
 _SECOND_S: Final = 8.0
 _PORT_S: Final = 20.0
@@ -65,7 +64,7 @@ class Intruder:
 
 
 def intrude(rig: Rig) -> float:
-    intruder = Intruder(SHARED)
+    intruder = Intruder(VICTIM)
     rig.guests.callback(intruder.end)
     return intruder.since
 
@@ -77,26 +76,26 @@ def _reset(drive: Drive) -> None:
 
 def end_intruder(rig: Rig) -> None:
     rig.send_guests_away()
-    _reset(SHARED)
+    _reset(VICTIM)
 
 
 def make_deaf(rig: Rig) -> None:
     """Its RPDO is switched off by SDO, and the bridge does not hear of it."""
     rig.gateway.silence_drives()
-    request = _DOWNLOAD.pack(_FOUR_BYTES, 0x1400, 1, _OFF | DEAF.rpdo)
-    machine.send(DRIVE_SIDE, 0x600 + DEAF.node_id, request)
+    request = _DOWNLOAD.pack(_FOUR_BYTES, 0x1400, 1, _OFF | VICTIM.rpdo)
+    machine.send(DRIVE_SIDE, 0x600 + VICTIM.node_id, request)
     time.sleep(_UNHEARD_S)
     rig.gateway.restore()
 
 
 def ignored_drive(rig: Rig, drive: Drive) -> float:
     """The bridge stops the node of one that does not follow."""
-    ignored_ms = IGNORED_STOP_MS + HEARTBEAT_MS if drive is DEAF else 0.0
+    ignored_ms = IGNORED_STOP_MS + PLANT.heartbeat_ms if drive is VICTIM else 0.0
     return bounds.controller_drive(rig, drive) + ignored_ms
 
 
 def let_hear(rig: Rig) -> None:
-    _reset(DEAF)
+    _reset(VICTIM)
     acts.continue_owners(rig)
 
 

@@ -17,7 +17,8 @@ from pathlib import Path
 
 from tests.proof.board import NUMBERS, Board
 from tests.proof.clients import CLIENTS, Client, ClientFault
-from tests.proof.drives import DRIVES, OWNER_PERIOD_S, Drive, drives_of
+from tests.proof.drives import DRIVES, Drive, drives_of
+from tests.proof.settings import PLANT
 
 _LOOK_S = 0.05
 _AGAIN_S = 0.1
@@ -52,7 +53,7 @@ async def _write(client: Client, protocol: str, board: Board) -> None:
         for (drive, word, _), accepted in zip(telegrams, await client.write(telegrams), strict=True):
             if accepted:
                 board.accept(drive.place, word)
-        due = began + OWNER_PERIOD_S
+        due = began + PLANT.owner_period_s
         # Another process changes the words: there is nothing to wait for.
         while time.monotonic() < due and words == _words(board, drives):  # noqa: ASYNC110
             await asyncio.sleep(max(0.0, min(_LOOK_S, due - time.monotonic())))

@@ -88,6 +88,7 @@ def merge(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
     for key in ("by_themselves", "seconds", "cycles"):
         merged[key] = sum(part[key] for part in parts)
     merged["faults_missing"] = sorted({name for part in parts for name in part["faults_missing"]})
+    merged["cells"] = sorted({tuple(cell) for part in parts for cell in part["cells"]})
     merged["errors"] = [text for part in parts for text in part["errors"]]
     merged["machines"] = len(parts)
     order = {name: place for place, name in enumerate(merged["faults"])}
@@ -163,8 +164,8 @@ def load(path: Path) -> dict[str, Any]:
 def failures(result: dict[str, Any], least: int) -> list[str]:
     """Why the proof has not succeeded: one sentence each, none where it has.
 
-    Each of the result's ``cells`` (fault, family, protocol) needs samples of as many rounds as inject its
-    fault ``least`` times."""
+    Each of the result's ``cells`` (fault, family, protocol, what a round is worth) needs samples of as many
+    rounds as inject its fault ``least`` times."""
     found = list(result["errors"])
     most = max(_MOST_AT_LEAST, int(_MOST_PER_MEASUREMENT * len(result["samples"])))
     in_vain = len(result["stopped_in_vain"])
@@ -173,12 +174,13 @@ def failures(result: dict[str, Any], least: int) -> list[str]:
     if result["by_themselves"] > most:
         found.append(f"{result['by_themselves']} drives were found stopped before a fault, {most} may be")
     seen = {(cell.fault, cell.family, cell.protocol): cell for cell in cells(result["samples"])}
-    empty = [Cell(*key, ()) for key in map(tuple, result["cells"]) if key not in seen]
-    for cell in [*seen.values(), *empty]:
+    worth = {(fault, family, protocol): each for fault, family, protocol, each in result["cells"]}
+    empty = {key: Cell(*key, ()) for key in worth if key not in seen}
+    for key, cell in {**seen, **empty}.items():
         name = f"{cell.fault}, {cell.family}, {cell.protocol}"
         if bad := cell.count("failed"):
             found.append(f"{name}: {bad} of {len(cell.records)} failed")
-        needed = -(-least // result["per_round"][cell.fault])
+        needed = -(-least // worth[key])
         if len(cell.records) < needed:
             found.append(f"{name}: only {len(cell.records)} samples of {needed}")
     return found

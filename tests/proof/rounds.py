@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from tests.proof import measure
-from tests.proof.drives import DEADMAN_MS, DRIVES, OWNER_PERIOD_S, REACTION_MS, RPDO_PERIOD_MS, WAY_MS, Drive
+from tests.proof.drives import DRIVES, WAY_MS, Drive
 from tests.proof.faults import Fault
 from tests.proof.measure import Sample
 from tests.proof.rig import BRIDGE, FRONT, SIMULATION, Rig, Stuck
+from tests.proof.settings import PLANT, REACTION_MS
 from tests.proof.waits import paused_ms, waited_ms
 
 _STOPPED_S: Final = 5.0
@@ -22,7 +23,7 @@ _QUIET_S: Final = 0.4
 """How long is waited that something does *not* stop the drives."""
 _LOOKS: Final = 5
 _LOOK_S: Final = 1.0
-_BEFORE_MS: Final = RPDO_PERIOD_MS + REACTION_MS
+_BEFORE_MS: Final = PLANT.rpdo_period_ms + REACTION_MS
 """The bridge, or the drive, has to begin its stop that long before its bound."""
 _HOLD_S: Final = 3.0
 """How long the owners go on writing "run" after everything is back and their telegrams are taken: nothing may
@@ -43,12 +44,17 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     holding = [drive for drive in DRIVES if fault.goes_on(drive) and drive not in others]
     began = time.monotonic()
     # At any time between two telegrams.
-    time.sleep(random.uniform(0.0, OWNER_PERIOD_S))
+    time.sleep(random.uniform(0.0, PLANT.owner_period_s))
     moment = fault.inject(rig)
     _let_pass(rig, fault, concerned, moment)
     still = [drive for drive in concerned + holding if not measure.was_moving(rig, drive, moment)]
     rig.by_themselves += len(still)
     stopped = _wait_stopped(rig, fault, [drive for drive in concerned if drive not in still], moment)
+    missing = [drive for drive in concerned if drive not in stopped and drive not in still]
+    if missing:
+        raise Stuck(
+            f"{fault.name}: not stopped: {', '.join(f'{one.path} ({one.protocol})' for one in missing)}"
+        )
     ways = _ways(rig, fault, list(stopped), moment)
     words = {drive: measure.stopping(rig, drive, times[0]) for drive, times in stopped.items()}
     _all_go_on(rig, others, fault, "which it does not concern")
@@ -66,11 +72,6 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
         if sample.verdict != "ok":
             drive = next(drive for drive in DRIVES if drive.path == sample.drive)
             say(f"{sample.verdict.upper()}: {sample}\n{measure.trace(rig, drive, moment)}")
-    missing = [drive for drive in concerned if drive not in stopped and drive not in still]
-    if missing:
-        raise Stuck(
-            f"{fault.name}: not stopped: {', '.join(f'{one.path} ({one.protocol})' for one in missing)}"
-        )
     rig.run_all(anew=holding)
     say(f"{fault.name}: {time.monotonic() - began:.1f} s")
     return samples
@@ -99,7 +100,9 @@ def _held(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> list[Sa
             rig.stopped_in_vain.append(f"{fault.name}: {drive.path} ({drive.protocol}), which is to hold")
             continue
         text = f"it is to hold, and {wrong}" if wrong else ""
-        samples.append(Sample(fault.name, drive.family.name, drive.protocol, drive.path, wrong=text))
+        samples.append(
+            Sample(fault.name, drive.family.name + PLANT.label, drive.protocol, drive.path, wrong=text)
+        )
     return samples
 
 
@@ -107,7 +110,7 @@ def _was_slow(rig: Rig, drive: Drive, since: float) -> bool:
     """The bridge hung for longer than its dead-man time, or the drive was not heard for as long."""
     now = time.monotonic()
     waited = max(paused_ms(rig.watched, since, now), waited_ms(rig.watched, BRIDGE, since, now))
-    return max(waited, measure.longest_pause(rig, drive, since) * 1000) >= DEADMAN_MS
+    return max(waited, measure.longest_pause(rig, drive, since) * 1000) >= PLANT.deadman_ms
 
 
 def _all_move(rig: Rig, say: Callable[[str], None]) -> None:
@@ -236,7 +239,7 @@ def _sample(
     paused, waited = _held_up_ms(rig, spans)
     return Sample(
         fault.name,
-        drive.family.name,
+        drive.family.name + PLANT.label,
         drive.protocol,
         drive.path,
         bus_ms=on_bus.ms if on_bus else None,

@@ -33,9 +33,8 @@ def result(*samples: dict[str, Any], **change: Any) -> dict[str, Any]:
         "machines": 1,
         "faults": ["owner killed", "bus-off"],
         "faults_missing": [],
-        "cells": [["owner killed", "NORD SK TU4-CAO", "modbus"]],
+        "cells": [["owner killed", "NORD SK TU4-CAO", "modbus", 1]],
         "cycles": 1,
-        "per_round": {"owner killed": 1, "bus-off": 1},
         "seconds": 60.0,
         "by_themselves": 0,
         "stopped_in_vain": [],
@@ -78,13 +77,13 @@ def test_too_few_samples_fail_the_proof() -> None:
 
 
 def test_a_cell_without_any_sample_fails_the_proof() -> None:
-    cells = [["owner killed", "NORD SK TU4-CAO", "modbus"], ["bus-off", "CiA 402", "zenoh"]]
+    cells = [["owner killed", "NORD SK TU4-CAO", "modbus", 1], ["bus-off", "CiA 402", "zenoh", 1]]
     found = failures(result(record(), cells=cells), 1)
     assert found == ["bus-off, CiA 402, zenoh: only 0 samples of 1"]
 
 
 def test_a_round_that_injects_a_fault_several_times_counts_as_often() -> None:
-    found = result(record(), record(), per_round={"owner killed": 3, "bus-off": 1})
+    found = result(record(), record(), cells=[["owner killed", "NORD SK TU4-CAO", "modbus", 3]])
     assert failures(found, 6) == []
     assert failures(found, 7) == ["owner killed, NORD SK TU4-CAO, modbus: only 2 samples of 3"]
 

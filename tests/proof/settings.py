@@ -1,0 +1,63 @@
+"""The times of the two plants: one with all drives, slow enough for thirteen of them and their owners on one
+CPU; and a small one with what a site file leaves to the program. PROOF_PLANT says which, for all processes of
+a run."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Final
+
+REACTION_MS: Final = 20
+"""How late the bridge may be (docs/explanation/dead-man-chain.md)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """``bus`` is what the site file says of them. An owner may be silent for longer than a hang of the bridge
+    takes (``paused_s``), and that takes longer than ``deadman_ms``; ``short_s`` does not."""
+
+    name: str
+    bus: str
+    rpdo_period_ms: int
+    deadman_ms: int
+    heartbeat_ms: int
+    """When a node's silence is noticed, with a heartbeat."""
+    fieldbus_timeout_ms: int
+    owner_period_s: float
+    paused_s: float
+    short_s: float
+    label: str = ""
+    nodes: tuple[str, ...] = ()
+    """All of them where there are none."""
+    share: int = 1
+    """Each fault is injected so many times less often."""
+
+
+ALL: Final = Settings(
+    "all",
+    bus="sync_period_ms = 100\nrpdo_period_ms = 100\ndeadman_ms = 400",
+    rpdo_period_ms=100,
+    deadman_ms=400,
+    heartbeat_ms=600,
+    fieldbus_timeout_ms=1000,
+    owner_period_s=0.35,
+    paused_s=0.6,
+    short_s=0.35,
+)
+DEFAULTS: Final = Settings(
+    "defaults",
+    bus="",
+    rpdo_period_ms=10,
+    deadman_ms=100,
+    heartbeat_ms=200,
+    fieldbus_timeout_ms=500,
+    owner_period_s=0.1,
+    paused_s=0.25,
+    short_s=0.08,
+    label=", default settings",
+    nodes=("conveyor", "pump_zenoh", "lift_modbus", "fan_opcua"),
+    share=3,
+)
+PLANTS: Final = {plant.name: plant for plant in (ALL, DEFAULTS)}
+PLANT: Final = PLANTS[os.environ.get("PROOF_PLANT", ALL.name)]

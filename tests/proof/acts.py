@@ -180,8 +180,8 @@ def pause_bridge(rig: Rig) -> float:
 
 
 def pause_as_it_sends(rig: Rig) -> float:
-    """The same, at the worst moment: between its look at the clock and what it sends, when a telegram has come
-    that changes it."""
+    """The same, at the worst moment: between its look at the clock and what it sends, when a telegram has
+    come that changes it."""
     assert rig.bridge
     sent = max(rig.board.last_sent(drive.place) for drive in drives_of("modbus"))
     periods = math.ceil((time.monotonic() + _BEFORE_S - sent) / PLANT.owner_period_s)

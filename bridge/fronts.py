@@ -121,6 +121,8 @@ class Front:
             *arguments,
             stdin=asyncio.subprocess.DEVNULL,
             pass_fds=(ear.mouth,) if ear else (),
+            # What a terminal sends to everybody is for the bus process: its drives stop first.
+            process_group=0,
             # The bus process alone talks to systemd's watchdog.
             env={k: v for k, v in os.environ.items() if k not in ("NOTIFY_SOCKET", "WATCHDOG_USEC")},
         )

@@ -13,7 +13,7 @@ from bridge import __version__, clock
 from bridge.auditlog import AuditLog
 from bridge.command import Plant
 from bridge.config import BusTable
-from bridge.errors import BridgeError
+from bridge.errors import BridgeError, OperationFailed
 from bridge.eventlog import EventLog
 from bridge.fronts import Front
 from bridge.lint import Severity, lint
@@ -78,6 +78,7 @@ class Service:
         )
         endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
         self.mirror = MirrorPublisher(self.plant, endpoint, clock.now, clock.epoch_ns)
+        self._tasks: list[asyncio.Task[None]] = []
         self.fronts: list[Front] = []
         if fronts and site.opcua:
             self.fronts.append(Front("opcua", ["run", str(project.path), "--role", "opcua"], watched=True))
@@ -104,7 +105,9 @@ class Service:
                 stack.push_async_callback(self.zenoh.close)
             await self.mirror.start()
             stack.push_async_callback(self.mirror.close)
+            stack.push_async_callback(self._end_tasks)
             await self.master.start()
+            # Whatever ends the service: the drives stop before anything else ends.
             stack.push_async_callback(self._stop)
             # What is there now stays: the collector need not look at it again and again.
             gc.collect()
@@ -112,16 +115,35 @@ class Service:
             buses = count(len(self.project.site.bus), "bus")
             self.notifier.ready(f"{count(len(self.plant.drives), 'drive')} on {buses}")
             ready()
-            async with asyncio.TaskGroup() as tasks:
-                for front in self.fronts:
-                    tasks.create_task(front.run(), name=f"front-{front.role}")
-                # Each waits until this task is cancelled, or tells that its part has failed.
-                tasks.create_task(self.master.failed(), name="master")
-                tasks.create_task(self.mirror.failed(), name="mirror")
-                tasks.create_task(self.wear.run(), name="EEPROM counts")
-                tasks.create_task(self.audit.run(), name="audit log")
-                if self.zenoh:
-                    tasks.create_task(self.zenoh.failed(), name="zenoh")
+            await self._serve()
+
+    def halt(self) -> None:
+        """Stop all drives now, and take no command any more but stops. ``run`` is to be cancelled next."""
+        self.master.halt(clock.now())
+
+    async def _serve(self) -> None:
+        """Until cancelled, or until a task ends: each waits for ever, or tells that its part has failed."""
+        works = {
+            "master": self.master.failed(),
+            "mirror": self.mirror.failed(),
+            "EEPROM counts": self.wear.run(),
+            "audit log": self.audit.run(),
+        }
+        if self.zenoh:
+            works["zenoh"] = self.zenoh.failed()
+        for front in self.fronts:
+            works[f"front-{front.role}"] = front.run()
+        self._tasks = [asyncio.create_task(work, name=name) for name, work in works.items()]
+        done, _ = await asyncio.wait(self._tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            if not task.cancelled():
+                task.result()
+        raise OperationFailed(f"the service has lost a task: {', '.join(task.get_name() for task in done)}")
+
+    async def _end_tasks(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
 
     def _say_what_is_doubtful(self) -> None:
         """A site that cannot work well is run all the same: stopping a plant over a prediction is worse."""
@@ -133,7 +155,10 @@ class Service:
             _log.info("%s", load)
 
     async def _stop(self) -> None:
+        self.halt()
         _log.info("stopping: all drives are stopped")
         self.notifier.stopping()
-        await self.master.stop_drives(clock.now())
-        await self.master.close()
+        try:
+            await self.master.stop_drives(clock.now())
+        finally:
+            await self.master.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -12,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from bridge.cli import logs
-from bridge.cli.stopping import until_stopped
+from bridge.cli.signals import ending_signals
+from bridge.cli.stopping import Ending, until_stopped
 from bridge.config import BusTable, ZenohTable, load_site
 from bridge.errors import OperationFailed
 from bridge.fronts import Front, become_front
@@ -48,12 +50,13 @@ def run(
     if role == "opcua":
         from bridge.front import run_opcua
 
-        become_front(parent)
+        _become_front(parent)
         until_stopped(run_opcua(load_site(site), signs))
         return
     from bridge.project import load_project
 
-    until_stopped(_serve(load_project(site), fronts=role == "all"))
+    ending = Ending()
+    until_stopped(_serve(load_project(site), ending, fronts=role == "all"), ending)
 
 
 def demo(verbose: Verbose = False) -> None:
@@ -63,7 +66,9 @@ def demo(verbose: Verbose = False) -> None:
     logs.set_up(verbose=verbose)
     with tempfile.TemporaryDirectory(prefix="drivebridge-") as folder:
         project = load_project(_demo_site(Path(folder)))
-        until_stopped(_serve(project, fronts=True, controller=True, ready=lambda: _print_demo(project)))
+        ending = Ending()
+        ready = partial(_print_demo, project)
+        until_stopped(_serve(project, ending, fronts=True, controller=True, ready=ready), ending)
 
 
 def simulate(site: SiteArgument, verbose: Verbose = False) -> None:
@@ -95,12 +100,19 @@ def demo_controller(endpoint: str, moves: list[str], parent: int = 0) -> None:
     from bridge.sim.controller import Move, run_controller
 
     logs.set_up(verbose=False)
-    become_front(parent)
+    _become_front(parent)
     run_controller(endpoint, [Move.from_text(move) for move in moves])
+
+
+def _become_front(parent: int) -> None:
+    """A front that is still starting holds nothing that would have to be put in order."""
+    ending_signals.let_kill()
+    become_front(parent)
 
 
 async def _serve(
     project: Project,
+    ending: Ending,
     *,
     fronts: bool,
     controller: bool = False,
@@ -123,6 +135,7 @@ async def _serve(
         return wire.end(table.name)
 
     service = Service(project, open_bus, fronts=fronts, alarm=SignalAlarm())
+    ending.first = service.halt
     if controller and project.site.zenoh:
         service.fronts.append(_demo_controller(project.site.zenoh, project.site.site.name))
     async with asyncio.TaskGroup() as tasks:

@@ -3,39 +3,64 @@
 from __future__ import annotations
 
 import asyncio
-import signal
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
 from typing import Any, cast
 
 from bridge.cli import logs
+from bridge.cli.signals import ending_signals
 
 
-def until_stopped(work: Coroutine[Any, Any, None]) -> None:
-    """Run ``work`` until it ends or SIGINT or SIGTERM arrives. Its one error is raised bare."""
+@dataclass(slots=True)
+class Ending:
+    """``first`` is done in the loop's turn after the signal, before anything else is ended."""
 
-    async def supervised() -> None:
-        task = asyncio.ensure_future(work)
-        loop = asyncio.get_running_loop()
-        loop.set_exception_handler(logs.LoopFaults())
-        stopped = False
+    first: Callable[[], None] = lambda: None
 
-        def stop() -> None:
-            nonlocal stopped
-            stopped = True
-            task.cancel()
 
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, stop)
-        try:
-            await task
-        except asyncio.CancelledError:
-            if not stopped:
-                raise
-
+def until_stopped(work: Coroutine[Any, Any, None], ending: Ending | None = None) -> None:
+    """Run ``work`` until it ends or one of the signals that end us comes; then ``work`` is cancelled, once.
+    Its one error is raised bare."""
+    was_held = ending_signals.is_held
+    if not was_held:
+        ending_signals.hold()
     try:
-        asyncio.run(supervised())
+        asyncio.run(_supervised(work, ending or Ending()))
     except BaseExceptionGroup as group:
         raise _first(cast("BaseException", group)) from None
+    finally:
+        ending_signals.tell(None)
+        if not was_held:
+            ending_signals.release()
+
+
+async def _supervised(work: Coroutine[Any, Any, None], ending: Ending) -> None:
+    loop = asyncio.get_running_loop()
+    loop.set_exception_handler(logs.LoopFaults())
+    stopped = False
+
+    def stop() -> None:
+        nonlocal stopped
+        stopped = True
+        try:
+            ending.first()
+        finally:
+            task.cancel()
+
+    def on_signal() -> None:
+        loop.call_soon_threadsafe(stop)
+
+    ending_signals.tell(on_signal)
+    if ending_signals.has_come:
+        # Before there was anything to stop.
+        work.close()
+        return
+    task = asyncio.ensure_future(work)
+    try:
+        await task
+    except asyncio.CancelledError:
+        if not stopped:
+            raise
 
 
 def _first(error: BaseException) -> BaseException:

@@ -108,13 +108,16 @@ class Master:
         self._plant.outputs_changed = self._wake
         self._running = True
 
+    def halt(self, now: float) -> None:
+        """Take no more commands, and hand stopped words to the buses at once. May be called again."""
+        self._plant.close(now)
+        self._wake()
+
     async def stop_drives(self, now: float) -> None:
         """Take no more commands and send stopped words for a moment, unless the master has failed."""
-        self._plant.close(now)
-        if not self._running:
-            return
-        self._wake()
-        await asyncio.sleep(_STOP_DRIVES_S)
+        self.halt(now)
+        if self._running:
+            await asyncio.sleep(_STOP_DRIVES_S)
 
     async def close(self) -> None:
         """Stop every drive's process data and close the buses."""
@@ -134,7 +137,8 @@ class Master:
 
     def _wake(self) -> None:
         """A round, if we run. A fault of our own ends the running: no drive is left to a master that
-        does half of its work. The bursts end within the dead-man time, and ``failed`` says why."""
+        does half of its work. Each gets a last, stopped word where that can still be done; the bursts end
+        within the dead-man time, and ``failed`` says why."""
         if not self._running:
             return
         if self._in_round:
@@ -151,9 +155,23 @@ class Master:
             self._running = False
             if self._failure and not self._failure.done():
                 self._failure.set_exception(OperationFailed(f"the master has failed: {error!r}"))
+            self._send_last_words()
             raise
         finally:
             self._in_round = False
+
+    def _send_last_words(self) -> None:
+        """After a fault of our own: what fails for one bus must not keep the others' drives running."""
+        now = self._clock()
+        try:
+            self._plant.close(now)
+        except Exception:  # noqa: BLE001 - what is wrong is said already, and this is tried all the same
+            _log.exception("not every drive could be stopped")
+        for line in self._lines:
+            try:
+                self._flush(line, now)
+            except Exception:  # noqa: BLE001 - nor may it keep the next bus from it
+                _log.exception("bus %s: no stopped words could be sent", line.bus.name)
 
     async def failed(self) -> None:
         """Wait for ever, or raise ``OperationFailed`` when a fault of our own has ended the running."""

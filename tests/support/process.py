@@ -47,6 +47,8 @@ class Process:
                 env=environment,
                 cwd=log.parent,
                 pass_fds=files,
+                # Leads a process group, as what a terminal starts does.
+                process_group=0,
             )
 
     @property

@@ -5,11 +5,13 @@ from __future__ import annotations
 import configparser
 import re
 import shutil
+import signal
 import subprocess
 from pathlib import Path
 
 import pytest
 
+from bridge.cli.signals import ENDING
 from bridge.lint import lint
 from bridge.project import load_project
 
@@ -71,6 +73,14 @@ def test_fronts_do_not_inherit_the_real_time_priority(service: configparser.Sect
 
 def test_no_front_outlives_the_bus_process(service: configparser.SectionProxy) -> None:
     assert service["KillMode"] == "mixed"
+
+
+def test_the_bus_process_is_ended_by_a_signal_that_stops_its_drives(
+    service: configparser.SectionProxy,
+) -> None:
+    assert getattr(signal, service.get("KillSignal", "SIGTERM")) in ENDING
+    # 3 s for a front, 2 s each for two zenoh sessions and the audit log: what it may take altogether.
+    assert seconds(service["TimeoutStopSec"]) >= 15
 
 
 @pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="systemd-analyze is not installed")

@@ -1,0 +1,142 @@
+"""However the service ends by itself: every drive is sent a stopped word before anything else is ended."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from bridge.command import Action, Identity, Kind, Request, Source
+from bridge.project import load_project
+from bridge.service import Service
+from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.shell import Simulation
+from bridge.southbound.bus.frame import Frame
+from bridge.southbound.bus.virtual import VirtualWire
+from tests.support import sites
+from tests.support.process import free_port
+
+RPDO1 = 0x205
+PLC = Identity(Source.MODBUS, "127.0.0.1")
+TASKS = {"master", "mirror", "zenoh", "EEPROM counts", "audit log", "front-slow"}
+"""What the service runs side by side."""
+
+
+class SlowFront:
+    """Takes its time to end."""
+
+    role = "slow"
+
+    def __init__(self, ended: Callable[[], None]) -> None:
+        self._ended = ended
+
+    async def run(self) -> None:
+        try:
+            await asyncio.get_running_loop().create_future()
+        finally:
+            self._ended()
+            await asyncio.sleep(0.3)
+
+
+class Moving:
+    """A service in this process whose drive runs, and what happened in which order."""
+
+    def __init__(self, service: Service, running: asyncio.Task[None]) -> None:
+        self.service = service
+        self.running = running
+        self.happened: list[str] = []
+
+    def task(self, name: str) -> asyncio.Task[object]:
+        [task] = [task for task in asyncio.all_tasks() if task.get_name() == name]
+        return task
+
+    def on_frame(self, frame: Frame) -> None:
+        if frame.can_id == RPDO1:
+            self.note("enabled" if frame.data[0] & 0x0F == 0x0F else "stopped")
+
+    def note(self, what: str) -> None:
+        if self.happened[-1:] != [what]:
+            self.happened.append(what)
+
+    def ends(self) -> list[str]:
+        """In which order: a drive is enabled no more once it was stopped."""
+        return self.happened[self.happened[0] == "enabled" :]
+
+    async def end(self) -> BaseException | None:
+        [result] = await asyncio.gather(asyncio.wait_for(self.running, 15), return_exceptions=True)
+        return result
+
+
+@asynccontextmanager
+async def moving(folder: Path) -> AsyncIterator[Moving]:
+    node = sites.node(sites.drive("fu1", "modbus", 20_000), more="supervision_ms = 1000")
+    path = sites.write(folder, sites.bus(node), sites.modbus(free_port()), sites.zenoh(free_port()))
+    wire = VirtualWire()
+    service = Service(load_project(path), lambda table: wire.end(table.name))
+    booted, enabled = asyncio.Event(), asyncio.Event()
+    service.plant.on_event(lambda event: booted.set() if event.kind is Kind.NODE_BACK else None)
+    simulating = asyncio.create_task(Simulation(wire.end("simulation"), [NordTu4(5)]).run())
+
+    move = Moving(service, asyncio.create_task(service.run(), name="service"))
+    service.fronts.append(SlowFront(lambda: move.note("front ends")))  # type: ignore[arg-type]
+    wire.listeners.append(move.on_frame)
+    wire.listeners.append(lambda _: enabled.set() if move.happened[-1:] == ["enabled"] else None)
+    try:
+        await asyncio.wait_for(booted.wait(), 15)
+        for word in (0x047E, 0x047F):
+            request = Request(PLC, "conveyor/fu1", Action.WRITE, {"control_word": word})
+            service.plant.submit(request, asyncio.get_running_loop().time(), lambda outcome: None)
+        await asyncio.wait_for(enabled.wait(), 15)
+        move.happened.clear()
+        yield move
+    finally:
+        for task in (move.running, simulating):
+            task.cancel()
+        await asyncio.gather(move.running, simulating, return_exceptions=True)
+
+
+def fail(task: asyncio.Task[object]) -> None:
+    """What the task waits for raises, as a fault of our own or of a library would."""
+    waited_for = task._fut_waiter  # type: ignore[attr-defined]
+    waited_for.set_exception(RuntimeError("broken"))
+
+
+@pytest.mark.parametrize("how", [fail, asyncio.Task.cancel], ids=["fails", "is cancelled"])
+@pytest.mark.parametrize("name", sorted(TASKS))
+async def test_drives_stop_first_when_a_task_ends(
+    tmp_path: Path, name: str, how: Callable[[asyncio.Task[object]], object]
+) -> None:
+    async with moving(tmp_path) as move:
+        assert {task.get_name() for task in move.service._tasks} == TASKS, "each of them is tried here"
+        how(move.task(name))
+        assert isinstance(await move.end(), Exception), "it is told"
+        if name == "front-slow":
+            # It is the one that has ended.
+            assert move.ends()[-1] == "stopped"
+        else:
+            assert move.ends() == ["stopped", "front ends"]
+
+
+async def test_drives_stop_first_when_the_service_is_cancelled_again_and_again(tmp_path: Path) -> None:
+    async with moving(tmp_path) as move:
+        for _ in range(3):
+            move.running.cancel()
+            await asyncio.sleep(0.02)
+        assert isinstance(await move.end(), asyncio.CancelledError)
+        assert move.ends() == ["stopped", "front ends"]
+
+
+async def test_a_fault_in_a_round_of_the_master_stops_the_drives_in_that_round(tmp_path: Path) -> None:
+    async with moving(tmp_path) as move:
+        move.service.master._plant.on_time = broken  # type: ignore[method-assign]
+        begin = asyncio.get_running_loop().time()
+        assert "the master has failed" in str(await move.end())
+        assert asyncio.get_running_loop().time() - begin < 5
+        assert move.ends() == ["stopped", "front ends"]
+
+
+def broken(*_: object) -> None:
+    raise RuntimeError("a fault of our own")

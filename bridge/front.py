@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import socket
 from contextlib import AsyncExitStack
 from pathlib import Path
 
@@ -16,8 +17,9 @@ from bridge.mirror.endpoint import socket_endpoint
 from bridge.northbound.opcua.server import OpcUaServer
 
 
-async def run_opcua(site: Site, signs: int | None = None) -> None:
-    """Serve until cancelled, with signs of life on the pipe ``signs`` as soon as it serves.
+async def run_opcua(site: Site, signs: int | None = None, listening: int | None = None) -> None:
+    """Serve until cancelled, with signs of life on the pipe ``signs`` as soon as it serves; on the socket
+    ``listening`` where the bus process holds the port.
 
     Raises ``PointsChanged`` where the bus process comes back with other points: this front has to
     start anew then.
@@ -31,7 +33,8 @@ async def run_opcua(site: Site, signs: int | None = None) -> None:
         # Nothing of what is built here is garbage, and looking for it takes a quarter of the time.
         gc.disable()
         stack.callback(gc.enable)
-        server = OpcUaServer(mirror, site.opcua, Path(site.site.state_dir), site.site.name)
+        bound = None if listening is None else socket.socket(fileno=listening)
+        server = OpcUaServer(mirror, site.opcua, Path(site.site.state_dir), site.site.name, bound)
         await server.start()
         stack.push_async_callback(server.close)
         gc.collect()
@@ -40,5 +43,6 @@ async def run_opcua(site: Site, signs: int | None = None) -> None:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(mirror.run(), name="mirror")
             tasks.create_task(mirror.failed(), name="mirror link")
+            tasks.create_task(server.failed(), name="listening socket")
             if signs is not None:
                 tasks.create_task(give_signs(signs), name="signs of life")

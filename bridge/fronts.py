@@ -1,4 +1,4 @@
-"""Looks after the front processes: starts them, restarts those that end, stops them.
+"""Front processes: started, heard, killed where they hang, and stopped.
 
 A front is heavy and may crash; it holds nothing up. It is a child of the bus process, with a lower
 priority, and dies with it.
@@ -9,118 +9,83 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ctypes
-import logging
 import os
 import signal
+import socket
 import sys
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from bridge.errors import BridgeError, OperationFailed
 
-_log = logging.getLogger(__name__)
-
 SIGN_PERIOD_S: Final = 1.0
 _SILENT_LOOKS: Final = 5
-_USERS_FAULT: Final = (2, 3)
-"""Exit codes of what the user has to mend: a file, a port (``bridge.errors``)."""
-_FIRST_PAUSE_S: Final = 0.2
-_LAST_PAUSE_S: Final = 10.0
-_LOG_PAUSE_S: Final = 60.0
-_STABLE_S: Final = 30.0
+_REASON: Final = b"!"
+"""On the pipe of signs: what follows is why the front ends."""
+_LONGEST_REASON: Final = 1000
 _STOP_S: Final = 3.0
 _NICE: Final = 5
 _PR_SET_PDEATHSIG: Final = 1
 
 
-class FrontRefused(BridgeError):
-    """A front has never come up, and trying again does not help. It has told why itself."""
-
-    def __init__(self, exit_code: int) -> None:
-        super().__init__("")
-        self.exit_code = exit_code
-
-
 class Front:
     """One front process: ``python -m bridge`` with ``arguments`` and our process id.
 
-    A ``watched`` one is given a pipe (``--signs``) on which it shows that its event loop runs.
+    A ``watched`` one is given a pipe (``--signs``) on which it shows that its event loop runs, and says why
+    it ends. ``listening`` gives the socket that it is to serve on (``--listening``), which stays ours, too.
     """
 
-    def __init__(self, role: str, arguments: Sequence[str], *, watched: bool = False) -> None:
-        self.role = role
-        self.restarts = 0
+    def __init__(
+        self,
+        role: str,
+        arguments: Sequence[str],
+        *,
+        watched: bool = False,
+        listening: Callable[[], socket.socket] | None = None,
+    ) -> None:
+        self.name = role
+        self.title = f"the {role} front"
         self._arguments = list(arguments)
         self._watched = watched
-        self._has_lived = False
-        self._logged_at = float("-inf")
+        self._listening = listening
         self._process: asyncio.subprocess.Process | None = None
 
     @property
     def pid(self) -> int | None:
         return self._process.pid if self._process else None
 
-    async def run(self) -> None:
-        """Keep the front running until cancelled; back-off where it does not stay up.
-
-        Raises ``FrontRefused`` where the first one ends with a fault of the site file or a port, before
-        it has given a sign of life: the user has to mend that.
-        """
-        pause_s = _FIRST_PAUSE_S
+    async def run_once(self, serves: Callable[[], None]) -> str:
+        """Run it until it ends; how that was, as the end of a sentence. ``serves`` is called at its first
+        sign of life; of one that is not watched, when it has run for a second. Cancelled, it is ended."""
+        ear = None
         try:
-            while True:
-                started = time.monotonic()
-                how = await self._run_once()
-                if time.monotonic() - started > _STABLE_S:
-                    pause_s = _FIRST_PAUSE_S
-                self._tell(how, pause_s)
-                await asyncio.sleep(pause_s)
-                pause_s = min(pause_s * 2, _LAST_PAUSE_S)
-                self.restarts += 1
-        finally:
-            await self._stop()
-
-    def _tell(self, how: str, pause_s: float) -> None:
-        """At most once a minute: one that never comes up must not fill a disk."""
-        now = time.monotonic()
-        if now - self._logged_at >= _LOG_PAUSE_S:
-            self._logged_at = now
-            _log.error("the %s front %s; it is started again in %.1f s", self.role, how, pause_s)
-
-    async def _run_once(self) -> str:
-        """Run it until it ends; how that was, as the end of a sentence."""
-        try:
-            ear = _Ear() if self._watched else None
-        except OSError as error:
+            ear = _Ear(serves) if self._watched else None
+            process = self._process = await self._spawn(ear)
+            return await self._wait(process, ear, serves)
+        except (BridgeError, OSError, RuntimeError) as error:
+            # No port, no process or no thread to be had: the machine is at its limits, which may pass. A
+            # child that nobody waits for loses its pipe, and ends by that.
             return f"cannot be started: {error}"
-        try:
-            try:
-                process = self._process = await self._spawn(ear)
-            except (OSError, RuntimeError) as error:
-                # No process or no thread to be had: the machine is at its limits, which may pass. A
-                # child that nobody waits for loses its pipe, and ends by that.
-                return f"cannot be started: {error}"
-            how = await self._wait(process, ear)
         finally:
             if ear:
-                self._has_lived |= ear.has_heard
                 ear.close()
-        if process.returncode in _USERS_FAULT and not self.restarts and not self._has_lived:
-            raise FrontRefused(process.returncode)
-        return how
+            await self._stop()
 
     async def _spawn(self, ear: _Ear | None) -> asyncio.subprocess.Process:
-        arguments = [*self._arguments, "--parent", str(os.getpid())]
+        arguments, files = [*self._arguments, "--parent", str(os.getpid())], list[int]()
         if ear:
             arguments += ["--signs", str(ear.mouth)]
+            files.append(ear.mouth)
+        if self._listening:
+            files.append(self._listening().fileno())
+            arguments += ["--listening", str(files[-1])]
         process = await asyncio.create_subprocess_exec(
             sys.executable,
             "-m",
             "bridge",
             *arguments,
             stdin=asyncio.subprocess.DEVNULL,
-            pass_fds=(ear.mouth,) if ear else (),
+            pass_fds=files,
             # What a terminal sends to everybody is for the bus process: its drives stop first.
             process_group=0,
             # The bus process alone talks to systemd's watchdog.
@@ -130,14 +95,19 @@ class Front:
             ear.let_go()
         return process
 
-    async def _wait(self, process: asyncio.subprocess.Process, ear: _Ear | None) -> str:
+    async def _wait(
+        self, process: asyncio.subprocess.Process, ear: _Ear | None, serves: Callable[[], None]
+    ) -> str:
         """Until it ends, or is killed because it hangs."""
         while ear is None or ear.silent_looks < _SILENT_LOOKS:
             try:
-                return f"ended ({_how(await asyncio.wait_for(process.wait(), SIGN_PERIOD_S))})"
+                code = await asyncio.wait_for(process.wait(), SIGN_PERIOD_S)
+                return f"ended ({_how(code)})" + (f": {ear.reason}" if ear and ear.reason else "")
             except TimeoutError:
                 if ear:
                     ear.look()
+                else:
+                    serves()
         with contextlib.suppress(ProcessLookupError):
             process.kill()
         await process.wait()
@@ -164,9 +134,11 @@ class _Ear:
     front's signs wait in the pipe, or it was stopped too.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, serves: Callable[[], None]) -> None:
         self.silent_looks = 0
-        self.has_heard = False
+        self.reason = ""
+        self._has_heard = False
+        self._serves = serves
         self._loop = asyncio.get_running_loop()
         self._end, self.mouth = os.pipe()
         self._mouth_is_ours = True
@@ -175,7 +147,7 @@ class _Ear:
 
     def look(self) -> None:
         """One that is still starting may take its time."""
-        self.silent_looks += self.has_heard
+        self.silent_looks += self._has_heard
 
     def let_go(self) -> None:
         """The front has its end now."""
@@ -193,10 +165,15 @@ class _Ear:
             heard = os.read(self._end, 4096)
         except BlockingIOError:
             return
-        if heard:
-            self.has_heard = True
+        signs, bang, reason = heard.partition(_REASON)
+        if bang:
+            self.reason = reason.decode("utf-8", "replace")
+        if signs:
             self.silent_looks = 0
-        else:
+            if not self._has_heard:
+                self._has_heard = True
+                self._serves()
+        if not heard:
             self._loop.remove_reader(self._end)
 
 
@@ -214,6 +191,12 @@ async def give_signs(pipe: int) -> None:
         except BrokenPipeError:
             raise OperationFailed("the bus process has given this front up") from None
         await asyncio.sleep(SIGN_PERIOD_S)
+
+
+def give_reason(pipe: int, reason: str) -> None:
+    """A front's last words: why it ends."""
+    with contextlib.suppress(OSError):
+        os.write(pipe, _REASON + " ".join(reason.split()).encode()[:_LONGEST_REASON])
 
 
 def become_front(parent: int) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-from collections.abc import Callable
-from contextlib import AsyncExitStack
+from collections.abc import Callable, Iterator
+from contextlib import AsyncExitStack, suppress
 from pathlib import Path
+from typing import Final
 
 from bridge import __version__, clock
 from bridge.auditlog import AuditLog
@@ -19,9 +20,12 @@ from bridge.fronts import Front
 from bridge.lint import Severity, lint
 from bridge.mirror.endpoint import socket_endpoint
 from bridge.mirror.publisher import MirrorPublisher
+from bridge.northbound.listening import Port
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.zenoh.session import ZenohServer
 from bridge.notify import Notifier
+from bridge.parts import Parts, ServerPart
+from bridge.preflight import check_files
 from bridge.project import Project, count
 from bridge.southbound.bus import Bus, open_bus
 from bridge.southbound.master import Master
@@ -30,6 +34,9 @@ from bridge.southbound.standstill import Alarm
 from bridge.wear import WearKeeper
 
 _log = logging.getLogger(__name__)
+
+_START_S: Final = 45.0
+"""How long "ready" waits for fronts that neither serve nor fail; less than the unit's TimeoutStartSec."""
 
 MakeBus = Callable[[BusTable], Bus]
 
@@ -79,32 +86,30 @@ class Service:
         endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
         self.mirror = MirrorPublisher(self.plant, endpoint, clock.now, clock.epoch_ns)
         self._tasks: list[asyncio.Task[None]] = []
+        drives, buses = count(len(self.plant.drives), "drive"), count(len(site.bus), "bus")
+        self.parts = Parts(self.plant, self.notifier, clock.now, f"{drives} on {buses}")
         self.fronts: list[Front] = []
-        if fronts and site.opcua:
-            self.fronts.append(Front("opcua", ["run", str(project.path), "--role", "opcua"], watched=True))
+        self._opcua_port = Port(site.opcua.listen, "opcua.listen") if fronts and site.opcua else None
+        if self._opcua_port:
+            command = ["run", str(project.path), "--role", "opcua"]
+            self.fronts.append(Front("opcua", command, watched=True, listening=self._opcua_port.socket))
 
     async def run(self, ready: Callable[[], None] = lambda: None) -> None:
         """Serve until cancelled.
 
-        Raises ``Unavailable`` where a bus or a port cannot be opened, ``FrontRefused`` where a front says
-        so, and ``OperationFailed`` when a part of the service has failed for good.
+        Raises ``FileFaults`` where a file cannot be used, ``Unavailable`` where a bus or a port cannot be
+        opened, and ``OperationFailed`` when the master has failed. A server or a front that fails later is
+        started again.
         """
         self._say_what_is_doubtful()
         async with AsyncExitStack() as stack:
             stack.callback(_log.info, "stopped")
+            check_files(self.project.site, self.project.path, opcua=self._opcua_port is not None)
             self.wear.load()
             stack.callback(self.wear.close)
             self.audit.start()
             stack.callback(self.audit.close)
-            # Ports first: a service that cannot be reached has no business on the bus.
-            if self.modbus:
-                await self.modbus.start()
-                stack.push_async_callback(self.modbus.close)
-            if self.zenoh:
-                await self.zenoh.start()
-                stack.push_async_callback(self.zenoh.close)
-            await self.mirror.start()
-            stack.push_async_callback(self.mirror.close)
+            await self._open_ports(stack)
             stack.push_async_callback(self._end_tasks)
             await self.master.start()
             # Whatever ends the service: the drives stop before anything else ends.
@@ -112,33 +117,58 @@ class Service:
             # What is there now stays: the collector need not look at it again and again.
             gc.collect()
             gc.freeze()
-            buses = count(len(self.project.site.bus), "bus")
-            self.notifier.ready(f"{count(len(self.plant.drives), 'drive')} on {buses}")
-            ready()
-            await self._serve()
+            await self._serve(ready)
+
+    async def _open_ports(self, stack: AsyncExitStack) -> None:
+        """Ports first: a service that cannot be reached has no business on the bus."""
+        if self.modbus:
+            await self.modbus.start()
+            stack.push_async_callback(self.modbus.close)
+        if self._opcua_port:
+            self._opcua_port.socket()
+            stack.callback(self._opcua_port.close)
+        if self.zenoh:
+            await self.zenoh.start()
+            stack.push_async_callback(self.zenoh.close)
+        await self.mirror.start()
+        stack.push_async_callback(self.mirror.close)
 
     def halt(self) -> None:
         """Stop all drives now, and take no command any more but stops. ``run`` is to be cancelled next."""
         self.master.halt(clock.now())
 
-    async def _serve(self) -> None:
-        """Until cancelled, or until a task ends: each waits for ever, or tells that its part has failed."""
+    async def _serve(self, ready: Callable[[], None]) -> None:
+        """Until cancelled, or until a task ends: each goes on for ever, or tells that its part has failed."""
+        parts = [*self._servers(), *self.fronts]
+        self.parts.expect(parts)
         works = {
             "master": self.master.failed(),
-            "mirror": self.mirror.failed(),
             "EEPROM counts": self.wear.run(),
             "audit log": self.audit.run(),
+            "start": self._start(ready),
+            **{part.name: self.parts.keep(part) for part in parts},
         }
-        if self.zenoh:
-            works["zenoh"] = self.zenoh.failed()
-        for front in self.fronts:
-            works[f"front-{front.role}"] = front.run()
         self._tasks = [asyncio.create_task(work, name=name) for name, work in works.items()]
         done, _ = await asyncio.wait(self._tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in done:
             if not task.cancelled():
                 task.result()
         raise OperationFailed(f"the service has lost a task: {', '.join(task.get_name() for task in done)}")
+
+    def _servers(self) -> Iterator[ServerPart]:
+        if self.modbus:
+            yield ServerPart("modbus", "the Modbus server", self.modbus)
+        if self.zenoh:
+            yield ServerPart("zenoh", "the zenoh session", self.zenoh)
+        yield ServerPart("mirror", "the link to the fronts", self.mirror)
+
+    async def _start(self, ready: Callable[[], None]) -> None:
+        """Ready is who serves what the site file says, or can say what it does not serve."""
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self.parts.all_known(), _START_S)
+        self.notifier.ready(self.parts.status)
+        ready()
+        await asyncio.get_running_loop().create_future()
 
     async def _end_tasks(self) -> None:
         for task in self._tasks:

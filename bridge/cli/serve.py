@@ -16,8 +16,8 @@ from bridge.cli import logs
 from bridge.cli.signals import ending_signals
 from bridge.cli.stopping import Ending, until_stopped
 from bridge.config import BusTable, ZenohTable, load_site
-from bridge.errors import OperationFailed
-from bridge.fronts import Front, become_front
+from bridge.errors import BridgeError, OperationFailed
+from bridge.fronts import Front, become_front, give_reason
 
 # The service is not imported for a front: where one has ended, its clients wait for the next.
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ def run(
     ] = "all",
     parent: Annotated[int, typer.Option(hidden=True)] = 0,
     signs: Annotated[int | None, typer.Option(hidden=True)] = None,
+    listening: Annotated[int | None, typer.Option(hidden=True)] = None,
     verbose: Verbose = False,
 ) -> None:
     """Run the bridge for SITE. Nodes of a virtual bus are simulated in the same process."""
@@ -51,7 +52,12 @@ def run(
         from bridge.front import run_opcua
 
         _become_front(parent)
-        until_stopped(run_opcua(load_site(site), signs))
+        try:
+            until_stopped(run_opcua(load_site(site), signs, listening))
+        except BridgeError as error:
+            if signs is not None:
+                give_reason(signs, str(error))
+            raise
         return
     from bridge.project import load_project
 

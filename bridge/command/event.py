@@ -16,6 +16,7 @@ class Kind(StrEnum):
     OWNER = "owner"
     BUS = "bus"
     CONFIGURATION = "configuration"
+    FRONT = "front"
 
 
 @dataclass(frozen=True, slots=True)

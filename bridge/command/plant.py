@@ -137,10 +137,15 @@ class Plant:
     def on_event(self, listener: Callable[[Event], None]) -> None:
         self._listeners.append(listener)
 
+    def forget(self, listener: Callable[[Event], None]) -> None:
+        """Tell ``listener`` no more."""
+        if listener in self._listeners:
+            self._listeners.remove(listener)
+
     def report(self, event: Event) -> None:
         if not self._gate.admits(event):
             return
-        for listener in self._listeners:
+        for listener in tuple(self._listeners):
             listener(event)
 
     def set(

@@ -261,4 +261,9 @@ def bridge_points() -> list[Point]:
         Point(name="bridge/drives_good", data_type=u32, description="drives with good data"),
         Point(name="bridge/refused_writes", data_type=u32, description="refused requests since start"),
         Point(name="bridge/audit_lost", data_type=u32, description="lines that are missing in the audit log"),
+        Point(
+            name="bridge/fronts_failing",
+            data_type=DataType.STRING,
+            description="servers and fronts that do not serve at present, each with the reason",
+        ),
     ]

@@ -74,7 +74,9 @@ class Image:
         return feed
 
     def drop_feed(self, feed: Feed) -> None:
-        self._feeds.remove(feed)
+        """Show ``feed`` nothing any more. May be called again."""
+        if feed in self._feeds:
+            self._feeds.remove(feed)
 
     def __getitem__(self, index: int) -> Reading:
         return Reading(self._values[index], self._qualities[index], self._times[index], self._reasons[index])

@@ -46,16 +46,25 @@ class MirrorPublisher:
         self._clock = clock
         self._epoch = epoch
         self._period_s = period_s
-        self._link = ZenohLink(zenoh_config(listen=[endpoint]), "mirror")
+        self._link = self._new_link()
         self._feed = plant.image.feed()
         self._instance = random.getrandbits(63)
         self._sequence = 0
         self._last_delta = float("-inf")
         self._snapshots: set[asyncio.Task[None]] = set()
         self._timer: asyncio.TimerHandle | None = None
+        self._was_started = False
+
+    def _new_link(self) -> ZenohLink:
+        return ZenohLink(zenoh_config(listen=[self._endpoint]), "mirror")
 
     async def start(self) -> None:
-        """Raises Unavailable where the socket cannot be opened."""
+        """Open the socket, also again after ``failed``. Raises Unavailable where that cannot be."""
+        if self._was_started:
+            await self.close()
+            self._link = self._new_link()
+            self._feed = self._plant.image.feed()
+        self._was_started = True
         prepare_folder(self._endpoint)
         try:
             await self._link.open()
@@ -74,6 +83,7 @@ class MirrorPublisher:
             self._timer.cancel()
         for task in tuple(self._snapshots):
             task.cancel()
+        self._plant.forget(self._on_event)
         self._plant.image.drop_feed(self._feed)
         await self._link.close()
 

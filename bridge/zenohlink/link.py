@@ -141,7 +141,7 @@ class ZenohLink:
 
     def put(self, message: Message) -> None:
         """Publish; where the worker is behind, a newer value takes the place of an older one."""
-        if self._worker.is_stopping:
+        if self._worker.is_stopping or not self._worker.is_alive:
             return
         if len(self._latest) >= _QUEUE_LIMIT and message.key not in self._latest:
             self._dropped += 1
@@ -156,8 +156,8 @@ class ZenohLink:
         return self.submit(lambda session: publish(session, message))
 
     def submit(self, job: Callable[[zenoh.Session], None]) -> bool:
-        """Let the worker do ``job``. False: there was no room."""
-        if self._worker.is_stopping or self._worker.waiting >= _QUEUE_LIMIT:
+        """Let the worker do ``job``. False: there was no room, or nobody to do it."""
+        if self._worker.is_stopping or not self._worker.is_alive or self._worker.waiting >= _QUEUE_LIMIT:
             self._dropped += 1
             return False
         self._worker.do(job)

@@ -102,7 +102,7 @@ async def loaded(folder: Path) -> AsyncIterator[Load]:
     service.plant.on_event(lambda event: booted.set() if event.kind is Kind.NODE_BACK else None)
     tasks = [asyncio.create_task(simulation.run()), asyncio.create_task(service.run(ready.set))]
     try:
-        await asyncio.wait_for(ready.wait(), 30)
+        await asyncio.wait_for(ready.wait(), 60)
         await asyncio.wait_for(booted.wait(), 30)
         yield load
     finally:

@@ -14,6 +14,7 @@ import pytest
 from bridge.cli.signals import ENDING
 from bridge.lint import lint
 from bridge.project import load_project
+from bridge.service import _START_S
 
 ROOT = Path(__file__).parents[2]
 UNIT = ROOT / "systemd" / "drivebridge.service"
@@ -44,6 +45,11 @@ def test_a_service_that_hangs_is_restarted_within_seconds(service: configparser.
     assert seconds(service["WatchdogSec"]) + seconds(service["TimeoutAbortSec"]) <= 5
     assert seconds(service["RestartSec"]) <= 1
     assert sections(UNIT)["Unit"]["StartLimitIntervalSec"] == "0"
+
+
+def test_it_has_time_to_wait_for_its_fronts(service: configparser.SectionProxy) -> None:
+    # And for the certificate that is made at the first start.
+    assert seconds(service["TimeoutStartSec"]) >= _START_S + 30
 
 
 def test_a_site_file_with_faults_is_not_tried_again(service: configparser.SectionProxy) -> None:

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import signal
 import socket
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pymodbus.client import ModbusTcpClient
 
-from bridge import fronts
+from bridge import fronts, parts
 from bridge.errors import OperationFailed
-from bridge.fronts import Front, FrontRefused, give_signs
-from tests.support.process import drivebridge, until
+from bridge.fronts import Front, give_signs
+from bridge.notify import Notifier
+from tests.support import sites
+from tests.support.process import REPOSITORY, Process, drivebridge, running, until
 from tests.support.zenoh_peer import until as until_in_loop
 from tests.wire.test_fronts import children, ports, start, starts, wait_for_front
 
@@ -41,45 +46,67 @@ class Spawns:
         return await self._spawn(sys.executable, "-c", script, *arguments, **options)  # type: ignore[arg-type]
 
 
+class Kept:
+    """A front that the parts of a service keep going."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, front: Front) -> None:
+        monkeypatch.setattr(parts, "_FIRST_PAUSE_S", 0.01)
+        self.plant = sites.plant_of(sites.site(sites.bus(sites.node(sites.drive("fu1", "modbus", 1000)))))
+        self.events: list[str] = []
+        self.plant.on_event(lambda event: self.events.append(event.message))
+        self.parts = parts.Parts(self.plant, Notifier(), time.monotonic, "1 drive on 1 bus")
+        self.parts.expect([front])
+        self.running = asyncio.create_task(self.parts.keep(front))
+
+    @property
+    def failing(self) -> object:
+        return self.plant.image.read("bridge/fronts_failing").value
+
+    async def end(self) -> None:
+        assert not self.running.done()
+        self.running.cancel()
+        await asyncio.gather(self.running, return_exceptions=True)
+
+
 async def test_a_machine_without_processes_left_does_not_end_the_service(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(fronts, "_FIRST_PAUSE_S", 0.01)
     spawns = Spawns(monkeypatch, BlockingIOError(11, "Resource temporarily unavailable"))
-    running = asyncio.create_task(Front("opcua", [], watched=True).run())
+    kept = Kept(monkeypatch, Front("opcua", [], watched=True))
     await asyncio.sleep(0.5)
-    assert not running.done()
     assert 3 <= spawns.count <= 7, "it backs off"
-    running.cancel()
-    await asyncio.gather(running, return_exceptions=True)
-    [record] = caplog.records
-    assert record.message.startswith("the opcua front cannot be started: ")
-    assert "temporarily unavailable" in record.message
+    await kept.end()
+    [told] = kept.events
+    assert told.startswith("the opcua front cannot be started: ")
+    assert "temporarily unavailable" in told
 
 
-@pytest.mark.parametrize("code", [2, 3])
-async def test_a_front_that_never_came_up_ends_the_service_with_its_exit_code(
+@pytest.mark.parametrize("code", [1, 2, 3])
+async def test_a_front_that_fails_at_each_start_is_tried_again_and_comes_back(
     monkeypatch: pytest.MonkeyPatch, code: int
 ) -> None:
-    Spawns(monkeypatch, f"raise SystemExit({code})")
-    with pytest.raises(FrontRefused) as caught:
-        await asyncio.wait_for(Front("opcua", [], watched=True).run(), 10)
-    assert caught.value.exit_code == code
-    assert str(caught.value) == "", "the front has told why"
+    fails = f"import os, sys; os.write(int(sys.argv[-1]), b'!no room'); raise SystemExit({code})"
+    serves = "import os, sys, time; os.write(int(sys.argv[-1]), b'.'); time.sleep(60)"
+    spawns = Spawns(monkeypatch, fails, fails, fails, serves)
+    kept = Kept(monkeypatch, Front("opcua", [], watched=True))
+    await asyncio.wait_for(kept.parts.all_known(), 10)
+    assert kept.failing == f"opcua: ended (exit status {code}): no room"
+    assert kept.parts.status == f"1 drive on 1 bus; not served: {kept.failing}"
+    await until_in_loop(lambda: not kept.failing, "it serves")
+    assert spawns.count == 4
+    assert kept.parts.status == "1 drive on 1 bus"
+    await kept.end()
+    assert len(kept.events) == 2, "told once a minute"
+    assert kept.events[1] == "the opcua front serves again"
 
 
-async def test_one_that_had_come_up_is_started_again_whatever_its_exit_code(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(fronts, "_FIRST_PAUSE_S", 0.01)
+async def test_one_that_does_not_stay_up_is_told_once_a_minute(monkeypatch: pytest.MonkeyPatch) -> None:
     once_alive = "import os, sys; os.write(int(sys.argv[-1]), b'.'); raise SystemExit(3)"
-    spawns = Spawns(monkeypatch, once_alive, "raise SystemExit(3)")
-    running = asyncio.create_task(Front("opcua", [], watched=True).run())
-    await until_in_loop(lambda: spawns.count >= 4 or running.done(), "some more starts")
-    assert not running.done()
-    running.cancel()
-    await asyncio.gather(running, return_exceptions=True)
-    assert len(caplog.records) == 1, "told once a minute"
+    spawns = Spawns(monkeypatch, once_alive)
+    kept = Kept(monkeypatch, Front("opcua", [], watched=True))
+    await until_in_loop(lambda: spawns.count >= 5, "some more starts")
+    await kept.end()
+    assert len(kept.events) <= 2
 
 
 async def test_a_front_without_listener_ends() -> None:
@@ -120,23 +147,99 @@ def test_a_front_is_not_killed_for_a_pause_of_the_bus_process(tmp_path: Path, po
         assert children(bridge.pid) == [front]
 
 
-def test_a_taken_opcua_port_ends_run_with_exit_3_and_one_sentence(
-    tmp_path: Path, ports: tuple[int, int]
+class Notices:
+    """What a process tells systemd (sd_notify(3)), in order."""
+
+    def __init__(self, folder: Path) -> None:
+        self.said: list[str] = []
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.bind(str(folder / "notify"))
+        self._socket.setblocking(False)
+
+    def read(self) -> list[str]:
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                self.said += self._socket.recv(4096).decode().split("\n")
+        return self.said
+
+    def until(self, text: str, limit_s: float = 40.0) -> None:
+        until(lambda: any(text in line for line in self.read()), limit_s, text)
+
+
+@pytest.fixture
+def notices(tmp_path: Path) -> Iterator[Notices]:
+    """Of what ``seen_and_notified`` starts."""
+    notices = Notices(tmp_path)
+    yield notices
+    notices._socket.close()
+
+
+@contextlib.contextmanager
+def seen_and_notified(folder: Path, path: Path) -> Iterator[Process]:
+    script = str(REPOSITORY / "tests" / "wire" / "peers" / "seen_bridge.py")
+    command = (sys.executable, script, str(folder / "words"), "run", str(path))
+    with running(folder, "run", "env", f"NOTIFY_SOCKET={folder}/notify", *command) as process:
+        yield process
+
+
+def test_a_taken_opcua_port_ends_run_before_the_bus_is_opened(
+    tmp_path: Path, ports: tuple[int, int], notices: Notices
 ) -> None:
     path = start(tmp_path, ports)
-    with socket.create_server(("127.0.0.1", ports[1])), drivebridge(tmp_path, "run", "run", str(path)) as run:
+    with socket.create_server(("127.0.0.1", ports[1])), seen_and_notified(tmp_path, path) as run:
         assert run.popen.wait(30) == 3
         told = [line for line in run.output().splitlines() if str(ports[1]) in line]
         assert len(told) == 1, run.output()
+        assert "opcua.listen" in told[0]
         assert "Traceback" not in run.output()
+    assert not (tmp_path / "words").read_text(), "nothing was sent on the bus"
+    assert not [line for line in notices.read() if line.startswith("READY")]
 
 
-def test_a_state_folder_that_cannot_be_written_ends_run_with_exit_3(
-    tmp_path: Path, ports: tuple[int, int]
+def test_a_state_folder_that_cannot_be_written_ends_run_before_the_bus_is_opened(
+    tmp_path: Path, ports: tuple[int, int], notices: Notices
 ) -> None:
     path = start(tmp_path, ports)
     (tmp_path / "state").write_text("a file", "utf-8")
-    with drivebridge(tmp_path, "run", "run", str(path)) as run:
+    with seen_and_notified(tmp_path, path) as run:
         assert run.popen.wait(30) == 3
         assert "state_dir" in run.output()
         assert "Traceback" not in run.output()
+    assert not (tmp_path / "words").read_text()
+
+
+def test_ready_is_who_serves_and_a_front_that_fails_later_is_in_the_status_line(
+    tmp_path: Path, ports: tuple[int, int], notices: Notices
+) -> None:
+    path = start(tmp_path, ports)
+    key = tmp_path / "state" / "opcua" / "own_key.pem"
+    with seen_and_notified(tmp_path, path) as run:
+        notices.until("READY=1")
+        assert starts(run) == 1, "OPC UA is served"
+        assert "STATUS=1 drive on 1 bus" in notices.read()
+        [front] = children(run.pid)
+        # It cannot come up again: its key is damaged.
+        content = key.read_bytes()
+        key.write_text("-----BEGIN")
+        os.kill(front, signal.SIGKILL)
+        notices.until("STATUS=1 drive on 1 bus; not served: opcua: ended (exit status 2): ")
+        plc = ModbusTcpClient("127.0.0.1", port=ports[0])
+        with plc:
+            assert not plc.write_registers(0, [0x047E, 0], device_id=1).isError(), "Modbus serves"
+        key.write_bytes(content)
+        notices.said.clear()
+        until(lambda: starts(run) == 2, 40.0, "it is back")
+        until(lambda: notices.read()[-1:] == ["STATUS=1 drive on 1 bus"], 5.0, "which is said")
+        assert run.popen.poll() is None
+        assert "hung" not in run.output()
+
+
+def test_a_port_is_ours_while_its_front_is_away(tmp_path: Path, ports: tuple[int, int]) -> None:
+    path = start(tmp_path, ports)
+    with drivebridge(tmp_path, "run", "run", str(path), notify=True) as bridge:
+        bridge.wait_ready()
+        [front] = children(bridge.pid)
+        os.kill(front, signal.SIGKILL)
+        with pytest.raises(OSError, match="in use"):
+            socket.create_server(("127.0.0.1", ports[1]))
+        until(lambda: starts(bridge) == 2, 40.0, "another one serves")

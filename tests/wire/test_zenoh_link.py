@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from bridge.errors import OperationFailed, Unavailable
+from bridge.mirror import protocol
 from bridge.project import load_project
 from bridge.service import Service
 from bridge.southbound.bus.virtual import VirtualWire
@@ -264,16 +265,32 @@ def dies(_: object) -> None:
 
 
 @DIES
-async def test_a_service_whose_link_is_dead_ends(tmp_path: Path) -> None:
-    for part in ("zenoh", "mirror"):
-        path = tmp_path / "site.toml"
-        drive = sites.drive("fu1", "zenoh", 1000)
-        path = sites.write(tmp_path, sites.bus(sites.node(drive)), sites.zenoh(free_port()), name="link")
-        wire = VirtualWire()
-        service = Service(load_project(path), lambda table, wire=wire: wire.end(table.name))
-        ready = asyncio.Event()
-        running = asyncio.create_task(service.run(ready.set))
+@pytest.mark.parametrize("part", ["zenoh", "mirror"])
+async def test_a_link_of_the_service_that_dies_is_opened_again(tmp_path: Path, part: str) -> None:
+    port = free_port()
+    node = sites.node(sites.drive("fu1", "zenoh", 1000))
+    path = sites.write(tmp_path, sites.bus(node), sites.zenoh(port), name="link")
+    wire = VirtualWire()
+    service = Service(load_project(path), lambda table: wire.end(table.name))
+    events: list[str] = []
+    service.plant.on_event(lambda event: events.append(event.message))
+    ready = asyncio.Event()
+    running = asyncio.create_task(service.run(ready.set))
+    try:
         await asyncio.wait_for(ready.wait(), 10)
-        getattr(service, part)._link.submit(dies)
-        with pytest.raises(OperationFailed, match=f"{part}: the zenoh session has ended"):
-            await asyncio.wait_for(running, 10)
+        server = getattr(service, part)
+        before = server._link
+        server._link.submit(dies)
+        await until(lambda: any(message.endswith(" serves again") for message in events), "it is back")
+        assert any(f"{part}: the zenoh session has ended by itself" in message for message in events)
+        assert server._link is not before
+        endpoint = f"tcp/127.0.0.1:{port}" if part == "zenoh" else server._endpoint
+        key = "drives/link/bridge/version" if part == "zenoh" else protocol.SNAPSHOT
+        client = ZenohLink(zenoh_config(connect=[endpoint]), "client")
+        await client.open()
+        assert [answer.ok for answer in await client.get(key, timeout_s=5.0)] == [True]
+        await client.close()
+        assert not running.done()
+    finally:
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import errno
 import ipaddress
 import logging
-import os
 import socket
 from collections.abc import Callable
 from typing import Final
 
 from bridge.command import Identity, Plant, Role, Source
 from bridge.config import ModbusTable
-from bridge.errors import Unavailable
+from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.modbus.dispatch import Dispatcher
 from bridge.northbound.modbus.session import READ_MOST, Session
 from bridge.northbound.pulse import Pulse
@@ -21,7 +19,6 @@ from bridge.northbound.pulse import Pulse
 _log = logging.getLogger(__name__)
 
 _LOG_PAUSE_S: Final = 60.0
-_BACKLOG: Final = 64
 _WINDOW: Final = 4 * READ_MOST
 """Bytes that may wait in the kernel: more than are read at once, so that who fills it is noticed."""
 
@@ -40,6 +37,7 @@ class ModbusServer:
         self._pulse = Pulse(clock)
         self._sessions: set[Session] = set()
         self._server: asyncio.Server | None = None
+        self._socket: socket.socket | None = None
         self._logged: dict[str, float] = {}
         self.refused_connections = 0
         self.broken_connections = 0
@@ -58,14 +56,26 @@ class ModbusServer:
         return len(self._sessions)
 
     async def start(self) -> None:
-        """Listen. Raises ``Unavailable`` with the sentence that helps where that cannot be."""
-        sock = _listen(self._settings.listen)
+        """Listen, also again after ``failed``. Raises ``Unavailable`` with the sentence that helps."""
+        is_first = self._server is None
+        if self._server:
+            # Only who listens has ended: the connections that there are go on.
+            self._server.close()
+        sock = self._socket = listen(self._settings.listen, "modbus.listen")
         loop = asyncio.get_running_loop()
-        self._pulse.start()
+        # Connections inherit it; set later, it would not narrow the window that they begin with.
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WINDOW)
+        if is_first:
+            self._pulse.start()
         self._server = await loop.create_server(
-            lambda: Session(self._dispatcher, self, self._clock, self._pulse), sock=sock, backlog=_BACKLOG
+            lambda: Session(self._dispatcher, self, self._clock, self._pulse), sock=sock
         )
         _log.info("Modbus TCP on %s", self._settings.listen)
+
+    async def failed(self) -> None:
+        """Wait for ever, or raise ``OperationFailed`` when nobody can connect any more."""
+        if self._socket:
+            await until_deaf(self._socket, "modbus.listen")
 
     async def close(self) -> None:
         """Stop listening and end every session."""
@@ -134,34 +144,3 @@ def _normalised(host: str) -> IpAddress:
     if isinstance(address, ipaddress.IPv6Address) and address.ipv4_mapped:
         return address.ipv4_mapped
     return address
-
-
-def _listen(endpoint: str) -> socket.socket:
-    host, _, port = endpoint.rpartition(":")
-    host = host.strip("[]")
-    is_v6 = ":" in host
-    try:
-        sock = socket.create_server(
-            (host, int(port)),
-            family=socket.AF_INET6 if is_v6 else socket.AF_INET,
-            backlog=_BACKLOG,
-            dualstack_ipv6=host == "::" and socket.has_dualstack_ipv6(),
-        )
-        # Connections inherit it; set later, it would not narrow the window that they begin with.
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WINDOW)
-        return sock
-    except OSError as error:
-        raise Unavailable(f"modbus.listen = {endpoint!r}: {_advice(error, host, port)}") from error
-
-
-def _advice(error: OSError, host: str, port: str) -> str:
-    match error.errno:
-        case errno.EADDRINUSE:
-            return f"port {port} is taken by another program; `ss -ltnp` shows which, or choose another port"
-        case errno.EACCES:
-            where = "start it as drivebridge.service, or choose a port from 1024 on"
-            return f"port {port} needs CAP_NET_BIND_SERVICE: {where}"
-        case errno.EADDRNOTAVAIL:
-            return f"no interface of this machine has the address {host}"
-        case _:
-            return os.strerror(error.errno) if error.errno else str(error)

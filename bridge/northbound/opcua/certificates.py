@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ipaddress
 import logging
 import os
 import socket
@@ -12,11 +11,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
-from asyncua.crypto.cert_gen import (
-    dump_private_key_as_pem,
-    generate_private_key,
-    generate_self_signed_app_certificate,
-)
 from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
 from cryptography.hazmat.primitives.hashes import SHA256
@@ -25,21 +19,37 @@ from cryptography.hazmat.primitives.serialization import (
     load_der_private_key,
     load_pem_private_key,
 )
-from cryptography.x509.oid import ExtendedKeyUsageOID
 
+from bridge.config import OpcUaTable
 from bridge.errors import Fault, FileFaults, Unavailable
+from bridge.northbound.opcua.selfsigned import KEY_BITS, new_key, self_signed
 
 _log = logging.getLogger(__name__)
 
 _PEM: Final = b"-----BEGIN"
-_VALID_DAYS: Final = 3650
-_LEAST_KEY_BITS: Final = 2048
 
 
 @dataclass(frozen=True, slots=True)
 class OwnCertificate:
     certificate: x509.Certificate
     private_key: RSAPrivateKey
+
+
+def application_uri() -> str:
+    return f"urn:{socket.gethostname()}:drivebridge"
+
+
+def configured_or_own(settings: OpcUaTable, folder: Path, uri: str) -> OwnCertificate:
+    """The certificate that the site file names, or else the bridge's own in ``folder``. Raises ``FileFaults``
+    and ``Unavailable``."""
+    certificate, key = settings.certificate, settings.private_key
+    if certificate and key:
+        return load_own(Path(certificate), Path(key))
+    if certificate or key:
+        missing = "private_key" if certificate else "certificate"
+        fault = Fault("site file", 0, f"opcua.{missing}", "is missing", "certificate and key go together")
+        raise FileFaults([fault])
+    return own_or_new(folder, uri)
 
 
 def load_own(certificate: Path, private_key: Path) -> OwnCertificate:
@@ -56,8 +66,8 @@ def load_own(certificate: Path, private_key: Path) -> OwnCertificate:
         faults.append(_fault(private_key, error, "an RSA key without a password in PEM or DER"))
     if loaded is None or key is None:
         raise FileFaults(faults)
-    if key.key_size < _LEAST_KEY_BITS:
-        message = f"has {key.key_size} bits; OPC UA's policies ask for at least {_LEAST_KEY_BITS}"
+    if key.key_size < KEY_BITS:
+        message = f"has {key.key_size} bits; OPC UA's policies ask for at least {KEY_BITS}"
         raise FileFaults([Fault(str(private_key), 0, "", message)])
     if loaded.public_key() != key.public_key():
         raise FileFaults([Fault(str(private_key), 0, "", f"is not the key of {certificate}")])
@@ -75,7 +85,7 @@ def own_or_new(folder: Path, application_uri: str) -> OwnCertificate:
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if not key.exists():
-            _write_private(key, dump_private_key_as_pem(generate_private_key()))
+            _write_private(key, new_key()[1])
             certificate.unlink(missing_ok=True)
         if certificate.exists():
             own = load_own(certificate, key)
@@ -83,7 +93,7 @@ def own_or_new(folder: Path, application_uri: str) -> OwnCertificate:
                 return own
             _log.warning("%s does not fit %s any more: a new one is made", certificate, application_uri)
         private_key = _read_key(key)
-        new = _self_signed(private_key, application_uri)
+        new = self_signed(private_key, application_uri)
         _write_private(certificate, new.public_bytes(Encoding.DER))
         _log.info("made an OPC UA certificate: %s, SHA-256 %s", certificate, fingerprint(new))
         return OwnCertificate(new, private_key)
@@ -107,20 +117,6 @@ def _uris(certificate: x509.Certificate) -> list[str]:
     except x509.ExtensionNotFound:
         return []
     return names.value.get_values_for_type(x509.UniformResourceIdentifier)
-
-
-def _self_signed(key: RSAPrivateKey, application_uri: str) -> x509.Certificate:
-    host = socket.gethostname()
-    names: list[x509.GeneralName] = [
-        x509.UniformResourceIdentifier(application_uri),
-        x509.DNSName(host),
-        x509.DNSName("localhost"),
-        x509.IPAddress(ipaddress.ip_address("127.0.0.1")),
-    ]
-    usage = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
-    return generate_self_signed_app_certificate(
-        key, f"drivebridge@{host}"[:64], {"organizationName": "drivebridge"}, names, usage, _VALID_DAYS
-    )
 
 
 def _write_private(path: Path, content: bytes) -> None:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
+from typing import Final
 
 from argon2 import PasswordHasher, extract_parameters
 from argon2.exceptions import InvalidHashError, VerificationError
 
+from bridge.config import UserTable
+from bridge.errors import Fault, FileFaults
+
+ANONYMOUS: Final = "anonymous"
 _HASHER = PasswordHasher()
 
 
@@ -39,3 +45,19 @@ def verify_password(password_hash: str | None, password: str) -> bool:
 @cache
 def _nobody() -> str:
     return hash_password("nobody")
+
+
+def check_users(users: Sequence[UserTable]) -> None:
+    """Raises ``FileFaults`` for names that are taken and lines that are no hash."""
+    faults: list[Fault] = []
+    seen: set[str] = set()
+    for position, user in enumerate(users):
+        key = f"opcua.user[{position}]"
+        if user.name in seen or user.name == ANONYMOUS:
+            faults.append(Fault("site file", 0, f"{key}.name", f"the name {user.name!r} is taken"))
+        seen.add(user.name)
+        if not is_password_hash(user.password_hash):
+            hint = "the line that `drivebridge hash-password` prints"
+            faults.append(Fault("site file", 0, f"{key}.password_hash", "is not an Argon2 hash", hint))
+    if faults:
+        raise FileFaults(faults)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import struct
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Final
@@ -15,11 +14,10 @@ from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
 from cryptography.hazmat.primitives.hashes import SHA1, SHA256
 
 from bridge.command.request import Identity, Role, Source
-from bridge.config import OpcUaTable, UserTable
-from bridge.errors import Fault, FileFaults
+from bridge.config import OpcUaTable
 from bridge.northbound.opcua.certificates import TrustedCertificates, fingerprint
 from bridge.northbound.opcua.library import ServiceError, StatusCodes, first_certificate, get, ua
-from bridge.northbound.opcua.passwords import hash_password, is_password_hash, verify_password
+from bridge.northbound.opcua.passwords import ANONYMOUS, check_users, hash_password, verify_password
 
 __all__ = [
     "CheckedPolicy",
@@ -32,7 +30,6 @@ __all__ = [
 
 _log = logging.getLogger(__name__)
 
-ANONYMOUS: Final = "anonymous"
 _LONGEST_PASSWORD: Final = 1024
 _MOST_BLOCKS: Final = 8
 """A password of that length, encrypted, with room for the nonce."""
@@ -144,7 +141,7 @@ class Users:
     """The users of the site file. Nobody is an administrator: the address space is the site's."""
 
     def __init__(self, settings: OpcUaTable) -> None:
-        _check_users(settings.user)
+        check_users(settings.user)
         self._accounts = {
             user.name: _Account(_ROLES[user.role], user.password_hash) for user in settings.user
         }
@@ -181,18 +178,3 @@ class Users:
             _log.warning("refused the login of %r from %s", name[:64], address)
             raise ServiceError(StatusCodes.BadUserAccessDenied)
         return Identity(Source.OPCUA, name, account.role, address)
-
-
-def _check_users(users: Sequence[UserTable]) -> None:
-    faults: list[Fault] = []
-    seen: set[str] = set()
-    for position, user in enumerate(users):
-        key = f"opcua.user[{position}]"
-        if user.name in seen or user.name == ANONYMOUS:
-            faults.append(Fault("site file", 0, f"{key}.name", f"the name {user.name!r} is taken"))
-        seen.add(user.name)
-        if not is_password_hash(user.password_hash):
-            hint = "the line that `drivebridge hash-password` prints"
-            faults.append(Fault("site file", 0, f"{key}.password_hash", "is not an Argon2 hash", hint))
-    if faults:
-        raise FileFaults(faults)

@@ -17,9 +17,14 @@ from asyncua.server.server import Server as LibraryServer
 import bridge
 from bridge.command import Kind
 from bridge.config import OpcUaTable
-from bridge.errors import Fault, FileFaults, Unavailable
+from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua.address_space import Bindings, Builder
-from bridge.northbound.opcua.certificates import OwnCertificate, TrustedCertificates, load_own, own_or_new
+from bridge.northbound.opcua.certificates import (
+    OwnCertificate,
+    TrustedCertificates,
+    application_uri,
+    configured_or_own,
+)
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
 from bridge.northbound.opcua.library import ObjectIds, node_id, ua, variant
 from bridge.northbound.opcua.methods import Caller
@@ -37,10 +42,6 @@ _CHUNK: Final = 65535
 _MOST_CHUNKS: Final = 256
 
 _log = logging.getLogger(__name__)
-
-
-def application_uri() -> str:
-    return f"urn:{socket.gethostname()}:drivebridge"
 
 
 class _Outer(LibraryServer):
@@ -65,17 +66,25 @@ class _Outer(LibraryServer):
 class OpcUaServer:
     """Serves ``view`` as the contract's OPC UA section says.
 
-    ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``.
+    ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``. ``bound`` is a
+    listening socket where somebody else holds the port.
     """
 
-    def __init__(self, view: View, settings: OpcUaTable, state_dir: Path, site_name: str) -> None:
+    def __init__(
+        self,
+        view: View,
+        settings: OpcUaTable,
+        state_dir: Path,
+        site_name: str,
+        bound: socket.socket | None = None,
+    ) -> None:
         self._view = view
         self._settings = settings
         self._folder = state_dir / "opcua"
         self._site_name = site_name
         self._users: Users | None = None
         self._server: _Outer | None = None
-        self._socket: socket.socket | None = None
+        self._socket = bound
         self._publisher: asyncio.Task[None] | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
@@ -98,16 +107,24 @@ class OpcUaServer:
         where the port cannot be opened or the folder not be written.
         """
         self._users = Users(self._settings)
-        own = await asyncio.to_thread(self._own_certificate)
+        uri = application_uri()
+        own = await asyncio.to_thread(configured_or_own, self._settings, self._folder, uri)
         trusted_dir = self._settings.trusted_dir
         trusted = TrustedCertificates(Path(trusted_dir)) if trusted_dir else None
-        bound = self._socket = self._bind()
+        bound = self._socket = self._socket or listen(self._settings.listen, "opcua.listen")
+        bound.setblocking(False)
+        self._port = bound.getsockname()[1]
         try:
             await self._serve(bound, own, trusted, self._users)
         except BaseException:
             await self.close()
             raise
         self._tell()
+
+    async def failed(self) -> None:
+        """Wait for ever, or raise ``OperationFailed`` when nobody can connect any more."""
+        if self._socket:
+            await until_deaf(self._socket, "opcua.listen")
 
     async def close(self) -> None:
         """Close every session and the port. May be called at any time, also twice."""
@@ -125,35 +142,6 @@ class OpcUaServer:
             self._users.close()
 
     # steps of start
-
-    def _own_certificate(self) -> OwnCertificate:
-        certificate, key = self._settings.certificate, self._settings.private_key
-        if certificate and key:
-            return load_own(Path(certificate), Path(key))
-        if certificate or key:
-            missing = "private_key" if certificate else "certificate"
-            fault = Fault("site file", 0, f"opcua.{missing}", "is missing", "certificate and key go together")
-            raise FileFaults([fault])
-        return own_or_new(self._folder, application_uri())
-
-    def _bind(self) -> socket.socket:
-        family = socket.AF_INET6 if ":" in self._host else socket.AF_INET
-        bound = socket.socket(family, socket.SOCK_STREAM)
-        try:
-            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            bound.bind((self._host, self._port))
-            # At once, because two processes may bind one port as long as neither listens.
-            bound.listen()
-            bound.setblocking(False)
-        except OSError as error:
-            bound.close()
-            reason = error.strerror or str(error)
-            raise Unavailable(
-                f"cannot serve OPC UA on {self._settings.listen}: {reason.lower()}; "
-                "stop what uses the port, or give another under [opcua] listen"
-            ) from error
-        self._port = bound.getsockname()[1]
-        return bound
 
     async def _serve(
         self, bound: socket.socket, own: OwnCertificate, trusted: TrustedCertificates | None, users: Users

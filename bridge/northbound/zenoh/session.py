@@ -57,9 +57,13 @@ class ZenohServer:
         self._present: set[str] = set()
         self._gets: set[asyncio.Task[None]] = set()
         self._tick_timer: asyncio.TimerHandle | None = None
+        self._was_started = False
 
     async def start(self) -> None:
-        """Raises Unavailable where zenoh cannot listen."""
+        """Open the session, also again after ``failed``. Raises Unavailable where zenoh cannot listen."""
+        if self._was_started:
+            await self._start_anew()
+        self._was_started = True
         try:
             if not await self._link.open():
                 _log.warning("zenoh: nobody answers at %s yet", ", ".join(self._settings.connect))
@@ -73,11 +77,19 @@ class ZenohServer:
         self._plant.on_event(self._on_event)
         self._tick()
 
+    async def _start_anew(self) -> None:
+        """With a session that knows nothing of the one before."""
+        await self.close()
+        self._link = ZenohLink(_config(self._settings), "zenoh")
+        self._feed = self._plant.image.feed()
+        self._present.clear()
+
     async def close(self) -> None:
         if self._tick_timer:
             self._tick_timer.cancel()
         for task in tuple(self._gets):
             task.cancel()
+        self._plant.forget(self._on_event)
         self._plant.image.drop_feed(self._feed)
         await self._link.close()
 

@@ -1,0 +1,151 @@
+"""The parts of the service beside its buses: servers and fronts. One that fails is told, and started again.
+
+Nothing of it ends the service: whoever is served by another part goes on moving drives.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Sequence
+from typing import Final, Protocol
+
+from bridge.command import Event, Kind, Plant
+from bridge.errors import BridgeError
+from bridge.notify import Notifier
+
+_log = logging.getLogger(__name__)
+
+_FIRST_PAUSE_S: Final = 0.2
+_LAST_PAUSE_S: Final = 10.0
+_STABLE_S: Final = 30.0
+"""Who has served for so long begins with the first pause again."""
+_TELL_S: Final = 60.0
+_LONGEST_REASON: Final = 300
+_FAILING: Final = "bridge/fronts_failing"
+
+
+class Part(Protocol):
+    """``name`` is what the point calls it, ``title`` what sentences do."""
+
+    name: str
+    title: str
+
+    async def run_once(self, serves: Callable[[], None]) -> str:
+        """Start it where it has ended, call ``serves`` (once or more) when it can be used, and wait until it
+        ends: how, as the end of a sentence. May raise."""
+        ...
+
+
+class Server(Protocol):
+    async def start(self) -> None: ...
+
+    async def failed(self) -> None: ...
+
+
+class ServerPart:
+    """A server of this process, which has been started once before."""
+
+    def __init__(self, name: str, title: str, server: Server) -> None:
+        self.name = name
+        self.title = title
+        self._server = server
+        self._is_started = True
+
+    async def run_once(self, serves: Callable[[], None]) -> str:
+        if not self._is_started:
+            await self._server.start()
+        self._is_started = False
+        serves()
+        await self._server.failed()
+        return "has ended"
+
+
+class Parts:
+    """Keeps the parts going, and says which fail: point, events, and systemd's status line.
+
+    ``clock`` is the plant's; ``status`` is what the status line says besides.
+    """
+
+    def __init__(self, plant: Plant, notifier: Notifier, clock: Callable[[], float], status: str) -> None:
+        self._plant = plant
+        self._notifier = notifier
+        self._clock = clock
+        self._status = status
+        self._failing: dict[str, str] = {}
+        self._told_at: dict[str, float] = {}
+        self._told: set[str] = set()
+        self._unknown: set[str] = set()
+        self._all_known = asyncio.Event()
+        plant.set(_FAILING, "", plant.began)
+
+    @property
+    def status(self) -> str:
+        """One line for whoever looks after the service."""
+        return f"{self._status}; not served: {self._failing_text}" if self._failing else self._status
+
+    @property
+    def _failing_text(self) -> str:
+        return "; ".join(f"{name}: {self._failing[name]}" for name in sorted(self._failing))
+
+    def expect(self, parts: Sequence[Part]) -> None:
+        """Whom ``all_known`` waits for."""
+        self._unknown = {part.name for part in parts}
+        self._look()
+
+    async def all_known(self) -> None:
+        """Wait until each part has served or failed for the first time."""
+        await self._all_known.wait()
+
+    async def keep(self, part: Part) -> None:
+        """Keep ``part`` going until cancelled: after each end again, with longer and longer pauses."""
+        pause_s = _FIRST_PAUSE_S
+        while True:
+            began = time.monotonic()
+            how = await self._run_once(part)
+            if time.monotonic() - began > _STABLE_S:
+                pause_s = _FIRST_PAUSE_S
+            self._fails(part, " ".join(how.split())[:_LONGEST_REASON], pause_s)
+            await asyncio.sleep(pause_s)
+            pause_s = min(pause_s * 2, _LAST_PAUSE_S)
+
+    async def _run_once(self, part: Part) -> str:
+        try:
+            return await part.run_once(lambda: self._serves(part))
+        except (BridgeError, OSError) as error:
+            return f"has failed: {error}"
+        except Exception as error:  # noqa: BLE001 - one of them must not stop the drives of the others
+            _log.exception("unexpected")
+            return f"has failed: {error!r}"
+
+    def _fails(self, part: Part, how: str, pause_s: float) -> None:
+        """An event at most once a minute: one that never comes up must not fill a disk."""
+        self._failing[part.name] = how
+        now = self._clock()
+        self._settled(part, now)
+        if now - self._told_at.get(part.name, float("-inf")) >= _TELL_S:
+            self._told_at[part.name] = now
+            self._told.add(part.name)
+            message = f"{part.title} {how}; it is started again in {pause_s:.1f} s"
+            self._plant.report(Event(now, Kind.FRONT, "bridge", 700, message))
+
+    def _serves(self, part: Part) -> None:
+        if part.name not in self._failing and part.name not in self._unknown:
+            return
+        self._failing.pop(part.name, None)
+        now = self._clock()
+        self._settled(part, now)
+        if part.name in self._told:
+            self._told.discard(part.name)
+            self._plant.report(Event(now, Kind.FRONT, "bridge", 300, f"{part.title} serves again"))
+
+    def _settled(self, part: Part, now: float) -> None:
+        self._unknown.discard(part.name)
+        self._look()
+        self._plant.set(_FAILING, self._failing_text, now)
+        self._notifier.status(self.status)
+
+    def _look(self) -> None:
+        if not self._unknown:
+            self._all_known.set()

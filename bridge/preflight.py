@@ -1,0 +1,44 @@
+"""What is looked at before a bus is opened: a drive must not be moved by a bridge that cannot go on."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import tempfile
+from pathlib import Path
+from typing import Final
+
+from bridge.config import Site
+from bridge.errors import Unavailable
+from bridge.northbound.opcua.preflight import check_opcua
+
+_log = logging.getLogger(__name__)
+
+_PROBE: Final = bytes(4096)
+_FULL: Final = (errno.ENOSPC, errno.EDQUOT)
+
+
+def check_files(site: Site, path: Path, *, opcua: bool) -> None:
+    """Files and folders of the site at ``path``. Raises ``FileFaults`` and ``Unavailable``."""
+    folder = Path(site.site.state_dir)
+    _check_state_folder(folder)
+    if opcua and site.opcua:
+        check_opcua(site.opcua, folder, path)
+
+
+def _check_state_folder(folder: Path) -> None:
+    """Raises ``Unavailable`` where nothing can be written. A full disk is told and no more: it costs lines of
+    the audit log and counts of the EEPROM guard, and stops no plant."""
+    try:
+        folder.mkdir(mode=0o750, parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as probe:
+            probe.write(_PROBE)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        if error.errno in _FULL:
+            _log.error(
+                "site.state_dir = %r: %s: audit log and EEPROM counts are not kept", str(folder), reason
+            )
+            return
+        hint = "it must be a folder that the service can write to"
+        raise Unavailable(f"site.state_dir = {str(folder)!r}: {reason} ({hint})") from None

@@ -252,10 +252,10 @@ AWAITED: Final = (
         new_process=True,
     ),
     Fault(
-        "front killed and its port taken",
+        "front killed, starts fail",
         "telegram",
-        others.kill_front_and_take_port,
-        others.give_port_back,
+        others.kill_front_and_keep_it_down,
+        others.let_front_up,
         *_OF_OWNERS,
         protocols=("opcua",),
         new_process=True,

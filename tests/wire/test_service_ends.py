@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
+from pymodbus.client import AsyncModbusTcpClient
 
 from bridge.command import Action, Event, Identity, Kind, Request, Source
 from bridge.project import load_project
@@ -152,6 +154,28 @@ async def test_no_drive_stops_when_a_part_fails(tmp_path: Path, name: str) -> No
         assert "broken" in told[0]
         assert told[1].endswith(" serves again")
         assert not move.running.done()
+        assert "stopped" not in move.happened
+
+
+async def test_a_listening_socket_that_ends_is_opened_again_and_connections_go_on(tmp_path: Path) -> None:
+    async with moving(tmp_path) as move:
+        server = move.service.modbus
+        assert server
+        port = server.port
+        plc = AsyncModbusTcpClient("127.0.0.1", port=port)
+        assert await plc.connect()
+        # As `ss --kill` does it: nobody can connect, and no call says so.
+        assert server._socket
+        server._socket.shutdown(socket.SHUT_RDWR)
+        await until(lambda: any("listens no more" in event.message for event in move.events), "it is said")
+        await until(
+            lambda: any(event.message.endswith("serves again") for event in move.events), "it is back"
+        )
+        assert not (await plc.read_input_registers(0, count=1, device_id=1)).isError(), "the same connection"
+        other = AsyncModbusTcpClient("127.0.0.1", port=port)
+        assert await other.connect()
+        for client in (plc, other):
+            client.close()
         assert "stopped" not in move.happened
 
 

@@ -136,8 +136,9 @@ class OpcUaServer:
         server, self._server = self._server, None
         if server:
             await server.stop()
-        if self._socket:
-            self._socket.close()
+        bound, self._socket = self._socket, None
+        if bound:
+            bound.close()
         if self._users:
             self._users.close()
 

@@ -28,6 +28,7 @@ from bridge.parts import Parts, ServerPart
 from bridge.preflight import check_files
 from bridge.project import Project, count
 from bridge.southbound.bus import Bus, open_bus
+from bridge.southbound.ending import Ending
 from bridge.southbound.master import Master
 from bridge.southbound.network import Network
 from bridge.southbound.standstill import Alarm
@@ -86,6 +87,7 @@ class Service:
         endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
         self.mirror = MirrorPublisher(self.plant, endpoint, clock.now, clock.epoch_ns)
         self._tasks: list[asyncio.Task[None]] = []
+        self._ending: Ending | None = None
         drives, buses = count(len(self.plant.drives), "drive"), count(len(site.bus), "bus")
         self.parts = Parts(self.plant, self.notifier, clock.now, f"{drives} on {buses}")
         self.fronts: list[Front] = []
@@ -103,7 +105,7 @@ class Service:
         """
         self._say_what_is_doubtful()
         async with AsyncExitStack() as stack:
-            stack.callback(_log.info, "stopped")
+            stack.callback(self._say_end)
             check_files(self.project.site, self.project.path, opcua=self._opcua_port is not None)
             self.wear.load()
             stack.callback(self.wear.close)
@@ -186,9 +188,17 @@ class Service:
 
     async def _stop(self) -> None:
         self.halt()
-        _log.info("stopping: all drives are stopped")
+        _log.info("stopping all drives")
         self.notifier.stopping()
         try:
-            await self.master.stop_drives(clock.now())
+            self._ending = await self.master.stop_drives(clock.now())
         finally:
             await self.master.close()
+
+    def _say_end(self) -> None:
+        """The last lines of the log."""
+        if self._ending is not None:
+            level = logging.INFO if self._ending.is_good else logging.ERROR
+            for line in self._ending.lines:
+                _log.log(level, "%s", line)
+        _log.info("stopped")

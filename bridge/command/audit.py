@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from bridge.command.request import Action, Code, Identity, Outcome, Reply, Request
+from bridge.command.request import Action, Code, Identity, Outcome, Reply, Request, Role, Source
 from bridge.image import Image, Value
 
 Values = dict[str, Value]
@@ -21,6 +21,7 @@ SETPOINTS_S: Final = 1.0
 """Where setpoints alone change, one telegram of each drive is told in this time, at last the newest."""
 _MOST_IN_A_SECOND: Final = 20
 _MOST_KEYS: Final = 1000
+_BRIDGE: Final = Identity(Source.NONE, "drivebridge", Role.ENGINEER)
 _READS: Final = "read_"
 """Actions that only read begin with it."""
 
@@ -128,6 +129,12 @@ class AuditTrail:
             who, ending = rejection.identity, Ending(rejection.code, rejection.message)
             new = rejection.values
             self._note(Entry(now, who, rejection.target, rejection.action, ending, new=new, count=count))
+
+    def stop_ended(self, target: str, outcome: str, message: str, now: float) -> None:
+        """A stop that was forwarded has been followed or ignored."""
+        if self.tell is not None:
+            ending = Ending(Code.OK if outcome == "followed" else outcome, message, forwarded=True)
+            self._note_other(Entry(now, _BRIDGE, target, "stop_ended", ending))
 
     def _held(self, request: Request) -> Values:
         """What the points hold that ``request`` is about to change."""

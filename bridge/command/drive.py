@@ -9,6 +9,8 @@ from typing import Final
 from bridge.command.actual import ActualData, FurtherTpdo
 from bridge.command.channel import DriveChannel
 from bridge.command.event import Event
+from bridge.command.follow import Verdict
+from bridge.command.following import Following
 from bridge.command.parameter_points import parameter_points
 from bridge.command.points import drive_points
 from bridge.config import IGNORE_ALL_S, BusTable, DriveTable, NodeTable
@@ -78,6 +80,7 @@ class Drive:
         self.family = family
         self.slot: Slot = family.slot_named(table.slot)
         self.channel = DriveChannel(self.name, family, table, node.hold_ms, report)
+        self.following = Following(self.channel)
         self.identification = Identification()
         self.own: OwnJudgement | None = None
         """What it does by itself when the bridge falls silent; None until the boot-up has read it."""
@@ -116,6 +119,7 @@ class Drive:
         self._value_indices = places("command", [codec.model.name for codec in self._commands])
         self._supervision = places("status", ("fault_text",)) + places("supervision", _SUPERVISION)
         self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms"))
+        self._follows = places("supervision", ("follows", "last_stop"))
         (self._bridge_ms,) = places("supervision", ("worst_case_bridge_ms",))
         self._identity = places("identity", _IDENTITY)
         self._actual.bind(image)
@@ -140,11 +144,15 @@ class Drive:
         """The TPDO with the status word, changed; ``words`` are raw, in the order of ``process.tpdo``."""
         if self._has_followers:
             self.channel.on_actual_words(words, now)
+        self.following.before_pdo(now)
         self._actual.on_words(words, now)
+        self.following.after_pdo(now)
 
     def on_unchanged_data(self, now: float) -> None:
         """A TPDO that says what the last one said."""
+        self.following.before_pdo(now)
         self.channel.on_unchanged(now)
+        self.following.after_pdo(now)
         if self._actual.quality is not Quality.GOOD:
             self._actual.refresh(now)
 
@@ -204,13 +212,45 @@ class Drive:
         self.identification = identification
         self._show(self._identity, [getattr(identification, leaf) for leaf in _IDENTITY], now)
 
+    # time
+
+    def on_time(self, now: float) -> list[Verdict]:
+        """Let everything happen that is due by ``now``; how stops have ended. Call it when the bus has been
+        drained."""
+        self.channel.on_time(now)
+        verdicts = self.following.on_time(now)
+        if verdicts:
+            self._refresh_follows(now)
+        return verdicts
+
+    def next_deadline(self, now: float) -> float | None:
+        """When ``on_time`` is to be called; ``now`` where something is due already, None for never."""
+        at, of_stop = self.channel.next_deadline(now), self.following.next_deadline()
+        if of_stop is None:
+            return at
+        return max(now, of_stop if at is None else min(at, of_stop))
+
+    def on_handed_over(self, now: float) -> None:
+        """What the channel puts out has been handed to the bus."""
+        self.following.on_handed_over(now, self.rpdo_period_ms, self.own)
+
     # into the image
 
     def refresh(self, now: float) -> None:
-        """Bring every point of the drive up to date."""
+        """Bring every point of the drive up to date; called when something about it has changed."""
+        self.following.on_settled()
         self._actual.refresh(now)
         self._refresh_command(now)
         self._refresh_supervision(now)
+        self._refresh_follows(now)
+
+    def _refresh_follows(self, now: float) -> None:
+        """As good as what the drive says; which stop that is about we know ourselves."""
+        quality = self.channel.link.quality(now)
+        reason = self.channel.link.reason(quality)
+        (follows, last_stop), following = self._follows, self.following
+        self._image.set(follows, following.follows, now, quality, reason)
+        self._image.set(last_stop, int(following.last_stop), now)
 
     def _refresh_command(self, now: float) -> None:
         channel, image = self.channel, self._image
@@ -250,6 +290,7 @@ class Drive:
         """The points that change by themselves; called a few times a second."""
         channel = self.channel
         self._actual.on_time(now)
+        self._refresh_follows(now)
         self._show(self._ages, (channel.watchdog.left_ms(now), channel.link.age_ms(now)), now)
 
     def _show(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:

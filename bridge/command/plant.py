@@ -14,6 +14,7 @@ from bridge.command.audit import AuditTrail, Rejection
 from bridge.command.deadlines import Deadlines
 from bridge.command.drive import Drive
 from bridge.command.event import Event, EventGate, Kind
+from bridge.command.ignored import conclude
 from bridge.command.link import NodeState
 from bridge.command.points import bridge_points, bus_points, node_points
 from bridge.command.request import (
@@ -37,6 +38,8 @@ _LOOK_PER_DRIVE_S: Final = 50e-6
 """Readings alone make us look at all timers this often at most, so that looking takes a tenth of the CPU."""
 
 NodeCommand = Callable[[Request, float, Reply], None]
+Enforce = Callable[[Action, str, float], None]
+"""Does something to a node in the bridge's own name; the text says why."""
 
 
 class ParameterAccess(Protocol):
@@ -56,6 +59,7 @@ class Node:
     family: Family
     drives: list[Drive] = field(default_factory=list[Drive])
     command: NodeCommand | None = None
+    enforce: Enforce | None = None
     parameters: ParameterAccess | None = None
 
     @property
@@ -89,6 +93,8 @@ class Plant:
         """How often parameters were written; whoever keeps it across restarts fills it first."""
         self.settled = 0
         """Counts up whenever what a drive is sent may have changed."""
+        self.unsent: set[Drive] = set()
+        """Drives with a stop that has not been handed to the bus yet."""
         self._deadlines = Deadlines(self._next_of_drives)
         self._listeners: list[Callable[[Event], None]] = []
         self._gate = EventGate()
@@ -221,9 +227,10 @@ class Plant:
         if not self._deadlines.is_due(now):
             return
         for drive in self.drives.values():
-            deadline = drive.channel.next_deadline(now)
+            deadline = drive.next_deadline(now)
             if deadline is not None and deadline <= now:
-                drive.channel.on_time(now)
+                for verdict in drive.on_time(now):
+                    conclude(self.nodes[drive.node_name], drive, verdict, now, self.report, self.audit)
 
     def refresh(self, now: float) -> None:
         """The slow part: ages, counters and the faults of the nodes; a few times a second."""
@@ -243,6 +250,8 @@ class Plant:
         self.settled += 1
         self._deadlines.on_change()
         drive.refresh(now)
+        if drive.following.awaits_sending:
+            self.unsent.add(drive)
         silent = any(
             drive.channel.is_tripped and drive.channel.watchdog.controller_is_silent for drive in node.drives
         )
@@ -261,7 +270,7 @@ class Plant:
         self._deadlines.on_readings()
 
     def _next_of_drives(self, now: float) -> float | None:
-        times = [drive.channel.next_deadline(now) for drive in self.drives.values()]
+        times = [drive.next_deadline(now) for drive in self.drives.values()]
         return min((time for time in times if time is not None), default=None)
 
     def on_node(self, node: Node, state: NodeState, now: float, *, tell: bool = True) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.command import watchdog
+from bridge.command import follow, watchdog
 from bridge.command.request import Source
 from bridge.config import BusTable, NodeTable
 from bridge.drive import STATES, LinearScale, ValueCodec
@@ -136,6 +136,17 @@ def _supervision_points(name: str) -> list[Point]:
             data_type=u32,
             unit=ms,
             description="longest time from a hang of the bridge to the drive's own reaction",
+        ),
+        Point(
+            name=f"{top}/follows",
+            data_type=DataType.BOOL,
+            description="false while the drive says that it is enabled, beyond the bound of its last stop",
+        ),
+        Point(
+            name=f"{top}/last_stop",
+            data_type=DataType.UINT8,
+            states=follow.STATES,
+            description="how the last stop has ended",
         ),
     ]
 

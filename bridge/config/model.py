@@ -26,6 +26,7 @@ OnLoss = Literal["restart", "stop_node", "stop_all", "nothing"]
 MandatoryMissing = Literal["go_on", "hold_all", "stop_all"]
 Control = Literal["modbus", "opcua", "zenoh", "lease", "none"]
 Reaction = Literal["disable_voltage", "quick_stop", "stop", "silence", "hold"]
+OnIgnoredStop = Literal["stop_node", "reset_node", "report"]
 ParameterRights = Literal["write", "read"]
 WordOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
 
@@ -210,10 +211,19 @@ class DriveTable(Table):
         default_factory=dict[str, float], description="scaling, where it is not read from the drive"
     )
     tpdo_deadline_ms: int | None = Field(None, ge=0, le=600_000, description="0 (never late) or a time in ms")
+    on_ignored_stop: OnIgnoredStop = Field("stop_node", description="stop_node, reset_node or report")
+    ignored_stop_ms: int | None = Field(None, ge=50, le=600_000, description="50…600000 ms")
     rtr_poll_ms: int = Field(100, ge=5, le=60_000, description="5…60000 ms")
     accepts: AcceptsTable = Field(default_factory=lambda: AcceptsTable.model_validate({}))
     rpdo: PdoTables = Field(default_factory=list[PdoTable])
     tpdo: PdoTables = Field(default_factory=list[PdoTable])
+
+    @property
+    def reacts_to_ignored_stop(self) -> OnIgnoredStop:
+        """A drive that nobody here commands may well be run by somebody else: its node is stopped only where
+        the site file says so."""
+        is_given = "on_ignored_stop" in self.model_fields_set
+        return self.on_ignored_stop if is_given or self.control != "none" else "report"
 
 
 class IdentityTable(Table):

@@ -46,6 +46,7 @@ class ControlWords:
         "_enable_value",
         "_quick_stop",
         "_stop",
+        "_takes_voltage",
         "_valid_mask",
         "_withhold",
         "acknowledge_mask",
@@ -71,6 +72,11 @@ class ControlWords:
         self._stop = self._bits(model.stop)
         self._quick_stop = self._bits(model.quick_stop)
         self._disable_voltage = self._bits(model.disable_voltage)
+        enabling = model.enabling.mask
+        self._takes_voltage = (
+            (model.disable_voltage.mask, model.disable_voltage.value),
+            (enabling, model.stopped & enabling),
+        )
         self._withhold = self._bits(Command(mask=self._enable_mask, value=model.ready & self._enable_mask))
 
     def _bits(self, command: Command) -> tuple[int, int]:
@@ -82,6 +88,10 @@ class ControlWords:
 
     def enables(self, word: int) -> bool:
         return word & self._enable_mask == self._enable_value
+
+    def takes_voltage(self, word: int) -> bool:
+        """Whether the drive is off at once with this word: any other stop may be a ramp."""
+        return any(word & mask == value for mask, value in self._takes_voltage)
 
     def is_valid(self, word: int) -> bool:
         return word & self._valid_mask == self._valid_mask
@@ -114,7 +124,7 @@ class ControlWords:
 class StatusWords:
     """Decodes status words of this family."""
 
-    __slots__ = ("_decoded", "_fault_mask", "_fault_value", "_relevant", "_states")
+    __slots__ = ("_decoded", "_fault_mask", "_fault_value", "_holding", "_relevant", "_states")
 
     def __init__(self, model: StatusWord) -> None:
         self._states = tuple(
@@ -126,6 +136,7 @@ class StatusWords:
         self._relevant = 0
         for mask, _, _ in self._states:
             self._relevant |= mask
+        self._holding = None if model.holding is None else pattern_bits(model.holding)
         self._decoded: dict[int, DriveState] = {}
 
     def state(self, word: int) -> DriveState:
@@ -141,6 +152,10 @@ class StatusWords:
             if bits & mask == value:
                 return state
         return DriveState.UNKNOWN
+
+    def holds(self, word: int) -> bool:
+        """Whether a drive that says *operation enabled* stands still and may be holding its motor."""
+        return self._holding is not None and word & self._holding[0] == self._holding[1]
 
     def as_fault(self, word: int) -> int:
         """``word`` showing the state *fault*, all other bits as they are."""

@@ -71,6 +71,7 @@ __all__ = [
     "StartWrite",
     "State",
     "StatusWord",
+    "Stopping",
     "pattern_bits",
 ]
 
@@ -159,6 +160,21 @@ class StatusWord(Table):
         description="they tell the drive's parameter set, low bit first; all 0 is set 1",
     )
     state: list[State]
+    holding: Pattern | None = Field(
+        None,
+        description="*operation enabled* at standstill: how a drive looks that a stop keeps under voltage",
+    )
+
+
+class Stopping(Table):
+    """How long a drive may go on saying that it is enabled after a stop; beyond that it ignores the stop."""
+
+    off_ms: int = Field(
+        250, ge=0, le=60_000, description="after a word that takes the voltage: the brake, the drive's cycle"
+    )
+    ramp_ms: int = Field(
+        60_000, ge=0, le=600_000, description="after any other stop: the longest ramp, as far as it is known"
+    )
 
 
 class Poll(Table):
@@ -188,6 +204,7 @@ class Family(Table):
     value: list[ProcessValue] = Field(default_factory=list[ProcessValue])
     control_word: ControlWord
     status_word: StatusWord
+    stopping: Stopping = Field(default_factory=lambda: Stopping.model_validate({}))
     parameter_names: ParameterNames | None = None
     parameter: list[Parameter] = Field(default_factory=list[Parameter])
     eeprom: Eeprom | None = None

@@ -16,6 +16,7 @@ from bridge.errors import OperationFailed
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import Bus, ControllerState
 from bridge.southbound.canopen.sync import burst_length
+from bridge.southbound.ending import Ending, end, waits_for
 from bridge.southbound.network import Beats, Network
 from bridge.southbound.ratelimit import RateLimit
 from bridge.southbound.standstill import Alarm
@@ -27,7 +28,10 @@ _REFRESH_S = 0.1
 _SEND_LIMIT_S = 0.1
 """A frame that could not be sent for this long is stale and is dropped."""
 _STOP_DRIVES_S = 0.1
-"""How long stopped words are sent before the bursts end, when the service is stopped."""
+"""How long stopped words are sent at least before the bursts end, when the service is stopped."""
+_DRIVES_FOLLOW_S = 5.0
+"""How long they are sent at most, while a drive has not said that it follows: a quarter of TimeoutStopSec."""
+_LOOK_S = 0.02
 _RENEWALS = 3
 """How often a burst is renewed within its dead-man time."""
 
@@ -113,11 +117,21 @@ class Master:
         self._plant.close(now)
         self._wake()
 
-    async def stop_drives(self, now: float) -> None:
-        """Take no more commands and send stopped words for a moment, unless the master has failed."""
+    async def stop_drives(self, now: float) -> Ending:
+        """Take no more commands and send stopped words until every drive follows, unless the master has
+        failed: for a moment at least, and not for ever. Whoever does not follow gets NMT stop."""
         self.halt(now)
         if self._running:
             await asyncio.sleep(_STOP_DRIVES_S)
+        for _ in range(round(_DRIVES_FOLLOW_S / _LOOK_S)):
+            if not self._running or not waits_for(self._plant) or self._clock() > now + _DRIVES_FOLLOW_S:
+                break
+            await asyncio.sleep(_LOOK_S)
+        ending = end(self._plant, self._clock(), can_send=self._running)
+        if ending.nodes_stopped:
+            self._wake()
+            await asyncio.sleep(_STOP_DRIVES_S)
+        return ending
 
     async def close(self) -> None:
         """Stop every drive's process data and close the buses."""
@@ -307,6 +321,8 @@ class Master:
                 count = burst_length(period_s, network.bus.deadman_ms)
                 bus.beat(frames, now, period_s, count, at_once=changed)
                 line.beating[can_id] = frames
+        if self._plant.unsent:
+            network.on_handed_over(self._clock())
 
     def _arm(self, now: float) -> None:
         times = [self._refresh_at]

@@ -253,6 +253,16 @@ class Network:
             beats[cobid.SYNC] = (self._sync, self.bus.sync_period_ms / 1000)
         return beats
 
+    def on_handed_over(self, now: float) -> None:
+        """What ``beats`` has said is on the bus: the bounds of stops begin (``command/follow.py``)."""
+        unsent = self._plant.unsent
+        for node in self.nodes:
+            for drive in node.node.drives:
+                is_sent = node.sends_process_data and drive.name in node.wire.drives
+                if drive in unsent and (is_sent or not drive.following.awaits_sending):
+                    unsent.discard(drive)
+                    drive.on_handed_over(now)
+
     def bus_is_gone(self, now: float) -> None:
         self._frames.clear()
         if self._window:

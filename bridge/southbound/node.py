@@ -53,6 +53,7 @@ class NodeCore:
         self._last_boot = float("-inf")
         self._operational_since = 0.0
         node.command = node_commands.taker(node.name, [self], plant)
+        node.enforce = self.carry_out_command
         if not table.enabled:
             self.boot_at = None
             self.set_state(NodeState.DISABLED, plant.began)

@@ -171,7 +171,8 @@ def test_run_serves_until_it_is_told_to_stop(tmp_path: Path) -> None:
         assert "Traceback" not in bridge.output()
         lines = bridge.output().splitlines()
         assert lines[-1].endswith("INFO    stopped")
-        assert sum("INFO    stopping: all drives are stopped" in line for line in lines) == 1
+        assert sum("INFO    stopping all drives" in line for line in lines) == 1
+        assert lines[-2].endswith("INFO    all drives are stopped")
 
 
 @pytest.mark.parametrize("what", ["modbus", "opcua"])

@@ -1,0 +1,116 @@
+"""Whether one drive does what its last stop asked: the judgement of ``Follow`` for the drive's words."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.command.channel import DriveChannel
+from bridge.command.follow import Bounds, Follow, LastStop, Says, Sent, Verdict
+from bridge.command.link import NodeState
+from bridge.drive import MOVING, DriveState, OwnJudgement, OwnVerdict, StatusWords
+
+_DEADLINES: Final = 3
+_ON_CHANGE_S: Final = 0.5
+"""In place of the deadline where the drive sends its TPDO on changes alone."""
+
+
+class Following:
+    """Told of every change of the channel's output, of the drive's status word and of its node."""
+
+    def __init__(self, channel: DriveChannel) -> None:
+        self._channel = channel
+        self._follow = Follow()
+        self._output: tuple[int, bool] | None = None
+        self._status_word: int | None = None
+        self._words = StatusWords(channel.family.status_word)
+
+    @property
+    def follows(self) -> bool:
+        return self._follow.follows
+
+    @property
+    def last_stop(self) -> LastStop:
+        return self._follow.state
+
+    @property
+    def is_judged(self) -> bool:
+        """A stop is on the bus, and the drive's node is in operation."""
+        return self._follow.is_judged
+
+    @property
+    def awaits_sending(self) -> bool:
+        return self._follow.awaits_sending
+
+    # what we do
+
+    def on_settled(self) -> None:
+        """The channel has settled: another output, another state of the node."""
+        channel = self._channel
+        self._follow.on_node(is_there=channel.link.node is NodeState.OPERATIONAL)
+        words, silent = channel.output
+        output = words[0], silent
+        if output != self._output:
+            self._output = output
+            self._follow.on_output(self._sent(*output))
+
+    def _sent(self, word: int, silent: bool) -> Sent:
+        words = self._channel.words
+        if silent:
+            return Sent.SILENT
+        if words.enables(word):
+            return Sent.ENABLES
+        return Sent.OFF if words.takes_voltage(word) else Sent.RAMP
+
+    def on_handed_over(self, now: float, rpdo_period_ms: int, own: OwnJudgement | None) -> None:
+        """What was to be sent has been handed to the bus. ``rpdo_period_ms`` is how long it may take to the
+        drive, ``own`` what the drive does when we fall silent."""
+        self._follow.on_handed_over(now, self._bounds(rpdo_period_ms, own))
+
+    def _bounds(self, rpdo_period_ms: int, own: OwnJudgement | None) -> Bounds:
+        channel = self._channel
+        given_ms = channel.settings.ignored_stop_ms
+        if given_ms is not None:
+            off_s = ramp_s = given_ms / 1000
+        else:
+            stopping = channel.family.stopping
+            deadline_s = channel.link.pdo_deadline_s or _ON_CHANGE_S
+            on_bus_s = _DEADLINES * deadline_s + rpdo_period_ms / 1000
+            off_s = on_bus_s + stopping.off_ms / 1000
+            ramp_s = off_s + stopping.ramp_ms / 1000
+        if own is None or own.verdict is not OwnVerdict.STOPS:
+            return Bounds(off_s, ramp_s)
+        return Bounds(off_s, ramp_s, own.bridge_ms / 1000 + ramp_s)
+
+    # what the drive does
+
+    def before_pdo(self, now: float) -> None:
+        """The TPDO with the status word has arrived; the link does not know of it yet."""
+        link = self._channel.link
+        last, deadline_s = link.last_pdo, link.pdo_deadline_s
+        if last is not None and deadline_s is not None and now - last > deadline_s:
+            self._follow.on_pause(now)
+
+    def after_pdo(self, now: float) -> None:
+        """The channel has the status word of the TPDO."""
+        word = self._channel.drive_status_word
+        if word != self._status_word or not self._follow.is_informed:
+            self._status_word = word
+            self._follow.on_report(self._says(word), now)
+
+    def _says(self, word: int) -> Says:
+        state = self._channel.state
+        if state is DriveState.OPERATION_ENABLED:
+            return Says.HOLDING if self._words.holds(word) else Says.ENABLED
+        if state is DriveState.UNKNOWN:
+            return Says.NOTHING
+        return Says.STOPPING if state in MOVING else Says.AT_REST
+
+    # time
+
+    def on_time(self, now: float) -> list[Verdict]:
+        """What has ended by ``now``; call it when the bus has been drained."""
+        link = self._channel.link
+        return self._follow.on_time(now, link.last_pdo if link.is_heard else None, link.pdo_deadline_s)
+
+    def next_deadline(self) -> float | None:
+        return self._follow.next_deadline()

@@ -1,0 +1,71 @@
+"""What is done about a stop that a drive has followed or ignored: audit log, event, NMT."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final
+
+from bridge.command.audit import AuditTrail
+from bridge.command.event import Event, Kind
+from bridge.command.follow import LastStop, Verdict
+from bridge.command.request import Action
+
+if TYPE_CHECKING:
+    from bridge.command.drive import Drive
+    from bridge.command.plant import Node
+
+_WORST: Final = 1000
+"""The highest severity there is (OPC UA Part 5 §6.4.2)."""
+_WORDS: Final = {Action.STOP_NODE: "NMT stop", Action.RESET: "NMT reset node"}
+
+
+def conclude(
+    node: Node, drive: Drive, verdict: Verdict, now: float, tell: Callable[[Event], None], audit: AuditTrail
+) -> None:
+    """Tell how the drive's last stop has ended, and stop the node of a drive that ignores it."""
+    took_s = verdict.at - verdict.since
+    if verdict.outcome is not LastStop.IGNORED:
+        audit.stop_ended(drive.name, verdict.outcome.label, f"after {took_s:.3f} s", now)
+        if verdict.before is LastStop.IGNORED:
+            message = f"follows its stop after all: {_heard(drive)}"
+            tell(Event(now, Kind.WATCHDOG, drive.name, 300, message))
+        return
+    action = _reaction(drive, verdict)
+    if verdict.before is LastStop.FOLLOWED:
+        what = f"is enabled although nothing that enables was sent: {_sent(drive)} for {took_s:.2f} s"
+    else:
+        what = f"ignores its stop: {_sent(drive)} since {took_s:.2f} s"
+    message = f"{what}, {_heard(drive)}; {_done(action, node, drive)}"
+    audit.stop_ended(drive.name, verdict.outcome.label, message, now)
+    tell(Event(now, Kind.WATCHDOG, drive.name, _WORST, message))
+    if action is not None and node.enforce is not None:
+        node.enforce(action, f"the bridge: {drive.name} ignores its stop", now)
+
+
+def _reaction(drive: Drive, verdict: Verdict) -> Action | None:
+    match drive.table.reacts_to_ignored_stop:
+        case "report":
+            return None
+        case "reset_node" if not verdict.again:
+            return Action.RESET
+        case _:
+            return Action.STOP_NODE
+
+
+def _sent(drive: Drive) -> str:
+    words, silent = drive.channel.output
+    return "nothing is sent" if silent else f"{words[0]:04X}h is sent"
+
+
+def _heard(drive: Drive) -> str:
+    channel = drive.channel
+    return f"the drive says {channel.drive_status_word:04X}h, {channel.state.label.replace('_', ' ')}"
+
+
+def _done(action: Action | None, node: Node, drive: Drive) -> str:
+    if action is None:
+        return "reported only (on_ignored_stop)"
+    others = ", ".join(other.slot.name for other in node.drives if other is not drive)
+    also = f", which stops {others}, too" if others else ""
+    back = "" if action is Action.RESET else "; it stays stopped until an operator starts or resets it"
+    return f"{_WORDS[action]} of {node.name}{also}{back}"

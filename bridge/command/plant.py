@@ -265,6 +265,12 @@ class Plant:
     def next_deadline(self, now: float) -> float | None:
         return self._deadlines.next(now)
 
+    def on_handed_over(self, drive: Drive, now: float) -> None:
+        """What this drive is sent has been handed to the bus."""
+        self.unsent.discard(drive)
+        drive.on_handed_over(now)
+        self._deadlines.on_change()
+
     def on_readings(self) -> None:
         """The southbound side has taken in frames: timers of drives may have moved."""
         self._deadlines.on_readings()

@@ -260,8 +260,7 @@ class Network:
             for drive in node.node.drives:
                 is_sent = node.sends_process_data and drive.name in node.wire.drives
                 if drive in unsent and (is_sent or not drive.following.awaits_sending):
-                    unsent.discard(drive)
-                    drive.on_handed_over(now)
+                    self._plant.on_handed_over(drive, now)
 
     def bus_is_gone(self, now: float) -> None:
         self._frames.clear()

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.command import Action, Event, Identity, Kind, Role, Source
+from bridge.command.audit import Entry
 from bridge.command.follow import LastStop
 from bridge.command.link import NodeState
 from bridge.image import Quality
@@ -91,6 +92,20 @@ def test_a_deaf_drive_is_named_and_its_node_stopped(bench: DeafBench) -> None:
     assert follows(bench) == (False, LastStop.IGNORED)
     assert bench.plant.nodes["conveyor"].drives[0].channel.link.node is NodeState.STOPPED
     assert str(bench.value("conveyor/node/boot_status")).startswith("stopped by the bridge: conveyor/fu1")
+
+
+@pytest.mark.parametrize(("deaf", "code"), [(False, "ok"), (True, "ignored")])
+def test_the_audit_log_has_the_end_of_a_stop(bench: DeafBench, deaf: bool, code: str) -> None:
+    entries: list[Entry] = []
+    bench.plant.audit.tell = entries.append
+    if deaf:
+        bench.node_is_deaf_to = frozenset({RPDO1})
+    bench.ask(Action.DISABLE_VOLTAGE)
+    bench.run(2.0)
+    asked, ended = entries
+    assert asked.action == "disable_voltage"
+    assert asked.ending.forwarded
+    assert (ended.action, ended.target, ended.ending.code) == ("stop_ended", FU1, code)
 
 
 def test_the_node_stays_stopped_until_somebody_asks(bench: DeafBench) -> None:

@@ -263,6 +263,40 @@ def test_two_masters_that_alternate_are_one_occurrence() -> None:
     assert drive.verdicts[-1].before is LastStop.IGNORED
 
 
+def test_two_masters_that_alternate_after_a_long_time_are_one_occurrence_too() -> None:
+    drive = judged()
+    drive.send(Sent.OFF)
+    drive.run(1.0)
+    drive.now += 60.0
+    for _ in range(50):
+        drive.says(Says.AT_REST)
+        drive.run(0.05)
+        drive.says(Says.ENABLED)
+        drive.run(0.05)
+    assert drive.outcomes == [LastStop.IGNORED]
+
+
+def test_a_ramp_is_over_when_the_drive_has_been_at_rest() -> None:
+    drive = judged()
+    drive.send(Sent.RAMP)
+    drive.run(0.3)
+    drive.says(Says.AT_REST)
+    drive.run(0.7)
+    drive.says(Says.ENABLED)
+    drive.run(0.7)
+    assert drive.outcomes == [LastStop.FOLLOWED, LastStop.IGNORED]
+
+
+def test_what_was_said_before_the_stop_does_not_count() -> None:
+    drive = Judged()
+    drive.send(Sent.ENABLES)
+    said_at = drive.now
+    drive.now += 0.01
+    drive.send(Sent.OFF)
+    drive.follow.on_report(Says.AT_REST, said_at)  # the bus is drained late
+    assert drive.follow.state is LastStop.FORWARDED
+
+
 def test_silence_is_a_stop_as_long_as_the_drive_watches_us() -> None:
     drive = judged()
     drive.send(Sent.SILENT)

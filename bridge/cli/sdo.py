@@ -26,6 +26,7 @@ from bridge.cli.bus import (
 from bridge.cli.terminal import printable, progress
 from bridge.errors import OperationFailed
 from bridge.mapping.model import SdoServer
+from bridge.parameter import Address, Names
 from bridge.southbound.canopen.sdo import SdoError
 from bridge.southbound.decode_sdo import shown
 from bridge.southbound.errand import SdoErrand
@@ -115,6 +116,9 @@ def write(
     what: Annotated[list[str], typer.Argument(metavar="[SITE] NODE INDEX[:SUB] VALUE")],
     kind: Annotated[ValueType, typer.Option("--type", help="how to send the value")],
     yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="also what commands, supervises or addresses the drive")
+    ] = False,
     bus: BusName = None,
     interface: Interface = None,
     channel: Channel = None,
@@ -133,6 +137,9 @@ def write(
         data = encode(kind, text)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
+    why = "" if force else why_forced(line, node_id, Address(index, sub))
+    if why:
+        raise typer.BadParameter(f"{why}. --force writes it: not beside a bridge whose drive runs")
     way = _way(line, node_id, sdo_channel, timeout_ms, retries)
     where = f"{index:04X}h:{sub:02X} of node {node_id}"
     if not yes and sys.stdin.isatty() and not typer.confirm(f"write {text} to {where}?", err=True):
@@ -143,6 +150,20 @@ def write(
         print(json.dumps({"ok": True} | facts))
         return
     print(f"{where} written: {text}")
+
+
+def why_forced(line: Line, node_id: int, address: Address) -> str:
+    """Why an object of one of the site's nodes is written with ``--force`` only. Without a site there is no
+    bridge that would supervise it."""
+    node = next((node for node in line.table.node if node.id == node_id), None)
+    if node is None:
+        return ""
+    names = Names(line.families[node.mapping])
+    entry = names.resolve(str(address))
+    why = names.protection.why_never(entry)
+    if not why and names.protection.level(address) == "communication":
+        why = f"{entry.name} decides who commands the drive and what supervises it"
+    return why
 
 
 def parse_object(text: str) -> tuple[int, int]:

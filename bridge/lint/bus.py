@@ -132,9 +132,10 @@ def view_bus(
     nodes: list[NodeView] = []
     for n, table in enumerate(bus.node):
         node_key = (*key, "node", n)
-        settings = Settings(table, node_key, downloads.get(table.name, ()))
+        family = families[table.mapping]
+        settings = Settings(table, family, node_key, downloads.get(table.name, ()))
         dictionary = dictionaries.get(table.mapping)
-        nodes.append(_node(table, node_key, families[table.mapping], dictionary, settings))
+        nodes.append(_node(table, node_key, family, dictionary, settings))
     return BusView(bus, key, tuple(nodes))
 
 

@@ -19,17 +19,19 @@ _COB_ID: Final = 1
 def check_contradictions(bus: BusView, report: LintReport) -> None:
     for node in bus.nodes:
         for (index, sub), value, why in _own_settings(node):
-            setting = node.settings[index, sub]
+            number = "{:X}h".format if _is_cob_id(index, sub) else str
+            name, hint = f"{index:04X}h:{sub:02X}", f"leave it out: {why} decides"
+            setting, related = node.settings[index, sub], node.settings.related.get((index, sub))
+            if related is not None:
+                told = f"{related.name} decides {name}, too, and the bridge sets that to {number(value)}"
+                report.warning(related.key, told, hint)
             if setting is None:
                 continue
             given = pdo_cob_id(setting.value) if _is_cob_id(index, sub) else setting.value
             if given != value:
-                number = "{:X}h".format if _is_cob_id(index, sub) else str
-                report.warning(
-                    setting.key,
-                    f"{index:04X}h:{sub:02X} = {number(given)}, and the bridge sets it to {number(value)}",
-                    f"leave it out: {why} decides",
-                )
+                name = f"{setting.name}, which is {name}," if setting.name else name
+                told = f"{name} = {number(given)}, and the bridge sets it to {number(value)}"
+                report.warning(setting.key, told, hint)
         _check_consumer(bus, node, report)
 
 

@@ -8,6 +8,8 @@ from typing import Final
 
 from bridge.config import NodeTable
 from bridge.config.download import Download
+from bridge.mapping.aliases import aliases
+from bridge.mapping.model import Family
 from bridge.southbound.canopen import cobid
 from bridge.tomlfile import Key
 
@@ -22,22 +24,34 @@ TPDO: Final = (0x1800, 0x1A00)
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One object as it will be when all is downloaded."""
+    """One object as it will be when all is downloaded. ``name`` is that of the parameter that is written in
+    its place, with its object, or empty."""
 
     value: int
     key: Key
+    name: str = ""
 
 
 class Settings:
-    """All downloads of one node. Of an object that is written more than once the last value counts."""
+    """All downloads of one node. Of an object that is written more than once the last value counts, under
+    whatever name of the family's it is written."""
 
-    def __init__(self, node: NodeTable, key: Key, from_file: Sequence[Download]) -> None:
+    def __init__(self, node: NodeTable, family: Family, key: Key, from_file: Sequence[Download]) -> None:
         """``from_file`` are the objects of the node's configuration file."""
         listed = [(one, (*key, "configuration")) for one in from_file]
         listed += [(one.download, (*key, "configure", c)) for c, one in enumerate(node.configure)]
-        self._found: Mapping[tuple[int, int], Setting] = {
-            (one.index, one.sub): Setting(int.from_bytes(one.data, "little"), where) for one, where in listed
-        }
+        known = {(one.ref.index, one.ref.sub): one for one in aliases(family)}
+        found: dict[tuple[int, int], Setting] = {}
+        self.related: dict[tuple[int, int], Setting] = {}
+        """Objects that a download decides in another form: the value is the download's."""
+        for one, where in listed:
+            value = int.from_bytes(one.data, "little")
+            found[one.index, one.sub] = Setting(value, where)
+            alias = known.get((one.index, one.sub))
+            for ref in alias.objects if alias else ():
+                setting = Setting(value, where, f"{one.name} ({alias.name})" if alias else "")
+                (found if alias and alias.is_same else self.related)[ref.index, ref.sub] = setting
+        self._found: Mapping[tuple[int, int], Setting] = found
 
     def __getitem__(self, place: tuple[int, int]) -> Setting | None:
         """What ``index, sub`` will hold, None where nothing is said of it."""

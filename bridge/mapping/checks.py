@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.image import DataType
+from bridge.mapping.checks_aliases import check_aliases
 from bridge.mapping.checks_own import check_own_supervision
 from bridge.mapping.checks_process import check_cob_id, check_process, check_slots, twice
 from bridge.mapping.checks_values import check_values
@@ -36,6 +37,7 @@ def check(family: Family, file: Noted) -> None:
     _check_sdo(family, file)
     check_values(family, file)
     _check_parameters(family, file)
+    check_aliases(family, file)
     _check_eeprom(family, file)
     _check_polls(family, file)
     _check_bits(family, file)

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from bridge.config import DriveTable
 from bridge.config.model import RegularExpression
+from bridge.mapping.aliases import Aliases
 from bridge.mapping.faults import EmcyEvent, EmcyNumber, EmcyTable, FaultNumbers, FaultParameter
 from bridge.mapping.fields import (
     Bit,
@@ -40,6 +41,7 @@ from bridge.mapping.process import (
 )
 
 __all__ = [
+    "Aliases",
     "Command",
     "ControlWord",
     "Eeprom",
@@ -83,6 +85,11 @@ class FamilyTable(Table):
     template: bool = Field(False, description="true: it can only be extended, no site can use it")
     preferred: bool = Field(
         False, description="true: `scan` names it where other mappings fit equally well; not inherited"
+    )
+    stopped_by: Literal["stop_node", "reset_node"] = Field(
+        "stop_node",
+        description="the NMT command that stops its drives where no word reaches them: `reset_node` where "
+        "they run on in the state Stopped",
     )
     node_id_low: int = Field(1, ge=1, le=127)
     node_id_high: int = Field(127, ge=1, le=127)
@@ -206,6 +213,7 @@ class Family(Table):
     status_word: StatusWord
     stopping: Stopping = Field(default_factory=lambda: Stopping.model_validate({}))
     parameter_names: ParameterNames | None = None
+    aliases: Aliases = Field(default_factory=Aliases)
     parameter: list[Parameter] = Field(default_factory=list[Parameter])
     eeprom: Eeprom | None = None
     poll: list[Poll] = Field(default_factory=list[Poll])

@@ -22,7 +22,6 @@ FRESH_S: Final = 1.0
 """A value that was read this long ago is what the drive holds: it is not read again before a write."""
 _RAM_ONLY_FRESH_S: Final = 10.0
 _SAVE: Final = b"save"
-_COMMUNICATION: Final = range(0x1000, 0x2000)
 MISSING: Final = (0x0602_0000, 0x0609_0011)
 """Abort codes: no such object, no such sub-index."""
 
@@ -90,14 +89,6 @@ class DriveParameters:
         self._eeprom = family.eeprom
         self._ledger = ledger
         self._cache: dict[Address, tuple[bytes, float]] = {}
-        self._process_objects = {
-            Address(part.index, part.sub)
-            for slot in family.slot
-            for pdo in slot.rpdo
-            for objects in pdo.objects
-            for mapped in objects
-            for part in mapped.parts
-        }
 
     def forget(self) -> None:
         """The drive may have been switched off, or exchanged."""
@@ -187,22 +178,9 @@ class DriveParameters:
         """Raises ``ParameterError`` for what nobody writes by this way."""
         if entry.definition and not entry.definition.writable:
             raise ParameterError(Why.READ_ONLY, f"{entry.name} is read-only")
-        if self.names.protection(entry.address) == "command":
-            raise ParameterError(
-                Why.PROTECTED,
-                f"{entry.name} commands the drive: its controller alone does, by process data",
-            )
-        if entry.address.index in _COMMUNICATION:
-            raise ParameterError(
-                Why.PROTECTED,
-                f"{entry.name} belongs to the communication that the bridge supervises: set it in the site "
-                "file ([[bus.node.configure]])",
-            )
-        if entry.address in self._process_objects:
-            raise ParameterError(
-                Why.PROTECTED,
-                f"{entry.name} is process data, which the drive's controller alone commands",
-            )
+        why = self.names.protection.why_never(entry)
+        if why:
+            raise ParameterError(Why.PROTECTED, why)
 
     # the EEPROM
 

@@ -12,10 +12,10 @@ from collections.abc import Iterator
 from typing import Final
 
 from bridge.mapping.model import Family, Parameter
-from bridge.mapping.own_places import places
 from bridge.mapping.parameters import object_of
 from bridge.parameter.definition import Address, Definition, Entry, leaf_of
 from bridge.parameter.error import ParameterError, Why
+from bridge.parameter.protection import Protection
 
 _OBJECT: Final = re.compile(r"(?:0x)?([0-9a-f]{4})h?:(?:0x)?([0-9a-f]{1,2})h?", re.IGNORECASE | re.ASCII)
 _SPELLINGS: Final = (
@@ -48,22 +48,9 @@ class Names:
             # Without element and set it is the first of each.
             self._by_leaf.setdefault(leaf_of(definition.name), self._entry(definition, None, None))
 
-        self._commands = [_span(one) for one in rule.protected] if rule else []
-        self._own = {place.ref.index for place in places(family, link=True)}
-        flags = ((one, self._entry(one, None, None).address.index) for one in self.definitions)
-        self._protected = {index: one.protected for one, index in flags if one.protected}
-
-    def protection(self, address: Address) -> str:
-        """Who may write an object and when (``Definition.protected``); what stands beside a protected
-        parameter under the same index is protected like it, and so is what the drive watches the
-        bridge by."""
-        if any(address.index in span for span in self._commands):
-            return "command"
-        return self._protected.get(address.index) or ("communication" if address.index in self._own else "")
-
-    def tells_own_supervision(self, address: Address) -> bool:
-        """Whether an object says what the drive does when the bridge falls silent."""
-        return address.index in self._own
+        self.protection = Protection(
+            family, [(self._entry(one, None, None).address.index, one) for one in self.definitions]
+        )
 
     def resolve(self, text: str) -> Entry:
         """The entry that ``text`` means. Raises ``ParameterError`` with the nearest names."""
@@ -167,11 +154,6 @@ class Names:
                 if (_number(parts.get("element")), _number(parts.get("set"))) == (element, number):
                     return text
         return "_".join(str(part) for part in (name, element, number) if part is not None)
-
-
-def _span(text: str) -> range:
-    first, _, last = text.partition("-")
-    return range(int(first, 16), int(last or first, 16) + 1)
 
 
 def _number(text: str | None) -> int | None:

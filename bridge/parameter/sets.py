@@ -71,7 +71,7 @@ def settings(names: Names, *, on_first: bool = True) -> list[Entry]:
         and entry.definition.writable
         and entry.definition.backup
         and (on_first or not entry.definition.of_node)
-        and names.protection(entry.address) != "command"
+        and not names.protection.why_never(entry)
     ]
 
 

@@ -46,9 +46,6 @@ _CODES: Final = {
     Why.NOT_TAKEN: Code.REFUSED_BY_DRIVE,
     Why.NOT_CONFIGURED: Code.NOT_CONFIGURED,
 }
-_REACHABLE: Final = (NodeState.OPERATIONAL, NodeState.CONFIG_ERROR)
-"""A node whose process data do not fit answers SDO all the same."""
-
 Waiting = list[Callable[[Reading | ParameterError], None]]
 
 
@@ -128,7 +125,7 @@ class NodeParameters:
         why = "" if request.action is Action.READ_PARAMETER else _why_not_set(request.identity, drive)
         if why:
             return _no(Code.NOT_ALLOWED, why)
-        if self._state not in _REACHABLE:
+        if self._state is not NodeState.OPERATIONAL:
             return _no(Code.NOT_READY, f"the drive's node is {self._state.value}")
         if request.action is not Action.SAVE_PARAMETERS and channel_of(self._node, drive.slot) is None:
             return _no(
@@ -148,7 +145,9 @@ class NodeParameters:
         if request.action is Action.READ_PARAMETER:
             self._read(drive, entry, request.max_age_ms / 1000, partial(self._on_read, conclude))
             return
-        refusal = _why_protected(access.names.protection(entry.address), entry, request.identity, drive)
+        access.check_writable(entry)
+        level = access.names.protection.level(entry.address)
+        refusal = _why_protected(level, entry, request.identity, drive)
         if refusal:
             conclude(_no(Code.NOT_ALLOWED, refusal))
             return
@@ -221,7 +220,7 @@ class NodeParameters:
             return
         reading = result.reading
         self._show(drive, entry, reading)
-        if result.changed and self._names.tells_own_supervision(entry.address):
+        if result.changed and self._names.protection.tells_own_supervision(entry.address):
             self._forget_own_supervision(drive, entry)
         if result.changed:
             was = "" if result.before is None else f" (was {shown(entry, result.before)})"

@@ -84,7 +84,11 @@ def _kinds(annotation: Any) -> tuple[str, str]:
         plural = inner.replace("list of", "lists of") if inner.startswith("list of") else f"{inner}s"
         return f"list of {plural}", ""
     if origin is dict:
-        return f"table of {_kinds(arguments[1])[0]}s", ""
+        inner = _kinds(arguments[1])[0]
+        return (
+            f"table of {inner.replace('list of', 'lists of', 1) if 'list of' in inner else f'{inner}s'}",
+            "",
+        )
     if isinstance(annotation, type) and issubclass(annotation, Enum):
         return "string", ", ".join(f'"{member.value}"' for member in annotation)
     names = {str: "string", int: "integer", float: "number", bool: "boolean"}

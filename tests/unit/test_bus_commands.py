@@ -8,9 +8,12 @@ import pytest
 import typer
 from hypothesis import given
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
+from bridge.cli.app import make_app
 from bridge.cli.bus import choose_line, split_site
-from bridge.cli.sdo import ValueType, decode, encode, parse_object
+from bridge.cli.sdo import ValueType, decode, encode, parse_object, why_forced
+from bridge.parameter import Address
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
 from bridge.southbound.errand import NmtErrand, SdoErrand
@@ -203,3 +206,28 @@ def test_an_sdo_errand_ends_with_its_answer() -> None:
     errand.on_frame(Frame(0x585, bytes.fromhex("4300100092010200"), 10.1))
     assert errand.is_finished(10.1)
     assert errand.result == bytes.fromhex("92010200")
+
+
+@pytest.mark.parametrize(
+    ("address", "why"),
+    [
+        ("1017", "belongs to the communication"),
+        ("1400:02", "belongs to the communication"),
+        ("20A2:02", "stands for 1400:02"),
+        ("3000:01", "commands the drive"),
+        ("2097:01", "P151 decides who commands the drive and what supervises it"),
+    ],
+)
+def test_what_is_protected_is_written_with_force_only(site: Path, address: str, why: str) -> None:
+    command = ["sdo", "write", str(site), "conveyor", address, "1", "--type", "uint16", "--yes"]
+    result = CliRunner().invoke(make_app(), [*command, "--bus", "north"], env={"COLUMNS": "300"})
+    assert result.exit_code == 2
+    said = " ".join(result.output.replace("│", " ").split())
+    assert why in said
+    assert "--force" in said
+
+
+def test_anything_else_is_written_without(site: Path) -> None:
+    line = choose_line(site, "north", None, None, None)
+    assert not why_forced(line, 5, Address(0x2066, 1))
+    assert not why_forced(line, 6, Address(0x1017, 0)), "no node of the site"

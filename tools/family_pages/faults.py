@@ -60,6 +60,10 @@ error number."
 
 
 def own_supervision(family: Family) -> Iterator[str]:
+    yield "## A node that cannot be booted"
+    yield ""
+    yield f"Its drives get stopped words, and it gets {_STOPPED_BY[family.family.stopped_by]}"
+    yield ""
     if not family.own_supervision:
         return
     yield "## Own supervision"
@@ -72,6 +76,12 @@ def own_supervision(family: Family) -> Iterator[str]:
     ]
     yield from table(("name", "watches", "time", "off", "reaction", "runs on with"), rows)
 
+
+_STOPPED_BY = {
+    "stop_node": "NMT stop.",
+    "reset_node": "NMT reset node where its drives may be running, since in Stopped they may run on; then \
+NMT stop.",
+}
 
 _WATCHES = {
     "process_data": "process data",

@@ -26,6 +26,7 @@ def parameters(family: Family) -> Iterator[str]:
             ("name", "title", "object", "type", "unit", "range", "access", "remarks"),
             (_parameter(family, parameter) for parameter in family.parameter),
         )
+    yield from _aliases(family)
     eeprom = family.eeprom
     if eeprom is None:
         return
@@ -44,6 +45,21 @@ def parameters(family: Family) -> Iterator[str]:
     yield ""
     yield " ".join(said)
     yield ""
+
+
+def _aliases(family: Family) -> Iterator[str]:
+    rows: list[tuple[str, str, str]] = []
+    for kind, listed in (("the same", family.aliases.same), ("in another form", family.aliases.related)):
+        for name, targets in listed.items():
+            objects = ", ".join("/".join(str(ref) for ref in refs) for refs in targets)
+            rows.append((f"{name} …" if len(targets) > 1 else name, f"`{objects}`", kind))
+    if rows:
+        yield "### Other names of communication objects"
+        yield ""
+        yield "Nobody writes these as parameters: the site file sets the objects. `…` goes on with the next \
+elements."
+        yield ""
+        yield from table(("name", "objects", "value"), rows)
 
 
 def _rule(family: Family) -> str:

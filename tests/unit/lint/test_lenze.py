@@ -60,3 +60,41 @@ def test_a_reaction_that_is_none_is_said_too(tmp_path):
 @pytest.mark.parametrize("configure", [(TIME.format(300), REACTION.format(1)), (REACTION.format(0),)])
 def test_nothing_is_said_where_the_site_has_decided(tmp_path, configure):
     assert not warnings(tmp_path, *configure)
+
+
+def contradictions(tmp_path, configure: str) -> list[str]:
+    text = SITE.format(configure=configure).replace('control = "modbus"', 'control = "modbus"\n' + OWN_PDOS)
+    path = tmp_path / "site.toml"
+    path.write_text(text, encoding="utf-8")
+    site = Site.model_validate(tomllib.loads(text))
+    verdict = lint(site, {NAME: load_family(NAME)}, path, {}, family_dictionaries([NAME]))
+    return [str(one) for one in verdict.of(Severity.WARNING) if "the bridge sets" in str(one)]
+
+
+OWN_PDOS = "rpdo = { cob_id = 0x285, transmission_type = 254 }"
+
+
+@pytest.mark.parametrize(
+    ("configure", "said"),
+    [
+        (
+            '{ object = "5EBC:01", type = "uint8", value = 1 }',
+            "5EBCh:01 (C00323/1), which is 1400h:02, = 1, and the bridge sets it to 254",
+        ),
+        (
+            '{ object = "5E82:00", type = "uint16", value = 60000 }',
+            "5E82h:00 (C00381), which is 1017h:00, = 60000, and the bridge sets it to 66",
+        ),
+        (
+            '{ object = "5E9D:01", type = "uint32", value = 0x205 }',
+            "5E9Dh:01 (C00354/1) decides 1400h:01, too, and the bridge sets that to 285h",
+        ),
+    ],
+)
+def test_a_download_to_another_name_of_an_object_is_compared_as_that(tmp_path, configure, said):
+    (warning,) = contradictions(tmp_path, configure)
+    assert said in warning
+
+
+def test_a_download_that_says_the_same_under_another_name_is_fine(tmp_path):
+    assert not contradictions(tmp_path, '{ object = "5EBC:01", type = "uint8", value = 254 }')

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.mapping import load_family
-from bridge.mapping.model import Parameter, ParameterNames
+from bridge.mapping.model import Aliases, Parameter, ParameterNames
 from bridge.parameter import Names, ParameterError, Why
 
 NORD = load_family("nord/sk-tu4-cao")
@@ -80,7 +80,7 @@ def _with(rule: dict[str, object], parameters: list[dict[str, object]]) -> Names
         "parameter_names": ParameterNames.model_validate(rule),
         "parameter": [Parameter.model_validate(parameter) for parameter in parameters],
     }
-    return Names(NORD.model_copy(update={**given, "own_supervision": []}))
+    return Names(NORD.model_copy(update={**given, "aliases": Aliases(), "own_supervision": []}))
 
 
 def test_lenze_codes_count_downwards_and_their_subcode_is_the_sub_index() -> None:

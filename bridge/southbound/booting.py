@@ -46,6 +46,7 @@ class Booting:
         self._sdo = sdo
         self._boot: boot.Boot | None = None
         self._awaited: _Awaited | None = None
+        self._goes_on_at: float | None = None
         self._answers: list[Result] = []
         self._step = boot.Step("", "B")
         self.is_held = False
@@ -64,7 +65,7 @@ class Booting:
         if self._boot:
             self._boot.close()
             self._boot = None
-        self._awaited = None
+        self._awaited = self._goes_on_at = None
         self.is_held = False
         self._sdo.flush(now)
         self._answers.clear()
@@ -84,6 +85,9 @@ class Booting:
             self._go_on(None, now)
 
     def on_time(self, now: float, state: NmtState) -> None:
+        if self._goes_on_at is not None and now >= self._goes_on_at:
+            self._goes_on_at = None
+            self._go_on(None, now)
         if self._awaited and now >= self._awaited.deadline:
             awaited, self._awaited = self._awaited, None
             if awaited.state is None:
@@ -94,7 +98,7 @@ class Booting:
             self._end(error, now)
 
     def next_deadline(self) -> float | None:
-        return self._awaited.deadline if self._awaited else None
+        return self._awaited.deadline if self._awaited else self._goes_on_at
 
     def _go_on(self, answer: Result | None, now: float) -> None:
         """Run until the boot-up waits for something."""
@@ -127,6 +131,9 @@ class Booting:
                 if not self._host.begin_await(state):
                     return False
                 self._awaited = _Awaited(state, now + timeout_s)
+                return True
+            case boot.Pause(seconds):
+                self._goes_on_at = now + seconds
                 return True
             case boot.AwaitRelease():
                 self.is_held = not self._host.may_start()

@@ -60,7 +60,9 @@ class Network:
             if node.bus is bus
         ]
         for node in self.nodes:
-            node.wire.is_taken = partial(_is_taken, [other for other in self.nodes if other is not node])
+            others = [other for other in self.nodes if other is not node]
+            node.wire.is_taken = partial(_is_taken, others)
+            node.wire.is_foreign = partial(_is_foreign, others)
         self._gate = StartGate(bus.mandatory_missing, self.nodes)
         self._schedule = Schedule(self.nodes)
         own_id = bus.master_node_id if bus.heartbeat_ms else None
@@ -316,6 +318,11 @@ class Network:
             self._errors_told = status.error_frames
             what = "an error frame" if number == 1 else f"{number} error frames"
             self._plant.report(Event(now, Kind.BUS, self.bus.name, 500, f"{what}: {status.last_error}"))
+
+
+def _is_foreign(others: list[NodeCore], cob_id: int) -> bool:
+    """Whether an identifier is one of the other nodes', or will be."""
+    return _is_taken(others, cob_id) or any(cob_id in node.wire.stop_words.given_ids for node in others)
 
 
 def _is_taken(others: list[NodeCore], cob_id: int) -> bool:

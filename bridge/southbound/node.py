@@ -21,8 +21,11 @@ from bridge.southbound.node_view import NodeView
 from bridge.southbound.node_wire import Listener, NodeWire
 from bridge.southbound.parameters import NodeParameters
 from bridge.southbound.sdo_channels import SdoChannels
+from bridge.southbound.stop_words import StopWords
 
 _SETTLE_S: Final = 2.0
+_OWN_RESET_S: Final = 30.0
+"""A boot-up message within this time is the answer to our own reset."""
 
 
 class NodeCore:
@@ -39,9 +42,10 @@ class NodeCore:
         self._view = NodeView(node, plant)
         self._touch = partial(neighbours.touched, self)
         listener = Listener(self._on_sign, self._touch, partial(neighbours.duplicate, self))
-        self.wire = NodeWire(node, plant, listener)
-        self.error_control = self.wire.error_control
         self._memory = boot.BootMemory(count_write=self._count_write)
+        configured = (*downloads, *(entry.download for entry in table.configure))
+        self.wire = NodeWire(node, plant, listener, StopWords(node, configured, self._memory))
+        self.error_control = self.wire.error_control
         self.booting = Booting(self, partial(boot.boot, node, downloads, self._memory), self.wire.sdo)
         self.parameters = NodeParameters(node, plant, lambda: self.sdo)
         self.boot_at: float | None = 0.0
@@ -49,6 +53,8 @@ class NodeCore:
         """Whether a boot-up has ended, well or not, since the bus is there."""
         self.told_to_stop = False
         """A stopped node answers no SDO: it has to be woken before it is asked."""
+        self._reset_at = float("-inf")
+        """When a boot-up that failed has last reset the node."""
         self._back_off = BackOff()
         self._last_boot = float("-inf")
         self._operational_since = 0.0
@@ -78,7 +84,11 @@ class NodeCore:
     def _on_boot_up(self, now: float) -> None:
         """The node has started: whatever it was told before is forgotten."""
         self.told_to_stop = False
-        self._memory.start_anew()
+        self._memory.may_run = False
+        if now > self._reset_at + _OWN_RESET_S:
+            self._memory.start_anew()
+        else:
+            self._memory.was_reset()
         loop = self.error_control.boot_loop
         pause_s = loop.on_boot_up(now)
         self._view.loops(loop, now)
@@ -187,8 +197,9 @@ class NodeCore:
                     self.say(text, now)
             case boot.Nmt(command):
                 self.wire.send_nmt(command)
-            case boot.SendStopped():
+            case boot.Found():
                 self.set_state(NodeState.BOOTING, now)
+            case boot.SendStopped():
                 self.wire.send_stopped()
             case boot.Wake():
                 self.wire.send_stopped()
@@ -236,7 +247,19 @@ class NodeCore:
         self._view.failed(error, now)
         if self.state is NodeState.BOOTING:
             self.set_state(NodeState.LOST if error.absent else NodeState.CONFIG_ERROR, now)
+        self._stop_unbooted(now)
         self.boot_at = now + self._back_off.failed(absent=error.absent)
+
+    def _stop_unbooted(self, now: float) -> None:
+        """Nobody watches over its drives: they are told to stop, and it to take no more words. Also where
+        it seems to be absent: it may hear all the same, and our heartbeat would keep it running."""
+        self.stop_drives(now)
+        self.wire.send_stopped()
+        self.told_to_stop = True
+        command = NmtCommand.STOP
+        if self._memory.may_run and self.node.family.family.stopped_by == "reset_node":
+            command, self._reset_at = NmtCommand.RESET_NODE, now
+        self.wire.send_nmt(command)
 
     # states
 

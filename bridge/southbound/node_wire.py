@@ -18,8 +18,9 @@ from bridge.southbound.error_control import ErrorControl, Sign
 from bridge.southbound.fault_reading import FaultReading
 from bridge.southbound.node_tpdo import node_tpdos
 from bridge.southbound.polling import Polling
-from bridge.southbound.process_data import DrivePdos, connect, stopped_frames
+from bridge.southbound.process_data import DrivePdos, connect
 from bridge.southbound.sdo_channels import SdoChannels
+from bridge.southbound.stop_words import StopWords
 
 Handler = Callable[[Frame], None]
 
@@ -39,14 +40,17 @@ class Listener:
 class NodeWire:
     """``rejected`` counts frames that did not fit what the node says it sends."""
 
-    def __init__(self, node: Node, plant: Plant, listener: Listener) -> None:
+    def __init__(self, node: Node, plant: Plant, listener: Listener, stop_words: StopWords) -> None:
         self._node = node
+        self.stop_words = stop_words
         self._plant = plant
         self._listener = listener
         self.sdo = SdoChannels(node)
         self.rejected = 0
         self.is_taken: Callable[[int], bool] = lambda cob_id: False
         """Whether another node of the bus has something on this identifier."""
+        self.is_foreign: Callable[[int], bool] = self.is_taken
+        """Whether it is that of another node, or will be by the site's files."""
         self.faults = FaultReading(node, self.sdo)
         self._emergencies = Emergencies(node, plant, self.reject, self.faults.on_emcy)
         self.error_control = ErrorControl(node.table, listener.on_duplicate)
@@ -82,7 +86,7 @@ class NodeWire:
         self._frames.append(nmt.command(command, self._node.table.id))
 
     def send_stopped(self) -> None:
-        self._frames += stopped_frames(self._node, self.drives)
+        self._frames += self.stop_words.frames(self.drives, self.is_foreign)
 
     def _on_sdo(self, channel: SdoChannel, frame: Frame) -> None:
         unmatched, late = channel.unmatched, channel.late

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Final
+from collections.abc import Callable, Sequence
 
 from bridge.command import Drive
 from bridge.command.actual import FurtherTpdo
 from bridge.command.plant import Node
 from bridge.config import BusTable
 from bridge.image import Quality
-from bridge.mapping.model import Pdo
-from bridge.southbound.boot import BootResult, PdoPlan, factory_entries, layouts, match_words
+from bridge.southbound.boot import BootResult, PdoPlan
 from bridge.southbound.bus.frame import Frame
-from bridge.southbound.canopen.pdo import PdoCodec
 from bridge.southbound.canopen.sync import LAST_SYNCHRONOUS, REMOTE_SYNCHRONOUS, REMOTE_TYPES, tpdo_deadline_s
 from bridge.southbound.words import WordMap
-
-_FACTORY_TYPE: Final = 255
 
 Reject = Callable[[Frame, str], None]
 
@@ -239,29 +234,3 @@ def _without_effect(bus: BusTable, rpdos: Sequence[PdoPlan], tpdos: Sequence[Pdo
         if kind in REMOTE_TYPES and not tpdo.remote_allowed:
             found.append(f"TPDO of type {kind} with a COB-ID that allows no remote frames")
     return found
-
-
-def stopped_frames(node: Node, connected: Mapping[str, DrivePdos]) -> list[Frame]:
-    """A stop for every drive and no setpoints: by its PDOs what stops it at present, which may be a ramp;
-    where they are not known a stopped word, by the factory's COB-IDs of those that are on at factory."""
-    frames: list[Frame] = []
-    for drive in node.drives:
-        channel = drive.channel
-        words = (channel.words.stopped, *([0] * (len(drive.family.process.rpdo) - 1)))
-        pdos = connected.get(drive.name)
-        if pdos:
-            is_stop = not channel.output.silent and not channel.words.enables(channel.output.words[0])
-            frames += pdos.frames_with(channel.output.words if is_stop else words)
-            continue
-        factory = [pdo for pdo in drive.slot.rpdo if not pdo.optional]
-        frames += [_factory_rpdo(drive, pdo, node.table.id).frame(words) for pdo in factory]
-    return frames
-
-
-def _factory_rpdo(drive: Drive, pdo: Pdo, node_id: int) -> Rpdo:
-    """An RPDO as the mapping file has it."""
-    process = drive.family.process.rpdo
-    entries = factory_entries(pdo)
-    places = match_words(entries, layouts([pdo], [drive.family.rpdo_words(pdo)], process))
-    plan = PdoPlan(pdo.cob_id + node_id, _FACTORY_TYPE, 0, PdoCodec(entries), places)
-    return Rpdo(plan, len(process))

@@ -150,3 +150,27 @@ def test_a_dead_bridge_lets_the_drive_run_where_nothing_is_configured(make_lab) 
     time.sleep(4.0)  # longer than C00357/1 = 3000 ms
     assert not lab.bus.of(EMCY, killed)
     assert lab.bus.of(TPDO1)[-1].word >> 8 & 0x0F == ENABLED
+
+
+def test_a_bridge_that_cannot_boot_it_again_stops_the_drive(make_lab, tmp_path: Path) -> None:
+    """Killed and started anew, with a site file that expects another maker and does not know where the
+    drive listens: 1400h:01 is no factory's identifier."""
+    lab = make_lab('configure = [{ object = "1400:01", type = "uint32", value = 0x400002B3 }]')
+    lab.run_drive()
+    lab.bridge.signal(signal.SIGKILL)
+    lab.bridge.popen.wait()
+    time.sleep(1.0)
+    assert lab.bus.of(TPDO1)[-1].word >> 8 & 0x0F == ENABLED
+    path = tmp_path / "again.toml"
+    stranger = "[bus.node.identity]\nvendor_id = 0x123"
+    path.write_text(_SITE.format(folder=tmp_path, modbus=lab.port, configure=stranger), encoding="utf-8")
+    begun = time.time()
+    with drivebridge(tmp_path, "again", "run", str(path), "--role", "bus", notify=True) as again:
+        again.wait_output("expected 00000123h", 10.0)
+        until(lambda: lab.bus.of(0x2B3, begun), 2.0, "a stopped word where the drive listens")
+        stopped_at = lab.bus.of(0x2B3, begun)[0].time
+        until(lambda: lab.bus.of(TPDO1, stopped_at), 2.0, "the drive's answer")
+        first = lab.bus.of(TPDO1, stopped_at)[0]
+        assert first.word >> 8 & 0x0F == READY
+        assert first.time - stopped_at <= 0.1
+        until(lambda: any(frame.data == b"\x02\x05" for frame in lab.bus.of(0, begun)), 5.0, "NMT stop")

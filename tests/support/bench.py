@@ -107,8 +107,9 @@ class Bench:
         family: Family = NORD,
         mapping: str = "nord/sk-tu4-cao",
         node: Any = None,
+        begin_s: float = BEGIN_S,
     ) -> None:
-        self.now = BEGIN_S
+        self.now = begin_s
         self.log: list[Frame] = []
         self.events: list[Event] = []
         self.cut = False

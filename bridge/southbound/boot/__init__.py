@@ -7,8 +7,10 @@ from bridge.southbound.boot.actions import (
     Boot,
     BootResult,
     DrivePlan,
+    Found,
     Nmt,
     NodePdoPlan,
+    Pause,
     PdoPlan,
     Read,
     SendStopped,
@@ -19,12 +21,15 @@ from bridge.southbound.boot.actions import (
 )
 from bridge.southbound.boot.error_control import heartbeat_period_ms
 from bridge.southbound.boot.layout import factory_entries, layouts, match_words
+from bridge.southbound.boot.listening import rpdo_plan
 from bridge.southbound.boot.memory import BootMemory
+from bridge.southbound.boot.pdo_settings import MOST_ENTRIES
 from bridge.southbound.boot.procedure import boot
 from bridge.southbound.boot.scales import number_from, parameter_value
 from bridge.southbound.boot.status import BootError
 
 __all__ = [
+    "MOST_ENTRIES",
     "Action",
     "Await",
     "AwaitRelease",
@@ -33,8 +38,10 @@ __all__ = [
     "BootMemory",
     "BootResult",
     "DrivePlan",
+    "Found",
     "Nmt",
     "NodePdoPlan",
+    "Pause",
     "PdoPlan",
     "Read",
     "SendStopped",
@@ -49,4 +56,5 @@ __all__ = [
     "match_words",
     "number_from",
     "parameter_value",
+    "rpdo_plan",
 ]

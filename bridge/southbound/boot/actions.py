@@ -9,11 +9,10 @@ from typing import Final
 from bridge.command import Identification
 from bridge.drive import OwnJudgement
 from bridge.southbound.boot.memory import BootMemory
+from bridge.southbound.boot.pdo_plan import PdoPlan
 from bridge.southbound.boot.status import BootError
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
-from bridge.southbound.canopen.pdo import PdoCodec
 from bridge.southbound.canopen.sdo import SdoError
-from bridge.southbound.words import Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +46,21 @@ class Nmt:
 
 
 @dataclass(frozen=True, slots=True)
+class Found:
+    """The node is there."""
+
+
+@dataclass(frozen=True, slots=True)
 class SendStopped:
-    """Send a stopped word to every drive on its factory COB-ID: the node may still be operational."""
+    """Send a stopped word to every drive, by every identifier under which it may listen: the node may still
+    be operational."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """Go on after this time, in seconds."""
+
+    seconds: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,30 +88,9 @@ class AwaitRelease:
     """Wait until the network lets the node start (start order, mandatory nodes). No time limit."""
 
 
-Action = Step | Read | Write | Nmt | SendStopped | Wake | StartSupervision | Await | AwaitRelease
-
-
-@dataclass(frozen=True, slots=True)
-class PdoPlan:
-    """One PDO as the node has it. ``places`` says for each entry where it stands among the words of
-    ``process.rpdo`` or ``process.tpdo``, or None for what we do not know."""
-
-    cob_id: int
-    transmission_type: int
-    event_timer_ms: int
-    codec: PdoCodec
-    places: tuple[Place | None, ...]
-    remote_allowed: bool = True
-    """Bit 30 of a TPDO's COB-ID is 0: it may be asked for by remote frame."""
-    name: str = ""
-    """Such as RPDO1."""
-
-    @property
-    def words(self) -> frozenset[int]:
-        """Places of the words that it carries, whole or in part."""
-        return frozenset(
-            place.word + part for place in self.places if place is not None for part in range(place.span)
-        )
+Action = (
+    Step | Read | Write | Nmt | Found | SendStopped | Pause | Wake | StartSupervision | Await | AwaitRelease
+)
 
 
 @dataclass(frozen=True, slots=True)

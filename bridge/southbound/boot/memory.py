@@ -1,10 +1,19 @@
-"""What is remembered of a node from one boot-up to the next, so that none of them wears out its EEPROM."""
+"""What is remembered of a node from one boot-up to the next: so that none of them wears out its EEPROM, and
+that a stop reaches it wherever it listens."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Final
+
+from bridge.config.download import COMMANDS
+from bridge.mapping.aliases import COMMUNICATION
+from bridge.southbound.boot.pdo_plan import PdoPlan
+from bridge.southbound.canopen.sync import LAST_SYNCHRONOUS
+
+_RPDOS: Final = 2
+"""Identifiers that are remembered of one RPDO: a node that lies does not fill the memory."""
 
 NOT_AGAIN: Final = "it is not written again until the node restarts or is reset"
 
@@ -24,17 +33,29 @@ class BootMemory:
     """Kept for as long as the bridge runs; ``start_anew`` is called when the node has started or an
     operator has reset it."""
 
+    may_run: bool = True
+    """Drives may be running: the node has not started since it was in operation, or since the bridge has."""
     unsaved: bool = False
     """Something was written that has not been stored (1010h) yet."""
     unanswered_stores: int = 0
     count_write: CountWrite = _not_counted
     _not_kept: dict[tuple[int, int], bytes] = field(default_factory=dict[tuple[int, int], bytes])
     _commands: set[tuple[int, int, bytes]] = field(default_factory=set[tuple[int, int, bytes]])
+    _rpdos: dict[tuple[str, int], list[PdoPlan]] = field(default_factory=dict[tuple[str, int], list[PdoPlan]])
 
     def start_anew(self) -> None:
         self.unanswered_stores = 0
         self._not_kept.clear()
         self._commands.clear()
+
+    def was_reset(self) -> None:
+        """A boot-up that failed has reset the node: its communication objects are as they were stored. That
+        is no reason to write its EEPROM once more."""
+        self._not_kept = {
+            key: data
+            for key, data in self._not_kept.items()
+            if key[0] not in COMMUNICATION or key[0] in COMMANDS
+        }
 
     def note_not_kept(self, index: int, sub: int, data: bytes) -> None:
         """The node has taken these bytes and holds others."""
@@ -54,3 +75,21 @@ class BootMemory:
     def boot_succeeded(self) -> None:
         """The next boot-up begins with all its commands."""
         self._commands.clear()
+        self.may_run = True
+
+    def note_rpdo(self, drive: str, number: int, plan: PdoPlan) -> None:
+        """The node listens for the words of ``drive`` in this RPDO."""
+        known = self._rpdos.get((drive, number), [])
+        others = [one for one in known if one.cob_id != plan.cob_id]
+        self._rpdos[drive, number] = [*others, plan][-_RPDOS:]
+
+    def rpdos_of(self, drive: str) -> Iterator[PdoPlan]:
+        """Where the node has listened for this drive; of one RPDO the last comes last."""
+        for (name, _), plans in self._rpdos.items():
+            if name == drive:
+                yield from plans
+
+    @property
+    def waits_for_sync(self) -> bool:
+        """Whether an RPDO takes effect with the next SYNC only (CiA 301 §7.5.2.35)."""
+        return any(plans[-1].transmission_type <= LAST_SYNCHRONOUS for plans in self._rpdos.values())

@@ -35,7 +35,8 @@ from bridge.southbound.canopen import cobid
 from bridge.southbound.canopen.pdo import Entry, MappingError, PdoCodec
 from bridge.southbound.canopen.sdo import SdoError
 
-_RPDO: Final = (0x1400, 0x1600)
+RPDO: Final = (0x1400, 0x1600)
+"""First communication and first mapping object."""
 _TPDO: Final = (0x1800, 0x1A00)
 _BYTES: Final = 2
 
@@ -77,7 +78,7 @@ def plan_drive(node: Node, drive: Drive, result: BootResult) -> Generator[Action
         for direction, found in (
             (
                 _Direction(
-                    "RPDO", "command", _RPDO, process.rpdo, slot.rpdo, receives, table.rpdo,
+                    "RPDO", "command", RPDO, process.rpdo, slot.rpdo, receives, table.rpdo,
                     layouts(slot.rpdo, receives, process.rpdo),
                 ),
                 plan.rpdos,
@@ -185,7 +186,7 @@ def _pdo(
         if count is None:
             result.notes.append(f"the node has no {mapping:04X}h: taken as the mapping file has it")
         else:
-            entries = yield from _entries(mapping, number(count))
+            entries = yield from read_entries(mapping, number(count))
     places = match_words(entries, direction.known)
     told = differences(entries, expected, places)
     result.notes += [f"{drive.slot.name}: {name}: {difference}" for difference in told]
@@ -218,7 +219,7 @@ def plan_node_tpdos(node: Node, result: BootResult) -> Generator[Action, bytes |
         if cob_id & cobid.PDO_DISABLED or not count:
             continue
         try:
-            entries = yield from _entries(mapping, count)
+            entries = yield from read_entries(mapping, count)
             codec = PdoCodec(entries, signed)
         except MappingError as error:
             result.notes.append(f"TPDO{tpdo.number} is not used: {error}")
@@ -232,7 +233,8 @@ def plan_node_tpdos(node: Node, result: BootResult) -> Generator[Action, bytes |
             result.node_tpdos.append(NodePdoPlan(plan, names))
 
 
-def _entries(mapping: int, count: int) -> Generator[Action, bytes | None, tuple[Entry, ...]]:
+def read_entries(mapping: int, count: int) -> Generator[Action, bytes | None, tuple[Entry, ...]]:
+    """The mapping as the node has it. Raises MappingError where it cannot be one."""
     if count > MOST_ENTRIES:
         raise MappingError(f"{mapping:04X}h:00 is {count}, at most {MOST_ENTRIES} objects can be mapped")
     entries: tuple[Entry, ...] = ()

@@ -14,7 +14,9 @@ from bridge.southbound.boot.actions import (
     Boot,
     BootResult,
     Do,
+    Found,
     Nmt,
+    Pause,
     SendStopped,
     StartSupervision,
     Step,
@@ -23,6 +25,7 @@ from bridge.southbound.boot.configuration import configure
 from bridge.southbound.boot.emergency import read_emcy_id
 from bridge.southbound.boot.error_control import set_error_control
 from bridge.southbound.boot.identity import identify, look_for
+from bridge.southbound.boot.listening import find_rpdos
 from bridge.southbound.boot.memory import BootMemory
 from bridge.southbound.boot.own_supervision import set_own_supervision
 from bridge.southbound.boot.pdos import plan_drive, plan_node_tpdos, refuse_doubles
@@ -31,6 +34,8 @@ from bridge.southbound.boot.sdo_servers import open_sdo_servers
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
 
 _GOES_OPERATIONAL_S: Final = 2.0
+_SYNCS: Final = 2
+"""Of so many SYNC periods one has a SYNC in it, however late that is."""
 
 
 def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | None = None) -> Boot:
@@ -41,8 +46,15 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
     ``memory`` is what the node's boot-ups before this one have left.
     """
     result = BootResult(memory=memory or BootMemory())
-    device_type = yield from look_for()
+    # Outside Operational it takes no RPDO: what stops its drives goes first, and what may fail afterwards.
     yield SendStopped()
+    device_type = yield from look_for()
+    yield Found()
+    if result.memory.may_run:
+        yield from find_rpdos(node, result)
+        yield SendStopped()
+        if result.memory.waits_for_sync:
+            yield Pause(_SYNCS * node.bus.sync_period_ms / 1000)
     yield Nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
     yield from identify(node, device_type, result)
     wanted = (*downloads, *(entry.download for entry in node.table.configure))

@@ -151,7 +151,7 @@ def test_a_refused_store_is_tried_again_and_told_until_it_succeeds(tmp_path: Pat
     quick = quick_with(tmp_path, node, STORE)
     quick.run(120.0)
     assert quick.status(1).startswith("J: 1010h:01: the node aborted")
-    assert quick.states() == "p"
+    assert quick.states() == "s"
     assert 3 <= len(writes(quick, 0x1010)) <= 10
     assert len(writes(quick, 0x2097)) == 1
     node.refuses_store = False

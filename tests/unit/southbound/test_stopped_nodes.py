@@ -13,7 +13,7 @@ from bridge.southbound.bus.frame import Frame
 from tests.support.quick import OPERATIONAL, STOPPED, Quick, quick_site
 
 SUPERVISIONS = ("heartbeat", "guarding", "none")
-ENTER = 0x80
+ENTER, RESET = 0x80, 0x81
 
 
 def site_with(tmp_path: Path, *nodes: str, bus: str = "") -> Quick:
@@ -31,17 +31,20 @@ def test_a_node_that_is_stopped_when_the_bridge_starts_is_woken(tmp_path: Path, 
     assert quick.states() == "o"
 
 
-def test_a_node_that_is_not_there_is_woken_once_in_each_attempt(tmp_path: Path) -> None:
+def test_a_node_that_is_not_there_is_woken_and_told_to_stop_in_each_attempt(tmp_path: Path) -> None:
+    """It may hear all the same. In Stopped a NORD may run on: it is reset."""
     quick = site_with(tmp_path, "")
     quick.nodes[1].present = False
-    quick.run(2.0)
-    assert quick.nmt() == [(ENTER, 1)]
-    assert [frame.can_id for frame in quick.log if frame.can_id == 0x201], "stopped words first"
+    quick.run(3.1)
+    assert quick.nmt()[:2] == [(ENTER, 1), (RESET, 1)]
+    stopped, woken = 0x201, [frame.can_id for frame in quick.log].index(0)
+    assert stopped in [frame.can_id for frame in quick.log[:woken]], "stopped words first"
     assert quick.core(1).state is NodeState.ABSENT
     quick.run(60.0)
     attempts = quick.nmt()
-    assert 5 <= len(attempts) <= 12
-    assert set(attempts) == {(ENTER, 1)}
+    assert 5 <= attempts.count((RESET, 1)) <= 12
+    assert set(attempts) == {(ENTER, 1), (RESET, 1)}
+    assert attempts[2:5] == [(ENTER, 1), (ENTER, 1), (RESET, 1)], "told to stop, it is woken first"
     assert "topped" in HINTS["B"]
     assert quick.status(1).endswith(HINTS["B"])
 
@@ -94,8 +97,12 @@ def test_a_node_that_cannot_be_used_is_woken_too(tmp_path: Path) -> None:
     quick.run(3.0)
     assert quick.core(2).state is NodeState.CONFIG_ERROR
     quick.nodes[1].present = False
+    since = quick.now
     quick.run(2.0)
-    assert quick.states()[1] == "p"
+    assert [command for command in quick.nmt(since) if command[1] == 2][-2:] == [(ENTER, 2), (0x02, 2)], (
+        "woken, looked at, and stopped again"
+    )
+    assert quick.states()[1] == "s"
 
 
 def test_a_node_that_an_operator_keeps_pre_operational_can_be_started_after_stop_all(tmp_path: Path) -> None:

@@ -46,8 +46,8 @@ class Aliases(Table):
 
 @dataclass(frozen=True, slots=True)
 class Alias:
-    """``name`` is the parameter that the mapping file names; ``ref`` is where it, or one of its elements,
-    stands in the object dictionary."""
+    """``name`` is the parameter that the mapping file names, with "…" for one of its further elements;
+    ``ref`` is where it stands in the object dictionary."""
 
     name: str
     ref: ObjectRef
@@ -65,7 +65,7 @@ def aliases(family: Family) -> Iterator[Alias]:
             first = place_of(family, name)
             for n, objects in enumerate(targets):
                 ref = ObjectRef(index=first.index, sub=first.sub + n)
-                yield Alias(name, ref, tuple(objects), is_same)
+                yield Alias(name if not n else f"{name} …", ref, tuple(objects), is_same)
 
 
 def place_of(family: Family, name: str) -> ObjectRef:

@@ -142,7 +142,7 @@ def protected(names: Names, mapping: str) -> Iterator[Entry]:
     family = load_family(mapping)
     for alias in aliases(family):
         yield names.resolve(str(alias.ref))
-        yield names.resolve(alias.name)
+        yield names.resolve(alias.name.removesuffix(" …"))
         yield from (names.resolve(str(ref)) for ref in alias.objects)
     for entry in names.entries():
         if names.protection.why_never(entry):

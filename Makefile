@@ -66,7 +66,8 @@ lab: compiled packages ## tests on real SocketCAN: vcan, or a user-mode kernel t
 packages: $(VENV)/dev.stamp ## install the Debian packages that the tests need
 	@tools/need-packages "the tests (LAB=0 leaves those on a CAN bus out)" $(PACKAGES)
 	@[ "$$(PYTHON=$(IN) tests/lab/vcan-run -w)" = here ] || \
-	  tools/need-packages "the lab tests: this kernel has no vcan (LAB=0 leaves them out)" user-mode-linux:linux.uml
+	  tools/need-packages "the lab tests: this kernel has no vcan (LAB=0 leaves them out)" user-mode-linux:linux.uml \
+	    $$(! grep -qw amx_tile /proc/cpuinfo || echo build-essential:cc)
 
 clients: $(CLIENTS)/node_modules/made.stamp
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from tests.proof.drives import TPDO_MS, WAY_MS, Drive
+from tests.proof.drives import CLIENT_MS, TPDO_MS, Drive
 from tests.proof.rig import Rig
 from tests.proof.settings import PLANT, REACTION_MS
 
@@ -49,11 +49,11 @@ def at_once_drive(rig: Rig, drive: Drive) -> float:
 
 def controller_sent(rig: Rig, drive: Drive) -> float:
     """From the client's call, of a telegram whose number nobody can tell."""
-    return WAY_MS[drive.protocol] + controller(rig, drive)
+    return CLIENT_MS + controller(rig, drive)
 
 
 def controller_sent_drive(rig: Rig, drive: Drive) -> float:
-    return WAY_MS[drive.protocol] + controller_drive(rig, drive)
+    return CLIENT_MS + controller_drive(rig, drive)
 
 
 def node_stopped(rig: Rig, drive: Drive) -> float:
@@ -63,7 +63,7 @@ def node_stopped(rig: Rig, drive: Drive) -> float:
 
 def asked(rig: Rig, drive: Drive) -> float:
     """The way of what asks for it, and the stop."""
-    return WAY_MS[drive.protocol] + at_once(rig, drive)
+    return CLIENT_MS + at_once(rig, drive)
 
 
 def asked_drive(rig: Rig, drive: Drive) -> float:

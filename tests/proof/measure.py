@@ -38,6 +38,9 @@ class Sample:
     way_ms: float | None = None
     """From the client's sending its last telegram to the RPDO by which the bridge handed it on."""
     way_bound_ms: float | None = None
+    sent_ms: float | None = None
+    """From the same to the stop on the bus."""
+    sent_bound_ms: float | None = None
     paused_ms: float = 0.0
     """How long the machine itself stood still, from shortly before a bound that was exceeded until the stop.
     What was before that did not make it late."""
@@ -53,6 +56,7 @@ class Sample:
         """By how much a bound is exceeded; 0 where none is."""
         pairs = (
             (self.way_ms, self.way_bound_ms),
+            (self.sent_ms, self.sent_bound_ms),
             (self.bus_ms, self.bus_bound_ms),
             (self.drive_ms, self.drive_bound_ms),
         )
@@ -75,6 +79,7 @@ class Sample:
             return self.wrong
         triples = (
             ("on its way", self.way_ms, self.way_bound_ms),
+            ("from the client's send", self.sent_ms, self.sent_bound_ms),
             ("on the bus", self.bus_ms, self.bus_bound_ms),
             ("the drive", self.drive_ms, self.drive_bound_ms),
         )

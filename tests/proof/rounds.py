@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from tests.proof import measure
-from tests.proof.drives import DRIVES, WAY_MS, Drive
+from tests.proof.drives import CLIENT_MS, DRIVES, WAY_MS, Drive
 from tests.proof.faults import Fault
 from tests.proof.measure import Sample
 from tests.proof.rig import BRIDGE, FRONT, SIMULATION, Rig, Stuck
@@ -232,11 +232,15 @@ def _sample(
     if bus is not None and fault.bus_bound:
         spans.append(_Span(begin, bus[0], fault.bus_bound(rig, drive), (BRIDGE,)))
     on_bus = spans[0] if spans else None
+    sent: _Span | None = None
     if own is not None and fault.drive_bound:
         spans.append(_Span(begin, own, fault.drive_bound(rig, drive), (BRIDGE, SIMULATION)))
     if way is not None:
         busy = (BRIDGE, drive.protocol, *([FRONT] if drive.protocol == "opcua" else []))
         spans.append(_Span(*way, WAY_MS[drive.protocol], busy))
+        if on_bus:
+            sent = _Span(way[0], on_bus.end, on_bus.bound_ms + CLIENT_MS, busy)
+            spans.append(sent)
     paused, waited = _held_up_ms(rig, spans)
     return Sample(
         fault.name,
@@ -249,6 +253,8 @@ def _sample(
         drive_bound_ms=fault.drive_bound(rig, drive) if fault.drive_bound else None,
         way_ms=None if way is None else (way[1] - way[0]) * 1000,
         way_bound_ms=None if way is None else WAY_MS[drive.protocol],
+        sent_ms=sent.ms if sent else None,
+        sent_bound_ms=sent.bound_ms if sent else None,
         paused_ms=paused,
         waited_ms=waited,
         noise_ms=rig.noise_ms,

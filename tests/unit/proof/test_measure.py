@@ -198,6 +198,7 @@ SAMPLE = Sample(
         ({"bus_ms": 600.0, "noise_ms": 150.0}, "ok"),
         ({"wrong": "it is to hold"}, "failed"),
         ({"way_ms": 251.0}, "failed"),
+        ({"sent_ms": 821.0, "sent_bound_ms": 820.0}, "failed"),
         ({"way_ms": 260.0, "waited_ms": 10.0}, "void"),
         ({"drive_ms": None, "drive_bound_ms": None}, "ok"),
     ],

@@ -20,6 +20,8 @@ def record(**change: Any) -> dict[str, Any]:
         "drive_ms": 600.0,
         "drive_bound_ms": 720.0,
         "way_ms": 3.0,
+        "sent_ms": 503.0,
+        "sent_bound_ms": 820.0,
         "over_ms": 0.0,
         "verdict": "ok",
         **change,
@@ -46,7 +48,7 @@ def result(*samples: dict[str, Any], **change: Any) -> dict[str, Any]:
 
 def test_a_row_has_median_worst_and_bound() -> None:
     (cell,) = cells([record(bus_ms=400.0), record(), record(bus_ms=560.0)])
-    assert cell.row()[3:] == ["3", "3", "500", "560", "570", "600", "600", "720", "ok"]
+    assert cell.row()[3:] == ["3", "3", "503", "820", "500", "560", "570", "600", "600", "720", "ok"]
 
 
 def test_what_failed_is_named_and_fails_the_proof() -> None:
@@ -59,7 +61,7 @@ def test_what_is_void_is_none_of_those_that_are_needed_and_is_shown_all_the_same
     late = record(bus_ms=580.0, over_ms=10.0, verdict="void")
     (cell,) = cells([record(), late])
     assert cell.row()[3] == "1"
-    assert cell.row()[6] == "580", "worst"
+    assert cell.row()[8] == "580", "worst"
     assert cell.row()[-1] == "1 void: late by up to 10.0 ms, and the machine was in the way for that"
     found = result(record(), late)
     assert failures(found, 2) == ["owner killed, NORD SK TU4-CAO, modbus: only 1 samples of 2"]

@@ -194,6 +194,31 @@ FAULTS: Final = (
         protocols=("opcua",),
         new_process=True,
     ),
+    Fault(
+        "SIGHUP to the bus process",
+        "moment",
+        acts.end_bridge(signal.SIGHUP),
+        acts.renew_bridge,
+        *_ENDING,
+        new_process=True,
+    ),
+    Fault(
+        "SIGTERM to the bus process",
+        "moment",
+        acts.end_bridge(signal.SIGTERM),
+        acts.renew_bridge,
+        *_ENDING,
+        new_process=True,
+    ),
+    Fault(
+        "front killed, starts fail",
+        "telegram",
+        others.kill_front_and_keep_it_down,
+        others.let_front_up,
+        *_OF_OWNERS,
+        protocols=("opcua",),
+        new_process=True,
+    ),
 )
 """In the order of a cycle. A service that is started anew in the middle has forgotten which nodes it has lost
 again and again, and how often its front has ended: it waits for neither longer than it has to."""
@@ -234,30 +259,5 @@ AWAITED: Final = (
         bounds.controller,
         others.ignored_drive,
         steady=others.make_deaf,
-    ),
-    Fault(
-        "SIGHUP to the bus process",
-        "moment",
-        acts.end_bridge(signal.SIGHUP),
-        acts.renew_bridge,
-        *_ENDING,
-        new_process=True,
-    ),
-    Fault(
-        "SIGTERM to the bus process",
-        "moment",
-        acts.end_bridge(signal.SIGTERM),
-        acts.renew_bridge,
-        *_ENDING,
-        new_process=True,
-    ),
-    Fault(
-        "front killed, starts fail",
-        "telegram",
-        others.kill_front_and_keep_it_down,
-        others.let_front_up,
-        *_OF_OWNERS,
-        protocols=("opcua",),
-        new_process=True,
     ),
 )

@@ -63,6 +63,7 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
             "date": _today(),
             "machine": _machine(),
             "machines": 1,
+            "plant": PLANT.name,
             "faults": [fault.name for fault in (*FAULTS, *AWAITED)],
             "cells": sorted(
                 {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import statistics
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -91,7 +92,7 @@ def merge(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
     merged["faults_missing"] = sorted({name for part in parts for name in part["faults_missing"]})
     merged["cells"] = sorted({tuple(cell) for part in parts for cell in part["cells"]})
     merged["errors"] = [text for part in parts for text in part["errors"]]
-    merged["machines"] = len(parts)
+    merged["machines"] = max(Counter(part["plant"] for part in parts).values())
     order = {name: place for place, name in enumerate(merged["faults"])}
     merged["samples"].sort(key=lambda sample: (order[sample["fault"]], sample["family"], sample["protocol"]))
     return merged

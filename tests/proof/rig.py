@@ -40,6 +40,10 @@ class Stuck(Exception):
     """The plant does not do what the proof waits for."""
 
 
+class NotStopped(Stuck):
+    """Drives that a fault should have stopped go on."""
+
+
 class Owner:
     """The owner of one protocol's drives: a process that can be stopped, killed and replaced."""
 

@@ -14,7 +14,7 @@ from tests.proof import measure
 from tests.proof.drives import CLIENT_MS, DRIVES, WAY_MS, Drive
 from tests.proof.faults import Fault
 from tests.proof.measure import Sample
-from tests.proof.rig import BRIDGE, FRONT, SIMULATION, Rig, Stuck
+from tests.proof.rig import BRIDGE, FRONT, SIMULATION, NotStopped, Rig, Stuck
 from tests.proof.settings import PLANT, REACTION_MS
 from tests.proof.waits import paused_ms, waited_ms
 
@@ -52,7 +52,7 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     stopped = _wait_stopped(rig, fault, [drive for drive in concerned if drive not in still], moment)
     missing = [drive for drive in concerned if drive not in stopped and drive not in still]
     if missing:
-        raise Stuck(
+        raise NotStopped(
             f"{fault.name}: not stopped: {', '.join(f'{one.path} ({one.protocol})' for one in missing)}"
         )
     ways = _ways(rig, fault, list(stopped), moment)

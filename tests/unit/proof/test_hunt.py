@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+import pytest
+
+from tests.proof import hunt
 from tests.proof.faults import FAULTS
 from tests.proof.hunt import Share, order
 from tests.proof.kills import BEGIN, END, failures, markdown, merge
+from tests.proof.measure import Sample
+from tests.proof.rig import NotStopped, Rig, Stuck
 
 
 def kill(name: str, judgement: str = "the drive after 9 ms, 8 allowed") -> dict[str, Any]:
@@ -69,3 +75,49 @@ def test_what_one_machine_takes_no_other_does(tmp_path: Path) -> None:
     assert Share(tmp_path).take("a/b")
     assert not Share(tmp_path).take("a/b")
     assert Share(tmp_path).take("a")
+
+
+class Scene:
+    """A plant whose rounds end as they are told."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *ends: list[Sample] | Exception) -> None:
+        self.stopped_in_vain: list[str] = []
+        self.mended = 0
+        self._ends = list(ends)
+        monkeypatch.setattr(hunt, "run_round", self._round)
+
+    def _round(self, *_: object) -> list[Sample]:
+        end = self._ends.pop(0)
+        if isinstance(end, Exception):
+            raise end
+        return end
+
+    def mend(self) -> None:
+        self.mended += 1
+
+    def run_all(self) -> None:
+        pass
+
+
+GOOD = Sample("bus-off", "CiA 402", "modbus", "fan/drive", bus_ms=100.0, bus_bound_ms=120.0)
+LATE = replace(GOOD, bus_ms=150.0)
+
+
+def judged(scene: Scene) -> str:
+    return hunt.judge(cast("Rig", scene), FAULTS[0], lambda text: None)
+
+
+def test_a_drive_that_is_late_or_goes_on_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert judged(Scene(monkeypatch, [GOOD])) == ""
+    assert (
+        judged(Scene(monkeypatch, [GOOD, LATE])) == "fan/drive (modbus): on the bus after 150 ms, 120 allowed"
+    )
+    assert judged(Scene(monkeypatch, NotStopped("not stopped: fan"))) == "not stopped: fan"
+    assert judged(Scene(monkeypatch, ProcessLookupError())) == "the bridge has ended"
+
+
+def test_a_plant_that_does_not_come_back_is_one_the_second_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    once = Scene(monkeypatch, Stuck("no process data"), [GOOD])
+    assert judged(once) == ""
+    assert once.mended == 1
+    assert judged(Scene(monkeypatch, Stuck("no process data"), Stuck("no process data"))) == "no process data"

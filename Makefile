@@ -90,12 +90,12 @@ ifneq ($(LAB),0)
 endif
 
 # Half of the cycles on each of two machines. PROOF=n: how many times each fault is injected.
-PROOF ?= 30
+PROOF ?= 24
 
-proof: compiled packages ## inject every fault 30 times, write docs/explanation/proof.md (half an hour)
+proof: compiled packages ## inject every fault 24 times, write docs/explanation/proof.md (40 minutes)
 	@$(ON_VCAN) tests/proof/run-proof -j $(FEW_JOBS) -n $(PROOF) -o build/proof.json docs/explanation/proof.md
 
-proof-mutants: compiled packages ## seed faults in the chain, which the proof has to find (twenty minutes)
+proof-mutants: compiled packages ## seed faults in the chain, which the proof has to find (15 minutes)
 	@$(ON_VCAN) tests/proof/run-proof -m -j $(FEW_JOBS) -o build/mutants.json docs/explanation/proof.md
 
 ##@ Check

@@ -107,7 +107,9 @@ def hunt(rig: Rig, tree: Tree, mutant: Mutant, say: Say) -> Kill:
         rig.mend()
         rig.run_all()
     except (Stuck, AssertionError) as error:
-        return kill("start", str(error).splitlines()[0], 0)
+        # What does not even start is found by anybody: the mutant is none.
+        say(f"{mutant.name} does not come up: {error}")
+        return kill("", "", 0)
     rounds = 0
     for rounds, fault in enumerate(order(mutant.first), start=1):
         judgement = judge(rig, fault, say)

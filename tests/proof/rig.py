@@ -23,6 +23,7 @@ from tests.support.process import REPOSITORY, Process, running
 
 _FRESH_S: Final = 0.5
 _LIMIT_S: Final = 120.0
+_FRONT_ENDS_S: Final = 10.0
 _HOUR_S: Final = 3600.0
 BRIDGE: Final = "bridge"
 SIMULATION: Final = "drives"
@@ -226,6 +227,17 @@ class Rig:
         if self.hours > 0:
             machine.step_clock(-_HOUR_S)
 
+    def _clear_away(self) -> None:
+        """The bridge and its front, which may have hung and would have the port for a moment."""
+        front = None
+        with suppress(OSError, IndexError):
+            front = self.front
+        self.kill_bridge()
+        if front:
+            with suppress(ProcessLookupError):
+                os.kill(front, signal.SIGKILL)
+            self.wait(lambda: not Path(f"/proc/{front}").exists(), _FRONT_ENDS_S, "the front has ended")
+
     def mend(self) -> None:
         """Whatever a round that failed has left: everything is as it was at the start."""
         for owner in self.owners.values():
@@ -235,7 +247,7 @@ class Rig:
         machine.set_link(BRIDGE_SIDE, up=True)
         self.gateway.open()
         self.disk.empty()
-        self.kill_bridge()
+        self._clear_away()
         self.renew_bridge()
         for owner in self.owners.values():
             owner.start()

@@ -104,6 +104,7 @@ class Rig:
         """What held bridge and drives up (``tests.proof.waits``)."""
         self.board = Board(folder / "board", len(DRIVES))
         self.bridge: Process | None = None
+        self._front = 0
         self._starts = 0
         state, run = self.disk.folder / "state", folder / "run"
         self._site = write_site(folder / "site.toml", BRIDGE_SIDE, state, run)
@@ -167,7 +168,8 @@ class Rig:
 
     def follow_front(self) -> None:
         """It may be another one."""
-        follow(self.watched, FRONT, self.front)
+        self._front = self.front
+        follow(self.watched, FRONT, self._front)
 
     def another_bridge(self, site: Path) -> AbstractContextManager[Process]:
         """Beside the first one, on the same bus."""
@@ -192,6 +194,8 @@ class Rig:
         kept = self.folder / log.name
         kept.write_bytes(log.read_bytes())
         log.unlink()
+        # Its port is free then.
+        self.wait(lambda: _has_ended(self._front), _FRONT_ENDS_S, "the front has ended")
         self.start_bridge()
 
     @property
@@ -227,17 +231,6 @@ class Rig:
         if self.hours > 0:
             machine.step_clock(-_HOUR_S)
 
-    def _clear_away(self) -> None:
-        """The bridge and its front, which may have hung and would have the port for a moment."""
-        front = None
-        with suppress(OSError, IndexError):
-            front = self.front
-        self.kill_bridge()
-        if front:
-            with suppress(ProcessLookupError):
-                os.kill(front, signal.SIGKILL)
-            self.wait(lambda: not Path(f"/proc/{front}").exists(), _FRONT_ENDS_S, "the front has ended")
-
     def mend(self) -> None:
         """Whatever a round that failed has left: everything is as it was at the start."""
         for owner in self.owners.values():
@@ -247,7 +240,9 @@ class Rig:
         machine.set_link(BRIDGE_SIDE, up=True)
         self.gateway.open()
         self.disk.empty()
-        self._clear_away()
+        self.kill_bridge()
+        with suppress(ProcessLookupError):
+            os.kill(self._front, signal.SIGKILL)
         self.renew_bridge()
         for owner in self.owners.values():
             owner.start()
@@ -296,6 +291,14 @@ class Rig:
             if now > end:
                 raise Stuck("; ".join(str(one) for one in going))
             time.sleep(0.03)
+
+
+def _has_ended(pid: int) -> bool:
+    """One that nobody has waited for yet has no command line any more."""
+    try:
+        return not Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return True
 
 
 def _from_nodes(drives: Iterable[Drive]) -> list[int]:

@@ -196,6 +196,7 @@ class Rig:
         log.unlink()
         # Its port is free then.
         self.wait(lambda: _has_ended(self._front), _FRONT_ENDS_S, "the front has ended")
+        self._front = 0
         self.start_bridge()
 
     @property
@@ -241,7 +242,7 @@ class Rig:
         self.gateway.open()
         self.disk.empty()
         self.kill_bridge()
-        with suppress(ProcessLookupError):
+        if not _has_ended(self._front):
             os.kill(self._front, signal.SIGKILL)
         self.renew_bridge()
         for owner in self.owners.values():

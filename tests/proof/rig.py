@@ -182,6 +182,8 @@ class Rig:
     def kill_bridge(self) -> float:
         """The bus process dies; its front goes with it."""
         assert self.bridge
+        with suppress(OSError, IndexError):
+            self._front = self.front
         now = time.monotonic()
         self.bridge.popen.kill()
         self.bridge.popen.wait()

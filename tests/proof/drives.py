@@ -25,7 +25,7 @@ WAY_MS: Final = {"modbus": 100 + CLIENT_MS, "opcua": 500 + CLIENT_MS, "zenoh": 2
 """How long a telegram may be on its way from its client's call to the bus. What waits before the bridge for
 longer than the first part of it does not count (docs/explanation/dead-man-chain.md, "What fresh means")."""
 IGNORED_STOP_MS: Final = 1500
-"""How long after its bound a stop may go without being followed."""
+"""How long a stop of a CiA 402 drive, which is the one that is made deaf, may go without being followed."""
 TPDO_MS: Final = 300
 """Event timer of every TPDO: what the drive does is on the bus so soon."""
 INHIBIT_MS: Final = 100
@@ -233,6 +233,7 @@ def _node(drives: list[Drive]) -> str:
             f'control = "{drive.protocol}"\nfieldbus_timeout_ms = {PLANT.fieldbus_timeout_ms}',
             f'on_expiry = "{drive.reaction}"',
             drive.settings,
+            f"ignored_stop_ms = {IGNORED_STOP_MS}" if family is CIA402 else "",
             f"tpdo = {{ event_ms = {TPDO_MS}, inhibit_ms = {INHIBIT_MS} }}",
             f"parameters = {{ {family.parameters} }}" if family.parameters else "",
         ]

@@ -139,10 +139,11 @@ def _as_number(leaf: str, value: object) -> float:
 
 
 def _as_word(leaf: str, value: object) -> int:
-    """``value`` as a 16-bit word; a signed number stands for its two's complement."""
+    """``value`` as a 16-bit word. A negative number is none: FFFFh, as which it would go out, acknowledges
+    and enables. Signed numbers belong to the scaled values."""
     number = _as_number(leaf, value)
-    if not -0x8000 <= number <= 0xFFFF:
+    if not 0 <= number <= _WORD_MASK:
         raise Refusal(Code.OUT_OF_RANGE, f"{leaf} takes 0…65535, not {number:g}")
     if not number.is_integer():
         raise Refusal(Code.OUT_OF_RANGE, f"{leaf} takes a whole number, not {number:g}")
-    return int(number) & 0xFFFF
+    return int(number)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
@@ -69,49 +68,3 @@ class Point:
     @property
     def leaf(self) -> str:
         return self.name.rpartition("/")[2]
-
-    def check(self, value: object) -> Value:
-        """``value`` as this point's type, or ValueError with the sentence that says what is allowed.
-
-        Integers are taken for float points; NaN and infinities are never taken. A 16-bit word may be
-        written as its signed number, because control programs hold setpoint words in INT variables.
-        """
-        kind = self.data_type
-        if kind is DataType.STRING:
-            if isinstance(value, str):
-                return value
-            raise ValueError(f"{self.name} takes a text")
-        if kind is DataType.BOOL:
-            if isinstance(value, bool):
-                return value
-            raise ValueError(f"{self.name} takes true or false")
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ValueError(f"{self.name} takes a number")
-        if kind is DataType.FLOAT:
-            return self._in_range(self._finite(value))
-        if isinstance(value, float) and not value.is_integer():
-            raise ValueError(f"{self.name} takes a whole number")
-        number = int(value)
-        if kind is DataType.UINT16 and -0x8000 <= number < 0:
-            number &= 0xFFFF
-        low, high = INTEGER_RANGE[kind]
-        if not low <= number <= high:
-            raise ValueError(f"{self.name} takes {low}…{high}")
-        return self._in_range(number)
-
-    def _finite(self, value: int | float) -> float:
-        try:
-            number = float(value)
-        except OverflowError:  # an integer of more than 308 digits
-            number = math.inf
-        if not math.isfinite(number):
-            raise ValueError(f"{self.name} takes a finite number")
-        return number
-
-    def _in_range(self, number: int | float) -> int | float:
-        low = -math.inf if self.low is None else self.low
-        high = math.inf if self.high is None else self.high
-        if not low <= number <= high:
-            unit = f" {self.unit}" if self.unit else ""
-            raise ValueError(f"{self.name} takes {low:g}…{high:g}{unit}, not {number:g}")
-        return number

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from bridge.command.request import Identity, Role
+
+GONE_S: Final = 10.0
+"""Without a watchdog: after this an owner that gives no sign holds nobody up any more. Long enough for one
+that connects anew for each telegram, and for a person who was stopped."""
 
 
 class Authority:
@@ -13,13 +19,17 @@ class Authority:
     time and keeps it by going on; with ``"none"`` nobody commands it.
     """
 
-    __slots__ = ("_lease_s", "_lease_until", "control", "owner")
+    __slots__ = ("_absent_until", "_lease_s", "_lease_until", "_stopped_until", "control", "owner")
 
     def __init__(self, control: str) -> None:
         self.control = control
         self.owner: Identity | None = None
         self._lease_s = 0.0
         self._lease_until: float | None = None
+        self._absent_until: float | None = None
+        """The owner has no connection any more: from then on it is gone."""
+        self._stopped_until: float | None = None
+        """Somebody else has stopped its drive, and it has sent nothing since: from then on it is gone."""
 
     def refusal(self, identity: Identity, *, owner_is_silent: bool) -> str | None:
         """Why ``identity`` may not command the drive now, in one sentence, or None if it may."""
@@ -64,10 +74,28 @@ class Authority:
     def renew(self, now: float) -> None:
         """The owner has shown that it is there: its lease runs anew."""
         self._lease_until = now + self._lease_s if self.control == "lease" else None
+        self._absent_until = self._stopped_until = None
 
     def release(self) -> None:
         self.owner = None
-        self._lease_until = None
+        self._lease_until = self._absent_until = self._stopped_until = None
+
+    # an owner that nobody watches
+
+    def on_stop_by_another(self, now: float) -> None:
+        """Whoever is there answers to a stop of its drive."""
+        if self._stopped_until is None and self.owner is not None:
+            self._stopped_until = now + GONE_S
+
+    def on_connection(self, identity: Identity, now: float, *, is_there: bool) -> None:
+        """``identity`` has its first connection, or none any more."""
+        if identity.is_same(self.owner):
+            self._absent_until = None if is_there else now + GONE_S
+
+    def owner_is_gone(self, now: float) -> bool:
+        """The owner has had no connection for ``GONE_S``, or not answered to a stop for so long."""
+        times = (self._absent_until, self._stopped_until)
+        return any(time is not None and now >= time for time in times)
 
     def next_deadline(self) -> float | None:
         return self._lease_until

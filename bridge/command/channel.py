@@ -77,7 +77,7 @@ class DriveChannel:
 
     @property
     def control_word(self) -> int:
-        return self._gate.control_word
+        return self._leg.control_word
 
     @property
     def setpoints(self) -> tuple[int, ...]:

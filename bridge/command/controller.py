@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from bridge.command.acknowledge import AcknowledgeEdges
 from bridge.command.authority import Authority
 from bridge.command.event import Kind
 from bridge.command.freshness import arrival_of, is_stale, limit_ms_of
@@ -28,7 +29,6 @@ from bridge.mapping.model import Family
 _LEASE_MS: Final = (100, 600_000)
 _TAKEN_STALE: Final = STOP_ACTIONS | {Action.WRITE, Action.RELEASE_CONTROL}
 """Nothing is too old to stop a drive; whether a write does so is seen when it has been decoded."""
-_TIMEOUT_MS: Final = (0, 32767)
 
 Tell = Callable[[float, Kind, int, str], None]
 """Reports an event: time, kind, severity, sentence."""
@@ -65,6 +65,7 @@ class ControllerLeg:
             followers_of(family, slot),
             self._handshake,
         )
+        self._edges = AcknowledgeEdges()
         self.outcomes: list[tuple[Reply, Outcome]] = []
         self.start = StartSequence(self.words, self.gate, self.outcomes)
         self._decoder = TelegramDecoder(name, family, slot, scales, unserved)
@@ -80,6 +81,12 @@ class ControllerLeg:
     @property
     def is_tripped(self) -> bool:
         return self.watchdog.state is WatchdogState.TRIPPED
+
+    @property
+    def control_word(self) -> int:
+        """The owner's control word, or what was led or stopped with since; the acknowledge bit is always as
+        the owner wrote it, so that whoever changes a bit beside it makes no edge of it."""
+        return self.gate.control_word | (self.words.acknowledge_mask if self._edges.is_set else 0)
 
     # time
 
@@ -121,7 +128,7 @@ class ControllerLeg:
         """Do what ``request`` asks; exactly one outcome goes to ``outcomes``, now or later."""
         self.judge(now)
         try:
-            self._check_authority(request)
+            self._check_authority(request, now)
             if request.action not in _TAKEN_STALE and self._is_stale(request, now):
                 raise self._stale(request)
             if request.action is Action.START:
@@ -134,16 +141,16 @@ class ControllerLeg:
             self._tell(now, Kind.REFUSED, 300, message)
             self.outcomes.append((reply, Outcome(refusal.code, refusal.message, forwarded=False)))
 
-    def _check_authority(self, request: Request) -> None:
+    def _check_authority(self, request: Request, now: float) -> None:
         """Raises ``Refusal`` where somebody else controls the drive. Stopping it is every operator's, unless
-        the site file forbids it."""
+        the site file forbids it, and then where the owner is gone."""
         identity = request.identity
-        is_stop = request.action in STOP_ACTIONS and self._settings.stop_by_anyone
-        if is_stop and identity.role >= Role.OPERATOR:
+        may_stop = self._settings.stop_by_anyone or self._owner_is_gone(now)
+        if request.action in STOP_ACTIONS and may_stop and identity.role >= Role.OPERATOR:
             return
         takes = request.action is Action.TAKE_CONTROL
         judge = self.authority.take_refusal if takes else self.authority.refusal
-        why = judge(identity, owner_is_silent=self._owner_is_silent)
+        why = judge(identity, owner_is_silent=self._owner_is_silent(now))
         if why:
             raise Refusal(Code.NOT_ALLOWED, why)
 
@@ -155,12 +162,15 @@ class ControllerLeg:
         limit_ms = limit_ms_of(request, self.watchdog.timeout_ms)
         return Refusal(Code.STALE, f"may have waited on its way for longer than {limit_ms} ms")
 
-    @property
-    def _owner_is_silent(self) -> bool:
+    def _owner_is_silent(self, now: float) -> bool:
         """Without a lease, an owner that has sent no telegram yet holds nobody up either."""
         watchdog = self.watchdog
         is_idle = watchdog.state is WatchdogState.IDLE and self.authority.control != "lease"
-        return watchdog.controller_is_silent or is_idle
+        return watchdog.controller_is_silent or is_idle or self._owner_is_gone(now)
+
+    def _owner_is_gone(self, now: float) -> bool:
+        """Where no watchdog says so."""
+        return self.watchdog.timeout_ms == 0 and self.authority.owner_is_gone(now)
 
     def _carry_out(self, request: Request, now: float) -> Outcome:
         """What is done at once. Raises ``Refusal`` before anything has changed."""
@@ -170,8 +180,7 @@ class ControllerLeg:
             case Action.KEEP_ALIVE:
                 self._hear(request, now)
             case Action.RESET_FAULT:
-                self._own(request, now)
-                self._acknowledge(request, now, pulse=True)
+                return self._reset_fault(request, now)
             case Action.STOP | Action.QUICK_STOP | Action.DISABLE_VOLTAGE:
                 self._stop(request, now)
             case Action.TAKE_CONTROL:
@@ -188,7 +197,7 @@ class ControllerLeg:
         is_owner = request.identity.is_same(self.owner)
         # A new owner inherits no setpoints.
         kept = self.gate.setpoints if is_owner else self.gate.rest
-        telegram = self._decoder.decode(request.values, kept, self.gate.control_word)
+        telegram = self._decoder.decode(request.values, kept, self.control_word)
         word = telegram.control_word
         if word is not None and not self.words.is_valid(word):
             self.watchdog.apply(Stimulus.INVALID, now)
@@ -200,11 +209,15 @@ class ControllerLeg:
         self._own(request, now)
         if word is not None:
             self.start.end(Outcome(Code.CANCELLED, "a control word was written meanwhile"))
-            if self.is_tripped and self.words.acknowledges(self.gate.control_word, word):
+            mask = self.words.acknowledge_mask
+            is_edge = self._edges.on_bit(is_set=bool(word & mask))
+            if self.is_tripped and is_edge:
                 self._acknowledge(request, now, pulse=False)
                 # The edge itself goes on to the drive; whatever else the word asks has to be asked anew.
-                self.gate.control_word |= self.words.acknowledge_mask
+                self.gate.control_word |= mask
                 return Outcome(Code.OK, "acknowledged; the drive stays stopped", forwarded=False)
+            if not is_edge and not self.gate.control_word & mask:
+                word &= ~mask  # what was sent meanwhile would make an edge of a bit that never fell
         self.watchdog.apply(Stimulus.TELEGRAM, arrival_of(request, now))
         position = self._handshake is not None and self._handshake.value in request.values
         may_enable = self.may_enable(now)
@@ -249,8 +262,11 @@ class ControllerLeg:
 
     def _own(self, request: Request, now: float) -> None:
         """A valid telegram: who sent it owns the drive from now on."""
-        if not request.identity.is_same(self.owner):
-            self._hand_over(request.identity, now)
+        identity = request.identity
+        if request.pressed is False:
+            self._edges.on_register(identity, is_set=False)
+        if not identity.is_same(self.owner):
+            self._hand_over(identity, now)
         self.authority.renew(arrival_of(request, now))
 
     def _hear(self, request: Request, now: float) -> None:
@@ -267,6 +283,15 @@ class ControllerLeg:
         if changes:
             self._tell(now, Kind.OWNER, 200, f"controlled by {identity}")
 
+    def _reset_fault(self, request: Request, now: float) -> Outcome:
+        """A method is an order each time; a register acknowledges where the telegram before it did not."""
+        if request.pressed and not self._edges.on_register(request.identity, is_set=True):
+            self._hear(request, now)
+            return Outcome(Code.OK, "no edge: the telegram before it acknowledged, too", forwarded=False)
+        self._own(request, now)
+        self._acknowledge(request, now, pulse=True)
+        return DONE
+
     def _acknowledge(self, request: Request, now: float, *, pulse: bool) -> None:
         was_tripped = self.is_tripped
         self.watchdog.apply(Stimulus.ACKNOWLEDGED, arrival_of(request, now))
@@ -278,7 +303,7 @@ class ControllerLeg:
         low, high = _LEASE_MS
         if self.authority.control == "lease" and not low <= request.ttl_ms <= high:
             raise Refusal(Code.OUT_OF_RANGE, f"ttl_ms takes {low}…{high}")
-        owner, is_free = self.owner, self._owner_is_silent
+        owner, is_free = self.owner, self._owner_is_silent(now)
         if owner is not None and not is_free and not request.identity.is_same(owner):
             self._tell(now, Kind.OWNER, 500, f"{request.identity} takes control away from {owner}")
         self._hand_over(request.identity, now, request.ttl_ms / 1000)
@@ -293,19 +318,31 @@ class ControllerLeg:
     def leave(self, stimulus: Stimulus, now: float) -> None:
         """The owner goes; the drive is stopped first."""
         self.watchdog.apply(stimulus, now)
+        self._restore_timeout(now)
         self.gate.stop(self.words.stop(self.gate.sent.words[0]))
         self.authority.release()
+        self._edges.on_leave()
         self.start.end(Outcome(Code.CANCELLED, "control of the drive has changed"))
 
     def _set_timeout(self, request: Request, now: float) -> None:
+        """Another time for as long as the owner owns the drive."""
         if not self._settings.fieldbus_timeout_writable:
             raise Refusal(Code.NOT_ALLOWED, "the site file does not allow to change fieldbus_timeout_ms")
-        low, high = _TIMEOUT_MS
+        if not request.identity.is_same(self.owner):
+            raise Refusal(Code.NOT_ALLOWED, "only who controls the drive may change fieldbus_timeout_ms")
+        low, high = self._settings.timeout_range_ms
         if not low <= request.timeout_ms <= high:
-            raise Refusal(Code.OUT_OF_RANGE, f"fieldbus_timeout_ms takes {low}…{high}")
+            raise Refusal(Code.OUT_OF_RANGE, f"fieldbus_timeout_ms takes {low}…{high} here")
         self.watchdog.set_timeout(request.timeout_ms)
         message = f"fieldbus_timeout_ms = {request.timeout_ms}, by {request.identity}"
         self._tell(now, Kind.CONFIGURATION, 400, message)
+
+    def _restore_timeout(self, now: float) -> None:
+        site_ms = self._settings.fieldbus_timeout_ms or 0
+        if self.watchdog.timeout_ms != site_ms:
+            self.watchdog.set_timeout(site_ms)
+            message = f"fieldbus_timeout_ms = {site_ms} again, as in the site file"
+            self._tell(now, Kind.CONFIGURATION, 400, message)
 
     def _stop(self, request: Request, now: float) -> None:
         """Stop, by whoever asks. The owner's telegrams go on counting, its old enable does not."""
@@ -314,6 +351,8 @@ class ControllerLeg:
                 self._hear(request, now)
         else:
             self._tell(now, Kind.OWNER, 400, f"{request.action} by {request.identity}")
+            if self.watchdog.timeout_ms == 0:
+                self.authority.on_stop_by_another(now)
         change = {
             Action.STOP: self.words.stop,
             Action.QUICK_STOP: self.words.quick_stop,

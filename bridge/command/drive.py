@@ -103,7 +103,13 @@ class Drive:
         self._actual = ActualData(self.name, family, self.slot, self.channel)
         self.channel.look_up(self._actual.why_lacking)
         self.points: list[Point] = [
-            *drive_points(self.name, family, self.slot, self.channel.scales),
+            *drive_points(
+                self.name,
+                family,
+                self.slot,
+                self.channel.scales,
+                timeout_writable=table.fieldbus_timeout_writable,
+            ),
             *parameter_points(self.name, family),
         ]
 

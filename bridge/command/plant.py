@@ -195,6 +195,12 @@ class Plant:
             if drive.channel.output != before or request.action in _BRINGS_TIMERS_FORWARD:
                 self.outputs_changed()
 
+    def on_connection(self, identity: Identity, now: float, *, is_there: bool) -> None:
+        """``identity`` has connected, or its last connection has ended: no telegram, and no end of control.
+        Told where a protocol knows it."""
+        for drive in self.drives.values():
+            drive.channel.authority.on_connection(identity, now, is_there=is_there)
+
     def rejected(self, rejection: Rejection, now: float, count: int = 1) -> None:
         """What a protocol has refused by itself, ``count`` times: counted, told and written to the audit log
         as what a drive refuses."""

@@ -27,16 +27,19 @@ def _word(name: str, description: str, bits: tuple[str, ...] = (), *, writable: 
     return Point(name=name, data_type=DataType.UINT16, writable=writable, description=description, bits=bits)
 
 
-def drive_points(name: str, family: Family, slot: Slot, scales: dict[str, LinearScale]) -> list[Point]:
+def drive_points(
+    name: str, family: Family, slot: Slot, scales: dict[str, LinearScale], *, timeout_writable: bool
+) -> list[Point]:
     """The points of the drive called ``<node>/<drive>``; of words that its PDOs do not carry there are none.
 
     ``scales`` holds the scales that are known already, by the value's leaf, for the ranges.
+    ``timeout_writable``: the owner may change ``fieldbus_timeout_ms``.
     """
     return [
         *_command_points(name, family, slot, scales),
         *_status_points(name, family),
         *_actual_points(name, family, slot, scales),
-        *_supervision_points(name),
+        *_supervision_points(name, timeout_writable),
         *_identity_points(name),
     ]
 
@@ -93,7 +96,7 @@ def _value(name: str, value: ProcessValue, scales: dict[str, LinearScale]) -> Po
     )
 
 
-def _supervision_points(name: str) -> list[Point]:
+def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
     top = f"{name}/supervision"
     u32, ms = DataType.UINT32, "ms"
     return [
@@ -106,7 +109,11 @@ def _supervision_points(name: str) -> list[Point]:
         ),
         Point(name=f"{top}/watchdog_left_ms", data_type=u32, unit=ms, description="time until the trip"),
         Point(
-            name=f"{top}/fieldbus_timeout_ms", data_type=u32, unit=ms, description="twin of P151; 0 is off"
+            name=f"{top}/fieldbus_timeout_ms",
+            data_type=u32,
+            unit=ms,
+            writable=timeout_writable,
+            description="twin of P151; 0 is off",
         ),
         Point(
             name=f"{top}/telegram_downtime_s",

@@ -154,7 +154,9 @@ class Request:
     the drive's own setting, ``timeout_ms`` goes with SET_TIMEOUT. ``parameter`` is a vendor's name, an
     object or the name of a point, ``value`` what is to be written, ``max_age_ms`` how old a value read
     earlier may be. ``received_at`` is when it can have come at the earliest, in monotonic seconds of the bus
-    process's machine; None for one that was made in this process just now.
+    process's machine; None for one that was made in this process just now. ``pressed`` is what the telegram
+    says of an acknowledge register, None where its protocol has none or another request of the same telegram
+    says it.
     """
 
     identity: Identity
@@ -168,6 +170,7 @@ class Request:
     value: Value | None = None
     max_age_ms: int = 0
     received_at: float | None = None
+    pressed: bool | None = None
 
 
 Reply = Callable[[Outcome], None]

@@ -33,6 +33,9 @@ WordOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
 IGNORE_ALL_S: Final = -0.1
 """``telegram_downtime_s`` that reports communication errors and otherwise ignores them (P513 = -0.1)."""
 
+LONGEST_TIMEOUT_MS: Final = 32767
+"""Of P151 (BU 2500 §7.1.1)."""
+
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 _PREFIX: Final = re.compile(r"[\w.-]+(/[\w.-]+)*", re.ASCII)
 _OBJECT: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})")
@@ -100,6 +103,12 @@ def _counter(value: int) -> int:
     raise ValueError("must be 0 (SYNC without a counter) or 2…240 (1019h)")
 
 
+def _range(limits: list[int]) -> list[int]:
+    if len(limits) != 2 or limits[0] > limits[1]:
+        raise ValueError("must be the lowest and the highest time such as [100, 2000]")
+    return limits
+
+
 def _locator(text: str) -> str:
     if not _LOCATOR.fullmatch(text):
         raise ValueError("must be a protocol and an address such as tcp/192.168.1.10:7447")
@@ -118,6 +127,7 @@ ObjectName = Annotated[str, AfterValidator(_object)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Network = Annotated[str, AfterValidator(_network)]
 Locator = Annotated[str, AfterValidator(_locator)]
+Timeout = Annotated[int, Field(ge=0, le=LONGEST_TIMEOUT_MS)]
 Full = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
@@ -198,9 +208,12 @@ class DriveTable(Table):
     unit_id: int | None = Field(None, ge=1, le=247, description="a Modbus unit id, 1…247")
     control: Control = Field("none", description="modbus, opcua, zenoh, lease or none")
     fieldbus_timeout_ms: int | None = Field(
-        None, ge=0, le=32767, description="0 (off) or 1…32767 ms, the twin of P151"
+        None, ge=0, le=LONGEST_TIMEOUT_MS, description="0 (off) or 1…32767 ms, the twin of P151"
     )
     fieldbus_timeout_writable: bool = False
+    fieldbus_timeout_range_ms: Annotated[list[Timeout], AfterValidator(_range)] | None = Field(
+        None, description="[lowest, highest] that the owner may set, each 0…32767 ms"
+    )
     telegram_downtime_s: Annotated[float, AfterValidator(_downtime)] = 0.5
     on_expiry: Reaction = Field(
         "disable_voltage", description="disable_voltage, quick_stop, stop, silence or hold"
@@ -224,6 +237,14 @@ class DriveTable(Table):
         the site file says so."""
         is_given = "on_ignored_stop" in self.model_fields_set
         return self.on_ignored_stop if is_given or self.control != "none" else "report"
+
+    @property
+    def timeout_range_ms(self) -> tuple[int, int]:
+        """What the owner may set. Where the file does not say: never off, and up to ten times its own."""
+        if self.fieldbus_timeout_range_ms is not None:
+            low, high = self.fieldbus_timeout_range_ms
+            return low, high
+        return 1, min(10 * (self.fieldbus_timeout_ms or LONGEST_TIMEOUT_MS), LONGEST_TIMEOUT_MS)
 
 
 class IdentityTable(Table):

@@ -40,7 +40,8 @@ _FAULT_BITS, _FAULT = 0b1001111, 0b0001000
 _MODEL_FIELDS: Final = tuple(field.name for field in fields(LegModel))
 _MODEL_TIMES: Final = tuple(
     map(
-        _MODEL_FIELDS.index, ("now", "deadline", "lease_until", "start_until", "believed_at", "believes_from")
+        _MODEL_FIELDS.index,
+        ("now", "deadline", "lease_until", "start_until", "believed_at", "believes_from", "gone_at"),
     ),
 )
 
@@ -221,6 +222,8 @@ class LegMachine:
         if action in STOP_ACTIONS and who.role >= Role.OPERATOR:
             if who.is_same(model.owner):
                 model.telegram(who)
+            else:
+                model.stopped_by_another()
             model.stop()
             return True
         if not model.may(who, take=action is Action.TAKE_CONTROL):

@@ -12,6 +12,8 @@ from bridge.command import Identity, Role
 
 START_LIMIT_S = 3.0
 BELIEVED_S = 1.0
+GONE_S = 0.0
+"""Of an owner that nobody watches; the exploration makes it that short, lest each pause be a state."""
 SETTLE_S = 0.2
 
 
@@ -55,8 +57,10 @@ class LegModel:
     tripped: bool = False
     held: bool = False
     """With the reaction "hold": a drive that moved when the watchdog tripped goes on."""
-    acknowledges: bool = False
-    """The acknowledge bit of the owner's last control word."""
+    acknowledges: bool | None = None
+    """The acknowledge bit of the owner's last control word; None where it has written none."""
+    gone_at: float | None = None
+    """Without a watchdog: the owner's drive was stopped by another, and it has sent nothing since."""
     stage: Stage = Stage.STOP_WORD
 
     # what it may do
@@ -74,12 +78,13 @@ class LegModel:
         if who.role < Role.OPERATOR:
             return False
         is_owner = who.is_same(self.owner)
+        is_gone = self.gone_at is not None and self.now >= self.gone_at
         if self.control == "lease":
-            free = self.owner is None or self.silent
+            free = self.owner is None or self.silent or is_gone
             return is_owner or (take and (free or who.role >= Role.ENGINEER))
         never_spoke = self.deadline is None and not self.silent and not self.tripped
         free = self.owner is None or self.silent or (never_spoke and self.timeout_s > 0 and not self.ignores)
-        return who.source.label == self.control and (is_owner or free)
+        return who.source.label == self.control and (is_owner or free or is_gone)
 
     # time
 
@@ -112,15 +117,19 @@ class LegModel:
     def stop(self) -> None:
         """Whatever was enabled has to be enabled anew."""
         self.stage = min(self.stage, Stage.STOP_WORD)
-        self.held = self.acknowledges = False
+        self.held = False
         self.end_start()
+
+    def stopped_by_another(self) -> None:
+        if self.owner is not None and not self.timeout_s and self.gone_at is None:
+            self.gone_at = self.now + GONE_S
 
     def end_start(self) -> None:
         self.start_until = self.believed_at = self.believes_from = None
 
     def leave(self) -> None:
         self.stop()
-        self.owner = self.lease_until = self.deadline = None
+        self.owner = self.lease_until = self.deadline = self.acknowledges = self.gone_at = None
         self.silent = False
 
     def own(self, who: Identity) -> None:
@@ -128,6 +137,7 @@ class LegModel:
             if self.owner is not None:
                 self.leave()
             self.owner = who
+        self.gone_at = None
         if self.control == "lease":
             self.lease_until = self.now + self.ttl_s
 
@@ -155,7 +165,7 @@ class LegModel:
         """A valid control word."""
         self.telegram(who)
         self.end_start()
-        is_edge = acknowledges and not self.acknowledges
+        is_edge = acknowledges and self.acknowledges is False
         if self.tripped and is_edge:
             self.acknowledge(who)
         elif self.tripped:
@@ -180,7 +190,6 @@ class LegModel:
         self.end_start()
         is_stopped = self.stage is not Stage.ENABLED and (enabled or not self.followed)
         self.stage = Stage.ENABLED if ready and not is_stopped else Stage.ENABLE
-        self.acknowledges = False
         if is_stopped:
             self.believed_at = believed_at or self.now + BELIEVED_S
             self.believes_from = believes_from or self.now + SETTLE_S
@@ -208,9 +217,9 @@ class LegModel:
         was_there = self.is_there
         self.is_there = is_there or (self.ignores and was_there)
         if is_there or not self.is_there:
-            acknowledges, held = self.acknowledges, self.held and self.is_there
+            held = self.held and self.is_there
             self.stop()
-            self.acknowledges, self.held = acknowledges, held
+            self.held = held
 
     def gap(self) -> None:
         """The bridge itself hung."""

@@ -11,12 +11,13 @@ from bridge.config import WordOrder
 from bridge.northbound.modbus.dispatch import Dispatcher
 from tests.support import sites
 
+_OF_FU3 = "fieldbus_timeout_writable = true\nstop_by_anyone = false"
 SITE = sites.site(
     sites.bus(
         sites.node(
             sites.drive("fu1", "modbus", 200, "unit_id = 1\nparameters = { P105 = 50.0 }"),
             sites.drive("fu2", "opcua", 200, f"unit_id = 2\n{sites.SCALED}"),
-            sites.drive("fu3", "modbus", 200, "unit_id = 9\nfieldbus_timeout_writable = true"),
+            sites.drive("fu3", "modbus", 200, "unit_id = 9\n" + _OF_FU3),
             more="hold_ms = 2000",
         )
     ),
@@ -34,7 +35,8 @@ def make_plant() -> Plant:
 
 
 class Rig:
-    """``fu1`` (unit 1) is ours; ``fu2`` (2) belongs to OPC UA; ``fu3`` (9) has no scale and takes a time."""
+    """``fu1`` (unit 1) is ours; ``fu2`` (2) belongs to OPC UA; ``fu3`` (9) has no scale, takes a time
+    and is stopped by its owner alone."""
 
     def __init__(self, word_order: WordOrder = "ABCD") -> None:
         self.plant = make_plant()

@@ -23,7 +23,7 @@ SITE = sites.site(
         sites.node(
             sites.drive("fu1", "opcua", 0),
             sites.drive("fu2", "modbus", 200, "parameters = { P105 = 50.0 }"),
-            sites.drive("fu3", "lease", 300),
+            sites.drive("fu3", "lease", 300, "fieldbus_timeout_writable = true"),
             '[[bus.node.drive]]\nslot = "fu4"\ncontrol = "none"\n',
         )
     ),

@@ -20,6 +20,7 @@ from bridge.config import ModbusTable
 from bridge.errors import Unavailable
 from bridge.northbound.modbus import session
 from bridge.northbound.modbus.server import ModbusServer
+from tests.support import sites
 from tests.support.modbus_site import ENABLED, READY, SWITCH_ON_INHIBITED, float_words, make_plant
 
 HOST = "127.0.0.1"
@@ -216,6 +217,59 @@ async def test_a_second_controller_is_refused(plant: Plant, server: ModbusServer
         assert (await other.read_holding_registers(10, count=1, device_id=1)).registers == [0]
         assert not (await owner.write_register(10, 0, device_id=1)).isError()
         assert not (await other.write_registers(0, [0x047E, 0], device_id=1)).isError()
+
+
+async def test_anybody_stops_a_drive_by_register_13(plant: Plant, server: ModbusServer):
+    async with pymodbus(server) as owner, pymodbus(server, "127.0.0.2") as other:
+        for code, word in ((1, 0x047E), (2, 0x047B), (3, 0x0474)):
+            drive_says(plant, READY)
+            assert not (await owner.write_registers(0, [0x047E, 0], device_id=1)).isError()
+            assert not (await owner.write_registers(0, [0x047F, 0x2000], device_id=1)).isError()
+            assert on_the_bus(plant)[:2] == (0x047F, 0x2000)
+            assert not (await other.write_register(13, code, device_id=1)).isError()
+            assert on_the_bus(plant)[:2] == (word, 0)
+        assert (await other.read_holding_registers(13, count=1, device_id=1)).registers == [0]
+        assert not (await other.write_registers(13, [2], device_id=1)).isError()
+        answer = await other.readwrite_registers(
+            read_address=13, read_count=1, write_address=13, values=[1], device_id=1
+        )
+        assert answer.registers == [0]
+        for value in (0, 4, 0xFFFF):
+            assert (await other.write_register(13, value, device_id=1)).exception_code == 3
+        assert (await other.write_register(13, 1, device_id=2)).isError() is False, "OPC UA's drive, too"
+        await owner.write_register(10, 1, device_id=9)
+        assert (await other.write_register(13, 1, device_id=9)).exception_code == 1, "stop_by_anyone = false"
+
+
+async def test_an_owner_that_is_gone_and_not_watched_holds_nobody_up():
+    """Its drive moves on until somebody stops it: the site file has switched the watchdog off."""
+    plant = sites.plant_of(sites.site(sites.bus(sites.node(sites.drive("fu1", "modbus", 0, "unit_id = 1")))))
+    drive_says(plant, READY)
+    later = 0.0
+    server = ModbusServer(
+        plant, ModbusTable.model_validate({"listen": f"{HOST}:0"}), lambda: time.monotonic() + later
+    )
+    await server.start()
+    try:
+        async with pymodbus(server, "127.0.0.2") as other:
+            async with pymodbus(server) as owner:
+                await owner.write_registers(0, [0x047E, 0], device_id=1)
+                await owner.write_registers(0, [0x047F, 0x2000], device_id=1)
+                later = 3600.0
+                assert (await other.write_register(0, 0x047E, device_id=1)).exception_code == 1
+            for _ in range(500):
+                if server.sessions == 1:
+                    break
+                await asyncio.sleep(0.01)
+            assert (await other.write_register(0, 0x047E, device_id=1)).exception_code == 1
+            later += 10.0
+            assert not (await other.write_register(13, 1, device_id=1)).isError()
+            assert on_the_bus(plant)[:2] == (0x047E, 0)
+            assert not (await other.write_registers(0, [0x047F, 0x2000], device_id=1)).isError()
+            assert on_the_bus(plant)[:2] == (0x047E, 0), "it is enabled anew, not taken over moving"
+            assert str(plant.drives["conveyor/fu1"].channel.owner) == "modbus:127.0.0.2"
+    finally:
+        await server.close()
 
 
 async def test_a_second_connection_from_the_same_address_is_the_same_controller(server: ModbusServer):

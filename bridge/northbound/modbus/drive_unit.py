@@ -18,6 +18,7 @@ not carry 0Ah; within a longer range they read as 0 and take 0.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 from bridge.command import Action, Drive, Identity, Request
@@ -30,6 +31,7 @@ from bridge.northbound.modbus.registers import (
     PARAMETERS,
     PROCESS_WORDS,
     QUALITY_BITS,
+    STOP,
     TIMEOUT,
     VALUES,
     DriveMap,
@@ -43,7 +45,7 @@ from bridge.northbound.modbus.unit import refuse_quality, state_code
 
 _WORD_BITS: Final = 16
 _RESERVED: Final = 9  # between the setpoints and the keep-alive, so that one write can reach both
-_TIMEOUT_MOST_MS: Final = 32767  # P151, BU 2500 §7.1.1
+_STOPS: Final = {1: Action.STOP, 2: Action.QUICK_STOP, 3: Action.DISABLE_VOLTAGE}
 
 
 class DriveUnit:
@@ -206,7 +208,7 @@ class DriveUnit:
         word = self._drive.channel.control_word
         for position, bit in enumerate(bits, start):
             word = word | 1 << position if bit else word & ~(1 << position)
-        return [self._write({"control_word": word}, caller)]
+        return _unpressed([self._write({"control_word": word}, caller)])
 
     def plan_mask(self, write: MaskWrite, caller: Identity) -> list[Request]:
         if write.address > PROCESS_WORDS:
@@ -221,7 +223,8 @@ class DriveUnit:
         Who may not command the drive is refused at the first request. Beyond that only the WRITE can be
         refused for what it holds, so it goes first; a time that will be refused is submitted alone: its
         refusal is the answer, and is counted, and nothing else is done. Values written together with a
-        release (keep-alive 0) are taken first, then the drive is stopped and free.
+        release (keep-alive 0) are taken first, then the drive is stopped and free. A stop is everybody's,
+        and all that is done.
         """
         end = start + len(words)
         self._check_range(Table.HOLDING_REGISTER, start, end)
@@ -229,33 +232,54 @@ class DriveUnit:
         if start >= PARAMETERS:
             return [self._parameter(start, words, caller)]
         self._check_writable(start, end)
-        target = self._drive.name
         block = dict(enumerate(words, start))
+        if STOP in block and (block[STOP] or start == STOP):
+            return [self._stop(block[STOP], caller)]
         if block.get(_RESERVED) or block.get(ACKNOWLEDGE, 0) > 1:
             raise Refused(ExceptionCode.ILLEGAL_VALUE)
-        requests: list[Request] = []
+        values = self._values_of(start, words, block)
+        requests = [] if values is None else [self._write(values, caller)]
+        return self._with_commands(requests, block, caller)
+
+    def _values_of(
+        self, start: int, words: Sequence[int], block: dict[int, int]
+    ) -> Mapping[str, Value] | None:
+        """The values of the command group in a write, or None where it reaches none."""
         if start <= PROCESS_WORDS:
-            requests.append(self._write(self._process_values(block), caller))
-        elif start >= VALUES:
-            requests.append(self._write(self._setpoint_values(start, words), caller))
-        if block.get(ACKNOWLEDGE):
-            requests.append(Request(caller, target, Action.RESET_FAULT))
+            return self._process_values(block)
+        return self._setpoint_values(start, words) if start >= VALUES else None
+
+    def _with_commands(
+        self, requests: list[Request], block: dict[int, int], caller: Identity
+    ) -> list[Request]:
+        target = self._drive.name
+        is_pressed = bool(block.get(ACKNOWLEDGE))
+        if is_pressed:
+            requests.append(Request(caller, target, Action.RESET_FAULT, pressed=True))
         if TIMEOUT in block:
             timeout_ms = block[TIMEOUT]
             request = Request(caller, target, Action.SET_TIMEOUT, timeout_ms=timeout_ms)
-            allowed = self._drive.channel.settings.fieldbus_timeout_writable
-            if not allowed or timeout_ms > _TIMEOUT_MOST_MS:
+            settings = self._drive.channel.settings
+            low, high = settings.timeout_range_ms
+            if not settings.fieldbus_timeout_writable or not low <= timeout_ms <= high:
                 return [request]
             requests.append(request)
         if KEEP_ALIVE in block:
             action = Action.KEEP_ALIVE if block[KEEP_ALIVE] else Action.RELEASE_CONTROL
             requests.append(Request(caller, target, action))
         # A 0 written to the acknowledge register alone: nothing to do, and still a telegram.
-        return requests or [Request(caller, target, Action.KEEP_ALIVE)]
+        requests = requests or [Request(caller, target, Action.KEEP_ALIVE)]
+        return requests if is_pressed else _unpressed(requests)
+
+    def _stop(self, code: int, caller: Identity) -> Request:
+        action = _STOPS.get(code)
+        if action is None:
+            raise Refused(ExceptionCode.ILLEGAL_VALUE)
+        return Request(caller, self._drive.name, action)
 
     def _check_writable(self, start: int, end: int) -> None:
         only_reserved = start == _RESERVED and end == KEEP_ALIVE
-        if only_reserved or (start < VALUES and end > TIMEOUT + 1):
+        if only_reserved or (start < VALUES and end > STOP + 1):
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
 
     def _process_values(self, block: dict[int, int]) -> dict[str, Value]:
@@ -316,6 +340,11 @@ class DriveUnit:
             0x82: f"{known.revision:08X}",
             0x83: f"{known.serial:08X}",
         }
+
+
+def _unpressed(telegram: list[Request]) -> list[Request]:
+    """The requests of a telegram that does not write 1 to the acknowledge register."""
+    return [replace(telegram[0], pressed=False), *telegram[1:]]
 
 
 def _bits(word: int) -> list[bool]:

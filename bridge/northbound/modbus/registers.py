@@ -27,6 +27,7 @@ PROCESS_WORDS: Final = 8
 KEEP_ALIVE: Final = 10
 ACKNOWLEDGE: Final = 11
 TIMEOUT: Final = 12
+STOP: Final = 13
 # Input registers of a drive: 0 … 9 are the drive's data, 10 … 31 what the bridge knows about it.
 DIAGNOSTICS: Final = 10
 VALUES: Final = 32
@@ -218,6 +219,7 @@ def _holding_rows(drive: Drive) -> list[Row]:
         row(KEEP_ALIVE, "keep_alive", "uint16", "", "not 0: a telegram; 0: release; reads 1 for the owner"),
         row(ACKNOWLEDGE, "acknowledge", "uint16", "", "write 1 to acknowledge a fault; reads 0"),
         Row(Table.HOLDING_REGISTER, TIMEOUT, name, "uint16", timeout_access, "ms", text),
+        row(STOP, "stop", "uint16", "", "for everybody: 1 stop, 2 quick stop, 3 disable voltage; reads 0"),
     ]
 
 

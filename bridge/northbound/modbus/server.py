@@ -103,10 +103,15 @@ class ModbusServer:
         self._sessions.add(session)
         shown = f"[{address}]" if address.version == 6 else str(address)
         sets = self._settings.parameters == "write"
-        return Identity(Source.MODBUS, str(address), Role.OPERATOR, f"{shown}:{port}", sets)
+        identity = Identity(Source.MODBUS, str(address), Role.OPERATOR, f"{shown}:{port}", sets)
+        self._plant.on_connection(identity, self._clock(), is_there=True)
+        return identity
 
     def leave(self, session: Session) -> None:
         self._sessions.discard(session)
+        identity = session.identity
+        if identity is not None and not any(identity.is_same(other.identity) for other in self._sessions):
+            self._plant.on_connection(identity, self._clock(), is_there=False)
 
     def on_fault(self, session: Session, fault: str) -> None:
         self.broken_connections += 1

@@ -55,6 +55,21 @@ class _Parameter(_Telegram):
         return Request(identity, self.target, Action.WRITE_PARAMETER, parameter=name, value=value)
 
 
+@dataclass(slots=True)
+class _Timeout(_Telegram):
+    """The owner's ``supervision/fieldbus_timeout_ms``, which is no telegram."""
+
+    action: ClassVar[Action] = Action.SET_TIMEOUT
+
+    def request(self, identity: Identity) -> Request:
+        (value,) = self.values.values()
+        return Request(identity, self.target, Action.SET_TIMEOUT, timeout_ms=int(value))
+
+
+_ALONE: Final[Mapping[str, type[_Telegram]]] = {"parameter": _Parameter, "supervision": _Timeout}
+"""Groups whose points are written one by one."""
+
+
 async def ask(view: View, request: Request) -> Outcome:
     """Make a request and wait for its outcome."""
     try:
@@ -66,7 +81,7 @@ async def ask(view: View, request: Request) -> Outcome:
 
 
 class Writer:
-    """Carries out Write calls. ``writable`` are the command points and parameters by NodeId."""
+    """Carries out Write calls. ``writable`` are the points that may be written, by NodeId."""
 
     def __init__(self, view: View, space: AddressSpace, writable: Mapping[ua.NodeId, VariableNode]) -> None:
         self._view = view
@@ -88,8 +103,8 @@ class Writer:
             owner, _, leaf = node.point.name.rpartition("/")
             target, _, group = owner.rpartition("/")
             telegram = latest.get(target)
-            if group == "parameter":
-                telegram = _Parameter(target)
+            if group in _ALONE:
+                telegram = _ALONE[group](target)
                 telegrams.append(telegram)
             # The same point twice is two telegrams: the edge from one value to the other may count.
             elif telegram is None or leaf in telegram.values:

@@ -135,8 +135,10 @@ class Commands:
         point = self._points.get(tail)
         if point is None:
             raise self._unknown(tail, target, group)
-        if group != "command" or not point.writable:
+        if not point.writable:
             raise BadCommand(Code.READ_ONLY, f"{tail} is read-only; {self._how(target)}")
+        if group == "supervision":
+            return Request(identity, target, Action.SET_TIMEOUT, timeout_ms=_decode_whole(point, payload))
         return Request(identity, target, Action.WRITE, {leaf: _decode_value(point, payload)})
 
     def parameter(self, tail: str) -> tuple[str, str]:
@@ -201,6 +203,13 @@ def _decode_value(point: Point, payload: bytes) -> Value:
             MALFORMED, f'{point.name} takes a number or {{"v": <number>}} in JSON: {error}'
         ) from None
     return _bounded(point.name, decoded.v if isinstance(decoded, _One) else decoded)
+
+
+def _decode_whole(point: Point, payload: bytes) -> int:
+    value = _decode_value(point, payload)
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise BadCommand(Code.OUT_OF_RANGE, f"{point.name} takes a whole number")
+    return value
 
 
 def _decode_parameter(name: str, payload: bytes) -> Value:

@@ -99,7 +99,6 @@ def test_a_refusal_is_told_with_its_reason(hall: Hall, stranger: Identity) -> No
 @pytest.mark.parametrize(
     ("action", "more", "old", "new"),
     [
-        (Action.SET_TIMEOUT, {"timeout_ms": 300}, {"fieldbus_timeout_ms": 200}, {"fieldbus_timeout_ms": 300}),
         (Action.TAKE_CONTROL, {}, {"owner": ""}, {"owner": str(PLC), "ttl_ms": 0}),
         (Action.RELEASE_CONTROL, {}, {"owner": ""}, {"owner": ""}),
         (Action.RESET_FAULT, {}, {}, {}),
@@ -112,6 +111,14 @@ def test_every_command_is_told(
     assert hall.ask(action, **more).ok
     (entry,) = hall.entries
     assert (entry.action, entry.old, entry.new) == (action, old, new)
+
+
+def test_another_time_out_is_told(hall: Hall) -> None:
+    hall.write(control_word=SHUT_DOWN)
+    assert hall.ask(Action.SET_TIMEOUT, timeout_ms=300).ok
+    entry = hall.entries[-1]
+    assert entry.action == Action.SET_TIMEOUT
+    assert (entry.old, entry.new) == ({"fieldbus_timeout_ms": 200}, {"fieldbus_timeout_ms": 300})
 
 
 def test_a_start_is_told_when_it_has_ended(hall: Hall) -> None:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
-from bridge.command import Action, Code, Kind
+from bridge.command import Action, Code, Identity, Kind, Role, Source
 from bridge.command.link import NodeState
 from tests.support.rig import (
+    ACKNOWLEDGE,
     ENABLE,
+    ENGINEER,
     HALF_SPEED,
+    OPERATOR,
     OTHER_PLC,
     PLC,
+    SHUT_DOWN,
     Rig,
 )
 
@@ -59,13 +65,28 @@ class TestSetTimeout:
 
     @pytest.fixture
     def writable(self) -> Rig:
-        rig = Rig(fieldbus_timeout_writable=True)
+        rig = Rig(fieldbus_timeout_writable=True, fieldbus_timeout_range_ms=[0, 1000])
         rig.run()
         return rig
 
-    @pytest.mark.parametrize("timeout_ms", [-1, 32768])
-    def test_takes_the_range_of_p151(self, writable: Rig, timeout_ms: int):
+    @pytest.mark.parametrize("timeout_ms", [-1, 1001, 32768])
+    def test_takes_the_range_of_the_site_file(self, writable: Rig, timeout_ms: int):
         assert writable.ask(Action.SET_TIMEOUT, timeout_ms=timeout_ms).code is Code.OUT_OF_RANGE
+        assert writable.channel.watchdog.timeout_ms == 200
+
+    @pytest.mark.parametrize(
+        ("site_ms", "taken", "refused"),
+        [(200, (1, 2000), (0, 2001)), (10_000, (1, 32767), (0, 32768)), (0, (1, 32767), (0, 32768))],
+    )
+    def test_without_a_range_it_is_never_off_and_ten_times_as_long_at_most(
+        self, site_ms: int, taken: tuple[int, int], refused: tuple[int, int]
+    ):
+        rig = Rig(fieldbus_timeout_writable=True, fieldbus_timeout_ms=site_ms)
+        rig.run()
+        for timeout_ms in taken:
+            assert rig.ask(Action.SET_TIMEOUT, timeout_ms=timeout_ms).ok
+        for timeout_ms in refused:
+            assert rig.ask(Action.SET_TIMEOUT, timeout_ms=timeout_ms).code is Code.OUT_OF_RANGE
 
     def test_counts_from_the_last_telegram(self, writable: Rig):
         writable.wait(0.1)
@@ -99,6 +120,107 @@ class TestSetTimeout:
         writable.ask(Action.RESET_FAULT)
         assert writable.watchdog == "off"
 
-    def test_somebody_else_may_not(self, writable: Rig):
-        assert writable.ask(Action.SET_TIMEOUT, OTHER_PLC, timeout_ms=0).code is Code.NOT_ALLOWED
-        assert writable.channel.owner == PLC
+    @pytest.mark.parametrize("downtime_s", [0.5, -0.1])
+    def test_after_silence_no_second_timer_begins(self, downtime_s: float):
+        """Neither trips nor tells again: the owner has sent nothing since."""
+        rig = Rig(
+            fieldbus_timeout_writable=True,
+            fieldbus_timeout_range_ms=[0, 1000],
+            telegram_downtime_s=downtime_s,
+        )
+        rig.run()
+        rig.wait(0.2)
+        told = len(rig.told(Kind.WATCHDOG))
+        assert told == 1
+        for timeout_ms in (400, 0, 300):
+            assert rig.ask(Action.SET_TIMEOUT, timeout_ms=timeout_ms).ok
+            assert rig.channel.watchdog.next_deadline() is None
+        assert rig.channel.watchdog.controller_is_silent
+        rig.wait(10)
+        assert len(rig.told(Kind.WATCHDOG)) == told
+        assert rig.channel.trips == (downtime_s > 0)
+
+    @pytest.mark.parametrize("who", [OTHER_PLC, OPERATOR, ENGINEER])
+    @pytest.mark.parametrize("when", ["owned", "silent", "free", "not yet owned"])
+    def test_only_the_owner_may(self, writable: Rig, who: Identity, when: str):
+        rig = Rig(fieldbus_timeout_writable=True) if when == "not yet owned" else writable
+        if when == "silent":
+            rig.wait(0.3)
+        elif when == "free":
+            rig.ask(Action.RELEASE_CONTROL)
+        owner = rig.channel.owner
+        assert rig.ask(Action.SET_TIMEOUT, who, timeout_ms=300).code is Code.NOT_ALLOWED
+        assert rig.channel.watchdog.timeout_ms == 200
+        assert rig.channel.owner == owner
+
+
+def _released(rig: Rig) -> None:
+    rig.ask(Action.RELEASE_CONTROL)
+
+
+def _displaced(rig: Rig) -> None:
+    rig.wait(0.9)
+    rig.write(SHUT_DOWN, identity=OTHER_PLC)
+
+
+def _displaced_by_taking(rig: Rig) -> None:
+    rig.wait(0.9)
+    rig.ask(Action.TAKE_CONTROL, OTHER_PLC)
+
+
+def _taken_away(rig: Rig) -> None:
+    rig.ask(Action.TAKE_CONTROL, Identity(Source.MODBUS, "192.168.1.12", Role.ENGINEER))
+
+
+def _bridge_hung(rig: Rig) -> None:
+    rig.channel.on_bridge_gap(rig.now)
+
+
+class TestTheSitesTimeoutIsBack:
+    """When the owner goes, whatever made it go."""
+
+    def rig(self, **settings: object) -> Rig:
+        rig = Rig(fieldbus_timeout_writable=True, fieldbus_timeout_range_ms=[0, 1000], **settings)
+        rig.node(NodeState.OPERATIONAL)
+        rig.ask(Action.TAKE_CONTROL, ttl_ms=600)
+        rig.run()
+        return rig
+
+    @pytest.mark.parametrize("goes", [_released, _displaced, _displaced_by_taking, _taken_away, _bridge_hung])
+    def test_with_a_fixed_source(self, goes: Callable[[Rig], None]):
+        rig = self.rig()
+        assert rig.ask(Action.SET_TIMEOUT, timeout_ms=800).ok
+        goes(rig)
+        assert rig.channel.owner != PLC
+        assert rig.channel.watchdog.timeout_ms == 200
+        assert "fieldbus_timeout_ms = 200 again, as in the site file" in rig.told(Kind.CONFIGURATION)
+
+    def test_when_a_lease_runs_out_and_the_next_owner_is_watched(self):
+        rig = self.rig(control="lease")
+        assert rig.ask(Action.SET_TIMEOUT, timeout_ms=0).ok
+        rig.wait(1.0)
+        assert rig.channel.owner is None
+        assert rig.ask(Action.TAKE_CONTROL, OTHER_PLC, ttl_ms=10_000).ok
+        rig.write(SHUT_DOWN, identity=OTHER_PLC)
+        rig.write(ENABLE, identity=OTHER_PLC)
+        rig.wait(0.2)
+        assert rig.watchdog == "tripped"
+
+    def test_who_takes_over_is_watched_by_it_at_once(self):
+        rig = self.rig()
+        assert rig.ask(Action.SET_TIMEOUT, timeout_ms=900).ok
+        rig.wait(1.0)
+        assert rig.watchdog == "tripped"
+        rig.write(SHUT_DOWN, identity=OTHER_PLC)
+        assert rig.watchdog == "tripped", "a trip stays a trip"
+        rig.write(ACKNOWLEDGE, identity=OTHER_PLC)
+        assert rig.channel.watchdog.left_ms(rig.now) == 200
+
+    def test_a_trip_and_a_bus_that_was_gone_leave_it_with_its_owner(self):
+        rig = self.rig()
+        rig.ask(Action.SET_TIMEOUT, timeout_ms=300)
+        rig.channel.start_anew(rig.now)
+        rig.wait(0.3)
+        rig.write(SHUT_DOWN)
+        assert rig.watchdog == "tripped"
+        assert rig.channel.watchdog.timeout_ms == 300

@@ -15,10 +15,11 @@ from unittest.mock import patch
 
 import pytest
 
-from bridge.command import output
+from bridge.command import authority, output
 from bridge.command.watchdog import TABLE, Effect, Stimulus, Watchdog, WatchdogState
 from tests.support.explorer import Map, explore
 from tests.support.leg_machine import GATES, TIMEOUT_MS, LegMachine, recorded_table
+from tests.support.leg_model import GONE_S
 
 _MOST: Final = 40_000
 
@@ -45,7 +46,8 @@ _OFF: Final = ("ignored", "ignored, lease", "off", "off, lease")
 def explored(profile: str) -> Map:
     # A limit like the others: far fewer states than with one that outlives five time-outs.
     limit = patch.object(output, "_QUICK_STOP_LIMIT_S", TIMEOUT_MS / 1000)
-    with recorded_table() as table, limit:
+    gone = patch.object(authority, "GONE_S", GONE_S)
+    with recorded_table() as table, limit, gone:
         machine = LegMachine(table, **_PROFILES[profile])
         found = explore(machine, _MOST)
     assert found.depth >= 6, "sequences that are long enough for a trip, its acknowledge and a fresh enable"

@@ -73,6 +73,9 @@ class DriveByChance(RuleBasedStateMachine):
         self.trips = 0
         self.needs_acknowledge = False
         self.needs_stop = True
+        self.owner: Identity | None = None
+        self.written = 0xFFFF
+        """The owner's last control word; a first one is no edge."""
 
     # the model
 
@@ -87,6 +90,9 @@ class DriveByChance(RuleBasedStateMachine):
             self.needs_acknowledge = self.needs_stop = True
         if not self.channel.link.may_enable or self.channel.owner is None:
             self.needs_stop = True
+        if self.channel.owner != self.owner:
+            self.owner = self.channel.owner
+            self.written = 0xFFFF
 
     # what may happen
 
@@ -147,7 +153,7 @@ class DriveByChance(RuleBasedStateMachine):
     def _write(self, values: dict[str, Value], identity: Identity) -> None:
         channel = self.channel
         owner = channel.owner
-        before = channel.control_word
+        before = self.written
         was_tripped = self._judged_tripped()
         (outcome,) = self.rig.submit(Action.WRITE, identity, values=values)
         self._look()
@@ -156,10 +162,11 @@ class DriveByChance(RuleBasedStateMachine):
         self._telegram(outcome, identity)
         if not identity.is_same(owner):
             self.needs_stop = True
-            before = 0 if owner is not None else before
+            before = 0xFFFF
         word = values.get("control_word")
         if not isinstance(word, int):
             return
+        self.written = word
         if was_tripped and word & ~before & 0x0080:
             self.needs_acknowledge = False
             self.needs_stop = True

@@ -190,3 +190,102 @@ class TestStops:
     def test_a_reader_stops_nothing(self, running: Rig):
         assert running.ask(Action.STOP, OBSERVER).code is Code.NOT_ALLOWED
         assert running.enables
+
+
+class TestAnOwnerThatNobodyWatches:
+    """With ``fieldbus_timeout_ms = 0`` nothing says that the owner is silent; a dead one blocks no one for
+    ever."""
+
+    def rig(self, **settings: object) -> Rig:
+        rig = Rig(fieldbus_timeout_ms=0, **settings)
+        rig.run()
+        return rig
+
+    def connected(self, rig: Rig, *, is_there: bool) -> None:
+        rig.channel.authority.on_connection(PLC, rig.now, is_there=is_there)
+
+    def may_take_over(self, rig: Rig) -> bool:
+        taken = rig.write(SHUT_DOWN, identity=OTHER_PLC).ok
+        assert (rig.channel.owner == OTHER_PLC) is taken
+        return taken
+
+    def test_as_long_as_it_is_connected_it_may_be_quiet(self):
+        rig = self.rig()
+        rig.wait(3600)
+        assert not self.may_take_over(rig)
+        assert rig.enables
+
+    @pytest.mark.parametrize("stop_by_anyone", [True, False])
+    def test_without_a_connection_it_is_gone_after_10_s(self, stop_by_anyone: bool):
+        rig = self.rig(stop_by_anyone=stop_by_anyone)
+        self.connected(rig, is_there=False)
+        rig.wait(9.9)
+        assert not self.may_take_over(rig)
+        assert rig.enables
+        rig.wait(0.1)
+        assert rig.ask(Action.STOP, OPERATOR).ok
+        assert not rig.enables
+        assert self.may_take_over(rig)
+        assert rig.sent == SHUT_DOWN
+
+    def test_taking_over_stops_the_drive_and_does_not_start_it(self):
+        rig = self.rig()
+        self.connected(rig, is_there=False)
+        rig.wait(10)
+        assert not rig.write(ENABLE, HALF_SPEED, identity=OTHER_PLC).forwarded
+        assert not rig.enables
+
+    @pytest.mark.parametrize("sign", ["telegram", "connection"])
+    def test_a_sign_of_it_in_time_keeps_the_drive(self, sign: str):
+        rig = self.rig()
+        self.connected(rig, is_there=False)
+        rig.wait(9)
+        if sign == "telegram":
+            rig.write(ENABLE, HALF_SPEED)
+        else:
+            self.connected(rig, is_there=True)
+        rig.wait(3600)
+        assert not self.may_take_over(rig)
+        assert rig.enables
+
+    def test_one_that_does_not_answer_to_a_stop_is_gone_after_10_s(self):
+        rig = self.rig()
+        assert rig.ask(Action.STOP, OPERATOR).ok
+        rig.wait(5)
+        assert rig.ask(Action.STOP, OPERATOR).ok  # the first one counts
+        rig.wait(4.9)
+        assert not self.may_take_over(rig)
+        rig.wait(0.1)
+        assert self.may_take_over(rig)
+
+    def test_one_that_does_is_not(self):
+        rig = self.rig()
+        assert rig.ask(Action.STOP, OPERATOR).ok
+        rig.write(SHUT_DOWN)
+        rig.wait(3600)
+        assert not self.may_take_over(rig)
+
+    @pytest.mark.parametrize("stop_by_anyone", [True, False])
+    def test_where_a_watchdog_runs_nothing_of_this_counts(self, stop_by_anyone: bool):
+        rig = Rig(fieldbus_timeout_ms=30_000, stop_by_anyone=stop_by_anyone)
+        rig.run()
+        self.connected(rig, is_there=False)
+        rig.ask(Action.STOP, OPERATOR)
+        rig.wait(20)
+        assert not self.may_take_over(rig)
+        assert rig.ask(Action.STOP, OPERATOR).ok is stop_by_anyone
+
+    def test_nor_does_it_end_a_lease(self):
+        rig = Rig(fieldbus_timeout_ms=0, control="lease")
+        rig.ask(Action.TAKE_CONTROL, ttl_ms=600_000)
+        self.connected(rig, is_there=False)
+        rig.wait(20)
+        assert rig.channel.owner == PLC
+        assert rig.write(SHUT_DOWN, identity=OTHER_PLC).code is Code.NOT_ALLOWED
+        assert rig.ask(Action.TAKE_CONTROL, OTHER_PLC, ttl_ms=1000).ok
+
+    def test_a_stranger_that_goes_says_nothing_of_the_owner(self):
+        rig = self.rig()
+        rig.channel.authority.on_connection(OTHER_PLC, rig.now, is_there=False)
+        rig.wait(20)
+        assert not self.may_take_over(rig)

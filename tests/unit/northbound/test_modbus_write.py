@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.command import Code, Event, Kind, Outcome, Plant, Reply, Request
+from bridge.command import Code, Event, Identity, Kind, Outcome, Plant, Reply, Request
 from tests.support.modbus_site import (
     ENABLED,
     OTHER_PLC,
+    PLC,
     READY,
     SWITCH_ON_INHIBITED,
     Rig,
@@ -103,8 +104,13 @@ def test_single_registers(rig: Rig):
         (0, [0x047E, *[0] * 10, 2], BAD_VALUE),
         (12, [500], NOT_ALLOWED),
         (0, [0x047E, *[0] * 11, 500], NOT_ALLOWED),
-        (13, [0], NO_ADDRESS),
-        (12, [200, 0], NO_ADDRESS),
+        (12, [200, 0], NOT_ALLOWED),
+        (13, [0], BAD_VALUE),
+        (13, [4], BAD_VALUE),
+        (13, [0xFFFF], BAD_VALUE),
+        (0, [0x047E, *[0] * 9, 1, 0, 200, 4], BAD_VALUE),
+        (13, [1, 0], NO_ADDRESS),
+        (14, [0], NO_ADDRESS),
         (31, [0], NO_ADDRESS),
         (30, [0, 0, 0, 0], NO_ADDRESS),
         (32, [0], NO_ADDRESS),
@@ -189,15 +195,137 @@ def test_acknowledge_after_a_trip_leaves_the_drive_stopped(rig: Rig):
     assert rig.sent[1] == 0
 
 
-def test_the_watchdog_time_where_the_site_file_allows(rig: Rig):
+def test_the_watchdog_time_is_its_owners_where_the_site_file_allows(rig: Rig):
+    """fu3 may have 1…2000 ms, ten times what its site file says."""
+    assert rig.write(12, 500, unit=9) == NOT_ALLOWED
+    assert rig.write(10, 1, unit=9) == OK
     assert rig.write(12, 500, unit=9) == OK
     assert rig.read(3, 12, 1, unit=9) == [500]
-    assert rig.write(12, 32768, unit=9) == BAD_VALUE
+    for refused in (0, 2001, 32768, 40_000):
+        assert rig.write(12, refused, unit=9) == BAD_VALUE
     assert rig.write(0, 0x047E, *[0] * 9, 1, 0, 40000, unit=9) == BAD_VALUE
     assert rig.drive("fu3").channel.control_word == 0x0400
     assert rig.write(0, 0x047E, *[0] * 9, 1, 0, 300, unit=9) == OK
     assert rig.read(3, 12, 1, unit=9) == [300]
     assert rig.drive("fu3").channel.control_word == 0x047E
+    assert rig.write(12, 400, unit=9, caller=OTHER_PLC) == NOT_ALLOWED
+    assert rig.write(10, 0, unit=9) == OK
+    assert rig.read(3, 12, 1, unit=9) == [200], "the site's own when the owner goes"
+
+
+class TestStopForEverybody:
+    """Holding register 13."""
+
+    def moving(self) -> Rig:
+        rig = Rig()
+        rig.runs(READY)
+        rig.write(0, 0x047E)
+        rig.write(0, 0x047F, 0x2000)
+        rig.runs(ENABLED, 0x2000)
+        assert rig.sent[:2] == (0x047F, 0x2000)
+        return rig
+
+    @pytest.mark.parametrize(("code", "word"), [(1, 0x047E), (2, 0x047B), (3, 0x0474)])
+    @pytest.mark.parametrize("caller", [PLC, OTHER_PLC])
+    def test_stops_by_every_function_that_writes_registers(self, code: int, word: int, caller: Identity):
+        for pdu in (
+            struct.pack(">BHH", 6, 13, code),
+            struct.pack(">BHHBH", 16, 13, 1, 2, code),
+            struct.pack(">BHHHHBH", 23, 0, 1, 13, 1, 2, code),
+        ):
+            rig = self.moving()
+            assert not rig.ask(pdu, caller=caller)[0] & 0x80
+            assert rig.sent[:2] == (word, 0)
+            assert rig.read(3, 13, 1) == [0]
+            assert rig.fu1.channel.owner == PLC
+            assert rig.write(0, 0x047F, 0x2000) == OK
+            assert rig.sent[0] == word, "what the owner goes on writing does not start it"
+
+    def test_of_a_drive_that_another_protocol_controls(self):
+        rig = Rig()
+        assert rig.write(13, 2, unit=2) == OK
+
+    def test_with_other_registers_it_is_all_that_is_done(self):
+        rig = self.moving()
+        assert rig.write(0, 0x047F, 0x3000, *[0] * 8, 0, 0, 500, 1, caller=OTHER_PLC) == OK
+        assert rig.sent[:2] == (0x047E, 0)
+        assert rig.fu1.channel.owner == PLC
+
+    def test_a_0_among_others_is_none(self):
+        rig = Rig()
+        rig.write(10, 1, unit=9)
+        assert rig.write(0, 0x047E, *[0] * 9, 1, 0, 300, 0, unit=9) == OK
+        assert rig.drive("fu3").channel.control_word == 0x047E
+
+    def test_an_owners_stop_is_a_telegram_and_anothers_is_none(self):
+        for caller, left_ms in ((PLC, 200), (OTHER_PLC, 100)):
+            rig = self.moving()
+            rig.pass_time(0.1)
+            rig.write(13, 1, caller=caller)
+            assert rig.fu1.channel.watchdog.left_ms(rig.now) == left_ms
+
+    def test_is_refused_to_others_where_the_site_file_forbids_it(self):
+        rig = Rig()
+        rig.write(0, 0x047E, unit=9)
+        assert rig.write(13, 1, unit=9, caller=OTHER_PLC) == NOT_ALLOWED
+        assert rig.write(13, 1, unit=9) == OK
+
+
+class TestAcknowledgeRegister:
+    """Holding register 11, and the bit by whatever function writes it."""
+
+    def tripped(self) -> Rig:
+        rig = Rig()
+        rig.runs(READY)
+        rig.write(0, 0x047E)
+        rig.pass_time(0.201)
+        assert rig.fu1.channel.is_tripped
+        return rig
+
+    def test_a_1_in_each_block_acknowledges_once(self):
+        rig = self.tripped()
+        block = (0x047E, *[0] * 9, 1, 1)
+        assert rig.write(0, *block) == OK
+        assert not rig.fu1.channel.is_tripped
+        for _ in range(3):
+            rig.pass_time(0.201)
+            assert rig.write(0, *block) == OK
+            assert rig.fu1.channel.is_tripped
+        assert rig.write(0, *block[:-1], 0) == OK
+        assert rig.write(0, *block) == OK
+        assert not rig.fu1.channel.is_tripped
+
+    def test_a_single_1_acknowledges_each_time(self):
+        rig = self.tripped()
+        for _ in range(3):
+            assert rig.write(11, 1) == OK
+            assert not rig.fu1.channel.is_tripped
+            rig.write(0, 0x047E)
+            rig.pass_time(0.201)
+
+    @pytest.mark.parametrize(
+        "constant",
+        [
+            bytes.fromhex("05 0007 FF00"),
+            bytes.fromhex("0F 0007 0001 01 01"),
+            bytes.fromhex("16 0000 FF7F 0080"),
+            bytes.fromhex("06 0000 04FE"),
+            bytes.fromhex("17 0000 0001 0000 0001 02 04FE"),
+        ],
+    )
+    def test_a_constant_bit_is_no_edge_beside_other_bits(self, constant: bytes):
+        """Coils and masks are written beside the word as it is served."""
+        rig = self.tripped()
+        rig.write(0, 0x04FE)
+        rig.write(0, 0x04FE)
+        rig.pass_time(0.201)
+        for between in ("06 000D 0001", "06 000A 0001", "05 0001 FF00", "0F 0002 0001 01 01"):
+            rig.ask(between)
+            rig.ask(constant)
+            assert rig.fu1.channel.is_tripped, between
+        rig.ask("05 0007 0000")
+        rig.ask(constant)
+        assert not rig.fu1.channel.is_tripped
 
 
 def test_mask_write(rig: Rig):

@@ -129,8 +129,11 @@ def test_bits_without_a_meaning_are_left_out_and_none_is_writable(trees: tuple[O
     assert not any(bit.writable for bit in word.bits)
 
 
-def test_only_command_points_and_parameters_are_writable(trees: tuple[ObjectNode, ...]) -> None:
-    assert {v.id.split("/")[2] for v in variables(trees) if v.writable} == {"command", "parameter"}
+def test_only_command_points_parameters_and_the_time_out_are_writable(trees: tuple[ObjectNode, ...]) -> None:
+    writable = {v.id for v in variables(trees) if v.writable}
+    assert {id for id in writable if id.split("/")[2] not in ("command", "parameter")} == {
+        "conveyor/fu3/supervision/fieldbus_timeout_ms"
+    }
     readings = [v for v in variables(trees) if v.id == "conveyor/fu1/parameter/p700_1"]
     assert [v.writable for v in readings] == [False]
 

@@ -11,11 +11,13 @@ from hypothesis import strategies as st
 
 from bridge.command import Action, Code, Identity, Request, Source
 from bridge.northbound.zenoh.commands import MALFORMED, BadCommand, Commands, identity_of
+from tests.support import sites
 from tests.support.zenoh_site import make_plant
 
 PLC = Identity(Source.ZENOH, "plc")
 PLANT = make_plant()
 COMMANDS = Commands(PLANT.image.points)
+_WRITABLE = sites.drive("fu3", "zenoh", 200, "fieldbus_timeout_writable = true")
 
 
 def request(tail: str, payload: str | bytes = b"") -> Request:
@@ -38,6 +40,20 @@ def test_a_point_of_the_command_group_is_written(payload: str) -> None:
 def test_an_object_is_one_telegram() -> None:
     made = request("conveyor/fu3/command", '{"control_word": 1151, "setpoint_1": 8192}')
     assert made.values == {"control_word": 0x047F, "setpoint_1": 0x2000}
+
+
+def test_the_owners_time_out_is_set_where_the_site_file_allows_it() -> None:
+    key = "conveyor/fu3/supervision/fieldbus_timeout_ms"
+    writable = Commands(sites.plant_of(sites.site(sites.bus(sites.node(_WRITABLE)))).image.points)
+    assert writable.request(key, b"300", PLC) == Request(
+        PLC, "conveyor/fu3", Action.SET_TIMEOUT, timeout_ms=300
+    )
+    for payload in (b"1.5", b"true", b'"300"', b"1e999", b"", b"{}"):
+        with pytest.raises(BadCommand):
+            writable.request(key, payload, PLC)
+    assert refusal(key, "300").code == Code.READ_ONLY
+    with pytest.raises(BadCommand):
+        writable.request("conveyor/fu3/supervision/trips", b"0", PLC)
 
 
 def test_every_method_has_its_key() -> None:

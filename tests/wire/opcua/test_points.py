@@ -16,11 +16,12 @@ from bridge.command import Action
 from bridge.errors import Unavailable
 from bridge.image import Quality
 from bridge.northbound.opcua.server import OpcUaServer
-from tests.support.opcua_client import node, word, write, write_all, write_value
+from tests.support.opcua_client import call, node, word, write, write_all, write_value
 from tests.support.opcua_site import OPEN, LocalView, make_plant, namespace
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 Codes = ua.StatusCodes
+_LEASE = ua.Variant(5000, ua.VariantType.UInt32)
 
 
 class TestNames:
@@ -159,7 +160,8 @@ class TestWrites:
         [
             ("control_word", ua.Variant(0x047E, ua.VariantType.Int64)),
             ("control_word", ua.Variant(0x047E, ua.VariantType.Int16)),
-            ("setpoint_1", ua.Variant(-5, ua.VariantType.Int16)),
+            ("setpoint_1", ua.Variant(5, ua.VariantType.Int16)),
+            ("frequency", ua.Variant(-5, ua.VariantType.Int16)),
             ("frequency", ua.Variant(25, ua.VariantType.Byte)),
             ("frequency", ua.Variant(2.5, ua.VariantType.Float)),
         ],
@@ -245,6 +247,40 @@ class TestWrites:
         read = await point.read_data_value()
         assert read.Value.Value == 77
         assert datetime.now(UTC) - read.SourceTimestamp < timedelta(seconds=5)
+
+    async def test_a_number_that_is_no_word_becomes_none(self, client: Client, view: LocalView) -> None:
+        int16 = ua.VariantType.Int16
+        before = view.image.read("conveyor/fu1/command/control_word").value
+        for value in (
+            ua.Variant(-1, int16),
+            ua.Variant(-32768, int16),
+            ua.Variant(65536, ua.VariantType.Int32),
+        ):
+            assert await write(client, control_word=value) == [Codes.BadOutOfRange]
+            assert await write(client, setpoint_1=value) == [Codes.BadOutOfRange]
+        assert view.image.read("conveyor/fu1/command/control_word").value == before
+
+    async def test_the_time_out_is_its_owners(self, client: Client, view: LocalView) -> None:
+        where = (await node(client, "conveyor/fu3/supervision/fieldbus_timeout_ms")).nodeid
+        other = (await node(client, "conveyor/fu1/supervision/fieldbus_timeout_ms")).nodeid
+
+        async def set_to(timeout_ms: int, which: ua.NodeId = where) -> list[int]:
+            return await write_all(
+                client, [write_value(which, ua.Variant(timeout_ms, ua.VariantType.UInt32))]
+            )
+
+        def timeout_ms() -> object:
+            return view.image.read("conveyor/fu3/supervision/fieldbus_timeout_ms").value
+
+        assert await set_to(1000) == [Codes.BadUserAccessDenied]
+        assert await call(client, "conveyor/fu3", "conveyor/fu3/TakeControl", [_LEASE]) == Codes.Good
+        assert await set_to(1000) == [Codes.Good]
+        assert timeout_ms() == 1000
+        assert await set_to(0) == [Codes.BadOutOfRange]
+        assert await set_to(3001) == [Codes.BadOutOfRange]
+        assert await set_to(1000, other) == [Codes.BadNotWritable]
+        assert await call(client, "conveyor/fu3", "conveyor/fu3/ReleaseControl", []) == Codes.Good
+        assert timeout_ms() == 300
 
     async def test_a_drive_without_its_scale_says_so(self, client: Client) -> None:
         where = (await node(client, "conveyor/fu4/command/frequency")).nodeid

@@ -178,3 +178,50 @@ def test_a_quick_stop_by_the_watchdog_ends_with_disable_voltage(way: Way) -> Non
     way.now = deadline
     assert way.sent == way.words.disable_voltage(way.words.quick_stop(way.run))
     assert way.gate.next_deadline() is None
+
+
+# what opens the way
+
+
+def test_a_stop_for_a_drive_that_may_not_be_enabled_does_not_open_the_interlock(way: Way) -> None:
+    assert way.gate.take(way.words.ready, (0,), may_enable=False)
+    assert way.gate.interlocked
+    assert not way.gate.take(way.run, (0,), may_enable=True), "that needs a stop while it may be enabled"
+    assert not way.words.enables(way.sent)
+
+
+def test_an_enable_for_a_drive_that_may_not_be_enabled_does_not_go_out(way: Way) -> None:
+    way.writes(way.words.ready)
+    assert not way.gate.interlocked
+    assert not way.gate.take(way.run, (0,), may_enable=False)
+    assert not way.words.enables(way.gate.compute(way.now, may_enable=False).words[0])
+
+
+def test_the_enabling_word_of_a_start_opens_no_interlock(way: Way) -> None:
+    way.gate.lead(way.run)
+    assert way.gate.interlocked
+    assert not way.words.enables(way.sent)
+    way.gate.lead(way.words.ready)
+    way.gate.lead(way.run)
+    assert way.sent == way.run
+
+
+def test_a_drive_in_fault_rests_also_where_it_never_said_that_it_had_moved(way: Way) -> None:
+    """A stop that would hold the motor brings it under no current when the fault is gone."""
+    way.writes(way.words.ready)
+    way.says(READY)
+    way.writes(way.run)
+    assert way.gate.may_follow_late
+    way.says(DriveState.FAULT)
+    way.gate.stop(way.words.stop(way.run))
+    assert way.sent == way.withheld
+
+
+@pytest.mark.parametrize("state", [DriveState.FAULT_REACTION_ACTIVE, DriveState.UNKNOWN])
+def test_one_whose_fault_reaction_goes_on_does_not(way: Way, state: DriveState) -> None:
+    way.writes(way.words.ready)
+    way.says(READY)
+    way.writes(way.run)
+    way.says(state)
+    way.gate.stop(way.words.stop(way.run))
+    assert way.sent == way.stop

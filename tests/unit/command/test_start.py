@@ -405,3 +405,26 @@ def test_a_drive_that_does_not_leave_the_quick_stop_is_told(rig: Rig):
     rig.wait(3.0)
     assert codes(outcomes) == [Code.TIMED_OUT]
     assert "quick stop active" in outcomes[0].message
+
+
+@pytest.mark.parametrize("how", ["the node has restarted", "the drive has to be enabled anew"])
+def test_is_not_led_across_a_restart(how: str):
+    """What the drive says afterwards is no answer to a start from before."""
+    rig = Rig(telegram_downtime_s=-0.1, fieldbus_timeout_ms=0)
+    rig.node(NodeState.OPERATIONAL)
+    rig.drive_says(INHIBITED)
+    outcomes = rig.submit(Action.START, direction=1)
+    assert not outcomes
+    if how == "the node has restarted":
+        rig.node(NodeState.LOST)
+        rig.node(NodeState.OPERATIONAL)
+    else:
+        rig.channel.start_anew(rig.now)
+    (outcome,) = outcomes
+    assert (outcome.code, outcome.message) == (Code.CANCELLED, how)
+    for _ in range(3):
+        for word in (INHIBITED, READY, READY):
+            rig.drive_says(word)
+            rig.wait(0.6)
+            assert not rig.enables
+    assert len(outcomes) == 1

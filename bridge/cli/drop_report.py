@@ -54,6 +54,7 @@ def facts(occasion: Occasion, node: Node, test: DropTest) -> dict[str, Any]:
         },
         "deadman_ms": node.bus.deadman_ms,
         "silent_ms": round(1000 * test.silent_s),
+        "rpdos_alone": test.rpdos_alone,
         "ok": bool(test.outcomes) and all(one.is_proven for one in test.outcomes),
         "failure": test.failure or None,
         "drives": [_drive(one) for one in test.outcomes],
@@ -69,7 +70,7 @@ def _drive(one: DropOutcome) -> dict[str, Any]:
             {"watches": watch.watches, "setting": watch.setting, "reaction": watch.reaction}
             for watch in one.own.watches
         ],
-        "own_ms": one.own.own_ms,
+        "own_ms": one.own_ms,
         "bound_ms": one.bound_ms,
         "worst_case_bridge_ms": one.own.bridge_ms,
         "reacted_ms": one.reacted_ms,
@@ -100,7 +101,10 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
     yield f"- **Boot-up**: {node['boot_status'] or '–'}"
     yield f"- **Site file**: {site['file']}, SHA-256 `{site['sha256']}`"
     yield f"- **drivebridge**: {report['version']}; deadman_ms {report['deadman_ms']}"
-    yield f"- **Silence**: {report['silent_ms']} ms without SYNC, RPDO, heartbeat, guarding and SDO"
+    without = "SYNC, RPDO, heartbeat, guarding and SDO"
+    if report["rpdos_alone"]:
+        without = "RPDOs, as the site file stops drives by silence; all else went on"
+    yield f"- **Silence**: {report['silent_ms']} ms without {without}"
     yield ""
     if report["failure"]:
         yield f"No result: {report['failure']}"

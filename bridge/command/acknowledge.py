@@ -1,5 +1,5 @@
-"""When a controller acknowledges: edges of its own telegrams, whatever else was sent in between (shared
-design, "When a stop is not enough"). Pure."""
+"""When a controller acknowledges: edges of its own telegrams, whatever else was sent in between
+(``docs/explanation/dead-man-chain.md``). Pure."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -49,14 +50,22 @@ class Identification:
     device_name: str = ""
 
 
-def worst_case_stop_ms(table: DriveTable, timeout_ms: int, rpdo_period_ms: int) -> int:
+def worst_case_stop_ms(
+    table: DriveTable, timeout_ms: int, rpdo_period_ms: int, own: OwnJudgement | None
+) -> int:
     """Longest time from the controller's last telegram to the reaction on the bus; 0 where none.
 
-    ``rpdo_period_ms`` includes the SYNC period where the drive takes its RPDO over with SYNC.
+    ``rpdo_period_ms`` includes the SYNC period where the drive takes its RPDO over with SYNC. With silence
+    the reaction is the drive's own, after its own time-out in ``own``.
     """
+    own_ms = 0
     if not timeout_ms or table.telegram_downtime_s == IGNORE_ALL_S or table.on_expiry == "hold":
         return 0
-    return timeout_ms + rpdo_period_ms + REACTION_BOUND_MS
+    if table.on_expiry == "silence":
+        own_ms = math.ceil(own.process_data_ms) if own else 0
+        if not own_ms:
+            return 0
+    return timeout_ms + rpdo_period_ms + REACTION_BOUND_MS + own_ms
 
 
 class Drive:
@@ -142,7 +151,8 @@ class Drive:
 
     def worst_case_stop_ms(self) -> int:
         """Longest time from the controller's last telegram to the reaction on the bus; 0 where none."""
-        return worst_case_stop_ms(self.table, self.channel.watchdog.timeout_ms, self.rpdo_period_ms)
+        timeout_ms = self.channel.watchdog.timeout_ms
+        return worst_case_stop_ms(self.table, timeout_ms, self.rpdo_period_ms, self.own)
 
     # fed by the southbound side
 
@@ -202,6 +212,7 @@ class Drive:
     def on_own_supervision(self, own: OwnJudgement, now: float) -> None:
         """What the drive does by itself when the bridge falls silent, as the boot-up has read it."""
         self.own = own
+        self._refresh_supervision(now)
         if own.verdict is OwnVerdict.STOPS or own.accepted:
             self._image.set(self._bridge_ms, own.bridge_ms, now, Quality.GOOD, own.accepted)
             return
@@ -212,6 +223,7 @@ class Drive:
     def on_own_supervision_changed(self, why: str, now: float) -> None:
         """What the boot-up has read of it is not true any more."""
         self.own = None
+        self._refresh_supervision(now)
         self._image.set(self._bridge_ms, 0, now, Quality.CONFIG_ERROR, why)
 
     def on_identification(self, identification: Identification, now: float) -> None:

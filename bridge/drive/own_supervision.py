@@ -58,6 +58,17 @@ class OwnJudgement:
         return self.watches[min(stops)[1]] if stops else None
 
     @property
+    def process_data_ms(self) -> float:
+        """The time after which it stops without its process data, while everything else goes on; 0 where it
+        does not."""
+        times = [
+            one.time_ms
+            for one in self.watches
+            if one.watches == "process_data" and one.verdict is OwnVerdict.STOPS and one.time_ms
+        ]
+        return min(times, default=0.0)
+
+    @property
     def verdict(self) -> OwnVerdict:
         if self.first is not None:
             return OwnVerdict.STOPS
@@ -95,6 +106,29 @@ def judge(family: Family, raw: Raw, bus: BusTable, node: NodeTable, accepted: st
         if entry.watches != "link" or place_of(family, entry).key in raw
     ]
     return OwnJudgement(tuple(watches), accepted)
+
+
+def why_silence_does_not_stop(family: Family, own: OwnJudgement, node: NodeTable) -> str:
+    """Why a drive of this node goes on when nothing but its RPDOs end, or an empty text.
+
+    Heartbeat, guarding and SYNC go on then, and so do the RPDOs of the node's other drives.
+    """
+    entries = [entry for entry in family.own_supervision if entry.watches == "process_data"]
+    if not entries:
+        watched = [entry.name for entry in family.own_supervision if entry.watches != "link"]
+        name = family.family.name
+        if not watched:
+            return f"nothing is known of what {name} watches"
+        return f"{name} watches {' and '.join(watched)}, and not its process data: that goes on"
+    alone = [entry for entry in entries if entry.per_drive or len(node.drive) == 1]
+    if not alone:
+        names = " and ".join(entry.name for entry in entries)
+        count = len(node.drive)
+        return f"{names} watches the RPDOs of all {count} drives of the node: those of the others go on"
+    if own.process_data_ms:
+        return ""
+    watches = {one.name: one for one in own.watches}
+    return "; ".join(dict.fromkeys(watches[entry.name].why for entry in alone))
 
 
 def _watch(family: Family, entry: OwnSupervision, raw: Raw, bus: BusTable, node: NodeTable) -> Watch:

@@ -96,10 +96,6 @@ class ControlWords:
     def is_valid(self, word: int) -> bool:
         return word & self._valid_mask == self._valid_mask
 
-    def acknowledges(self, before: int, after: int) -> bool:
-        """Whether the acknowledge bit rises from one word to the next."""
-        return bool(after & ~before & self.acknowledge_mask)
-
     def stop(self, word: int) -> int:
         return self._changed(word, self._stop)
 

@@ -34,8 +34,9 @@ def worst_cases(bus: BusView) -> Iterator[WorstCase]:
     for node in bus.nodes:
         for drive in node.drives:
             timeout_ms = drive.table.fieldbus_timeout_ms or 0
-            controller_ms = worst_case_stop_ms(drive.table, timeout_ms, rpdo_period_ms(bus, drive))
-            yield WorstCase(drive.name, controller_ms, judged(bus, node, drive))
+            own = judged(bus, node, drive)
+            controller_ms = worst_case_stop_ms(drive.table, timeout_ms, rpdo_period_ms(bus, drive), own)
+            yield WorstCase(drive.name, controller_ms, own)
 
 
 def rpdo_period_ms(bus: BusView, drive: DriveView) -> int:

@@ -1,9 +1,10 @@
 """The supervised proof that a node's drives notice a silent bridge. Sans-IO.
 
 The node is booted as the bridge boots it and gets stopped words, until all that it watches is running. Then
-nothing is sent any more, for the drives' own time and a margin, and what comes from the node is timed. No
-drive is ever enabled: one that stands still shows the same emergency message and the same fault as one that
-moves, and nothing can be hurt.
+nothing is sent any more, for the drives' own time and a margin, and what comes from the node is timed. Where
+the site stops a drive by silence, the RPDOs alone end: heartbeat, guarding and SYNC go on, as they do then.
+No drive is ever enabled: one that stands still shows the same emergency message and the same fault as one
+that moves, and nothing can be hurt.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Final
 
 from bridge.command import Drive, Event, Kind, Plant
 from bridge.command.plant import Node
-from bridge.drive import FAULTED, MOVING, DriveState, OwnJudgement, OwnVerdict
+from bridge.drive import FAULTED, MOVING, DriveState, OwnJudgement
 from bridge.southbound.bus.frame import REMOTE, Frame
 from bridge.southbound.canopen import cobid, nmt
 from bridge.southbound.canopen.nmt import NmtState
@@ -65,11 +66,18 @@ class DropOutcome:
     fault_after: str = ""
     latency_ms: int = MESSAGE_MS
     """What a node that says its state in its heartbeat may add."""
+    rpdos_alone: bool = False
+    """All but the RPDOs went on."""
+
+    @property
+    def own_ms(self) -> float:
+        """The drive's own time-out that the test waits for, 0 where it has none."""
+        return self.own.process_data_ms if self.rpdos_alone else self.own.own_ms
 
     @property
     def bound_ms(self) -> float:
         """Within which time of the last frame the reaction has to show; 0 where there is none to come."""
-        return self.own.own_ms + MESSAGE_MS if self.own.own_ms else 0.0
+        return self.own_ms + MESSAGE_MS if self.own_ms else 0.0
 
     @property
     def proof(self) -> Proof:
@@ -77,8 +85,8 @@ class DropOutcome:
             return Proof.LATE if self.bound_ms and self.reacted_ms > self.bound_ms else Proof.REACTED
         if self.noticed_ms is None:
             return Proof.NOTHING
-        bound_ms = self.own.own_ms + MESSAGE_MS + self.latency_ms
-        return Proof.LATE if self.own.own_ms and self.noticed_ms > bound_ms else Proof.NOTICED
+        bound_ms = self.own_ms + MESSAGE_MS + self.latency_ms
+        return Proof.LATE if self.own_ms and self.noticed_ms > bound_ms else Proof.NOTICED
 
     @property
     def is_proven(self) -> bool:
@@ -102,6 +110,10 @@ class DropTest:
         """How long nothing was sent."""
         self.notes = ""
         """What the boot-up said."""
+        self.rpdos_alone = any(
+            drive.on_expiry == "silence" or drive.then_silence_ms for drive in node.table.drive
+        )
+        """The site stops drives of the node by ending their RPDOs, and by nothing else."""
         self._core = next(core for core in network.nodes if core.node is node)
         self._plant = plant
         self._node = node
@@ -167,16 +179,20 @@ class DropTest:
         self._fall_silent(now)
 
     def _fall_silent(self, now: float) -> None:
-        self._bus.mute()
+        pdos = self._core.wire.drives.values()
+        rpdos = frozenset(rpdo.cob_id for one in pdos for rpdo in one.rpdos)
+        self._bus.mute(rpdos if self.rpdos_alone else None)
         times_s: list[float] = []
         table = self._node.table
         latency_ms = table.supervision_ms if table.supervision == "heartbeat" else 0
         for drive in self._node.drives:
             own = drive.own or OwnJudgement()
             before = drive.channel.state
-            self.outcomes.append(DropOutcome(drive.name, own, before, latency_ms=latency_ms))
-            is_known = own.verdict is OwnVerdict.STOPS
-            times_s.append(own.own_ms / 1000 if is_known else UNKNOWN_S)
+            outcome = DropOutcome(
+                drive.name, own, before, latency_ms=latency_ms, rpdos_alone=self.rpdos_alone
+            )
+            self.outcomes.append(outcome)
+            times_s.append(outcome.own_ms / 1000 or UNKNOWN_S)
         self.silent_s = max(times_s) + MARGIN_S
         self._enter(Phase.SILENT, now)
 

@@ -9,17 +9,17 @@ from bridge.southbound.bus.interface import Bus, BusStatus
 
 
 class MutableBus:
-    """Stands in for ``bus``. ``last_sent`` is when the last frame of ours was on the bus, as far as the bus
-    tells: bursts come back with their time stamps. ``heard`` is called with every frame of others.
-    """
+    """Stands in for ``bus``. ``heard`` is called with every frame of others."""
 
     def __init__(self, bus: Bus, heard: Callable[[Frame], None]) -> None:
         self._bus = bus
         self._heard = heard
         self._accepted: list[int] = []
         self._beating: set[int] = set()
+        self._muted: frozenset[int] | None = None
+        """The identifiers that are muted alone; None: all are."""
+        self._sent_at: dict[int, float] = {}
         self.is_muted = False
-        self.last_sent = float("-inf")
 
     @property
     def name(self) -> str:
@@ -40,22 +40,36 @@ class MutableBus:
         frames = self._bus.drain(now)
         for frame in frames:
             if frame.can_id in self._beating:
-                self.last_sent = max(self.last_sent, frame.time)
+                self._note(frame.can_id, frame.time)
             else:
                 self._heard(frame)
         return frames
 
     def send(self, frame: Frame, now: float, deadline: float) -> None:
-        if not self.is_muted:
-            self.last_sent = max(self.last_sent, now)
-            self._bus.send(frame, now, deadline)
+        if self._mutes(frame.can_id):
+            return
+        self._note(frame.can_id, now)
+        self._bus.send(frame, now, deadline)
+
+    def _note(self, can_id: int, at: float) -> None:
+        self._sent_at[can_id] = max(self._sent_at.get(can_id, at), at)
+
+    @property
+    def last_sent(self) -> float:
+        """When the last of our frames that are muted was on the bus, as far as the bus tells: bursts come
+        back with their time stamps."""
+        muted = self._muted
+        return max(
+            (at for can_id, at in self._sent_at.items() if muted is None or can_id in muted),
+            default=float("-inf"),
+        )
 
     def beat(
         self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool = False
     ) -> None:
-        if self.is_muted:
-            return
         can_id = frames[0].can_id
+        if self._mutes(can_id):
+            return
         if can_id not in self._beating:
             self._beating.add(can_id)
             self.accept(self._accepted)
@@ -64,14 +78,19 @@ class MutableBus:
     def silence(self, can_id: int) -> None:
         self._bus.silence(can_id)
 
-    def mute(self) -> None:
-        """From now on nothing is sent: no SYNC, no RPDO, no heartbeat, no guarding, no SDO."""
-        self.is_muted = True
+    def mute(self, only: frozenset[int] | None = None) -> None:
+        """From now on nothing is sent: no SYNC, no RPDO, no heartbeat, no guarding, no SDO; or nothing on the
+        identifiers in ``only``."""
+        self.is_muted, self._muted = True, only
         for can_id in self._beating:
-            self._bus.silence(can_id)
+            if self._mutes(can_id):
+                self._bus.silence(can_id)
 
     def unmute(self) -> None:
         self.is_muted = False
+
+    def _mutes(self, can_id: int) -> bool:
+        return self.is_muted and (self._muted is None or can_id in self._muted)
 
     def next_deadline(self) -> float | None:
         return self._bus.next_deadline()

@@ -54,9 +54,8 @@ class TestControlWord:
     def test_a_word_is_valid_by_bit_10_alone(self, word: int):
         assert CONTROL.is_valid(word) is bool(word & 0x0400)
 
-    @given(WORDS, WORDS)
-    def test_an_acknowledge_is_a_rising_edge(self, before: int, after: int):
-        assert CONTROL.acknowledges(before, after) is (not before & 0x80 and bool(after & 0x80))
+    def test_bit_7_acknowledges(self):
+        assert CONTROL.acknowledge_mask == 0x0080
 
     @given(WORDS, st.sampled_from([CONTROL.stop, CONTROL.quick_stop, CONTROL.disable_voltage]))
     def test_a_stop_is_valid_enables_nothing_and_acknowledges_nothing(self, word: int, command):

@@ -65,7 +65,7 @@ def test_the_words_are_the_commands_of_the_standard(name: str):
     assert command_of(words.stop(words.run)) is Command.SWITCH_ON
     assert command_of(words.quick_stop(words.run)) is Command.QUICK_STOP
     assert command_of(words.disable_voltage(words.run)) is Command.DISABLE_VOLTAGE
-    assert words.acknowledges(0x0000, 0x0080)
+    assert words.acknowledge_mask == 0x0080
     assert words.enables(words.run | words.begin)
 
 

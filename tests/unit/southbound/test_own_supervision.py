@@ -58,10 +58,12 @@ class MutableBench(Bench):
 @pytest.fixture
 def make(tmp_path: Path):
     def make(
-        mapping: str, node: str = "", *, drives: str = "", bus: str = "", **parameters: float
+        mapping: str, node: str = "", *, drive: str = "", drives: str = "", bus: str = "", **parameters: float
     ) -> MutableBench:
         slot = SLOTS.get(mapping, "drive")
-        whole = sites.node(sites.drive(slot, "modbus", 500, ""), drives, name="n", mapping=mapping, more=node)
+        whole = sites.node(
+            sites.drive(slot, "modbus", 500, drive), drives, name="n", mapping=mapping, more=node
+        )
         path = sites.write(tmp_path, sites.bus(whole, more=bus), sites.modbus())
         simulated = simulate_node(mapping, 5, parameters)
         bench = MutableBench(load_site(path), family=load_family(mapping), mapping=mapping, node=simulated)
@@ -287,6 +289,49 @@ def test_a_drop_test_sends_nothing_while_it_is_silent(make) -> None:
     assert again - last >= test.silent_s - 0.02
     enabling = [frame for frame in bench.sent(0x205) if frame.data[0] & 0x0F == 0x0F]
     assert not enabling, "no drive is ever enabled"
+
+
+SILENCE = 'on_expiry = "silence"'
+
+
+@pytest.mark.parametrize("silent", [SILENCE, "then_silence_ms = 100"])
+def test_where_the_site_stops_by_silence_a_drop_test_ends_the_rpdos_alone(make, silent: str) -> None:
+    bench = make("nord/sk-tu4-cao", drive=silent, P151=300.0)
+    test = drop(bench)
+    (outcome,) = test.outcomes
+    assert test.rpdos_alone
+    assert outcome.proof is Proof.REACTED, outcome.seen
+    emergency = next(frame for frame in bench.sent(EMCY) if any(frame.data[:2]))
+    last = max(frame.time for frame in bench.sent(0x205) if frame.time < emergency.time)
+    assert abs(1000 * (emergency.time - last) - outcome.reacted_ms) < 0.2
+    again = min(frame.time for frame in bench.sent(0x205) if frame.time > emergency.time)
+    assert again - last >= test.silent_s - 0.02
+    for other in (0x080, 0x77F):
+        assert [frame for frame in bench.sent(other) if last + 0.1 < frame.time < again - 0.1]
+
+
+@pytest.mark.parametrize(
+    ("mapping", "node"), [("lenze/8400-motec", HEARTBEAT_LENZE), ("stoeber/5000", GUARDED)]
+)
+def test_a_drive_that_watches_something_else_does_not_pass_it(make, mapping: str, node: str) -> None:
+    """`check` and `run` refuse such a site; a drive may be set otherwise than it says."""
+    assert drop(make(mapping, node)).outcomes[0].is_proven
+    (outcome,) = drop(make(mapping, node, drive=SILENCE)).outcomes
+    assert (outcome.proof, outcome.is_proven) == (Proof.NOTHING, False)
+    assert outcome.bound_ms == 0
+
+
+def test_the_published_time_of_silence_has_the_drives_own(make) -> None:
+    name = f"{leaf('nord/sk-tu4-cao')}/supervision/worst_case_stop_ms"
+    assert make("nord/sk-tu4-cao", P151=300.0).number(name) + 300 == make(
+        "nord/sk-tu4-cao", drive=SILENCE, P151=300.0
+    ).number(name)
+    assert (
+        make("stoeber/5000", GUARDED, drive=SILENCE).number(
+            f"{leaf('stoeber/5000')}/supervision/worst_case_stop_ms"
+        )
+        == 0
+    ), "by silence it never stops"
 
 
 def test_a_drop_test_of_a_drive_that_runs_on_fails(make) -> None:

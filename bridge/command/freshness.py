@@ -44,16 +44,26 @@ _CALM_MOST: Final = 32
 """So few arrivals in ``CALM_S`` are no backlog: one drains at more than a thousand telegrams a second."""
 
 
-def way_ms(control: str) -> int:
-    """How much older than it is taken for a telegram of who controls a drive can be, at most.
+HANG_MS: Final = 100
+"""An event loop without a turn for so long has hung. Where the connections cannot be seen, a shorter wait in
+them is not noticed."""
+_SEEN: Final = frozenset(("opcua", "modbus"))
+"""Protocols whose connections are seen; with a lease it may be any."""
 
-    The same for all protocols: what waits longer counts from when it came, or not at all.
-    """
-    return 0 if control == "none" else GRAIN_MS
+
+def way_ms(control: str) -> int:
+    """How much older than it is taken for a telegram of who controls a drive can be, at most."""
+    if control == "none":
+        return 0
+    return GRAIN_MS if control in _SEEN else GRAIN_MS + HANG_MS
 
 
 NEVER: Final = float("-inf")
 """The time of a telegram of which nobody knows how long it has waited."""
+
+
+_AFTER_HANG_S: Final = 1.0
+"""So long after a hang, who asks for the first time may have asked before it."""
 
 
 def arrival_of(request: Request, now: float) -> float:
@@ -113,6 +123,8 @@ class Inflow:
         self._calm_since = now
         self._steady_since = look.steady_since
         self._came = 0
+        if is_hidden and now - look.steady_since < _AFTER_HANG_S:
+            self._crowd(now)
 
     @property
     def is_open(self) -> bool:

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 from bridge.command import Code, Event, Outcome, Rejection, Request
@@ -77,7 +78,12 @@ class MirrorClient:
         self._listeners.append(listener)
 
     async def request(self, request: Request, timeout_s: float = 5.0) -> Outcome:
-        """Have ``request`` carried out by the bus process; any number may be under way at once."""
+        """Have ``request`` carried out by the bus process; any number may be under way at once.
+
+        One without a time has come now: what it waits from here on, it is older there.
+        """
+        if request.received_at is None:
+            request = replace(request, received_at=self._clock())
         asked = Asked(self._clock() + timeout_s, request)
         answers = await self._link.get(protocol.REQUEST, protocol.encode(asked), timeout_s=timeout_s)
         for answer in answers:

@@ -6,9 +6,11 @@ import asyncio
 import logging
 import random
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 from bridge.command import Code, Event, Outcome, Plant
+from bridge.command.freshness import NEVER
 from bridge.command.request import STOP_ACTIONS
 from bridge.errors import Unavailable
 from bridge.mirror import protocol
@@ -168,4 +170,7 @@ class MirrorPublisher:
         if now > message.deadline_s and request.action not in STOP_ACTIONS:
             reply(Outcome(Code.TIMED_OUT, "the request came too late to be carried out", forwarded=False))
             return
+        if request.received_at is None or request.received_at > now:
+            # No time, or one of another machine's clock: nobody knows how old it is.
+            request = replace(request, received_at=NEVER)
         self._plant.submit(request, now, reply)

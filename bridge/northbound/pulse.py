@@ -6,11 +6,9 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
-from bridge.command.freshness import Look
+from bridge.command.freshness import HANG_MS, Look
 
 PERIOD_S: Final = 0.01
-HANG_S: Final = 0.1
-"""So long without a turn, what waits outside of the event loop may have grown old."""
 
 
 class Pulse:
@@ -20,11 +18,11 @@ class Pulse:
         self._clock = clock
         self._beat_at = clock()
         self._timer: asyncio.TimerHandle | None = None
-        self.look = Look(self._beat_at, self._beat_at)
+        self.look = Look(self._beat_at, float("-inf"))
 
     def start(self) -> None:
         self._beat_at = self._clock()
-        self.look = Look(self._beat_at, self._beat_at)
+        self.look = Look(self._beat_at, float("-inf"))
         self._timer = asyncio.get_running_loop().call_later(PERIOD_S, self._beat)
 
     def stop(self) -> None:
@@ -36,6 +34,6 @@ class Pulse:
         """Between two beats the loop looks at its sockets, after the first and before what it calls on the
         second; what it finds is read before the second beat."""
         before, self._beat_at = self._beat_at, self._clock()
-        has_hung = self._beat_at - before > HANG_S
+        has_hung = (self._beat_at - before) * 1000 > HANG_MS
         self.look = Look(before, self._beat_at if has_hung else self.look.steady_since)
         self._timer = asyncio.get_running_loop().call_later(PERIOD_S, self._beat)

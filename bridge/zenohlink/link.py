@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -52,6 +53,8 @@ class Asked:
     attachment: bytes | None
     parameters: str
     """What stands behind the ? of the selector."""
+    received_at: float
+    """When zenoh has handed it over, in monotonic seconds; it may have waited for the loop since."""
     _query: zenoh.Query
     _submit: Callable[[Callable[[zenoh.Session], None]], bool]
 
@@ -233,7 +236,8 @@ class ZenohLink:
         def on_query(query: zenoh.Query) -> None:
             payload, attachment = to_bytes(query.payload), to_bytes(query.attachment)
             parameters = str(query.parameters)
-            asked = Asked(str(query.key_expr), payload, attachment, parameters, query, self.submit)
+            key, now = str(query.key_expr), time.monotonic()
+            asked = Asked(key, payload, attachment, parameters, now, query, self.submit)
             if not self._inbox.take_in(partial(handler, asked)):
                 query.drop()
 

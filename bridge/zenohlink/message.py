@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -17,12 +18,14 @@ _SOURCE_PLACE: Final = re.compile(r"\s+at /\S+?\.rs:\d+\.?")
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A payload under its key, as it is sent or was received. ``encoding`` is zenoh's name of it."""
+    """A payload under its key, as it is sent or was received. ``encoding`` is zenoh's name of it;
+    ``received_at`` is in monotonic seconds."""
 
     key: str
     payload: bytes
     encoding: str = ""
     attachment: bytes | None = None
+    received_at: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +71,8 @@ def to_answer(reply: zenoh.Reply) -> Answer:
 
 def to_message(sample: zenoh.Sample) -> Message:
     attachment = to_bytes(sample.attachment)
-    return Message(str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding), attachment)
+    payload, encoding = sample.payload.to_bytes(), str(sample.encoding)
+    return Message(str(sample.key_expr), payload, encoding, attachment, time.monotonic())
 
 
 def to_bytes(data: zenoh.ZBytes | None) -> bytes | None:

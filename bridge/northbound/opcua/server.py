@@ -15,6 +15,7 @@ from asyncua.common.connection import TransportLimits
 from asyncua.server.server import Server as LibraryServer
 
 import bridge
+from bridge import clock
 from bridge.command import Kind
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
@@ -32,8 +33,9 @@ from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.publisher import Publisher
 from bridge.northbound.opcua.security import CheckedPolicy, Users, security_policies
 from bridge.northbound.opcua.session import MOST_CALLS, Server, Services
-from bridge.northbound.opcua.transport import Listener
+from bridge.northbound.opcua.transport import WINDOW, Listener
 from bridge.northbound.opcua.writes import Writer
+from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 
 NAMESPACE: Final = "urn:drivebridge:points"
@@ -47,8 +49,11 @@ _log = logging.getLogger(__name__)
 class _Outer(LibraryServer):
     """asyncua's server on a socket that is bound already, with checked channels."""
 
-    def __init__(self, inner: Server, bound: socket.socket, trusted: TrustedCertificates | None) -> None:
+    def __init__(
+        self, inner: Server, bound: socket.socket, trusted: TrustedCertificates | None, pulse: Pulse
+    ) -> None:
         super().__init__(iserver=inner)
+        self._pulse = pulse
         self._inner = inner
         self._bound = bound
         self._trusted = trusted
@@ -58,7 +63,7 @@ class _Outer(LibraryServer):
         await self._setup_server_nodes()
         policies = [CheckedPolicy(policy, self._trusted) for policy in self._policies]
         await self._inner.start()
-        self.bserver = Listener(self._inner, self._bound, self.limits)
+        self.bserver = Listener(self._inner, self._bound, self.limits, self._pulse)
         self.bserver.set_policies(policies)
         await self.bserver.start()
 
@@ -85,6 +90,7 @@ class OpcUaServer:
         self._users: Users | None = None
         self._server: _Outer | None = None
         self._socket = bound
+        self._pulse = Pulse(clock.now)
         self._publisher: asyncio.Task[None] | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
@@ -113,7 +119,10 @@ class OpcUaServer:
         trusted = TrustedCertificates(Path(trusted_dir)) if trusted_dir else None
         bound = self._socket = self._socket or listen(self._settings.listen, "opcua.listen")
         bound.setblocking(False)
+        # Connections inherit it: who fills their buffers is noticed.
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WINDOW)
         self._port = bound.getsockname()[1]
+        self._pulse.start()
         try:
             await self._serve(bound, own, trusted, self._users)
         except BaseException:
@@ -128,6 +137,7 @@ class OpcUaServer:
 
     async def close(self) -> None:
         """Close every session and the port. May be called at any time, also twice."""
+        self._pulse.stop()
         task, self._publisher = self._publisher, None
         if task:
             task.cancel()
@@ -153,7 +163,7 @@ class OpcUaServer:
             library_log.setLevel(logging.WARNING)
         inner = Server(no_security=self._settings.no_security)
         inner.certificate, inner.private_key = own.certificate, own.private_key
-        server = _Outer(inner, bound, trusted)
+        server = _Outer(inner, bound, trusted, self._pulse)
         await self._describe(server, users)
         namespace = await server.register_namespace(NAMESPACE)
         builder = Builder(inner.aspace, namespace, self._view.image, self._view.epoch_ns)

@@ -15,6 +15,7 @@ import asyncio
 import logging
 import socket
 import struct
+from collections import deque
 from typing import Any, Final
 
 from asyncua.common.connection import TransportLimits
@@ -25,6 +26,8 @@ from asyncua.server.uaprocessor import UaProcessor
 from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary, uatcp_to_binary
 from cryptography.hazmat.primitives.serialization import Encoding
 
+from bridge import clock
+from bridge.command.freshness import NEVER, Inflow
 from bridge.command.request import Identity
 from bridge.northbound.opcua.library import (
     InvalidSignature,
@@ -42,6 +45,8 @@ from bridge.northbound.opcua.library import (
 )
 from bridge.northbound.opcua.security import read_password
 from bridge.northbound.opcua.session import Server, Session
+from bridge.northbound.opcua.writes import received_at
+from bridge.northbound.pulse import Pulse
 
 _log = logging.getLogger(__name__)
 
@@ -71,6 +76,12 @@ _SLOW: Final = frozenset(
 
 _ERROR: Final[Any] = ua.MessageType.Error
 _MOST_WAITING: Final = 32
+_MOST_UNREAD: Final = 64
+"""Messages that a client which waits for its answers has under way at most."""
+_READ_MOST: Final = 64 * 1024
+"""Bytes that are read at once from such a client."""
+WINDOW: Final = 2 * _READ_MOST
+"""Bytes that may wait in the kernel: more than that, so that who fills it is noticed."""
 
 _MALFORMED: Final = (
     UaError,
@@ -93,9 +104,13 @@ class Processor(UaProcessor):
         super().__init__(server, transport, limits)
         self._server = server
         self._waiting: set[asyncio.Task[Any]] = set()
+        self.arrivals: deque[float] = deque()
+        """When the messages that are still to be processed can have come at the earliest, in their order."""
 
     async def process(self, header: Any, body: Buffer) -> bool:
         """False closes the connection; the client is told why first."""
+        # For what is carried out from here on, the tasks that are made for it included.
+        received_at.set(self.arrivals.popleft() if self.arrivals else NEVER)
         try:
             return bool(await super().process(header, body))
         except (ServiceError, UaStatusCodeError) as error:
@@ -200,6 +215,13 @@ class Processor(UaProcessor):
 
 
 class _Protocol(OPCUAProtocol):
+    """Notes with each message when it can have come: it may wait here, or in the bus process."""
+
+    def __init__(self, pulse: Pulse, **settings: Any) -> None:
+        super().__init__(**settings)
+        self._pulse = pulse
+        self._inflow = Inflow(clock.now(), pulse.look)
+
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         super().connection_made(transport)
         # Its task has not run yet, so no message has seen the other processor.
@@ -208,7 +230,13 @@ class _Protocol(OPCUAProtocol):
             self.processor.set_policies(self.policies)
 
     def data_received(self, data: bytes) -> None:
+        before = self.messages.qsize()
         super().data_received(data)
+        waiting = self.messages.qsize()
+        crowded = len(data) >= _READ_MOST or waiting > _MOST_UNREAD
+        came_at = self._inflow.arrive(clock.now(), self._pulse.look, crowded=crowded)
+        if isinstance(self.processor, Processor):
+            self.processor.arrivals += [came_at] * (waiting - before)
         # What is left is part of one chunk. asyncua would wait for the 4 GiB that a header may ask for.
         if len(self._buffer) > self.limits.max_recv_buffer and self.transport is not None:
             _log.warning("closed the connection from %s: a chunk without end", self.peer_name)
@@ -219,13 +247,15 @@ class _Protocol(OPCUAProtocol):
 class Listener(BinaryServer):
     """Takes connections on a socket that is bound already."""
 
-    def __init__(self, server: Server, bound: socket.socket, limits: TransportLimits) -> None:
+    def __init__(self, server: Server, bound: socket.socket, limits: TransportLimits, pulse: Pulse) -> None:
         host, port = bound.getsockname()[:2]
         super().__init__(server, host, port, limits)
         self._socket = bound
+        self._pulse = pulse
 
     def _make_protocol(self) -> OPCUAProtocol:
         return _Protocol(
+            self._pulse,
             iserver=self.iserver,
             policies=self._policies,
             clients=self.clients,

@@ -10,7 +10,8 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from contextvars import ContextVar
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Final
 
 from asyncua.server.address_space import AddressSpace
@@ -26,6 +27,10 @@ _log = logging.getLogger(__name__)
 
 ANSWER_LIMIT_S: Final = 10.0
 """No request takes longer (a start takes 3 s); after this the way to the bus is taken for broken."""
+
+
+received_at: ContextVar[float | None] = ContextVar("received_at", default=None)
+"""When the message whose service is being carried out can have come at the earliest; None for just now."""
 
 
 @dataclass(slots=True)
@@ -74,7 +79,7 @@ async def ask(view: View, request: Request) -> Outcome:
     """Make a request and wait for its outcome."""
     try:
         async with asyncio.timeout(ANSWER_LIMIT_S):
-            return await view.request(request)
+            return await view.request(replace(request, received_at=received_at.get()))
     except TimeoutError:
         _log.warning("%s on %s: no outcome within %g s", request.action, request.target, ANSWER_LIMIT_S)
         return Outcome(Code.TIMED_OUT, "no outcome in time", forwarded=False)

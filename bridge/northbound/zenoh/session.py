@@ -16,11 +16,13 @@ from typing import Final
 
 import zenoh
 
-from bridge.command import Code, Event, Identity, Outcome, Plant, Rejection
+from bridge.command import Code, Event, Identity, Outcome, Plant, Rejection, Reply, Request
 from bridge.command.link import NodeState
 from bridge.config import ZenohTable
 from bridge.errors import Unavailable
+from bridge.northbound.pulse import Pulse
 from bridge.northbound.zenoh import keys
+from bridge.northbound.zenoh.askers import Askers
 from bridge.northbound.zenoh.commands import MALFORMED, BadCommand, Commands, identity_of
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 
@@ -35,7 +37,7 @@ _GETS_AT_ONCE: Final = 16
 class ZenohServer:
     """Serves one plant under zenoh keys.
 
-    ``clock`` is monotonic seconds; ``epoch`` turns such a time into ns since 1970 UTC.
+    ``clock`` is the machine's monotonic clock in seconds; ``epoch`` turns such a time into ns since 1970 UTC.
     """
 
     def __init__(
@@ -53,6 +55,8 @@ class ZenohServer:
         self._keys = keys.KeySpace(settings.prefix, site_name, plant.image.points)
         self._commands = Commands(plant.image.points)
         self._link = ZenohLink(_config(settings), "zenoh")
+        self._pulse = Pulse(clock)
+        self._askers = Askers()
         self._feed = plant.image.feed()
         self._present: set[str] = set()
         self._gets: set[asyncio.Task[None]] = set()
@@ -70,6 +74,7 @@ class ZenohServer:
         except Unavailable as error:
             listen = ", ".join(self._settings.listen)
             raise Unavailable(f"{error} (is another bridge running? [zenoh] listen = {listen})") from None
+        self._pulse.start()
         self._link.declare_queryable(self._keys.everything, self._on_query)
         if self._settings.accept_put:
             self._link.declare_subscriber(self._keys.commands, self._on_put, from_others=True)
@@ -85,6 +90,7 @@ class ZenohServer:
         self._present.clear()
 
     async def close(self) -> None:
+        self._pulse.stop()
         if self._tick_timer:
             self._tick_timer.cancel()
         for task in tuple(self._gets):
@@ -185,7 +191,13 @@ class ZenohServer:
             self._note_refusal(tail, asked.attachment, bad)
             _refuse(asked, bad)
             return
-        self._plant.submit(request, self._clock(), reply)
+        self._submit(request, asked.received_at, reply)
+
+    def _submit(self, request: Request, received_at: float, reply: Reply) -> None:
+        """``received_at``: when zenoh handed it over."""
+        now = self._clock()
+        came_at = self._askers.arrival(request.identity.user, received_at, now, self._pulse.look)
+        self._plant.submit(replace(request, received_at=came_at), now, reply)
 
     def _identity(self, attachment: bytes | None) -> Identity:
         """Raises ``BadCommand``."""
@@ -238,7 +250,7 @@ class ZenohServer:
             _log.info("zenoh: a put on %s is no command: %s", message.key, bad.message)
             self._note_refusal(self._keys.tail(message.key), message.attachment, bad)
             return
-        self._plant.submit(request, self._clock(), lambda _: None)
+        self._submit(request, message.received_at, lambda _: None)
 
 
 def _refuse(asked: Asked, bad: BadCommand) -> None:

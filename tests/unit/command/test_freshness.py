@@ -170,12 +170,18 @@ def test_calm_is_few_arrivals(arrivals: int, counts: bool):
 
 
 def test_what_comes_after_a_hang_where_nobody_sees_the_connections_waits_for_calm():
-    inflow = Inflow(0.0, Look(0.0, 0.0), is_hidden=True)
-    assert inflow.arrive(0.03, Look(0.02, 0.0)) == 0.03
-    assert inflow.arrive(1.03, Look(0.03, 0.0)) == 0.03
+    inflow = Inflow(0.0, Look(0.0, NEVER), is_hidden=True)
+    assert inflow.arrive(0.02, Look(0.01, NEVER)) == 0.02
+    assert inflow.arrive(1.03, Look(0.03, NEVER)) == 0.03
     assert inflow.arrive(1.05, Look(1.03, 1.03)) == NEVER
     assert inflow.arrive(1.20, Look(1.19, 1.03)) == 1.20
     assert inflow.arrive(1.21, Look(1.20, 1.03)) == 1.21
+
+
+def test_who_asks_for_the_first_time_after_a_hang_may_have_asked_before_it():
+    assert Inflow(5.5, Look(5.49, 5.0), is_hidden=True).arrive(5.5, Look(5.49, 5.0)) == NEVER
+    assert Inflow(6.5, Look(6.49, 5.0), is_hidden=True).arrive(6.5, Look(6.49, 5.0)) == 6.5
+    assert Inflow(5.5, Look(5.49, 5.0)).arrive(5.5, Look(5.49, 5.0)) == 5.5
 
 
 # at the drive

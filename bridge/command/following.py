@@ -79,7 +79,9 @@ class Following:
             ramp_s = off_s + stopping.ramp_ms / 1000
         if own is None or own.verdict is not OwnVerdict.STOPS:
             return Bounds(off_s, ramp_s)
-        return Bounds(off_s, ramp_s, own.bridge_ms / 1000 + ramp_s)
+        # Our heartbeat goes on while the RPDOs are silent: a watch over it says nothing then.
+        own_ms = own.process_data_ms or own.bridge_ms
+        return Bounds(off_s, ramp_s, own_ms / 1000 + ramp_s)
 
     # what the drive does
 

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.command.follow import Bounds, Follow, LastStop, Says, Sent, Verdict
+from bridge.command.following import Following
+from bridge.drive import OwnJudgement, OwnVerdict
+from bridge.drive.own_supervision import Watch
+from tests.support.rig import Rig
 
 BOUNDS = Bounds(off_s=0.5, ramp_s=5.0, silence_s=6.0)
 PAUSE_S = 0.1
@@ -487,3 +492,14 @@ def test_a_drive_that_somebody_else_enables_is_named(
     bus.drive.state = Says.ENABLED
     bus.run(PAUSE_S + 2 * STEP_S)
     assert len(bus.ignored) == 1
+
+
+def test_of_a_drive_that_watches_our_heartbeat_too_silence_ends_its_process_data_alone() -> None:
+    stops = OwnVerdict.STOPS
+    heartbeat = Watch("heartbeat", "heartbeat", "", 300.0, "", stops, silent_ms=100)
+    process_data = Watch("RPDO1", "process_data", "", 3000.0, "", stops, silent_ms=100)
+    following = Following(Rig().channel)
+    bounds = following._bounds(10, OwnJudgement((heartbeat, process_data)))
+    assert bounds.silence_s == pytest.approx(3.0 + bounds.ramp_s)
+    bounds = following._bounds(10, OwnJudgement((heartbeat,)))
+    assert bounds.silence_s == pytest.approx(0.4 + bounds.ramp_s), "soon found to go on"

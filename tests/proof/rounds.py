@@ -28,6 +28,7 @@ _BEFORE_MS: Final = PLANT.rpdo_period_ms + REACTION_MS
 _HOLD_S: Final = 3.0
 """How long the owners go on writing "run" after everything is back and their telegrams are taken: nothing may
 start by that."""
+_SURELY: Final = 0.8
 _WRITES_S: Final = 30.0
 
 
@@ -63,10 +64,13 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     _wait_talking(rig, concerned)
     _wait_writing(rig, before)
     time.sleep(_HOLD_S)
-    samples = [
-        _sample(rig, fault, drive, moment, ways.get(drive), _wrong(rig, fault, drive, times, words[drive]))
-        for drive, times in stopped.items()
-    ]
+    samples: list[Sample] = []
+    for drive, times in stopped.items():
+        if _was_stopped_before(rig, fault, drive, times[0], moment):
+            rig.by_themselves += 1
+            continue
+        wrong = _wrong(rig, fault, drive, times, words[drive])
+        samples.append(_sample(rig, fault, drive, moment, ways.get(drive), wrong))
     samples += _held(rig, fault, [drive for drive in holding if drive not in still], moment)
     for sample in samples:
         if sample.verdict != "ok":
@@ -89,6 +93,12 @@ def _wrong(rig: Rig, fault: Fault, drive: Drive, times: tuple[float, float], wor
     if not fault.leaves_silence and (word is None or not drive.reacts(word)):
         return f"stopped by {word.hex() if word else 'nothing'}, and not by {drive.reaction}"
     return "its setpoint goes on" if measure.keeps_setpoint(rig, drive, times[0]) else ""
+
+
+def _was_stopped_before(rig: Rig, fault: Fault, drive: Drive, bus: float, moment: float) -> bool:
+    """A slow machine stopped the drive before its controller's time was up: that is no reaction to it."""
+    early = bus < moment + (PLANT.fieldbus_timeout_ms / 1000 - PLANT.owner_period_s) * _SURELY
+    return fault.of_controller and early and _was_slow(rig, drive, moment - PLANT.owner_period_s)
 
 
 def _held(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> list[Sample]:

@@ -20,6 +20,7 @@ _COMMANDS: Final = {
     "check": "project.check",
     "audit": "audit.audit",
     "drop-test": "drop_test.drop_test",
+    "witness": "witness.witness",
     "eds": "eds.eds",
     "hash-password": "project.hash_password",
     "scan": "scan.scan",

@@ -133,7 +133,7 @@ class Drive:
         self._setpoint_indices = [image.index[f"{self.name}/{leaf}"] for _, leaf in self._setpoints]
         self._value_indices = places("command", [codec.model.name for codec in self._commands])
         self._supervision = places("status", ("fault_text",)) + places("supervision", _SUPERVISION)
-        self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms"))
+        self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms", "telegrams"))
         self._follows = places("supervision", ("follows", "last_stop"))
         (self._bridge_ms,) = places("supervision", ("worst_case_bridge_ms",))
         self._identity = places("identity", _IDENTITY)
@@ -309,7 +309,8 @@ class Drive:
         channel = self.channel
         self._actual.on_time(now)
         self._refresh_follows(now)
-        self._show(self._ages, (channel.watchdog.left_ms(now), channel.link.age_ms(now)), now)
+        watchdog = channel.watchdog
+        self._show(self._ages, (watchdog.left_ms(now), channel.link.age_ms(now), watchdog.telegrams), now)
 
     def _show(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:
         """Values that the bridge itself knows: their quality is always good."""

@@ -155,6 +155,7 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
             states=follow.STATES,
             description="how the last stop has ended",
         ),
+        _word(f"{top}/telegrams", "number of the owner's last valid telegram, modulo 65536"),
     ]
 
 

@@ -84,7 +84,7 @@ class Watchdog:
     -0.1) the state stays OFF and an expiry is told once by ``on_time`` and does nothing else.
     """
 
-    __slots__ = ("_deadline", "_heard_at", "_report_only", "_silent", "state", "timeout_ms")
+    __slots__ = ("_deadline", "_heard_at", "_report_only", "_silent", "state", "telegrams", "timeout_ms")
 
     def __init__(self, timeout_ms: int, *, report_only: bool = False) -> None:
         self.timeout_ms = timeout_ms
@@ -92,6 +92,8 @@ class Watchdog:
         self._deadline: float | None = None
         self._heard_at: float | None = None
         self._silent = False
+        self.telegrams = 0
+        """Number of the last valid telegram, modulo 2¹⁶: a witness outside sees by it that one came."""
         self.state = WatchdogState.IDLE if self._can_trip else WatchdogState.OFF
 
     @property
@@ -137,6 +139,7 @@ class Watchdog:
         self.state, effect = TABLE[self.state, stimulus]
         if stimulus in (Stimulus.TELEGRAM, Stimulus.ACKNOWLEDGED):
             self._silent = False
+            self.telegrams = (self.telegrams + 1) & 0xFFFF
             self._heard_at = heard_at if self._heard_at is None else max(heard_at, self._heard_at)
             self._deadline = self._heard_at + self.timeout_ms / 1000 if self.timeout_ms else None
         elif stimulus in (Stimulus.RELEASED, Stimulus.OWNER_CHANGED, Stimulus.STARTED):

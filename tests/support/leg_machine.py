@@ -105,7 +105,7 @@ class LegMachine:
             self._channel,
             _EPOCH,
             memory_s={"_tripped_at": memory_ms / 1000},
-            only_shown=("trips", "refused_writes", "last_fault"),
+            only_shown=("trips", "refused_writes", "last_fault", "telegrams"),
             spent=("_acknowledge_until",),
         )
         assert isinstance(self._timeout_ms, int)

@@ -32,6 +32,7 @@ from bridge.northbound.modbus.registers import (
     PROCESS_WORDS,
     QUALITY_BITS,
     STOP,
+    TELEGRAMS,
     TIMEOUT,
     VALUES,
     DriveMap,
@@ -165,7 +166,9 @@ class DriveUnit:
             *from_int(self._drive.sdo_abort_code),
             owner.source if owner else 0,
         ]
-        return words + [0] * (VALUES - DIAGNOSTICS - len(words))
+        words += [0] * (VALUES - DIAGNOSTICS - len(words))
+        words[TELEGRAMS - DIAGNOSTICS] = channel.watchdog.telegrams
+        return words
 
     def _values(
         self,

@@ -30,6 +30,7 @@ TIMEOUT: Final = 12
 STOP: Final = 13
 # Input registers of a drive: 0 … 9 are the drive's data, 10 … 31 what the bridge knows about it.
 DIAGNOSTICS: Final = 10
+TELEGRAMS: Final = 24
 VALUES: Final = 32
 """First register of the 32-bit values, input and holding alike."""
 PARAMETERS: Final = 1000
@@ -206,6 +207,7 @@ def _input_rows(drive: Drive) -> list[Row]:
         row(16, "supervision/pdo_age_ms", "uint32", "ms", "age of the last PDO; FFFFFFFFh: none yet"),
         row(18, "sdo_abort_code", "uint32", "", "last SDO abort code"),
         row(20, "supervision/owner", "uint16", "", "0 none, 1 opcua, 2 modbus, 3 zenoh, 4 local"),
+        row(TELEGRAMS, "supervision/telegrams", "uint16", "", "number of the owner's last valid telegram"),
     ]
 
 

@@ -1,0 +1,281 @@
+"""The judgement of the witness: frames, telegrams' numbers and the time in, stops and alarms out. Sans-IO.
+
+A stop is recorded with its time and what is promised of it; an alarm is raised as soon as a promise is
+broken, whether or not the drive stops in the end. Times are seconds of one monotonic clock, those of frames
+their reception.
+
+The owner's telegrams are known by their number alone, which is read now and then: a telegram is taken for as
+young as it can be, so a stop may have been later by one reading than it seems, and is never earlier.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from bridge.witness.plan import WatchedBus, WatchedDrive
+
+_TURNS_S: Final = 0.5
+_MOST_TURNS: Final = 4
+"""An RPDO that turns from "run" to "stop" and back so often in ``_TURNS_S`` has two senders."""
+_BEAT_WINDOW_S: Final = 2.0
+_BEAT_LOAD: Final = 1.5
+_BEAT_SPARE: Final = 5
+"""What comes beside the beat when it changes."""
+_UNSEEN_S: Final = 1.0
+"""An enabled drive gets its RPDO more often than that."""
+
+
+class Cause(StrEnum):
+    """Why a drive stopped."""
+
+    CONTROLLER = "controller silent"
+    COMMAND = "stop commanded"
+    BRIDGE = "bridge silent"
+    DRIVE = "drive by itself"
+
+
+class Kind(StrEnum):
+    """What an alarm is about."""
+
+    LATE = "late"
+    RUNS_ON = "runs on"
+    IGNORED = "stop ignored"
+    UNTOLD = "enabled untold"
+    INTRUDER = "intruder"
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """One stop of a drive. ``bus_ms``: from the owner's last telegram to the first RPDO that stops, None
+    where that is not what stopped it; ``drive_ms``: from what stopped it to the drive that says so."""
+
+    drive: str
+    cause: Cause
+    time: float
+    bus_ms: int | None
+    bus_bound_ms: int | None
+    drive_ms: int
+    drive_bound_ms: int | None
+
+    @property
+    def is_in_time(self) -> bool:
+        pairs = ((self.bus_ms, self.bus_bound_ms), (self.drive_ms, self.drive_bound_ms))
+        return all(ms is None or bound is None or ms <= bound for ms, bound in pairs)
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """A promise is broken, or somebody else is there. ``source`` is a drive or a bus."""
+
+    source: str
+    kind: Kind
+    time: float
+    message: str
+
+
+Finding = Stop | Alarm
+
+
+class _Track:
+    """What is known of one drive."""
+
+    def __init__(self, drive: WatchedDrive) -> None:
+        self.drive = drive
+        self.number: int | None = None
+        self.telegram_at: float | None = None
+        """When the owner's last telegram had come at the latest."""
+        self.read_at: float | None = None
+        """The last reading of its number was asked for at this time."""
+        self.rpdo_at: float | None = None
+        self.late_at: float | None = None
+        """The first RPDO that enables later than promised after that telegram."""
+        self.stopped_at: float | None = None
+        """The first RPDO that does not enable, of those that go on with it."""
+        self.tells_run = False
+        self.turns: deque[float] = deque()
+        self.is_enabled = False
+        self.tpdo_at: float | None = None
+        self.enabled_since: float | None = None
+        self.told: set[Kind] = set()
+        """Alarms of what goes on are raised once."""
+
+
+class Watch:
+    """One bus. ``findings`` are taken by whoever tells them."""
+
+    def __init__(self, bus: WatchedBus) -> None:
+        self._name = bus.name
+        self._tracks = {drive.name: _Track(drive) for drive in bus.drives}
+        self._by_rpdo = {track.drive.rpdo: track for track in self._tracks.values()}
+        self._by_tpdo = {track.drive.tpdo: track for track in self._tracks.values()}
+        self._beats = bus.beats
+        self._beaten: dict[int, deque[float]] = {can_id: deque() for can_id in bus.beats}
+        self._findings: list[Finding] = []
+
+    @property
+    def identifiers(self) -> list[int]:
+        """What it has to see."""
+        return sorted({*self._by_rpdo, *self._by_tpdo, *self._beats})
+
+    def take_findings(self) -> list[Finding]:
+        findings, self._findings = self._findings, []
+        return findings
+
+    # what comes
+
+    def on_frame(self, can_id: int, data: bytes, at: float) -> None:
+        if (track := self._by_rpdo.get(can_id)) is not None:
+            self._on_rpdo(track, data, at)
+        elif (track := self._by_tpdo.get(can_id)) is not None:
+            self._on_tpdo(track, data, at)
+        elif can_id in self._beats:
+            self._on_beat(can_id, at)
+
+    def on_number(self, name: str, number: int, asked_at: float, answered_at: float) -> None:
+        """The number of the owner's last telegram, as it was between these times."""
+        track = self._tracks[name]
+        if number != track.number:
+            # The first reading says only that there may have been one just now.
+            track.telegram_at = answered_at
+            track.number = number
+            track.late_at = None
+            track.told.discard(Kind.LATE)
+        track.read_at = asked_at
+
+    def on_numbers_lost(self) -> None:
+        """Nobody tells the numbers any more: nothing is known of the owners."""
+        for track in self._tracks.values():
+            track.number = track.telegram_at = track.read_at = track.late_at = None
+
+    def _on_rpdo(self, track: _Track, data: bytes, at: float) -> None:
+        enables = track.drive.control.enables(data)
+        track.rpdo_at = at
+        if enables is None:
+            return
+        if enables:
+            track.stopped_at = None
+            telegram, stop_ms = track.telegram_at, track.drive.stop_ms
+            is_late = telegram is not None and stop_ms and _ms(at - telegram) > stop_ms
+            if is_late and track.late_at is None:
+                track.late_at = at
+        elif track.stopped_at is None:
+            track.stopped_at = at
+            track.told.discard(Kind.IGNORED)
+        if enables != track.tells_run:
+            track.tells_run = enables
+            self._on_turn(track, at)
+
+    def _on_turn(self, track: _Track, at: float) -> None:
+        turns = track.turns
+        turns.append(at)
+        while turns[0] < at - _TURNS_S:
+            turns.popleft()
+        if len(turns) > _MOST_TURNS:
+            turns.clear()
+            self._alarm(
+                track.drive.name,
+                Kind.INTRUDER,
+                at,
+                f"RPDO {track.drive.rpdo:03X}h says run and stop by turns: somebody else sends it, too",
+            )
+
+    def _on_tpdo(self, track: _Track, data: bytes, at: float) -> None:
+        enabled = track.drive.status.enables(data)
+        if enabled is None:
+            return
+        was_enabled, track.is_enabled = track.is_enabled, enabled
+        track.tpdo_at = at
+        if enabled and not was_enabled:
+            track.enabled_since = at
+        elif was_enabled and not enabled:
+            self._findings.append(self._stop_of(track, at))
+            track.told -= {Kind.RUNS_ON, Kind.IGNORED, Kind.UNTOLD}
+            track.enabled_since = None
+
+    def _on_beat(self, can_id: int, at: float) -> None:
+        what, period_ms = self._beats[can_id]
+        times = self._beaten[can_id]
+        times.append(at)
+        while times[0] < at - _BEAT_WINDOW_S:
+            times.popleft()
+        if len(times) > _BEAT_LOAD * _BEAT_WINDOW_S * 1000 / period_ms + _BEAT_SPARE:
+            times.clear()
+            message = f"{what}, {can_id:03X}h, comes too often: somebody else sends it, too"
+            self._alarm(self._name, Kind.INTRUDER, at, message)
+
+    # judging
+
+    def _stop_of(self, track: _Track, at: float) -> Stop:
+        drive = track.drive
+        if track.stopped_at is not None:
+            silence_s = None if track.telegram_at is None else track.stopped_at - track.telegram_at
+            is_silent = silence_s is not None and drive.timeout_ms and silence_s * 1000 >= drive.timeout_ms
+            return Stop(
+                drive.name,
+                Cause.CONTROLLER if is_silent else Cause.COMMAND,
+                at,
+                bus_ms=_ms(silence_s) if is_silent and silence_s is not None else None,
+                bus_bound_ms=drive.stop_ms or None if is_silent else None,
+                drive_ms=_ms(at - track.stopped_at),
+                drive_bound_ms=drive.follow_ms,
+            )
+        since = at if track.rpdo_at is None else track.rpdo_at
+        is_bridge = drive.silent_ms and at - since > _UNSEEN_S / 4
+        return Stop(
+            drive.name,
+            Cause.BRIDGE if is_bridge else Cause.DRIVE,
+            at,
+            bus_ms=None,
+            bus_bound_ms=None,
+            drive_ms=_ms(at - since),
+            drive_bound_ms=drive.silent_ms if is_bridge else None,
+        )
+
+    def on_time(self, now: float) -> None:
+        """Call it when everything that had come by ``now`` has been handed over."""
+        for track in self._tracks.values():
+            self._judge_controller(track, now)
+            self._judge_drive(track, now)
+
+    def _judge_controller(self, track: _Track, now: float) -> None:
+        """An enabling RPDO later than promised, of an owner that had sent nothing when it was asked again."""
+        telegram, late, read = track.telegram_at, track.late_at, track.read_at
+        if telegram is None or late is None or read is None or read < late:
+            return
+        told = f"told to run {_ms(late - telegram)} ms after its owner's last telegram"
+        self._once(track, Kind.LATE, now, f"{told}; promised: {track.drive.stop_ms}")
+
+    def _judge_drive(self, track: _Track, now: float) -> None:
+        """A drive that says "enabled" longer than it may."""
+        drive, seen = track.drive, track.tpdo_at
+        if not track.is_enabled or seen is None or track.enabled_since is None:
+            return
+        if track.stopped_at is not None:
+            since = max(track.stopped_at, track.enabled_since)
+            if _ms(seen - since) > drive.follow_ms:
+                after = f"enabled {_ms(seen - since)} ms after it was told to stop"
+                self._once(track, Kind.IGNORED, now, f"{after}; expected: {drive.follow_ms}")
+        elif track.rpdo_at is None:
+            if seen - track.enabled_since > _UNSEEN_S:
+                message = f"enabled, and nobody sends its RPDO {drive.rpdo:03X}h"
+                self._once(track, Kind.UNTOLD, now, message)
+        elif drive.silent_ms and _ms(seen - track.rpdo_at) > drive.silent_ms:
+            message = (
+                f"enabled {_ms(seen - track.rpdo_at)} ms after its last RPDO; promised: {drive.silent_ms}"
+            )
+            self._once(track, Kind.RUNS_ON, now, message)
+
+    def _once(self, track: _Track, kind: Kind, now: float, message: str) -> None:
+        if kind not in track.told:
+            track.told.add(kind)
+            self._alarm(track.drive.name, kind, now, message)
+
+    def _alarm(self, source: str, kind: Kind, at: float, message: str) -> None:
+        self._findings.append(Alarm(source, kind, at, message))
+
+
+def _ms(seconds: float) -> int:
+    return round(seconds * 1000)

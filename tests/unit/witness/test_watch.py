@@ -1,0 +1,225 @@
+"""The judgement of the witness: every way to break the promise is told, and an honest plant is left alone."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.witness.plan import WatchedBus, WatchedDrive, Word
+from bridge.witness.watch import Alarm, Cause, Kind, Stop, Watch
+
+RPDO, TPDO, SYNC = 0x205, 0x185, 0x080
+CONTROL, STATUS = Word(0, 2, 0x000F, 0x000F), Word(0, 2, 0x007F, 0x0037)
+RUN, STOP = bytes.fromhex("7F 04 00 20"), bytes.fromhex("7E 04 00 00")
+ENABLED, READY = bytes.fromhex("37 0B 00 20"), bytes.fromhex("31 0B 00 00")
+FU1 = WatchedDrive("conveyor/fu1", 1, RPDO, TPDO, CONTROL, STATUS, 200, 240, 600, 1500)
+BUS = WatchedBus("can0", "vcan0", (FU1,), {SYNC: ("SYNC", 10)})
+
+
+class Plant:
+    """A bridge, a drive and an owner that say what the test wants, 10 ms at a time."""
+
+    def __init__(self) -> None:
+        self.watch = Watch(BUS)
+        self.now = 100.0
+        self.number = 0
+        self.rpdo: bytes | None = STOP
+        self.tpdo: bytes | None = READY
+        self.writes = False
+        self.answers = True
+        self.beats = 1
+        self.stops: list[Stop] = []
+        self.alarms: list[Alarm] = []
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds * 100)):
+            self.now = round(self.now + 0.01, 6)
+            tenth = round(self.now * 100)
+            if self.writes and tenth % 5 == 0:
+                self.number = (self.number + 1) & 0xFFFF
+            if self.answers and tenth % 5 == 1:
+                self.watch.on_number(FU1.name, self.number, self.now - 0.002, self.now - 0.001)
+            for _ in range(self.beats):
+                self.watch.on_frame(SYNC, b"", self.now)
+            if self.rpdo is not None:
+                self.watch.on_frame(RPDO, self.rpdo, self.now)
+            if self.tpdo is not None:
+                self.watch.on_frame(TPDO, self.tpdo, self.now)
+            self.watch.on_time(self.now)
+            for finding in self.watch.take_findings():
+                if isinstance(finding, Stop):
+                    self.stops.append(finding)
+                else:
+                    self.alarms.append(finding)
+
+    def move(self) -> None:
+        self.writes = True
+        self.run(1.0)
+        self.rpdo = RUN
+        self.run(0.05)
+        self.tpdo = ENABLED
+        self.run(2.0)
+        assert not self.stops
+        assert not self.alarms
+
+    @property
+    def kinds(self) -> list[Kind]:
+        return [alarm.kind for alarm in self.alarms]
+
+
+@pytest.fixture
+def plant() -> Plant:
+    plant = Plant()
+    plant.move()
+    return plant
+
+
+def test_a_silent_controller_and_a_stop_in_time(plant: Plant) -> None:
+    plant.writes = False
+    plant.run(0.2)
+    plant.rpdo = STOP
+    plant.run(0.03)
+    plant.tpdo = READY
+    plant.run(1.0)
+    (stop,) = plant.stops
+    assert stop.cause is Cause.CONTROLLER
+    assert stop.bus_ms is not None and 200 <= stop.bus_ms <= 240
+    assert stop.is_in_time
+    assert not plant.alarms
+
+
+def test_an_enabling_rpdo_after_the_bound_is_told_at_once_and_once(plant: Plant) -> None:
+    plant.writes = False
+    plant.run(0.4)
+    assert plant.kinds == [Kind.LATE]
+    assert "its owner's last telegram; promised: 240" in plant.alarms[0].message
+    plant.run(3.0)
+    assert plant.kinds == [Kind.LATE]
+    plant.rpdo, plant.tpdo = STOP, READY
+    plant.run(0.1)
+    assert not plant.stops[0].is_in_time
+
+
+def test_the_owner_is_not_judged_while_nobody_tells_its_telegrams(plant: Plant) -> None:
+    plant.answers = False
+    plant.watch.on_numbers_lost()
+    plant.run(5.0)
+    assert not plant.alarms
+
+
+def test_a_stop_that_was_ordered(plant: Plant) -> None:
+    plant.rpdo = STOP
+    plant.run(0.3)
+    plant.tpdo = READY
+    plant.run(0.1)
+    (stop,) = plant.stops
+    assert (stop.cause, stop.bus_ms, stop.drive_bound_ms) == (Cause.COMMAND, None, 1500)
+    assert 290 <= stop.drive_ms <= 320
+
+
+def test_a_drive_that_does_not_follow_a_stop_is_told(plant: Plant) -> None:
+    plant.rpdo = STOP
+    plant.run(1.4)
+    assert not plant.alarms
+    plant.run(0.3)
+    assert plant.kinds == [Kind.IGNORED]
+
+
+def test_a_dead_bridge_and_a_drive_that_stops_by_itself(plant: Plant) -> None:
+    plant.rpdo, plant.answers, plant.beats = None, False, 0
+    plant.run(0.5)
+    plant.tpdo = READY
+    plant.run(0.5)
+    (stop,) = plant.stops
+    assert (stop.cause, stop.drive_bound_ms) == (Cause.BRIDGE, 600)
+    assert stop.is_in_time
+    assert not plant.alarms
+
+
+def test_a_drive_that_runs_on_without_a_bridge_is_told(plant: Plant) -> None:
+    plant.rpdo, plant.answers, plant.beats = None, False, 0
+    plant.run(0.7)
+    assert plant.kinds == [Kind.RUNS_ON]
+
+
+def test_a_drive_that_falls_into_fault_is_nobodys(plant: Plant) -> None:
+    plant.tpdo = READY
+    plant.run(0.1)
+    assert plant.stops[0].cause is Cause.DRIVE
+
+
+def test_a_drive_that_nobody_enabled_is_told() -> None:
+    plant = Plant()
+    plant.rpdo, plant.tpdo = None, ENABLED
+    plant.run(2.0)
+    assert plant.kinds == [Kind.UNTOLD]
+
+
+def test_two_senders_of_one_rpdo_are_told(plant: Plant) -> None:
+    for _ in range(20):
+        plant.watch.on_frame(RPDO, STOP, plant.now + 0.005)
+        plant.run(0.01)
+    assert Kind.INTRUDER in plant.kinds
+    assert plant.alarms[0].source == "conveyor/fu1"
+
+
+def test_two_producers_of_sync_are_told(plant: Plant) -> None:
+    plant.beats = 2
+    plant.run(2.0)
+    assert Kind.INTRUDER in plant.kinds
+    assert plant.alarms[0].source == "can0"
+
+
+@pytest.mark.parametrize("data", [b"", b"\x7f"])
+def test_a_frame_that_is_too_short_is_no_word(plant: Plant, data: bytes) -> None:
+    plant.watch.on_frame(RPDO, data, plant.now)
+    plant.watch.on_frame(TPDO, data, plant.now)
+    plant.run(0.5)
+    assert not plant.alarms
+    assert not plant.stops
+
+
+@given(st.integers(0, 600))
+def test_late_is_told_exactly_if_it_is(after_ms: int) -> None:
+    """``after_ms`` from the owner's last telegram to the last enabling RPDO. By the time between two
+    readings it may seem shorter, never longer."""
+    plant = Plant()
+    plant.move()
+    while round(plant.now * 100) % 5:
+        plant.run(0.01)
+    plant.writes = False
+    plant.run(after_ms // 10 / 100)
+    plant.rpdo, plant.tpdo = STOP, READY
+    plant.run(0.3)
+    is_told = Kind.LATE in plant.kinds
+    if after_ms <= FU1.stop_ms:
+        assert not is_told
+    if after_ms > FU1.stop_ms + 70:
+        assert is_told
+
+
+@given(st.lists(st.sampled_from(("write", "pause", "stop", "die", "fault")), max_size=12))
+def test_an_honest_plant_is_left_alone(events: list[str]) -> None:
+    plant = Plant()
+    for event in events:
+        plant.writes = plant.answers = True
+        plant.beats = 1
+        plant.rpdo, plant.tpdo = RUN, ENABLED
+        plant.run(1.0)
+        if event == "pause":
+            plant.writes = False
+            plant.run(0.2)
+            plant.rpdo = STOP
+            plant.run(0.05)
+        elif event == "stop":
+            plant.rpdo = STOP
+            plant.run(1.0)
+        elif event == "die":
+            plant.rpdo, plant.answers, plant.beats = None, False, 0
+            plant.watch.on_numbers_lost()
+            plant.run(0.5)
+        if event != "write":
+            plant.tpdo = READY
+            plant.run(0.5)
+    assert not plant.alarms

@@ -178,13 +178,16 @@ class Service:
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     def _say_what_is_doubtful(self) -> None:
-        """A site that cannot work well is run all the same: stopping a plant over a prediction is worse."""
+        """A site that cannot work well is run all the same: stopping a plant over a prediction is worse. What
+        is predicted of each bus becomes part of its drives' published times."""
         verdict = lint(self.project.site, self.project.families, self.project.path, self.project.downloads)
         for finding in verdict.findings:
             level = logging.ERROR if finding.severity is Severity.ERROR else logging.WARNING
             _log.log(level, "%s", finding.fault)
         for load in verdict.loads:
             _log.info("%s", load)
+        for case in verdict.worst_cases:
+            self.plant.drives[case.drive].wire = case.wire
 
     async def _stop(self) -> None:
         self.halt()

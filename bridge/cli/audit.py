@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -103,14 +103,13 @@ def _audit(project: Project, only: str | None, *, offline: bool) -> Iterator[Aud
                 own = errand.found.get(drive.name)
                 failure = errand.failed.get(node.name, "" if own else "interrupted")
                 unknown = OwnJudgement(accepted=case.own.accepted)
-                yield Audited(
-                    node, WorstCase(case.drive, case.controller_ms, own or unknown), own is not None, failure
-                )
+                found = replace(case, own=own or unknown)
+                yield Audited(node, found, own is not None, failure)
 
 
 def _rows(one: Audited) -> Iterator[tuple[str, ...]]:
     """A row for each thing that the drive watches; the first says what comes of them."""
-    controller = f"{one.case.controller_ms} ms" if one.case.controller_ms else "never"
+    controller = "not known" if one.case.stop.unknown else str(one.case.stop)
     bridge = f"{one.own.bridge_ms} ms" if one.own.bridge_ms else "never"
     ends = (controller, bridge, one.verdict)
     heads = (one.case.drive,)
@@ -131,8 +130,12 @@ def _rows(one: Audited) -> Iterator[tuple[str, ...]]:
 
 
 def _explain(found: list[Audited], site: Path) -> None:
-    """Why drives are errors, and what would be right; or why they are accepted."""
+    """The sums, why drives are errors, and what would be right; or why they are accepted."""
     for one in found:
+        for terms in one.case.terms:
+            print(terms)
+        if one.case.stop.unknown:
+            print(f"warning: {one.case.drive}: dead controller: {one.case.stop}")
         for watch in one.own.watches:
             if watch.verdict is None and watch.why:
                 print(f"warning: {one.case.drive}: {watch.setting}: {watch.why}")
@@ -203,9 +206,8 @@ def _facts(one: Audited) -> dict[str, Any]:
         "verdict": "no answer" if one.failure else str(own.verdict),
         "reason": one.failure or own.reason,
         "accepted": own.accepted or None,
-        "controller_ms": one.case.controller_ms,
+        **one.case.facts,
         "own_ms": own.own_ms,
-        "bridge_ms": own.bridge_ms,
         "watches": [
             {
                 "name": watch.name,

@@ -42,6 +42,8 @@ def check(
         print(load)
     for case in verdict.worst_cases:
         print(case)
+        for terms in case.terms:
+            print(f"  {terms}")
     if errors:
         raise FileFaults([finding.fault for finding in errors])
     drives, buses = count(len(_drives(project)), "drive"), count(len(project.site.bus), "bus")
@@ -69,8 +71,7 @@ def _as_json(project: Project, verdict: Verdict) -> dict[str, Any]:
         "worst_cases": [
             {
                 "drive": case.drive,
-                "controller_ms": case.controller_ms,
-                "bridge_ms": case.own.bridge_ms,
+                **case.facts,
                 "verdict": str(case.own.verdict),
             }
             for case in verdict.worst_cases

@@ -76,6 +76,16 @@ class DriveChannel:
         return self._gate.sent
 
     @property
+    def until(self) -> float | None:
+        """Until when ``output`` may be on the bus if nothing more is heard of the owner; None where no time
+        ends it."""
+        return self._leg.until
+
+    def output_then(self) -> Output:
+        """What belongs on the bus from ``until`` on."""
+        return self._leg.output_then()
+
+    @property
     def control_word(self) -> int:
         return self._leg.control_word
 

@@ -14,7 +14,7 @@ from bridge.command.authority import Authority
 from bridge.command.event import Kind
 from bridge.command.freshness import arrival_of, is_stale, limit_ms_of
 from bridge.command.link import Link
-from bridge.command.output import Gate
+from bridge.command.output import Gate, Output
 from bridge.command.request import DONE, STOP_ACTIONS, Action, Code, Identity, Outcome, Reply, Request, Role
 from bridge.command.setpoints import followers_of, handshake_of
 from bridge.command.start import StartSequence
@@ -109,6 +109,23 @@ class ControllerLeg:
             self.gate.next_deadline(),
             self.start.next_deadline(),
         )
+
+    @property
+    def until(self) -> float | None:
+        """Until when what enables the drive may be on the bus, unless its owner is heard; None where no time
+        ends it, or where nothing enables it."""
+        if not self.words.enables(self.gate.sent.words[0]):
+            return None
+        trip = None if self._settings.on_expiry == "hold" else self.watchdog.trips_at
+        lease = self.authority.next_deadline()
+        if trip is None or (lease is not None and lease < trip):
+            return lease
+        return trip
+
+    def output_then(self) -> Output:
+        """What is sent from ``until`` on."""
+        trip = self.gate.if_tripped() if self.until == self.watchdog.trips_at else None
+        return trip or self.gate.if_left()
 
     def _trip(self, now: float) -> None:
         fault = self._status.faults.controller_silent

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -14,14 +13,13 @@ from bridge.command.follow import Verdict
 from bridge.command.following import Following
 from bridge.command.parameter_points import parameter_points
 from bridge.command.points import drive_points
-from bridge.config import IGNORE_ALL_S, BusTable, DriveTable, NodeTable
+from bridge.command.worst_case import StopTime, Wire, stop_time, sync_wait_ms
+from bridge.config import BusTable, DriveTable, NodeTable
 from bridge.drive import OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, scale_of
 from bridge.image import Image, Point, Quality, Value
 from bridge.mapping.model import Family, Slot
 
-REACTION_BOUND_MS: Final = 20
-"""How late the bridge may be itself, beside one cycle of the RPDO (``docs/explanation``)."""
-
+_ASYNCHRONOUS: Final = 255
 _IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
 _SUPERVISION: Final = (
     "owner",
@@ -31,7 +29,6 @@ _SUPERVISION: Final = (
     "last_fault",
     "current_fault",
     "trips",
-    "worst_case_stop_ms",
     "sent_control_word",
     "restart_interlock",
     "refused_writes",
@@ -48,24 +45,6 @@ class Identification:
     revision: int = 0
     serial: int = 0
     device_name: str = ""
-
-
-def worst_case_stop_ms(
-    table: DriveTable, timeout_ms: int, rpdo_period_ms: int, own: OwnJudgement | None
-) -> int:
-    """Longest time from the controller's last telegram to the reaction on the bus; 0 where none.
-
-    ``rpdo_period_ms`` includes the SYNC period where the drive takes its RPDO over with SYNC. With silence
-    the reaction is the drive's own, after its own time-out in ``own``.
-    """
-    own_ms = 0
-    if not timeout_ms or table.telegram_downtime_s == IGNORE_ALL_S or table.on_expiry == "hold":
-        return 0
-    if table.on_expiry == "silence":
-        own_ms = math.ceil(own.process_data_ms) if own else 0
-        if not own_ms:
-            return 0
-    return timeout_ms + rpdo_period_ms + REACTION_BOUND_MS + own_ms
 
 
 class Drive:
@@ -94,14 +73,20 @@ class Drive:
         self.own: OwnJudgement | None = None
         """What it does by itself when the bridge falls silent; None until the boot-up has read it."""
         self.sdo_abort_code = 0
-        self.rpdo_period_ms = round(bus.rpdo_period_s * 1000)
+        self.bus = bus
+        self.rpdo_type = _ASYNCHRONOUS
+        """Transmission type of the RPDO with the control word; read by the boot-up."""
+        self.wire = Wire()
         self.sync_period_ms = bus.sync_period_ms
+        self.burst_s = bus.deadman_ms / 1000 + bus.rpdo_period_s
+        """How far ahead the bus may have been told what to send."""
         self.table = table
         self.given_parameters = table.parameters
         words = family.process.rpdo[1:]
         self._commands = [
             ValueCodec(value, words) for value in family.values_of(self.slot) if value.group == "command"
         ]
+        self._shown_for: tuple[int, int, Wire, float] | None = None
         self._set = ParameterSet(family.control_word.parameter_set_bits)
         self._setpoints = [
             (words.index(word), f"command/{word}") for word in family.carried(self.slot)[0][1:]
@@ -135,7 +120,7 @@ class Drive:
         self._supervision = places("status", ("fault_text",)) + places("supervision", _SUPERVISION)
         self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms", "telegrams"))
         self._follows = places("supervision", ("follows", "last_stop"))
-        (self._bridge_ms,) = places("supervision", ("worst_case_bridge_ms",))
+        self._stop_ms, self._bridge_ms = places("supervision", ("worst_case_stop_ms", "worst_case_bridge_ms"))
         self._identity = places("identity", _IDENTITY)
         self._actual.bind(image)
         self.channel.settled = self.refresh
@@ -149,10 +134,19 @@ class Drive:
         """The words of the last TPDOs, the status word first, in the order of ``process.tpdo``."""
         return self._actual.words
 
-    def worst_case_stop_ms(self) -> int:
-        """Longest time from the controller's last telegram to the reaction on the bus; 0 where none."""
+    @property
+    def rpdo_period_ms(self) -> int:
+        """How long a new control word may be on its way: until its frame, and until SYNC takes that over."""
+        return round(1000 * self.bus.rpdo_period_s) + sync_wait_ms(self.bus, self.rpdo_type)
+
+    def stop_time(self) -> StopTime:
+        """Longest time from the controller's last telegram to the stop on the bus."""
         timeout_ms = self.channel.watchdog.timeout_ms
-        return worst_case_stop_ms(self.table, timeout_ms, self.rpdo_period_ms, self.own)
+        return stop_time(self.table, self.bus, timeout_ms, self.rpdo_type, self.wire, self._own_ms)
+
+    @property
+    def _own_ms(self) -> float:
+        return self.own.process_data_ms if self.own else 0.0
 
     # fed by the southbound side
 
@@ -297,12 +291,21 @@ class Drive:
             channel.last_fault,
             channel.current_fault,
             channel.trips,
-            self.worst_case_stop_ms(),
             channel.output.words[0],
             channel.restart_interlock,
             channel.refused_writes,
         )
         self._show(self._supervision, values, now)
+        self._show_stop_time(now)
+
+    def _show_stop_time(self, now: float) -> None:
+        settings = self.channel.watchdog.timeout_ms, self.rpdo_type, self.wire, self._own_ms
+        if settings == self._shown_for:
+            return
+        self._shown_for = settings
+        stop = self.stop_time()
+        quality = Quality.CONFIG_ERROR if stop.unknown else Quality.GOOD
+        self._image.set(self._stop_ms, stop.ms, now, quality, stop.unknown)
 
     def refresh_ages(self, now: float) -> None:
         """The points that change by themselves; called a few times a second."""

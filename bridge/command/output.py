@@ -270,7 +270,7 @@ class Gate:
         if self._tripped_at is not None and self._reaction != "hold":
             silence_at = self._silence_at
             silent = silence_at is not None and self._now >= silence_at
-            return Output((self._reaction_word(), *self.rest), silent)
+            return Output((self._reaction_word(awaits_rest=self.awaits_rest), *self.rest), silent)
         if self._held is not None:
             if may_enable or not self._words.enables(self._held.words[0]):
                 return self._held
@@ -293,9 +293,20 @@ class Gate:
             word |= self._handshake.bits
         return Output((word, *(self.rest if blocked else self.setpoints)))
 
-    def _reaction_word(self) -> int:
+    def if_tripped(self) -> Output | None:
+        """What the drive would get if the watchdog tripped now; None where it goes on with what it has."""
+        if self._reaction == "hold":
+            return None
+        word = self._reaction_word(awaits_rest=self._reaction == "quick_stop")
+        return Output((word, *self.rest), silent=self._reaction == "silence")
+
+    def if_left(self) -> Output:
+        """What the drive would get if its owner went now."""
+        return Output((self._words.stop(self.sent.words[0]), *self.rest))
+
+    def _reaction_word(self, *, awaits_rest: bool) -> int:
         word = self.sent.words[0]
-        if self._reaction != "stop" and not self.awaits_rest:
+        if self._reaction != "stop" and not awaits_rest:
             return self._words.disable_voltage(word)
         stop = self._words.stop if self._reaction == "stop" else self._words.quick_stop
         return self._words.withhold(stop(word)) if self._rests else stop(word)

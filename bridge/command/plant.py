@@ -188,11 +188,13 @@ class Plant:
             access.submit(request, drive, now, reply)
             self.outputs_changed()
             return
-        before = drive.channel.output
+        before, until = drive.channel.output, drive.channel.until
         try:
             drive.channel.handle(request, now, reply)
         finally:
-            if drive.channel.output != before or request.action in _BRINGS_TIMERS_FORWARD:
+            is_changed = drive.channel.output != before or request.action in _BRINGS_TIMERS_FORWARD
+            if is_changed or (until is not None and until < now + drive.burst_s):
+                # The bus may have been told to stop the drive by itself: not any more, its owner is there.
                 self.outputs_changed()
 
     def on_connection(self, identity: Identity, now: float, *, is_there: bool) -> None:

@@ -133,6 +133,11 @@ class Watchdog:
     def next_deadline(self) -> float | None:
         return self._deadline
 
+    @property
+    def trips_at(self) -> float | None:
+        """When the drive is stopped unless its owner is heard; None where no time does that."""
+        return self._deadline if self.state is WatchdogState.RUNNING else None
+
     def apply(self, stimulus: Stimulus, heard_at: float) -> Effect:
         """Let ``stimulus`` happen and say what is to be done about it. ``heard_at`` is when a telegram came,
         which may be a while ago: its time is up that much earlier. It takes none from a newer one."""

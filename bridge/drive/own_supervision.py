@@ -87,6 +87,17 @@ class OwnJudgement:
         return round(self.first.bridge_ms or 0) if self.first else 0
 
     @property
+    def terms(self) -> tuple[tuple[str, float], ...]:
+        """The summands of ``bridge_ms`` by their names; none where there is no such time."""
+        first = self.first
+        return (("silent_ms", first.silent_ms), ("own_ms", first.time_ms or 0)) if first else ()
+
+    @property
+    def sum(self) -> str:
+        """The summands in one line."""
+        return " + ".join(f"{name} {ms:g}" for name, ms in self.terms)
+
+    @property
     def reason(self) -> str:
         """Why it would not stop, or why that is not known; empty where it would."""
         if self.verdict is OwnVerdict.STOPS:

@@ -65,11 +65,11 @@ class BusLoad:
 
 
 def predict(bus: BusView) -> BusLoad:
-    streams = list(_streams(bus))
-    cycle_bits = sum(longest_bits(one.length) * _in_cycle(one, bus.sync_s) for one in streams if one.cyclic)
+    found = list(streams(bus))
+    cycle_bits = sum(longest_bits(one.length) * _in_cycle(one, bus.sync_s) for one in found if one.cyclic)
     bitrate = bus.table.bitrate
-    regular = sum(one.bits_per_s for one in streams)
-    most = sum(max(one.bits_per_s, one.most_bits_per_s) for one in streams)
+    regular = sum(one.bits_per_s for one in found)
+    most = sum(max(one.bits_per_s, one.most_bits_per_s) for one in found)
     return BusLoad(
         bus.table.name,
         bitrate,
@@ -87,7 +87,8 @@ def _in_cycle(stream: Stream, sync_s: float) -> int:
     return max(1, math.ceil(sync_s / stream.period_s - 1e-9))
 
 
-def _streams(bus: BusView) -> Iterator[Stream]:
+def streams(bus: BusView) -> Iterator[Stream]:
+    """All that is regular on the bus."""
     table = bus.table
     if table.sync_period_ms:
         yield Stream(1 if table.sync_counter else 0, bus.sync_s, cyclic=True)
@@ -107,9 +108,11 @@ def _node_streams(node: NodeView, bus: BusView) -> Iterator[Stream]:
     elif node.table.supervision == "guarding":
         yield Stream(0, supervision_s)
         yield Stream(1, supervision_s)
-    for poll in node.family.poll:
+    polls_per_s = sum(1000 / poll.every_ms for poll in node.family.poll)
+    if polls_per_s:
+        # They take turns: one request of a node is on its way at a time.
         for _ in ("request", "reply"):
-            yield Stream(_SDO_BYTES, poll.every_ms / 1000)
+            yield Stream(_SDO_BYTES, 1 / polls_per_s)
     for pdo in node.pdos:
         if pdo.receives and pdo.sent:
             yield Stream(pdo.length, bus.table.rpdo_period_s, cyclic=bool(bus.sync_s))

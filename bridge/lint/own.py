@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
-from bridge.command.drive import worst_case_stop_ms
+from bridge.command.worst_case import StopTime, Wire, stop_time
 from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_supervision import judge
 from bridge.lint.bus import BusView, DriveView, NodeView
 from bridge.lint.report import LintReport
+from bridge.lint.wire import busy_bits, wire_of
 from bridge.mapping.model import Family, OwnSupervision
 from bridge.mapping.own_places import offline, place_of, settable, wanted
 from bridge.tomlfile import Key
@@ -17,32 +18,46 @@ from bridge.tomlfile import Key
 
 @dataclass(frozen=True, slots=True)
 class WorstCase:
-    """How long one drive may take. ``controller_ms`` is 0 where a silent controller does not stop it."""
+    """How long one drive may take after its controller, and after the bridge, fell silent."""
 
     drive: str
-    controller_ms: int
+    stop: StopTime
     own: OwnJudgement
+    wire: Wire
 
     def __str__(self) -> str:
-        controller = f"{self.controller_ms} ms" if self.controller_ms else "never"
         bridge = f"{self.own.bridge_ms} ms" if self.own.bridge_ms else str(self.own.verdict)
-        return f"{self.drive}: dead controller: {controller}, dead bridge: {bridge}"
+        return f"{self.drive}: dead controller: {self.stop}, dead bridge: {bridge}"
+
+    @property
+    def terms(self) -> list[str]:
+        """The sums, where there are any."""
+        sums = [("dead controller", self.stop.sum), ("dead bridge", self.own.sum)]
+        return [f"{self.drive}: {who}: {terms}" for who, terms in sums if terms]
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """For programs."""
+        return {
+            "controller_ms": self.stop.ms,
+            "controller_terms": [asdict(term) for term in self.stop.terms],
+            "controller_unknown": self.stop.unknown,
+            "bridge_ms": self.own.bridge_ms,
+            "bridge_terms": [{"name": name, "ms": ms} for name, ms in self.own.terms],
+        }
 
 
 def worst_cases(bus: BusView) -> Iterator[WorstCase]:
     """Every drive of the bus, with what is known without asking it."""
+    busy = busy_bits(bus)
     for node in bus.nodes:
         for drive in node.drives:
             timeout_ms = drive.table.fieldbus_timeout_ms or 0
+            kind = drive.rpdos[0].transmission_type
+            wire = wire_of(bus, drive, busy)
             own = judged(bus, node, drive)
-            controller_ms = worst_case_stop_ms(drive.table, timeout_ms, rpdo_period_ms(bus, drive), own)
-            yield WorstCase(drive.name, controller_ms, own)
-
-
-def rpdo_period_ms(bus: BusView, drive: DriveView) -> int:
-    """How long a new control word may be on its way; one that waits for SYNC takes a period more."""
-    waits_ms = bus.table.sync_period_ms if drive.rpdos[0].is_synchronous else 0
-    return round(1000 * bus.table.rpdo_period_s) + waits_ms
+            stop = stop_time(drive.table, bus.table, timeout_ms, kind, wire, own.process_data_ms)
+            yield WorstCase(drive.name, stop, own, wire)
 
 
 def judged(bus: BusView, node: NodeView, drive: DriveView) -> OwnJudgement:

@@ -10,14 +10,17 @@ import asyncio
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from bridge.command import Event, Kind, Plant
 from bridge.errors import OperationFailed
+from bridge.southbound.bus.burstend import MOST_FRAMES, BurstEnd
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import Bus, ControllerState
 from bridge.southbound.canopen.sync import burst_length
 from bridge.southbound.ending import Ending, end, waits_for
 from bridge.southbound.network import Beats, Network
+from bridge.southbound.process_data import Beat
 from bridge.southbound.ratelimit import RateLimit
 from bridge.southbound.standstill import Alarm
 from bridge.southbound.timer import LoopTimer
@@ -46,13 +49,26 @@ _SEVERITIES = {
 }
 
 
+class _Told(NamedTuple):
+    """What a bus repeats at present: ``frames`` until then, ``ends`` at the latest if nobody renews it."""
+
+    frames: tuple[Frame, ...]
+    until: float | None
+    ends: float
+
+    def ends_as(self, beat: Beat) -> bool:
+        """Whether it does so at the right time without being told again."""
+        earliest = min((time for time in (self.until, beat.until) if time is not None), default=self.ends)
+        return self.until == beat.until or earliest >= self.ends
+
+
 @dataclass(slots=True)
 class _Line:
     """One bus with its network, and what the bus has been told to repeat."""
 
     bus: Bus
     network: Network
-    beating: dict[int, tuple[Frame, ...]] = field(default_factory=dict[int, tuple[Frame, ...]])
+    beating: dict[int, _Told] = field(default_factory=dict[int, _Told])
     beats: Beats | None = None
     renew_at: float = 0.0
     was_up: bool = True
@@ -60,6 +76,28 @@ class _Line:
     shown_refusal: str = ""
     limit: RateLimit = field(default_factory=lambda: RateLimit(_BUS_EVENTS, _BUS_EVENT_EVERY_S))
     outages: int = 0
+
+    @property
+    def burst_s(self) -> float:
+        """How long a burst goes on that nobody renews."""
+        return self.network.bus.deadman_ms / 1000
+
+    @property
+    def renew_s(self) -> float:
+        """How often bursts are renewed. Those that have to end in a stop reach no further ahead than the
+        longest sequence that the kernel takes."""
+        return min(self.burst_s, MOST_FRAMES * self.network.bus.rpdo_period_s) / _RENEWALS
+
+    def beat(self, beat: Beat, now: float, *, at_once: bool) -> None:
+        """Have the bus repeat this for the dead-man time, and what follows if its own time is up before."""
+        ending = None
+        # A deadline that lies further ahead is none of this burst, however long that is on its way.
+        if beat.until is not None and beat.until < now + 2 * self.burst_s + beat.period_s:
+            ending = BurstEnd(beat.until, beat.then())
+        count = burst_length(beat.period_s, self.network.bus.deadman_ms)
+        self.bus.beat(beat.frames, now, beat.period_s, count, at_once=at_once, ending=ending)
+        ends = now + self.burst_s + beat.period_s
+        self.beating[beat.frames[0].can_id] = _Told(beat.frames, beat.until, ends)
 
 
 class Master:
@@ -214,6 +252,7 @@ class Master:
         self._last_round = now
         now = self._clock()
         self._check_gap(now)
+        self._plant.on_time(now)
         for line in self._lines:
             self._flush(line, now)
             if not self._stood_still(line, now):
@@ -302,25 +341,24 @@ class Master:
             return
         renew = now >= line.renew_at
         if renew:
-            line.renew_at = now + network.bus.deadman_ms / 1000 / _RENEWALS
+            line.renew_at = now + line.renew_s
         beats = network.beats(anew=renew)
         if beats is line.beats and not renew:
             return
         line.beats = beats
-        self._alarm.set(network.bus.deadman_ms / 1000)
+        self._alarm.set(line.burst_s)
         for can_id in [can_id for can_id in line.beating if can_id not in beats]:
             bus.silence(can_id)
             del line.beating[can_id]
-        for can_id, (frames, period_s) in beats.items():
-            changed = line.beating.get(can_id) != frames
-            if changed or renew:
+        for can_id, beat in beats.items():
+            told = line.beating.get(can_id)
+            changed = told is None or told.frames != beat.frames
+            if changed or renew or (told and not told.ends_as(beat)):
                 # In this order: the process may be stopped at the end of the look at the clock.
                 if self._stood_still(line, now) or self._alarm.rang:
                     line.beats = None
                     return
-                count = burst_length(period_s, network.bus.deadman_ms)
-                bus.beat(frames, now, period_s, count, at_once=changed)
-                line.beating[can_id] = frames
+                line.beat(beat, now, at_once=changed)
         if self._plant.unsent:
             network.on_handed_over(self._clock())
 

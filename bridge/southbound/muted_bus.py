@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from bridge.southbound.bus.burstend import BurstEnd
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import Bus, BusStatus
 
@@ -65,7 +66,14 @@ class MutableBus:
         )
 
     def beat(
-        self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool = False
+        self,
+        frames: tuple[Frame, ...],
+        now: float,
+        period_s: float,
+        count: int,
+        *,
+        at_once: bool = False,
+        ending: BurstEnd | None = None,
     ) -> None:
         can_id = frames[0].can_id
         if self._mutes(can_id):
@@ -73,7 +81,7 @@ class MutableBus:
         if can_id not in self._beating:
             self._beating.add(can_id)
             self.accept(self._accepted)
-        self._bus.beat(frames, now, period_s, count, at_once=at_once)
+        self._bus.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
 
     def silence(self, can_id: int) -> None:
         self._bus.silence(can_id)

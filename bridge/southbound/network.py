@@ -23,6 +23,7 @@ from bridge.southbound.canopen.time_stamp import TimeProducer
 from bridge.southbound.neighbours import Neighbour
 from bridge.southbound.node import NodeCore
 from bridge.southbound.node_wire import Handler
+from bridge.southbound.process_data import Beat
 from bridge.southbound.ratelimit import RateLimit
 from bridge.southbound.schedule import Schedule
 from bridge.southbound.startup import StartGate
@@ -34,8 +35,8 @@ _ERRORS_EVERY_S: Final = 10.0
 
 NOTHING: Final[Mapping[str, Sequence[Download]]] = MappingProxyType({})
 
-Beats = dict[int, tuple[tuple[Frame, ...], float]]
-"""What is to be repeated and its period in seconds, by COB-ID."""
+Beats = dict[int, Beat]
+"""What is to be repeated, by COB-ID."""
 
 
 class Network:
@@ -242,17 +243,17 @@ class Network:
         # The state before that is said once, by the boot-up message.
         if self.bus.heartbeat_ms and self._has_booted:
             frame = Frame(cobid.ERROR_CONTROL + self.bus.master_node_id, bytes((self.nmt_state,)))
-            beats[frame.can_id] = ((frame,), self.bus.heartbeat_ms / 1000)
+            beats[frame.can_id] = Beat((frame,), self.bus.heartbeat_ms / 1000)
         period_s = self.bus.rpdo_period_s
         for node in self.nodes:
             if node.sends_process_data:
                 for pdos in node.wire.drives.values():
                     if not pdos.is_silent:
-                        for frames in pdos.bursts():
-                            beats[frames[0].can_id] = (frames, period_s)
+                        for beat in pdos.beats(period_s):
+                            beats[beat.frames[0].can_id] = beat
         # SYNC last: what goes out together with it is taken over by it (CiA 301 §7.2.2.2).
         if self.bus.sync_period_ms:
-            beats[cobid.SYNC] = (self._sync, self.bus.sync_period_ms / 1000)
+            beats[cobid.SYNC] = Beat(self._sync, self.bus.sync_period_ms / 1000)
         return beats
 
     def on_handed_over(self, now: float) -> None:

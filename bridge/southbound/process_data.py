@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
+from typing import NamedTuple
 
 from bridge.command import Drive
 from bridge.command.actual import FurtherTpdo
+from bridge.command.channel import DriveChannel
+from bridge.command.output import Output
 from bridge.command.plant import Node
 from bridge.config import BusTable
 from bridge.image import Quality
@@ -15,6 +19,16 @@ from bridge.southbound.canopen.sync import LAST_SYNCHRONOUS, REMOTE_SYNCHRONOUS,
 from bridge.southbound.words import WordMap
 
 Reject = Callable[[Frame, str], None]
+
+
+class Beat(NamedTuple):
+    """One identifier: the frames that are to be repeated in turn, and how often. With ``until`` they may be
+    on the bus no longer than that, and ``then`` gives the frame that takes their place; None for silence."""
+
+    frames: tuple[Frame, ...]
+    period_s: float
+    until: float | None = None
+    then: Callable[[], Frame | None] = lambda: None
 
 
 class Tpdo:
@@ -105,7 +119,7 @@ class Tpdo:
 class Rpdo:
     """Packs one RPDO of a drive from the channel's output."""
 
-    __slots__ = ("_codec", "_map", "_packed", "_words", "cob_id")
+    __slots__ = ("_codec", "_last", "_last_words", "_map", "_packed", "_words", "cob_id")
 
     def __init__(self, plan: PdoPlan, words: int) -> None:
         self.cob_id = plan.cob_id
@@ -113,6 +127,8 @@ class Rpdo:
         self._map = WordMap(plan.codec.entries, plan.places, words)
         self._words: Sequence[int] = ()
         self._packed = (Frame(plan.cob_id),)
+        self._last_words: Sequence[int] = ()
+        self._last = Frame(plan.cob_id)
 
     def frames(self, words: Sequence[int]) -> tuple[Frame, ...]:
         """The burst that carries these words; the same one while they stay."""
@@ -120,6 +136,15 @@ class Rpdo:
             self._words = words
             self._packed = (self.frame(words),)
         return self._packed
+
+    def last_frame(self, output: Output) -> Frame | None:
+        """The frame in which a burst ends, kept as well; None where it ends in silence."""
+        if output.silent:
+            return None
+        if output.words != self._last_words:
+            self._last_words = output.words
+            self._last = self.frame(output.words)
+        return self._last
 
     def frame(self, words: Sequence[int]) -> Frame:
         """The frame that carries these words, the control word first; what is mapped beside them is 0."""
@@ -130,7 +155,7 @@ class DrivePdos:
     """All PDOs of one drive. Of several the one with the status word is the first of ``tpdos``, and the
     one with the control word the last of ``rpdos``: setpoints are there when an enable comes."""
 
-    __slots__ = ("_drive", "rpdos", "tpdos")
+    __slots__ = ("_drive", "_endings", "rpdos", "tpdos")
 
     def __init__(
         self, drive: Drive, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan], reject: Reject
@@ -138,6 +163,7 @@ class DrivePdos:
         self._drive = drive
         words = len(drive.family.process.rpdo)
         self.rpdos = tuple(Rpdo(plan, words) for plan in reversed(rpdos))
+        self._endings = {rpdo: partial(_last_frame, rpdo, drive.channel) for rpdo in self.rpdos}
         main, *others = tpdos
         self.tpdos = (
             Tpdo(drive, main, None, reject),
@@ -158,14 +184,19 @@ class DrivePdos:
     def is_silent(self) -> bool:
         return self._drive.channel.output.silent
 
-    def bursts(self) -> list[tuple[Frame, ...]]:
+    def beats(self, period_s: float) -> list[Beat]:
         """The frames that belong on the bus now, those of each identifier together."""
-        words = self._drive.channel.output.words
-        return [rpdo.frames(words) for rpdo in self.rpdos]
+        channel = self._drive.channel
+        words, until = channel.output.words, channel.until
+        return [Beat(rpdo.frames(words), period_s, until, self._endings[rpdo]) for rpdo in self.rpdos]
 
     def frames_with(self, words: Sequence[int]) -> list[Frame]:
         """The frames that carry these words."""
         return [rpdo.frame(words) for rpdo in self.rpdos]
+
+
+def _last_frame(rpdo: Rpdo, channel: DriveChannel) -> Frame | None:
+    return rpdo.last_frame(channel.output_then())
 
 
 def _further(drive: Drive, plan: PdoPlan) -> FurtherTpdo:
@@ -205,19 +236,17 @@ def connect(
             result.notes.append(f"{drive.slot.name}: {plan.problem}")
             continue
         pdos = connected[drive.name] = DrivePdos(drive, plan.rpdos, plan.tpdos, reject)
-        _set_times(drive, node.bus, plan.rpdos[0], plan.tpdos[0])
+        _set_times(drive, plan.rpdos[0], plan.tpdos[0])
         drive.on_pdos(plan.unserved, pdos.further, now)
         missing = _without_effect(node.bus, plan.rpdos, plan.tpdos)
         result.notes += [f"{drive.slot.name}: {why}" for why in missing]
     return connected
 
 
-def _set_times(drive: Drive, bus: BusTable, rpdo: PdoPlan, tpdo: PdoPlan) -> None:
-    """When the drive's TPDO is late, and how long its RPDO may take: those with status and control word."""
+def _set_times(drive: Drive, rpdo: PdoPlan, tpdo: PdoPlan) -> None:
+    """When the drive's TPDO is late, and what takes its RPDO over: those with status and control word."""
     drive.channel.link.pdo_deadline_s = _deadline_s(drive, tpdo)
-    # A synchronous RPDO is taken over with the next SYNC (CiA 301 §7.5.2.35).
-    waits_ms = bus.sync_period_ms if rpdo.transmission_type <= LAST_SYNCHRONOUS else 0
-    drive.rpdo_period_ms = round(bus.rpdo_period_s * 1000) + waits_ms
+    drive.rpdo_type = rpdo.transmission_type
 
 
 def _without_effect(bus: BusTable, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan]) -> list[str]:

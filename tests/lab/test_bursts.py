@@ -7,12 +7,14 @@ import time
 
 import pytest
 
+from bridge.southbound.bus.burstend import BurstEnd
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.socketcan import SocketCanBus
 from bridge.southbound.canopen.sync import burst_length
 from tests.support.sniffer import sniffing
 
 DEADMAN_MS = 100
+NOISE_S = 0.02
 RPDO = Frame(0x205, bytes(8))
 
 
@@ -55,6 +57,62 @@ async def test_a_renewal_that_was_held_up_on_its_way_ends_no_burst_for_good() ->
             bus.close()
         after = sniffer.of(RPDO.can_id, late)
     assert len(after) >= 3
+
+
+STOP = Frame(0x205, b"\1" + bytes(7))
+
+
+@pytest.mark.parametrize("period_ms", [2, 10, 20])
+@pytest.mark.parametrize("stop", [STOP, None])
+async def test_a_burst_that_nobody_renews_any_more_stops_at_its_deadline(
+    period_ms: int, stop: Frame | None
+) -> None:
+    period_s = period_ms / 1000
+    count = burst_length(period_s, DEADMAN_MS)
+    bus = SocketCanBus("can0", "vcan0")
+    with sniffing() as sniffer:
+        bus.open(lambda: None)
+        bus.accept([])
+        try:
+            begin = time.time()
+            at = time.monotonic() + 0.2
+            deadline = time.time() + 0.2
+            while time.monotonic() < at - 0.05:
+                ending = BurstEnd(at, stop)
+                bus.beat((RPDO,), time.monotonic(), period_s, count, ending=ending)
+                await asyncio.sleep(DEADMAN_MS / 3000)
+            renewed = time.time()
+            await asyncio.sleep(0.4)
+        finally:
+            bus.close()
+        seen = sniffer.of(RPDO.can_id, begin)
+    going = [frame.time for frame in seen if frame.data == RPDO.data]
+    stops = [frame.time for frame in seen if frame.data == STOP.data]
+    assert len(going) >= 0.5 * 0.2 / period_s
+    assert max(going) < deadline + period_s + NOISE_S
+    assert bool(stops) is bool(stop)
+    if stops:
+        assert deadline <= stops[0] <= deadline + 2 * period_s + NOISE_S
+        assert max(stops) <= renewed + DEADMAN_MS / 1000 + NOISE_S
+        assert max(going) < stops[0]
+
+
+async def test_a_deadline_that_moves_moves_the_stop() -> None:
+    bus = SocketCanBus("can0", "vcan0")
+    with sniffing() as sniffer:
+        bus.open(lambda: None)
+        bus.accept([])
+        try:
+            end = time.monotonic() + 1.0
+            begin = time.time()
+            while (now := time.monotonic()) < end:
+                bus.beat((RPDO,), now, 0.01, 10, ending=BurstEnd(now + 0.08, STOP))
+                await asyncio.sleep(0.01)
+        finally:
+            bus.close()
+        seen = sniffer.of(RPDO.can_id, begin)
+    assert len(seen) >= 50
+    assert {frame.data for frame in seen} == {RPDO.data}, "each telegram is in time"
 
 
 async def renew(bus: SocketCanBus, period_s: float, count: int, seconds: float) -> None:

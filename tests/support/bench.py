@@ -13,6 +13,7 @@ from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Sou
 from bridge.config import Site, load_site
 from bridge.mapping import Family, load_family
 from bridge.sim.nord_tu4 import NordTu4
+from bridge.southbound.bus.burstend import BurstEnd
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import BusStatus, ControllerState
 from bridge.southbound.bus.softbeat import SoftBeat
@@ -67,9 +68,16 @@ class ClockBus:
             self._deliver(frame._replace(time=now))
 
     def beat(
-        self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool = False
+        self,
+        frames: tuple[Frame, ...],
+        now: float,
+        period_s: float,
+        count: int,
+        *,
+        at_once: bool = False,
+        ending: BurstEnd | None = None,
     ) -> None:
-        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once)
+        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
         if frame is not None:
             self._send_beat(frame, now)
 
@@ -118,7 +126,7 @@ class Bench:
         self.plant.on_event(self.events.append)
         self.bus = self.make_bus()
         self.network = Network(site.bus[0], self.plant, epoch_ns)
-        self.master = Master([(self.bus, self.network)], self.plant, lambda: self.now)
+        self.master = Master([(self.bus, self.network)], self.plant, self.clock)
         self._wake_at = self.now
         self.master.attach(self._set_timer)
         self.node = NordTu4(5) if node is None else node
@@ -128,6 +136,10 @@ class Bench:
 
     def make_bus(self) -> ClockBus:
         return ClockBus(self._from_master)
+
+    def clock(self) -> float:
+        """What the master looks at."""
+        return self.now
 
     def power_on(self) -> None:
         self.powered = True

@@ -15,6 +15,7 @@ _TX_DELETE: Final = 2
 _SETTIMER: Final = 1
 _STARTTIMER: Final = 2
 _TX_ANNOUNCE: Final = 8
+_TX_RESET_MULTI_IDX: Final = 0x200
 
 
 def frame_bytes(frame: Frame) -> bytes:
@@ -22,13 +23,16 @@ def frame_bytes(frame: Frame) -> bytes:
     return _FRAME.pack(frame.can_id, len(frame.data), frame.data.ljust(8, b"\0"))
 
 
-def setup(frames: tuple[Frame, ...], period_s: float, count: int, *, start: bool, at_once: bool) -> bytes:
+def setup(
+    frames: tuple[Frame, ...], period_s: float, count: int, *, start: bool, at_once: bool, anew: bool = False
+) -> bytes:
     """Send one of ``frames`` every period, in turn, ``count`` more times.
 
-    ``start`` begins a new phase with a frame; without it a running burst keeps its phase and its place
-    in ``frames``.
+    ``start`` begins a new phase with a frame; without it a running burst keeps its phase, and unless ``anew``
+    its place in ``frames``.
     """
     flags = _SETTIMER | (_STARTTIMER if start else 0) | (_TX_ANNOUNCE if at_once else 0)
+    flags |= _TX_RESET_MULTI_IDX if anew else 0
     seconds, microseconds = divmod(round(period_s * 1e6), 1_000_000)
     can_id = frames[0].can_id
     head = _HEAD.pack(_TX_SETUP, flags, count, seconds, microseconds, 0, 0, can_id, len(frames))

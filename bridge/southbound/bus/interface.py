@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from bridge.southbound.bus.burstend import BurstEnd
 from bridge.southbound.bus.errorframe import ControllerState as ControllerState
 from bridge.southbound.bus.errorframe import describe
 from bridge.southbound.bus.frame import Frame
@@ -75,7 +76,14 @@ class Bus(Protocol):
         ...
 
     def beat(
-        self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool = False
+        self,
+        frames: tuple[Frame, ...],
+        now: float,
+        period_s: float,
+        count: int,
+        *,
+        at_once: bool = False,
+        ending: BurstEnd | None = None,
     ) -> None:
         """Send one of ``frames`` every ``period_s`` seconds, ``count`` more times.
 
@@ -84,7 +92,8 @@ class Bus(Protocol):
 
         Calling it again for the same identifier replaces the data and refills the count without moving
         the phase; ``at_once`` sends the frame immediately as well. A burst that nobody renews ends by
-        itself: that is the dead-man's handle (``docs/explanation/dead-man-chain.md``).
+        itself: that is the dead-man's handle (``docs/explanation/dead-man-chain.md``). A burst of one frame
+        may have an ``ending``: from then on its frame is sent in place of this one, still ``count`` in all.
         """
         ...
 

@@ -5,16 +5,19 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 from bridge.southbound.bus import bcm
+from bridge.southbound.bus.burstend import BurstEnd, Sequence, sequence
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.softbeat import SoftBeat
 
 _SHORTEST: Final = 4
 _RETRY_S: Final = 0.001
 _PATIENCE_S: Final = 0.01
+_ON_ITS_WAY_S: Final = 0.001
+"""A message that took longer to the kernel than this carries too many frames before the deadline."""
 _LINK_IS_GONE: Final = (errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.ENOTCONN)
 
 
@@ -27,24 +30,31 @@ class Manager(Protocol):
 
 
 @dataclass(slots=True)
-class _Job:
-    """What the kernel has taken; it surely runs until ``until``."""
-
-    frames: tuple[Frame, ...]
-    period_s: float
-    count: int
-    until: float
-
-
-@dataclass(slots=True)
 class _Wish:
-    """What the kernel has not taken yet. Without ``frames`` its burst is to end."""
+    """What the kernel is to send. Without ``frames`` its burst is to end."""
 
     frames: tuple[Frame, ...]
     period_s: float
     count: int
     at_once: bool
     since: float
+    ending: BurstEnd | None = None
+
+    def sequence(self, now: float, *, start: bool) -> Sequence:
+        """As the broadcast manager takes it."""
+        if len(self.frames) != 1:
+            return Sequence(self.frames, self.count)
+        frame = self.frames[0]
+        extra = int(self.at_once and not start)
+        return sequence(frame, self.ending, now, self.period_s, self.count, extra=extra)
+
+
+@dataclass(slots=True)
+class _Job:
+    """What the kernel has taken; it surely runs until ``until``."""
+
+    wish: _Wish
+    until: float
 
 
 class KernelBeat:
@@ -88,20 +98,27 @@ class KernelBeat:
             self._manager = None
 
     def beat(
-        self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool
+        self,
+        frames: tuple[Frame, ...],
+        now: float,
+        period_s: float,
+        count: int,
+        *,
+        at_once: bool,
+        ending: BurstEnd | None = None,
     ) -> Frame | None:
         """Start or renew a burst; gives the frame that whoever calls has to send now, if any."""
         can_id = frames[0].can_id
         # The kernel counts the first frame of a burst, so one of a frame or two ends before it can be
         # renewed. What is that slow needs no kernel: a round sends it.
         if self._manager is None or count < _SHORTEST:
-            return self._soft.beat(frames, now, period_s, count, at_once=at_once)
+            return self._soft.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
         waiting = self._wishes.get(can_id)
-        wish = _Wish(frames, period_s, count, at_once, now)
+        wish = _Wish(frames, period_s, count, at_once, now, ending)
         if waiting:
             wish.at_once, wish.since = at_once or waiting.at_once, waiting.since
         if not self._try(can_id, wish, now) and can_id in self._soft:
-            return self._soft.beat(frames, now, period_s, count, at_once=at_once)
+            return self._soft.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
         return None
 
     def silence(self, can_id: int, now: float) -> None:
@@ -132,15 +149,8 @@ class KernelBeat:
         """Tell the kernel; False where it does not take it now."""
         if self._manager is None:
             return False
-        job = self._jobs.get(can_id)
-        # Refilling keeps the phase of a burst that runs and cannot wake one that has ended.
-        runs = job is not None and job.period_s == wish.period_s and now < job.until
         try:
-            self._manager.send(_message(can_id, wish, start=not runs))
-            if job is not None and runs and job.until <= self._clock() < now + wish.count * wish.period_s:
-                # It may have ended between ``now`` and the refill. After a longer time nothing that was right
-                # then may go on.
-                self._manager.send(_message(can_id, wish, start=True))
+            count = self._hand_over(can_id, wish, now)
         except OSError as error:
             if error.errno in _LINK_IS_GONE:
                 raise
@@ -153,26 +163,56 @@ class KernelBeat:
         if not self._wishes:
             self._retry_at = None
         self._soft.silence(can_id)
-        if wish.frames:
+        if count:
             # The last frame of a burst comes up to a period before its count of periods is over.
-            until = now + (wish.count - 2) * wish.period_s
-            self._jobs[can_id] = _Job(wish.frames, wish.period_s, wish.count, until)
+            self._jobs[can_id] = _Job(wish, now + (count - 2) * wish.period_s)
         else:
             self._jobs.pop(can_id, None)
         return True
 
+    def _hand_over(self, can_id: int, wish: _Wish, now: float) -> int:
+        """Give the kernel a burst, or end it; how many frames it has got. What it counts are frames, what it
+        has to keep to is a time: where the message was long on its way, it gets a second one with fewer."""
+        job = self._jobs.get(can_id)
+        # Refilling keeps the phase of a burst that runs and cannot wake one that has ended.
+        runs = job is not None and job.wish.period_s == wish.period_s and now < job.until
+        before = max(now, self._clock()) if wish.ending else now
+        count = self._send(can_id, wish, before, start=not runs)
+        if not wish.frames or not (runs or wish.ending):
+            return count
+        after = self._clock()
+        if job is not None and runs and job.until <= after < now + wish.count * wish.period_s:
+            # It may have ended between ``now`` and the refill. After a longer time nothing that was right
+            # then may go on.
+            return self._send(can_id, wish, after, start=True)
+        if wish.ending and after - before > _ON_ITS_WAY_S:
+            return self._send(can_id, replace(wish, at_once=False), after, start=False)
+        return count
+
+    def _send(self, can_id: int, wish: _Wish, now: float, *, start: bool) -> int:
+        assert self._manager is not None
+        frames, count, head = wish.sequence(now, start=start)
+        if not count:
+            if can_id in self._jobs:  # what it does not have it refuses to delete
+                self._manager.send(bcm.delete(can_id))
+            return 0
+        if head and not start:
+            # The kernel takes the new frames before it goes back to their beginning, and may send one
+            # between the two. So it goes back first, with frames that are all alike.
+            alike = (frames[0],) * len(frames)
+            message = bcm.setup(alike, wish.period_s, head, start=False, at_once=False, anew=True)
+            self._manager.send(message)
+        at_once, anew = wish.at_once, bool(head)
+        self._manager.send(bcm.setup(frames, wish.period_s, count, start=start, at_once=at_once, anew=anew))
+        return count
+
     def _give_up(self, error: OSError, now: float) -> None:
-        going = {can_id: (job.frames, job.period_s, job.count) for can_id, job in self._jobs.items()}
-        going |= {can_id: (wish.frames, wish.period_s, wish.count) for can_id, wish in self._wishes.items()}
+        going = {can_id: job.wish for can_id, job in self._jobs.items()} | self._wishes
         self._forget_manager()
         self.refusal = error.strerror or str(error)
-        for frames, period_s, count in going.values():
-            if frames:
-                first = self._soft.beat(frames, now, period_s, count, at_once=True)
+        for wish in going.values():
+            if wish.frames:
+                first = self._soft.beat(
+                    wish.frames, now, wish.period_s, wish.count, at_once=True, ending=wish.ending
+                )
                 self._first += [first] if first else []
-
-
-def _message(can_id: int, wish: _Wish, *, start: bool) -> bytes:
-    if not wish.frames:
-        return bcm.delete(can_id)
-    return bcm.setup(wish.frames, wish.period_s, wish.count, start=start, at_once=wish.at_once)

@@ -17,6 +17,7 @@ from typing import Any, Final
 import can
 
 from bridge.errors import Unavailable
+from bridge.southbound.bus.burstend import BurstEnd
 from bridge.southbound.bus.frame import EXTENDED, REMOTE, Frame
 from bridge.southbound.bus.interface import BusStatus, ControllerState
 from bridge.southbound.bus.softbeat import SoftBeat
@@ -186,9 +187,16 @@ class PythonCanBus:
             self._status.frames_expired += 1
 
     def beat(
-        self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool = False
+        self,
+        frames: tuple[Frame, ...],
+        now: float,
+        period_s: float,
+        count: int,
+        *,
+        at_once: bool = False,
+        ending: BurstEnd | None = None,
     ) -> None:
-        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once)
+        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
         if frame is not None:
             self._send_beat(frame, now, period_s)
 

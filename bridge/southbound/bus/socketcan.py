@@ -17,6 +17,7 @@ from typing import Final
 
 from bridge.errors import Unavailable
 from bridge.southbound.bus import bcm
+from bridge.southbound.bus.burstend import BurstEnd
 from bridge.southbound.bus.cansockets import CanSockets
 from bridge.southbound.bus.errorframe import judge
 from bridge.southbound.bus.explain import WrongBitrate, explain
@@ -234,10 +235,17 @@ class SocketCanBus:
         self._status.frames_expired += self._outbox.clear()
 
     def beat(
-        self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool = False
+        self,
+        frames: tuple[Frame, ...],
+        now: float,
+        period_s: float,
+        count: int,
+        *,
+        at_once: bool = False,
+        ending: BurstEnd | None = None,
     ) -> None:
         try:
-            first = self._beats.beat(frames, now, period_s, count, at_once=at_once)
+            first = self._beats.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
         except OSError as error:
             self._break_down(error, now)
             return

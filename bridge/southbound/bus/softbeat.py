@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.southbound.bus.burstend import BurstEnd
 from bridge.southbound.bus.frame import Frame
 
 _SYNC: Final = 0x080
@@ -16,9 +17,13 @@ class _Job:
     period_s: float
     left: int
     due: float
+    ending: BurstEnd | None
     place: int = 0
 
-    def take(self) -> Frame:
+    def take(self, now: float) -> Frame | None:
+        """The next frame; None where the burst has ended."""
+        if self.ending is not None and now >= self.ending.at:
+            return self.ending.frame
         frame = self.frames[self.place]
         self.place = (self.place + 1) % len(self.frames)
         return frame
@@ -31,18 +36,26 @@ class SoftBeat:
         self._jobs: dict[int, _Job] = {}
 
     def beat(
-        self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool
+        self,
+        frames: tuple[Frame, ...],
+        now: float,
+        period_s: float,
+        count: int,
+        *,
+        at_once: bool,
+        ending: BurstEnd | None = None,
     ) -> Frame | None:
         """Start or renew; gives the frame that is to be sent right now."""
         job = self._jobs.get(frames[0].can_id)
         if job is None or job.period_s != period_s:
-            job = self._jobs[frames[0].can_id] = _Job(frames, period_s, count - 1, now + period_s)
-            return job.take()
+            job = self._jobs[frames[0].can_id] = _Job(frames, period_s, count - 1, now + period_s, ending)
+            return job.take(now)
         if len(frames) != len(job.frames):
             job.place = 0
         job.frames = frames
         job.left = count
-        return job.take() if at_once else None
+        job.ending = ending
+        return job.take(now) if at_once else None
 
     def __contains__(self, can_id: int) -> bool:
         return can_id in self._jobs
@@ -65,7 +78,11 @@ class SoftBeat:
             if job.left <= 0:
                 del self._jobs[can_id]
                 continue
-            frames.append(job.take())
+            frame = job.take(now)
+            if frame is None:
+                del self._jobs[can_id]
+                continue
+            frames.append(frame)
             job.left -= 1
             missed = int((now - job.due) / job.period_s)
             job.left -= missed

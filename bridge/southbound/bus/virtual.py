@@ -7,6 +7,7 @@ import random
 from collections import deque
 from collections.abc import Callable
 
+from bridge.southbound.bus.burstend import BurstEnd
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import BusStatus, ControllerState
 from bridge.southbound.bus.softbeat import SoftBeat
@@ -123,9 +124,16 @@ class VirtualBus:
         self._wire.put(frame, self, now)
 
     def beat(
-        self, frames: tuple[Frame, ...], now: float, period_s: float, count: int, *, at_once: bool = False
+        self,
+        frames: tuple[Frame, ...],
+        now: float,
+        period_s: float,
+        count: int,
+        *,
+        at_once: bool = False,
+        ending: BurstEnd | None = None,
     ) -> None:
-        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once)
+        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
         if frame is not None:
             self._send_beat(frame, now)
 

@@ -147,8 +147,8 @@ class TestPoints:
         assert hall.plant.image.read("bridge/version").value == "1.2.3"
         assert hall.plant.image.read("bridge/drives_configured").value == 2
 
-    def test_the_worst_case_is_the_time_out_one_cycle_and_the_bridges_own(self, hall: Hall):
-        assert hall.value("supervision/worst_case_stop_ms") == 200 + 10 + 20
+    def test_the_worst_case_is_the_time_out_two_cycles_and_the_bridges_own(self, hall: Hall):
+        assert hall.value("supervision/worst_case_stop_ms") == 25 + 200 + 20 + 10 + 10
         assert hall.plant.image.read("conveyor/infeed/supervision/worst_case_stop_ms").value == 0
 
 

@@ -105,7 +105,7 @@ def test_the_published_time_has_the_drives_own_in_it(tmp_path: Path, mapping: st
         path = site(tmp_path, mapping, (slot, drive), node=ON)
         project = load_project(path)
         (case,) = lint(project.site, project.families, path, project.downloads).worst_cases
-        return case.controller_ms
+        return case.stop.ms
 
     assert worst_ms(SILENT[0]) == worst_ms("") + 300
     assert worst_ms(SILENT[1]) == worst_ms("")

@@ -86,7 +86,7 @@ def test_further_points_come_after_the_scaled_values_as_they_are_listed():
     rows = {row.name: row for row in DriveMap(rig.fu1).inputs}
     downtime, stop = rows["supervision/telegram_downtime_s"], rows["supervision/worst_case_stop_ms"]
     assert rig.read(4, downtime.address, 2) == list(float_words(0.5))
-    assert (stop.type, rig.read(4, stop.address, 2)) == ("uint32", [0, 200 + 10 + 20])
+    assert (stop.type, rig.read(4, stop.address, 2)) == ("uint32", [0, 25 + 200 + 20 + 10 + 10])
     assert rig.read(4, rows["identity/serial"].address, 2) == [NOT_RESPONDING]  # not read from the node yet
 
 

@@ -237,6 +237,9 @@ def test_without_sync_a_synchronous_pdo_is_reported(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path, bus="sync_period_ms = 0", drive="rpdo = { transmission_type = 1 }"))
     bench.run(1.0)
     assert "RPDO of type 1 waits for SYNC" in str(bench.value("conveyor/node/boot_status"))
+    reading = bench.plant.image.read("conveyor/fu1/supervision/worst_case_stop_ms")
+    assert reading.quality is Quality.CONFIG_ERROR
+    assert "waits for a SYNC that somebody else sends" in reading.reason
 
 
 ENABLE_TPDO5 = 'configure = [{ object = "1804:01", type = "uint32", value = 0x400001C5 }]'

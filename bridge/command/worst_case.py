@@ -1,0 +1,120 @@
+"""How long a drive may still be enabled after the last telegram of its owner, term by term. Pure.
+
+What each term is, and what is in none of them: ``docs/explanation/dead-man-chain.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.command.freshness import way_ms
+from bridge.config import IGNORE_ALL_S, BusTable, DriveTable
+
+REACTION_BOUND_MS: Final = 20
+"""How late the bridge may be itself, or the kernel's timer in its place."""
+_THREAD_QUEUE_MS: Final = 50.0
+"""How long a frame may wait for python-can's thread (``bus/pythoncan.py``)."""
+_KERNEL: Final = ("socketcan", "virtual")
+_LAST_SYNCHRONOUS: Final = 240
+_ROUNDING: Final = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """One summand: its name, and what takes this long."""
+
+    name: str
+    ms: float
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.ms:.3g}" if self.ms < 1 else f"{self.name} {self.ms:g}"
+
+
+@dataclass(frozen=True, slots=True)
+class StopTime:
+    """The sum. Without ``terms`` nothing stops the drive, or it is ``unknown`` why that takes how long."""
+
+    terms: tuple[Term, ...] = ()
+    unknown: str = ""
+
+    @property
+    def ms(self) -> int:
+        """Rounded up; 0 where there is none."""
+        return math.ceil(sum(term.ms for term in self.terms) - _ROUNDING)
+
+    def __str__(self) -> str:
+        if self.unknown:
+            return f"not known: {self.unknown}"
+        return f"{self.ms} ms" if self.terms else "never"
+
+    @property
+    def sum(self) -> str:
+        """The summands in one line."""
+        return " + ".join(str(term) for term in self.terms)
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """What a drive's RPDOs take on their bus, and what may be before them there. ``before_ms`` is None where
+    nothing bounds it."""
+
+    frames_ms: float = 0.0
+    before_ms: float | None = 0.0
+
+
+def stop_time(
+    table: DriveTable,
+    bus: BusTable,
+    timeout_ms: int,
+    transmission_type: int,
+    wire: Wire,
+    own_ms: float = 0.0,
+) -> StopTime:
+    """From the owner's last telegram to the last frame that enables the drive, and to the first that does
+    not. ``transmission_type`` is that of the RPDO with the control word. With silence the reaction is the
+    drive's own, ``own_ms`` after its last RPDO; 0 where it has none."""
+    if not timeout_ms or table.telegram_downtime_s == IGNORE_ALL_S or table.on_expiry == "hold":
+        return StopTime()
+    if table.on_expiry == "silence" and not own_ms:
+        return StopTime()
+    sync_ms = sync_wait_ms(bus, transmission_type)
+    is_synchronous = transmission_type <= _LAST_SYNCHRONOUS
+    if is_synchronous and not bus.sync_period_ms:
+        return StopTime(
+            unknown=f"its RPDO of transmission type {transmission_type} waits for a SYNC that somebody else "
+            "sends (sync_period_ms = 0)"
+        )
+    if wire.before_ms is None:
+        return StopTime(unknown="the predicted load of its bus is more than 100 %")
+    terms = [
+        *_before_the_bus(table, bus, timeout_ms),
+        Term("before_ms", wire.before_ms, "frames that may go first on the bus at the predicted load"),
+        Term("frames_ms", wire.frames_ms, "the drive's own RPDOs on the wire"),
+    ]
+    if is_synchronous:
+        terms.append(Term("sync_ms", sync_ms, "until the SYNC that takes the RPDO over"))
+        terms.append(Term("sync_late_ms", wire.before_ms, "frames that may go before SYNC"))
+    if table.on_expiry == "silence":
+        terms.append(Term("own_ms", own_ms, "the drive's own time-out, which stops it without RPDOs"))
+    return StopTime(tuple(term for term in terms if term.ms))
+
+
+def sync_wait_ms(bus: BusTable, transmission_type: int) -> int:
+    """How long an RPDO of this type waits for the SYNC with which it is taken over (CiA 301 §7.5.2.35)."""
+    return max(1, transmission_type) * bus.sync_period_ms if transmission_type <= _LAST_SYNCHRONOUS else 0
+
+
+def _before_the_bus(table: DriveTable, bus: BusTable, timeout_ms: int) -> Iterator[Term]:
+    period_ms = 1000 * bus.rpdo_period_s
+    way = "how much older the owner's last telegram may be than it is taken for"
+    yield Term("way_ms", way_ms(table.control), way)
+    yield Term("timeout_ms", timeout_ms, "the owner's time-out, fieldbus_timeout_ms")
+    yield Term("reaction_ms", REACTION_BOUND_MS, "the bridge's own lateness, or that of the kernel's timer")
+    yield Term("burst_ms", period_ms, "the kernel counts frames: the time-out is rounded up to a whole one")
+    yield Term("period_ms", period_ms, "the next frame of the burst, with the stop")
+    if bus.interface not in _KERNEL:
+        yield Term("queue_ms", _THREAD_QUEUE_MS, "frames that wait for the interface")

@@ -1,0 +1,47 @@
+"""What may be on the bus before a frame of ours, at the predicted load."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from bridge.command.worst_case import Wire
+from bridge.lint.bus import BusView, DriveView
+from bridge.lint.load import longest_bits, streams
+
+_LONGEST_BYTES: Final = 8
+_LONGEST_S: Final = 10.0
+"""A bus that is busy for this long without a pause is full."""
+
+
+def wire_of(bus: BusView, drive: DriveView, busy_bits: int | None) -> Wire:
+    """``busy_bits`` is that of the bus."""
+    rate = bus.table.bitrate
+    own_bits = sum(longest_bits(pdo.length) for pdo in drive.rpdos if pdo.sent)
+    # The drive's own RPDOs are among them.
+    before_ms = None if busy_bits is None else 1000 * max(0, busy_bits - own_bits) / rate
+    return Wire(1000 * own_bits / rate, before_ms)
+
+
+def busy_bits(bus: BusView) -> int | None:
+    """How many bits may follow each other without a pause; None where the bus never comes to rest.
+
+    The queue of a CAN interface is served in its order: a frame of ours with a low identifier may wait
+    behind one that loses against everybody (an SDO request, say). So all that is regular on the bus may go
+    first, and one frame that is under way already, the longest: the fixed point of what is asked for while
+    all that lasts.
+    """
+    under_way = longest_bits(_LONGEST_BYTES)
+    rate = bus.table.bitrate
+    loads = [(longest_bits(one.length), one.period_s or one.shortest_s) for one in streams(bus)]
+    busy = under_way + sum(bits for bits, _ in loads)
+    while busy < _LONGEST_S * rate:
+        frames = (
+            bits * max(1, math.ceil(busy / rate / every_s - 1e-9)) if every_s else bits
+            for bits, every_s in loads
+        )
+        longer = under_way + sum(frames)
+        if longer == busy:
+            return busy
+        busy = longer
+    return None

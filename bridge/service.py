@@ -77,7 +77,7 @@ class Service:
             (make_bus(table), Network(table, self.plant, clock.epoch_ns, project.downloads))
             for table in site.bus
         ]
-        self.master = Master(networks, self.plant, clock.now, self.notifier.alive, alarm)
+        self.master = Master(networks, self.plant, clock.now, self.notifier.alive, alarm, clock.suspended_s)
         self.modbus = ModbusServer(self.plant, site.modbus, clock.now) if site.modbus else None
         self.zenoh = (
             ZenohServer(self.plant, site.zenoh, site.site.name, clock.now, clock.epoch_ns)
@@ -187,7 +187,7 @@ class Service:
         for load in verdict.loads:
             _log.info("%s", load)
         for case in verdict.worst_cases:
-            self.plant.drives[case.drive].wire = case.wire
+            self.plant.drives[case.drive].on_wire(case.wire, clock.now())
 
     async def _stop(self) -> None:
         self.halt()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import tempfile
 from collections.abc import Callable
 from functools import partial
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 SiteArgument = Annotated[Path, typer.Argument(metavar="SITE", help="the site file")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="log more")]
+_log = logging.getLogger(__name__)
 _DEMO_MOVES = (
     ("conveyor/fu4", "frequency", 40.0),
     ("pump/drive", "velocity", 1200.0),
@@ -125,8 +127,13 @@ async def _serve(
     ready: Callable[[], None] = lambda: None,
 ) -> None:
     """The service, with simulated nodes on its virtual buses."""
+    from bridge.memory import lock_memory
     from bridge.service import Service, make_bus
     from bridge.southbound.standstill import SignalAlarm
+
+    why_not = lock_memory()
+    if why_not:
+        _log.info("memory is not locked: %s", why_not)
 
     simulations: list[Simulation] = []
 

@@ -68,6 +68,10 @@ class DriveChannel:
         nothing where they are."""
         self._leg.why_lacking = why_lacking
 
+    def on_trip(self, tripped: Callable[[float], None]) -> None:
+        """Call this with the deadline whenever the watchdog trips."""
+        self._leg.tripped = tripped
+
     # what others may see
 
     @property

@@ -71,6 +71,8 @@ class ControllerLeg:
         self._decoder = TelegramDecoder(name, family, slot, scales, unserved)
         self.why_lacking: Callable[[frozenset[int], float], str] = lambda places, now: ""
         """Why these actual words are not known at this time, empty where they are; set by the drive."""
+        self.tripped: Callable[[float], None] = lambda due: None
+        """Called with the deadline when the watchdog has tripped."""
         self.trips = 0
         self.refused_writes = 0
 
@@ -92,9 +94,12 @@ class ControllerLeg:
 
     def judge(self, now: float) -> None:
         """Is the controller still there?"""
+        due = self.watchdog.trips_at
         effect = self.watchdog.on_time(now)
         if effect is Effect.REACT:
             self._trip(now)
+            if due is not None:
+                self.tripped(due)
         elif effect is not None and self._link.ignores_errors:
             self._status.last_fault = self._status.faults.controller_silent
             self._tell(now, Kind.WATCHDOG, 500, "the controller is silent; ignored (telegram_downtime_s)")

@@ -220,6 +220,11 @@ class Drive:
         self._refresh_supervision(now)
         self._image.set(self._bridge_ms, 0, now, Quality.CONFIG_ERROR, why)
 
+    def on_wire(self, wire: Wire, now: float) -> None:
+        """What is predicted of the drive's bus."""
+        self.wire = wire
+        self._show_stop_time(now)
+
     def on_identification(self, identification: Identification, now: float) -> None:
         self.identification = identification
         self._show(self._identity, [getattr(identification, leaf) for leaf in _IDENTITY], now)

@@ -91,6 +91,8 @@ class Plant:
         self.outputs_changed: Callable[[], None] = lambda: None
         self.eeprom_writes = Ledger()
         """How often parameters were written; whoever keeps it across restarts fills it first."""
+        self.stop_due: float | None = None
+        """Since when a tripped drive's stop is to be on the bus; whoever hands it over takes this away."""
         self.settled = 0
         """Counts up whenever what a drive is sent may have changed."""
         self.unsent: set[Drive] = set()
@@ -129,6 +131,7 @@ class Plant:
             for drive in node.drives:
                 drive.bind(self.image)
                 drive.channel.settled = partial(self._settled, node, drive)
+                drive.channel.on_trip(self._tripped)
                 self._settled(node, drive, began)
         self._deadlines.look_every_s = len(self.drives) * _LOOK_PER_DRIVE_S
         self.set("bridge/version", version, began)
@@ -139,6 +142,9 @@ class Plant:
         self._is_closing = True
         for drive in self.drives.values():
             drive.channel.on_bridge_gap(now)
+
+    def _tripped(self, due: float) -> None:
+        self.stop_due = due if self.stop_due is None else min(due, self.stop_due)
 
     def on_event(self, listener: Callable[[Event], None]) -> None:
         self._listeners.append(listener)

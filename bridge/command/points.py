@@ -285,4 +285,16 @@ def bridge_points() -> list[Point]:
             data_type=DataType.STRING,
             description="servers and fronts that do not serve at present, each with the reason",
         ),
+        Point(
+            name="bridge/worst_trip_lateness_ms",
+            data_type=DataType.FLOAT,
+            unit="ms",
+            description="longest time since start from a deadline until the stop was handed to the bus",
+        ),
+        Point(
+            name="bridge/worst_round_lateness_ms",
+            data_type=DataType.FLOAT,
+            unit="ms",
+            description="longest time since start that a round of the bus process came late",
+        ),
     ]

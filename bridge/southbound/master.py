@@ -19,10 +19,12 @@ from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import Bus, ControllerState
 from bridge.southbound.canopen.sync import burst_length
 from bridge.southbound.ending import Ending, end, waits_for
+from bridge.southbound.lateness import Lateness
 from bridge.southbound.network import Beats, Network
 from bridge.southbound.process_data import Beat
 from bridge.southbound.ratelimit import RateLimit
 from bridge.southbound.standstill import Alarm
+from bridge.southbound.suspend import SuspendWatch
 from bridge.southbound.timer import LoopTimer
 
 _log = logging.getLogger(__name__)
@@ -104,7 +106,8 @@ class Master:
     """Runs any number of networks on their buses in one event loop.
 
     ``clock`` gives monotonic seconds; ``alive`` is called at the end of every complete round; ``alarm`` tells
-    of a standstill while frames are handed to the bus.
+    of a standstill while frames are handed to the bus; ``suspended`` bounds the time for which the
+    machine has been suspended.
     """
 
     def __init__(
@@ -114,12 +117,16 @@ class Master:
         clock: Callable[[], float],
         alive: Callable[[float], None] = lambda now: None,
         alarm: Alarm | None = None,
+        suspended: Callable[[], tuple[float, float]] = lambda: (0.0, 0.0),
     ) -> None:
         self._lines = [_Line(bus, network) for bus, network in lines]
         self._plant = plant
         self._clock = clock
         self._alive = alive
         self._alarm = alarm or Alarm()
+        self._suspend = SuspendWatch(suspended)
+        self._lateness = Lateness(plant)
+        self._due: float | None = None
         self._timer: LoopTimer | None = None
         self._set_timer: Callable[[float], None] = lambda at: None
         self._refresh_at = 0.0
@@ -234,6 +241,9 @@ class Master:
         """One round: drain, judge, send, renew."""
         now = self._clock()
         self._check_gap(now)
+        if self._due is not None:
+            self._lateness.on_round(self._due, now)
+            self._due = None
         for line in self._lines:
             frames = line.bus.drain(now)
             if frames:
@@ -246,6 +256,7 @@ class Master:
         if now >= self._refresh_at:
             self._refresh_at = now + _REFRESH_S
             self._plant.refresh(now)
+            self._lateness.refresh(now)
             for line in self._lines:
                 line.network.refresh(line.bus.status, now)
         # A process that was stopped since the round began must not send what was right then.
@@ -257,6 +268,9 @@ class Master:
             self._flush(line, now)
             if not self._stood_still(line, now):
                 line.bus.on_time(now)
+        if self._plant.stop_due is not None:
+            self._lateness.on_stop(self._plant.stop_due, self._clock())
+            self._plant.stop_due = None
         self._last_round = now
         self._alive(now)
         self._arm(now)
@@ -268,15 +282,18 @@ class Master:
 
     def _check_gap(self, now: float) -> None:
         """The process was not there for longer than the dead-man time: its bursts have ended meanwhile,
-        and nothing that was moving goes on by itself."""
+        and nothing that was moving goes on by itself. Nor does it where the whole machine was suspended."""
+        slept_s = self._suspend.take()
         if self._last_round is None:
             return
         pause_s = now - self._last_round
-        hung = [line for line in self._lines if pause_s * 1000 > line.network.bus.deadman_ms]
+        hung = [line for line in self._lines if slept_s or pause_s * 1000 > line.network.bus.deadman_ms]
         if not hung:
             return
         self.gaps += 1
         message = f"the bridge hung for {pause_s * 1000:.0f} ms; all drives were left without commands"
+        if slept_s:
+            message = f"the machine was suspended for {slept_s:.1f} s; all drives were left without commands"
         for line in hung:
             self._plant.report(Event(now, Kind.BUS, line.bus.name, 900, message))
             for node in line.network.nodes:
@@ -371,4 +388,5 @@ class Master:
             # Also with the bus down: a round that comes too late means that the process hung.
             times.append(max(line.renew_at, now) if line.was_up else now + _REFRESH_S / _RENEWALS)
             times += [t for t in (line.network.next_deadline(), line.bus.next_deadline()) if t is not None]
-        self._set_timer(min(times))
+        self._due = max(min(times), now)
+        self._set_timer(self._due)

@@ -6,6 +6,7 @@ import pytest
 
 from bridge.command import Action, Code, Drive, Event, Identification, Kind, Outcome, Request
 from bridge.command.link import NodeState
+from bridge.command.worst_case import Wire
 from bridge.image import Quality, Reading, Value
 from tests.support import sites
 from tests.support.rig import (
@@ -150,6 +151,15 @@ class TestPoints:
     def test_the_worst_case_is_the_time_out_two_cycles_and_the_bridges_own(self, hall: Hall):
         assert hall.value("supervision/worst_case_stop_ms") == 25 + 200 + 20 + 10 + 10
         assert hall.plant.image.read("conveyor/infeed/supervision/worst_case_stop_ms").value == 0
+
+    def test_what_is_predicted_of_its_bus_is_in_the_worst_case_at_once(self, hall: Hall):
+        before = hall.value("supervision/worst_case_stop_ms")
+        hall.plant.drives["conveyor/fu1"].on_wire(Wire(frames_ms=0.5, before_ms=5.1), 1.0)
+        assert hall.value("supervision/worst_case_stop_ms") == before + 6
+        hall.plant.drives["conveyor/fu1"].on_wire(Wire(frames_ms=0.5, before_ms=None), 2.0)
+        reading = hall.plant.image.read("conveyor/fu1/supervision/worst_case_stop_ms")
+        assert reading.quality is Quality.CONFIG_ERROR
+        assert "more than 100 %" in reading.reason
 
 
 class TestData:

@@ -1,0 +1,45 @@
+"""How late the bridge itself was at worst: an event where it was later than what is published allows."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.command import Event, Kind, Plant
+from bridge.command.worst_case import REACTION_BOUND_MS
+from bridge.southbound.ratelimit import RateLimit
+
+_EVENTS: Final = 3
+_EVENT_EVERY_S: Final = 60.0
+_SEVERITY: Final = 700
+
+
+class Lateness:
+    """Times are monotonic seconds. The worst of a trip is from its deadline until its stop was handed to the
+    bus, that of a round from when it was to begin."""
+
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
+        self._trip_ms = 0.0
+        self._round_ms = 0.0
+        self._trip_limit = RateLimit(_EVENTS, _EVENT_EVERY_S)
+        self._round_limit = RateLimit(_EVENTS, _EVENT_EVERY_S)
+
+    def on_round(self, due: float, now: float) -> None:
+        late_ms = 1000 * (now - due)
+        self._round_ms = max(self._round_ms, late_ms)
+        if late_ms > REACTION_BOUND_MS and self._round_limit.allows(now):
+            self._tell(f"a round came {late_ms:.0f} ms late", now)
+
+    def on_stop(self, due: float, now: float) -> None:
+        late_ms = 1000 * (now - due)
+        self._trip_ms = max(self._trip_ms, late_ms)
+        if late_ms > REACTION_BOUND_MS and self._trip_limit.allows(now):
+            self._tell(f"the stop of a silent controller's drive was handed over {late_ms:.0f} ms late", now)
+
+    def _tell(self, what: str, now: float) -> None:
+        message = f"{what}; {REACTION_BOUND_MS} ms are allowed for"
+        self._plant.report(Event(now, Kind.WATCHDOG, "bridge", _SEVERITY, message))
+
+    def refresh(self, now: float) -> None:
+        self._plant.set("bridge/worst_trip_lateness_ms", round(self._trip_ms, 1), now)
+        self._plant.set("bridge/worst_round_lateness_ms", round(self._round_ms, 1), now)

@@ -1,0 +1,29 @@
+"""Whether the machine was suspended: then CLOCK_BOOTTIME goes on and CLOCK_MONOTONIC does not. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+_NOTICEABLE_S: Final = 0.01
+
+
+class SuspendWatch:
+    """``look`` gives two numbers of seconds between which the time lies that the machine has been suspended
+    since it was booted: two clocks cannot be read at once, and the process may be held up between them."""
+
+    __slots__ = ("_at_most", "_look")
+
+    def __init__(self, look: Callable[[], tuple[float, float]]) -> None:
+        self._look = look
+        self._at_most = look()[1]
+
+    def take(self) -> float:
+        """How many seconds it was suspended since the last time this was asked; 0 where it was not."""
+        at_least, at_most = self._look()
+        slept_s = at_least - self._at_most
+        if slept_s > _NOTICEABLE_S:
+            self._at_most = at_most
+            return slept_s
+        self._at_most = min(self._at_most, at_most)
+        return 0.0

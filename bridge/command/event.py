@@ -17,6 +17,7 @@ class Kind(StrEnum):
     BUS = "bus"
     CONFIGURATION = "configuration"
     FRONT = "front"
+    INTRUDER = "intruder"
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +32,7 @@ class Event:
     message: str
 
 
-_REPEATING: Final = frozenset((Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION))
+_REPEATING: Final = frozenset((Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION, Kind.INTRUDER))
 _MOST_A_SECOND: Final = 10
 
 

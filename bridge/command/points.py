@@ -269,6 +269,17 @@ def bus_points(bus: BusTable) -> list[Point]:
             data_type=u32,
             description="synchronous TPDOs that came after the SYNC window",
         ),
+        Point(
+            name=f"{top}/intruders",
+            data_type=u32,
+            description="frames of others on identifiers that are the bridge's alone",
+        ),
+        Point(name=f"{top}/last_intruder", data_type=DataType.STRING, description="the latest one in words"),
+        Point(
+            name=f"{top}/passive",
+            data_type=DataType.BOOL,
+            description="another bridge is in charge of the bus: this one only listens",
+        ),
     ]
 
 

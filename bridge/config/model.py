@@ -27,6 +27,7 @@ MandatoryMissing = Literal["go_on", "hold_all", "stop_all"]
 Control = Literal["modbus", "opcua", "zenoh", "lease", "none"]
 Reaction = Literal["disable_voltage", "quick_stop", "stop", "silence", "hold"]
 OnIgnoredStop = Literal["stop_node", "reset_node", "report"]
+OnIntruder = Literal["stop_node", "stop_all", "report"]
 ParameterRights = Literal["write", "read"]
 WordOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
 
@@ -334,6 +335,7 @@ class BusTable(Table):
     reset_at_start: Literal["none", "communication", "node"] = Field(
         "none", description="none, communication or node"
     )
+    on_intruder: OnIntruder = Field("stop_node", description="stop_node, stop_all or report")
     node: list[NodeTable] = Field(default_factory=list[NodeTable])
 
     @property

@@ -249,6 +249,9 @@ class Master:
             if frames:
                 line.network.on_frames(frames, now)
                 self._plant.on_readings()
+            foreign = line.bus.take_foreign(now)
+            if foreign:
+                line.network.on_foreign(foreign, now)
         self._plant.on_time(now)
         for line in self._lines:
             line.network.on_time(now)
@@ -296,6 +299,7 @@ class Master:
             message = f"the machine was suspended for {slept_s:.1f} s; all drives were left without commands"
         for line in hung:
             self._plant.report(Event(now, Kind.BUS, line.bus.name, 900, message))
+            line.network.came_back(now)
             for node in line.network.nodes:
                 for drive in node.node.drives:
                     drive.channel.on_bridge_gap(now)
@@ -313,6 +317,7 @@ class Master:
                 line.beating.clear()
                 line.renew_at = now
                 line.network.bus_is_gone(now)
+                line.network.bus_is_back(now)
         if is_up == line.was_up:
             return
         line.was_up = is_up
@@ -352,6 +357,7 @@ class Master:
         routes = network.take_routes()
         if routes is not None:
             bus.accept(routes)
+            bus.watch(network.ours)
         for frame in network.take_frames():
             bus.send(frame, now, now + _SEND_LIMIT_S)
         if not line.was_up:

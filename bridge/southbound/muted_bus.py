@@ -37,6 +37,12 @@ class MutableBus:
         self._accepted = can_ids
         self._bus.accept([*can_ids, *self._beating.difference(can_ids)])
 
+    def watch(self, can_ids: frozenset[int]) -> None:
+        self._bus.watch(can_ids)
+
+    def take_foreign(self, now: float) -> list[Frame]:
+        return self._bus.take_foreign(now)
+
     def drain(self, now: float) -> list[Frame]:
         frames = self._bus.drain(now)
         for frame in frames:

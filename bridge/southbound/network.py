@@ -20,6 +20,9 @@ from bridge.southbound.canopen import cobid, nmt
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
 from bridge.southbound.canopen.sync import SyncWindow, sync_frames
 from bridge.southbound.canopen.time_stamp import TimeProducer
+from bridge.southbound.charge import Charge
+from bridge.southbound.intruders import Intruders
+from bridge.southbound.listening import Listening
 from bridge.southbound.neighbours import Neighbour
 from bridge.southbound.node import NodeCore
 from bridge.southbound.node_wire import Handler
@@ -51,8 +54,10 @@ class Network:
         plant: Plant,
         epoch_ns: Callable[[float], int] | None = None,
         downloads: Mapping[str, Sequence[Download]] = NOTHING,
+        listening: Listening | None = None,
     ) -> None:
-        """``downloads`` has the configuration of nodes that a file gives, by the node's name."""
+        """``downloads`` has the configuration of nodes that a file gives, by the node's name. ``listening``
+        is as the bus has it, unless given."""
         self.bus = bus
         self._plant = plant
         self.nodes = [
@@ -68,16 +73,20 @@ class Network:
         self._schedule = Schedule(self.nodes)
         own_id = bus.master_node_id if bus.heartbeat_ms else None
         known = {node.table.id: node.node.name for node in self.nodes}
-        self._watch = BusWatch(bus.name, own_id, lambda: self.nmt_state, known, plant)
+        self.charge = Charge(bus, self.nodes, plant, self._forget_bus, listening)
+        self._watch = BusWatch(bus.name, own_id, self.charge.acts, known, plant)
+        self._intruders = Intruders(bus, self.nodes, plant, self.charge.acts, self._stop_nodes)
+        self.ours: frozenset[int] = frozenset()
+        """Identifiers on which nobody else may send what we repeat; brought up to date by ``take_routes``."""
         self._has_booted = False
         self._nmt_for_all: Frame | None = None
-        plant.bus_commands[f"bus/{bus.name}"] = self.command
+        plant.bus_commands[f"bus/{bus.name}"] = self.charge.guarded(self.command)
         self.unrouted = 0
         self._routes_changed = True
         self._routes: dict[int, Handler] = {}
         self._routings = 0
         self._beats: Beats = {}
-        self._beats_for: tuple[int, int, NmtState] | None = None
+        self._beats_for: tuple[int, int, NmtState, bool] | None = None
         self._measured: tuple[float, int] | None = None
         self._sync = sync_frames(bus.sync_counter)
         self._window = SyncWindow(bus.sync_window_us / 1e6) if bus.sync_window_us else None
@@ -97,6 +106,16 @@ class Network:
                 handler(frame)
         self._pump(now)
 
+    def on_foreign(self, frames: list[Frame], now: float) -> None:
+        """What others have sent on identifiers that are ours."""
+        for frame in frames:
+            if frame.can_id == cobid.ERROR_CONTROL + self.bus.master_node_id:
+                self._watch.on_own_id(now)
+            if self._intruders.is_sign(frame, acts=self.charge.acts()):
+                self.charge.heard(self._intruders.name(frame), now)
+            self._intruders.on_frame(frame)
+        self._pump(now)
+
     def _pump(self, now: float) -> None:
         """Let every boot-up go on to which something has happened, and start who may start."""
         while touched := self._schedule.take_touched():
@@ -113,6 +132,9 @@ class Network:
                 self._schedule.plan(node)
 
     def on_time(self, now: float) -> None:
+        self.charge.on_time(now)
+        if not self.charge.acts():
+            return
         if not self._has_booted:
             self._boot_up(now)
         if self._time:
@@ -124,8 +146,21 @@ class Network:
         self._pump(now)
 
     def next_deadline(self) -> float | None:
+        if not self.charge.acts():
+            return self.charge.next_deadline()
         times = (self._schedule.next_deadline(), self._time.next_deadline() if self._time else None)
         return min((time for time in times if time is not None), default=None)
+
+    def came_back(self, now: float) -> None:
+        """The bridge was away for longer than its bursts last."""
+        self.charge.came_back(now)
+
+    def _stop_nodes(self, nodes: Sequence[NodeCore], why: str, now: float) -> None:
+        are_all = len(nodes) == len(self.nodes) > 1
+        for node in nodes:
+            node.carry_out_command(Action.STOP_NODE, why, now, send=not are_all)
+        if are_all:
+            self._nmt_for_all = nmt.command(NmtCommand.STOP, 0)
 
     # NMT
 
@@ -190,6 +225,9 @@ class Network:
     def take_frames(self) -> list[Frame]:
         """Frames to be sent once, now."""
         frames, self._frames = self._frames, []
+        if not self.charge.acts():
+            self._nmt_for_all = None
+            return []
         if self._nmt_for_all:
             # Last: the stopped words of the drives go before it.
             frames.append(self._nmt_for_all)
@@ -206,6 +244,8 @@ class Network:
         for node in self.nodes:
             node.wire.routes_changed = False
             self._routes.update(node.wire.routes)
+        self.ours = self._intruders.watched(self._routes)
+        self._routes |= self._intruders.routes(self._routes)
         if self._window:
             self._judge_by_window(self._window)
         return list(self._routes)
@@ -232,7 +272,7 @@ class Network:
         A drive's settling, a node's new PDOs and our own state change them; asked ``anew``, every drive is
         looked at.
         """
-        made_for = self._plant.settled, self._routings, self.nmt_state
+        made_for = self._plant.settled, self._routings, self.nmt_state, self.charge.acts()
         if anew or made_for != self._beats_for:
             self._beats_for = made_for
             self._beats = self._make_beats()
@@ -240,6 +280,8 @@ class Network:
 
     def _make_beats(self) -> Beats:
         beats: Beats = {}
+        if not self.charge.acts():
+            return beats
         # The state before that is said once, by the boot-up message.
         if self.bus.heartbeat_ms and self._has_booted:
             frame = Frame(cobid.ERROR_CONTROL + self.bus.master_node_id, bytes((self.nmt_state,)))
@@ -266,17 +308,22 @@ class Network:
                     self._plant.on_handed_over(drive, now)
 
     def bus_is_gone(self, now: float) -> None:
+        self.charge.bus_is_gone()
+        self._forget_bus(now)
+
+    def _forget_bus(self, now: float, why: str = "the bus is down") -> None:
         self._frames.clear()
         if self._window:
             self._window.reset()
         self._has_booted = False
         self._nmt_for_all = None
         for node in self.nodes:
-            node.bus_is_gone(now)
+            node.bus_is_gone(now, why)
             self._schedule.touch(node)
 
     def bus_is_back(self, now: float) -> None:
         """What was written while the bus was gone does not go out first."""
+        self.charge.bus_is_back(now)
         for node in self.nodes:
             node.stop_drives(now)
 
@@ -296,6 +343,9 @@ class Network:
         self._plant.set(f"{top}/nmt_state", int(self.nmt_state), now)
         self._plant.set(f"{top}/held_by", ", ".join(self._gate.missing), now)
         self._watch.refresh(now)
+        self._plant.set(f"{top}/intruders", self._intruders.count, now)
+        self._plant.set(f"{top}/last_intruder", self._intruders.last, now)
+        self._plant.set(f"{top}/passive", self.charge.is_left, now)
         for node in self.nodes:
             node.wire.refresh(now)
             # Whoever has asked it for something meanwhile: its deadlines are looked at.

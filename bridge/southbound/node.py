@@ -314,8 +314,8 @@ class NodeCore:
         if begins_again or self.state is NodeState.CONFIG_ERROR:
             self.boot_at = now + BETWEEN_BOOTS_S
 
-    def bus_is_gone(self, now: float) -> None:
-        """The bus is down: everything on it is lost at once."""
+    def bus_is_gone(self, now: float, why: str = "the bus is down") -> None:
+        """The bus is down, or another's: everything on it is lost at once."""
         self.error_control.state = NmtState.UNKNOWN
         self.stop_drives(now)
         self.wire.clear()
@@ -325,7 +325,7 @@ class NodeCore:
             # Who was stopped on purpose is not started by a bus that comes back.
             return
         if self.state is not NodeState.ABSENT:
-            self.say("lost: the bus is down", now)
+            self.say(f"lost: {why}", now)
             self.set_state(NodeState.LOST, now)
         self.leave_operation(now)
         self.has_concluded = False

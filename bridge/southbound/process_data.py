@@ -119,10 +119,24 @@ class Tpdo:
 class Rpdo:
     """Packs one RPDO of a drive from the channel's output."""
 
-    __slots__ = ("_codec", "_last", "_last_words", "_map", "_packed", "_words", "cob_id")
+    __slots__ = (
+        "_codec",
+        "_count",
+        "_has_control_word",
+        "_last",
+        "_last_words",
+        "_map",
+        "_packed",
+        "_words",
+        "cob_id",
+        "is_synchronous",
+    )
 
     def __init__(self, plan: PdoPlan, words: int) -> None:
         self.cob_id = plan.cob_id
+        self.is_synchronous = plan.transmission_type <= LAST_SYNCHRONOUS
+        self._count = words
+        self._has_control_word = any(place is not None and place.word == 0 for place in plan.places)
         self._codec = plan.codec
         self._map = WordMap(plan.codec.entries, plan.places, words)
         self._words: Sequence[int] = ()
@@ -149,6 +163,14 @@ class Rpdo:
     def frame(self, words: Sequence[int]) -> Frame:
         """The frame that carries these words, the control word first; what is mapped beside them is 0."""
         return Frame(self.cob_id, self._codec.pack(self._map.pack(words)))
+
+    def control_word(self, data: bytes) -> int | None:
+        """The control word of a frame with this data; None where it has none."""
+        if not self._has_control_word or len(data) < self._codec.length:
+            return None
+        words = [0] * self._count
+        self._map.unpack(self._codec.unpack(data[: self._codec.length]), words)
+        return words[0]
 
 
 class DrivePdos:

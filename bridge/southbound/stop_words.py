@@ -42,6 +42,12 @@ class StopWords:
         """Identifiers of PDOs that the site's files give this node: no other node's stop goes there."""
         return self._given_ids
 
+    def plans(self, drive: Drive) -> dict[int, PdoPlan]:
+        """The RPDOs under which this drive may listen, by their COB-IDs."""
+        # Of one identifier what the node itself has said of it counts, and that comes last.
+        plans = [*self._known[drive.name], *self._memory.rpdos_of(drive.name)]
+        return {plan.cob_id: plan for plan in plans}
+
     def frames(self, connected: Mapping[str, DrivePdos], is_foreign: IsForeign) -> list[Frame]:
         """A stop for every drive and no setpoints: by its PDOs what stops it at present, which may be a ramp;
         where they are not known a stopped word. Identifiers of other nodes (``is_foreign``) are left alone.
@@ -54,11 +60,9 @@ class StopWords:
             pdos = connected.get(drive.name)
             if pdos and not channel.output.silent and not channel.words.enables(channel.output.words[0]):
                 words = channel.output.words
-            # Of one identifier what the node itself has said of it counts, and that comes last.
-            plans = [*self._known[drive.name], *self._memory.rpdos_of(drive.name)]
-            last = {plan.cob_id: plan for plan in plans}
             # Nothing is sent into objects that nobody knows.
-            packed = {plan.cob_id: Rpdo(plan, count).frame(words) for plan in last.values() if plan.words}
+            plans = [plan for plan in self.plans(drive).values() if plan.words]
+            packed = {plan.cob_id: Rpdo(plan, count).frame(words) for plan in plans}
             for frame in pdos.frames_with(words) if pdos else []:
                 packed.pop(frame.can_id, None)
                 packed[frame.can_id] = frame
@@ -72,14 +76,14 @@ def _known(node: Node, drive: Drive, downloads: Sequence[Download]) -> Iterator[
     for pdo in drive.slot.rpdo:
         factory_id = pdo.cob_id + node.table.id
         if not pdo.optional:
-            yield rpdo_plan(drive, pdo, factory_id)
+            yield rpdo_plan(drive.family, drive.slot, pdo, factory_id)
         configured = _configured(pdo, downloads)
         if configured is not None:
-            yield rpdo_plan(drive, pdo, *configured)
+            yield rpdo_plan(drive.family, drive.slot, pdo, *configured)
         asked = _asked(drive, pdo)
         if asked is not None and asked.enable:
             entries = [Entry(ref.index, ref.sub, ref.bits) for ref in asked.mapping]
-            yield rpdo_plan(drive, pdo, asked.cob_id or factory_id, entries)
+            yield rpdo_plan(drive.family, drive.slot, pdo, asked.cob_id or factory_id, entries)
 
 
 def _asked(drive: Drive, pdo: Pdo) -> PdoTable | None:

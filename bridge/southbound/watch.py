@@ -8,12 +8,10 @@ from typing import Final
 from bridge.command import Event, Kind, Plant
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.canopen import cobid, nmt
-from bridge.southbound.canopen.nmt import NmtState
 
 _NODES: Final = range(1, 128)
 _FORGET_S: Final = 60.0
 """So long after the last sign a point is back, and so long nothing is told twice."""
-_ON_ITS_WAY_S: Final = 1.0
 
 
 class BusWatch:
@@ -23,18 +21,15 @@ class BusWatch:
         self,
         bus: str,
         own_id: int | None,
-        own_state: Callable[[], NmtState],
+        acts: Callable[[], bool],
         known: dict[int, str],
         plant: Plant,
     ) -> None:
-        """``own_id`` is the bridge's own node id where it produces a heartbeat, which says ``own_state``;
-        ``known`` has the configured nodes."""
+        """``own_id`` is the bridge's own node id where it produces a heartbeat; where the bridge does not
+        act, another one is the NMT master. ``known`` has the configured nodes."""
         self._bus = bus
         self._own_id = own_id
-        self._own_state = own_state
-        self._states = [NmtState.INITIALISING]
-        """Our own, the present one first, and those that may still be on their way back to us."""
-        self._changed_at = float("-inf")
+        self._acts = acts
         self._known = known
         self._plant = plant
         self._master_at = float("-inf")
@@ -43,16 +38,17 @@ class BusWatch:
         self._told: dict[str, float] = {}
 
     def routes(self) -> dict[int, Callable[[Frame], None]]:
-        """NMT commands, and the error control messages of every node that is not configured, or is us."""
+        """NMT commands, and the error control messages of every node that is not configured."""
         routes: dict[int, Callable[[Frame], None]] = {cobid.NMT: self._on_nmt}
         for node_id in _NODES:
-            if node_id not in self._known:
-                is_own = node_id == self._own_id
-                routes[cobid.ERROR_CONTROL + node_id] = self._on_own_id if is_own else self._on_stranger
+            if node_id not in self._known and node_id != self._own_id:
+                routes[cobid.ERROR_CONTROL + node_id] = self._on_stranger
         return routes
 
     def _on_nmt(self, frame: Frame) -> None:
         """An NMT command that we did not send: our own do not come back."""
+        if not self._acts():
+            return
         self._master_at = frame.time
         what = nmt.describe(frame.data)
         self._tell(
@@ -74,30 +70,10 @@ class BusWatch:
             500,
         )
 
-    def _on_own_id(self, frame: Frame) -> None:
-        """Our own heartbeat comes back to us where the kernel sends it; our boot-up message does not."""
-        state = nmt.state_of(frame.data[0]) if len(frame.data) == 1 else None
-        self._look_at_own_state(frame.time)
-        if state in self._states:
-            return
-        node_id = frame.can_id - cobid.ERROR_CONTROL
-        said = "nonsense" if state is None else "that it starts" if not state else state.words
-        self._duplicates[node_id] = frame.time
-        self._tell(
-            f"duplicate {node_id}",
-            f"node id {node_id}, the bridge's own, seems to be used twice: another device said {said}. "
-            "Give it another id, or change master_node_id",
-            frame.time,
-            700,
-        )
-
-    def _look_at_own_state(self, now: float) -> None:
-        state = self._own_state()
-        if state is not self._states[0]:
-            self._states = [state, self._states[0]]
-            self._changed_at = now
-        elif now - self._changed_at > _ON_ITS_WAY_S:
-            del self._states[1:]
+    def on_own_id(self, now: float) -> None:
+        """Somebody else uses the bridge's own id; who holds this watch tells it."""
+        if self._own_id is not None:
+            self._duplicates[self._own_id] = now
 
     def on_duplicate(self, node_id: int, sign: str, now: float) -> None:
         """A configured node id behaves as if two devices had it."""
@@ -118,7 +94,6 @@ class BusWatch:
     def refresh(self, now: float) -> None:
         """Bring the points of the bus up to date."""
         top = f"bus/{self._bus}"
-        self._look_at_own_state(now)
         self._plant.set(f"{top}/second_master", now - self._master_at < _FORGET_S, now)
         self._plant.set(f"{top}/unexpected_nodes", _listed(self._strangers, now), now)
         self._plant.set(f"{top}/duplicate_ids", _listed(self._duplicates, now), now)

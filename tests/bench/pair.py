@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import socket
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import can
 from can.interfaces.socketcan import SocketcanBus
@@ -54,6 +54,15 @@ class PairSockets(CanSockets):
 
     def accept(self, can_ids: list[int], raw: socket.socket | None) -> None:
         """Everything is let in."""
+
+    def watching(self, can_ids: Collection[int]) -> socket.socket:
+        """Nothing comes here."""
+        watching, nobody = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+        nobody.close()
+        watching.setblocking(False)
+        return watching
+
+    def let_in(self, can_ids: Collection[int], watching: socket.socket) -> None: ...
 
     def link(self) -> Link:
         return Link(is_up=True)

@@ -35,6 +35,7 @@ interface = "socketcan"
 channel = "vcan0"
 bitrate = 500000
 deadman_ms = 400
+on_intruder = "{on_intruder}"
 [[bus.node]]
 name = "axis"
 id = 7
@@ -90,14 +91,15 @@ def words(control: int, target: int = 0) -> list[int]:
 class Lab:
     """The drive, the bridge, its owner and a witness."""
 
-    def __init__(self, folder: Path, stack: ExitStack, mode: str) -> None:
+    def __init__(self, folder: Path, stack: ExitStack, mode: str, on_intruder: str = "stop_node") -> None:
         port = free_port()
-        site = folder / "site.toml"
-        site.write_text(SITE.format(folder=folder, port=port, mode=mode), encoding="utf-8")
+        path = folder / "site.toml"
+        site = SITE.format(folder=folder, port=port, mode=mode, on_intruder=on_intruder)
+        path.write_text(site, encoding="utf-8")
         self.bus: Sniffer = stack.enter_context(sniffing())
         self.drive: Process = stack.enter_context(peer(folder, "cia402_slave", "vcan0", str(NODE), "500000"))
         self.drive.wait_output("is there")
-        arguments = ("run", str(site), "--role", "bus")
+        arguments = ("run", str(path), "--role", "bus")
         self.bridge: Process = stack.enter_context(drivebridge(folder, "run", *arguments, notify=True))
         self.bridge.wait_ready()
         self.bridge.wait_output("node operational")

@@ -135,7 +135,17 @@ def test_everything_comes_at_its_period_for_longer_than_a_burst(lab: Lab) -> Non
         assert max(pauses) <= period_s + NOISE_S
 
 
-def test_a_killed_bridge_sends_nothing_more_and_the_drive_trips_by_its_own_p151(lab: Lab) -> None:
+@pytest.fixture
+def lab_that_reports(tmp_path: Path) -> Iterator[Lab]:
+    """The bridge stops nobody because we write to the drive ourselves."""
+    with ExitStack() as stack:
+        yield Lab(tmp_path, stack, lab_site(tmp_path, timeout_ms=200, bus='on_intruder = "report"'))
+
+
+def test_a_killed_bridge_sends_nothing_more_and_the_drive_trips_by_its_own_p151(
+    lab_that_reports: Lab,
+) -> None:
+    lab = lab_that_reports
     lab.bus.send(SDO, P151_500_MS)
     lab.run_drive()
     lab.bridge.signal(signal.SIGKILL)

@@ -32,6 +32,7 @@ interface = "socketcan"
 channel = "vcan0"
 bitrate = 500000
 deadman_ms = 400
+on_intruder = "report"
 [[bus.node]]
 name = "pump"
 id = 5

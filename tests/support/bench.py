@@ -17,6 +17,7 @@ from bridge.southbound.bus.burstend import BurstEnd
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import BusStatus, ControllerState
 from bridge.southbound.bus.softbeat import SoftBeat
+from bridge.southbound.listening import Listening, listen_s
 from bridge.southbound.master import Master
 from bridge.southbound.network import Network
 from tests.support import sites
@@ -51,6 +52,8 @@ class ClockBus:
         self.status = BusStatus()
         self.inbox: list[Frame] = []
         self.accepted: frozenset[int] = frozenset()
+        self.ours: frozenset[int] = frozenset()
+        self.foreign: list[Frame] = []
         self._deliver = deliver
         self._beats = SoftBeat()
 
@@ -58,6 +61,13 @@ class ClockBus:
 
     def accept(self, can_ids: list[int]) -> None:
         self.accepted = frozenset(can_ids)
+
+    def watch(self, can_ids: frozenset[int]) -> None:
+        self.ours = can_ids
+
+    def take_foreign(self, now: float) -> list[Frame]:
+        frames, self.foreign = self.foreign, []
+        return frames
 
     def drain(self, now: float) -> list[Frame]:
         frames, self.inbox = self.inbox, []
@@ -116,6 +126,7 @@ class Bench:
         mapping: str = "nord/sk-tu4-cao",
         node: Any = None,
         begin_s: float = BEGIN_S,
+        listens: bool = False,
     ) -> None:
         self.now = begin_s
         self.log: list[Frame] = []
@@ -125,7 +136,9 @@ class Bench:
         self.plant = Plant(site, {mapping: family}, "0")
         self.plant.on_event(self.events.append)
         self.bus = self.make_bus()
-        self.network = Network(site.bus[0], self.plant, epoch_ns)
+        # Most tests begin where the bridge has listened already.
+        listening = Listening(listen_s(site.bus[0]) if listens else 0.0, lambda: 0.0)
+        self.network = Network(site.bus[0], self.plant, epoch_ns, listening=listening)
         self.master = Master([(self.bus, self.network)], self.plant, self.clock)
         self._wake_at = self.now
         self.master.attach(self._set_timer)
@@ -165,6 +178,8 @@ class Bench:
         for frame in frames:
             if frame.can_id in self.bus.accepted and frame.can_id not in self.deaf_to:
                 self.bus.inbox.append(frame._replace(time=self.now))
+            if frame.can_id in self.bus.ours:
+                self.bus.foreign.append(frame._replace(time=self.now))
 
     def run(self, seconds: float) -> None:
         """Let time pass; everything happens at its own moment."""

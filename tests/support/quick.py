@@ -13,6 +13,7 @@ from bridge.mapping import load_family
 from bridge.southbound.bus.frame import REMOTE, Frame
 from bridge.southbound.bus.interface import BusStatus
 from bridge.southbound.canopen.nmt import NmtState
+from bridge.southbound.listening import Listening
 from bridge.southbound.network import Network
 from bridge.southbound.node import NodeCore
 
@@ -137,7 +138,8 @@ class Quick:
         # The manual's family leaves node ids above 63 out; a bus has 127.
         self.plant = Plant(site, {MAPPING: NORD}, "0", self.now)
         self.plant.on_event(self.events.append)
-        self.network = Network(site.bus[0], self.plant)
+        # These tests begin where the bridge has listened already.
+        self.network = Network(site.bus[0], self.plant, listening=Listening(0.0))
         self.nodes = {table.id: QuickNode(table.id) for table in site.bus[0].node}
         self.lose: Callable[[Frame], bool] = lambda frame: False
         self.routes = frozenset(self.network.take_routes() or ())
@@ -194,6 +196,9 @@ class Quick:
         heard = [frame._replace(time=self.now) for frame in frames if frame.can_id in self.routes]
         if heard:
             self.network.on_frames(heard, self.now)
+        foreign = [frame._replace(time=self.now) for frame in frames if frame.can_id in self.network.ours]
+        if foreign:
+            self.network.on_foreign(foreign, self.now)
 
     def ask(self, action: Action, target: str, identity: Identity = ENGINEER) -> Outcome:
         outcomes: list[Outcome] = []

@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.command import Drive
 from bridge.command.plant import Node
-from bridge.mapping.model import Pdo
+from bridge.mapping.model import Family, Pdo, Slot
 from bridge.southbound.boot.actions import Action, BootResult, Do, PdoPlan, Step, number, optional
 from bridge.southbound.boot.layout import factory_entries, layouts, match_words
 from bridge.southbound.boot.pdos import RPDO, read_entries
@@ -40,15 +40,19 @@ def _rpdo(drive: Drive, pdo: Pdo) -> Generator[Action, bytes | None, PdoPlan | N
     if not pdo.static:
         with suppress(MappingError):
             entries = yield from read_entries(mapping, number((yield from optional(mapping, 0))))
-    return rpdo_plan(drive, pdo, identifier, entries, kind)
+    return rpdo_plan(drive.family, drive.slot, pdo, identifier, entries, kind)
 
 
 def rpdo_plan(
-    drive: Drive, pdo: Pdo, cob_id: int, entries: Sequence[Entry] = (), kind: int = _FACTORY_TYPE
+    family: Family,
+    slot: Slot,
+    pdo: Pdo,
+    cob_id: int,
+    entries: Sequence[Entry] = (),
+    kind: int = _FACTORY_TYPE,
 ) -> PdoPlan:
-    """An RPDO of ``drive`` with this mapping; with the mapping file's where there is none, or none that
-    can be packed."""
-    slot, family = drive.slot, drive.family
+    """An RPDO of a drive with this mapping; with the mapping file's where there is none, or none that can be
+    packed."""
     known = layouts(slot.rpdo, [family.rpdo_words(one) for one in slot.rpdo], family.process.rpdo)
     have = tuple(entries) or factory_entries(pdo)
     try:

@@ -67,6 +67,15 @@ class Bus(Protocol):
         """Receive only these 11-bit identifiers (and error frames). Frees the process of its own echo."""
         ...
 
+    def watch(self, can_ids: frozenset[int]) -> None:
+        """These 11-bit identifiers are ours alone: give what others send on them by ``take_foreign``."""
+        ...
+
+    def take_foreign(self, now: float) -> list[Frame]:
+        """What others have sent on the watched identifiers since the last call, oldest first. A frame of our
+        own is never among them; one of another's that is like ours may be missing."""
+        ...
+
     def drain(self, now: float) -> list[Frame]:
         """Everything that has arrived, oldest first, each with the time of its reception."""
         ...

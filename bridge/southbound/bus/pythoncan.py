@@ -43,6 +43,8 @@ class PythonCanBus:
         self._received: deque[Frame] = deque(maxlen=_MOST_WAITING)
         self._to_send: queue.Queue[tuple[Frame, float] | None] = queue.Queue(_MOST_TO_SEND)
         self._accepted: frozenset[int] | None = None
+        self._ours: frozenset[int] = frozenset()
+        self._foreign: deque[Frame] = deque(maxlen=_MOST_WAITING)
         self._bus: can.BusABC | None = None
         self._bits = WireBits()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -81,6 +83,15 @@ class PythonCanBus:
     def accept(self, can_ids: list[int]) -> None:
         self._accepted = frozenset(can_ids)
 
+    def watch(self, can_ids: frozenset[int]) -> None:
+        self._ours = can_ids
+
+    def take_foreign(self, now: float) -> list[Frame]:
+        frames: list[Frame] = []
+        while self._foreign:
+            frames.append(self._foreign.popleft())
+        return frames
+
     def _receive(self) -> None:
         """Thread: everything that comes, each frame stamped as it comes."""
         while not self._stopping.is_set():
@@ -107,6 +118,10 @@ class PythonCanBus:
         flags = (EXTENDED if message.is_extended_id else 0) | (REMOTE if message.is_remote_frame else 0)
         frame = Frame(message.arbitration_id | flags, bytes(message.data), time.monotonic())
         self._bits.add(frame)
+        if frame.can_id in self._ours:
+            # python-can gives no bus its own frames.
+            self._foreign.append(frame)
+            self._rouse()
         if self._accepted is None or frame.can_id in self._accepted:
             self._give(frame)
 

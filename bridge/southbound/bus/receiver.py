@@ -11,6 +11,7 @@ import errno
 import os
 import socket
 import struct
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from bridge.southbound.bus.frame import ERROR, Frame
@@ -23,6 +24,8 @@ _SO_RXQ_OVFL: Final = 40
 _HEAD_BYTES: Final = struct.calcsize("@Nii")
 _CONTROL: Final = struct.Struct(f"@{_HEAD_BYTES}xll{_HEAD_BYTES}xI0N")
 _MSG_DONTWAIT: Final = 0x40
+_MSG_DONTROUTE: Final = 0x04
+"""What the kernel sets in frames that came from a socket of this host (raw_rcv in net/can/raw.c)."""
 BATCH: Final = 64
 """Frames per call at most."""
 
@@ -58,17 +61,17 @@ class _Message(ctypes.Structure):  # struct mmsghdr
 
 
 _MESSAGE_BYTES: Final = ctypes.sizeof(_Message)
+_FLAGS_AT: Final = _Header.flags.offset
+_FLAGS: Final = struct.Struct(f"@{_FLAGS_AT}xi{_MESSAGE_BYTES - _FLAGS_AT - ctypes.sizeof(ctypes.c_int)}x")
 
 
-class Receiver:
-    """Receives from one socket without waiting, into buffers that are made once."""
+class _Batches:
+    """Fills buffers that are made once from one socket, without waiting."""
 
     def __init__(self, raw: socket.socket) -> None:
         """Asks for time stamps and drop counters. Raises OSError."""
         raw.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
         raw.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
-        self.drops = 0
-        """Frames that the kernel has dropped since the opening, modulo 2³²."""
         self._raw = raw
         self._receive = ctypes.CDLL(None, use_errno=True).recvmmsg
         frames = ctypes.create_string_buffer(BATCH * _FRAME.size)
@@ -90,22 +93,37 @@ class Receiver:
         self._buffers = frames, controls
         self._frame_view, self._control_view = memoryview(frames), memoryview(controls)
 
+    def _fill(self) -> int:
+        """The number of messages that came, at most ``BATCH``. Raises OSError where the interface is gone or
+        down."""
+        used = self._used
+        self._message_view[:used] = self._fresh[:used]
+        count: int = self._receive(self._raw.fileno(), self._messages, BATCH, _MSG_DONTWAIT, None)
+        self._used = min(max(count, 0) + 1, BATCH) * _MESSAGE_BYTES
+        if count < 0:
+            number = ctypes.get_errno()
+            if number in (errno.EAGAIN, errno.EINTR):
+                return 0
+            raise OSError(number, os.strerror(number))
+        return count
+
+
+class Receiver(_Batches):
+    """Receives what is waited for."""
+
+    def __init__(self, raw: socket.socket) -> None:
+        super().__init__(raw)
+        self.drops = 0
+        """Frames that the kernel has dropped since the opening, modulo 2³²."""
+
     def receive(self, frames: list[Frame], stamps: Stamps) -> tuple[int, list[tuple[int, bytes]]]:
         """Put the next frames into ``frames``, at most ``BATCH`` of them.
 
         Gives the number of all that came, and the identifiers and data of the error frames among them.
         Raises OSError where the interface is gone or down.
         """
-        used = self._used
-        self._message_view[:used] = self._fresh[:used]
-        count: int = self._receive(self._raw.fileno(), self._messages, BATCH, _MSG_DONTWAIT, None)
-        self._used = min(max(count, 0) + 1, BATCH) * _MESSAGE_BYTES
+        count = self._fill()
         errors: list[tuple[int, bytes]] = []
-        if count < 0:
-            number = ctypes.get_errno()
-            if number in (errno.EAGAIN, errno.EINTR):
-                return 0, errors
-            raise OSError(number, os.strerror(number))
         wall_offset, earliest, latest = stamps
         for (can_id, length, data), (seconds, nanoseconds, drops) in zip(
             _FRAME.iter_unpack(self._frame_view[: count * _FRAME.size]),
@@ -123,3 +141,37 @@ class Receiver:
                 stamp = earliest
             frames.append(Frame(can_id, data if length == _FULL else data[:length], stamp))
         return count, errors
+
+
+class WatchReceiver(_Batches):
+    """Receives what only we should send: mostly our own frames, which come back."""
+
+    def __init__(self, raw: socket.socket) -> None:
+        super().__init__(raw)
+        self._has_marks = False
+        """Frames of local senders come with the mark here. As long as none did, a driver may have lost it."""
+
+    def receive(
+        self, frames: list[Frame], stamps: Stamps, is_own: Callable[[int, bytes, float], bool]
+    ) -> int:
+        """Put those of the next frames that are somebody else's into ``frames``: those without the mark of a
+        local sender, and those with it of which ``is_own`` says no. Gives the number of all that came.
+
+        Raises OSError where the interface is gone or down.
+        """
+        count = self._fill()
+        wall_offset, earliest, latest = stamps
+        for (can_id, length, data), (seconds, nanoseconds, _), (flags,) in zip(
+            _FRAME.iter_unpack(self._frame_view[: count * _FRAME.size]),
+            _CONTROL.iter_unpack(self._control_view[: count * _CONTROL.size]),
+            _FLAGS.iter_unpack(self._message_view[: count * _MESSAGE_BYTES]),
+            strict=True,
+        ):
+            stamp = min(max(seconds + nanoseconds * 1e-9 + wall_offset, earliest), latest)
+            data = data if length == _FULL else data[:length]
+            is_marked = bool(flags & _MSG_DONTROUTE)
+            self._has_marks |= is_marked
+            if (is_marked or not self._has_marks) and is_own(can_id, data, stamp):
+                continue
+            frames.append(Frame(can_id, data, stamp))
+        return count

@@ -21,6 +21,7 @@ from bridge.southbound.bus.burstend import BurstEnd
 from bridge.southbound.bus.cansockets import CanSockets
 from bridge.southbound.bus.errorframe import judge
 from bridge.southbound.bus.explain import WrongBitrate, explain
+from bridge.southbound.bus.foreignwatch import ForeignWatch
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import BusStatus, ControllerState
 from bridge.southbound.bus.kernelbeat import KernelBeat
@@ -53,6 +54,7 @@ class SocketCanBus:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._sockets = sockets or CanSockets(channel)
         self._watch = LinkWatch(self._sockets.link)
+        self._foreign = ForeignWatch(self._sockets)
         self._beats = KernelBeat(time.monotonic)
         self._outbox = Outbox()
         self._accepted: frozenset[int] = frozenset()
@@ -91,6 +93,8 @@ class SocketCanBus:
         self._drops = 0
         self._open_manager()
         self._last_drain = time.monotonic()
+        self._foreign.open(self._last_drain)
+        self._foreign.own.stalled(self._last_drain, is_stalled=False)
         self._watch.opened(self._last_drain)
         self._status.state = ControllerState.OK
         if self._loop:
@@ -111,6 +115,9 @@ class SocketCanBus:
         self._accepted = frozenset(can_ids)
         self._sockets.accept(can_ids, self._raw)
 
+    def watch(self, can_ids: frozenset[int]) -> None:
+        self._foreign.watch(can_ids)
+
     def close(self) -> None:
         self._watch.end()
         self._close_sockets()
@@ -119,6 +126,8 @@ class SocketCanBus:
         self._beats.close()
         self._own.clear()
         self._drop_waiting()
+        self._foreign.own.silenced_all(self._last_drain)
+        self._foreign.close()
         self._receiver = None
         if self._raw:
             if self._loop and self._raw.fileno() >= 0:
@@ -167,6 +176,9 @@ class SocketCanBus:
             self._send_waiting(now)
         return frames
 
+    def take_foreign(self, now: float) -> list[Frame]:
+        return self._foreign.take(now)
+
     def _count_drops(self, drops: int) -> None:
         """The kernel counts from the socket's opening, modulo 2³²."""
         if drops != self._drops:
@@ -187,9 +199,11 @@ class SocketCanBus:
         """The controller is in this state: where it cannot send, what was to be sent is stale."""
         is_outage = state in _OUTAGES and state is not self._status.state
         self._status.state = state
+        self._foreign.own.stalled(now, is_stalled=state in _OUTAGES)
         if is_outage:
             self._status.outages += 1
             self._drop_waiting()
+            self._foreign.own.silenced_all(now)
             try:
                 self._beats.silence_all(now)
             except OSError as error:
@@ -200,6 +214,8 @@ class SocketCanBus:
     def send(self, frame: Frame, now: float, deadline: float) -> None:
         if self._outbox and self._can_send:
             self._send_waiting(now)
+        if frame.can_id in self._foreign:
+            self._foreign.own.sent(frame, now)
         if not self._can_send:
             self._status.frames_expired += 1
         elif self._outbox or not self._try_send(frame, now):
@@ -244,6 +260,9 @@ class SocketCanBus:
         at_once: bool = False,
         ending: BurstEnd | None = None,
     ) -> None:
+        if frames[0].can_id in self._foreign:
+            last = (ending.frame,) if ending and ending.frame else ()
+            self._foreign.own.told((*frames, *last), now, period_s, at_once=at_once)
         try:
             first = self._beats.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
         except OSError as error:
@@ -254,6 +273,7 @@ class SocketCanBus:
         self._wire.sample(frames[0])
 
     def silence(self, can_id: int) -> None:
+        self._foreign.own.silenced(can_id, self._last_drain)
         try:
             self._beats.silence(can_id, self._last_drain)
         except OSError as error:
@@ -280,7 +300,7 @@ class SocketCanBus:
     def next_deadline(self) -> float | None:
         times = [self._watch.next_deadline()]
         if self._raw is not None:
-            times += [self._outbox.retry_at, self._beats.next_deadline()]
+            times += [self._outbox.retry_at, self._beats.next_deadline(), self._foreign.next_deadline()]
         return min((time for time in times if time is not None), default=None)
 
     def on_time(self, now: float) -> None:

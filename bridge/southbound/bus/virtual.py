@@ -42,7 +42,7 @@ class VirtualWire:
             return
         for end in self._ends:
             if end is not sender:
-                end.pass_by(frame)
+                end.pass_by(frame, now)
                 end.deliver(frame, now)
 
 
@@ -57,6 +57,8 @@ class VirtualBus:
         self._bits = WireBits()
         self._waiting: deque[Frame] = deque()
         self._accepted: frozenset[int] | None = None
+        self._ours: frozenset[int] = frozenset()
+        self._foreign: list[Frame] = []
         self._wake: Callable[[], None] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._woken = False
@@ -77,9 +79,20 @@ class VirtualBus:
     def accept(self, can_ids: list[int]) -> None:
         self._accepted = frozenset(can_ids)
 
-    def pass_by(self, frame: Frame) -> None:
+    def watch(self, can_ids: frozenset[int]) -> None:
+        self._ours = can_ids
+
+    def take_foreign(self, now: float) -> list[Frame]:
+        foreign, self._foreign = self._foreign, []
+        return foreign
+
+    def pass_by(self, frame: Frame, now: float) -> None:
         """Somebody else's frame is on the wire."""
         self._bits.add(frame)
+        is_down = self._wake is None or self._status.state is ControllerState.DOWN
+        if frame.can_id in self._ours and not is_down and len(self._foreign) < _MOST_WAITING:
+            self._foreign.append(frame)
+            self._rouse(frame.time - now)
 
     def deliver(self, frame: Frame, now: float) -> None:
         """The wire brings a frame."""
@@ -91,13 +104,16 @@ class VirtualBus:
             self._status.frames_lost += 1
             return
         self._waiting.append(frame)
-        if not self._woken:
-            self._woken = True
-            delay = frame.time - now
-            if delay > 0:
-                self._loop.call_later(delay, self._wake_up)
-            else:
-                self._loop.call_soon(self._wake_up)
+        self._rouse(frame.time - now)
+
+    def _rouse(self, delay_s: float) -> None:
+        if self._woken or self._loop is None:
+            return
+        self._woken = True
+        if delay_s > 0:
+            self._loop.call_later(delay_s, self._wake_up)
+        else:
+            self._loop.call_soon(self._wake_up)
 
     def _wake_up(self) -> None:
         self._woken = False
@@ -109,9 +125,8 @@ class VirtualBus:
         frames: list[Frame] = []
         while waiting and waiting[0].time <= now:
             frames.append(waiting.popleft())
-        if waiting and not self._woken and self._loop:
-            self._woken = True
-            self._loop.call_later(max(0.0, waiting[0].time - now), self._wake_up)
+        if waiting:
+            self._rouse(waiting[0].time - now)
         self._status.frames_received += len(frames)
         return frames
 
@@ -158,6 +173,7 @@ class VirtualBus:
         self._status.note_error("the interface is down")
         self._beats.clear()
         self._waiting.clear()
+        self._foreign.clear()
         if self._loop and self._wake:
             self._loop.call_soon(self._wake)
 

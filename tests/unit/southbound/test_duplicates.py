@@ -71,49 +71,18 @@ def test_the_period_that_the_node_keeps_is_the_one_that_counts() -> None:
 # the bridge's own id
 
 
-def test_a_device_that_starts_with_the_bridges_own_id_is_told(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("octet", "said"), [(0x00, "that it starts"), (0x7F, "pre-operational"), (0x05, "operational")]
+)
+def test_a_device_with_the_bridges_own_id_is_told_whatever_it_says(
+    tmp_path: Path, octet: int, said: str
+) -> None:
     quick = started(tmp_path)
-    quick.receive(Frame(0x77F, b"\0"))
+    quick.receive(Frame(0x77F, bytes((octet,))))
     quick.run(0.2)
-    [event] = quick.told("node id 127")
-    assert "the bridge's own, seems to be used twice: another device said that it starts" in event.message
+    [event] = quick.told("node 127, the bridge's own")
+    assert f"used twice: another device said {said}" in event.message
     assert quick.value("bus/can0/duplicate_ids") == "127"
-
-
-def test_a_device_that_says_another_state_is_told(tmp_path: Path) -> None:
-    quick = started(tmp_path)
-    quick.receive(Frame(0x77F, b"\x7f"))
-    quick.run(0.2)
-    [event] = quick.told("node id 127")
-    assert "another device said pre-operational" in event.message
-
-
-def test_our_own_heartbeat_comes_back_and_is_nobody_elses(tmp_path: Path) -> None:
-    bus = 'mandatory_missing = "hold_all"'
-    quick = Quick(quick_site(tmp_path, ["mandatory = true"], bus=bus))
-    quick.nodes[1].present = False
-    quick.run(2.0)
-    quick.receive(Frame(0x77F, b"\x7f"))
-    quick.nodes[1].present = True
-    quick.nodes[1].start(quick.now)
-    quick.run(1.0)
-    quick.receive(Frame(0x77F, b"\x05"))
-    quick.run(1.0)
-    assert not quick.told("twice")
-
-
-def test_what_left_before_our_state_changed_is_still_ours(tmp_path: Path) -> None:
-    bus = 'mandatory_missing = "hold_all"'
-    quick = Quick(quick_site(tmp_path, ["mandatory = true"], bus=bus))
-    quick.nodes[1].present = False
-    quick.run(2.0)
-    quick.nodes[1].present = True
-    quick.nodes[1].start(quick.now)
-    while not quick.network._gate.is_open:
-        quick.run(0.01)
-    quick.receive(Frame(0x77F, b"\x7f"))
-    quick.run(1.0)
-    assert not quick.told("twice")
 
 
 def test_a_bridge_without_a_heartbeat_has_no_id_of_its_own(tmp_path: Path) -> None:

@@ -48,6 +48,14 @@ class HearingBus(MutableBus):
     def inbox(self) -> list[Frame]:
         return self._clock_bus.inbox
 
+    @property
+    def ours(self) -> frozenset[int]:
+        return self._clock_bus.ours
+
+    @property
+    def foreign(self) -> list[Frame]:
+        return self._clock_bus.foreign
+
 
 class MutableBench(Bench):
     def make_bus(self) -> Any:

@@ -1,0 +1,99 @@
+"""Whether the bridge may act on a bus, or listens because another one may be in charge of it. Sans-IO."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from enum import Enum
+from typing import Final
+
+from bridge.config import BusTable
+
+_SHORTEST_S: Final = 0.2
+_LONGEST_S: Final = 1.0
+_PERIODS: Final = 2
+_SILENCE: Final = 3
+"""A bridge in charge that has been silent for so many times the listening is gone."""
+
+
+class Part(Enum):
+    """What the bridge does on a bus."""
+
+    LISTENING = "listens before it begins"
+    PASSIVE = "leaves the bus to another bridge"
+    ACTING = "acts"
+
+
+def listen_s(bus: BusTable) -> float:
+    """How long to listen: two periods of what another bridge with this site file would send."""
+    longest_s = max(bus.heartbeat_ms / 1000, bus.rpdo_period_s)
+    return min(max(_PERIODS * longest_s, _SHORTEST_S), _LONGEST_S)
+
+
+class Listening:
+    """Who acts for less than the time it listens gives way to another that acts: it may have begun in the
+    same moment, or was away while the other took over. Who has acted for longer stays.
+
+    ``spread`` gives a number from 0 to 1: so different are the times after which two that have given way to
+    each other begin again.
+    """
+
+    def __init__(self, listen_s: float, spread: Callable[[], float] = random.random) -> None:
+        self.listen_s = listen_s
+        self.silence_s = 0.0
+        """How long the other one has to be silent before this one acts: three to six times ``listen_s``."""
+        self.part = Part.LISTENING if listen_s else Part.ACTING
+        self._spread = spread
+        self._until: float | None = None
+        """When it acts unless it hears something before; None where that is not known yet."""
+        self._acts_since = float("-inf")
+        self._is_gone = False
+
+    @property
+    def acts(self) -> bool:
+        return self.part is Part.ACTING
+
+    def heard(self, now: float) -> bool:
+        """Another one is in charge of the bus; True where that is new and it is left to it. Of one that acts
+        it is told only what gives the other away as a bridge."""
+        is_new = not self.is_passive
+        if self.acts and now >= self._acts_since + self.listen_s:
+            return False
+        if is_new:
+            self.part = Part.PASSIVE
+            self.silence_s = _SILENCE * self.listen_s * (1 + self._spread())
+        self._until = now + self.silence_s
+        return is_new
+
+    @property
+    def is_passive(self) -> bool:
+        return self.part is Part.PASSIVE
+
+    def on_time(self, now: float) -> bool:
+        """True at the moment it begins to act."""
+        if self.acts or self._is_gone:
+            return False
+        if self._until is None:
+            self._until = now + (self.silence_s if self.is_passive else self.listen_s)
+        if now < self._until:
+            return False
+        self.part = Part.ACTING
+        self.returns(now)
+        return True
+
+    def next_deadline(self) -> float | None:
+        return None if self.acts else self._until
+
+    def returns(self, now: float) -> None:
+        """The bridge or its bus was away: another one may have taken over meanwhile."""
+        self._acts_since = now
+
+    def bus_is_gone(self) -> None:
+        """What is not heard now says nothing."""
+        self._is_gone = True
+        self._until = None
+
+    def bus_is_back(self, now: float) -> None:
+        """Who acts goes on at once, with stopped words: to listen first would keep them back."""
+        self._is_gone = False
+        self.returns(now)

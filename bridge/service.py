@@ -97,7 +97,7 @@ class Service:
             self.fronts.append(Front("opcua", command, watched=True, listening=self._opcua_port.socket))
 
     async def run(self, ready: Callable[[], None] = lambda: None) -> None:
-        """Serve until cancelled.
+        """Serve until cancelled; ``ready`` is called as soon as the buses are open.
 
         Raises ``FileFaults`` where a file cannot be used, ``Unavailable`` where a bus or a port cannot be
         opened, and ``OperationFailed`` when the master has failed. A server or a front that fails later is
@@ -113,13 +113,15 @@ class Service:
             stack.callback(self.audit.close)
             await self._open_ports(stack)
             stack.push_async_callback(self._end_tasks)
+            # What is there now stays: the collector need not look at it again and again. Before the bus is
+            # opened, because the first look takes longer than a round may be late.
+            gc.collect()
+            gc.freeze()
             await self.master.start()
             # Whatever ends the service: the drives stop before anything else ends.
             stack.push_async_callback(self._stop)
-            # What is there now stays: the collector need not look at it again and again.
-            gc.collect()
-            gc.freeze()
-            await self._serve(ready)
+            ready()
+            await self._serve()
 
     async def _open_ports(self, stack: AsyncExitStack) -> None:
         """Ports first: a service that cannot be reached has no business on the bus."""
@@ -139,7 +141,7 @@ class Service:
         """Stop all drives now, and take no command any more but stops. ``run`` is to be cancelled next."""
         self.master.halt(clock.now())
 
-    async def _serve(self, ready: Callable[[], None]) -> None:
+    async def _serve(self) -> None:
         """Until cancelled, or until a task ends: each goes on for ever, or tells that its part has failed."""
         parts = [*self._servers(), *self.fronts]
         self.parts.expect(parts)
@@ -147,7 +149,7 @@ class Service:
             "master": self.master.failed(),
             "EEPROM counts": self.wear.run(),
             "audit log": self.audit.run(),
-            "start": self._start(ready),
+            "start": self._start(),
             **{part.name: self.parts.keep(part) for part in parts},
         }
         self._tasks = [asyncio.create_task(work, name=name) for name, work in works.items()]
@@ -164,12 +166,11 @@ class Service:
             yield ServerPart("zenoh", "the zenoh session", self.zenoh)
         yield ServerPart("mirror", "the link to the fronts", self.mirror)
 
-    async def _start(self, ready: Callable[[], None]) -> None:
+    async def _start(self) -> None:
         """Ready is who serves what the site file says, or can say what it does not serve."""
         with suppress(TimeoutError):
             await asyncio.wait_for(self.parts.all_known(), _START_S)
         self.notifier.ready(self.parts.status)
-        ready()
         await asyncio.get_running_loop().create_future()
 
     async def _end_tasks(self) -> None:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from bridge.command.request import Request, Source
+from bridge.command.request import Request
 
 GRAIN_MS: Final = 25
 """A wait that is shorter is not told from none. A telegram can be so much older than it is taken for: this is
@@ -27,15 +27,10 @@ its way through the bridge's front in ``worst_case_stop_ms``."""
 NOW_S: Final = 0.001
 """What is handled so soon after it was read needs no time of its own; a part of the grain."""
 
-BOUND_MS: Final = {
-    Source.NONE: 100,
-    Source.OPCUA: 500,
-    Source.MODBUS: 100,
-    Source.ZENOH: 200,
-    Source.LOCAL: 100,
-}
-"""What can have waited for longer counts for nothing. An OPC UA server may be busy with other clients, for
-half a second with a large subscription; the time for which it was is none that the owner gains."""
+BOUND_MS: Final = 500
+"""What can have waited for longer counts for nothing. A busy machine holds a request up for a while, and an
+OPC UA server may be half a second with a large subscription; the time for which it waited is none that the
+owner gains: its drive's timer runs from when it can have come."""
 
 _GRAIN_S: Final = GRAIN_MS / 1000 - NOW_S
 
@@ -73,8 +68,7 @@ def arrival_of(request: Request, now: float) -> float:
 
 def limit_ms_of(request: Request, timeout_ms: int) -> int:
     """How long it may have waited to count for a drive with this time-out (0: none)."""
-    bound_ms = BOUND_MS[request.identity.source]
-    return min(bound_ms, timeout_ms) if timeout_ms else bound_ms
+    return min(BOUND_MS, timeout_ms) if timeout_ms else BOUND_MS
 
 
 def is_stale(request: Request, now: float, timeout_ms: int) -> bool:

@@ -26,7 +26,7 @@ def test_who_floods_hides_nobody_else():
     assert gate.admits(event(Kind.EMERGENCY, 5.0))
 
 
-REPEATING = (Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION)
+REPEATING = (Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION, Kind.INTRUDER)
 """What somebody on the network or on the bus can bring about at will."""
 
 

@@ -21,6 +21,9 @@ from tests.support.explorer import Map, explore
 from tests.support.leg_machine import GATES, TIMEOUT_MS, LegMachine, recorded_table
 from tests.support.leg_model import GONE_S
 
+# All of a CPU for a minute and more each: on a busy machine that takes its time.
+pytestmark = pytest.mark.timeout(400)
+
 _MOST: Final = 40_000
 
 _PROFILES: Final[dict[str, dict[str, Any]]] = {

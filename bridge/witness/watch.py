@@ -24,6 +24,8 @@ _BEAT_WINDOW_S: Final = 2.0
 _BEAT_LOAD: Final = 1.5
 _BEAT_SPARE: Final = 5
 """What comes beside the beat when it changes."""
+_READING_MS: Final = 150
+"""A telegram may seem so much younger than it is."""
 _UNSEEN_S: Final = 1.0
 """An enabled drive gets its RPDO more often than that."""
 
@@ -212,7 +214,11 @@ class Watch:
         drive = track.drive
         if track.stopped_at is not None:
             silence_s = None if track.telegram_at is None else track.stopped_at - track.telegram_at
-            is_silent = silence_s is not None and drive.timeout_ms and silence_s * 1000 >= drive.timeout_ms
+            is_silent = (
+                silence_s is not None
+                and drive.timeout_ms
+                and _ms(silence_s) + _READING_MS >= drive.timeout_ms
+            )
             return Stop(
                 drive.name,
                 Cause.CONTROLLER if is_silent else Cause.COMMAND,

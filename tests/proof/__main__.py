@@ -31,7 +31,7 @@ from typing import Any
 from tests.proof import hunt, mutants, report
 from tests.proof import kills as kill_table
 from tests.proof.drives import DRIVES
-from tests.proof.faults import AWAITED, FAULTS, Fault
+from tests.proof.faults import FAULTS, Fault
 from tests.proof.machine import is_user_mode
 from tests.proof.measure import Sample
 from tests.proof.rig import Rig, Stuck
@@ -48,9 +48,7 @@ def say(text: str) -> None:
 
 def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: float) -> int:
     os.environ["PYTHONPATH"] = str(REPOSITORY)
-    # Those that wait for the program are injected where they are asked for by name.
     faults = [fault for fault in FAULTS if not names or fault.name in names]
-    faults += [fault for fault in AWAITED if fault.name in names]
     possible = [fault for fault in faults if fault.possible()]
     began = time.monotonic()
     samples: list[Sample] = []
@@ -64,7 +62,7 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
             "machine": _machine(),
             "machines": 1,
             "plant": PLANT.name,
-            "faults": [fault.name for fault in (*FAULTS, *AWAITED)],
+            "faults": [fault.name for fault in FAULTS],
             "cells": sorted(
                 {
                     (

@@ -47,15 +47,6 @@ def at_once_drive(rig: Rig, drive: Drive) -> float:
     return at_once(rig, drive) + TPDO_MS
 
 
-def controller_sent(rig: Rig, drive: Drive) -> float:
-    """From the client's call, of a telegram whose number nobody can tell."""
-    return CLIENT_MS + controller(rig, drive)
-
-
-def controller_sent_drive(rig: Rig, drive: Drive) -> float:
-    return CLIENT_MS + controller_drive(rig, drive)
-
-
 def node_stopped(rig: Rig, drive: Drive) -> float:
     """The bridge stops the node at once; its heartbeat says so."""
     return at_once(rig, drive) + PLANT.heartbeat_ms

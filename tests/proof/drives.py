@@ -93,9 +93,11 @@ class Drive:
 
 
 _SPLIT_ID: Final = 0x300
+_ELSEWHERE: Final = 0x400
+"""Not the factory's."""
 _CIA402_RPDOS: Final = {
-    "modbus": "rpdo = {{ transmission_type = 1 }}",
-    "opcua": "rpdo = {{ transmission_type = 3 }}",
+    "modbus": "rpdo = {{ transmission_type = 1, cob_id = {rpdo} }}",
+    "opcua": "rpdo = {{ transmission_type = 3, cob_id = {rpdo} }}",
     "zenoh": "rpdo = [{{ number = 1, transmission_type = 255 }}, {{ number = 2, cob_id = {split} }}]",
 }
 _SPLIT: Final = """
@@ -144,6 +146,8 @@ _REACTIONS: Final = {
 def _single(place: int, family: Family, protocol: str, name: str, node_id: int) -> Drive:
     split = _SPLIT_ID + node_id
     is_fan = family is CIA402
+    is_synchronous = is_fan and protocol != "zenoh"
+    rpdo = (_ELSEWHERE if is_synchronous else 0x200) + node_id
     return Drive(
         place,
         family,
@@ -151,12 +155,12 @@ def _single(place: int, family: Family, protocol: str, name: str, node_id: int) 
         f"{name}_{protocol}",
         "drive",
         node_id,
-        rpdo=0x200 + node_id,
+        rpdo=rpdo,
         tpdo=0x180 + node_id,
         emcy=0x080 + node_id,
         reaction=_REACTIONS.get(f"{name}_{protocol}", "disable_voltage"),
-        is_synchronous=is_fan and protocol != "zenoh",
-        settings=_CIA402_RPDOS[protocol].format(split=split) if is_fan else "",
+        is_synchronous=is_synchronous,
+        settings=_CIA402_RPDOS[protocol].format(rpdo=rpdo, split=split) if is_fan else "",
         setpoint_rpdo=split if is_fan and protocol == "zenoh" else 0,
     )
 
@@ -232,6 +236,7 @@ def _node(drives: list[Drive]) -> str:
             f'[[bus.node.drive]]\nslot = "{slot}"\nunit_id = {drive.place + 1}',
             f'control = "{drive.protocol}"\nfieldbus_timeout_ms = {PLANT.fieldbus_timeout_ms}',
             f'on_expiry = "{drive.reaction}"',
+            "fieldbus_timeout_writable = true" if drive.protocol == "modbus" else "",
             drive.settings,
             f"ignored_stop_ms = {IGNORED_STOP_MS}" if family is CIA402 else "",
             f"tpdo = {{ event_ms = {TPDO_MS}, inhibit_ms = {INHIBIT_MS} }}",

@@ -24,8 +24,8 @@ class Fault:
     there are any. ``steady``: what of the fault is to stop no drive comes first. ``at_once``: to how many
     owners, connections or nodes a round does it; each of them counts. ``leaves_silence``: the bridge does not
     answer it with a stop: it is not there, or its bus is not. ``new_process``: a process is started anew for
-    it, which takes its time. Without a ``bus_bound`` somebody else speaks there; without a ``drive_bound``
-    the drive says nothing."""
+    it, which takes its time. ``others_may_stop``: drives that it does not concern. Without a ``bus_bound``
+    somebody else speaks there; without a ``drive_bound`` the drive says nothing."""
 
     name: str
     reference: Reference
@@ -40,6 +40,7 @@ class Fault:
     at_once: int = 1
     leaves_silence: bool = False
     new_process: bool = False
+    others_may_stop: bool = False
 
     @property
     def per_round(self) -> int:
@@ -109,9 +110,9 @@ FAULTS: Final = (
         "send",
         others.write_ahead,
         others.stop_writing_ahead,
-        bounds.controller_sent,
-        bounds.controller_sent_drive,
+        *_OF_OWNERS,
         protocols=("modbus",),
+        others_may_stop=True,
     ),
     Fault(
         "deaf drive",
@@ -195,6 +196,24 @@ FAULTS: Final = (
     Fault("bus-off", "moment", acts.bus_off, acts.bus_restarted, *_GONE, leaves_silence=True),
     Fault("node rebooting", "boot-up", acts.reboot, acts.nothing, bounds.lost, None, at_once=_NODES),
     Fault(
+        "pause of the bridge across the deadline",
+        "telegram",
+        acts.pause_across_deadline,
+        acts.continue_owners,
+        bounds.controller,
+        bounds.controller_and_bridge_drive,
+        leaves_silence=True,
+    ),
+    Fault(
+        "intruder on an RPDO",
+        "moment",
+        others.intrude,
+        others.end_intruder,
+        None,
+        bounds.node_stopped,
+        nodes=(others.VICTIM.node,),
+    ),
+    Fault(
         "front killed",
         "telegram",
         acts.signal_front(signal.SIGKILL),
@@ -228,29 +247,6 @@ FAULTS: Final = (
         protocols=("opcua",),
         new_process=True,
     ),
-)
-"""In the order of a cycle. A service that is started anew in the middle has forgotten which nodes it has lost
-again and again, and how often its front has ended: it waits for neither longer than it has to."""
-
-AWAITED: Final = (
-    Fault(
-        "pause of the bridge across the deadline",
-        "telegram",
-        acts.pause_across_deadline,
-        acts.continue_owners,
-        bounds.controller,
-        bounds.controller_and_bridge_drive,
-        leaves_silence=True,
-    ),
-    Fault(
-        "intruder on an RPDO",
-        "moment",
-        others.intrude,
-        others.end_intruder,
-        None,
-        bounds.node_stopped,
-        nodes=(others.VICTIM.node,),
-    ),
     Fault(
         "second bridge",
         "telegram",
@@ -260,4 +256,17 @@ AWAITED: Final = (
         steady=others.start_second_bridge,
         new_process=True,
     ),
+    Fault(
+        "boot-up fails after a restart",
+        "moment",
+        others.restart_unbooted,
+        others.let_boot,
+        None,
+        bounds.at_once_drive,
+        nodes=(others.VICTIM.node,),
+        new_process=True,
+        others_may_stop=True,
+    ),
 )
+"""In the order of a cycle. A service that is started anew in the middle has forgotten which nodes it has lost
+again and again, and how often its front has ended: it waits for neither longer than it has to."""

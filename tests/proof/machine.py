@@ -22,6 +22,12 @@ from typing import Final
 from tests.proof.drives import BRIDGE_SIDE, DRIVE_SIDE
 
 _FRAME: Final = struct.Struct("=IB3x8s")
+_DOWNLOAD: Final = struct.Struct("<BHBI")
+_FOUR_BYTES, _TAKEN = 0x23, 0x60
+"""Expedited SDO download, and its answer (CiA 301 §7.2.4.3.3)."""
+_ANSWER_S: Final = 1.0
+_BROADCAST: Final = struct.Struct("@3I4l2I0q")
+"""struct bcm_msg_head of <linux/can/bcm.h>."""
 _ERROR: Final = 0x2000_0000
 _BUS_OFF: Final = _ERROR | 0x040
 _RESTARTED: Final = _ERROR | 0x100
@@ -71,6 +77,11 @@ class Gateway:
     def restore(self) -> None:
         call("cangw", "-A", *FROM_DRIVES)
 
+    def pass_only(self, can_id: int) -> None:
+        """Of what the drives' side sends."""
+        call("cangw", "-D", *FROM_DRIVES)
+        call("cangw", "-A", "-s", DRIVE_SIDE, "-d", BRIDGE_SIDE, "-e", "-f", f"{can_id:03X}:7FF")
+
 
 def send(channel: str, can_id: int, data: bytes) -> float:
     """Send a frame; gives the time before it."""
@@ -79,6 +90,30 @@ def send(channel: str, can_id: int, data: bytes) -> float:
         now = time.monotonic()
         raw.send(_FRAME.pack(can_id, len(data), data.ljust(8, b"\0")))
     return now
+
+
+def download(channel: str, node_id: int, index: int, value: int) -> None:
+    """Set a 32-bit object without subindices by SDO. Raises ``OSError`` where the node does not take it."""
+    request = _DOWNLOAD.pack(_FOUR_BYTES, index, 0, value)
+    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as raw:
+        answers = struct.pack("=II", 0x580 + node_id, 0x7FF)
+        raw.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, answers)
+        raw.settimeout(_ANSWER_S)
+        raw.bind((channel,))
+        raw.send(_FRAME.pack(0x600 + node_id, len(request), request))
+        _, _, answer = _FRAME.unpack(raw.recv(_FRAME.size))
+    if answer[0] != _TAKEN:
+        raise OSError(f"node {node_id} does not take {index:04X}h = {value:X}h: {answer.hex(' ')}")
+
+
+def repeat(channel: str, can_id: int, data: bytes, period_s: float) -> socket.socket:
+    """The kernel sends a frame again and again, however busy the machine is, until the socket is closed."""
+    beat = socket.socket(socket.AF_CAN, socket.SOCK_DGRAM, socket.CAN_BCM)
+    beat.connect((channel,))
+    flags = socket.CAN_BCM_SETTIMER | socket.CAN_BCM_STARTTIMER
+    head = _BROADCAST.pack(socket.CAN_BCM_TX_SETUP, flags, 0, 0, 0, 0, int(period_s * 1e6), can_id, 1)
+    beat.send(head + _FRAME.pack(can_id, len(data), data.ljust(8, b"\0")))
+    return beat
 
 
 def bus_off() -> float:

@@ -139,8 +139,13 @@ def drive_stop(rig: Rig, drive: Drive, since: float) -> float | None:
 def was_moving(rig: Rig, drive: Drive, at: float) -> bool:
     """The drive was enabled just then, on the bus and by its own word."""
     told = [run for run in rig.told.runs(drive.rpdo, at - _BEFORE_S) if run.first <= at]
+    return bool(told) and drive.enabling(told[-1].data) and says_enabled(rig, drive, at)
+
+
+def says_enabled(rig: Rig, drive: Drive, at: float) -> bool:
+    """The drive was enabled just then, by its own word."""
     said = [run for run in rig.said.runs(drive.tpdo, at - _BEFORE_S) if run.first <= at]
-    return bool(told and said) and drive.enabling(told[-1].data) and drive.enabled(said[-1].data)
+    return bool(said) and drive.enabled(said[-1].data)
 
 
 def handed_on(rig: Rig, drive: Drive, enabling: Run) -> Run:

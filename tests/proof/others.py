@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import signal
 import socket
-import struct
 import threading
 import time
 from contextlib import suppress
@@ -25,21 +24,22 @@ from tests.proof.drives import (
     write_second_site,
 )
 from tests.proof.families import CIA402
-from tests.proof.rig import Rig, Stuck
+from tests.proof.rig import BRIDGE_HEARTBEAT, Rig, Stuck
 from tests.proof.settings import PLANT
 from tests.proof.strangers import Connection
 
 VICTIM: Final = next(drive for drive in DRIVES if drive.family is CIA402)
-"""Whose RPDO is switched off, or sent by somebody else. It watches our heartbeat, so it goes on."""
+"""Whose RPDO is not heard any more, or sent by somebody else. It watches our heartbeat, so it goes on."""
 _INTRUDES_S: Final = 0.02
 _SECOND_S: Final = 8.0
 _DOWN_S: Final = 20.0
-_AHEAD: Final = 3000
-_OFF: Final = 0x8000_0000
-_DOWNLOAD: Final = struct.Struct("<BHBI")
-_FOUR_BYTES: Final = 0x23
-"""Expedited SDO download (CiA 301 §7.2.4.3.3)."""
-_UNHEARD_S: Final = 0.02
+_AHEAD: Final = 100
+_WAITS_S: Final = min(0.25, PLANT.short_s)
+_ACCEPTED_S: Final = 0.05
+_FED_S: Final = 0.1
+_STARTS_S: Final = 30.0
+_NEVER_SENT: Final = 0x7FF
+_OPERATIONAL: Final = b"\x05"
 
 
 class Intruder:
@@ -80,11 +80,9 @@ def end_intruder(rig: Rig) -> None:
 
 
 def make_deaf(rig: Rig) -> None:
-    """Its RPDO is switched off by SDO, and the bridge does not hear of it."""
+    """Its RPDO waits for a SYNC that never comes (1005h), and the bridge does not hear of it."""
     rig.gateway.silence_drives()
-    request = _DOWNLOAD.pack(_FOUR_BYTES, 0x1400, 1, _OFF | VICTIM.rpdo)
-    machine.send(DRIVE_SIDE, 0x600 + VICTIM.node_id, request)
-    time.sleep(_UNHEARD_S)
+    machine.download(DRIVE_SIDE, VICTIM.node_id, 0x1005, _NEVER_SENT)
     rig.gateway.restore()
 
 
@@ -110,17 +108,41 @@ def end_second_bridge(rig: Rig) -> None:
     acts.continue_owners(rig)
 
 
+def restart_unbooted(rig: Rig) -> float:
+    """The bridge dies, and a drive that is kept running by its heartbeat hears the next one, which hears of
+    it no more than that it is there: no SDO is answered. Gives the time of that one's first heartbeat."""
+    acts.stop_owners(rig)
+    rig.gateway.pass_only(0x700 + VICTIM.node_id)
+    rig.guests.enter_context(machine.repeat(DRIVE_SIDE, BRIDGE_HEARTBEAT, _OPERATIONAL, _FED_S))
+    killed = rig.kill_bridge()
+    rig.renew_bridge()
+    since = killed + PLANT.deadman_ms / 1000
+    rig.wait(lambda: bool(rig.told.times(BRIDGE_HEARTBEAT, since)), _STARTS_S, "the bridge acts")
+    return rig.told.times(BRIDGE_HEARTBEAT, since)[0]
+
+
+def let_boot(rig: Rig) -> None:
+    rig.send_guests_away()
+    rig.gateway.open()
+    _reset(VICTIM)
+    acts.continue_owners(rig)
+
+
 def write_ahead(rig: Rig) -> float:
-    """A client of the Modbus owner's machine writes thousands of telegrams without waiting for an answer, and
-    hangs. Gives the time of the last one."""
+    """While the bridge stands still for less than its dead-man time, a client of the Modbus owner's machine
+    writes hundreds of telegrams without waiting for an answer, and hangs. Gives the time of the last one."""
+    assert rig.bridge
     rig.owners["modbus"].signal(signal.SIGSTOP)
+    drives = [drive for drive in drives_of("modbus") if drive.reaction != "hold"]
+    connections = [Connection.of_owner() for _ in drives]
+    time.sleep(_ACCEPTED_S)
+    rig.bridge.signal(signal.SIGSTOP)
+    for connection, drive in zip(connections, drives, strict=True):
+        rig.guests.callback(connection.abandon)
+        connection.write_ahead(drive, _AHEAD)
     moment = time.monotonic()
-    for drive in drives_of("modbus"):
-        if drive.reaction != "hold":
-            connection = Connection.of_owner()
-            rig.guests.callback(connection.abandon)
-            connection.write_ahead(drive, _AHEAD)
-            moment = time.monotonic()
+    time.sleep(_WAITS_S)
+    rig.bridge.signal(signal.SIGCONT)
     return moment
 
 

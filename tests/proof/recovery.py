@@ -12,7 +12,9 @@ if TYPE_CHECKING:
 
 _PATIENCE_S: Final = 1.5
 _MOST_PATIENCE_S: Final = 12.0
-"""Twice as long each time: a slow machine may take seconds for a telegram."""
+"""After some tries twice as long each time: a slow machine may take seconds for a telegram."""
+_QUICK_TRIES: Final = 6
+"""As long as a node may take to be booted."""
 
 
 class Recovery:
@@ -26,6 +28,7 @@ class Recovery:
         self._since = float("-inf")
         self._accepted = 0
         self._patience_s = _PATIENCE_S
+        self._tries = 0
         if anew:
             self._tell(drive.family.acknowledge)
 
@@ -39,8 +42,10 @@ class Recovery:
         elif self._word == family.run and self._rig.moves(self._drive):
             return True
         elif waited > self._patience_s:
-            self._patience_s = min(2 * self._patience_s, _MOST_PATIENCE_S)
             # Not yet: the node may still be booting. Once more from the start.
+            self._tries += 1
+            if self._tries > _QUICK_TRIES:
+                self._patience_s = min(2 * self._patience_s, _MOST_PATIENCE_S)
             self._tell(family.acknowledge)
         return False
 

@@ -25,14 +25,15 @@ _FRESH_S: Final = 0.5
 _LIMIT_S: Final = 120.0
 _FRONT_ENDS_S: Final = 10.0
 _HOUR_S: Final = 3600.0
+BRIDGE_HEARTBEAT: Final = 0x77F
 BRIDGE: Final = "bridge"
 SIMULATION: Final = "drives"
 FRONT: Final = "front"
 _MAIN_THREAD: Final = ("chrt", "--reset-on-fork", "--other", "0")
-_BRIDGE_AHEAD: Final = (*_MAIN_THREAD, "nice", "-n", "-20")
-"""Its main thread goes first, its front and zenoh's threads do not, as in systemd/drivebridge.service; but
-not in the real-time class, which on one CPU would starve its clients. Without the right ``nice`` only says
-that it has none."""
+"""What it may do more than others is not handed on to what it starts."""
+_AHEAD: Final = -20
+"""The bridge's main thread goes first once it serves, its front and zenoh's threads do not, as in
+systemd/drivebridge.service; but not in the real-time class, which on one CPU would starve its clients."""
 _DRIVES_AHEAD: Final = (*_MAIN_THREAD, "nice", "-n", "-5")
 """They react late where the machine is busy with other things; elsewhere they have a CPU of their own."""
 
@@ -131,7 +132,7 @@ class Rig:
         self._stack.callback(self.send_guests_away)
         self.gateway.open()
         rpdos = {can_id for drive in DRIVES for can_id in (drive.rpdo, drive.number_id)}
-        self.told = Witness(BRIDGE_SIDE, sorted(rpdos), self.clock)
+        self.told = Witness(BRIDGE_SIDE, sorted({*rpdos, BRIDGE_HEARTBEAT}), self.clock)
         self.heard = Witness(BRIDGE_SIDE, _from_nodes(DRIVES), self.clock)
         self.said = Witness(DRIVE_SIDE, _from_nodes(DRIVES), self.clock)
         for witness in (self.told, self.heard, self.said):
@@ -160,9 +161,11 @@ class Rig:
         self._starts += 1
         name = f"run_{self._starts}"
         source = ("env", f"PYTHONPATH={self.tree}")
-        command = [*source, *_BRIDGE_AHEAD, sys.executable, "-m", "bridge", "run", str(self._site)]
+        command = [*source, *_MAIN_THREAD, sys.executable, "-m", "bridge", "run", str(self._site)]
         self.bridge = self._bridges.enter_context(running(self.disk.folder, name, *command))
         self.bridge.wait_output("OPC UA on", _LIMIT_S)
+        with suppress(PermissionError):
+            os.setpriority(os.PRIO_PROCESS, self.bridge.pid, _AHEAD)
         follow(self.watched, BRIDGE, self.bridge.pid)
         self.follow_front()
 

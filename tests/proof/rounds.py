@@ -41,14 +41,16 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
         time.sleep(_QUIET_S)
         _wait_handed_on(rig, fault, since, say)
     concerned = [drive for drive in DRIVES if not fault.goes_on(drive)]
-    others = [drive for drive in DRIVES if not fault.concerns(drive)]
-    holding = [drive for drive in DRIVES if fault.goes_on(drive) and drive not in others]
+    others = [drive for drive in DRIVES if not (fault.concerns(drive) or fault.others_may_stop)]
+    holding = [drive for drive in DRIVES if fault.concerns(drive) and fault.goes_on(drive)]
+    # Where somebody else speaks on the bus, the drive alone tells whether it moved.
+    moved = measure.was_moving if fault.bus_bound else measure.says_enabled
     began = time.monotonic()
     # At any time between two telegrams.
     time.sleep(random.uniform(0.0, PLANT.owner_period_s))
     moment = fault.inject(rig)
     _let_pass(rig, fault, concerned, moment)
-    still = [drive for drive in concerned + holding if not measure.was_moving(rig, drive, moment)]
+    still = [drive for drive in concerned + holding if not moved(rig, drive, moment)]
     rig.by_themselves += len(still)
     stopped = _wait_stopped(rig, fault, [drive for drive in concerned if drive not in still], moment)
     missing = [drive for drive in concerned if drive not in stopped and drive not in still]

@@ -11,6 +11,7 @@ from typing import Final
 
 from tests.proof.drives import PORTS, SERVERS, Drive, drives_of
 from tests.proof.families import NORD
+from tests.proof.settings import PLANT
 
 _OWNERS_MACHINE: Final = "127.0.0.1"
 _ELSEWHERE: Final = "127.0.0.20"
@@ -18,8 +19,9 @@ _HEAD: Final = struct.Struct(">HHHB")
 _READ: Final = struct.Struct(">BHH")
 _WRITE: Final = struct.Struct(">BHHB")
 _READ_HOLDING, _WRITE_HOLDING = 3, 16
-_KEEP_ALIVE: Final = 10
-"""Holding register (docs/reference/modbus.md): 0 releases the drive."""
+_KEEP_ALIVE, _TIMEOUT = 10, 12
+"""Holding registers (docs/reference/modbus.md): 0 releases the drive; the owner's time-out."""
+_LONG_MS: Final = 5 * PLANT.fieldbus_timeout_ms
 _INVALID: Final = 0x007F
 """NORD: "run" without bit 10, "control data valid" (BU 2500 §6.5.1)."""
 _MOST_BYTES: Final = 260
@@ -90,8 +92,8 @@ def release(drives: list[Drive]) -> float:
 
 
 class Strangers:
-    """Nothing of what they do is a telegram of the owner: another machine writes "run" to its drives, its own
-    machine reads them, and writes what is no valid telegram."""
+    """Nothing of what they do is a telegram of the owner: another machine writes "run" to its drives and a
+    longer time-out, its own machine reads them, and writes what is no valid telegram."""
 
     def __init__(self) -> None:
         self._ended = threading.Event()
@@ -106,6 +108,7 @@ class Strangers:
             while not self._ended.wait(_PERIOD_S):
                 for drive in drives:
                     other.write(drive, 0, drive.family.run, drive.family.setpoint)
+                    other.write(drive, _TIMEOUT, _LONG_MS)
                     own.read(drive)
                     if drive.family is NORD:
                         own.write(drive, 0, _INVALID)

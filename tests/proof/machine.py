@@ -101,7 +101,9 @@ def download(channel: str, node_id: int, index: int, value: int) -> None:
         raw.settimeout(_ANSWER_S)
         raw.bind((channel,))
         raw.send(_FRAME.pack(0x600 + node_id, len(request), request))
-        _, _, answer = _FRAME.unpack(raw.recv(_FRAME.size))
+        answer = bytes(8)
+        while answer[1:4] != request[1:4]:  # what comes before that answers somebody else
+            _, _, answer = _FRAME.unpack(raw.recv(_FRAME.size))
     if answer[0] != _TAKEN:
         raise OSError(f"node {node_id} does not take {index:04X}h = {value:X}h: {answer.hex(' ')}")
 

@@ -31,13 +31,12 @@ from tests.proof.strangers import Connection
 VICTIM: Final = next(drive for drive in DRIVES if drive.family is CIA402)
 """Whose RPDO is not heard any more, or sent by somebody else. It watches our heartbeat, so it goes on."""
 _INTRUDES_S: Final = 0.02
-_SECOND_S: Final = 8.0
 _DOWN_S: Final = 20.0
 _AHEAD: Final = 100
 _WAITS_S: Final = min(0.25, PLANT.short_s)
 _ACCEPTED_S: Final = 0.05
 _FED_S: Final = 0.1
-_STARTS_S: Final = 30.0
+_STARTS_S: Final = 60.0
 _NEVER_SENT: Final = 0x7FF
 _OPERATIONAL: Final = b"\x05"
 
@@ -99,8 +98,8 @@ def let_hear(rig: Rig) -> None:
 
 def start_second_bridge(rig: Rig) -> None:
     """On the same bus, for the same drives, with ports of its own."""
-    rig.guests.enter_context(rig.another_bridge(write_second_site(rig.folder)))
-    time.sleep(_SECOND_S)
+    second = rig.guests.enter_context(rig.another_bridge(write_second_site(rig.folder)))
+    second.wait_output("OPC UA on", _STARTS_S)
 
 
 def end_second_bridge(rig: Rig) -> None:

@@ -31,6 +31,7 @@ SIMULATION: Final = "drives"
 FRONT: Final = "front"
 _MAIN_THREAD: Final = ("chrt", "--reset-on-fork", "--other", "0")
 """What it may do more than others is not handed on to what it starts."""
+_LAST: Final = ("nice", "-n", "15")
 _AHEAD: Final = -20
 """The bridge's main thread goes first once it serves, its front and zenoh's threads do not, as in
 systemd/drivebridge.service; but not in the real-time class, which on one CPU would starve its clients."""
@@ -175,8 +176,8 @@ class Rig:
         follow(self.watched, FRONT, self._front)
 
     def another_bridge(self, site: Path) -> AbstractContextManager[Process]:
-        """Beside the first one, on the same bus."""
-        command = ("env", f"PYTHONPATH={self.tree}", sys.executable, "-m", "bridge", "run", str(site))
+        """Beside the first one, on the same bus. On a box of its own it would take no time from anybody."""
+        command = ("env", f"PYTHONPATH={self.tree}", *_LAST, sys.executable, "-m", "bridge", "run", str(site))
         return running(self.folder, "second", *command)
 
     def send_guests_away(self) -> None:

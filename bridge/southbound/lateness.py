@@ -10,7 +10,7 @@ from bridge.southbound.ratelimit import RateLimit
 
 _EVENTS: Final = 3
 _EVENT_EVERY_S: Final = 60.0
-_SEVERITY: Final = 700
+_SEVERITY_ROUND, _SEVERITY_TRIP = 500, 700
 
 
 class Lateness:
@@ -28,17 +28,18 @@ class Lateness:
         late_ms = 1000 * (now - due)
         self._round_ms = max(self._round_ms, late_ms)
         if late_ms > REACTION_BOUND_MS and self._round_limit.allows(now):
-            self._tell(f"a round came {late_ms:.0f} ms late", now)
+            self._tell(f"a round came {late_ms:.0f} ms late", _SEVERITY_ROUND, now)
 
     def on_stop(self, due: float, now: float) -> None:
         late_ms = 1000 * (now - due)
         self._trip_ms = max(self._trip_ms, late_ms)
         if late_ms > REACTION_BOUND_MS and self._trip_limit.allows(now):
-            self._tell(f"the stop of a silent controller's drive was handed over {late_ms:.0f} ms late", now)
+            what = f"the stop of a silent controller's drive was handed over {late_ms:.0f} ms late"
+            self._tell(what, _SEVERITY_TRIP, now)
 
-    def _tell(self, what: str, now: float) -> None:
+    def _tell(self, what: str, severity: int, now: float) -> None:
         message = f"{what}; {REACTION_BOUND_MS} ms are allowed for"
-        self._plant.report(Event(now, Kind.WATCHDOG, "bridge", _SEVERITY, message))
+        self._plant.report(Event(now, Kind.WATCHDOG, "bridge", severity, message))
 
     def refresh(self, now: float) -> None:
         self._plant.set("bridge/worst_trip_lateness_ms", round(self._trip_ms, 1), now)

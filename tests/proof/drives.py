@@ -18,12 +18,12 @@ PORTS: Final = {"modbus": 1502, "opcua": 4840, "zenoh": 7447}
 BRIDGE_SIDE: Final = "vcan0"
 DRIVE_SIDE: Final = "vcan1"
 
-CLIENT_MS: Final = 250
+CLIENT_MS: Final = 200
 """What the time from the client's call to the stop may exceed the published time, which runs from when the
 telegram came: the client's and the network's, on a CPU that they share with the bridge."""
 WAY_MS: Final = {"modbus": 100 + CLIENT_MS, "opcua": 500 + CLIENT_MS, "zenoh": 200 + CLIENT_MS}
-"""How long a telegram may be on its way from its client's call to the bus. What waits before the bridge for
-longer than the first part of it does not count (docs/explanation/dead-man-chain.md, "What fresh means")."""
+"""How long a telegram may be on its way from its client's call to the bus: what is carried out so late that
+it exceeds this has waited somewhere."""
 IGNORED_STOP_MS: Final = 1500
 """How long a stop of a CiA 402 drive, which is the one that is made deaf, may go without being followed."""
 TPDO_MS: Final = 300

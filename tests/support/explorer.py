@@ -7,40 +7,47 @@ that of a ``Machine`` relative to its clock.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from itertools import pairwise
 from typing import Any, Protocol
 
-_OURS = "bridge.command."
+_OURS = ("bridge.command.", "bridge.drive.handshake")
 _PLAIN = (int, float, str, bytes, tuple, Enum, type(None))
+
+State = tuple[Hashable, ...]
 
 
 class Parts:
-    """The mutable state of ``root`` and of all objects of ``bridge.command`` that it is made of.
+    """The mutable state of ``root`` and of all objects of the command channel that it is made of.
 
-    Tables (dicts) do not change while a drive is commanded and are left out; lists have to be empty. Times
-    are kept relative to the clock; how long ago something was counts up to ``memory_s`` of the attribute.
-    Attributes ``only_shown`` decide nothing; times in ``spent`` mean nothing when they are over.
+    A state is what their attributes hold at the time ``at``: one that is taken later is brought back to that
+    time, and what is left of it is that of any other. Tables (dicts) do not change while a drive is commanded
+    and are left out; lists have to be empty. What is over counts for ``memory_s`` of the attribute, and after
+    that no more. Numbers below ``epoch`` are no times. Attributes ``only_shown`` decide nothing; times in
+    ``spent`` mean nothing when they are over.
     """
 
     def __init__(
         self,
         root: object,
-        epoch: float,
         *,
-        memory_s: Mapping[str, float],
+        epoch: float,
+        at: float,
+        memory_s: Mapping[str, float] | None = None,
         only_shown: Sequence[str] = (),
         spent: Sequence[str] = (),
     ) -> None:
         self._only_shown = only_shown
         self._spent = spent
         self._epoch = epoch
-        self._memory_s = memory_s
+        self._at = at
+        self._memory_s = memory_s or {}
         self._fields: list[tuple[object, str]] = []
         self._lists: list[list[object]] = []
         self._walk(root, set())
+        self._read, self._write = _accessors(self._fields)
 
     def _walk(self, part: object, seen: set[int]) -> None:
         if id(part) in seen:
@@ -57,25 +64,37 @@ class Parts:
             elif type(value).__module__.startswith(_OURS):
                 self._walk(value, seen)
 
-    def take(self, now: float) -> tuple[Hashable, ...]:
+    def take(self, now: float) -> State:
         """The state as it is; equal ones have the same future."""
         assert not any(self._lists), "an outcome was not told"
-        state: list[Hashable] = [getattr(part, name) for part, name in self._fields]
-        for place, value in enumerate(state):
-            if type(value) is float and self._epoch <= value < float("inf"):
-                state[place] = self._relative(self._fields[place][1], value, now)
-        return tuple(state)
+        state = self._read()
+        if now == self._at:
+            return state
+        return tuple(
+            self._brought_back(name, value, now)
+            if type(value) is float and self._epoch <= value < float("inf")
+            else value
+            for (_, name), value in zip(self._fields, state, strict=True)
+        )
 
-    def _relative(self, name: str, value: float, now: float) -> Hashable:
+    def _brought_back(self, name: str, value: float, now: float) -> float | None:
         if name in self._spent and value <= now:
             return None
-        return ("at", round(max(value - now, -self._memory_s.get(name, 0.0)), 6))
+        return round(self._at + max(value - now, -self._memory_s.get(name, 0.0)), 6)
 
-    def put(self, state: tuple[Hashable, ...], now: float) -> None:
-        """Be in ``state`` at ``now``."""
-        for (part, name), value in zip(self._fields, state, strict=True):
-            is_time = type(value) is tuple and len(value) == 2 and value[0] == "at"
-            setattr(part, name, now + value[1] if is_time else value)
+    def put(self, state: State) -> None:
+        """Be in ``state``, at the time ``at``."""
+        self._write(state)
+
+
+def _accessors(fields: Sequence[tuple[object, str]]) -> tuple[Callable[[], State], Callable[[State], None]]:
+    """What reads all attributes at once, and what sets them. Each step does both, so they are compiled: a
+    third of the time that going through the attributes by name takes."""
+    places = {id(part): place for place, (part, _) in enumerate(fields)}
+    scope: dict[str, Any] = {f"part_{place}": fields[place][0] for place in places.values()}
+    attributes = "".join(f"part_{places[id(part)]}.{name}, " for part, name in fields)
+    exec(f"def read(): return ({attributes})\ndef write(state): ({attributes}) = state", scope)
+    return scope["read"], scope["write"]
 
 
 def _attributes(part: object) -> Iterator[str]:

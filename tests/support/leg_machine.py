@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields, replace
 from typing import Any, Final
 
 from bridge.command import Action, Code, Identity, Outcome, Request, Role, watchdog
@@ -14,7 +13,7 @@ from bridge.command.request import STOP_ACTIONS
 from bridge.command.watchdog import Stimulus, WatchdogState
 from bridge.drive import DriveState
 from bridge.image import Value
-from tests.support.explorer import Parts
+from tests.support.explorer import Parts, State
 from tests.support.leg_events import (
     ACTIONS,
     ANSWERS,
@@ -36,14 +35,6 @@ _NOW: Final = 2000.0
 _HUNG_S: Final = 20.0
 _A_MOMENT_S: Final = 0.001
 _FAULT_BITS, _FAULT = 0b1001111, 0b0001000
-
-_MODEL_FIELDS: Final = tuple(field.name for field in fields(LegModel))
-_MODEL_TIMES: Final = tuple(
-    map(
-        _MODEL_FIELDS.index,
-        ("now", "deadline", "lease_until", "start_until", "believed_at", "believes_from", "gone_at"),
-    ),
-)
 
 Transition = tuple[WatchdogState, Stimulus, str]
 """Where the watchdog was, what happened, and in which of ``GATES`` the way to the bus was."""
@@ -103,7 +94,8 @@ class LegMachine:
         assert isinstance(memory_ms, int)
         self._parts = Parts(
             self._channel,
-            _EPOCH,
+            epoch=_EPOCH,
+            at=_NOW,
             memory_s={"_tripped_at": memory_ms / 1000},
             only_shown=("trips", "refused_writes", "last_fault", "telegrams"),
             spent=("_acknowledge_until",),
@@ -112,13 +104,14 @@ class LegMachine:
         self._model = LegModel(
             str(given["control"]), self._timeout_ms / 1000, self._ignores, self._is_hold, _NOW, is_there=True
         )
+        self._model_parts = Parts(self._model, epoch=_EPOCH, at=_NOW)
         self._rig.now = _NOW
         self._channel.on_node(NodeState.OPERATIONAL, _NOW)
         self._rig.drive_says(READY)
         self._channel.on_time(_NOW)
         self._hung = False
         self._outcomes: list[Outcome] = []
-        self._before: tuple[Hashable, ...] = ()
+        self._before: tuple[State, State] = ((), ())
         left_out = (
             *(PULSES if starts else STARTS),
             *(() if starts or answers else ANSWERS),
@@ -132,19 +125,14 @@ class LegMachine:
 
     def take(self) -> Hashable:
         now = self._rig.now
-        model = [getattr(self._model, name) for name in _MODEL_FIELDS]
-        for place in _MODEL_TIMES:
-            if model[place] is not None:
-                model[place] = round(max(model[place] - now, 0.0), 6)
-        return self._parts.take(now), tuple(model), self._hung
+        return self._parts.take(now), self._model_parts.take(now), self._hung
 
-    def put(self, state: tuple[tuple[Hashable, ...], tuple[Any, ...], bool]) -> None:
-        self._before, model, self._hung = state
+    def put(self, state: tuple[State, State, bool]) -> None:
+        parts, model, self._hung = state
+        self._before = parts, model
         self._rig.now = _NOW
-        self._parts.put(self._before, _NOW)
-        for place, value in enumerate(model):
-            is_time = place in _MODEL_TIMES and value is not None
-            setattr(self._model, _MODEL_FIELDS[place], value + _NOW if is_time else value)
+        self._parts.put(parts)
+        self._model_parts.put(model)
 
     # what happens
 
@@ -182,7 +170,7 @@ class LegMachine:
     # requests, between two rounds of the service: the channel has to see to its timers by itself
 
     def _request(self, request: Request) -> None:
-        before, model_before = self._before, replace(self._model) if self._hung else self._model
+        before, model_before = self._before
         was_hung = self._hung
         self._model.judge()
         is_taken = self._expect(request)
@@ -204,8 +192,8 @@ class LegMachine:
             # Nothing has changed but what the timers changed.
             self._round()
             after = self._parts.take(self._rig.now)
-            self._parts.put(before, self._rig.now)
-            self._model = model_before
+            self._parts.put(before)
+            self._model_parts.put(model_before)
             self._round()
             before = self._parts.take(self._rig.now)
             del self._recorder.seen[made:]

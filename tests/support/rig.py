@@ -9,8 +9,9 @@ from bridge.config import DriveTable
 from bridge.drive import EmergencyReader, LinearScale, Told
 from bridge.image import Value
 from bridge.mapping import Family, load_family
+from tests.support.leg_words import HALF_SPEED, NORD_TU4, LegWords
 
-NORD: Family = load_family("nord/sk-tu4-cao")
+NORD: Family = load_family(NORD_TU4.mapping)
 
 PLC = Identity(Source.MODBUS, "192.168.1.10")
 OTHER_PLC = Identity(Source.MODBUS, "192.168.1.11")
@@ -19,12 +20,10 @@ OBSERVER = Identity(Source.OPCUA, "guest", Role.OBSERVER)
 ENGINEER = Identity(Source.OPCUA, "eve", Role.ENGINEER)
 
 # BU 2500 §6.8: control words and the drive's answers to them.
-SHUT_DOWN, ENABLE = 0x047E, 0x047F
-ACKNOWLEDGE = 0x04FE
-INHIBITED, READY, SWITCHED_ON, ENABLED = 0x0B40, 0x0B31, 0x0B33, 0x0B37
-QUICK_STOPPING, FAULT, FAULT_REACTION = 0x0B17, 0x0B08, 0x0B0F
-HALF_SPEED = 0x2000
-
+SHUT_DOWN, ENABLE = NORD_TU4.shut_down, NORD_TU4.enable
+ACKNOWLEDGE = SHUT_DOWN | NORD_TU4.acknowledge
+INHIBITED, READY, SWITCHED_ON, ENABLED = 0x0B40, NORD_TU4.ready, 0x0B33, NORD_TU4.enabled
+QUICK_STOPPING, FAULT, FAULT_REACTION = 0x0B17, NORD_TU4.fault, 0x0B0F
 
 _ROUNDING_S = 1e-9
 """0.15 + 0.05 may come out a little less than 0.2."""
@@ -36,19 +35,29 @@ def emergency(code: int, vendor: bytes = bytes(5)) -> Told:
 
 
 class Rig:
-    """A channel with the controller that owns it. ``settings`` are those of the site file's drive.
+    """A channel with the controller that owns it. ``settings`` are those of the site file's drive, ``words``
+    those of its family.
 
     Times are seconds from the start of the rig; ``now`` is on the channel's own clock.
     """
 
     def __init__(
-        self, *, hold_ms: int = 2000, pdo_deadline_s: float | None = None, **settings: object
+        self,
+        *,
+        hold_ms: int = 2000,
+        pdo_deadline_s: float | None = None,
+        words: LegWords = NORD_TU4,
+        **settings: object,
     ) -> None:
-        given = {"slot": "fu1", "control": "modbus", "fieldbus_timeout_ms": 200, **settings}
+        self.words = words
+        family = NORD if words is NORD_TU4 else load_family(words.mapping)
+        slot = family.slot[0].name
+        given = {"slot": slot, "control": "modbus", "fieldbus_timeout_ms": 200, **settings}
         self.events: list[Event] = []
         table = DriveTable.model_validate(given)
-        self.channel = DriveChannel("conveyor/fu1", NORD, table, hold_ms, self.events.append)
-        self.channel.scales["command/frequency"] = LinearScale(50.0, 16384, 2.0)
+        self.channel = DriveChannel(f"conveyor/{slot}", family, table, hold_ms, self.events.append)
+        self.channel.scales.setdefault("command/frequency", LinearScale(50.0, 16384, 2.0))
+        self.channel.scales.setdefault("command/velocity", LinearScale(3000.0, 1000, 2.0))
         self.channel.link.pdo_deadline_s = pdo_deadline_s
         self.now = 1000.0
 
@@ -130,8 +139,8 @@ class Rig:
 
     @property
     def enables(self) -> bool:
-        """Whether what is on the bus makes the drive move (bits 0 … 3, BU 2500 §6.5.1)."""
-        return not self.silent and self.sent & 0x000F == 0x000F
+        """Whether what is on the bus makes the drive move."""
+        return not self.silent and self.words.enabling.fit(self.sent)
 
     @property
     def watchdog(self) -> str:

@@ -380,7 +380,7 @@ class ControllerLeg:
             Action.QUICK_STOP: self.words.quick_stop,
             Action.DISABLE_VOLTAGE: self.words.disable_voltage,
         }[request.action]
-        self.gate.stop(change(self.gate.sent.words[0]), is_asked=True)
+        self.gate.stop_as_asked(change(self.gate.sent.words[0]))
         self.start.end(Outcome(Code.CANCELLED, f"{request.action} by {request.identity}"))
 
     def _begin_start(self, request: Request, now: float, reply: Reply) -> None:

@@ -170,6 +170,12 @@ class Gate:
         if not self._words.enables(control_word):
             self.interlocked = False
 
+    def stop_as_asked(self, control_word: int) -> None:
+        """A stop by a command, made from the word that is sent. A reaction of the watchdog goes on from it,
+        too: after a ramp was begun, somebody may still disable the voltage."""
+        self.stop(control_word, is_asked=True)
+        self.sent = Output((control_word, *self.rest), self.sent.silent)
+
     def stop(self, control_word: int, *, is_asked: bool = False) -> None:
         """Stop with this word in place of the owner's, and wait for a fresh enable. ``is_asked``: by a
         command, and not because the bridge has to."""

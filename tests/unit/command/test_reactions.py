@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command import Action
+from bridge.command import Action, Identity
 from bridge.command.link import NodeState
+from tests.support.leg_words import NORD_TU4
 from tests.support.rig import (
     ACKNOWLEDGE,
     ENABLE,
@@ -13,6 +14,7 @@ from tests.support.rig import (
     HALF_SPEED,
     INHIBITED,
     OPERATOR,
+    PLC,
     QUICK_STOPPING,
     READY,
     SHUT_DOWN,
@@ -171,3 +173,26 @@ class TestHold:
         assert not rig.enables
         rig.node(NodeState.OPERATIONAL)
         assert not rig.enables
+
+
+@pytest.mark.parametrize("action", [Action.QUICK_STOP, Action.DISABLE_VOLTAGE])
+@pytest.mark.parametrize("who", [PLC, OPERATOR])
+def test_a_stronger_stop_is_sent_while_the_drive_ramps_down(action: Action, who: Identity):
+    rig = tripped("stop")
+    assert rig.ask(action, who).forwarded
+    strong = rig.sent
+    stops = NORD_TU4.quick_stop if action is Action.QUICK_STOP else NORD_TU4.disable_voltage
+    assert stops.fit(strong)
+    rig.drive_says(ENABLED)
+    assert rig.sent == strong
+    assert rig.ask(Action.STOP, who).ok
+    assert rig.sent == strong, "a weaker stop lifts it not"
+    assert rig.watchdog == "tripped"
+
+
+@pytest.mark.parametrize("on_expiry", ["disable_voltage", "silence"])
+def test_a_weaker_stop_changes_nothing_of_the_reaction(on_expiry: str):
+    rig = tripped(on_expiry)
+    before = rig.channel.output
+    assert rig.ask(Action.STOP, OPERATOR).ok
+    assert rig.channel.output == before

@@ -61,9 +61,9 @@ class Handshake:
         return self._mask if self._raised else 0
 
     def order(self, setpoints: Sequence[int]) -> None:
-        """The position was written."""
-        if self._words(setpoints) != self._taken:
-            self._ordered = True
+        """The position was written. Where the drive has it already, or is getting it, one that was written
+        in between does not count any more."""
+        self._ordered = self._words(setpoints) != self._taken
 
     def reset(self) -> None:
         """The drive is stopped: what was ordered does not count any more."""

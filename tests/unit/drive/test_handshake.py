@@ -55,6 +55,15 @@ def test_one_that_comes_while_the_bit_is_up_gets_an_edge_of_its_own(handshake: H
     assert handshake.bits == NEW
 
 
+def test_going_back_to_the_position_that_is_handed_over_takes_the_one_between_back(handshake: Handshake):
+    order(handshake, 1, 0)
+    order(handshake, 2, 0)
+    assert order(handshake, 1, 0) == NEW
+    handshake.step((1, 0), TAKEN, 0.0, enabled=True)
+    handshake.step((1, 0), 0, 0.0, enabled=True)
+    assert handshake.bits == 0, "a drive that counts from where it is would go on by 1 again"
+
+
 def test_an_order_waits_for_the_enable(handshake: Handshake):
     assert order(handshake, 1, 0, enabled=False) == 0
     handshake.step((1, 0), 0, 0.0, enabled=True)

@@ -13,7 +13,7 @@ from enum import Enum
 from itertools import pairwise
 from typing import Any, Protocol
 
-_OURS = ("bridge.command.", "bridge.drive.handshake")
+_OURS = ("bridge.command.", "bridge.drive.handshake", "tests.support.handshake_model")
 _PLAIN = (int, float, str, bytes, tuple, Enum, type(None))
 
 State = tuple[Hashable, ...]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Hashable, Mapping
 from typing import Any, Final
 
-from bridge.command import Action, Code, Identity, Outcome, Request, Role, watchdog
+from bridge.command import Action, Code, Identity, Outcome, Request, Role
 from bridge.command.channel import DriveChannel
 from bridge.command.link import NodeState
 from bridge.command.request import STOP_ACTIONS
@@ -19,14 +18,16 @@ from tests.support.leg_events import (
     ANSWERS,
     PULSES,
     REST,
-    RIVALS,
     STARTS,
     STOPS,
+    TAKEN,
     TIMES,
-    WRITES,
+    writes_of,
 )
-from tests.support.leg_model import LegModel, Stage
-from tests.support.rig import ENABLED, FAULT, READY, Rig
+from tests.support.leg_model import LegModel, Says, Stage
+from tests.support.leg_words import NORD_TU4, LegWords
+from tests.support.recorded_table import RecordedTable
+from tests.support.rig import Rig
 
 TIMEOUT_MS: Final = 2000
 """Shorter than a start may take, so that both ends of a start are on the way."""
@@ -34,92 +35,93 @@ _EPOCH: Final = 1000.0
 _NOW: Final = 2000.0
 _HUNG_S: Final = 20.0
 _A_MOMENT_S: Final = 0.001
-_FAULT_BITS, _FAULT = 0b1001111, 0b0001000
 
 Transition = tuple[WatchdogState, Stimulus, str]
 """Where the watchdog was, what happened, and in which of ``GATES`` the way to the bus was."""
 GATES: Final = ("open", "interlocked", "node gone")
 
-_CAN_BE_ENABLED: Final = (DriveState.READY, DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED)
-
-
-class _Recorder(dict[tuple[WatchdogState, Stimulus], Any]):
-    """The watchdog's table, which notes what is looked up in it."""
-
-    def __init__(self, *args: Any) -> None:
-        super().__init__(*args)
-        self.seen: list[tuple[WatchdogState, Stimulus]] = []
-
-    def __getitem__(self, key: tuple[WatchdogState, Stimulus]) -> Any:
-        self.seen.append(key)
-        return super().__getitem__(key)
-
-
-@contextmanager
-def recorded_table() -> Iterator[_Recorder]:
-    table = watchdog.TABLE
-    recorder = _Recorder(table)
-    watchdog.TABLE = recorder  # pyright: ignore[reportConstantRedefinition]
-    try:
-        yield recorder
-    finally:
-        watchdog.TABLE = table  # pyright: ignore[reportConstantRedefinition]
+_STATES: Final = {
+    Says.READY: DriveState.READY,
+    Says.ENABLED: DriveState.OPERATION_ENABLED,
+    Says.FAULT: DriveState.FAULT,
+}
 
 
 class LegMachine:
-    """``starts``: explore starts, else pulses of the acknowledge bit. ``answers``: explore what the drive
-    says, as starts need it. ``stops``: every kind of stop. ``ttl_ms`` is how long everybody takes control
-    for. The rest are the drive's keys of the site file."""
+    """``words``: of which family. ``starts``: explore starts, else pulses of the acknowledge bit.
+    ``answers``: explore what the drive says, as starts need it. ``stops``: every kind of stop. ``without``:
+    events that are left out, too. ``ttl_ms`` is how long everybody takes control for. The rest are the
+    drive's keys of the site file."""
 
     def __init__(
         self,
-        recorder: _Recorder,
+        recorder: RecordedTable,
         *,
+        words: LegWords = NORD_TU4,
         starts: bool = False,
         answers: bool = False,
         stops: bool = False,
+        without: Collection[str] = (),
         ttl_ms: int = 5000,
         **settings: object,
     ) -> None:
-        self._ttl_ms = ttl_ms
         given = {"control": "modbus", "fieldbus_timeout_ms": TIMEOUT_MS, "on_expiry": "disable_voltage"}
         given |= settings
         self._recorder = recorder
-        self._rig = Rig(hold_ms=0, **given)
+        self._words = words
+        self._rig = Rig(hold_ms=0, words=words, **given)
         self._channel: DriveChannel = self._rig.channel
-        self._is_hold = given["on_expiry"] == "hold"
-        self._timeout_ms = given["fieldbus_timeout_ms"]
-        self._ignores = given.get("telegram_downtime_s") == -0.1
-        memory_ms = given.get("then_silence_ms", 0)
-        assert isinstance(memory_ms, int)
-        self._parts = Parts(
-            self._channel,
-            epoch=_EPOCH,
-            at=_NOW,
-            memory_s={"_tripped_at": memory_ms / 1000},
-            only_shown=("trips", "refused_writes", "last_fault", "telegrams"),
-            spent=("_acknowledge_until",),
-        )
-        assert isinstance(self._timeout_ms, int)
-        self._model = LegModel(
-            str(given["control"]), self._timeout_ms / 1000, self._ignores, self._is_hold, _NOW, is_there=True
-        )
-        self._model_parts = Parts(self._model, epoch=_EPOCH, at=_NOW)
+        self._parts, self._model, self._model_parts = self._observed(given)
+        self._is_hold = self._model.reaction == "hold"
         self._rig.now = _NOW
         self._channel.on_node(NodeState.OPERATIONAL, _NOW)
-        self._rig.drive_says(READY)
+        self._rig.drive_says(words.ready)
         self._channel.on_time(_NOW)
         self._hung = False
         self._outcomes: list[Outcome] = []
         self._before: tuple[State, State] = ((), ())
+        self._requests = {
+            **{
+                name: Request(who, "", Action.WRITE, values)
+                for name, (who, values) in writes_of(words).items()
+            },
+            **{
+                name: Request(who, "", action, ttl_ms=ttl_ms, direction=1)
+                for name, (who, action) in ACTIONS.items()
+            },
+        }
+        names = (*self._requests, *TIMES, *REST, *((TAKEN,) if words.taken else ()))
         left_out = (
+            *without,
             *(PULSES if starts else STARTS),
             *(() if starts or answers else ANSWERS),
             *(() if stops else STOPS),
-            *(RIVALS if starts or answers else ()),
+            *(name for name in names if name.startswith("rival") and (starts or answers)),
         )
-        self.events = tuple(n for n in (*WRITES, *ACTIONS, *TIMES, *REST) if n not in left_out)
+        self.events = tuple(name for name in names if name not in left_out)
         self.trips = self.refusals = self.enabled = 0
+
+    def _observed(self, given: dict[str, Any]) -> tuple[Parts, LegModel, Parts]:
+        """The channel's state, the model of it, and its."""
+        silence_ms, reaction = given.get("then_silence_ms", 0), given["on_expiry"]
+        parts = Parts(
+            self._channel,
+            epoch=_EPOCH,
+            at=_NOW,
+            memory_s={"_tripped_at": silence_ms / 1000},
+            only_shown=("trips", "refused_writes", "last_fault", "telegrams"),
+            spent=("_acknowledge_until",),
+        )
+        model = LegModel(
+            control=given["control"],
+            timeout_s=given["fieldbus_timeout_ms"] / 1000,
+            ignores=given.get("telegram_downtime_s") == -0.1,
+            reaction=reaction,
+            mutes_after_s=0.0 if reaction == "silence" else silence_ms / 1000 or None,
+            now=_NOW,
+            is_there=True,
+        )
+        return parts, model, Parts(model, epoch=_EPOCH, at=_NOW)
 
     # the state
 
@@ -140,12 +142,9 @@ class LegMachine:
         self._recorder.seen.clear()
         gate = self._gate_state()
         trips = self._channel.trips
-        if event in WRITES:
-            who, values = WRITES[event]
-            self._request(Request(who, "", Action.WRITE, values))
-        elif event in ACTIONS:
-            who, action = ACTIONS[event]
-            self._request(Request(who, "", action, ttl_ms=self._ttl_ms, direction=1))
+        request = self._requests.get(event)
+        if request is not None:
+            self._request(request)
         elif event in TIMES:
             self._pass_time(event)
         else:
@@ -156,8 +155,8 @@ class LegMachine:
         start = self._channel._leg.start
         if not start.is_going_on:
             start._deadline = 0.0  # that of one that is over
-        self._see()
         if not self._hung:
+            self._see()
             self._check()
         return seen
 
@@ -184,6 +183,9 @@ class LegMachine:
             assert all(outcome.ok or outcome.code is Code.CANCELLED for outcome in outcomes)
         else:
             assert outcomes[-1].ok is is_taken, f"{request.action}: {outcomes[-1]}"
+        self._see()
+        if is_taken and request.action in STOP_ACTIONS:
+            self._check_stop(request.action)
         if is_taken:
             return
         self.refusals += 1
@@ -212,7 +214,7 @@ class LegMachine:
                 model.telegram(who)
             else:
                 model.stopped_by_another()
-            model.stop()
+            model.asked_to_stop(action)
             return True
         if not model.may(who, take=action is Action.TAKE_CONTROL):
             return False
@@ -222,14 +224,11 @@ class LegMachine:
             case Action.KEEP_ALIVE:
                 model.telegram(who)
             case Action.RESET_FAULT:
-                model.acknowledge(who, fault=self._channel.state is DriveState.FAULT)
+                model.acknowledge(who, fault=model.says is Says.FAULT)
             case Action.START:
-                state = self._channel.state
-                if model.tripped or state is DriveState.FAULT or not model.is_there:
+                if model.tripped or model.says is Says.FAULT or not model.is_there:
                     return False
-                model.start(
-                    who, ready=state in _CAN_BE_ENABLED, enabled=state is DriveState.OPERATION_ENABLED
-                )
+                model.start(who)
             case Action.TAKE_CONTROL:
                 model.take(who, request.ttl_ms / 1000)
             case Action.RELEASE_CONTROL:
@@ -240,16 +239,18 @@ class LegMachine:
         return True
 
     def _expect_write(self, who: Identity, values: Mapping[str, Value]) -> bool:
-        word = values.get("control_word")
-        if "frequency" in values:
+        model, words, word = self._model, self._words, values.get("control_word")
+        if values is words.too_large:
             return False
         if word is None:
-            self._model.telegram(who)
-            return True
-        assert isinstance(word, int)
-        if not word & 0x0400:
-            return False
-        self._model.word(who, enables=word & 0xF == 0xF, acknowledges=bool(word & 0x80))
+            model.telegram(who)
+        else:
+            assert isinstance(word, int)
+            if word & words.valid != words.valid:
+                return False
+            model.word(who, enables=words.enabling.fit(word), acknowledges=bool(word & words.acknowledge))
+        if "position" in values:
+            model.handshake.order(values["position"])
         return True
 
     # rounds of the service
@@ -258,6 +259,7 @@ class LegMachine:
         self._model.now = self._rig.now
         self._model.pump()
         self._channel.on_time(self._rig.now)
+        self._see()
         self._hung = False
 
     def _pass_time(self, event: str) -> None:
@@ -296,19 +298,35 @@ class LegMachine:
                 model.gap()
                 channel.on_bridge_gap(now)
             case _:
-                word = FAULT if event == "drive in fault" else ENABLED if self._rig.enables else READY
-                state = channel.state
-                channel.on_pdo(now)
-                channel.on_status_word(word, now)
-                if channel.state is not state:
-                    model.drive_is(fault=word == FAULT, ready=word != FAULT, enabled=word == ENABLED)
-                else:
-                    model.drive_is_still(ready=word != FAULT)
-                self._see()
+                self._drive_says(event)
+                return
+        self._see()
+        self._round()
+
+    def _drive_says(self, event: str) -> None:
+        words = self._words
+        if event == "drive in fault":
+            says, word = Says.FAULT, words.fault
+        elif self._rig.enables:
+            says, word = Says.ENABLED, words.enabled | (words.taken if event == TAKEN else 0)
+        else:
+            says, word = Says.READY, words.ready
+        is_news = word != self._channel.drive_status_word
+        self._channel.on_pdo(self._rig.now)
+        self._channel.on_status_word(word, self._rig.now)
+        self._model.drive_says(says)
+        if is_news:
+            self._see()
         self._round()
 
     def _see(self) -> None:
-        self._model.see(sent=self._rig.enables, enabled=self._channel.state is DriveState.OPERATION_ENABLED)
+        model, sends = self._model, self._rig.enables
+        model.see(sent=sends)
+        if self._words.handshake:
+            if not model.is_there:
+                model.handshake.forget()
+            taken = bool(self._channel.drive_status_word & self._words.taken)
+            model.handshake.go_on(self._rig.now, commanded=sends and model.is_enabled, taken=taken)
 
     def _read(self) -> None:
         """Everything that others may see is looked at, which must change nothing."""
@@ -326,24 +344,54 @@ class LegMachine:
     # what must hold
 
     def _check(self) -> None:
-        channel, model, rig = self._channel, self._model, self._rig
+        channel, model, rig, words = self._channel, self._model, self._rig, self._words
         assert channel.is_tripped is model.tripped, "the watchdog has tripped exactly if its time was up"
         assert channel.owner == model.owner
+        assert channel.state is _STATES[model.says], "what the drive says is understood"
+        is_mute = model.mute_at is not None and rig.now >= model.mute_at
+        assert rig.silent is is_mute, "nothing is sent where the site file says so, and only there"
+        assert rig.sent & words.valid == words.valid, "the drive takes what is sent"
         if rig.enables:
             self.enabled += 1
             assert model.is_there, "nothing enables a drive whose node is not there"
-            if not (self._ignores or self._is_hold or not model.timeout_s):
+            if not (model.ignores or self._is_hold or not model.timeout_s):
                 assert model.deadline is not None, "nothing enables without a telegram of the owner"
                 assert rig.now < model.deadline, "nothing enables after the deadline"
             assert model.held or model.stage is Stage.ENABLED, f"still missing: {model.stage.name}"
+            if words.begin:
+                assert bool(rig.sent & words.begin) is model.has_begun, "it begins when the drive is enabled"
+            if words.handshake:
+                is_up = bool(rig.sent & words.handshake)
+                assert is_up is model.handshake.is_up, (
+                    "a position is handed over once, and only when it may be"
+                )
         else:
             assert not model.enables or rig.silent, "what may be enabled is enabled"
-            assert rig.silent or rig.sent & 0xF != 0xF
+            assert rig.silent or not words.enabling.fit(rig.sent)
         drives = channel.drive_status_word
         if model.tripped:
-            assert channel.status_word & _FAULT_BITS == _FAULT, "while tripped, the status word says fault"
-            assert channel.status_word & ~_FAULT_BITS == drives & ~_FAULT_BITS
-            assert self._is_hold or not any(rig.sent_setpoints)
+            assert words.in_fault.fit(channel.status_word), "while tripped, the status word says fault"
+            assert (channel.status_word ^ drives) & ~words.in_fault.mask == 0, (
+                "its other bits are the drive's"
+            )
+            if not self._is_hold:
+                assert not any(rig.sent_setpoints), "setpoints go to zero"
+                self._check_reaction()
         else:
             assert channel.status_word == drives
         assert channel.owner or model.deadline is None, "a timer without an owner"
+
+    def _check_reaction(self) -> None:
+        """Tripped: the drive is stopped as the site file says, or more strongly, unless it stands."""
+        model, word = self._model, self._rig.sent
+        if model.coasts_at is not None and self._rig.now >= model.coasts_at:
+            assert self._words.disable_voltage.fit(word), "a quick stop ends with disable voltage"
+        elif model.stop_kind and model.is_enabled:
+            is_stop = any(stop.fit(word) for stop in self._words.stops(model.stop_kind))
+            assert is_stop, f"{word:04X}h is no {model.stop_kind}"
+
+    def _check_stop(self, action: str) -> None:
+        """Somebody has just stopped the drive."""
+        word = self._rig.sent
+        stops = any(stop.fit(word) for stop in self._words.stops(action))
+        assert stops or self._rig.silent, f"{word:04X}h is no {action}"

@@ -5,16 +5,29 @@ Nothing here is taken from ``bridge.command``: the exploration compares the two 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 from bridge.command import Identity, Role
+from tests.support.handshake_model import HandshakeModel
+from tests.support.leg_words import STRENGTH
 
 START_LIMIT_S = 3.0
 BELIEVED_S = 1.0
 GONE_S = 0.0
 """Of an owner that nobody watches; the exploration makes it that short, lest each pause be a state."""
 SETTLE_S = 0.2
+QUICK_STOP_LIMIT_S = 2.0
+"""As long as the time-out, to which the exploration sets it: far fewer states than with one that outlives
+five of them."""
+
+
+class Says(IntEnum):
+    """What the drive says of itself; it says nothing else here."""
+
+    READY = 0
+    ENABLED = 1
+    FAULT = 2
 
 
 class Stage(IntEnum):
@@ -28,12 +41,14 @@ class Stage(IntEnum):
 
 @dataclass(slots=True)
 class LegModel:
-    """One drive's controller leg. ``timeout_s`` 0 is off; ``ignores``: telegram downtime -0.1."""
+    """One drive's controller leg. ``timeout_s`` 0 is off; ``ignores``: telegram downtime -0.1;
+    ``mutes_after_s`` is how long after a trip the drive is spoken to, or None for always."""
 
     control: str
     timeout_s: float
     ignores: bool
-    holds: bool
+    reaction: str
+    mutes_after_s: float | None
     now: float
     is_there: bool = False
     """The node is operational."""
@@ -49,14 +64,22 @@ class LegModel:
     """And takes from then on what the drive says, though it is nothing new."""
     sent: bool = False
     """What is sent enables the drive."""
-    is_enabled: bool = False
-    """The drive says that it is."""
+    says: Says = Says.READY
     followed: bool = True
     """The drive has said that it follows the last word that enabled it."""
     silent: bool = False
     tripped: bool = False
     held: bool = False
     """With the reaction "hold": a drive that moved when the watchdog tripped goes on."""
+    mute_at: float | None = None
+    """Tripped: from then on nothing is sent to the drive."""
+    stop_kind: str = ""
+    """Tripped: how the drive is being stopped, by the reaction or by somebody who has asked for more."""
+    coasts_at: float | None = None
+    """Tripped with a quick stop: from then on it is disable voltage."""
+    has_begun: bool = False
+    """A start has come to its end, and what it raises then is up."""
+    handshake: HandshakeModel = field(default_factory=HandshakeModel)
     acknowledges: bool | None = None
     """The acknowledge bit of the owner's last control word; None where it has written none."""
     gone_at: float | None = None
@@ -68,6 +91,10 @@ class LegModel:
     @property
     def may_enable(self) -> bool:
         return self.is_there
+
+    @property
+    def is_enabled(self) -> bool:
+        return self.says is Says.ENABLED
 
     @property
     def enables(self) -> bool:
@@ -94,12 +121,23 @@ class LegModel:
             self.deadline = None
             self.silent = True
             if not self.ignores and not self.tripped:
-                self.held = self.holds and self.stage is Stage.ENABLED
-                self.tripped = True
-                self.stage = Stage.ACKNOWLEDGE
-                self.end_start()
+                self.trip()
         if self.lease_until is not None and self.now >= self.lease_until:
             self.leave()
+
+    def trip(self) -> None:
+        is_held = self.reaction == "hold"
+        self.held = is_held and self.stage is Stage.ENABLED
+        self.tripped = True
+        self.stage = Stage.ACKNOWLEDGE
+        self.end_start()
+        if self.reaction in STRENGTH:
+            self.stop_kind = self.reaction
+        if not is_held:
+            self.handshake.forget()
+            self.mute_at = None if self.mutes_after_s is None else self.now + self.mutes_after_s
+        if self.reaction == "quick_stop":
+            self.coasts_at = self.now + QUICK_STOP_LIMIT_S
 
     def pump(self) -> None:
         """All timers, as in each round of the service."""
@@ -110,15 +148,21 @@ class LegModel:
             self.stage = Stage.ENABLED
             self.believed_at = self.believes_from = None
             if self.is_enabled:
-                self.end_start()
+                self.conclude_start()
 
     # what happens
 
     def stop(self) -> None:
         """Whatever was enabled has to be enabled anew."""
         self.stage = min(self.stage, Stage.STOP_WORD)
-        self.held = False
+        self.held = self.has_begun = False
+        self.handshake.forget()
         self.end_start()
+
+    def asked_to_stop(self, kind: str) -> None:
+        self.stop()
+        if self.stop_kind:
+            self.stop_kind = max(self.stop_kind, kind, key=STRENGTH.index)
 
     def stopped_by_another(self) -> None:
         if self.owner is not None and not self.timeout_s and self.gone_at is None:
@@ -126,6 +170,11 @@ class LegModel:
 
     def end_start(self) -> None:
         self.start_until = self.believed_at = self.believes_from = None
+
+    def conclude_start(self) -> None:
+        """The drive is enabled."""
+        self.end_start()
+        self.has_begun = True
 
     def leave(self) -> None:
         self.stop()
@@ -158,6 +207,8 @@ class LegModel:
             self.stop()
         if self.tripped:
             self.tripped = False
+            self.mute_at = self.coasts_at = None
+            self.stop_kind = ""
             self.stop()
             self.stage = Stage.STOP_WORD
 
@@ -165,6 +216,9 @@ class LegModel:
         """A valid control word."""
         self.telegram(who)
         self.end_start()
+        self.has_begun = False
+        if not enables:
+            self.handshake.forget()
         is_edge = acknowledges and self.acknowledges is False
         if self.tripped and is_edge:
             self.acknowledge(who)
@@ -176,40 +230,54 @@ class LegModel:
             self.stage = Stage.ENABLE
         self.acknowledges = acknowledges
 
-    def see(self, *, sent: bool, enabled: bool) -> None:
-        """What is on the bus after an event: whether an enabling word, and the drive's word that it is."""
+    def see(self, *, sent: bool) -> None:
+        """What is on the bus after an event: whether an enabling word."""
         if sent and not self.sent:
             self.followed = False
-        self.sent, self.is_enabled = sent, enabled
-        self.followed |= enabled
+        self.sent = sent
+        self.followed |= self.is_enabled
 
-    def start(self, who: Identity, *, ready: bool, enabled: bool) -> None:
-        """A start that was taken, of a drive that is in this state."""
+    def start(self, who: Identity) -> None:
+        """A start that was taken."""
         self.telegram(who)
+        self.has_begun = False
         believed_at, believes_from = self.believed_at, self.believes_from
         self.end_start()
-        is_stopped = self.stage is not Stage.ENABLED and (enabled or not self.followed)
-        self.stage = Stage.ENABLED if ready and not is_stopped else Stage.ENABLE
+        is_stopped = self.stage is not Stage.ENABLED and (self.is_enabled or not self.followed)
+        self.stage = Stage.ENABLE if is_stopped else Stage.ENABLED
         if is_stopped:
             self.believed_at = believed_at or self.now + BELIEVED_S
             self.believes_from = believes_from or self.now + SETTLE_S
-        if is_stopped or not enabled:
+        if is_stopped or not self.is_enabled:
             self.start_until = self.now + START_LIMIT_S
+        else:
+            self.conclude_start()
 
-    def drive_is(self, *, fault: bool, ready: bool, enabled: bool) -> None:
+    def drive_says(self, says: Says) -> None:
+        before, self.says = self.says, says
+        if self.coasts_at is not None and says is not Says.ENABLED:
+            self.coasts_at = min(self.coasts_at, self.now)  # it stands
+        if says is not before:
+            if says is Says.FAULT or before is Says.ENABLED:
+                self.handshake.forget()
+            self._drive_is()
+        elif says is not Says.FAULT:
+            self._drive_is_still()
+
+    def _drive_is(self) -> None:
         if self.start_until is None:
             return
         self.believed_at = self.believes_from = None
-        if fault:
+        if self.says is Says.FAULT:
             self.stop()
-        elif ready and self.stage >= Stage.ENABLE:
+        elif self.stage >= Stage.ENABLE:
             self.stage = Stage.ENABLED
-        if enabled:
-            self.end_start()
+        if self.is_enabled:
+            self.conclude_start()
 
-    def drive_is_still(self, *, ready: bool) -> None:
+    def _drive_is_still(self) -> None:
         """The drive has said once more what it said before."""
-        if ready and self.believes_from is not None and self.now >= self.believes_from:
+        if self.believes_from is not None and self.now >= self.believes_from:
             self.stage = Stage.ENABLED
             self.believed_at = self.believes_from = None
 

@@ -7,7 +7,7 @@ compares the two, so that a mistake in either shows.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from bridge.image import Value
@@ -60,6 +60,7 @@ class LegWords:
 
 
 STRENGTH: Final = ("stop", "quick_stop", "disable_voltage")
+"""The stops, the weakest first."""
 
 HALF_SPEED: Final = 0x2000
 
@@ -83,23 +84,7 @@ NORD_TU4: Final = LegWords(
 )
 
 # The same words (§6.5 is both's), one value with them (§6.5.7).
-NORD_TU3: Final = LegWords(
-    "nord/sk-tu3-cao-pdo1",
-    shut_down=0x047E,
-    enable=0x047F,
-    acknowledge=0x0080,
-    valid=0x0400,
-    enabling=Bits(0x000F, 0x000F),
-    stop=Bits(0x0007, 0x0006),
-    quick_stop=Bits(0x0006, 0x0002),
-    disable_voltage=Bits(0x0002, 0x0000),
-    ready=0x0B31,
-    enabled=0x0B37,
-    fault=0x0B08,
-    in_fault=Bits(0x004F, 0x0008),
-    setpoint={"setpoint_1": HALF_SPEED},
-    too_large={"control_word": 0x047F, "frequency": 1e9},
-)
+NORD_TU3: Final = replace(NORD_TU4, mapping="nord/sk-tu3-cao-pdo1")
 
 # EDS84DMOTCAN prints neither word. Control word: the 8400's device control, with 1 in bit 0 "switch on",
 # bit 1 "disable voltage", bit 2 "quick stop", bit 3 "enable operation", bit 7 "reset fault"; it ramps down by

@@ -101,7 +101,7 @@ class Rig:
         return outcome
 
     def run(self, setpoint: int = HALF_SPEED) -> None:
-        """Boot the node and lead the drive to operation enabled, as the manual's example does."""
+        """Boot the node and lead NORD's drive to operation enabled, as the manual's example does."""
         self.node(NodeState.OPERATIONAL)
         self.drive_says(INHIBITED)
         assert self.write(SHUT_DOWN).code is Code.OK

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Final
 
 from tests.proof import machine
-from tests.proof.drives import BRIDGE_SIDE, DRIVE_SIDE, DRIVES, SERVERS, drives_of
+from tests.proof.drives import BRIDGE_SIDE, DRIVES, SERVERS, drives_of
 from tests.proof.rig import Rig
 from tests.proof.settings import PLANT
 from tests.proof.strangers import Strangers, release
@@ -165,8 +165,7 @@ def speak(rig: Rig) -> None:
 
 
 def reboot(rig: Rig) -> float:
-    """NMT reset node, to all; the bridge does not see it (``machine.FROM_DRIVES``)."""
-    return machine.send(DRIVE_SIDE, 0x000, bytes((0x81, 0x00)))
+    return machine.reset_nodes()
 
 
 def pause_bridge(rig: Rig) -> float:

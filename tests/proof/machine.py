@@ -118,6 +118,12 @@ def repeat(channel: str, can_id: int, data: bytes, period_s: float) -> socket.so
     return beat
 
 
+def reset_nodes(node_id: int = 0) -> float:
+    """NMT reset node, to all or to one: as if it were switched off and on. The bridge does not see it
+    (``FROM_DRIVES``). Gives the time before it."""
+    return send(DRIVE_SIDE, 0x000, bytes((0x81, node_id)))
+
+
 def bus_off() -> float:
     """The bridge's controller says bus-off, as a driver would."""
     return send(BRIDGE_SIDE, _BUS_OFF, bytes(8))

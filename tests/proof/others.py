@@ -68,14 +68,9 @@ def intrude(rig: Rig) -> float:
     return intruder.since
 
 
-def _reset(drive: Drive) -> None:
-    """The node is switched off and on."""
-    machine.send(DRIVE_SIDE, 0x000, bytes((0x81, drive.node_id)))
-
-
 def end_intruder(rig: Rig) -> None:
     rig.send_guests_away()
-    _reset(VICTIM)
+    machine.reset_nodes(VICTIM.node_id)
 
 
 def make_deaf(rig: Rig) -> None:
@@ -92,7 +87,7 @@ def ignored_drive(rig: Rig, drive: Drive) -> float:
 
 
 def let_hear(rig: Rig) -> None:
-    _reset(VICTIM)
+    machine.reset_nodes(VICTIM.node_id)
     acts.continue_owners(rig)
 
 
@@ -123,7 +118,7 @@ def restart_unbooted(rig: Rig) -> float:
 def let_boot(rig: Rig) -> None:
     rig.send_guests_away()
     rig.gateway.open()
-    _reset(VICTIM)
+    machine.reset_nodes(VICTIM.node_id)
     acts.continue_owners(rig)
 
 

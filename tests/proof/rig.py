@@ -250,6 +250,7 @@ class Rig:
         self.kill_bridge()
         if not _has_ended(self._front):
             os.kill(self._front, signal.SIGKILL)
+        machine.reset_nodes()
         self.renew_bridge()
         for owner in self.owners.values():
             owner.start()

@@ -77,6 +77,7 @@ class Service:
             (make_bus(table), Network(table, self.plant, clock.epoch_ns, project.downloads))
             for table in site.bus
         ]
+        self._networks = [network for _, network in networks]
         self.master = Master(networks, self.plant, clock.now, self.notifier.alive, alarm, clock.suspended_s)
         self.modbus = ModbusServer(self.plant, site.modbus, clock.now) if site.modbus else None
         self.zenoh = (
@@ -192,7 +193,11 @@ class Service:
 
     async def _stop(self) -> None:
         self.halt()
-        _log.info("stopping all drives")
+        passive = [network.bus.name for network in self._networks if network.charge.is_left]
+        if passive:
+            _log.info("passive on %s: another bridge is in charge, nothing is sent there", ", ".join(passive))
+        if len(passive) < len(self._networks):
+            _log.info("stopping all drives%s", " of the other buses" if passive else "")
         self.notifier.stopping()
         try:
             self._ending = await self.master.stop_drives(clock.now())

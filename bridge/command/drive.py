@@ -13,7 +13,7 @@ from bridge.command.follow import Verdict
 from bridge.command.following import Following
 from bridge.command.parameter_points import parameter_points
 from bridge.command.points import drive_points
-from bridge.command.worst_case import StopTime, Wire, stop_time, sync_wait_ms
+from bridge.command.worst_case import StopTime, Wire, stop_time, sync_wait_ms, takeover_ms
 from bridge.config import BusTable, DriveTable, NodeTable
 from bridge.drive import OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, scale_of
 from bridge.image import Image, Point, Quality, Value
@@ -139,6 +139,11 @@ class Drive:
         """How long a new control word may be on its way: until its frame, and until SYNC takes that over."""
         return round(1000 * self.bus.rpdo_period_s) + sync_wait_ms(self.bus, self.rpdo_type)
 
+    @property
+    def takeover_s(self) -> float:
+        """How long a stopped word may wait on the drive for SYNC: while its node is in Operational."""
+        return takeover_ms(self.bus, self.rpdo_type) / 1000
+
     def stop_time(self) -> StopTime:
         """Longest time from the controller's last telegram to the stop on the bus."""
         timeout_ms = self.channel.watchdog.timeout_ms
@@ -250,6 +255,10 @@ class Drive:
     def on_handed_over(self, now: float) -> None:
         """What the channel puts out has been handed to the bus."""
         self.following.on_handed_over(now, self.rpdo_period_ms, self.own)
+
+    def on_silenced(self, now: float) -> None:
+        """The bridge takes its node out of operation, with stopped words before it."""
+        self.following.on_silenced(now, self.rpdo_period_ms, self.own)
 
     # into the image
 

@@ -18,6 +18,8 @@ What follows an ignored stop may halt a plant, so nothing is called ignored that
   the stop: the word that enabled it may still have been on its way.
 - Where the word leaves the voltage on, a drive may hold the motor, and may be enabled for a moment on its
   way there: it gets a bound for that, too.
+- A drive that the bridge itself silences, by an NMT stop of its node, is judged by what it said last: one
+  that said *enabled* and is not known to stop in that state is called ignoring when the bound has passed.
 - The ramp of a fault may come at any time, and has its bound from then.
 - A status word that fits no state of the family says nothing.
 """
@@ -92,6 +94,8 @@ class Verdict:
     since: float
     at: float
     again: bool = False
+    is_silenced: bool = False
+    """The bridge had taken the drive's node out of operation, and it has said nothing else since."""
 
 
 class Follow:
@@ -101,6 +105,7 @@ class Follow:
         "_bounds",
         "_disobeyed_at",
         "_graced",
+        "_is_silenced",
         "_is_there",
         "_look_at",
         "_off_since",
@@ -112,6 +117,7 @@ class Follow:
         "_stopping_since",
         "_until",
         "_verdicts",
+        "_was_enabled",
         "awaits_sending",
         "follows",
         "state",
@@ -126,6 +132,10 @@ class Follow:
         self._sent = Sent.OFF
         self._on_bus = Sent.OFF
         self._is_there = False
+        self._is_silenced = False
+        """The bridge has taken the node out of operation, and the drive was not known to stop before."""
+        self._was_enabled = False
+        """The stop came after a word that enabled the drive."""
         self._says = Says.NOTHING
         self._since: float | None = None
         """When the stop was handed to the bus; None where there is none, or the drive is not there."""
@@ -142,7 +152,11 @@ class Follow:
     @property
     def is_judged(self) -> bool:
         """A stop is on the bus, and the drive's node is in operation."""
-        return self._since is not None
+        return self._since is not None and self._is_there
+
+    def told_for_s(self, now: float) -> float:
+        """For how long the stop has been on the bus; 0 where it is not, or not judged."""
+        return 0.0 if self._since is None or self.awaits_sending else max(0.0, now - self._since)
 
     @property
     def is_informed(self) -> bool:
@@ -162,6 +176,7 @@ class Follow:
             self.follows = True
         elif before is Sent.ENABLES:
             self._begin()
+            self._was_enabled = True
         else:
             self.awaits_sending = self._is_there
 
@@ -192,10 +207,44 @@ class Follow:
         if is_there is self._is_there:
             return
         self._is_there = is_there
+        if self._is_silenced and not is_there:
+            return
         self._forget()
         self._says = Says.NOTHING
         if is_there and self._sent is not Sent.ENABLES:
             self._begin()
+
+    def on_silenced(self, now: float, bounds: Bounds) -> None:
+        """The bridge takes the node out of operation, and its stop is on the bus: most drives will not say
+        any more whether they follow. To be told before ``on_node``."""
+        if not self._is_there or self._sent is Sent.ENABLES or self._says is Says.NOTHING:
+            return
+        if self.state is LastStop.IGNORED or (self._obeys(now) and not self._may_be_enabled):
+            return
+        self.on_handed_over(now, bounds)
+        self._is_silenced = True
+        if self._says is Says.AT_REST:
+            # It said so before it had the word that enabled it, or had taken that over.
+            self._says = Says.ENABLED
+        if self._until == inf:
+            self._until = now + bounds.ramp_s
+
+    @property
+    def _may_be_enabled(self) -> bool:
+        """It was enabled, and has not said anything since it was told to stop."""
+        return self._was_enabled and self.state is LastStop.FORWARDED
+
+    def on_node_stopped(self, now: float) -> None:
+        """The node has said that it is in a state in which its drives do not run."""
+        is_open = self.state is LastStop.FORWARDED or not self._obeys(now)
+        if self._is_silenced and is_open and self.state is not LastStop.IGNORED:
+            self._says = Says.AT_REST
+            self._conclude(LastStop.FOLLOWED, now)
+
+    def on_restart(self) -> None:
+        """The node has started anew."""
+        if self._is_silenced:
+            self._forget()
 
     def _begin(self) -> None:
         self._forget()
@@ -207,6 +256,7 @@ class Follow:
         self._since = None
         self._until = self._off_since = inf
         self._rested = self._graced = False
+        self._is_silenced = self._was_enabled = False
         self._look_at = -inf
         self._verdicts.clear()
 
@@ -280,7 +330,8 @@ class Follow:
 
     def _conclude(self, outcome: LastStop, at: float) -> None:
         since = at if self._since is None else self._since
-        self._verdicts.append(Verdict(outcome, self.state, since, at, again=not self.follows))
+        again = not self.follows
+        self._verdicts.append(Verdict(outcome, self.state, since, at, again, self._is_silenced))
         self.state = outcome
         self.follows = outcome is LastStop.FOLLOWED
 
@@ -296,7 +347,7 @@ class Follow:
         if since is not None and self._says is not Says.NOTHING:
             # Of a drive that sends changes alone, what it said before the stop is true to the short bound.
             old = since + self._bounds.off_s if pause_s is None else since
-            at = now if pause_s is None else heard_at
+            at = now if pause_s is None or self._is_silenced else heard_at
             if at is not None and at >= old:
                 self._judge(at)
             is_quiet = now >= self._disobeyed_at + self._bounds.off_s

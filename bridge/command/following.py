@@ -37,6 +37,10 @@ class Following:
         """A stop is on the bus, and the drive's node is in operation."""
         return self._follow.is_judged
 
+    def told_for_s(self, now: float) -> float:
+        """For how long the stop has been on the bus; 0 where there is none, or nobody says."""
+        return self._follow.told_for_s(now)
+
     @property
     def awaits_sending(self) -> bool:
         return self._follow.awaits_sending
@@ -65,6 +69,18 @@ class Following:
         """What was to be sent has been handed to the bus. ``rpdo_period_ms`` is how long it may take to the
         drive, ``own`` what the drive does when we fall silent."""
         self._follow.on_handed_over(now, self._bounds(rpdo_period_ms, own))
+
+    def on_silenced(self, now: float, rpdo_period_ms: int, own: OwnJudgement | None) -> None:
+        """The bridge takes the node out of operation: the drive will not be heard any more."""
+        self._follow.on_silenced(now, self._bounds(rpdo_period_ms, own))
+
+    def on_node_stopped(self, now: float) -> None:
+        """The node has said that it is in a state in which its drives do not run."""
+        self._follow.on_node_stopped(now)
+
+    def on_restart(self) -> None:
+        """The node has started: what it was told before is over."""
+        self._follow.on_restart()
 
     def _bounds(self, rpdo_period_ms: int, own: OwnJudgement | None) -> Bounds:
         channel = self._channel

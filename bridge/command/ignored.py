@@ -31,6 +31,12 @@ def conclude(
             tell(Event(now, Kind.WATCHDOG, drive.name, 300, message))
         return
     action = _reaction(drive, verdict)
+    if verdict.is_silenced:
+        message = _silenced(node, drive, took_s)
+        audit.stop_ended(drive.name, verdict.outcome.label, message, now)
+        tell(Event(now, Kind.WATCHDOG, drive.name, _WORST, message))
+        # What can be done has been done: its node has been told to stop, and takes no more words.
+        return
     if verdict.before is LastStop.FOLLOWED:
         what = f"is enabled although nothing that enables was sent: {_sent(drive)} for {took_s:.2f} s"
     else:
@@ -50,6 +56,19 @@ def _reaction(drive: Drive, verdict: Verdict) -> Action | None:
             return Action.RESET
         case _:
             return Action.STOP_NODE
+
+
+def _silenced(node: Node, drive: Drive, took_s: float) -> str:
+    """The bridge has stopped the drive's node, and the drive has said nothing else since."""
+    why = "an NMT stop does not stop it"
+    if node.family.family.stopped_by == "stop_node":
+        why = f"{node.name} has not said that it is stopped"
+    channel = drive.channel
+    said = f"{channel.drive_status_word:04X}h, {channel.state.label.replace('_', ' ')}"
+    return (
+        f"may run on, and is not known to follow its stop: it said {said} before its node was taken out of "
+        f"operation {took_s:.2f} s ago, and nothing since; {why}: see to it at the drive"
+    )
 
 
 def _sent(drive: Drive) -> str:

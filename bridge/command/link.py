@@ -117,6 +117,12 @@ class Link:
         downtime_s = max(self._downtime_s, 0.1)
         return self._last_sign() + max(downtime_s, self.pdo_deadline_s)
 
+    def is_fresh(self, now: float) -> bool:
+        """The drive is heard, and no TPDO of it is late."""
+        if self.last_pdo is None or not self.is_heard:
+            return False
+        return self.pdo_deadline_s is None or now < self.last_pdo + self.pdo_deadline_s
+
     def _last_sign(self) -> float:
         return self._since if self.last_pdo is None else max(self.last_pdo, self._since)
 

@@ -19,6 +19,8 @@ _THREAD_QUEUE_MS: Final = 50.0
 """How long a frame may wait for python-can's thread (``bus/pythoncan.py``)."""
 _KERNEL: Final = ("socketcan", "virtual")
 _LAST_SYNCHRONOUS: Final = 240
+_FOREIGN_SYNC_MS: Final = 100
+"""For how long a SYNC is waited for that somebody else sends: its period is not known here."""
 _ROUNDING: Final = 1e-9
 
 
@@ -106,6 +108,15 @@ def stop_time(
 def sync_wait_ms(bus: BusTable, transmission_type: int) -> int:
     """How long an RPDO of this type waits for the SYNC with which it is taken over (CiA 301 §7.5.2.35)."""
     return max(1, transmission_type) * bus.sync_period_ms if transmission_type <= _LAST_SYNCHRONOUS else 0
+
+
+def takeover_ms(bus: BusTable, transmission_type: int) -> int:
+    """After how long a word that is on the bus has been taken over, or is no longer waited for: 0 where that
+    takes no SYNC."""
+    if transmission_type > _LAST_SYNCHRONOUS:
+        return 0
+    wait_ms = sync_wait_ms(bus, transmission_type) if bus.sync_period_ms else _FOREIGN_SYNC_MS
+    return wait_ms + REACTION_BOUND_MS
 
 
 def _before_the_bus(table: DriveTable, bus: BusTable, timeout_ms: int) -> Iterator[Term]:

@@ -156,11 +156,16 @@ class Network:
         self.charge.came_back(now)
 
     def _stop_nodes(self, nodes: Sequence[NodeCore], why: str, now: float) -> None:
-        are_all = len(nodes) == len(self.nodes) > 1
+        are_all = len(nodes) == len(self.nodes) > 1 and not self._takes_over(nodes)
         for node in nodes:
             node.carry_out_command(Action.STOP_NODE, why, now, send=not are_all)
         if are_all:
             self._nmt_for_all = nmt.command(NmtCommand.STOP, 0)
+
+    @staticmethod
+    def _takes_over(nodes: Sequence[NodeCore]) -> bool:
+        """Whether one has to take over stopped words before its NMT stop: each gets its own in its time."""
+        return any(node.leaving.takeover_s for node in nodes)
 
     # NMT
 
@@ -187,8 +192,8 @@ class Network:
 
     def command(self, request: Request, now: float, reply: Reply) -> None:
         """NMT for every node of the bus."""
-        done = node_commands.answer(request, self.bus.name, self.nodes, self._plant, now, reply)
-        if done and request.action is not Action.START_NODE:
+        is_for_all = node_commands.answer(request, self.bus.name, self.nodes, self._plant, now, reply)
+        if is_for_all:
             self._nmt_for_all = nmt.command(node_commands.NMT[request.action], 0)
 
     # as its nodes see it
@@ -204,13 +209,17 @@ class Network:
         """A node is lost without which the others must not go on."""
         self._gate.stopped_by(node)
         self._plant.report(Event(now, Kind.BUS, self.bus.name, 800, f"all nodes are stopped: {why}"))
+        each = self._takes_over(self.nodes)
         for other in self.nodes:
-            # One frame stops them all, the lost one included if it still hears us.
+            # The lost one included, if it still hears us.
             other.told_to_stop = True
             if other is not node:
                 other.hold(why, now)
                 self._schedule.touch(other)
-        self._nmt_for_all = nmt.command(NmtCommand.STOP, 0)
+            if each:
+                other.leaving.send(NmtCommand.STOP, now)
+        if not each:
+            self._nmt_for_all = nmt.command(NmtCommand.STOP, 0)
 
     def duplicate(self, node: Neighbour, sign: str, now: float) -> None:
         self._watch.on_duplicate(node.table.id, sign, now)
@@ -325,7 +334,8 @@ class Network:
         """What was written while the bus was gone does not go out first."""
         self.charge.bus_is_back(now)
         for node in self.nodes:
-            node.stop_drives(now)
+            node.bus_is_back(now)
+            self._schedule.touch(node)
 
     def refresh(self, status: BusStatus, now: float) -> None:
         """Bring the points of the bus and its nodes up to date; a few times a second."""

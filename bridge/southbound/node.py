@@ -16,6 +16,7 @@ from bridge.southbound.booting import Booting
 from bridge.southbound.canopen.bootloop import BootLoop
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
 from bridge.southbound.error_control import Sign
+from bridge.southbound.leaving import Leaving
 from bridge.southbound.neighbours import Neighbours
 from bridge.southbound.node_view import NodeView
 from bridge.southbound.node_wire import Listener, NodeWire
@@ -45,6 +46,7 @@ class NodeCore:
         self._memory = boot.BootMemory(count_write=self._count_write)
         configured = (*downloads, *(entry.download for entry in table.configure))
         self.wire = NodeWire(node, plant, listener, StopWords(node, configured, self._memory))
+        self.leaving = Leaving(node, self.wire, self._memory, self._takes_words)
         self.error_control = self.wire.error_control
         self.booting = Booting(self, partial(boot.boot, node, downloads, self._memory), self.wire.sdo)
         self.parameters = NodeParameters(node, plant, lambda: self.sdo)
@@ -59,7 +61,7 @@ class NodeCore:
         self._last_boot = float("-inf")
         self._operational_since = 0.0
         node.command = node_commands.taker(node.name, [self], plant)
-        node.enforce = self.carry_out_command
+        node.enforce = self.enforce
         if not table.enabled:
             self.boot_at = None
             self.set_state(NodeState.DISABLED, plant.began)
@@ -79,12 +81,15 @@ class NodeCore:
             return
         if sign is Sign.CHANGED:
             self._show(now)
-        self._judge_nmt_state(now)
+        self.leaving.on_state(self.error_control.state, now)
+        if not self.leaving.is_due:
+            self._judge_nmt_state(now)
 
     def _on_boot_up(self, now: float) -> None:
         """The node has started: whatever it was told before is forgotten."""
         self.told_to_stop = False
         self._memory.may_run = False
+        self.leaving.on_restart()
         if now > self._reset_at + _OWN_RESET_S:
             self._memory.start_anew()
         else:
@@ -151,9 +156,10 @@ class NodeCore:
             self._back_off.reset()
             self._view.stays(now)
         self.booting.on_time(now, self.error_control.state)
-        if self.boot_at is not None and now >= self.boot_at and not self.booting.is_running:
+        if self.boot_at is not None and now >= self.boot_at and not self._is_busy:
             self.boot_at = None
             self._last_boot = now
+            self.leaving.forget()
             if self.told_to_stop or self.error_control.state is NmtState.STOPPED:
                 self.wire.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
             self.booting.begin(now)
@@ -165,12 +171,16 @@ class NodeCore:
             self.wire.next_deadline(),
             self.booting.next_deadline(),
             self.parameters.next_deadline(),
-            None if self.booting.is_running else self.boot_at,
+            None if self._is_busy else self.boot_at,
             self._back_off.steady_at,
         )
         return min((time for time in times if time is not None), default=None)
 
     # boot-up
+
+    @property
+    def _is_busy(self) -> bool:
+        return self.booting.is_running or self.leaving.is_due
 
     @property
     def is_on_its_way(self) -> bool:
@@ -256,10 +266,15 @@ class NodeCore:
         self.stop_drives(now)
         self.wire.send_stopped()
         self.told_to_stop = True
-        command = NmtCommand.STOP
-        if self._memory.may_run and self.node.family.family.stopped_by == "reset_node":
-            command, self._reset_at = NmtCommand.RESET_NODE, now
-        self.wire.send_nmt(command)
+        if self._memory.may_run and not self.leaving.is_stopped_by_nmt:
+            self._reset_at = now
+            self.wire.send_nmt(NmtCommand.RESET_NODE)
+        else:
+            self.leaving.send(NmtCommand.STOP, now)
+
+    def enforce(self, action: Action, why: str, now: float) -> None:
+        """Because a drive ignores its stop, whose words have been on the bus for long."""
+        self.carry_out_command(action, why, now, at_once=self.leaving.has_told(now))
 
     # states
 
@@ -273,18 +288,21 @@ class NodeCore:
         self.say(why, now)
         pause_s = self._back_off.lost(now)
         self._view.flaps(self._back_off, now)
-        self.set_state(NodeState.LOST, now)
-        self.leave_operation(now)
         reaction = self.table.on_loss
-        if reaction == "stop_node":
-            self.told_to_stop = True
+        policy = self.node.bus.mandatory_missing
+        stops_all = reaction == "stop_all" or (self.table.mandatory and policy == "stop_all")
+        if reaction == "stop_node" or stops_all:
             self.stop_drives(now)
             self.wire.send_stopped()
-            self.wire.send_nmt(NmtCommand.STOP)
+            self.leaving.silence(now, only_heard=True)
+        self.set_state(NodeState.LOST, now)
+        self.leave_operation(now)
+        if reaction == "stop_node":
+            self.leaving.send(NmtCommand.STOP, now)
+            self.told_to_stop = True
         elif reaction != "nothing":
             self.boot_at = now + pause_s
-        policy = self.node.bus.mandatory_missing
-        if reaction == "stop_all" or (self.table.mandatory and policy == "stop_all"):
+        if stops_all:
             self._neighbours.stop_others(self, f"{self.node.name} is lost", now)
 
     def stop_drives(self, now: float) -> None:
@@ -307,6 +325,7 @@ class NodeCore:
         begins_again = self.is_operational or self.booting.is_running
         if begins_again:
             self.wire.send_stopped()
+            self.leaving.silence(now)
             self.leave_operation(now)
             self.say(f"stopped: {why}", now)
         if self.is_operational:
@@ -318,6 +337,7 @@ class NodeCore:
         """The bus is down, or another's: everything on it is lost at once."""
         self.error_control.state = NmtState.UNKNOWN
         self.stop_drives(now)
+        self.leaving.on_bus_gone(stays_stopped=self.state is NodeState.STOPPED)
         self.wire.clear()
         gave_up = self.boot_at is None and self.state is NodeState.LOST and self.table.on_loss == "stop_node"
         was_stopped = self.state is NodeState.STOPPED or gave_up
@@ -331,6 +351,10 @@ class NodeCore:
         self.has_concluded = False
         self.boot_at = now + self._back_off.pause_s
 
+    def bus_is_back(self, now: float) -> None:
+        self.stop_drives(now)
+        self.leaving.on_bus_back(now)
+
     def set_state(self, state: NodeState, now: float) -> None:
         if state is self.state:
             return
@@ -338,14 +362,18 @@ class NodeCore:
         self.plant.on_node(self.node, state, now, tell=not self._back_off.is_flapping)
         self._show(now)
 
+    def _takes_words(self) -> bool:
+        return self.state is not NodeState.STOPPED or self.error_control.state is NmtState.OPERATIONAL
+
     @property
     def is_operational(self) -> bool:
         return self.state is NodeState.OPERATIONAL
 
     @property
     def sends_process_data(self) -> bool:
-        """RPDOs go on while the node is lost: stopped ones, in case it still hears us."""
-        return self.state in (NodeState.OPERATIONAL, NodeState.LOST, NodeState.DISABLED)
+        """RPDOs go on while it is lost, for it may hear us, and until it has taken over its last ones."""
+        states = (NodeState.OPERATIONAL, NodeState.LOST, NodeState.DISABLED)
+        return self.leaving.is_due or self.state in states
 
     def say(self, text: str, now: float) -> None:
         self._view.say(text, now)
@@ -360,11 +388,13 @@ class NodeCore:
         ledger.check((owner, address), name, self._last_boot, cycles)
         return ledger.count((owner, address), name, cycles, self._last_boot)
 
-    def carry_out_command(self, action: Action, who: str, now: float, *, send: bool = True) -> None:
+    def carry_out_command(
+        self, action: Action, who: str, now: float, *, send: bool = True, at_once: bool = False
+    ) -> None:
         """A command that may be given; ``send`` is false where one frame has told all nodes."""
         self.error_control.boot_loop = BootLoop()
         self._back_off.reset()
         if action in (Action.RESET, Action.RESET_COMMUNICATION):
             self._memory.start_anew()
-        node_commands.carry_out(self, action, who, now, send=send)
+        node_commands.carry_out(self, action, who, now, send=send, at_once=at_once)
         self._touch()

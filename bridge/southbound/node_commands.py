@@ -9,7 +9,9 @@ from bridge.command import Action, Code, Drive, Event, Kind, Outcome, Plant, Rep
 from bridge.command.link import NodeState
 from bridge.command.plant import Node, NodeCommand
 from bridge.southbound.canopen.nmt import NmtCommand
+from bridge.southbound.leaving import Leaving
 from bridge.southbound.node_wire import NodeWire
+from bridge.southbound.put_off import CANCELS_WORDS
 
 NMT: Final = {
     Action.RESET: NmtCommand.RESET_NODE,
@@ -31,6 +33,7 @@ class Commanded(Protocol):
     @property
     def wire(self) -> NodeWire: ...
 
+    leaving: Leaving
     boot_at: float | None
     told_to_stop: bool
 
@@ -45,6 +48,8 @@ class Commandable(Protocol):
 
     @property
     def node(self) -> Node: ...
+
+    leaving: Leaving
 
     def carry_out_command(self, action: Action, who: str, now: float, *, send: bool = True) -> None: ...
 
@@ -61,10 +66,11 @@ def taker(name: str, nodes: Sequence[Commandable], plant: Plant) -> NodeCommand:
 def answer(
     request: Request, name: str, nodes: Sequence[Commandable], plant: Plant, now: float, reply: Reply
 ) -> bool:
-    """A request for these nodes, ``name`` in the log; True where it may be carried out and was.
+    """A request for these nodes, ``name`` in the log; True where it was carried out and one frame is to be
+    sent to them all.
 
     For a whole bus all commands but Start go out as one frame, which the caller sends: an unchecked node
-    is not started.
+    is not started. Where a node has to take over its stopped words first each gets its own.
     """
     is_bus = request.target.startswith("bus/")
     why = refusal(request, [drive for one in nodes for drive in one.node.drives])
@@ -77,10 +83,11 @@ def answer(
     who = str(request.identity)
     plant.report(Event(now, Kind.OWNER, name, 400, f"{request.action} by {who}"))
     each = not is_bus or request.action is Action.START_NODE
+    each |= NMT.get(request.action) in CANCELS_WORDS and any(one.leaving.takeover_s for one in nodes)
     for one in nodes:
         one.carry_out_command(request.action, who, now, send=each)
     reply(Outcome(Code.OK))
-    return True
+    return not each
 
 
 def refusal(request: Request, drives: Sequence[Drive]) -> str | None:
@@ -100,10 +107,13 @@ def refusal(request: Request, drives: Sequence[Drive]) -> str | None:
     return None
 
 
-def carry_out(node: Commanded, action: Action, who: str, now: float, *, send: bool = True) -> None:
-    """Do what ``action`` asks of a node. ``send`` is false where one frame tells all nodes."""
+def carry_out(
+    node: Commanded, action: Action, who: str, now: float, *, send: bool = True, at_once: bool = False
+) -> None:
+    """Do what ``action`` asks of a node. ``send`` is false where one frame tells all nodes; ``at_once``: its
+    drives have had their stopped words for long."""
     if action in NMT:
-        _nmt(node, NMT[action], who, now, send=send)
+        _nmt(node, NMT[action], who, now, send=send, at_once=at_once)
     elif action is Action.DISABLE:
         node.leave_operation(now)
         node.boot_at = None
@@ -115,7 +125,7 @@ def carry_out(node: Commanded, action: Action, who: str, now: float, *, send: bo
         node.boot_at = now
 
 
-def _nmt(node: Commanded, command: NmtCommand, who: str, now: float, *, send: bool) -> None:
+def _nmt(node: Commanded, command: NmtCommand, who: str, now: float, *, send: bool, at_once: bool) -> None:
     """NMT on a node that is switched off goes on the bus and changes nothing here."""
     if command is NmtCommand.START and node.state is not NodeState.OPERATIONAL:
         # It is booted first, and started at the end of that: an unchecked node gets no process data.
@@ -128,8 +138,12 @@ def _nmt(node: Commanded, command: NmtCommand, who: str, now: float, *, send: bo
     if command is not NmtCommand.START:
         node.stop_drives(now)
         node.wire.send_stopped()
-    if send:
+    if send and command in CANCELS_WORDS:
+        node.leaving.send(command, now, at_once=at_once)
+    elif send:
         node.wire.send_nmt(command)
+    if command in CANCELS_WORDS:
+        node.leaving.silence(now)
     if command is NmtCommand.START or node.state is NodeState.DISABLED:
         return
     node.leave_operation(now)

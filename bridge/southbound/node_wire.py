@@ -19,6 +19,7 @@ from bridge.southbound.fault_reading import FaultReading
 from bridge.southbound.node_tpdo import node_tpdos
 from bridge.southbound.polling import Polling
 from bridge.southbound.process_data import DrivePdos, connect
+from bridge.southbound.put_off import PutOff
 from bridge.southbound.sdo_channels import SdoChannels
 from bridge.southbound.stop_words import StopWords
 
@@ -60,6 +61,7 @@ class NodeWire:
         self.routes: dict[int, Handler] = self._basic_routes()
         self.routes_changed = True
         self._frames: list[Frame] = []
+        self._put_off = PutOff()
 
     def _basic_routes(self) -> dict[int, Handler]:
         routes: dict[int, Handler] = {
@@ -81,8 +83,24 @@ class NodeWire:
     def clear(self) -> None:
         """Send nothing that waits: the bus is gone."""
         self._frames.clear()
+        self._put_off.clear()
+
+    @property
+    def put_off(self) -> NmtCommand | None:
+        """The NMT command that waits for stopped words to be taken over; stopped words go on until then."""
+        return self._put_off.command
+
+    def put_nmt_off(self, command: NmtCommand, now: float, wait_s: float) -> None:
+        """Send it when the stopped words that go before it have been taken over. Takes the place of another
+        one that waits, and goes at the time of that."""
+        self._put_off.begin(command, now, wait_s)
+
+    def drop_put_off(self) -> None:
+        self._put_off.clear()
 
     def send_nmt(self, command: NmtCommand) -> None:
+        """Now, and nothing that waits after it."""
+        self._put_off.clear()
         self._frames.append(nmt.command(command, self._node.table.id))
 
     def send_stopped(self) -> None:
@@ -116,6 +134,9 @@ class NodeWire:
         self._emergencies.on_time(now)
         self.faults.on_time(now)
         self.sdo.on_time(now)
+        command = self._put_off.on_time(now)
+        if command is not None:
+            self.send_nmt(command)
 
     def next_deadline(self) -> float | None:
         times = (
@@ -124,6 +145,7 @@ class NodeWire:
             self.polling.next_deadline(),
             self._emergencies.next_deadline(),
             self.faults.next_deadline(),
+            self._put_off.next_deadline(),
         )
         return min((time for time in times if time is not None), default=None)
 

@@ -90,6 +90,11 @@ class BootMemory:
                 yield from plans
 
     @property
+    def rpdo_types(self) -> set[int]:
+        """Transmission types of the RPDOs that the node has named last."""
+        return {plans[-1].transmission_type for plans in self._rpdos.values()}
+
+    @property
     def waits_for_sync(self) -> bool:
         """Whether an RPDO takes effect with the next SYNC only (CiA 301 §7.5.2.35)."""
-        return any(plans[-1].transmission_type <= LAST_SYNCHRONOUS for plans in self._rpdos.values())
+        return any(kind <= LAST_SYNCHRONOUS for kind in self.rpdo_types)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from bridge.command.plant import Node
+from bridge.command.worst_case import takeover_ms
 from bridge.config import NodeTable
 from bridge.config.download import Download
 from bridge.southbound.boot.actions import (
@@ -54,7 +55,8 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
         yield from find_rpdos(node, result)
         yield SendStopped()
         if result.memory.waits_for_sync:
-            yield Pause(_SYNCS * node.bus.sync_period_ms / 1000)
+            needed_ms = [takeover_ms(node.bus, kind) for kind in result.memory.rpdo_types]
+            yield Pause(max(_SYNCS * node.bus.sync_period_ms, *needed_ms) / 1000)
     yield Nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
     yield from identify(node, device_type, result)
     wanted = (*downloads, *(entry.download for entry in node.table.configure))

@@ -13,7 +13,8 @@ from bridge.drive.own_supervision import judge, why_silence_does_not_stop
 from bridge.eds import read_configurations
 from bridge.errors import FileFaults
 from bridge.mapping import Family
-from bridge.mapping.own_places import Raw, offline
+from bridge.mapping.model import Slot
+from bridge.mapping.own_places import Raw, channels_needed, offline
 from bridge.mapping.site import load_site_and_families
 from bridge.tomlfile import Key
 
@@ -44,32 +45,46 @@ def _refuse_vain_silence(project: Project) -> None:
     found = list(_vain_silences(project))
     if found:
         file, _ = read_site(project.path)
-        for where, why in found:
-            file.fault(where, f"silence does not stop this drive: {why}", _INSTEAD[where[-1]])
+        for where, why, hint in found:
+            file.fault(where, why, hint)
         raise FileFaults(file.faults)
 
 
-def _vain_silences(project: Project) -> Iterator[tuple[Key, str]]:
-    """Keys of the site file that ask for one, and why it is in vain."""
+def _vain_silences(project: Project) -> Iterator[tuple[Key, str, str]]:
+    """Keys of the site file that ask for one, why it is in vain, and what would not be."""
     for b, bus in enumerate(project.site.bus):
         for n, node in enumerate(bus.node):
             family = project.families[node.mapping]
             settings = _settings(node, project.downloads.get(node.name, ()))
             for d, drive in enumerate(node.drive):
-                raw = offline(family, settings, bus, node, family.slot_named(drive.slot))
-                why = why_silence_does_not_stop(family, judge(family, raw, bus, node), node)
                 table = ("bus", b, "node", n, "drive", d)
-                if why and drive.on_expiry == "silence":
-                    yield (*table, "on_expiry"), why
-                if why and drive.then_silence_ms:
-                    yield (*table, "then_silence_ms"), why
+                if drive.on_expiry == "hold":
+                    if drive.then_silence_ms:
+                        yield (*table, "then_silence_ms"), _NEVER_SILENT, "0 (never), or another on_expiry"
+                    continue
+                slot = family.slot_named(drive.slot)
+                raw = offline(family, settings, bus, node, slot)
+                why = why_silence_does_not_stop(family, judge(family, raw, bus, node), node)
+                if not why:
+                    continue
+                why = f"silence does not stop this drive: {why}"
+                watch = _own_watch(family, node, slot)
+                if drive.on_expiry == "silence":
+                    hint = f'"disable_voltage", "quick_stop" or "stop"; or {watch}'
+                    yield (*table, "on_expiry"), why, hint
+                if drive.then_silence_ms:
+                    yield (*table, "then_silence_ms"), why, f"0 (never); or {watch}"
 
 
-_OWN_WATCH: Final = "own_timeout_ms and enforce = true where it has a watch of its own over its process data"
-_INSTEAD: Final[dict[int | str, str]] = {
-    "on_expiry": f'"disable_voltage", "quick_stop" or "stop"; or {_OWN_WATCH}',
-    "then_silence_ms": f"0 (never); or {_OWN_WATCH}",
-}
+_NEVER_SILENT: Final = 'has no effect with on_expiry = "hold": what it goes on with never ends'
+
+
+def _own_watch(family: Family, node: NodeTable, slot: Slot) -> str:
+    """What makes silence a stop."""
+    channels = channels_needed(family, node, [slot])
+    watch = "own_timeout_ms and enforce = true where it has a watch of its own over its process data"
+    reached = f", and sdo_channels = {channels}, over which its own parameters are reached"
+    return watch + reached if channels else watch
 
 
 def _settings(node: NodeTable, from_file: Sequence[Download]) -> Raw:

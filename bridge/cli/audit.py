@@ -17,7 +17,7 @@ from bridge.command import Plant
 from bridge.command.plant import Node
 from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.lint import WorstCase, lint
-from bridge.mapping.own_places import OwnWant, suggested, suggested_ms
+from bridge.mapping.own_places import OwnWant, channels_needed, suggested, suggested_ms
 from bridge.project import Project, load_project
 from bridge.southbound.audit import AuditErrand
 
@@ -167,10 +167,8 @@ def _remedy(drives: list[Audited]) -> Iterator[str]:
         guards = any(entry.watches == "guarding" for entry in node.family.own_supervision)
         yield 'supervision = "guarding"' if guards else "# its mapping needs an [[own_supervision]]"
         return
-    reach = {server.slot: server.number for server in node.family.sdo}
-    hidden = {reach[slot.name] for slot in slots if not slot.parameters_by_sdo and slot.name in reach}
-    if any(want.place.per_drive for want in wants) and not hidden.issubset(node.table.sdo_channels):
-        channels = sorted(hidden.union(node.table.sdo_channels))
+    channels = channels_needed(node.family, node.table, slots)
+    if channels:
         yield f"sdo_channels = {channels}    # to read each drive's own parameters"
     for want in wants:
         if not want.only_if or (not want.place.per_drive and any(_runs_on_by(one, want) for one in drives)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
 from bridge.command.worst_case import StopTime, Wire, stop_time
@@ -11,8 +11,8 @@ from bridge.drive.own_supervision import judge
 from bridge.lint.bus import BusView, DriveView, NodeView
 from bridge.lint.report import LintReport
 from bridge.lint.wire import busy_bits, wire_of
-from bridge.mapping.model import Family, OwnSupervision
-from bridge.mapping.own_places import offline, place_of, settable, wanted
+from bridge.mapping.model import OwnSupervision
+from bridge.mapping.own_places import channels_needed, offline, place_of, settable, wanted
 from bridge.tomlfile import Key
 
 
@@ -162,13 +162,18 @@ def _check_runs_on(bus: BusView, node: NodeView, report: LintReport) -> None:
     for (verdict, reason), names in drives.items():
         runs_on = "runs on" if verdict is OwnVerdict.RUNS_ON else "may run on"
         message = f"{', '.join(names)}: {runs_on} when the bridge falls silent: {reason}"
-        report.warning(node.key, message, _remedy(node.family))
+        report.warning(node.key, message, _remedy(node, names))
 
 
-def _remedy(family: Family) -> str:
-    """What a site can do about drives that would run on."""
+def _remedy(node: NodeView, names: Sequence[str]) -> str:
+    """What a site can do about these drives, which would run on."""
+    family = node.family
     if settable(family) is not None:
         what = "own_timeout_ms and enforce = true"
+        slots = [family.slot_named(drive.table.slot) for drive in node.drives if drive.name in names]
+        channels = channels_needed(family, node.table, slots)
+        if channels:
+            what += f", and sdo_channels = {channels}, over which their own parameters are reached"
     elif any(entry.watches == "guarding" for entry in family.own_supervision):
         what = 'supervision = "guarding"'
     else:

@@ -6,6 +6,7 @@ of a vendor's drive is in such a file.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 from pydantic import Field
@@ -228,6 +229,14 @@ class Family(Table):
             if slot.name == name:
                 return slot
         raise KeyError(name)
+
+    def sdo_channel(self, slot: Slot, opened: Sequence[int]) -> int | None:
+        """The number of the SDO server that reaches a drive's parameters, with these opened beside the
+        first; None where none does."""
+        if slot.parameters_by_sdo:
+            return 1
+        numbers = {server.number for server in self.sdo if server.slot == slot.name}
+        return next((number for number in opened if number in numbers), None)
 
     def leaf_of(self, drive: DriveTable) -> str:
         """What the site calls this drive below its node: its name, else its slot; the one drive of a node

@@ -147,8 +147,9 @@ def offline(
     """What the drive in ``slot`` will hold, by the site file and the factory alone.
 
     ``settings`` are the node's downloads; they reach a drive's own objects where the first SDO channel
-    does.
+    does. ``enforce`` reaches them over an opened one, too.
     """
+    channel = family.sdo_channel(slot, node.sdo_channels)
     raw: dict[tuple[int, int], int] = {}
     for one in _objects(family.own_supervision):
         place = place_of(family, one)
@@ -165,9 +166,21 @@ def offline(
             raw[LIFE_TIME_FACTOR] = node.life_time_factor if guards else 0
     if node.enforce:
         for want in wanted(family, bus, node):
+            if want.place.per_drive and channel is None:
+                continue
             if want.place.key not in raw or not want.met_by(raw[want.place.key]):
                 raw[want.place.key] = want.value
     return raw
+
+
+def channels_needed(family: Family, node: NodeTable, slots: Iterable[Slot]) -> list[int]:
+    """What ``sdo_channels`` has to be, for the drives' own objects to be reached; empty where they are, or
+    where no server reaches them."""
+    if not any(place.per_drive for place in places(family)):
+        return []
+    servers = {server.slot: server.number for server in family.sdo}
+    hidden = {servers[slot.name] for slot in slots if not slot.parameters_by_sdo and slot.name in servers}
+    return [] if hidden.issubset(node.sdo_channels) else sorted(hidden.union(node.sdo_channels))
 
 
 _SUGGESTED_MS: Final = 300

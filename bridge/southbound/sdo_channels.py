@@ -29,9 +29,7 @@ def opened_servers(node: Node) -> list[SdoServer]:
 
 def channel_of(node: Node, slot: Slot) -> int | None:
     """The number of the channel that reaches this drive's parameters, or None where none is open."""
-    if slot.parameters_by_sdo:
-        return FIRST
-    return next((server.number for server in opened_servers(node) if server.slot == slot.name), None)
+    return node.family.sdo_channel(slot, node.table.sdo_channels)
 
 
 class SdoChannels:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bridge.errors import FileFaults
-from bridge.lint import lint
+from bridge.lint import Severity, lint
 from bridge.mapping import load_family
 from bridge.mapping.loader import family_names, mapping_folders
 from bridge.project import load_project
@@ -39,8 +39,27 @@ def faults(path: Path) -> list[str]:
     return []
 
 
-def node_of(mapping: str) -> str:
-    return ON if WATCHES_ITS_PROCESS_DATA[mapping.partition("/")[0]] else ""
+def node_of(mapping: str, *slots: str) -> str:
+    """A node whose drives watch their process data where they can, all of them reached by SDO."""
+    if not WATCHES_ITS_PROCESS_DATA[mapping.partition("/")[0]]:
+        return ""
+    channels = channels_to(mapping, *slots)
+    return f"{ON}\nsdo_channels = {channels}" if channels else ON
+
+
+def channels_to(mapping: str, *slots: str) -> list[int]:
+    """The SDO servers of these drives beside the first one."""
+    family = load_family(mapping)
+    hidden = [slot for slot in slots if not family.slot_named(slot).parameters_by_sdo]
+    return [server.number for server in family.sdo if server.slot in hidden]
+
+
+def has_hidden_reaction(mapping: str, slot: str) -> bool:
+    """Whether the drive's own watch has a part that the first SDO server does not reach."""
+    family = load_family(mapping)
+    first = next(entry for entry in family.own_supervision if entry.watches == "process_data")
+    is_of_drive = first.per_drive or (first.reaction is not None and first.reaction.per_drive)
+    return is_of_drive and not family.slot_named(slot).parameters_by_sdo
 
 
 @pytest.mark.parametrize("silent", SILENT)
@@ -48,7 +67,7 @@ def node_of(mapping: str) -> str:
 def test_it_is_taken_where_the_drive_watches_its_own_process_data(
     tmp_path: Path, mapping: str, slot: str, silent: str
 ):
-    told = faults(site(tmp_path, mapping, (slot, silent), node=node_of(mapping)))
+    told = faults(site(tmp_path, mapping, (slot, silent), node=node_of(mapping, slot)))
     if WATCHES_ITS_PROCESS_DATA[mapping.partition("/")[0]]:
         assert not told
         return
@@ -58,12 +77,50 @@ def test_it_is_taken_where_the_drive_watches_its_own_process_data(
     assert "site.toml:" in fault
 
 
+WATCHING = [(name, slot) for name, slot in SLOTS if WATCHES_ITS_PROCESS_DATA[name.partition("/")[0]]]
+
+
+@pytest.mark.parametrize("silent", SILENT)
+@pytest.mark.parametrize(("mapping", "slot"), WATCHING)
+def test_what_is_enforced_counts_only_where_an_sdo_channel_reaches_it(
+    tmp_path: Path, mapping: str, slot: str, silent: str
+):
+    """P513 of fu2 may be -0.1 (ignore), and over the first channel nobody reads or writes it."""
+    told = faults(site(tmp_path, mapping, (slot, silent), node=ON))
+    if not has_hidden_reaction(mapping, slot):
+        assert not told
+        return
+    (fault,) = told
+    assert "silence does not stop this drive: P513 is not known" in fault
+    assert f"sdo_channels = {channels_to(mapping, slot)}" in fault
+
+
+@pytest.mark.parametrize("is_open", [True, False])
+@pytest.mark.parametrize(("mapping", "slot"), WATCHING)
+def test_a_dead_bridge_is_not_known_of_what_cannot_be_reached(
+    tmp_path: Path, mapping: str, slot: str, is_open: bool
+):
+    path = site(tmp_path, mapping, (slot, ""), node=node_of(mapping, slot) if is_open else ON)
+    project = load_project(path)
+    verdict = lint(project.site, project.families, path, project.downloads)
+    (case,) = verdict.worst_cases
+    warnings = [str(one) for one in verdict.of(Severity.WARNING) if "may run on" in str(one)]
+    if is_open or not has_hidden_reaction(mapping, slot):
+        assert "dead bridge: 400 ms" in str(case)
+        assert not warnings
+        return
+    assert "dead bridge: not known" in str(case)
+    (warning,) = warnings
+    assert f"sdo_channels = {channels_to(mapping, slot)}" in warning
+
+
 @pytest.mark.parametrize("silent", SILENT)
 @pytest.mark.parametrize("mapping", [name for name in FAMILIES if len(load_family(name).slot) > 1])
 def test_it_is_refused_where_drives_share_a_watch(tmp_path: Path, mapping: str, silent: str):
     """NORD's P151 is the interface's: the RPDOs of fu1 keep it quiet for fu2."""
     first, second, *_ = (slot.name for slot in load_family(mapping).slot)
-    (fault,) = faults(site(tmp_path, mapping, (first, ""), (second, silent), node=node_of(mapping)))
+    node = node_of(mapping, first, second)
+    (fault,) = faults(site(tmp_path, mapping, (first, ""), (second, silent), node=node))
     if node_of(mapping):
         assert "watches the RPDOs of all 2 drives of the node" in fault
 
@@ -109,3 +166,14 @@ def test_the_published_time_has_the_drives_own_in_it(tmp_path: Path, mapping: st
 
     assert worst_ms(SILENT[0]) == worst_ms("") + 300
     assert worst_ms(SILENT[1]) == worst_ms("")
+
+
+@pytest.mark.parametrize(("mapping", "slot"), SLOTS)
+def test_silence_after_hold_is_refused_since_it_never_comes(tmp_path: Path, mapping: str, slot: str):
+    held = 'on_expiry = "hold"\nthen_silence_ms = 100'
+    for node in {"", node_of(mapping, slot)}:
+        (fault,) = faults(site(tmp_path, mapping, (slot, held), node=node))
+        assert "then_silence_ms" in fault
+        assert 'has no effect with on_expiry = "hold"' in fault
+        assert "does not stop" not in fault
+    assert not faults(site(tmp_path, mapping, (slot, 'on_expiry = "hold"')))

@@ -98,6 +98,11 @@ class DriveChannel:
         return self._gate.setpoints
 
     @property
+    def silence_stops(self) -> bool:
+        """The drive is known to stop by itself when it gets no RPDO any more, or nobody has asked it yet."""
+        return self._gate.silence_stops
+
+    @property
     def restart_interlock(self) -> bool:
         return self._gate.interlocked
 
@@ -162,6 +167,17 @@ class DriveChannel:
         return self._status.fault_text(self._bridge_fault)
 
     # from the drive
+
+    def on_own_watch(self, why_not: str, now: float) -> None:
+        """Whether the drive stops by itself when it gets no RPDO any more: ``why_not``, or an empty text."""
+        stops = not why_not
+        if stops is self._gate.silence_stops:
+            return
+        self._gate.silence_stops = stops
+        if why_not and self.settings.falls_silent:
+            message = f"silence does not stop the drive, it gets disable voltage instead: {why_not}"
+            self._tell(now, Kind.WATCHDOG, 700, message)
+        self._settle(now)
 
     def on_status_word(self, word: int, now: float) -> None:
         """A TPDO brought this status word."""

@@ -139,7 +139,7 @@ class ControllerLeg:
         self._status.last_fault = fault
         self.start.end(Outcome(Code.CANCELLED, "the watchdog tripped"))
         message = (
-            f"{self.owner} was silent for {self.watchdog.timeout_ms} ms: {self._settings.on_expiry}, "
+            f"{self.owner} was silent for {self.watchdog.timeout_ms} ms: {self.gate.reaction}, "
             f"{self._status.fault_text(fault)}"
         )
         self._tell(now, Kind.WATCHDOG, 900, message)

@@ -16,6 +16,7 @@ from bridge.command.points import drive_points
 from bridge.command.worst_case import StopTime, Wire, stop_time, sync_wait_ms, takeover_ms
 from bridge.config import BusTable, DriveTable, NodeTable
 from bridge.drive import OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, scale_of
+from bridge.drive.own_supervision import why_silence_does_not_stop
 from bridge.image import Image, Point, Quality, Value
 from bridge.mapping.model import Family, Slot
 
@@ -64,6 +65,7 @@ class Drive:
     ) -> None:
         self.name = f"{node.name}/{family.leaf_of(table)}"
         self.node_name = node.name
+        self._node = node
         self.unit_id = unit_id
         self.family = family
         self.slot: Slot = family.slot_named(table.slot)
@@ -71,7 +73,8 @@ class Drive:
         self.following = Following(self.channel)
         self.identification = Identification()
         self.own: OwnJudgement | None = None
-        """What it does by itself when the bridge falls silent; None until the boot-up has read it."""
+        """What it does by itself when the bridge falls silent; None until the boot-up has read it, and empty
+        where that is not true any more."""
         self.sdo_abort_code = 0
         self.bus = bus
         self.rpdo_type = _ASYNCHRONOUS
@@ -86,7 +89,7 @@ class Drive:
         self._commands = [
             ValueCodec(value, words) for value in family.values_of(self.slot) if value.group == "command"
         ]
-        self._shown_for: tuple[int, int, Wire, float] | None = None
+        self._shown_for: tuple[int, int, Wire, float | None] | None = None
         self._set = ParameterSet(family.control_word.parameter_set_bits)
         self._setpoints = [
             (words.index(word), f"command/{word}") for word in family.carried(self.slot)[0][1:]
@@ -150,8 +153,11 @@ class Drive:
         return stop_time(self.table, self.bus, timeout_ms, self.rpdo_type, self.wire, self._own_ms)
 
     @property
-    def _own_ms(self) -> float:
-        return self.own.process_data_ms if self.own else 0.0
+    def _own_ms(self) -> float | None:
+        """Its own time-out without RPDOs, 0 where it has none, None where nobody has asked it yet."""
+        if self.own is None:
+            return None
+        return self.own.process_data_ms if self.channel.silence_stops else 0.0
 
     # fed by the southbound side
 
@@ -211,6 +217,7 @@ class Drive:
     def on_own_supervision(self, own: OwnJudgement, now: float) -> None:
         """What the drive does by itself when the bridge falls silent, as the boot-up has read it."""
         self.own = own
+        self.channel.on_own_watch(why_silence_does_not_stop(self.family, own, self._node), now)
         self._refresh_supervision(now)
         if own.verdict is OwnVerdict.STOPS or own.accepted:
             self._image.set(self._bridge_ms, own.bridge_ms, now, Quality.GOOD, own.accepted)
@@ -221,7 +228,8 @@ class Drive:
 
     def on_own_supervision_changed(self, why: str, now: float) -> None:
         """What the boot-up has read of it is not true any more."""
-        self.own = None
+        self.own = OwnJudgement()
+        self.channel.on_own_watch(why, now)
         self._refresh_supervision(now)
         self._image.set(self._bridge_ms, 0, now, Quality.CONFIG_ERROR, why)
 

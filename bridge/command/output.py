@@ -45,6 +45,9 @@ class Gate:
         self._words = words
         self._reaction: Reaction = reaction
         self._then_silence_s = then_silence_ms / 1000
+        self.silence_stops = True
+        """The drive stops by itself without its RPDOs. Where it does not, or nobody knows, it gets disable
+        voltage in place of silence."""
         self._follows = tuple(follows)
         self._followed = frozenset(source for _, source in self._follows)
         self._handshake = handshake
@@ -74,6 +77,12 @@ class Gate:
         self.setpoints = self.rest
         self.interlocked = True
         self.sent = Output((words.stopped, *self.rest))
+
+    @property
+    def reaction(self) -> Reaction:
+        """What a trip leads to at first."""
+        in_vain = self._reaction == "silence" and not self.silence_stops
+        return "disable_voltage" if in_vain else self._reaction
 
     @property
     def _silence_at(self) -> float | None:
@@ -276,7 +285,10 @@ class Gate:
         if self._tripped_at is not None and self._reaction != "hold":
             silence_at = self._silence_at
             silent = silence_at is not None and self._now >= silence_at
-            return Output((self._reaction_word(awaits_rest=self.awaits_rest), *self.rest), silent)
+            word = self._reaction_word(awaits_rest=self.awaits_rest)
+            if silent and not self.silence_stops:
+                return Output((self._words.disable_voltage(word), *self.rest))
+            return Output((word, *self.rest), silent)
         if self._held is not None:
             if may_enable or not self._words.enables(self._held.words[0]):
                 return self._held
@@ -304,7 +316,7 @@ class Gate:
         if self._reaction == "hold":
             return None
         word = self._reaction_word(awaits_rest=self._reaction == "quick_stop")
-        return Output((word, *self.rest), silent=self._reaction == "silence")
+        return Output((word, *self.rest), silent=self.reaction == "silence")
 
     def if_left(self) -> Output:
         """What the drive would get if its owner went now."""

@@ -74,15 +74,16 @@ def stop_time(
     timeout_ms: int,
     transmission_type: int,
     wire: Wire,
-    own_ms: float = 0.0,
+    own_ms: float | None = 0.0,
 ) -> StopTime:
     """From the owner's last telegram to the last frame that enables the drive, and to the first that does
     not. ``transmission_type`` is that of the RPDO with the control word. With silence the reaction is the
-    drive's own, ``own_ms`` after its last RPDO; 0 where it has none."""
+    drive's own, ``own_ms`` after its last RPDO. Where it has none, 0, it gets disable voltage instead; None
+    where nobody has asked it yet."""
     if not timeout_ms or table.telegram_downtime_s == IGNORE_ALL_S or table.on_expiry == "hold":
         return StopTime()
-    if table.on_expiry == "silence" and not own_ms:
-        return StopTime()
+    if table.on_expiry == "silence" and own_ms is None:
+        return StopTime(unknown="the drive's own time-out has not been read yet")
     sync_ms = sync_wait_ms(bus, transmission_type)
     is_synchronous = transmission_type <= _LAST_SYNCHRONOUS
     if is_synchronous and not bus.sync_period_ms:
@@ -100,7 +101,7 @@ def stop_time(
     if is_synchronous:
         terms.append(Term("sync_ms", sync_ms, "until the SYNC that takes the RPDO over"))
         terms.append(Term("sync_late_ms", wire.before_ms, "frames that may go before SYNC"))
-    if table.on_expiry == "silence":
+    if table.on_expiry == "silence" and own_ms:
         terms.append(Term("own_ms", own_ms, "the drive's own time-out, which stops it without RPDOs"))
     return StopTime(tuple(term for term in terms if term.ms))
 

@@ -240,6 +240,11 @@ class DriveTable(Table):
         return self.on_ignored_stop if is_given or self.control != "none" else "report"
 
     @property
+    def falls_silent(self) -> bool:
+        """Whether a trip ends the RPDOs, at once or later."""
+        return self.on_expiry == "silence" or (self.then_silence_ms > 0 and self.on_expiry != "hold")
+
+    @property
     def timeout_range_ms(self) -> tuple[int, int]:
         """What the owner may set. Where the file does not say: never off, and up to ten times its own."""
         if self.fieldbus_timeout_range_ms is not None:

@@ -173,6 +173,19 @@ def offline(
     return raw
 
 
+def ends_own_watch(family: Family, key: tuple[int, int], value: int) -> bool:
+    """Whether this value in an object ends a drive's watch over its process data, or has it do nothing."""
+    for entry in family.own_supervision:
+        if entry.watches != "process_data":
+            continue
+        if place_of(family, entry).key == key and value in entry.off:
+            return True
+        reaction = entry.reaction
+        if reaction is not None and place_of(family, reaction).key == key and value in reaction.nothing:
+            return True
+    return False
+
+
 def channels_needed(family: Family, node: NodeTable, slots: Iterable[Slot]) -> list[int]:
     """What ``sdo_channels`` has to be, for the drives' own objects to be reached; empty where they are, or
     where no server reaches them."""

@@ -110,9 +110,7 @@ class DropTest:
         """How long nothing was sent."""
         self.notes = ""
         """What the boot-up said."""
-        self.rpdos_alone = any(
-            drive.on_expiry == "silence" or drive.then_silence_ms for drive in node.table.drive
-        )
+        self.rpdos_alone = any(drive.falls_silent for drive in node.table.drive)
         """The site stops drives of the node by ending their RPDOs, and by nothing else."""
         self._core = next(core for core in network.nodes if core.node is node)
         self._plant = plant

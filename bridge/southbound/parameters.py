@@ -15,7 +15,6 @@ from bridge.command import Action, Code, Drive, Event, Identity, Kind, Outcome, 
 from bridge.command.link import NodeState
 from bridge.command.plant import Node
 from bridge.drive import MOVING
-from bridge.mapping.own_places import places
 from bridge.parameter import (
     Address,
     DriveParameters,
@@ -29,6 +28,7 @@ from bridge.parameter import (
 )
 from bridge.parameter.codec import shown
 from bridge.southbound.canopen.sdo import Priority, SdoChannel
+from bridge.southbound.own_watch import OwnWatch
 from bridge.southbound.parameter_polling import Came, ParameterPolling
 from bridge.southbound.parameter_run import Procedure, run
 from bridge.southbound.parameter_view import NO_CHANNEL, ParameterView
@@ -70,6 +70,7 @@ class NodeParameters:
             )
             for drive in node.drives
         }
+        self._own_watch = OwnWatch(node, names)
         self._view = ParameterView(node, plant.image, names)
         sharing = sum(other.bus is node.bus for other in plant.nodes.values())
         self._polling = ParameterPolling(node, names, sharing, self._poll)
@@ -154,6 +155,8 @@ class NodeParameters:
         key = (drive.name, entry.address)
         if request.value is None:
             conclude(_no(Code.OUT_OF_RANGE, f"{entry.name}: there is no value to write"))
+        elif why := self._own_watch.why_kept(drive, entry, request.value):
+            conclude(_no(Code.NOT_ALLOWED, why))
         elif key in self._writing:
             conclude(_no(Code.BUSY, f"{entry.name} of {drive.name} is being written"))
         else:
@@ -216,27 +219,20 @@ class NodeParameters:
     ) -> None:
         self._writing.discard((drive.name, entry.address))
         if isinstance(result, ParameterError):
+            if result.why in (Why.NO_ANSWER, Why.NOT_TAKEN):
+                self._own_watch.forget(drive, entry, "may have been changed", self._now)
             conclude(_failed(result))
             return
         reading = result.reading
         self._show(drive, entry, reading)
-        if result.changed and self._names.protection.tells_own_supervision(entry.address):
-            self._forget_own_supervision(drive, entry)
+        if result.changed:
+            self._own_watch.forget(drive, entry, "was changed", self._now)
         if result.changed:
             was = "" if result.before is None else f" (was {shown(entry, result.before)})"
             self._tell(drive.name, 400, f"{reading}{was}, by {request.identity}")
         self._warn(drive.name, result.warning)
         message = "" if result.changed else "the drive holds this value already: not written again"
         conclude(Outcome(Code.OK, message, value=reading.value, time=reading.time))
-
-    def _forget_own_supervision(self, drive: Drive, entry: Entry) -> None:
-        """What the boot-up has read of it is not true any more; the next boot-up reads it again."""
-        is_of_drive = any(
-            place.per_drive and place.ref.index == entry.address.index for place in places(self._node.family)
-        )
-        why = f"{entry.name} was changed since boot: boot the node to have it read again"
-        for one in [drive] if is_of_drive else self._node.drives:
-            one.on_own_supervision_changed(why, self._now)
 
     def _on_saved(self, conclude: Reply, result: str | ParameterError) -> None:
         if isinstance(result, ParameterError):

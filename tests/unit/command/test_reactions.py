@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command import Action, Identity
+from bridge.command import Action, Identity, Kind
 from bridge.command.link import NodeState
 from tests.support.leg_words import NORD_TU4
 from tests.support.rig import (
@@ -196,3 +196,56 @@ def test_a_weaker_stop_changes_nothing_of_the_reaction(on_expiry: str):
     before = rig.channel.output
     assert rig.ask(Action.STOP, OPERATOR).ok
     assert rig.channel.output == before
+
+
+def test_silence_that_would_not_stop_the_drive_is_disable_voltage():
+    rig = Rig(on_expiry="silence")
+    rig.channel.on_own_watch("P151 is 0 (off)", rig.now)
+    rig.run()
+    rig.wait(0.2)
+    assert not rig.silent
+    assert rig.sent == 0x0474
+    assert rig.sent_setpoints[0] == 0
+    (trip,) = (message for message in rig.told(Kind.WATCHDOG) if "was silent" in message)
+    assert ": disable_voltage, " in trip
+
+
+@pytest.mark.parametrize("on_expiry", ["disable_voltage", "quick_stop", "stop"])
+def test_then_silence_that_would_not_stop_the_drive_is_disable_voltage(on_expiry: str):
+    rig = Rig(on_expiry=on_expiry, then_silence_ms=500)
+    rig.channel.on_own_watch("P151 is 0 (off)", rig.now)
+    rig.run()
+    rig.wait(0.2)
+    first = rig.sent
+    rig.wait(0.49)
+    assert rig.sent == first
+    rig.wait(0.02)
+    assert not rig.silent
+    assert rig.sent & 0x0002 == 0, "bit 1: disable voltage"
+
+
+@pytest.mark.parametrize("on_expiry", ["silence", "stop"])
+def test_a_drive_that_goes_on_in_the_silence_is_stopped_when_that_is_known(on_expiry: str):
+    rig = tripped(on_expiry, then_silence_ms=50)
+    rig.wait(0.1)
+    assert rig.silent
+    rig.channel.on_own_watch("P151 was changed", rig.now)
+    assert not rig.silent
+    assert not rig.enables
+    assert rig.sent & 0x0002 == 0
+
+
+def test_that_silence_would_not_stop_the_drive_is_told_once_and_only_where_it_matters():
+    for on_expiry, then_silence_ms, count in (
+        ("silence", 0, 1),
+        ("stop", 100, 1),
+        ("stop", 0, 0),
+        ("hold", 100, 0),
+    ):
+        rig = Rig(on_expiry=on_expiry, then_silence_ms=then_silence_ms)
+        for _ in range(2):
+            rig.channel.on_own_watch("P151 is 0 (off)", rig.now)
+        assert sum("P151 is 0 (off)" in message for message in rig.told(Kind.WATCHDOG)) == count
+        rig.channel.on_own_watch("", rig.now)
+        rig.channel.on_own_watch("P513 is -1", rig.now)
+        assert sum("P513 is -1" in message for message in rig.told(Kind.WATCHDOG)) == count

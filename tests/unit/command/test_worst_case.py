@@ -67,7 +67,10 @@ def test_a_bus_behind_a_thread_has_its_queue() -> None:
 def test_with_silence_the_drives_own_time_out_is_in_it() -> None:
     silent = drive(on_expiry="silence")
     assert stop_time(silent, bus(), 200, 255, WIRE, 300.0).terms[-1].ms == 300
-    assert stop_time(silent, bus(), 200, 255, WIRE).ms == 0
+    assert stop_time(silent, bus(), 200, 255, WIRE, 0.0) == stop_time(drive(), bus(), 200, 255, WIRE), (
+        "it gets disable voltage where it has none"
+    )
+    assert "not been read" in stop_time(silent, bus(), 200, 255, WIRE, None).unknown
 
 
 def test_a_full_bus_leaves_no_number() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from bridge.command import Action, Code, Identity, Kind, Outcome, Request, Role, Source
-from bridge.drive import DriveState
+from bridge.drive import DriveState, OwnJudgement
 from bridge.image import Quality
 from bridge.parameter.ledger import MOST_WRITES, Saved
 from bridge.sim.nord_tu4 import NordTu4
@@ -354,7 +354,7 @@ def test_own_supervision_is_not_known_any_more_when_it_was_written(parameters: P
     assert parameters.write("P151", 500).ok
     reading = parameters.bench.plant.image.read("conveyor/fu1/supervision/worst_case_bridge_ms")
     assert reading.quality is Quality.CONFIG_ERROR
-    assert parameters.bench.plant.drives["conveyor/fu1"].own is None
+    assert parameters.bench.plant.drives["conveyor/fu1"].own == OwnJudgement()
 
 
 def test_the_nodes_own_parameters_go_over_its_first_channel(parameters: Parameters) -> None:

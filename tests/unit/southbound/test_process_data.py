@@ -84,6 +84,8 @@ class TestBeats:
 
     def test_silence_ends_all_of_them(self, tmp_path: Path) -> None:
         bench = running(tmp_path, spindle(), drive='on_expiry = "silence"')
+        (drive,) = bench.plant.drives.values()
+        drive.channel.on_own_watch("", bench.now)  # as of a drive that watches its process data
         assert command(bench, control_word=READY).ok
         bench.run(0.6)
         del bench.log[:]

@@ -1,5 +1,6 @@
 """Downloads that the bridge's own settings undo: the node is written twice in each boot-up, and holds what
-the configuration does not say. And a node told to watch a heartbeat that does not come."""
+the configuration does not say. And a node told to watch a heartbeat, or to wait for a SYNC, that does not
+come."""
 
 from __future__ import annotations
 
@@ -11,8 +12,12 @@ from bridge.lint.bus import BusView, NodeView
 from bridge.lint.report import LintReport
 from bridge.lint.settings import RPDO, TPDO, pdo_cob_id
 from bridge.southbound.boot import heartbeat_period_ms
+from bridge.southbound.canopen import cobid
 
 _CONSUMER: Final = 0x1016
+_SYNC: Final = (0x1005, 0)
+_SYNC_BITS: Final = 0x7FFF_FFFF
+"""Bit 31 has no meaning (CiA 301 §7.5.2.5). Bit 30 makes the node a producer of SYNC, too."""
 _COB_ID: Final = 1
 
 
@@ -33,6 +38,7 @@ def check_contradictions(bus: BusView, report: LintReport) -> None:
                 told = f"{name} = {number(given)}, and the bridge sets it to {number(value)}"
                 report.warning(setting.key, told, hint)
         _check_consumer(bus, node, report)
+        _check_sync(node, report)
 
 
 def _is_cob_id(index: int, sub: int) -> bool:
@@ -103,3 +109,22 @@ def _check_consumer(bus: BusView, node: NodeView, report: LintReport) -> None:
                 f"{name} waits for {time_ms} ms, and {whose}'s heartbeat comes every {period_ms} ms",
                 f"at least {2 * period_ms}",
             )
+
+
+def _check_sync(node: NodeView, report: LintReport) -> None:
+    """A synchronous PDO waits for the SYNC with the identifier in 1005h: on another one it takes no stop
+    over."""
+    waiting = [pdo.name for pdo in node.pdos if pdo.enabled and pdo.is_synchronous]
+    if not waiting:
+        return
+    waits = f"{' and '.join(waiting)} would wait for it, and the bridge's SYNC is {cobid.SYNC:X}h"
+    setting, related = node.settings[_SYNC], node.settings.related.get(_SYNC)
+    hint = f"0x{cobid.SYNC:X}, or PDOs that are not synchronous"
+    at_factory = node.dictionary.number(*_SYNC, node.table.id) if node.dictionary else None
+    value = at_factory if setting is None else setting.value
+    if value is not None and value & _SYNC_BITS != cobid.SYNC:
+        told = f"{setting.name}, which is 1005h:00," if setting and setting.name else "1005h:00"
+        at = "" if setting else " at factory"
+        report.error(setting.key if setting else node.key, f"{told} = {value:X}h{at}: {waits}", hint)
+    if related is not None and related.value & _SYNC_BITS != cobid.SYNC:
+        report.warning(related.key, f"{related.name} decides 1005h:00, the identifier of SYNC: {waits}", hint)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 
 from bridge.command.worst_case import StopTime, Wire, stop_time
+from bridge.config import DriveTable
 from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_supervision import judge
 from bridge.lint.bus import BusView, DriveView, NodeView
@@ -24,10 +26,13 @@ class WorstCase:
     stop: StopTime
     own: OwnJudgement
     wire: Wire
+    longest: StopTime | None = None
+    """With the longest time-out that the owner may set; None where it may not set any."""
 
     def __str__(self) -> str:
         bridge = f"{self.own.bridge_ms} ms" if self.own.bridge_ms else str(self.own.verdict)
-        return f"{self.drive}: dead controller: {self.stop}, dead bridge: {bridge}"
+        owner = f" (as its owner may set it: {self.longest})" if self.longest else ""
+        return f"{self.drive}: dead controller: {self.stop}{owner}, dead bridge: {bridge}"
 
     @property
     def terms(self) -> list[str]:
@@ -42,6 +47,7 @@ class WorstCase:
             "controller_ms": self.stop.ms,
             "controller_terms": [asdict(term) for term in self.stop.terms],
             "controller_unknown": self.stop.unknown,
+            "controller_longest_ms": self.longest.ms if self.longest else self.stop.ms,
             "bridge_ms": self.own.bridge_ms,
             "bridge_terms": [{"name": name, "ms": ms} for name, ms in self.own.terms],
         }
@@ -56,8 +62,23 @@ def worst_cases(bus: BusView) -> Iterator[WorstCase]:
             kind = drive.rpdos[0].transmission_type
             wire = wire_of(bus, drive, busy)
             own = judged(bus, node, drive)
-            stop = stop_time(drive.table, bus.table, timeout_ms, kind, wire, own.process_data_ms)
-            yield WorstCase(drive.name, stop, own, wire)
+            of_time = partial(_stop_time, bus, drive, kind, wire, own.process_data_ms)
+            writable = drive.table.fieldbus_timeout_writable and drive.table.control != "none"
+            longest = of_time(longest_ms(drive.table)) if writable else None
+            yield WorstCase(drive.name, of_time(timeout_ms), own, wire, longest)
+
+
+def longest_ms(table: DriveTable) -> int:
+    """The longest time-out that the owner may set, or has; 0, off, is longer than any."""
+    low, high = table.timeout_range_ms
+    own_ms = table.fieldbus_timeout_ms or 0
+    return max(high, own_ms) if low and own_ms else 0
+
+
+def _stop_time(
+    bus: BusView, drive: DriveView, kind: int, wire: Wire, own_ms: float, timeout_ms: int
+) -> StopTime:
+    return stop_time(drive.table, bus.table, timeout_ms, kind, wire, own_ms)
 
 
 def judged(bus: BusView, node: NodeView, drive: DriveView) -> OwnJudgement:

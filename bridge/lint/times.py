@@ -22,6 +22,7 @@ def check_times(bus: BusView, report: LintReport) -> None:
         _check_sdo(node, report)
         for drive in node.drives:
             _check_controller(bus, drive, report)
+            _check_range(drive, report)
             _check_downtime(bus, node, drive, report)
 
 
@@ -90,6 +91,25 @@ def _check_controller(bus: BusView, drive: DriveView, report: LintReport) -> Non
             "drive going for longer than a silent controller may",
             f"at least {bus.table.deadman_ms}, or a shorter deadman_ms",
         )
+
+
+def _check_range(drive: DriveView, report: LintReport) -> None:
+    """What the owner may make of its time-out."""
+    table, key = drive.table, (*drive.key, "fieldbus_timeout_range_ms")
+    if table.fieldbus_timeout_range_ms is None or table.control == "none":
+        return
+    low, high = table.timeout_range_ms
+    if not table.fieldbus_timeout_writable:
+        message = "has no effect: the owner may not set its time-out"
+        report.warning(key, message, "fieldbus_timeout_writable = true, or leave it out")
+        return
+    if low == 0:
+        message = "begins with 0: the owner may switch off the time-out that stops its drive"
+        report.warning(key, message, "at least 1, better two RPDO periods and more")
+    own_ms = table.fieldbus_timeout_ms
+    if own_ms and not low <= own_ms <= high:
+        message = f"{low}…{high} ms does not have the site's own fieldbus_timeout_ms = {own_ms} in it"
+        report.warning(key, message, "a range with it: an owner that has changed it cannot set it again")
 
 
 def _check_downtime(bus: BusView, node: NodeView, drive: DriveView, report: LintReport) -> None:

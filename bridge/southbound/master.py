@@ -10,18 +10,17 @@ import asyncio
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from math import inf
 
 from bridge.command import Event, Kind, Plant
 from bridge.errors import OperationFailed
 from bridge.southbound.bus.burstend import MOST_FRAMES, BurstEnd
-from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import Bus, ControllerState
 from bridge.southbound.canopen.sync import burst_length
 from bridge.southbound.ending import Ending, end, waits_for
 from bridge.southbound.lateness import Lateness
 from bridge.southbound.network import Beats, Network
-from bridge.southbound.process_data import Beat
+from bridge.southbound.process_data import Beat, Told
 from bridge.southbound.ratelimit import RateLimit
 from bridge.southbound.standstill import Alarm
 from bridge.southbound.suspend import SuspendWatch
@@ -51,28 +50,17 @@ _SEVERITIES = {
 }
 
 
-class _Told(NamedTuple):
-    """What a bus repeats at present: ``frames`` until then, ``ends`` at the latest if nobody renews it."""
-
-    frames: tuple[Frame, ...]
-    until: float | None
-    ends: float
-
-    def ends_as(self, beat: Beat) -> bool:
-        """Whether it does so at the right time without being told again."""
-        earliest = min((time for time in (self.until, beat.until) if time is not None), default=self.ends)
-        return self.until == beat.until or earliest >= self.ends
-
-
 @dataclass(slots=True)
 class _Line:
     """One bus with its network, and what the bus has been told to repeat."""
 
     bus: Bus
     network: Network
-    beating: dict[int, _Told] = field(default_factory=dict[int, _Told])
+    beating: dict[int, Told] = field(default_factory=dict[int, Told])
     beats: Beats | None = None
     renew_at: float = 0.0
+    hold_at: float = inf
+    """When some bursts have to be renewed so that they go on for as long as a drive needs them."""
     was_up: bool = True
     shown: ControllerState = ControllerState.OK
     shown_refusal: str = ""
@@ -99,7 +87,7 @@ class _Line:
         count = burst_length(beat.period_s, self.network.bus.deadman_ms)
         self.bus.beat(beat.frames, now, beat.period_s, count, at_once=at_once, ending=ending)
         ends = now + self.burst_s + beat.period_s
-        self.beating[beat.frames[0].can_id] = _Told(beat.frames, beat.until, ends)
+        self.beating[beat.frames[0].can_id] = Told(beat.frames, beat.until, ends, now)
 
 
 class Master:
@@ -366,7 +354,7 @@ class Master:
         if renew:
             line.renew_at = now + line.renew_s
         beats = network.beats(anew=renew)
-        if beats is line.beats and not renew:
+        if beats is line.beats and not renew and now < line.hold_at:
             return
         line.beats = beats
         self._alarm.set(line.burst_s)
@@ -376,12 +364,13 @@ class Master:
         for can_id, beat in beats.items():
             told = line.beating.get(can_id)
             changed = told is None or told.frames != beat.frames
-            if changed or renew or (told and not told.ends_as(beat)):
+            if changed or renew or (told and not told.ends_as(beat, now)):
                 # In this order: the process may be stopped at the end of the look at the clock.
                 if self._stood_still(line, now) or self._alarm.rang:
                     line.beats = None
                     return
                 line.beat(beat, now, at_once=changed)
+        line.hold_at = min((at for beat in beats.values() for at in beat.hold_at if at > now), default=inf)
         if self._plant.unsent:
             network.on_handed_over(self._clock())
 
@@ -392,7 +381,8 @@ class Master:
             times.append(plant)
         for line in self._lines:
             # Also with the bus down: a round that comes too late means that the process hung.
-            times.append(max(line.renew_at, now) if line.was_up else now + _REFRESH_S / _RENEWALS)
+            renew_at = max(min(line.renew_at, line.hold_at), now)
+            times.append(renew_at if line.was_up else now + _REFRESH_S / _RENEWALS)
             times += [t for t in (line.network.next_deadline(), line.bus.next_deadline()) if t is not None]
         self._due = max(min(times), now)
         self._set_timer(self._due)

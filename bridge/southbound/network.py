@@ -296,15 +296,18 @@ class Network:
             frame = Frame(cobid.ERROR_CONTROL + self.bus.master_node_id, bytes((self.nmt_state,)))
             beats[frame.can_id] = Beat((frame,), self.bus.heartbeat_ms / 1000)
         period_s = self.bus.rpdo_period_s
+        hold_at: list[float] = []
         for node in self.nodes:
             if node.sends_process_data:
                 for pdos in node.wire.drives.values():
                     if not pdos.is_silent:
                         for beat in pdos.beats(period_s):
                             beats[beat.frames[0].can_id] = beat
+                            if pdos.needs_sync:
+                                hold_at += beat.hold_at
         # SYNC last: what goes out together with it is taken over by it (CiA 301 §7.2.2.2).
         if self.bus.sync_period_ms:
-            beats[cobid.SYNC] = Beat(self._sync, self.bus.sync_period_ms / 1000)
+            beats[cobid.SYNC] = Beat(self._sync, self.bus.sync_period_ms / 1000, hold_at=tuple(hold_at))
         return beats
 
     def on_handed_over(self, now: float) -> None:

@@ -16,6 +16,7 @@ from bridge.image import Quality
 from bridge.southbound.boot import BootResult, PdoPlan
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.canopen.sync import LAST_SYNCHRONOUS, REMOTE_SYNCHRONOUS, REMOTE_TYPES, tpdo_deadline_s
+from bridge.southbound.held import held_s
 from bridge.southbound.words import WordMap
 
 Reject = Callable[[Frame, str], None]
@@ -23,12 +24,33 @@ Reject = Callable[[Frame, str], None]
 
 class Beat(NamedTuple):
     """One identifier: the frames that are to be repeated in turn, and how often. With ``until`` they may be
-    on the bus no longer than that, and ``then`` gives the frame that takes their place; None for silence."""
+    on the bus no longer than that, and ``then`` gives the frame that takes their place; None for silence.
+
+    A burst that is handed over at one of ``hold_at`` or later goes on for as long as a drive needs it in
+    order to stop without us (``held.py``)."""
 
     frames: tuple[Frame, ...]
     period_s: float
     until: float | None = None
     then: Callable[[], Frame | None] = lambda: None
+    hold_at: tuple[float, ...] = ()
+
+
+class Told(NamedTuple):
+    """What a bus repeats at present: ``frames`` until then, ``ends`` at the latest if nobody renews it, as it
+    has been told ``at`` that time."""
+
+    frames: tuple[Frame, ...]
+    until: float | None
+    ends: float
+    at: float
+
+    def ends_as(self, beat: Beat, now: float) -> bool:
+        """Whether it does so at the right time without being told again."""
+        if any(self.at < at <= now for at in beat.hold_at):
+            return False
+        earliest = min((time for time in (self.until, beat.until) if time is not None), default=self.ends)
+        return self.until == beat.until or earliest >= self.ends
 
 
 class Tpdo:
@@ -177,7 +199,7 @@ class DrivePdos:
     """All PDOs of one drive. Of several the one with the status word is the first of ``tpdos``, and the
     one with the control word the last of ``rpdos``: setpoints are there when an enable comes."""
 
-    __slots__ = ("_drive", "_endings", "rpdos", "tpdos")
+    __slots__ = ("_drive", "_endings", "_held_s", "needs_sync", "rpdos", "tpdos")
 
     def __init__(
         self, drive: Drive, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan], reject: Reject
@@ -186,6 +208,10 @@ class DrivePdos:
         words = len(drive.family.process.rpdo)
         self.rpdos = tuple(Rpdo(plan, words) for plan in reversed(rpdos))
         self._endings = {rpdo: partial(_last_frame, rpdo, drive.channel) for rpdo in self.rpdos}
+        kind = rpdos[0].transmission_type
+        self._held_s = held_s(drive.bus, kind)
+        self.needs_sync = kind <= LAST_SYNCHRONOUS
+        """Whether a stop has to be taken over by SYNC."""
         main, *others = tpdos
         self.tpdos = (
             Tpdo(drive, main, None, reject),
@@ -210,7 +236,8 @@ class DrivePdos:
         """The frames that belong on the bus now, those of each identifier together."""
         channel = self._drive.channel
         words, until = channel.output.words, channel.until
-        return [Beat(rpdo.frames(words), period_s, until, self._endings[rpdo]) for rpdo in self.rpdos]
+        hold_at = (until - self._held_s,) if until is not None and self._held_s else ()
+        return [Beat(one.frames(words), period_s, until, self._endings[one], hold_at) for one in self.rpdos]
 
     def frames_with(self, words: Sequence[int]) -> list[Frame]:
         """The frames that carry these words."""

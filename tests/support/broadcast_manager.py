@@ -16,7 +16,7 @@ _FRAME = struct.Struct("=IB3x8s")
 _SETUP, _DELETE = 1, 2
 _SETTIMER, _STARTTIMER, _ANNOUNCE, _RESET_MULTI_IDX = 1, 2, 8, 0x200
 _MOST_FRAMES = 256
-_LATE_S = 0.00006
+LATE_S = 0.00006
 """Each timer is set anew when the last one has run, so a burst is a little slower than its period."""
 
 
@@ -79,7 +79,7 @@ class BroadcastManager:
                 continue
             if op.count:
                 self._transmit(op)
-            op.due = self._now() + op.period_s + _LATE_S if op.count else None
+            op.due = self._now() + op.period_s + LATE_S if op.count else None
 
     def close(self) -> None:
         self._ops.clear()

@@ -9,6 +9,8 @@ from bridge.southbound.bus.frame import Frame
 
 MOST_FRAMES: Final = 256
 """The longest sequence that the kernel's broadcast manager takes (MAX_NFRAMES of net/can/bcm.c)."""
+SHORTEST: Final = 4
+"""A burst of fewer frames is none for the kernel: it counts the first, and would end before it is renewed."""
 _ROUNDING: Final = 1e-9
 
 

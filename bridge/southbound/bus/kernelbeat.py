@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 from bridge.southbound.bus import bcm
-from bridge.southbound.bus.burstend import BurstEnd, Sequence, sequence
+from bridge.southbound.bus.burstend import SHORTEST, BurstEnd, Sequence, sequence
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.softbeat import SoftBeat
 
-_SHORTEST: Final = 4
 _RETRY_S: Final = 0.001
 _PATIENCE_S: Final = 0.01
 _ON_ITS_WAY_S: Final = 0.001
@@ -111,7 +110,7 @@ class KernelBeat:
         can_id = frames[0].can_id
         # The kernel counts the first frame of a burst, so one of a frame or two ends before it can be
         # renewed. What is that slow needs no kernel: a round sends it.
-        if self._manager is None or count < _SHORTEST:
+        if self._manager is None or count < SHORTEST:
             return self._soft.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
         waiting = self._wishes.get(can_id)
         wish = _Wish(frames, period_s, count, at_once, now, ending)

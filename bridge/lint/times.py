@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from typing import Final
 
+from bridge.config import IGNORE_ALL_S
 from bridge.lint.bus import BusView, DriveView, NodeView
 from bridge.lint.report import LintReport
-from bridge.southbound.canopen.sync import tpdo_deadline_s
+from bridge.southbound.canopen.sync import LAST_SYNCHRONOUS, tpdo_deadline_s
+from bridge.southbound.held import held_s, least_deadman_ms
 
 _SLOW_ANSWER_MS: Final = 50
 """What an SDO answer may take: 30 + 20 ms in an 8400 motec (EDS84DMOTCAN 3.0 §9), 50 ms and more behind
 NORD's system bus."""
 _SDO_LIVES: Final = 10
+_LONGEST_DEADMAN_MS: Final = 10_000
 
 
 def check_times(bus: BusView, report: LintReport) -> None:
@@ -23,6 +26,7 @@ def check_times(bus: BusView, report: LintReport) -> None:
         for drive in node.drives:
             _check_controller(bus, drive, report)
             _check_range(drive, report)
+            _check_held(bus, drive, report)
             _check_downtime(bus, node, drive, report)
 
 
@@ -110,6 +114,27 @@ def _check_range(drive: DriveView, report: LintReport) -> None:
     if own_ms and not low <= own_ms <= high:
         message = f"{low}…{high} ms does not have the site's own fieldbus_timeout_ms = {own_ms} in it"
         report.warning(key, message, "a range with it: an owner that has changed it cannot set it again")
+
+
+def _check_held(bus: BusView, drive: DriveView, report: LintReport) -> None:
+    """A stop that no SYNC takes over any more when the controller and the bridge fail together."""
+    table, rpdo = drive.table, drive.rpdos[0]
+    kind, sync_ms, timeout_ms = rpdo.transmission_type, bus.table.sync_period_ms, table.fieldbus_timeout_ms
+    if not timeout_ms or table.control == "none" or table.telegram_downtime_s == IGNORE_ALL_S:
+        return
+    if table.on_expiry in ("hold", "silence"):
+        return
+    if kind > LAST_SYNCHRONOUS or not sync_ms or held_s(bus.table, kind):
+        return
+    least_ms = least_deadman_ms(bus.table, kind)
+    longer = f", or deadman_ms = {least_ms}" if least_ms <= min(timeout_ms, _LONGEST_DEADMAN_MS) else ""
+    report.warning(
+        rpdo.type_key or drive.key,
+        f"{rpdo.name} of type {kind} waits for SYNC for up to {max(1, kind) * sync_ms} ms: with deadman_ms = "
+        f"{bus.table.deadman_ms} none comes that takes a stop over when the bridge fails together with the "
+        "controller; the drive's own time-out is what stops it then",
+        f"type 254 or 255, a shorter sync_period_ms{longer}",
+    )
 
 
 def _check_downtime(bus: BusView, node: NodeView, drive: DriveView, report: LintReport) -> None:

@@ -24,7 +24,7 @@ from bridge.errors import BridgeError, OperationFailed, Unavailable
 from bridge.witness.numbers import Numbers
 from bridge.witness.plan import UnknownFamily, WatchedBus, plan
 from bridge.witness.shell import Witness
-from bridge.witness.watch import Alarm, Finding, Kind, Stop
+from bridge.witness.watch import Alarm, Finding, Kind, Sight, Stop
 
 _log = logging.getLogger(__name__)
 
@@ -124,7 +124,8 @@ def _promises(buses: list[WatchedBus], has_numbers: bool) -> list[str]:
     lines: list[str] = []
     for bus in buses:
         for drive in bus.drives:
-            controller = f"{drive.stop_ms} ms" if drive.stop_ms and has_numbers else "not judged"
+            stop_ms = drive.stop_ms(drive.timeout_ms) if has_numbers else 0
+            controller = f"{stop_ms} ms" if stop_ms else "not judged"
             silent = f"{drive.silent_ms} ms" if drive.silent_ms else "not judged, give --own-timeout-ms"
             lines.append(
                 f"{drive.name}: dead controller: {controller}, dead bridge: {silent}, "
@@ -196,6 +197,8 @@ def _as_dict(finding: Finding) -> dict[str, object]:
             "source": finding.source,
             "message": finding.message,
         }
+    if isinstance(finding, Sight):
+        return {"time": _time(finding.time), "sees": finding.source, "message": finding.message}
     return {
         "time": _time(finding.time),
         "stop": finding.drive,
@@ -212,6 +215,8 @@ def _as_text(finding: Finding) -> str:
     if isinstance(finding, Alarm):
         mark = "INTRUDER" if finding.kind is Kind.INTRUDER else "ALARM"
         return f"{_time(finding.time)} {mark} {finding.source}: {finding.message}"
+    if isinstance(finding, Sight):
+        return f"{_time(finding.time)} sees again {finding.source}: {finding.message}"
     return f"{_time(finding.time)} stop {finding.drive}: {finding.cause}{_times(finding)}"
 
 

@@ -1,7 +1,8 @@
-"""The numbers of the owners' telegrams, asked of the bridge by Modbus TCP: a client that has no other use.
+"""The owners' telegrams, asked of the bridge by Modbus TCP: a client that has no other use.
 
-MODBUS Messaging on TCP/IP V1.0b §3.1.3, function 4 of MODBUS Application Protocol V1.1b3 §6.4. Input
-register 24 of a drive's unit is the number (docs/reference/modbus.md).
+MODBUS Messaging on TCP/IP V1.0b §3.1.3, functions 3 and 4 of MODBUS Application Protocol V1.1b3 §6.3, §6.4.
+Input register 24 of a drive's unit is the number of the last telegram, holding register 12 the time-out in
+force (docs/reference/modbus.md).
 """
 
 from __future__ import annotations
@@ -9,31 +10,47 @@ from __future__ import annotations
 import socket
 import struct
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 NUMBER_REGISTER: Final = 24
+TIMEOUT_REGISTER: Final = 12
 _PERIOD_S: Final = 0.05
 _LIMIT_S: Final = 1.0
 _AGAIN_S: Final = 2.0
 _REQUEST: Final = struct.Struct(">HHHBBHH")
 _HEADER: Final = struct.Struct(">HHHB")
+_READ_HOLDING: Final = 3
 _READ_INPUTS: Final = 4
+_QUESTIONS: Final = ((_READ_HOLDING, TIMEOUT_REGISTER), (_READ_INPUTS, NUMBER_REGISTER))
+"""The number last: its answer makes the reading."""
+
+
+class Reading(NamedTuple):
+    """What one drive's unit said. ``timeout_ms`` is None where it did not tell."""
+
+    unit: int
+    number: int
+    timeout_ms: int | None
+    asked_at: float
+    answered_at: float
 
 
 class Numbers:
     """Asks for all units every 50 ms. Non-blocking: the shell waits for ``fileno``.
 
-    A reading is (unit id, number, asked at, answered at). ``is_lost`` is true once after the bridge has
-    stopped answering; then it is called again every two seconds.
+    ``take_lost`` is true after each time that the bridge was not there or has stopped answering, ``why``
+    says what was wrong then; it is called again every two seconds.
     """
 
     def __init__(self, host: str, port: int, units: Sequence[int]) -> None:
         self._address = (host, port)
         self._units = tuple(units)
         self._socket: socket.socket | None = None
-        self._connected = False
+        self.why = "no answer yet"
         self._buffer = bytearray()
-        self._asked: dict[int, float] = {}
+        self._asked: dict[tuple[int, int], float] = {}
+        """When what has not been answered yet was asked for: function and unit."""
+        self._timeouts_ms: dict[int, int] = {}
         self._asked_at = float("-inf")
         self._next = 0.0
         self._lost = False
@@ -45,9 +62,9 @@ class Numbers:
         if self._socket:
             self._socket.close()
         self._socket = None
-        self._connected = False
         self._buffer.clear()
         self._asked.clear()
+        self._timeouts_ms.clear()
 
     def take_lost(self) -> bool:
         lost, self._lost = self._lost, False
@@ -63,7 +80,7 @@ class Numbers:
         if self._socket is None:
             self._connect(now)
         elif self._asked and now > self._asked_at + _LIMIT_S:
-            self._give_up(now)
+            self._give_up(now, "it does not answer")
         else:
             self._next = now + _PERIOD_S
             if not self._asked:
@@ -80,47 +97,51 @@ class Numbers:
             self._socket.connect(self._address)
         except BlockingIOError:
             pass  # it goes on in the background; asking fails until it is there
-        except OSError:
-            self._give_up(now)
+        except OSError as error:
+            self._give_up(now, _text(error))
 
-    def _give_up(self, now: float) -> None:
-        self._lost |= self._connected
+    def _give_up(self, now: float, why: str) -> None:
+        self._lost, self.why = True, why
         self.close()
         self._next = now + _AGAIN_S
 
     def _ask(self, now: float) -> None:
         assert self._socket is not None
         request = b"".join(
-            _REQUEST.pack(unit, 0, 6, unit, _READ_INPUTS, NUMBER_REGISTER, 1) for unit in self._units
+            _REQUEST.pack(unit, 0, 6, unit, function, register, 1)
+            for unit in self._units
+            for function, register in _QUESTIONS
         )
         try:
             self._socket.sendall(request)
         except BlockingIOError:
             if now > self._asked_at + _LIMIT_S:
-                self._give_up(now)
+                self._give_up(now, "no connection")
             return
-        except OSError:
-            self._give_up(now)
+        except OSError as error:
+            self._give_up(now, _text(error))
             return
-        self._connected = True
-        self._asked = dict.fromkeys(self._units, now)
+        self._asked = {(function, unit): now for unit in self._units for function, _ in _QUESTIONS}
         self._asked_at = now
 
-    def receive(self, now: float) -> list[tuple[int, int, float, float]]:
+    def receive(self, now: float) -> list[Reading]:
         """The answers that have come."""
         if self._socket is None:
             return []
+        ended = "it ends the connection: this address has to be among its [modbus] allow"
         try:
             data = self._socket.recv(65536)
         except (BlockingIOError, InterruptedError):
             return []
-        except OSError:
+        except ConnectionResetError:
             data = b""
+        except OSError as error:
+            data, ended = b"", _text(error)
         if not data:
-            self._give_up(now)
+            self._give_up(now, ended)
             return []
         self._buffer += data
-        readings: list[tuple[int, int, float, float]] = []
+        readings: list[Reading] = []
         while len(self._buffer) >= _HEADER.size:
             _, _, length, unit = _HEADER.unpack_from(self._buffer)
             end = 6 + length
@@ -128,8 +149,27 @@ class Numbers:
                 break
             pdu = bytes(self._buffer[_HEADER.size : end])
             del self._buffer[:end]
-            asked = self._asked.pop(unit, None)
-            # An exception (a unit that is not there) is no number.
-            if asked is not None and len(pdu) == 4 and pdu[0] == _READ_INPUTS:
-                readings.append((unit, int.from_bytes(pdu[2:], "big"), asked, now))
+            reading = self._reading(unit, pdu, now)
+            if reading is not None:
+                readings.append(reading)
         return readings
+
+    def _reading(self, unit: int, pdu: bytes, now: float) -> Reading | None:
+        function = pdu[0] & 0x7F if pdu else 0
+        asked = self._asked.pop((function, unit), None)
+        if asked is None:
+            return None
+        if len(pdu) != 4 or pdu[0] & 0x80:
+            # An exception (a unit that is not there) is no answer.
+            self.why = f"unit {unit} answers exception {pdu[1]:02X}h" if len(pdu) == 2 else "no Modbus"
+            self._timeouts_ms.pop(unit, None)
+            return None
+        value = int.from_bytes(pdu[2:], "big")
+        if function == _READ_HOLDING:
+            self._timeouts_ms[unit] = value
+            return None
+        return Reading(unit, value, self._timeouts_ms.get(unit), asked, now)
+
+
+def _text(error: OSError) -> str:
+    return error.strerror or str(error)

@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any, Final
 
-from bridge.config import IGNORE_ALL_S, BusTable, DriveTable, NodeTable, Site
+from bridge.config import IGNORE_ALL_S, BusTable, DriveTable, NodeTable, PdoTable, Site
 
 REACTION_MS: Final = 20
 """How late the bridge may be itself (docs/explanation/dead-man-chain.md, "How long it takes")."""
+_FRAME_BITS: Final = 135
+"""A data frame of eight bytes with all its stuff bits, and the pause after it (ISO 11898-1)."""
+_BEFORE_OF_EACH: Final = 5
+"""Frames that each node and each drive may have waiting before one of ours, with all that is sent meanwhile
+(docs/explanation/dead-man-chain.md, "The witness")."""
+_IDLE_LEAST: Final = 0.2
+"""A bus with less to spare is not reckoned with."""
+_QUEUE_MS: Final = 50
+"""How long a frame may wait for an interface that is none of the kernel's."""
 _TPDO_MS: Final = 500
 """How often a drive says what it does, where the site file does not tell."""
 _RAMP_MS: Final = 5000
 """How long a drive may take to stand, where the site file does not tell."""
 _FIRST_UNITS: Final = range(1, 248)
+_NUMBERS: Final = {base + 0x100 * place: place + 1 for base in (0x180, 0x200) for place in range(4)}
+"""The PDO's number by its identifier without the node's (CiA 301 §7.3.5)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +51,12 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class WatchedDrive:
-    """One drive. Times are in ms; 0 where nothing is promised.
+    """One drive. Times are in ms.
 
-    ``stop_ms``: from the owner's last telegram to the last enabling RPDO. ``silent_ms``: from the last RPDO
-    to a drive that says that it is not enabled. ``follow_ms``: from a stop in an RPDO to the same.
+    ``timeout_ms`` is the owner's time-out as long as the bridge does not tell the one in force. From the
+    owner's last telegram to the last enabling RPDO it takes ``beside_ms`` more, None where no stop is
+    promised. ``silent_ms``: from the last RPDO to a drive that says that it is not enabled, 0 where that is
+    not promised. ``follow_ms``: from a stop in an RPDO to the same.
     """
 
     name: str
@@ -52,9 +66,14 @@ class WatchedDrive:
     control: Word
     status: Word
     timeout_ms: int
-    stop_ms: int
+    beside_ms: int | None
     silent_ms: int
     follow_ms: int
+
+    def stop_ms(self, timeout_ms: int) -> int:
+        """From the owner's last telegram to the last enabling RPDO, with this time-out in force; 0 where
+        nothing is promised."""
+        return timeout_ms + self.beside_ms if timeout_ms and self.beside_ms is not None else 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,30 +135,45 @@ def _drive(
     own_timeout_ms: int | None,
 ) -> WatchedDrive:
     slot = family["slots"].get(table.slot) or next(iter(family["slots"].values()))
-    period_ms = round(bus.rpdo_period_s * 1000)
     tpdo_ms = _tpdo_ms(table)
-    timeout_ms = table.fieldbus_timeout_ms or 0
+    # What the owner may set is not known before the bridge tells: it is held to the longest.
+    timeout_ms = table.timeout_range_ms[1] if table.fieldbus_timeout_writable else table.fieldbus_timeout_ms
     is_watched = timeout_ms and table.telegram_downtime_s != IGNORE_ALL_S and table.on_expiry != "hold"
     own_ms = node.own_timeout_ms or own_timeout_ms or 0
     return WatchedDrive(
         name=f"{node.name}/{table.name or (table.slot if len(node.drive) > 1 else 'drive')}",
         unit_id=unit_id,
-        rpdo=_cob_id(table, "rpdo", slot["rpdo"] + node.id),
-        tpdo=_cob_id(table, "tpdo", slot["tpdo"] + node.id),
+        rpdo=_cob_id(table.rpdo, slot["rpdo"], node.id),
+        tpdo=_cob_id(table.tpdo, slot["tpdo"], node.id),
         control=Word(**family["control"]),
         status=Word(**family["status"]),
-        timeout_ms=timeout_ms,
-        stop_ms=timeout_ms + 2 * period_ms + REACTION_MS if is_watched else 0,
+        timeout_ms=timeout_ms or 0,
+        beside_ms=_beside_ms(bus) if is_watched else None,
         silent_ms=own_ms + tpdo_ms if own_ms else 0,
         follow_ms=3 * tpdo_ms + _RAMP_MS,
     )
 
 
-def _cob_id(table: DriveTable, kind: str, factory: int) -> int:
-    for pdo in getattr(table, kind):
-        if pdo.cob_id is not None:
-            return int(pdo.cob_id)
-    return factory
+def _beside_ms(bus: BusTable) -> int:
+    """What the bridge, the kernel and the bus may take beside the time-out: two periods, lateness, what is
+    sent before our frame, and the interface's queue."""
+    period_ms = 1000 * bus.rpdo_period_s
+    frame_ms = 1000 * _FRAME_BITS / bus.bitrate
+    nodes = [node for node in bus.node if node.enabled]
+    drives = sum(len(node.drive) for node in nodes)
+    # Each period an RPDO of each drive, and SYNC: what comes in while frames wait may go first, too.
+    idle = max(_IDLE_LEAST, 1 - (drives + 1) * frame_ms / period_ms)
+    before_ms = _BEFORE_OF_EACH * (1 + len(nodes) + drives) * frame_ms / idle
+    queue_ms = 0 if bus.interface in ("socketcan", "virtual") else _QUEUE_MS
+    return math.ceil(2 * period_ms + REACTION_MS + before_ms + queue_ms)
+
+
+def _cob_id(tables: Sequence[PdoTable], base: int, node_id: int) -> int:
+    """The identifier of the PDO with the word: the maker's, or the one that the site file gives it. Without
+    a number a table of the site file is that PDO's (docs/reference/site-file.md)."""
+    number = _NUMBERS[base]
+    given = (table.cob_id for table in tables if (table.number or number) == number)
+    return next((cob_id for cob_id in given if cob_id is not None), base + node_id)
 
 
 def _tpdo_ms(table: DriveTable) -> int:

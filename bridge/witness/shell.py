@@ -31,7 +31,7 @@ class Witness:
         }
         try:
             for bus in buses:
-                watch = Watch(bus)
+                watch = Watch(bus, asks=numbers is not None)
                 self._lines.append((Listener(bus.channel, watch.identifiers), watch))
         except OSError:
             self.close()
@@ -62,13 +62,13 @@ class Witness:
         # Answers before frames: a frame that is fetched later than an answer may be older, never younger.
         if self._numbers:
             now = time.monotonic()
-            for unit, number, asked_at, answered_at in self._numbers.receive(now):
+            for unit, number, timeout_ms, asked_at, answered_at in self._numbers.receive(now):
                 place, name = self._places[unit]
-                self._lines[place][1].on_number(name, number, asked_at, answered_at)
+                self._lines[place][1].on_number(name, number, asked_at, answered_at, timeout_ms)
             self._numbers.on_time(time.monotonic())
             if self._numbers.take_lost():
                 for _, watch in self._lines:
-                    watch.on_numbers_lost()
+                    watch.on_numbers_lost(self._numbers.why)
         now = time.monotonic()
         findings: list[Finding] = []
         for listener, watch in self._lines:

@@ -4,8 +4,9 @@ A stop is recorded with its time and what is promised of it; an alarm is raised 
 broken, whether or not the drive stops in the end. Times are seconds of one monotonic clock, those of frames
 their reception.
 
-The owner's telegrams are known by their number alone, which is read now and then: a telegram is taken for as
-young as it can be, so a stop may have been later by one reading than it seems, and is never earlier.
+The owner's telegrams are known by their number alone, which is read now and then, with the time-out in force:
+a telegram is taken for as young as it can be, so a stop may have been later by one reading than it seems, and
+is never earlier. Without readings nothing is known of the owner, and that is told.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ _READING_MS: Final = 150
 """A telegram may seem so much younger than it is."""
 _UNSEEN_S: Final = 1.0
 """An enabled drive gets its RPDO more often than that."""
+BLIND_S: Final = 5.0
+"""Without a reading for so long the witness says that it sees nothing of the owner."""
 
 
 class Cause(StrEnum):
@@ -47,6 +50,7 @@ class Kind(StrEnum):
     IGNORED = "stop ignored"
     UNTOLD = "enabled untold"
     INTRUDER = "intruder"
+    BLIND = "blind"
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +82,16 @@ class Alarm:
     message: str
 
 
-Finding = Stop | Alarm
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """What was said to be blind sees again."""
+
+    source: str
+    time: float
+    message: str
+
+
+Finding = Stop | Alarm | Sight
 
 
 class _Track:
@@ -86,6 +99,12 @@ class _Track:
 
     def __init__(self, drive: WatchedDrive) -> None:
         self.drive = drive
+        self.timeout_ms = drive.timeout_ms
+        """The owner's time-out that is in force."""
+        self.timeout_at = float("-inf")
+        """It has been told at this time for the first time."""
+        self.answered_at: float | None = None
+        """When its number was told last, or telling it was waited for first."""
         self.number: int | None = None
         self.telegram_at: float | None = None
         """When the owner's last telegram had come at the latest."""
@@ -104,12 +123,24 @@ class _Track:
         self.told: set[Kind] = set()
         """Alarms of what goes on are raised once."""
 
+    def may_run_until(self, telegram_at: float) -> float | None:
+        """The last time for an RPDO that enables; None where nothing is promised. A time-out that has been
+        made shorter holds from when that is known."""
+        stop_ms = self.drive.stop_ms(self.timeout_ms)
+        if not stop_ms:
+            return None
+        beside_s = (stop_ms - self.timeout_ms) / 1000
+        return max(telegram_at + stop_ms / 1000, self.timeout_at + beside_s)
+
 
 class Watch:
-    """One bus. ``findings`` are taken by whoever tells them."""
+    """One bus. ``findings`` are taken by whoever tells them. Whether it ``asks`` for telegrams' numbers."""
 
-    def __init__(self, bus: WatchedBus) -> None:
+    def __init__(self, bus: WatchedBus, *, asks: bool = True) -> None:
         self._name = bus.name
+        self._asks = asks
+        self._why_blind = ""
+        self._blind: list[_Track] = []
         self._tracks = {drive.name: _Track(drive) for drive in bus.drives}
         self._by_rpdo = {track.drive.rpdo: track for track in self._tracks.values()}
         self._by_tpdo = {track.drive.tpdo: track for track in self._tracks.values()}
@@ -136,9 +167,16 @@ class Watch:
         elif can_id in self._beats:
             self._on_beat(can_id, at)
 
-    def on_number(self, name: str, number: int, asked_at: float, answered_at: float) -> None:
-        """The number of the owner's last telegram, as it was between these times."""
+    def on_number(
+        self, name: str, number: int, asked_at: float, answered_at: float, timeout_ms: int | None = None
+    ) -> None:
+        """The number of the owner's last telegram, as it was between these times, and the time-out in force;
+        None where that was not told."""
         track = self._tracks[name]
+        track.answered_at = answered_at
+        timeout_ms = track.drive.timeout_ms if timeout_ms is None else timeout_ms
+        if timeout_ms != track.timeout_ms:
+            track.timeout_ms, track.timeout_at = timeout_ms, answered_at
         if number != track.number:
             # The first reading says only that there may have been one just now.
             track.telegram_at = answered_at
@@ -147,8 +185,9 @@ class Watch:
             track.told.discard(Kind.LATE)
         track.read_at = asked_at
 
-    def on_numbers_lost(self) -> None:
-        """Nobody tells the numbers any more: nothing is known of the owners."""
+    def on_numbers_lost(self, why: str = "") -> None:
+        """Nobody tells the numbers (any more): nothing is known of the owners."""
+        self._why_blind = why
         for track in self._tracks.values():
             track.number = track.telegram_at = track.read_at = track.late_at = None
 
@@ -159,9 +198,7 @@ class Watch:
             return
         if enables:
             track.stopped_at = None
-            telegram, stop_ms = track.telegram_at, track.drive.stop_ms
-            is_late = telegram is not None and stop_ms and _ms(at - telegram) > stop_ms
-            if is_late and track.late_at is None:
+            if track.late_at is None and _is_late(track, at):
                 track.late_at = at
         elif track.stopped_at is None:
             track.stopped_at = at
@@ -216,15 +253,15 @@ class Watch:
             silence_s = None if track.telegram_at is None else track.stopped_at - track.telegram_at
             is_silent = (
                 silence_s is not None
-                and drive.timeout_ms
-                and _ms(silence_s) + _READING_MS >= drive.timeout_ms
+                and track.timeout_ms
+                and _ms(silence_s) + _READING_MS >= track.timeout_ms
             )
             return Stop(
                 drive.name,
                 Cause.CONTROLLER if is_silent else Cause.COMMAND,
                 at,
                 bus_ms=_ms(silence_s) if is_silent and silence_s is not None else None,
-                bus_bound_ms=drive.stop_ms or None if is_silent else None,
+                bus_bound_ms=_bound_ms(track) if is_silent else None,
                 drive_ms=_ms(at - track.stopped_at),
                 drive_bound_ms=drive.follow_ms,
             )
@@ -245,14 +282,39 @@ class Watch:
         for track in self._tracks.values():
             self._judge_controller(track, now)
             self._judge_drive(track, now)
+        if self._asks:
+            self._judge_sight(now)
+
+    def _judge_sight(self, now: float) -> None:
+        """Who is promised something of its owner, and nobody tells the owner's telegrams."""
+        blind: list[_Track] = []
+        for track in self._tracks.values():
+            if track.drive.beside_ms is None:
+                continue
+            if track.answered_at is None:
+                track.answered_at = now
+            if now - track.answered_at > BLIND_S:
+                blind.append(track)
+        if added := [track for track in blind if track not in self._blind]:
+            why = f": {self._why_blind}" if self._why_blind else ""
+            message = f"the bridge does not tell the owner's telegrams{why}; not judged: {_names(added)}"
+            self._alarm(self._name, Kind.BLIND, now, message)
+        if gone := [track for track in self._blind if track not in blind]:
+            message = f"the owner's telegrams are told again: {_names(gone)}"
+            self._findings.append(Sight(self._name, now, message))
+        self._blind = blind
 
     def _judge_controller(self, track: _Track, now: float) -> None:
         """An enabling RPDO later than promised, of an owner that had sent nothing when it was asked again."""
         telegram, late, read = track.telegram_at, track.late_at, track.read_at
         if telegram is None or late is None or read is None or read < late:
             return
+        if not _is_late(track, late):
+            # The time-out had been changed meanwhile.
+            track.late_at = None
+            return
         told = f"told to run {_ms(late - telegram)} ms after its owner's last telegram"
-        self._once(track, Kind.LATE, now, f"{told}; promised: {track.drive.stop_ms}")
+        self._once(track, Kind.LATE, now, f"{told}; promised: {_bound_ms(track)}")
 
     def _judge_drive(self, track: _Track, now: float) -> None:
         """A drive that says "enabled" longer than it may."""
@@ -281,6 +343,23 @@ class Watch:
 
     def _alarm(self, source: str, kind: Kind, at: float, message: str) -> None:
         self._findings.append(Alarm(source, kind, at, message))
+
+
+def _is_late(track: _Track, at: float) -> bool:
+    """Whether an RPDO at this time must not enable any more."""
+    until = None if track.telegram_at is None else track.may_run_until(track.telegram_at)
+    return until is not None and _ms(at - until) > 0
+
+
+def _bound_ms(track: _Track) -> int | None:
+    """What is promised after the owner's last telegram; None for nothing."""
+    if track.telegram_at is None or (until := track.may_run_until(track.telegram_at)) is None:
+        return None
+    return _ms(until - track.telegram_at)
+
+
+def _names(tracks: list[_Track]) -> str:
+    return ", ".join(track.drive.name for track in tracks)
 
 
 def _ms(seconds: float) -> int:

@@ -88,8 +88,9 @@ def test_the_stop_after_a_silent_controller_is_recorded_with_its_time(
     stop = watched.recorded(lambda line: line.get("cause") == "controller silent", "the stop is recorded")
     assert stop["stop"] == "conveyor/fu1"
     assert isinstance(stop["bus_ms"], int) and stop["bus_ms"] >= 250
-    assert stop["bus_bound_ms"] == 460
-    alarms = [line for line in watched.lines if "alarm" in line and line["alarm"] != "late"]
+    assert isinstance(stop["bus_bound_ms"], int) and 460 <= stop["bus_bound_ms"] <= 480
+    # The bridge is started after the witness, which may have waited for it.
+    alarms = [line for line in watched.lines if line.get("alarm") not in (None, "late", "blind")]
     assert not alarms, alarms
 
 
@@ -116,6 +117,17 @@ def test_who_breaks_the_promise_is_told_and_the_command_runs(tmp_path: Path, sta
     assert alarm["source"] == "conveyor/fu1"
     until(watched.called.exists, 10.0, "the command has run")
     assert watched.called.read_text(encoding="ascii").splitlines()[0] == "conveyor/fu1 runs on"
+    assert watched.end() == 1
+
+
+def test_a_bridge_that_never_answers_is_told_and_the_command_runs(tmp_path: Path, stack: ExitStack) -> None:
+    watched = Watched(tmp_path, stack)
+    alarm = watched.recorded(lambda line: line.get("alarm") == "blind", "blindness is recorded")
+    assert "Connection refused" in str(alarm["message"])
+    until(watched.called.exists, 10.0, "the command has run")
+    watched.start()
+    watched.recorded(lambda line: line.get("sees") == "can0", "its end is recorded")
+    assert len([line for line in watched.lines if line.get("alarm") == "blind"]) == 1
     assert watched.end() == 1
 
 

@@ -7,13 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.witness.plan import WatchedBus, WatchedDrive, Word
-from bridge.witness.watch import Alarm, Cause, Kind, Stop, Watch
+from bridge.witness.watch import BLIND_S, Alarm, Cause, Kind, Sight, Stop, Watch
 
 RPDO, TPDO, SYNC = 0x205, 0x185, 0x080
 CONTROL, STATUS = Word(0, 2, 0x000F, 0x000F), Word(0, 2, 0x007F, 0x0037)
 RUN, STOP = bytes.fromhex("7F 04 00 20"), bytes.fromhex("7E 04 00 00")
 ENABLED, READY = bytes.fromhex("37 0B 00 20"), bytes.fromhex("31 0B 00 00")
-FU1 = WatchedDrive("conveyor/fu1", 1, RPDO, TPDO, CONTROL, STATUS, 200, 240, 600, 1500)
+FU1 = WatchedDrive("conveyor/fu1", 1, RPDO, TPDO, CONTROL, STATUS, 200, 40, 600, 1500)
+BOUND_MS = 240
 BUS = WatchedBus("can0", "vcan0", (FU1,), {SYNC: ("SYNC", 10)})
 
 
@@ -28,9 +29,11 @@ class Plant:
         self.tpdo: bytes | None = READY
         self.writes = False
         self.answers = True
+        self.timeout_ms: int | None = 200
         self.beats = 1
         self.stops: list[Stop] = []
         self.alarms: list[Alarm] = []
+        self.sights: list[Sight] = []
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds * 100)):
@@ -39,7 +42,8 @@ class Plant:
             if self.writes and tenth % 5 == 0:
                 self.number = (self.number + 1) & 0xFFFF
             if self.answers and tenth % 5 == 1:
-                self.watch.on_number(FU1.name, self.number, self.now - 0.002, self.now - 0.001)
+                at = self.now - 0.001
+                self.watch.on_number(FU1.name, self.number, at - 0.001, at, self.timeout_ms)
             for _ in range(self.beats):
                 self.watch.on_frame(SYNC, b"", self.now)
             if self.rpdo is not None:
@@ -50,6 +54,8 @@ class Plant:
             for finding in self.watch.take_findings():
                 if isinstance(finding, Stop):
                     self.stops.append(finding)
+                elif isinstance(finding, Sight):
+                    self.sights.append(finding)
                 else:
                     self.alarms.append(finding)
 
@@ -102,10 +108,78 @@ def test_an_enabling_rpdo_after_the_bound_is_told_at_once_and_once(plant: Plant)
 
 
 def test_the_owner_is_not_judged_while_nobody_tells_its_telegrams(plant: Plant) -> None:
-    plant.answers = False
+    plant.answers = plant.writes = False
     plant.watch.on_numbers_lost()
-    plant.run(5.0)
+    plant.run(BLIND_S - 0.1)
     assert not plant.alarms
+
+
+@pytest.mark.parametrize("ever", [False, True])
+def test_blindness_is_told_once_per_outage_and_so_is_its_end(ever: bool) -> None:
+    plant = Plant()
+    plant.answers = ever
+    plant.run(1.0)
+    for outage in (1, 2):
+        plant.answers = False
+        plant.watch.on_numbers_lost("connection refused")
+        plant.run(3 * BLIND_S)
+        assert plant.kinds == [Kind.BLIND] * outage
+        assert plant.alarms[-1].source == "can0"
+        assert "connection refused; not judged: conveyor/fu1" in plant.alarms[-1].message
+        plant.answers = True
+        plant.run(1.0)
+        assert len(plant.sights) == outage
+        assert "conveyor/fu1" in plant.sights[-1].message
+
+
+def test_a_witness_that_does_not_ask_is_not_blind() -> None:
+    plant = Plant()
+    plant.watch = Watch(BUS, asks=False)
+    plant.answers = False
+    plant.run(3 * BLIND_S)
+    assert not plant.alarms
+
+
+def test_a_time_out_that_its_owner_has_set_is_what_it_is_held_to(plant: Plant) -> None:
+    plant.timeout_ms = 500
+    plant.run(1.0)
+    plant.writes = False
+    plant.run(0.53)
+    assert not plant.alarms
+    plant.run(0.2)
+    assert plant.kinds == [Kind.LATE]
+    assert "promised: 540" in plant.alarms[0].message
+
+
+def test_a_shorter_time_out_is_held_to_from_when_it_is_known(plant: Plant) -> None:
+    plant.timeout_ms = 2000
+    plant.run(1.0)
+    plant.writes = False
+    plant.run(0.5)
+    plant.timeout_ms = 200
+    plant.run(0.05)
+    assert not plant.alarms
+    plant.run(0.3)
+    assert plant.kinds == [Kind.LATE]
+
+
+def test_a_time_out_that_was_made_longer_just_in_time_is_no_lateness(plant: Plant) -> None:
+    """The frames after the old deadline are seen before the new time-out is read."""
+    plant.writes = False
+    while round(plant.now * 100) % 5 != 1:
+        plant.run(0.01)
+    plant.answers = False
+    plant.run(0.3)
+    plant.answers, plant.timeout_ms = True, 2000
+    plant.run(1.0)
+    assert not plant.alarms
+
+
+def test_where_the_time_out_is_not_told_that_of_the_site_counts(plant: Plant) -> None:
+    plant.timeout_ms = None
+    plant.writes = False
+    plant.run(0.4)
+    assert plant.kinds == [Kind.LATE]
 
 
 def test_a_stop_that_was_ordered(plant: Plant) -> None:
@@ -193,9 +267,9 @@ def test_late_is_told_exactly_if_it_is(after_ms: int) -> None:
     plant.rpdo, plant.tpdo = STOP, READY
     plant.run(0.3)
     is_told = Kind.LATE in plant.kinds
-    if after_ms <= FU1.stop_ms:
+    if after_ms <= BOUND_MS:
         assert not is_told
-    if after_ms > FU1.stop_ms + 70:
+    if after_ms > BOUND_MS + 70:
         assert is_told
 
 

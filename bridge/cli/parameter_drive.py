@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Final, TypeVar
 
 import typer
 
@@ -15,9 +15,10 @@ from bridge.cli.terminal import progress
 from bridge.config import BusTable, NodeTable
 from bridge.errors import OperationFailed
 from bridge.mapping.model import Family, Slot
-from bridge.parameter import DriveParameters, Ledger, Names, ParameterError
+from bridge.parameter import DriveParameters, Entry, Ledger, Names, ParameterError
 from bridge.parameter.ledger_file import LedgerFile
 from bridge.project import load_project
+from bridge.southbound.bystander import Bystander, Standstill
 from bridge.southbound.parameter_errand import ParameterErrand
 from bridge.southbound.parameter_run import Procedure
 
@@ -26,6 +27,11 @@ DriveArgument = Annotated[
     str, typer.Argument(metavar="DRIVE", help="NODE/DRIVE as in the site file; NODE where it has one drive")
 ]
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="do not ask")]
+Force = Annotated[
+    bool, typer.Option("--force", help="also what supervises or addresses the drive, while it is not enabled")
+]
+
+_LISTEN_S: Final = 1.0
 
 T = TypeVar("T")
 
@@ -46,13 +52,42 @@ class Target:
     def name(self) -> str:
         return self.access.name
 
+    def refuse_unforced(self, entries: Iterable[Entry]) -> None:
+        """Raises ``BadParameter`` with all that is written with ``--force`` only, if at all."""
+        protection = self.access.names.protection
+        reasons = "; ".join(filter(None, map(protection.why_forced, entries)))
+        if reasons:
+            raise typer.BadParameter(
+                f"{reasons}. Nothing was written. --force writes what decides and supervises, while the "
+                "drive is not enabled"
+            )
+
+    def alone(self, *, force: bool = False) -> Standstill:
+        """Listen, and say what is known of the drive's state. Raises ``OperationFailed`` where somebody
+        commands this bus already."""
+        table = self._real()
+        listen_s = max(_LISTEN_S, 3 * table.heartbeat_ms / 1000)
+        heard = carry_out(
+            self.line,
+            lambda now: Bystander(table.master_node_id, self.node, self.family, self.slot, now, listen_s),
+        )
+        if heard.found:
+            raise OperationFailed(
+                f"another master is active on {table.name}: {heard.found}; write through it, or stop it first"
+            )
+        return Standstill(self.access.names, self.family, self.slot, heard.status, force=force)
+
+    def _real(self) -> BusTable:
+        if self.line.table.interface == "virtual":
+            raise typer.BadParameter("a virtual bus exists only inside the process that serves it")
+        return self.line.table
+
     def run(self, make: Callable[[float], Procedure[T]], *, writes: bool = False) -> T:
         """Carry a procedure out on the bus. Raises ``OperationFailed`` with the sentence that says why.
 
         Where it ``writes``, nothing is begun unless writes can be counted.
         """
-        if self.line.table.interface == "virtual":
-            raise typer.BadParameter("a virtual bus exists only inside the process that serves it")
+        self._real()
         if writes:
             self.count()
         try:

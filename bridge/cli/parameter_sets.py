@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from bridge.cli.bus import AsJson, print_table, tell
-from bridge.cli.parameter_drive import DriveArgument, SiteArgument, Target, Yes, find
+from bridge.cli.parameter_drive import DriveArgument, Force, SiteArgument, Target, Yes, find
 from bridge.errors import OperationFailed
 from bridge.image import Value
 from bridge.parameter import Definition, ParameterError, sets
@@ -64,23 +64,28 @@ def restore(
     file: FileArgument,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="only say what would be written")] = False,
     yes: Yes = False,
+    force: Force = False,
     as_json: AsJson = False,
 ) -> None:
     """Write FILE to the drive where it differs, in the order of the mapping file, and read it back."""
     target = find(site, drive)
     values = _values(target, file)
     asks = not yes and sys.stdin.isatty()
+    found = _compare(target, values)
     if dry_run or asks:
-        found = _compare(target, values)
         _print_comparison(target, found, as_json)
         if dry_run or not found.differences:
             return
-        question = f"write {len(found.differences)} parameters of {target.name}?"
-        if not typer.confirm(question, err=True):
-            raise OperationFailed("nothing written")
+    changed = [one.entry for one in found.differences]
+    if not force:
+        target.refuse_unforced(changed)
+    if asks and not typer.confirm(f"write {len(changed)} parameters of {target.name}?", err=True):
+        raise OperationFailed("nothing written")
+    check = target.alone(force=force).check
+    target.run(lambda now: check(changed))
     done = sets.Restored()
     try:
-        target.run(lambda now: sets.restore(target.access, values, done, now), writes=True)
+        target.run(lambda now: sets.restore(target.access, values, done, now, before_it=check), writes=True)
     except OperationFailed:
         _print_restored(target, done)
         raise

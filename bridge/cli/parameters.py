@@ -11,7 +11,7 @@ import typer
 
 from bridge.cli import parameter_sets
 from bridge.cli.bus import AsJson, print_table, tell
-from bridge.cli.parameter_drive import DriveArgument, SiteArgument, Yes, find
+from bridge.cli.parameter_drive import DriveArgument, Force, SiteArgument, Yes, find
 from bridge.errors import OperationFailed
 from bridge.parameter import DriveParameters, Entry, ParameterError, Reading, Transfer
 from bridge.parameter.codec import parse, shown
@@ -98,11 +98,14 @@ def write(
     name: _NameArgument,
     value: Annotated[str, typer.Argument(metavar="VALUE", help="in its unit, or the text of a state")],
     yes: Yes = False,
+    force: Force = False,
     as_json: AsJson = False,
 ) -> None:
     """Write a parameter and read it back; nothing is written where the drive holds the value already."""
     target = find(site, drive)
     entry = _resolve(target.access, name)
+    if not force:
+        target.refuse_unforced([entry])
     try:
         wanted = parse(entry, value)
     except ParameterError as error:
@@ -111,7 +114,8 @@ def write(
         question = f"write {shown(entry, wanted)} to {entry.name} of {target.name}?"
         if not typer.confirm(question, err=True):
             raise OperationFailed("nothing written")
-    written = target.run(lambda now: target.access.write(entry, wanted, now), writes=True)
+    check = target.alone(force=force).check
+    written = target.run(lambda now: target.access.write(entry, wanted, now, before_it=check), writes=True)
     if written.warning:
         tell(f"warning: {written.warning}")
     if as_json:
@@ -129,6 +133,7 @@ def save(site: SiteArgument, drive: DriveArgument, yes: Yes = False, as_json: As
     question = f"write the EEPROM of {target.node.name}?"
     if not yes and sys.stdin.isatty() and not typer.confirm(question, err=True):
         raise OperationFailed("nothing saved")
+    target.alone()
     warning = target.run(target.access.save, writes=True)
     if warning:
         tell(f"warning: {warning}")

@@ -159,11 +159,7 @@ def why_forced(line: Line, node_id: int, address: Address) -> str:
     if node is None:
         return ""
     names = Names(line.families[node.mapping])
-    entry = names.resolve(str(address))
-    why = names.protection.why_never(entry)
-    if not why and names.protection.level(address) == "communication":
-        why = f"{entry.name} decides who commands the drive and what supervises it"
-    return why
+    return names.protection.why_forced(names.resolve(str(address)))
 
 
 def parse_object(text: str) -> tuple[int, int]:

@@ -6,7 +6,7 @@ carries them out on the SDO channel of the drive (``southbound.parameters``, or 
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -28,11 +28,13 @@ MISSING: Final = (0x0602_0000, 0x0609_0011)
 
 @dataclass(frozen=True, slots=True)
 class Transfer:
-    """Read an object (``data`` None) or write it. ``of_node``: over the node's first SDO channel."""
+    """Read an object (``data`` None) or write it. ``of_node``: over the node's first SDO channel. A write is
+    not begun where ``why_not``, asked at that moment, has a reason."""
 
     address: Address
     data: bytes | None = None
     of_node: bool = False
+    why_not: Callable[[], str] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,7 @@ class Written:
     warning: str = ""
 
 
+Asks = Callable[[Iterable[Entry]], Generator[Transfer, tuple[bytes, float], None]]
 Reads = Generator[Transfer, tuple[bytes, float], Reading]
 Writes = Generator[Transfer, tuple[bytes, float], Written]
 Saves = Generator[Transfer, tuple[bytes, float], str]
@@ -132,8 +135,20 @@ class DriveParameters:
 
     # writing
 
-    def write(self, entry: Entry, value: Value, now: float) -> Writes:
-        """Write ``value`` where the drive does not hold it yet, and read it back."""
+    def write(
+        self,
+        entry: Entry,
+        value: Value,
+        now: float,
+        *,
+        before_it: Asks | None = None,
+        why_not: Callable[[], str] | None = None,
+    ) -> Writes:
+        """Write ``value`` where the drive does not hold it yet, and read it back.
+
+        What ``before_it`` asks of the drive comes right before the write; it raises ``ParameterError`` where
+        there is to be none. ``why_not`` is that of the ``Transfer``.
+        """
         self.check_writable(entry)
         definition = entry.definition
         blind = definition is not None and not definition.readable
@@ -150,10 +165,12 @@ class DriveParameters:
         key = (self._node_name if _is_of_node(entry) else self.name, str(entry.address))
         if wears:
             self._check(key, entry.name, now)
+        if before_it is not None:
+            yield from before_it([entry])
         self._cache.pop(entry.address, None)
         lost: TransferFailed | None = None
         try:
-            _, now = yield Transfer(entry.address, data, of_node=_is_of_node(entry))
+            _, now = yield Transfer(entry.address, data, of_node=_is_of_node(entry), why_not=why_not)
         except TransferFailed as failure:
             if failure.by_drive or blind:
                 raise self._error(entry, failure) from None

@@ -78,6 +78,13 @@ class Protection:
             return f"{entry.name} is process data, which the drive's controller alone commands"
         return ""
 
+    def why_forced(self, entry: Entry) -> str:
+        """Why the command line, which knows no roles, writes it with ``--force`` only, if at all."""
+        why = self.why_never(entry)
+        if not why and self.level(entry.address) == "communication":
+            why = f"{entry.name} decides who commands the drive and what supervises it"
+        return why
+
 
 def _span(text: str) -> range:
     first, _, last = text.partition("-")

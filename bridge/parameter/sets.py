@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 
 from bridge.image import Value
-from bridge.parameter.access import MISSING, DriveParameters, Transfer, Written
+from bridge.parameter.access import MISSING, Asks, DriveParameters, Transfer, Written
 from bridge.parameter.codec import encode_value
 from bridge.parameter.definition import Address, Entry
 from bridge.parameter.error import ParameterError, Why
@@ -145,8 +145,10 @@ def restore(
     into: Restored,
     now: float,
     tell: Told = lambda _: None,
+    before_it: Asks | None = None,
 ) -> Steps:
     """Write a set where the drive differs; every write is read back, and the first refusal ends it.
+    ``before_it`` is that of ``DriveParameters.write``.
 
     Raises ``ParameterError`` only for a set that does not fit, before anything is written.
     """
@@ -154,7 +156,7 @@ def restore(
     for place, (entry, value) in enumerate(wanted):
         tell(entry.name)
         try:
-            written = yield from access.write(entry, value, now)
+            written = yield from access.write(entry, value, now, before_it=before_it)
         except ParameterError as error:
             if error.abort_code in MISSING:
                 into.missing.append(entry.name)
@@ -173,12 +175,18 @@ def restore(
 
 def _checked(access: DriveParameters, values: Mapping[str, Value]) -> list[tuple[Entry, Value]]:
     """The set in the order in which it is written. The switch of the EEPROM comes first where what follows
-    is to be kept, and last where it is not. Raises ``ParameterError`` where an entry cannot be written."""
+    is to be kept, and last where it is not. Raises ``ParameterError`` with all that cannot be written."""
     wanted = in_order(access.names, values)
+    refused: list[ParameterError] = []
     for entry, value in wanted:
-        access.check_writable(entry)
-        if entry.definition is not None:  # of others only the drive knows how long they are
-            encode_value(entry, value, None)
+        try:
+            access.check_writable(entry)
+            if entry.definition is not None:  # of others only the drive knows how long they are
+                encode_value(entry, value, None)
+        except ParameterError as error:
+            refused.append(error)
+    if refused:
+        raise ParameterError(refused[0].why, "; ".join(map(str, refused)))
     switch = access.ram_switch
 
     def place(pair: tuple[Entry, Value]) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Generator
 from functools import partial
 from typing import TypeVar
 
-from bridge.parameter import ParameterError, Transfer, TransferFailed
+from bridge.parameter import ParameterError, Transfer, TransferFailed, Why
 from bridge.southbound.canopen.sdo import Priority, Result, SdoChannel, SdoError
 
 T = TypeVar("T")
@@ -29,6 +29,9 @@ def run(
     time at which it was asked for.
     """
 
+    refused: list[str] = []
+    """Why the write that is under way was not begun."""
+
     def advance(resume: Callable[[], Transfer]) -> None:
         try:
             transfer = resume()
@@ -46,12 +49,30 @@ def run(
         channel = channel_for(transfer)
         if transfer.data is None:
             channel.read(index, sub, now, concluded, priority=priority)
-        else:
-            # Not repeated where no answer comes: an EEPROM is written once, and read to see whether it was.
-            channel.write(index, sub, transfer.data, now, concluded, priority=priority, repeatable=False)
+            return
+
+        def may_begin() -> bool:
+            if transfer.why_not is not None:
+                refused[:] = filter(None, [transfer.why_not()])
+            return not refused
+
+        # Not repeated where no answer comes: an EEPROM is written once, and read to see whether it was.
+        channel.write(
+            index,
+            sub,
+            transfer.data,
+            now,
+            concluded,
+            priority=priority,
+            repeatable=False,
+            may_begin=may_begin,
+        )
 
     def conclude(asked: float, result: Result) -> None:
-        if isinstance(result, SdoError):
+        if refused:
+            why = refused.pop()
+            advance(lambda: procedure.throw(ParameterError(Why.PROTECTED, why)))
+        elif isinstance(result, SdoError):
             failure = TransferFailed(str(result), result.code, by_drive=result.by_server)
             advance(lambda: procedure.throw(failure))
         else:

@@ -161,7 +161,13 @@ class NodeParameters:
             conclude(_no(Code.BUSY, f"{entry.name} of {drive.name} is being written"))
         else:
             self._writing.add(key)
-            steps = access.write(entry, request.value, now)
+            # Who asks may enable the drive while this waits for its turn.
+            steps = access.write(
+                entry,
+                request.value,
+                now,
+                why_not=lambda: _why_protected(level, entry, request.identity, drive),
+            )
             self._run(steps, drive, partial(self._on_written, request, drive, entry, conclude))
 
     def _read(
@@ -296,7 +302,9 @@ def _why_protected(protection: str, entry: Entry, identity: Identity, drive: Dri
     """Why a parameter that more depends on than its own value is not written now."""
     if protection == "communication" and identity.role < Role.ENGINEER:
         return f"{entry.name} decides who commands the drive and what supervises it: an engineer may set it"
-    if protection in ("communication", "while_enabled") and drive.channel.state in MOVING:
+    channel = drive.channel
+    is_enabled = channel.state in MOVING or channel.words.enables(channel.output.words[0])
+    if protection in ("communication", "while_enabled") and is_enabled:
         return f"{entry.name} is not written while the drive is enabled: stop and disable it first"
     return ""
 

@@ -71,6 +71,35 @@ def test_what_is_wrong_is_told_with_its_exit_code(commands: Commands) -> None:
         assert text in " ".join(done.stderr.replace("│", " ").split()), done.stderr
 
 
+def test_what_is_protected_takes_force_and_a_drive_that_stands(commands: Commands, tmp_path: Path) -> None:
+    file = tmp_path / "fu1.toml"
+    assert commands.call("backup", str(file)).returncode == 0
+    text = file.read_text("utf-8")
+    text = text.replace('"P513" = 1.0', '"P513" = 2.5').replace('"P102.1" = 2.0', '"P102.1" = 1.0')
+    file.write_text(text, "utf-8")
+    done = commands.call("restore", str(file), "--yes")
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert "P513" in done.stderr
+    assert commands.call("read", "P102").stdout == "P102 = 2 s\n", "nothing half applied"
+    assert commands.call("write", "P513", "2.5", "--yes").returncode == 2
+    done = commands.call("write", "P513", "2.5", "--yes", "--force")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert commands.call("restore", str(file), "--yes").returncode == 0
+
+
+def test_nothing_is_written_beside_another_master(commands: Commands) -> None:
+    line = ["cangen", "vcan0", "-I", "77F", "-L", "1", "-D", "05", "-g", "100"]
+    with subprocess.Popen(line) as master:
+        try:
+            for arguments in (("write", "P102", "1.03", "--yes"), ("save", "--yes")):
+                done = commands.call(*arguments)
+                assert done.returncode == 1, done.stdout + done.stderr
+                assert "another master is active" in done.stderr
+        finally:
+            master.terminate()
+    assert commands.call("read", "P102").stdout == "P102 = 2 s\n"
+
+
 def test_cyclic_writing_is_refused_across_commands(commands: Commands) -> None:
     for number in range(10):
         assert commands.call("write", "P104", str(number + 1), "--yes").returncode == 0

@@ -50,6 +50,15 @@ def test_a_bus_is_named_by_its_options() -> None:
     assert (line.table.channel, line.table.bitrate, line.is_of_site) == ("can0", 500_000, False)
 
 
+@pytest.mark.parametrize("name", ["P509", "P513", "P151", "P120", "P515", "P546", "2201:00", "6040:00"])
+def test_what_supervises_a_drive_takes_force_on_the_command_line(site: Path, name: str) -> None:
+    """Said before a bus is opened."""
+    arguments = ["parameters", "write", str(site), "conveyor/fu1", name, "1", "--yes"]
+    done = CliRunner().invoke(make_app(), arguments)
+    assert done.exit_code == 2
+    assert "Nothing was written. --force writes" in " ".join(done.output.replace("│", " ").split())
+
+
 def test_a_site_with_two_buses_needs_the_name_of_one(site: Path) -> None:
     with pytest.raises(typer.BadParameter, match="one of north, south"):
         choose_line(site, None, None, None, None)

@@ -122,8 +122,11 @@ class SdoChannel:
         *,
         priority: Priority = Priority.COMMAND,
         repeatable: bool = True,
+        may_begin: Callable[[], bool] | None = None,
     ) -> SdoJob:
-        """Write an object. ``repeatable`` is false where writing the same twice does more than once."""
+        """Write an object. ``repeatable`` is false where writing the same twice does more than once.
+        ``may_begin`` is asked when its turn has come: where it may not, nothing is sent, and the result is
+        an error."""
 
         def start(block: BlockUse) -> Transfer:
             return write_object(index, sub, data, block)
@@ -131,7 +134,7 @@ class SdoChannel:
         is_command = index in _COMMANDS
         retries = self.retries if repeatable and not is_command else 0
         timeout_s = max(self.timeout_s, _COMMAND_S) if is_command else self.timeout_s
-        return self._submit(SdoJob(index, sub, start, done, priority, retries, timeout_s), now)
+        return self._submit(SdoJob(index, sub, start, done, priority, retries, timeout_s, may_begin), now)
 
     def cancel(self, job: SdoJob, now: float) -> bool:
         """End this transfer without calling its ``done``; False where it has ended already."""
@@ -226,6 +229,9 @@ class SdoChannel:
 
     def _begin(self, job: SdoJob, now: float) -> None:
         self._job = job
+        if job.may_begin is not None and not job.may_begin():
+            self._end(SdoError(job.index, job.sub, abort.GENERAL, by_server=False), now)
+            return
         transfer = self._transfer = job.start(self._block)
         self._resume(next, transfer, now)
 

@@ -33,6 +33,7 @@ class SdoJob:
     priority: Priority
     retries_left: int
     timeout_s: float
+    may_begin: Callable[[], bool] | None = None
 
 
 class SdoQueue:

@@ -197,6 +197,12 @@ def test_nothing_is_written_of_a_set_with_one_wrong_entry(workshop: Workshop) ->
     assert "commands the drive" in _refusal(workshop, {"P102.1": 1.0, "6040:00": 1})
 
 
+def test_all_that_is_wrong_in_a_set_is_named_at_once(workshop: Workshop) -> None:
+    values: dict[str, Value] = {"P102.1": 1.0, "P103.1": 999.0, "P700[1]": 1, "6040:00": 1}
+    said = _refusal(workshop, values)
+    assert all(name in said for name in ("P103.1", "P700[1]", "6040:00"))
+
+
 def test_two_names_of_one_parameter_are_refused(workshop: Workshop) -> None:
     assert "P102 and 2066:01 are the same parameter" in _refusal(workshop, {"P102": 1.0, "2066:01": 3.0})
 

@@ -350,6 +350,26 @@ def test_what_supervises_a_drive_is_not_set_while_it_is_enabled(parameters: Para
     assert "while the drive is enabled" in drive_word[0].message
 
 
+@pytest.mark.parametrize(("name", "index"), [("P513", 0x2201), ("P509", 0x21FD)])
+def test_whether_it_is_enabled_is_judged_again_when_its_turn_has_come(
+    parameters: Parameters, name: str, index: int
+) -> None:
+    """The drive is enabled while the write waits for the read before it."""
+    channel = parameters.bench.plant.drives["conveyor/fu1"].channel
+    outcomes = parameters.begin(WRITE, parameter=name, value=2)
+    for _ in range(100):
+        channel._status.state = DriveState.OPERATION_ENABLED  # pyright: ignore[reportPrivateUsage]
+        if outcomes:
+            break
+        parameters.bench.run(0.001)
+    (outcome,) = outcomes
+    assert outcome.code is Code.NOT_ALLOWED
+    assert "while the drive is enabled" in outcome.message
+    assert not parameters.downloads(index)
+    parameters.bench.run(1.0)
+    assert parameters.write("P102.1", 3.0).ok, "the channel goes on"
+
+
 def test_own_supervision_is_not_known_any_more_when_it_was_written(parameters: Parameters) -> None:
     assert parameters.write("P151", 500).ok
     reading = parameters.bench.plant.image.read("conveyor/fu1/supervision/worst_case_bridge_ms")

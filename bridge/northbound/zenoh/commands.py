@@ -45,6 +45,8 @@ _LONGEST: Final = 4096
 _NAME: Final = re.compile(r"[A-Za-z0-9_.\-]{1,64}")
 _PARAMETER: Final = "/parameter/"
 _CACHED_MS: Final = 2**31
+_LONGEST_MS: Final = 2**32 - 1
+"""As OPC UA's UInt32 argument."""
 """As old as can be: whatever was read last."""
 _HEXADECIMAL: Final = re.compile(r"0[xX][0-9A-Fa-f]{1,8}")
 
@@ -263,6 +265,8 @@ def _call(identity: Identity, target: str, action: Action, payload: bytes) -> Re
     ttl_ms, direction = options.ttl_ms, options.direction
     if ttl_ms is not msgspec.UNSET and action is not Action.TAKE_CONTROL:
         raise BadCommand(MALFORMED, f"{action} takes no ttl_ms")
+    if ttl_ms is not msgspec.UNSET and not 0 <= ttl_ms <= _LONGEST_MS:
+        raise BadCommand(Code.OUT_OF_RANGE, f"ttl_ms takes 0…{_LONGEST_MS}")
     if direction is not msgspec.UNSET and action is not Action.START:
         raise BadCommand(MALFORMED, f"{action} takes no direction")
     if direction not in (msgspec.UNSET, -1, 0, 1):

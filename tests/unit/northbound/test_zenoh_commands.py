@@ -113,6 +113,9 @@ def test_a_plain_get_starts_acknowledges_and_resets_nothing(tail: str, payload: 
         ("conveyor/fu3/command/start", '{"direction": 2}', Code.OUT_OF_RANGE, "reverse"),
         ("conveyor/fu3/command/start", '{"direction": "left"}', MALFORMED, "direction"),
         ("conveyor/fu3/command/start", '{"ttl_ms": 1}', MALFORMED, "ttl_ms"),
+        ("conveyor/fu3/command/take_control", '{"ttl_ms": -1}', Code.OUT_OF_RANGE, "ttl_ms takes 0"),
+        ("conveyor/fu3/command/take_control", '{"ttl_ms": 4294967296}', Code.OUT_OF_RANGE, "ttl_ms takes 0"),
+        ("conveyor/fu3/command/take_control", '{"ttl_ms": 500.5}', MALFORMED, "ttl_ms"),
         ("conveyor/fu3/command/stop", '{"v": true}', MALFORMED, "v"),
     ],
 )

@@ -6,13 +6,15 @@ Judged on the raw file, so that these faults are found beside those of single va
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, cast
 
 from bridge.config.model import BusTable
 from bridge.tomlfile import Key, RawTable, TomlFile
 
 _RESERVED_NODES: Final = ("bus", "bridge")
 _PROTOCOLS: Final = ("modbus", "opcua", "zenoh")
+_WITHOUT_CONNECTIONS: Final = ("opcua", "zenoh")
+"""Whose clients' connections are not known where drives are commanded."""
 _BUS: Final = BusTable.model_construct()
 """The defaults."""
 
@@ -123,6 +125,24 @@ def _check_control(drive: RawTable, file: TomlFile) -> None:
             (*drive.key, "control"),
             f"the drive is controlled by {control}, which this site does not serve",
             f"add a [{control}] table",
+        )
+    if control in _WITHOUT_CONNECTIONS and drive.content.get("stop_by_anyone") is False:
+        _check_dead_owner(drive, file)
+
+
+def _check_dead_owner(drive: RawTable, file: TomlFile) -> None:
+    """Without a time-out only the end of its connection tells that an owner is dead."""
+    content = drive.content
+    given = content.get("fieldbus_timeout_range_ms")
+    low = next(iter(cast("list[object]", given)), None) if isinstance(given, list) else None
+    may_be_off = content.get("fieldbus_timeout_writable") is True and low == 0
+    if content.get("fieldbus_timeout_ms") == 0 or may_be_off:
+        way = "fieldbus_timeout_range_ms from 1 ms on" if may_be_off else "a fieldbus_timeout_ms from 1 ms on"
+        file.fault(
+            (*drive.key, "stop_by_anyone"),
+            f"nobody would be told that an owner by {drive.text('control')} is dead: without a time-out it "
+            "would block the drive for ever",
+            f"{way}, or stop_by_anyone = true",
         )
 
 

@@ -278,6 +278,34 @@ class TestWhatDoesNotGoTogether:
         (fault,) = faults(tmp_path, text)
         assert fault.startswith(f"13: bus[0].node[0].drive[0].control: the drive is controlled by {control}")
 
+    @pytest.mark.parametrize("control", ["modbus", "opcua", "zenoh", "lease"])
+    @pytest.mark.parametrize(
+        ("time", "may_be_off"),
+        [
+            ("fieldbus_timeout_ms = 0", True),
+            ("fieldbus_timeout_ms = 200", False),
+            (
+                "fieldbus_timeout_ms = 200\nfieldbus_timeout_writable = true\n"
+                "fieldbus_timeout_range_ms = [0, 500]",
+                True,
+            ),
+            ("fieldbus_timeout_ms = 200\nfieldbus_timeout_writable = true", False),
+            ("fieldbus_timeout_ms = 200\nfieldbus_timeout_range_ms = [0, 500]", False),
+        ],
+    )
+    def test_a_dead_owner_blocks_nobody_for_ever(
+        self, tmp_path: Path, control: str, time: str, may_be_off: bool
+    ):
+        """Of Modbus the end of a connection is known, and a lease ends by itself."""
+        text = f'{SMALL}control = "{control}"\n{time}\nstop_by_anyone = {{}}\n[modbus]\n[opcua]\n[zenoh]\n'
+        load(tmp_path, text.format("true"))
+        if not may_be_off or control in ("modbus", "lease"):
+            load(tmp_path, text.format("false"))
+            return
+        (fault,) = faults(tmp_path, text.format("false"))
+        assert "stop_by_anyone: nobody would be told" in fault
+        assert "from 1 ms on, or stop_by_anyone = true" in fault
+
     def test_a_lease_needs_no_protocol_of_its_own(self, tmp_path: Path):
         site = load(tmp_path, f'{SMALL}control = "lease"\nfieldbus_timeout_ms = 0\n')
         assert site.bus[0].node[0].drive[0].control == "lease"

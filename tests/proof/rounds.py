@@ -192,26 +192,32 @@ def _wait_stopped(
 
 
 def _wait_talking(rig: Rig, drives: list[Drive]) -> None:
-    """One that has tripped into silence says nothing until it is acknowledged."""
-    rig.wait(
-        lambda: all(
-            rig.says(drive) and (drive.reaction == "silence" or rig.talks(drive)) for drive in drives
-        ),
-        rig.patience_s,
-        "process data flow again",
-    )
+    """One that has tripped into silence is told nothing until it is acknowledged."""
+
+    def waiting() -> list[Drive]:
+        return [
+            drive
+            for drive in drives
+            if not (rig.says(drive) and (drive.reaction == "silence" or rig.talks(drive)))
+        ]
+
+    _wait_none(rig, waiting, rig.patience_s, "process data flow again")
+
+
+def _wait_none(rig: Rig, waiting: Callable[[], list[Drive]], limit_s: float, what: str) -> None:
+    try:
+        rig.wait(lambda: not waiting(), limit_s, what)
+    except Stuck as stuck:
+        raise Stuck(f"{stuck}: {', '.join(drive.path for drive in waiting())}") from None
 
 
 def _wait_writing(rig: Rig, before: dict[Drive, int]) -> None:
     """Every owner's telegrams are taken again, which move nothing."""
 
-    def waiting() -> list[str]:
-        return [drive.path for drive, count in before.items() if rig.board.accepted(drive.place)[0] <= count]
+    def waiting() -> list[Drive]:
+        return [drive for drive, count in before.items() if rig.board.accepted(drive.place)[0] <= count]
 
-    try:
-        rig.wait(lambda: not waiting(), _WRITES_S, "telegrams are taken again")
-    except Stuck as stuck:
-        raise Stuck(f"{stuck}: {', '.join(waiting())}") from None
+    _wait_none(rig, waiting, _WRITES_S, "telegrams are taken again")
 
 
 def _ways(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> dict[Drive, tuple[float, float]]:

@@ -90,9 +90,9 @@ ifneq ($(LAB),0)
 endif
 
 # Half of the cycles on each of two machines. PROOF=n: how many times each fault is injected.
-PROOF ?= 16
+PROOF ?= 12
 
-proof: compiled packages ## inject every fault 16 times, write docs/explanation/proof.md (40 minutes)
+proof: compiled packages ## inject every fault 12 times, write docs/explanation/proof.md (30 minutes)
 	@$(ON_VCAN) tests/proof/run-proof -j $(FEW_JOBS) -n $(PROOF) -o build/proof.json docs/explanation/proof.md
 
 proof-mutants: compiled packages ## seed faults in the chain, which the proof has to find (12 minutes)

@@ -26,6 +26,8 @@ _EXACT: Final = 0xC000_07FF
 _OLDEST_S: Final = 10.0
 _MOST_RUNS: Final = 2_000
 _MOST_TIMES: Final = 500
+_PAUSE_S: Final = 1.0
+"""The same frame after such a pause is another one: an emergency that comes again, say."""
 _LOOK_S: Final = 0.03
 """The kernel has stamped and kept the frames: they are fetched together, which costs the machine less."""
 _TIMESTAMPNS, _OVERFLOW = 35, 40
@@ -37,11 +39,19 @@ _CONTROL_BYTES: Final = socket.CMSG_SPACE(_STAMP.size) + socket.CMSG_SPACE(_COUN
 
 @dataclass(slots=True)
 class Run:
-    """The same frame again and again."""
+    """The same frame again and again, without a long pause."""
 
     first: float
     last: float
     data: bytes
+
+
+def add_to(track: deque[Run], data: bytes, at: float) -> None:
+    """A frame of this identifier was seen."""
+    if track and track[-1].data == data and at - track[-1].last < _PAUSE_S:
+        track[-1].last = at
+    else:
+        track.append(Run(at, at, data))
 
 
 class Clock:
@@ -110,11 +120,7 @@ class Witness:
 
     def _note(self, can_id: int, data: bytes, at: float) -> None:
         self._times[can_id].append(at)
-        track = self._tracks[can_id]
-        if track and track[-1].data == data:
-            track[-1].last = at
-        else:
-            track.append(Run(at, at, data))
+        add_to(self._tracks[can_id], data, at)
 
     def runs(self, can_id: int, since: float) -> list[Run]:
         """Everything that was seen after ``since``, oldest first, begun or still going on then."""

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from tests.proof import acts, bounds, machine
+from tests.proof.board import NUMBERS
 from tests.proof.drives import (
     BRIDGE_SIDE,
     DRIVE_SIDE,
@@ -45,7 +46,10 @@ class Intruder:
     """Sends a drive's RPDO with a word that enables, beside the bridge."""
 
     def __init__(self, drive: Drive) -> None:
-        words = drive.family.run.to_bytes(2, "little") + drive.family.setpoint.to_bytes(2, "little")
+        # None of the setpoints that its owner writes: on the wire what another device sends bears no mark of
+        # this host, here nothing but the data tells it from what the bridge has sent a moment ago.
+        setpoint = drive.family.setpoint + NUMBERS
+        words = drive.family.run.to_bytes(2, "little") + setpoint.to_bytes(2, "little")
         self._frame = drive.rpdo, words
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True, name="intruder")

@@ -216,11 +216,6 @@ class KernelBeat:
         assert self._manager is not None
         start = until <= now
         frames, count, head = wish.sequence(now, start=start)
-        if head == 1 and not start:
-            # The next frame may come at any moment. With one more it might be the last, before the next
-            # message is there.
-            start = True
-            frames, count, head = wish.sequence(now, start=start)
         if not count:
             return _Sent(self._end(can_id), _ENDED, is_fresh=False)
         if start:
@@ -229,11 +224,12 @@ class KernelBeat:
             until = now + (count - 1) * wish.period_s
         elif head:
             # The kernel takes the new frames before it goes back to their beginning, and may send one
-            # between the two. So it goes back first, with frames that are all alike.
+            # between the two. So it goes back first, with frames that are all alike; with one more, so that
+            # it cannot come to their end before the next message is there.
             alike = (frames[0],) * len(frames)
-            message = bcm.setup(alike, wish.period_s, head, start=False, at_once=False, anew=True)
+            message = bcm.setup(alike, wish.period_s, head + 1, start=False, at_once=False, anew=True)
             self._manager.send(message)
-            until = min(until, now + (head - 1) * wish.period_s)
+            until = min(until, now + head * wish.period_s)
         at_once, anew = wish.at_once, bool(head)
         self._manager.send(bcm.setup(frames, wish.period_s, count, start=start, at_once=at_once, anew=anew))
         self._held.add(can_id)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from bridge.mapping import emcy_codes
 from bridge.mapping.fields import Decimal, EmcyCode, FaultNumber, Table
 
 
@@ -33,9 +34,9 @@ class EmcyTable(Table):
     )
 
     def text(self, code: int) -> str:
-        """The text of an EMCY code, or of its group."""
+        """The text of an EMCY code, or of its group: the family's own, else that of CiA 301."""
         name = f"{code:04X}"
-        return self.codes.get(name) or self.codes.get(f"{name[:2]}xx") or "unknown code"
+        return self.codes.get(name) or self.codes.get(f"{name[:2]}xx") or emcy_codes.text(code)
 
 
 class FaultParameter(Table):

@@ -16,6 +16,7 @@ from typing import Final
 
 from bridge.config import NodeTable
 from bridge.drive import EmergencyReader
+from bridge.mapping import emcy_codes
 from bridge.mapping.model import Family
 from bridge.southbound import decode_lss
 from bridge.southbound.bus.frame import EXTENDED, REMOTE, STANDARD_MASK, Frame
@@ -37,21 +38,6 @@ _PDOS: Final = {
     0x400: "RPDO3",
     0x480: "TPDO4",
     0x500: "RPDO4",
-}
-# CiA 301 §7.2.7.1, table 26, by the first two digits of the code.
-_EMCY_GROUPS: Final = {
-    0x00: "no error",
-    0x10: "generic error",
-    0x20: "current",
-    0x30: "voltage",
-    0x40: "temperature",
-    0x50: "device hardware",
-    0x60: "device software",
-    0x70: "additional modules",
-    0x80: "monitoring",
-    0x90: "external error",
-    0xF0: "additional functions",
-    0xFF: "device specific",
 }
 
 
@@ -176,9 +162,7 @@ class Decoder:
         if family:
             text = EmergencyReader(family.emcy).read(found.code, found.vendor).text
         else:
-            text = _EMCY_GROUPS.get(found.code >> 8) or _EMCY_GROUPS.get(
-                found.code >> 8 & 0xF0, "unknown code"
-            )
+            text = emcy_codes.text(found.code)
         vendor = found.vendor.hex(" ").upper()
         values = (
             ("code", f"{found.code:04X}"),

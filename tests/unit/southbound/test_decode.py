@@ -140,7 +140,9 @@ def test_an_emergency_in_the_words_of_its_family() -> None:
 
 
 def test_an_emergency_of_a_stranger_in_those_of_cia_301() -> None:
-    assert heard(Decoder(), (0x087, "3081110000000000")).text.startswith("8130h monitoring, register 11h")
+    text = heard(Decoder(), (0x087, "3081110000000000")).text
+    assert text.startswith("8130h life guard error or heartbeat error, register 11h")
+    assert heard(Decoder(), (0x087, "1023010000000000")).text.startswith("2310h current, device output side")
     assert "no emergency" in heard(Decoder(), (0x087, "30")).text
 
 

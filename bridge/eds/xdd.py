@@ -6,8 +6,9 @@ from typing import Final
 
 from bridge.eds.fields import Fields
 from bridge.eds.ini import Section, Text, shown
-from bridge.eds.model import Commissioning, DataType, Description, Device, Object, Report
+from bridge.eds.model import Commissioning, Description, Device, Object, Report
 from bridge.eds.objects import ObjectReader
+from bridge.eds.xdd_parameters import DEFAULT_ACCESS, Parameters
 from bridge.eds.xml import Element, parse
 
 _KEYS: Final = {
@@ -23,35 +24,6 @@ _KEYS: Final = {
     "subnumber": "subnumber",
 }
 """Attributes of CANopenObject and CANopenSubObject by the keys of an EDS that mean the same."""
-_ACCESS: Final = {
-    "const": "const",
-    "read": "ro",
-    "write": "wo",
-    "readWrite": "rw",
-    "readWriteInput": "rwr",
-    "readWriteOutput": "rww",
-}
-"""Of a parameter in the application process (CiA 311 §5.4)."""
-_TYPES: Final = {
-    "BOOL": DataType.BOOLEAN,
-    "SINT": DataType.INTEGER8,
-    "INT": DataType.INTEGER16,
-    "DINT": DataType.INTEGER32,
-    "LINT": DataType.INTEGER64,
-    "USINT": DataType.UNSIGNED8,
-    "BYTE": DataType.UNSIGNED8,
-    "UINT": DataType.UNSIGNED16,
-    "WORD": DataType.UNSIGNED16,
-    "UDINT": DataType.UNSIGNED32,
-    "DWORD": DataType.UNSIGNED32,
-    "ULINT": DataType.UNSIGNED64,
-    "LWORD": DataType.UNSIGNED64,
-    "REAL": DataType.REAL32,
-    "LREAL": DataType.REAL64,
-    "STRING": DataType.VISIBLE_STRING,
-    "WSTRING": DataType.UNICODE_STRING,
-}
-"""Elements that name a type of IEC 61131-3."""
 
 
 def read_xdd(content: bytes, report: Report) -> Description:
@@ -64,11 +36,7 @@ class _XddReader:
         self._root = root
         self._report = report
         self._fields = Fields(report)
-        self._parameters = {
-            element.attributes["uniqueid"]: element
-            for element in root.all("parameter")
-            if "uniqueid" in element.attributes
-        }
+        self._parameters = Parameters(root, report)
 
     def read(self) -> Description:
         objects = self._objects()
@@ -127,27 +95,12 @@ class _XddReader:
         mapping = element.attributes.get("pdomapping", "no").lower()
         if mapping not in ("no", ""):
             section.keys["pdomapping"] = Text("1", element.line)
-        self._from_parameter(section, element)
+        self._parameters.fill(section, element)
+        has_subs = any(child.tag == "CANopenSubObject" for child in element.children)
+        if section.get("AccessType") is None and not has_subs:
+            self._report.warning(element.line, f"{name} has no accessType: taken as {DEFAULT_ACCESS}")
+            section.keys["accesstype"] = Text(DEFAULT_ACCESS, element.line)
         return section
-
-    def _from_parameter(self, section: Section, element: Element) -> None:
-        """What only the parameter of the application process says (uniqueIDRef)."""
-        reference = element.attributes.get("uniqueidref")
-        parameter = self._parameters.get(reference or "")
-        if parameter is None:
-            if reference:
-                self._report.warning(element.line, f"there is no parameter {shown(reference)}")
-            return
-        line = parameter.line
-        access = _ACCESS.get(parameter.attributes.get("access", ""))
-        if access:
-            section.keys.setdefault("accesstype", Text(access, line))
-        for child in parameter.children:
-            if child.tag in _TYPES:
-                section.keys.setdefault("datatype", Text(hex(_TYPES[child.tag]), line))
-            elif child.tag in ("defaultValue", "actualValue") and "value" in child.attributes:
-                key = "defaultvalue" if child.tag == "defaultValue" else "parametervalue"
-                section.keys.setdefault(key, Text(child.attributes["value"], child.line))
 
     def _device(self) -> Device:
         identity = self._root.first("DeviceIdentity")

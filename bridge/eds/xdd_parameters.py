@@ -1,0 +1,140 @@
+"""Parameters of an XDD's application process (CiA 311 §5.4): what objects leave to them by uniqueIDRef."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from bridge.eds.ini import Section, Text, shown
+from bridge.eds.model import DataType, ObjectType, Report
+from bridge.eds.xml import Element
+
+_ACCESS: Final = {
+    "const": "const",
+    "read": "ro",
+    "write": "wo",
+    "readwrite": "rw",
+    "readwriteinput": "rwr",
+    "readwriteoutput": "rww",
+    "noaccess": "ro",
+}
+"""By the attribute in lower case. What may not be accessed at all is not written either."""
+DEFAULT_ACCESS: Final = "ro"
+"""Of a parameter that does not say, and of an object that has none (the schema's default is ``read``)."""
+
+BIT_STRING: Final = "BITSTRING"
+TYPES: Final = {
+    "BOOL": DataType.BOOLEAN,
+    BIT_STRING: DataType.OCTET_STRING,
+    "CHAR": DataType.INTEGER8,
+    "SINT": DataType.INTEGER8,
+    "INT": DataType.INTEGER16,
+    "DINT": DataType.INTEGER32,
+    "LINT": DataType.INTEGER64,
+    "USINT": DataType.UNSIGNED8,
+    "BYTE": DataType.UNSIGNED8,
+    "UINT": DataType.UNSIGNED16,
+    "WORD": DataType.UNSIGNED16,
+    "UDINT": DataType.UNSIGNED32,
+    "DWORD": DataType.UNSIGNED32,
+    "ULINT": DataType.UNSIGNED64,
+    "LWORD": DataType.UNSIGNED64,
+    "REAL": DataType.REAL32,
+    "LREAL": DataType.REAL64,
+    "STRING": DataType.VISIBLE_STRING,
+    "WSTRING": DataType.UNICODE_STRING,
+}
+"""Every element that names a simple type (IEC 61131-3). Types of other lengths, 24 bits say, and domains have
+none: tools write BITSTRING for them."""
+_VALUES: Final = {"defaultValue": "defaultvalue", "actualValue": "parametervalue"}
+_LIMITS: Final = {"minValue": "lowlimit", "maxValue": "highlimit"}
+_DEEPEST: Final = 8
+"""Types derived from each other."""
+
+
+class Parameters:
+    """The parameters of one file, by their ``uniqueID``."""
+
+    def __init__(self, root: Element, report: Report) -> None:
+        self._report = report
+        self._parameters = _by_id(root.all("parameter"))
+        self._templates = _by_id(root.all("parameterTemplate"))
+        self._types = _by_id(one for tag in ("derived", "enum") for one in root.all(tag))
+
+    def fill(self, section: Section, element: Element) -> None:
+        """What ``element``, an object or sub-object, does not say itself."""
+        reference = element.attributes.get("uniqueidref")
+        parameter = self._parameters.get(reference or "")
+        if parameter is None:
+            if reference:
+                self._report.warning(element.line, f"there is no parameter {shown(reference)}")
+            return
+        self._fill(section, parameter)
+        template = self._templates.get(parameter.attributes.get("templateidref", ""))
+        if template is not None:
+            self._fill(section, template)
+        _give(section, "accesstype", DEFAULT_ACCESS, parameter.line)
+
+    def _fill(self, section: Section, parameter: Element) -> None:
+        access = parameter.attributes.get("access")
+        if access and section.get("AccessType") is None:
+            _give(section, "accesstype", self._access(access, parameter.line), parameter.line)
+        found = self._type_of(parameter)
+        if found is not None and not (found == BIT_STRING and _is_domain(section)):
+            _give(section, "datatype", hex(TYPES[found]), parameter.line)
+        for child in parameter.children:
+            if child.tag in _VALUES:
+                _give(section, _VALUES[child.tag], child.attributes.get("value", ""), child.line)
+            elif child.tag == "allowedValues":
+                _fill_limits(section, child)
+
+    def _access(self, word: str, line: int) -> str:
+        known = _ACCESS.get(word.lower())
+        if known is None:
+            self._report.warning(line, f"access={shown(word)} is taken as {DEFAULT_ACCESS}")
+        return known or DEFAULT_ACCESS
+
+    def _type_of(self, parameter: Element) -> str | None:
+        """The element that names the type, also through types that the file derives from it."""
+        element = parameter
+        for _ in range(_DEEPEST):
+            named = next((child for child in element.children if child.tag in TYPES), None)
+            if named is not None:
+                return named.tag
+            reference = next((child for child in element.children if child.tag == "dataTypeIDRef"), None)
+            derived = self._types.get(reference.attributes.get("uniqueidref", "")) if reference else None
+            if derived is None:
+                return None
+            element = derived
+        return None
+
+
+def _give(section: Section, key: str, text: str, line: int) -> None:
+    """Set a key that the section does not have, or has empty."""
+    if text and not section.text(key):
+        section.keys[key] = Text(text, line)
+
+
+def _by_id(elements: Iterator[Element]) -> dict[str, Element]:
+    found: dict[str, Element] = {}
+    for element in elements:
+        if "uniqueid" in element.attributes:
+            found.setdefault(element.attributes["uniqueid"], element)
+    return found
+
+
+def _is_domain(section: Section) -> bool:
+    kind = section.get("ObjectType")
+    return kind is not None and kind.text.lower().removeprefix("0x").lstrip("0") == str(
+        int(ObjectType.DOMAIN)
+    )
+
+
+def _fill_limits(section: Section, allowed: Element) -> None:
+    """Of one range: several are no limits."""
+    ranges = [child for child in allowed.children if child.tag == "range"]
+    if len(ranges) != 1:
+        return
+    for child in ranges[0].children:
+        if child.tag in _LIMITS:
+            _give(section, _LIMITS[child.tag], child.attributes.get("value", ""), child.line)

@@ -114,7 +114,7 @@ def _as_json(
         },
         "node_id": node_id,
         "node_name": commissioning.node_name,
-        "objects": [_entry_json(entry) for one in description.objects for entry in one.entries],
+        "objects": [_entry_json(entry, node_id) for one in description.objects for entry in one.entries],
         "pdos": [_pdo_json(pdo) for pdo in pdos(description, node_id)],
         "downloads": [{"index": one.index, "sub": one.sub, "data": one.data.hex()} for one in downloads],
         "findings": [
@@ -123,25 +123,27 @@ def _as_json(
     }
 
 
-def _entry_json(entry: Entry) -> dict[str, Any]:
+def _entry_json(entry: Entry, node_id: int | None) -> dict[str, Any]:
     return {
         "index": entry.index,
         "sub": entry.sub,
         "name": entry.name,
         "type": entry.data_type.name if entry.data_type else None,
         "access": entry.access.value,
-        "default": _value(entry.default),
-        "value": _value(entry.parameter_value),
-        "low": _value(entry.low),
-        "high": _value(entry.high),
+        "default": _value(entry.default, node_id),
+        "value": _value(entry.parameter_value, node_id),
+        "low": _value(entry.low, node_id),
+        "high": _value(entry.high, node_id),
         "pdo_mappable": entry.pdo_mappable,
     }
 
 
-def _value(value: Value | None) -> int | float | str | None:
+def _value(value: Value | None, node_id: int | None) -> int | float | str | None:
+    """The value on this node; as the file has it where it needs a node id and none is known."""
     if value is None:
         return None
-    return str(value) if value.plus_node_id or isinstance(value.plain, bytes) else value.plain
+    plain = value.at(node_id)
+    return str(value) if plain is None or isinstance(plain, bytes) else plain
 
 
 def _pdo_json(pdo: PdoSummary) -> dict[str, Any]:

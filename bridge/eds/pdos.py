@@ -139,10 +139,10 @@ def _summary(
         enabled=plain is not None and not plain & _OFF,
         cob_id=None if whole is None else whole & 0x7FF,
         cob_id_text=_cob_id_text(value),
-        transmission_type=description.number(communication + number, 2),
-        inhibit_100us=description.number(communication + number, 3) or 0,
-        event_timer_ms=description.number(communication + number, 5) or 0,
-        mapped=tuple(_mapped(description, mapping + number)),
+        transmission_type=description.number(communication + number, 2, node_id),
+        inhibit_100us=description.number(communication + number, 3, node_id) or 0,
+        event_timer_ms=description.number(communication + number, 5, node_id) or 0,
+        mapped=tuple(_mapped(description, mapping + number, node_id)),
     )
 
 
@@ -152,10 +152,10 @@ def _cob_id_text(value: Value | None) -> str:
     return f"{value.plain & 0x7FF:X}h" + ("+id" if value.plus_node_id else "")
 
 
-def _mapped(description: Description, index: int) -> Iterator[MappedObject]:
-    count = description.number(index, 0) or 0
+def _mapped(description: Description, index: int, node_id: int | None) -> Iterator[MappedObject]:
+    count = description.number(index, 0, node_id) or 0
     for sub in range(1, min(count, _MOST_MAPPED) + 1):
-        word = description.number(index, sub)
+        word = description.number(index, sub, node_id)
         if word:
             target, target_sub = word >> 16 & 0xFFFF, word >> 8 & 0xFF
             entry = description.entry(target, target_sub)

@@ -39,7 +39,8 @@ _WRITE_USAGE = "drivebridge sdo write [SITE] NODE INDEX[:SUB] VALUE --type TYPE"
 
 
 class ValueType(StrEnum):
-    """Little-endian on the wire, all of them (CiA 301 §7.1.4)."""
+    """Little-endian on the wire, all of them (CiA 301 §7.1.4). The types of the site file, and two names more
+    that points and other tools have for its real numbers."""
 
     BOOL = "bool"
     UINT8 = "uint8"
@@ -50,6 +51,8 @@ class ValueType(StrEnum):
     INT16 = "int16"
     INT32 = "int32"
     INT64 = "int64"
+    REAL32 = "real32"
+    REAL64 = "real64"
     FLOAT = "float"
     DOUBLE = "double"
     STRING = "string"
@@ -66,9 +69,12 @@ _STRUCTS = {
     ValueType.INT16: "<h",
     ValueType.INT32: "<i",
     ValueType.INT64: "<q",
+    ValueType.REAL32: "<f",
+    ValueType.REAL64: "<d",
     ValueType.FLOAT: "<f",
     ValueType.DOUBLE: "<d",
 }
+_REALS = (ValueType.REAL32, ValueType.REAL64, ValueType.FLOAT, ValueType.DOUBLE)
 
 Timeout = Annotated[
     int | None, typer.Option(min=10, max=60_000, help="wait so long for each answer; 500, or the site's")
@@ -180,7 +186,7 @@ def encode(kind: ValueType, text: str) -> bytes:
                 return bytes.fromhex(text)
             case ValueType.BOOL:
                 return struct.pack("<?", {"0": False, "1": True, "false": False, "true": True}[text.lower()])
-            case ValueType.FLOAT | ValueType.DOUBLE:
+            case _ if kind in _REALS:
                 return struct.pack(_STRUCTS[kind], float(text))
             case _:
                 return struct.pack(_STRUCTS[kind], int(text, 0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
 import pytest
 import typer
@@ -13,6 +14,9 @@ from typer.testing import CliRunner
 from bridge.cli.app import make_app
 from bridge.cli.bus import choose_line, split_site
 from bridge.cli.sdo import ValueType, decode, encode, parse_object, why_forced
+from bridge.config.download import encode as as_site_file
+from bridge.config.model import ObjectType
+from bridge.image import DataType
 from bridge.parameter import Address
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
@@ -115,6 +119,33 @@ def test_what_is_no_object_is_bad_usage(text: str) -> None:
 )
 def test_values_on_the_wire(kind: ValueType, text: str, data: str) -> None:
     assert encode(kind, text) == bytes.fromhex(data)
+
+
+SITE_TYPES: dict[str, tuple[bool | int | float | str, str]] = {
+    "bool": (True, "true"),
+    "int8": (-2, "-2"),
+    "int16": (-300, "-300"),
+    "int32": (-70_000, "-70000"),
+    "int64": (-(1 << 40), str(-(1 << 40))),
+    "uint8": (200, "200"),
+    "uint16": (60_000, "0xEA60"),
+    "uint32": (1 << 31, str(1 << 31)),
+    "uint64": (1 << 63, str(1 << 63)),
+    "real32": (-1.5, "-1.5"),
+    "real64": (0.1, "0.1"),
+    "string": ("Förderer", "Förderer"),
+    "bytes": ("0A 1B", "0A 1B"),
+}
+
+
+@pytest.mark.parametrize("name", [*get_args(ObjectType), *DataType])
+def test_the_types_of_the_site_file_and_of_points_are_those_of_sdo(name: str) -> None:
+    kind = ValueType(name)
+    value, text = SITE_TYPES[{"float": "real32"}.get(name, name)]
+    data = encode(kind, text)
+    if name in get_args(ObjectType):
+        assert data == as_site_file(name, value)
+    assert decode(kind, data) == value
 
 
 @pytest.mark.parametrize(

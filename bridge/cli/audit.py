@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,6 +16,7 @@ from bridge.cli.terminal import progress
 from bridge.command import Plant
 from bridge.command.plant import Node
 from bridge.drive import OwnJudgement, OwnVerdict
+from bridge.errors import Unavailable
 from bridge.lint import WorstCase, lint
 from bridge.mapping.own_places import OwnWant, channels_needed, suggested, suggested_ms
 from bridge.project import Project, load_project
@@ -28,6 +29,10 @@ _WATCHES = {
     "guarding": "our guarding",
     "link": "its interface",
 }
+
+
+_Answers = tuple[dict[str, OwnJudgement], dict[str, str]]
+"""What was read, by drive; why a node could not be asked, by node."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,17 +74,22 @@ def audit(
     names = [table.name for table in project.site.bus]
     if bus is not None and bus not in names:
         raise typer.BadParameter(f"which bus? One of {', '.join(names)}")
-    found = list(_audit(project, bus, offline=offline))
+    unavailable: list[str] = []
+    found = list(_audit(project, bus, unavailable, offline=offline))
     if as_json:
         print(json.dumps({"ok": all(one.is_ok for one in found), "drives": [*map(_facts, found)]}, indent=2))
     else:
         print_table([_COLUMNS, *(row for one in found for row in _rows(one))])
         _explain(found, site)
+    if unavailable:
+        raise Unavailable("\n".join(unavailable))
     if not all(one.is_ok for one in found):
         raise typer.Exit(1)
 
 
-def _audit(project: Project, only: str | None, *, offline: bool) -> Iterator[Audited]:
+def _audit(project: Project, only: str | None, unavailable: list[str], *, offline: bool) -> Iterator[Audited]:
+    """Each drive of the site, or of the bus ``only``; ``unavailable`` gets a line for each bus that cannot be
+    opened."""
     verdict = lint(project.site, project.families, project.path, project.downloads)
     cases = {case.drive: case for case in verdict.worst_cases}
     plant = Plant(project.site, project.families, __version__)
@@ -87,24 +97,33 @@ def _audit(project: Project, only: str | None, *, offline: bool) -> Iterator[Aud
         if only not in (None, table.name):
             continue
         nodes = [one for one in plant.nodes.values() if one.bus is table and one.table.enabled]
-        errand: AuditErrand | None = None
+        answers: _Answers | None = None
         if not offline and table.interface == "virtual":
             tell(f"bus {table.name} is virtual: by site file and factory settings alone")
         elif not offline:
-            line = Line(table, project.families, is_of_site=True)
-            with progress(f"bus {table.name}"):
-                errand = carry_out(line, lambda now, nodes=nodes: AuditErrand(nodes, now))
+            answers = _ask(Line(table, project.families, is_of_site=True), nodes, unavailable)
         for node in nodes:
             for drive in node.drives:
                 case = cases[drive.name]
-                if errand is None:
+                if answers is None:
                     yield Audited(node, case, was_read=False)
                     continue
-                own = errand.found.get(drive.name)
-                failure = errand.failed.get(node.name, "" if own else "interrupted")
+                judgements, failed = answers
+                own = judgements.get(drive.name)
+                failure = failed.get(node.name, "" if own else "interrupted")
                 unknown = OwnJudgement(accepted=case.own.accepted)
                 found = replace(case, own=own or unknown)
                 yield Audited(node, found, own is not None, failure)
+
+
+def _ask(line: Line, nodes: Sequence[Node], unavailable: list[str]) -> _Answers:
+    try:
+        with progress(f"bus {line.table.name}"):
+            errand = carry_out(line, lambda now: AuditErrand(nodes, now))
+    except Unavailable as error:
+        unavailable.append(str(error))
+        return {}, {node.name: "its bus cannot be opened" for node in nodes}
+    return errand.found, errand.failed
 
 
 def _rows(one: Audited) -> Iterator[tuple[str, ...]]:

@@ -84,6 +84,7 @@ def simulate(site: SiteArgument, verbose: Verbose = False) -> None:
     from bridge.cli.simulation import simulation
     from bridge.project import load_project
     from bridge.service import make_bus
+    from bridge.southbound.bus import open_all
 
     logs.set_up(verbose=verbose)
     project = load_project(site)
@@ -91,6 +92,7 @@ def simulate(site: SiteArgument, verbose: Verbose = False) -> None:
     async def play() -> None:
         simulations = [simulation(make_bus(table), table, project.path) for table in project.site.bus]
         try:
+            open_all(one.open for one in simulations)
             async with asyncio.TaskGroup() as tasks:
                 for one in simulations:
                     tasks.create_task(one.run())

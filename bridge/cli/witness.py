@@ -23,7 +23,7 @@ from bridge.config import Site, load_site
 from bridge.errors import BridgeError, OperationFailed, Unavailable
 from bridge.witness.numbers import Numbers
 from bridge.witness.plan import UnknownFamily, WatchedBus, plan
-from bridge.witness.shell import Witness
+from bridge.witness.shell import CannotListen, Witness
 from bridge.witness.watch import Alarm, Finding, Kind, Sight, Stop
 
 _log = logging.getLogger(__name__)
@@ -70,9 +70,8 @@ def witness(
     teller = _Teller(record, run, as_json=as_json)
     try:
         watching = Witness(buses, numbers, teller.tell)
-    except OSError as error:
-        names = ", ".join(bus.channel for bus in buses)
-        raise Unavailable(f"cannot listen on {names}: {error.strerror or error}") from error
+    except CannotListen as error:
+        raise Unavailable(str(error)) from error
     try:
         for line in _promises(buses, numbers is not None):
             _log.info("%s", line)

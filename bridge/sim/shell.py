@@ -20,17 +20,21 @@ class Simulation:
         self._bus = bus
         self._nodes = tuple(nodes)
         self._work = asyncio.Event()
+        self._is_open = False
         self._due: dict[SimulatedNode, float | None] = {}
         """When each node wants to be looked at; one that is not in it, now. Asking all of them for every
         frame of a busy bus would cost more than playing them."""
 
-    async def run(self) -> None:
-        """Open the bus, power the nodes on and keep them going until cancelled.
-
-        Raises ``Unavailable`` where the bus cannot be opened.
-        """
-        loop = asyncio.get_running_loop()
+    def open(self) -> None:
+        """Open the bus. Raises ``Unavailable`` where that cannot be."""
         self._bus.open(self._work.set)
+        self._is_open = True
+
+    async def run(self) -> None:
+        """Power the nodes on and keep them going until cancelled. Opens the bus where nobody has."""
+        loop = asyncio.get_running_loop()
+        if not self._is_open:
+            self.open()
         for node in self._nodes:
             node.start(loop.time())
         while True:

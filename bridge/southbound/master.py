@@ -10,10 +10,12 @@ import asyncio
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from math import inf
 
 from bridge.command import Event, Kind, Plant
 from bridge.errors import OperationFailed
+from bridge.southbound.bus import open_all
 from bridge.southbound.bus.burstend import MOST_FRAMES, BurstEnd
 from bridge.southbound.bus.interface import Bus, ControllerState
 from bridge.southbound.canopen.sync import burst_length
@@ -141,10 +143,9 @@ class Master:
         self.gaps = 0
 
     async def start(self) -> None:
-        """Open the buses. Raises ``Unavailable`` where one cannot be opened; none stays open then."""
+        """Open the buses. Raises ``Unavailable`` with all that cannot be opened; none stays open then."""
         try:
-            for line in self._lines:
-                line.bus.open(self._wake)
+            open_all(partial(line.bus.open, self._wake) for line in self._lines)
         except BaseException:
             self._close_buses()
             raise

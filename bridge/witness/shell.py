@@ -14,10 +14,14 @@ from bridge.witness.watch import Finding, Watch
 _TICK_S = 0.05
 
 
+class CannotListen(Exception):
+    """Has a line for each interface that cannot be opened."""
+
+
 class Witness:
     """Any number of buses. ``tell`` gets each finding in the order of its time.
 
-    Raises OSError where an interface cannot be opened.
+    Raises CannotListen where interfaces cannot be opened.
     """
 
     def __init__(
@@ -29,13 +33,16 @@ class Witness:
         self._places = {
             drive.unit_id: (place, drive.name) for place, bus in enumerate(buses) for drive in bus.drives
         }
-        try:
-            for bus in buses:
-                watch = Watch(bus, asks=numbers is not None)
+        failures: list[str] = []
+        for bus in buses:
+            watch = Watch(bus, asks=numbers is not None)
+            try:
                 self._lines.append((Listener(bus.channel, watch.identifiers), watch))
-        except OSError:
+            except OSError as error:
+                failures.append(f"cannot listen on {bus.channel}: {error.strerror or error}")
+        if failures:
             self.close()
-            raise
+            raise CannotListen("\n".join(failures))
 
     def close(self) -> None:
         for listener, _ in self._lines:

@@ -144,6 +144,23 @@ def test_a_bus_that_is_missing_is_exit_3(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
+def test_all_buses_that_are_missing_are_named_at_once(tmp_path: Path) -> None:
+    drive = sites.drive("fu1", "none", 0)
+    buses = [
+        sites.bus(
+            sites.node(drive, name=name), name=name, interface="carrier_pigeon", more=f'channel = "{name}"'
+        )
+        for name in ("north", "south")
+    ]
+    site = str(sites.write(tmp_path, *buses))
+    for command in ("run", "simulate"):
+        done = call(command, site)
+        assert done.returncode == 3
+        assert "bus north: interface 'carrier_pigeon'" in done.stderr
+        assert "bus south: interface 'carrier_pigeon'" in done.stderr
+        assert "Traceback" not in done.stderr
+
+
 def test_an_interface_nobody_knows_is_exit_3(tmp_path: Path) -> None:
     done = call("run", str(write_site(tmp_path, interface="carrier_pigeon")))
     assert done.returncode == 3

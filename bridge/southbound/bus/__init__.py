@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
+from bridge.errors import Unavailable
 from bridge.southbound.bus.interface import Bus
 
 
@@ -14,3 +17,16 @@ def open_bus(name: str, interface: str, channel: str, bitrate: int) -> Bus:
     from bridge.southbound.bus.pythoncan import PythonCanBus
 
     return PythonCanBus(name, interface, channel, bitrate)
+
+
+def open_all(opening: Iterable[Callable[[], None]]) -> None:
+    """Do all of ``opening``, each of which opens a bus. Raises one ``Unavailable`` that has a line for every
+    bus that cannot be opened; the others are open then."""
+    failures: list[str] = []
+    for open_one in opening:
+        try:
+            open_one()
+        except Unavailable as error:
+            failures.append(str(error))
+    if failures:
+        raise Unavailable("\n".join(failures))

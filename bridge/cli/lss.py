@@ -27,11 +27,12 @@ from bridge.errors import OperationFailed
 from bridge.southbound import lss_errand
 from bridge.southbound.canopen.lss import BIT_RATES, NO_NODE_ID, Identity, LssError, Service
 from bridge.southbound.lss_errand import LssErrand
+from bridge.southbound.lss_scan import Scanned, find_all
 
 app = typer.Typer(help="Give devices node ids and bit rates (CiA 305).", no_args_is_help=True)
 
 _T = TypeVar("_T")
-_QUESTIONS = 133
+_QUESTIONS = 134
 """Of a fastscan that finds something."""
 _NUMBER = re.compile(r"(?:0x)?([0-9a-f]{1,8})h?", re.IGNORECASE)
 
@@ -62,14 +63,26 @@ def scan(
 ) -> None:
     """Find every device that has no node id (fastscan). 14 seconds for each, longer for slow ones."""
     line = choose_line(site, bus, interface, channel, bitrate)
-    found = _run(line, lss_errand.find_all(parse_identity(known) if known else None), timeout_ms)
+    scanned = Scanned()
+    try:
+        _run(line, find_all(parse_identity(known) if known else None, scanned), timeout_ms)
+    except OperationFailed as error:
+        scanned.problem = f"{error}; what is listed was not checked"
+    _print_scanned(scanned, as_json=as_json)
+    if scanned.problem:
+        raise OperationFailed(f"there may be more devices: {scanned.problem}")
+
+
+def _print_scanned(scanned: Scanned, *, as_json: bool) -> None:
+    for identity in scanned.keeps_answering:
+        tell(f"{identity_text(identity)} keeps answering after it was found: the others were told apart")
     if as_json:
-        print(json.dumps([identity._asdict() for identity in found], indent=2))
-        return
-    if not found:
+        rows = [one._asdict() | {"keeps_answering": one in scanned.keeps_answering} for one in scanned.found]
+        print(json.dumps(rows, indent=2))
+    elif scanned.found:
+        print_table([("vendor", "product", "revision", "serial", "--identity"), *map(_row, scanned.found)])
+    elif not scanned.problem:
         print("no device without a node id")
-        return
-    print_table([("vendor", "product", "revision", "serial", "--identity"), *map(_row, found)])
 
 
 @app.command()

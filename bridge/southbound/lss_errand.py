@@ -10,8 +10,6 @@ from bridge.southbound.canopen.lss import Exchange, Identity, LssError, Service
 
 _PAUSE_S: Final = 0.02
 """After a request that nobody answers: the devices have to act on it."""
-_MOST_FOUND: Final = 127
-_MOST_SPOILT: Final = 3
 _FIRST_QUESTION: Final = 5
 """How many times longer the first question of a scan waits: it measures how quick the devices are."""
 _SAFETY: Final = 4
@@ -119,49 +117,6 @@ class LssErrand(Generic[_R]):
         self._service.close()
         self._exchange = self._deadline = None
         self._finished = True
-
-
-def find_all(known: Identity | None) -> Service[list[Identity]]:
-    """Every device without a node id, one after the other; all are left in waiting state.
-
-    A late answer that was taken for one to another question spoils a scan: the device does not confirm,
-    or has another identity than was found. It is looked for again, with the time that the late answer has
-    shown to be needed; and what was found counts if the device can be selected by it. Raises LssError where
-    scans are spoilt too often.
-    """
-    found: list[Identity] = []
-    spoilt = 0
-    yield from lss.to_waiting()
-    while len(found) < _MOST_FOUND:
-        yield from lss.settle()
-        try:
-            identity = yield from lss.fastscan(known)
-            if identity is None:
-                break
-            if identity in found:
-                raise LssError("devices answer too late: allow them more time")
-        except LssError:
-            spoilt += 1
-            if spoilt > _MOST_SPOILT:
-                raise
-            continue
-        found.append(identity)
-    # Who was found is still in configuration state, and silent in a scan.
-    yield from lss.to_waiting()
-    phantoms: set[Identity] = set()
-    for identity in found:
-        if not (yield from _is_there(identity)):
-            phantoms.add(identity)
-    yield from lss.to_waiting()
-    return [identity for identity in found if identity not in phantoms]
-
-
-def _is_there(identity: Identity) -> Service[bool]:
-    try:
-        yield from lss.switch_selective(identity)
-    except LssError:
-        return False
-    return True
 
 
 def select(which: Identity | None) -> Service[None]:

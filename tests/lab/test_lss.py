@@ -51,6 +51,20 @@ def test_two_new_devices_are_found_named_and_stored(slaves: Process) -> None:
     slaves.wait_output("A01: id 255, stored (255, 3)", 5.0)
 
 
+def test_devices_that_keep_answering_are_found_all_the_same(tmp_path: Path) -> None:
+    """As two nodes of CANopenNode 4 do, which hid each other for good."""
+    with peer(tmp_path, "lss_slave", "vcan0", f"talks={ONE}", f"talks={OTHER}") as slaves:
+        slaves.wait_output("the slaves are there")
+        found = lss("scan", "--json", "--known", "38:10203:7:0", "--timeout-ms", "50")
+    assert found.returncode == 0, found.stderr
+    devices = json.loads(found.stdout)
+    assert {device["serial"]: device["keeps_answering"] for device in devices} == {
+        0x0A01: True,
+        0x8000_0B02: False,
+    }
+    assert f"{ONE} keeps answering after it was found" in found.stderr
+
+
 def test_what_fails_says_so_and_fails(slaves: Process) -> None:
     absent = lss("store", "--identity", "1:2:3:4", "--timeout-ms", "100")
     assert absent.returncode == 1

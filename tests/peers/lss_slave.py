@@ -1,6 +1,8 @@
 """LSS slaves on a real bus, each said by its identity in hexadecimal; prints what became of them.
 
-lss_slave.py CHANNEL VENDOR:PRODUCT:REVISION:SERIAL …
+lss_slave.py CHANNEL [talks=]VENDOR:PRODUCT:REVISION:SERIAL …
+
+One that talks answers every question of a fastscan once it was found, as CANopenNode 4 does.
 """
 
 import select
@@ -16,8 +18,14 @@ from tests.support.lss_slave import LssSlave
 _FRAME = struct.Struct("=IB3x8s")
 
 
+def slave_of(text: str) -> LssSlave:
+    kind, _, identity = text.rpartition("=")
+    vendor, product, revision, serial = (int(part, 16) for part in identity.split(":"))
+    return LssSlave((vendor, product, revision, serial), talks_when_found=kind == "talks")
+
+
 def main(channel: str, *identities: str) -> None:
-    slaves = [LssSlave(tuple(int(part, 16) for part in text.split(":"))) for text in identities]
+    slaves = [slave_of(text) for text in identities]
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as bus:
         bus.bind((channel,))
         print("the slaves are there", flush=True)

@@ -20,6 +20,13 @@ class LssSlave:
     bit_timing: int = 0
     activated_ms: int | None = None
     cannot_store: bool = False
+    talks_when_found: bool = False
+    """As CANopenNode 4: in configuration state every question of a fastscan is answered, and every switch
+    state selective is taken for its own."""
+    never_leaves: bool = False
+    """The last confirmation of a fastscan does not lead to configuration state."""
+    answers_all: bool = False
+    """Every question of a fastscan is answered, in every state."""
     log: list[bytes] = field(default_factory=list[bytes])
     _selected: list[int] = field(default_factory=list[int])
     _scan_part: int = 0
@@ -54,13 +61,17 @@ class LssSlave:
         if part == 0:
             self._selected = []
         self._selected.append(number)
+        if self.talks_when_found and self.state == CONFIGURATION:
+            return b"\x44" + bytes(7) if part == 3 else None
         if part == 3 and tuple(self._selected) == self.identity:
             self.state = CONFIGURATION
             return b"\x44" + bytes(7)
         return None
 
     def _fastscan(self, number: int, bit: int, part: int, following: int) -> bytes | None:
-        if self.state != WAITING or self.node_id != 255:
+        if self.answers_all or (self.talks_when_found and self.state == CONFIGURATION):
+            return b"\x4f" + bytes(7)
+        if self.state != WAITING or self.node_id != 255 or self.pending_id != 255:
             return None
         if bit == 0x80:
             self._scan_part = 0
@@ -70,7 +81,7 @@ class LssSlave:
         if bit == 0:
             self._scan_part = following
             # The last confirmation: the one device that is left is now the one that is talked to.
-            if part == 3 and following == 0:
+            if part == 3 and following == 0 and not self.never_leaves:
                 self.state = CONFIGURATION
         return b"\x4f" + bytes(7)
 

@@ -36,6 +36,7 @@ _INQUIRE_NODE_ID: Final = 0x5E
 _CONFIRM: Final = 0x80
 
 FIELDS: Final = ("vendor id", "product code", "revision number", "serial number")
+_SERIAL: Final = 3
 _U32: Final = struct.Struct("<I")
 _STANDARD_ERRORS: Final = {
     _NODE_ID: {1: "a node id must be 1…127 or 255"},
@@ -168,26 +169,52 @@ def error_text(answer: bytes) -> str:
     return _STANDARD_ERRORS.get(answer[0], {}).get(answer[1], default)
 
 
-def fastscan(known: Identity | None = None) -> Service[Identity | None]:
-    """Find one device that has no node id; it is in configuration state then (CiA 305 §6.10).
-
-    Each of 133 questions takes a whole reply time. None: there is no (further)
-    such device. ``known`` fills in fields that are the same for all (not 0).
-    """
+def is_anybody_there(*, is_first: bool = False) -> Service[bool]:
+    """Begin a scan: whether a device without a node id answers. Every device begins with the vendor id."""
     request = struct.pack("<IBBB", 0, _CONFIRM, 0, 0)
-    if (yield _question(request, "is anybody there?", is_first=True)) is None:
-        return None
+    return (yield _question(request, "is anybody there?", is_first=is_first)) is not None
+
+
+def answers_everything() -> Service[bool]:
+    """Right after the beginning of a scan: whether somebody answers what is asked of nobody yet, for either
+    value of a serial number's first bit. CANopenNode does, once it has been found and is in configuration
+    state."""
+    for value in (0, 1 << 31):
+        request = struct.pack("<IBBB", value, 31, _SERIAL, _SERIAL)
+        if (yield _question(request, "does somebody answer everything?")) is None:
+            return False
+    return True
+
+
+def fastscan(known: Identity | None = None) -> Service[Identity]:
+    """After ``is_anybody_there``: find one of the devices; it is in configuration state then (CiA 305 §6.10).
+
+    Each of 132 questions takes a whole reply time. ``known`` fills in fields that are the same for all
+    (not 0). Raises LssError where nobody confirms what was found.
+    """
     found: list[int] = []
     for sub, name in enumerate(FIELDS):
         value = known[sub] if known else 0
         if not value:
-            value = yield from _find_number(sub, name)
-        following = (sub + 1) % len(FIELDS)
-        request = struct.pack("<IBBB", value, 0, sub, following)
-        if (yield _question(request, f"{name} is {value:08X}h")) is None:
+            value = yield from _find_number(sub)
+        if not (yield from enter(sub, value)):
             raise LssError(f"a device answered and confirmed no {name} {value:08X}h: allow it more time")
         found.append(value)
     return Identity(*found)
+
+
+def enter(sub: int, value: int) -> Service[bool]:
+    """Devices whose field ``sub`` is ``value`` go on to the next one, after the last to configuration state.
+    False: there is none."""
+    request = struct.pack("<IBBB", value, 0, sub, (sub + 1) % len(FIELDS))
+    return (yield _question(request, f"{FIELDS[sub]} is {value:08X}h")) is not None
+
+
+def has(sub: int, value: int, bit: int = 0) -> Service[bool]:
+    """Whether a device that has come to field ``sub`` has this ``value`` there, from ``bit`` on upwards. It
+    stays where it is."""
+    request = struct.pack("<IBBB", value, bit, sub, sub)
+    return (yield _question(request, f"{FIELDS[sub]}, bit {bit}")) is not None
 
 
 def _question(request: bytes, step: str, *, is_first: bool = False) -> Exchange:
@@ -195,10 +222,9 @@ def _question(request: bytes, step: str, *, is_first: bool = False) -> Exchange:
     return Exchange(message, IDENTIFIED, step, fails=False, by_many=True, is_first=is_first)
 
 
-def _find_number(sub: int, name: str) -> Service[int]:
+def _find_number(sub: int) -> Service[int]:
     value = 0
     for bit in range(31, -1, -1):
-        request = struct.pack("<IBBB", value, bit, sub, sub)
-        if (yield _question(request, f"{name}, bit {bit}")) is None:
+        if not (yield from has(sub, value, bit)):
             value |= 1 << bit
     return value

@@ -14,6 +14,7 @@ from bridge.southbound.bus.frame import Frame
 from bridge.southbound.canopen import lss
 from bridge.southbound.canopen.lss import Identity, LssError, Service
 from bridge.southbound.lss_errand import LssErrand
+from bridge.southbound.lss_scan import find_all
 from tests.support.lss_slave import CONFIGURATION, WAITING, LssSlave
 
 T = TypeVar("T")
@@ -92,22 +93,23 @@ def test_the_messages_are_those_of_cia_305() -> None:
 @settings(max_examples=60, deadline=None)
 def test_a_scan_finds_every_device_and_leaves_it_waiting(present: list[tuple[int, int, int, int]]) -> None:
     slaves = [LssSlave(identity) for identity in present]
-    errand = LssBus(*slaves).run(lss_errand.find_all(None))
-    assert sorted(errand.result) == sorted(present)
+    errand = LssBus(*slaves).run(find_all(None))
+    assert sorted(errand.result.found) == sorted(present)
+    assert not errand.result.keeps_answering
     assert all(slave.state == WAITING for slave in slaves)
 
 
 def test_late_answers_of_several_devices_do_not_spoil_the_scan() -> None:
     """Both answer the same question, the second nearly when the time is over."""
     bus = LssBus(LssSlave(NORD), LssSlave(OTHER), delay_s=0.024)
-    assert set(bus.run(lss_errand.find_all(None)).result) == {NORD, OTHER}
+    assert set(bus.run(find_all(None)).result.found) == {NORD, OTHER}
 
 
 def test_devices_slower_than_the_answer_time_are_given_what_they_need() -> None:
     """The first question waits longer, and measures how slow they are."""
     slow_s = 2 * TIMEOUT_S
-    errand = LssBus(LssSlave(NORD), LssSlave(OTHER), delay_s=slow_s).run(lss_errand.find_all(None))
-    assert set(errand.result) == {NORD, OTHER}
+    errand = LssBus(LssSlave(NORD), LssSlave(OTHER), delay_s=slow_s).run(find_all(None))
+    assert set(errand.result.found) == {NORD, OTHER}
     assert errand.late == 0
 
 
@@ -119,8 +121,8 @@ def test_a_device_that_becomes_slow_in_the_middle_is_found_in_the_next_scan() ->
         asked += 1
         return 1.5 * TIMEOUT_S if asked > 20 else 0.0
 
-    errand = LssBus(LssSlave(NORD), delays=delays).run(lss_errand.find_all(None))
-    assert errand.result == [NORD]
+    errand = LssBus(LssSlave(NORD), delays=delays).run(find_all(None))
+    assert errand.result.found == [NORD]
 
 
 def test_a_late_answer_that_passes_for_the_last_confirmation_finds_no_phantom() -> None:
@@ -135,14 +137,14 @@ def test_a_late_answer_that_passes_for_the_last_confirmation_finds_no_phantom() 
         return 1.1 * TIMEOUT_S
 
     slave = LssSlave(NORD)
-    errand = LssBus(slave, delays=delays).run(lss_errand.find_all(None))
+    errand = LssBus(slave, delays=delays).run(find_all(None))
     assert hits
-    assert errand.result == [NORD]
+    assert errand.result.found == [NORD]
     assert slave.state == WAITING
 
 
 def test_a_device_that_is_too_slow_for_the_first_question_is_not_found_but_noticed() -> None:
-    errand = LssErrand(lss_errand.find_all(None), 0.0, TIMEOUT_S)
+    errand = LssErrand(find_all(None), 0.0, TIMEOUT_S)
     now = 0.0
     while not errand.is_finished(now):
         asked = any(frame.data[0] == 0x51 for frame in errand.take_frames())
@@ -150,13 +152,13 @@ def test_a_device_that_is_too_slow_for_the_first_question_is_not_found_but_notic
         errand.on_time(now)
         if asked:
             errand.on_frame(Frame(0x7E4, b"\x4f" + bytes(7), now + 0.001))
-    assert errand.result == []
+    assert errand.result.found == []
     assert errand.late == 1
 
 
 def test_a_scan_that_was_spoilt_by_a_late_answer_is_made_again() -> None:
     bus = LssBus(LssSlave(NORD), delay_s=0.001)
-    service = lss_errand.find_all(None)
+    service = find_all(None)
     errand = LssErrand(service, 0.0, TIMEOUT_S)
     asked, now = 0, 0.0
     while not errand.is_finished(now):
@@ -170,17 +172,17 @@ def test_a_scan_that_was_spoilt_by_a_late_answer_is_made_again() -> None:
                 errand.on_frame(Frame(0x7E4, answer, now))
         now = errand.next_deadline() or now
         errand.on_time(now)
-    assert errand.result == [NORD]
+    assert errand.result.found == [NORD]
 
 
 def test_a_scan_passes_over_devices_that_have_a_node_id() -> None:
-    assert LssBus(LssSlave(NORD, node_id=5)).run(lss_errand.find_all(None)).result == []
+    assert LssBus(LssSlave(NORD, node_id=5)).run(find_all(None)).result.found == []
 
 
 def test_what_is_known_is_not_searched() -> None:
     bus = LssBus(LssSlave(NORD))
-    errand = bus.run(lss_errand.find_all(Identity(NORD.vendor, NORD.product, NORD.revision, 0)))
-    assert errand.result == [NORD]
+    errand = bus.run(find_all(Identity(NORD.vendor, NORD.product, NORD.revision, 0)))
+    assert errand.result.found == [NORD]
     assert len(bus.requests) < 50
 
 
@@ -232,7 +234,7 @@ def test_a_silent_device_is_told_by_the_step_it_was_silent_at() -> None:
 
 @given(st.lists(st.tuples(st.sampled_from([0x7E4, 0x7E5, 0x185]), st.binary(max_size=8)), max_size=40))
 def test_nothing_on_the_wire_raises(frames: list[tuple[int, bytes]]) -> None:
-    errand = LssErrand(lss_errand.find_all(None), 0.0, TIMEOUT_S)
+    errand = LssErrand(find_all(None), 0.0, TIMEOUT_S)
     now = 0.0
     for can_id, data in frames:
         errand.take_frames()

@@ -212,6 +212,11 @@ def node_points(node: NodeTable, polls: list[Poll]) -> list[Point]:
             )
             for poll in polls
         ),
+        Point(
+            name=f"{top}/device_errors",
+            data_type=DataType.STRING,
+            description="errors that the node told at its last boot-up, 1001h and 1003h",
+        ),
     ]
 
 

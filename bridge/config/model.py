@@ -23,6 +23,7 @@ ObjectType = Literal[
     "real32", "real64", "string", "bytes",
 ]  # fmt: skip
 OnLoss = Literal["restart", "stop_node", "stop_all", "nothing"]
+OnFailedStart = Literal["reset_communication", "report"]
 MandatoryMissing = Literal["go_on", "hold_all", "stop_all"]
 Control = Literal["modbus", "opcua", "zenoh", "lease", "none"]
 Reaction = Literal["disable_voltage", "quick_stop", "stop", "silence", "hold"]
@@ -307,6 +308,7 @@ class NodeTable(Table):
     mandatory: bool = False
     start_order: int = Field(0, ge=0, le=126, description="0…126, lower ones start first")
     on_loss: OnLoss = Field("restart", description="restart, stop_node, stop_all or nothing")
+    on_failed_start: OnFailedStart = Field("reset_communication", description="reset_communication or report")
     enabled: bool = True
     hold_ms: int = Field(2000, ge=0, le=3_600_000)
     sdo_timeout_ms: int = Field(500, ge=10, le=60_000)

@@ -95,13 +95,13 @@ class Booting:
             else:
                 wants, stays = awaited.state.words, state.words
                 error = boot.BootError("J", f"the node stays {stays}, expected {wants}", absent=False)
-            self._end(error, now)
+            self._go_on(error, now)
 
     def next_deadline(self) -> float | None:
         return self._awaited.deadline if self._awaited else self._goes_on_at
 
-    def _go_on(self, answer: Result | None, now: float) -> None:
-        """Run until the boot-up waits for something."""
+    def _go_on(self, answer: Result | boot.BootError | None, now: float) -> None:
+        """Run until the boot-up waits for something, from an answer, or from what has become of waiting."""
         while self._boot is not None:
             try:
                 action = _resume(self._boot, answer)
@@ -158,7 +158,7 @@ def _failure(error: SdoError, letter: str) -> boot.BootError:
     return boot.BootError(letter, f"the node does not answer: {error}", absent=True)
 
 
-def _resume(generator: boot.Boot, answer: Result | None) -> boot.Action:
-    if isinstance(answer, SdoError):
+def _resume(generator: boot.Boot, answer: Result | boot.BootError | None) -> boot.Action:
+    if isinstance(answer, SdoError | boot.BootError):
         return generator.throw(answer)
     return generator.send(answer)

@@ -73,7 +73,10 @@ class Leaving:
 
     def on_state(self, state: NmtState, now: float) -> None:
         """The node has said its state."""
+        if state is NmtState.OPERATIONAL:
+            self._memory.is_at_rest = False
         if state is NmtState.STOPPED and self.is_stopped_by_nmt:
+            self._memory.is_at_rest = True
             for drive in self._node.drives:
                 drive.following.on_node_stopped(now)
 

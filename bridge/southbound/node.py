@@ -56,7 +56,7 @@ class NodeCore:
         self.told_to_stop = False
         """A stopped node answers no SDO: it has to be woken before it is asked."""
         self._reset_at = float("-inf")
-        """When a boot-up that failed has last reset the node."""
+        """When a boot-up has last reset the node, or its communication."""
         self._back_off = BackOff()
         self._last_boot = float("-inf")
         self._operational_since = 0.0
@@ -205,19 +205,17 @@ class NodeCore:
                 # Looking for a node that was never there is nothing to report every ten seconds.
                 if self.state is not NodeState.ABSENT:
                     self.say(text, now)
-            case boot.Nmt(command):
-                self.wire.send_nmt(command)
             case boot.Found():
                 self.set_state(NodeState.BOOTING, now)
-            case boot.SendStopped():
-                self.wire.send_stopped()
-            case boot.Wake():
-                self.wire.send_stopped()
-                self.wire.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+            case boot.DeviceErrors():
+                self._view.errors(action.text, now)
             case boot.StartSupervision():
                 self.error_control.expect(now)
             case _:
-                raise AssertionError(f"{action} waits for an answer")
+                if isinstance(action, boot.ResetCommunication):
+                    self._reset_at = now
+                    self._view.resets(action.why, now)
+                self.wire.carry_out(action)
 
     def begin_await(self, state: NmtState | None) -> bool:
         if not self.error_control.supervises:

@@ -17,6 +17,7 @@ class NodeView:
         self._plant = plant
         self._top = f"{node.name}/node"
         self._failure = ""
+        self._errors = ""
 
     def say(self, text: str, now: float) -> None:
         """Step or result of the boot-up."""
@@ -39,6 +40,16 @@ class NodeView:
         if self._failure != str(error):
             self._failure = str(error)
             self._tell(Kind.CONFIGURATION, 600, f"boot-up failed: {error}", now)
+
+    def errors(self, text: str, now: float) -> None:
+        """What the node says of its errors, empty where it has none; an event when it is something else."""
+        self._plant.set(f"{self._top}/device_errors", text, now)
+        if text and text != self._errors:
+            self._tell(Kind.EMERGENCY, 300, f"the node says: {text}", now)
+        self._errors = text
+
+    def resets(self, why: str, now: float) -> None:
+        self._tell(Kind.OWNER, 500, f"reset communication by the bridge, once: {why}", now)
 
     def restarted(self, now: float) -> None:
         self._tell(Kind.NODE_LOST, 800, "the node has restarted", now)

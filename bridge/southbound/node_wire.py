@@ -103,6 +103,22 @@ class NodeWire:
         self._put_off.clear()
         self._frames.append(nmt.command(command, self._node.table.id))
 
+    def carry_out(self, action: boot.Action) -> None:
+        """What a boot-up has sent and needs no answer."""
+        match action:
+            case boot.Nmt(command):
+                self.send_nmt(command)
+            case boot.SendStopped():
+                self.send_stopped()
+            case boot.Wake():
+                self.send_stopped()
+                self.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+            case boot.ResetCommunication():
+                self.send_stopped()
+                self.send_nmt(NmtCommand.RESET_COMMUNICATION)
+            case _:
+                raise AssertionError(f"{action} waits for an answer")
+
     def send_stopped(self) -> None:
         self._frames += self.stop_words.frames(self.drives, self.is_foreign)
 

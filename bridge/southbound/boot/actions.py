@@ -84,12 +84,46 @@ class Await:
 
 
 @dataclass(frozen=True, slots=True)
+class DeviceErrors:
+    """What the node says of its errors: 1001h, the newest codes of 1003h, and both in words (empty where it
+    has none)."""
+
+    register: int = 0
+    codes: tuple[int, ...] = ()
+    text: str = ""
+
+    @property
+    def cause(self) -> tuple[int, int]:
+        """By which an error is known again."""
+        return self.register, self.codes[0] if self.codes else 0
+
+
+@dataclass(frozen=True, slots=True)
+class ResetCommunication:
+    """NMT reset communication, because of ``why``, after a stopped word for every drive."""
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
 class AwaitRelease:
     """Wait until the network lets the node start (start order, mandatory nodes). No time limit."""
 
 
 Action = (
-    Step | Read | Write | Nmt | Found | SendStopped | Pause | Wake | StartSupervision | Await | AwaitRelease
+    Step
+    | Read
+    | Write
+    | Nmt
+    | Found
+    | SendStopped
+    | Pause
+    | Wake
+    | DeviceErrors
+    | ResetCommunication
+    | StartSupervision
+    | Await
+    | AwaitRelease
 )
 
 
@@ -128,6 +162,7 @@ class BootResult:
     """The heartbeat period that the node keeps; 0 for none."""
     own: dict[str, OwnJudgement] = field(default_factory=dict[str, OwnJudgement])
     """What each drive does by itself when the bridge falls silent."""
+    errors: DeviceErrors = field(default_factory=DeviceErrors)
     memory: BootMemory = field(default_factory=BootMemory)
 
 

@@ -15,6 +15,9 @@ from bridge.southbound.canopen.sync import LAST_SYNCHRONOUS
 _RPDOS: Final = 2
 """Identifiers that are remembered of one RPDO: a node that lies does not fill the memory."""
 
+_RESETS: Final = 3
+"""Errors in a row for which a node that does not start is reset: one with ever new ones is left alone."""
+
 NOT_AGAIN: Final = "it is not written again until the node restarts or is reset"
 
 
@@ -35,22 +38,31 @@ class BootMemory:
 
     may_run: bool = True
     """Drives may be running: the node has not started since it was in operation, or since the bridge has."""
+    is_at_rest: bool = False
+    """The node has said that it is in a state in which its drives do not run, and has not been in operation
+    since."""
+    did_not_start: bool = False
+    """The boot-up before this one has come as far as the start, and the node did not follow."""
     unsaved: bool = False
     """Something was written that has not been stored (1010h) yet."""
     unanswered_stores: int = 0
     count_write: CountWrite = _not_counted
     _not_kept: dict[tuple[int, int], bytes] = field(default_factory=dict[tuple[int, int], bytes])
     _commands: set[tuple[int, int, bytes]] = field(default_factory=set[tuple[int, int, bytes]])
+    _resets: set[tuple[int, int]] = field(default_factory=set[tuple[int, int]])
     _rpdos: dict[tuple[str, int], list[PdoPlan]] = field(default_factory=dict[tuple[str, int], list[PdoPlan]])
 
     def start_anew(self) -> None:
         self.unanswered_stores = 0
+        self.did_not_start = False
         self._not_kept.clear()
         self._commands.clear()
+        self._resets.clear()
 
     def was_reset(self) -> None:
         """A boot-up that failed has reset the node: its communication objects are as they were stored. That
         is no reason to write its EEPROM once more."""
+        self.did_not_start = False
         self._not_kept = {
             key: data
             for key, data in self._not_kept.items()
@@ -75,7 +87,19 @@ class BootMemory:
     def boot_succeeded(self) -> None:
         """The next boot-up begins with all its commands."""
         self._commands.clear()
+        self._resets.clear()
         self.may_run = True
+        self.is_at_rest = self.did_not_start = False
+
+    def may_reset_for(self, cause: tuple[int, int]) -> bool:
+        """Whether a node that did not start may be reset because of this error: no drive may be running, and
+        it was not tried before, since the node was in operation or somebody else has restarted it."""
+        is_new = cause not in self._resets and len(self._resets) < _RESETS
+        return self.did_not_start and is_new and (self.is_at_rest or not self.may_run)
+
+    def note_reset(self, cause: tuple[int, int]) -> None:
+        self._resets.add(cause)
+        self.did_not_start = False
 
     def note_rpdo(self, drive: str, number: int, plan: PdoPlan) -> None:
         """The node listens for the words of ``drive`` in this RPDO."""

@@ -23,6 +23,7 @@ from bridge.southbound.boot.actions import (
     Step,
 )
 from bridge.southbound.boot.configuration import configure
+from bridge.southbound.boot.device_errors import read_errors, reset_once
 from bridge.southbound.boot.emergency import read_emcy_id
 from bridge.southbound.boot.error_control import set_error_control
 from bridge.southbound.boot.identity import identify, look_for
@@ -32,6 +33,7 @@ from bridge.southbound.boot.own_supervision import set_own_supervision
 from bridge.southbound.boot.pdos import plan_drive, plan_node_tpdos, refuse_doubles
 from bridge.southbound.boot.scales import read_scales
 from bridge.southbound.boot.sdo_servers import open_sdo_servers
+from bridge.southbound.boot.status import BootError
 from bridge.southbound.canopen.nmt import NmtCommand, NmtState
 
 _GOES_OPERATIONAL_S: Final = 2.0
@@ -59,6 +61,8 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
             yield Pause(max(_SYNCS * node.bus.sync_period_ms, *needed_ms) / 1000)
     yield Nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
     yield from identify(node, device_type, result)
+    yield from read_errors(node, result)
+    yield from reset_once(node, result)
     wanted = (*downloads, *(entry.download for entry in node.table.configure))
     yield from configure(wanted, store=node.table.configuration_store, result=result)
     yield from read_emcy_id(node.table.id, result)
@@ -72,13 +76,14 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
     yield Step("reading the scaling parameters", "J")
     for drive in node.drives:
         result.scales[drive.name] = yield from read_scales(node, drive, result)
-    yield from _start(node.table)
+    yield from _start(node.table, result)
     result.memory.boot_succeeded()
     return result
 
 
-def _start(table: NodeTable) -> Do:
-    """Error control first, then NMT start; both are seen from the node's own messages."""
+def _start(table: NodeTable, result: BootResult) -> Do:
+    """Error control first, then NMT start; both are seen from the node's own messages. Raises BootError where
+    they do not come."""
     not_heard = "F" if table.supervision == "guarding" else "K"
     yield Step(f"waiting for {table.supervision}", not_heard)
     yield StartSupervision()
@@ -88,4 +93,9 @@ def _start(table: NodeTable) -> Do:
     yield AwaitRelease()
     yield Step("starting", "J")
     yield Nmt(NmtCommand.START)
-    yield Await(NmtState.OPERATIONAL, limit_s)
+    try:
+        yield Await(NmtState.OPERATIONAL, limit_s)
+    except BootError as error:
+        result.memory.did_not_start = True
+        detail = "; ".join(text for text in (error.detail, result.errors.text) if text)
+        raise BootError(error.letter, detail, absent=error.absent) from None

@@ -138,7 +138,7 @@ class Parts:
         self._settled(part, now)
         if part.name in self._told:
             self._told.discard(part.name)
-            self._plant.report(Event(now, Kind.FRONT, "bridge", 300, f"{part.title} serves again"))
+            self._plant.report(Event(now, Kind.FRONT, "bridge", 200, f"{part.title} serves again"))
 
     def _settled(self, part: Part, now: float) -> None:
         self._unknown.discard(part.name)

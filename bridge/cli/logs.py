@@ -5,15 +5,13 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-import time
-from collections.abc import Callable
 from typing import Any, Final
 
 from bridge.cli.terminal import printable_lines
+from bridge.quietlog import QuietHandler, about
 
 _log = logging.getLogger(__name__)
 
-_PAUSE_S: Final = 60.0
 _PRIORITY: Final = {
     logging.DEBUG: 7,
     logging.INFO: 6,
@@ -40,7 +38,7 @@ class _JournalFormatter(_Formatter):
 
 def set_up(*, verbose: bool) -> None:
     """Configure logging for the process."""
-    handler = logging.StreamHandler()
+    handler = QuietHandler()
     if "JOURNAL_STREAM" in os.environ:
         handler.setFormatter(_JournalFormatter("%(name)s: %(message)s"))
     else:
@@ -54,29 +52,14 @@ def set_up(*, verbose: bool) -> None:
 
 
 class LoopFaults:
-    """An event loop's exception handler: what nobody awaited or caught, told without a flood.
-
-    The first from each place is logged with its traceback, later ones at most once a minute.
-    """
-
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
-        self._told: dict[tuple[str, int], tuple[float, int]] = {}
+    """An event loop's exception handler: what nobody awaited or caught. Of each place the first is logged
+    with its traceback."""
 
     def __call__(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         error: BaseException | None = context.get("exception")
-        place = _place(error) or (str(context.get("message")), 0)
-        now = self._clock()
-        told_at, left_out = self._told.get(place, (None, 0))
-        if told_at is not None and now - told_at < _PAUSE_S:
-            self._told[place] = (told_at, left_out + 1)
-            return
-        self._told[place] = (now, 0)
+        place = _place(error) or str(context.get("message"))
         message = f"unexpected: {context.get('message')}: {error!r}" if error else str(context.get("message"))
-        if told_at is None:
-            _log.error("%s", message, exc_info=error)
-        else:
-            _log.error("%s (%d more since)", message, left_out)
+        _log.error("%s", message, exc_info=error, extra=about("event loop", place))
 
 
 def _place(error: BaseException | None) -> tuple[str, int] | None:

@@ -289,6 +289,11 @@ class DriveChannel:
         self._leg.handle(request, now, reply)
         self._settle(now)
 
+    def on_refused(self, now: float) -> None:
+        """A request about this drive was refused elsewhere, and counts as one that is refused here."""
+        self._leg.refused_writes += 1
+        self.settled(now)
+
     def _settle(self, now: float) -> None:
         """The end of every entry: what is sent and seen is brought up to date, then outcomes are told."""
         leg = self._leg

@@ -16,7 +16,7 @@ from bridge.command.drive import Drive
 from bridge.command.event import Event, EventGate, Kind
 from bridge.command.ignored import conclude
 from bridge.command.link import NodeState
-from bridge.command.points import bridge_points, bus_points, node_points
+from bridge.command.points import CONNECTION_COUNTS, bridge_points, bus_points, node_points
 from bridge.command.request import (
     NODE_ACTIONS,
     PARAMETER_ACTIONS,
@@ -136,6 +136,8 @@ class Plant:
         self._deadlines.look_every_s = len(self.drives) * _LOOK_PER_DRIVE_S
         self.set("bridge/version", version, began)
         self.set("bridge/drives_configured", len(self.drives), began)
+        for leaf in CONNECTION_COUNTS:
+            self.count(leaf, began, 0)
 
     def close(self, now: float) -> None:
         """Stop every drive, and take no command any more but stops."""
@@ -176,19 +178,22 @@ class Plant:
         if request.action in NODE_ACTIONS:
             node = self.nodes.get(request.target)
             command = node.command if node else self.bus_commands.get(request.target)
+            reply = self._telling(request, now, reply)
             if command is None:
                 reply(Outcome(Code.UNKNOWN_TARGET, f"there is no node {request.target!r}"))
             else:
-                command(request, now, self._telling(request, now, reply))
+                command(request, now, reply)
                 self.outputs_changed()
             return
         drive = self.drives.get(request.target)
         if drive is None:
+            reply = self._telling(request, now, reply)
             reply(Outcome(Code.UNKNOWN_TARGET, f"there is no drive {request.target!r}"))
             return
         if request.action in PARAMETER_ACTIONS:
             access = self.nodes[drive.node_name].parameters
             if access is None:
+                reply = self._telling(request, now, reply)
                 reply(Outcome(Code.NOT_READY, f"{drive.name} is on no bus", forwarded=False))
                 return
             access.submit(request, drive, now, reply)
@@ -213,28 +218,33 @@ class Plant:
         """What a protocol has refused by itself, ``count`` times: counted, told and written to the audit log
         as what a drive refuses."""
         self.audit.rejected(rejection, now, count)
-        target = rejection.target
-        is_known = target in self.drives or target in self.nodes or target in self.bus_commands
-        what = rejection.action if is_known else f"{rejection.action} on {target[:_LONGEST_NAME]!r}"
-        source = target.removeprefix("bus/") if is_known else "bridge"
-        self._tell_refusal(what, rejection.identity, source, rejection.message, now, count)
+        self._tell_refusal(
+            rejection.action, rejection.identity, rejection.target, rejection.message, now, count
+        )
 
     def _tell_refusal(
-        self, what: str, identity: Identity, source: str, why: str, now: float, count: int = 1
+        self, what: str, identity: Identity, target: str, why: str, now: float, count: int = 1
     ) -> None:
+        is_known = target in self.drives or target in self.nodes or target in self.bus_commands
+        source = target.removeprefix("bus/") if is_known else "bridge"
+        what = what if is_known else f"{what} on {target[:_LONGEST_NAME]!r}"
         self._refused_by_others += count
         self.report(Event(now, Kind.REFUSED, source, 300, f"{what} by {identity} refused: {why}"))
 
     def _telling(self, request: Request, now: float, reply: Reply) -> Reply:
-        """``reply`` for a command on nodes, whose refusal is an event and counts as one of a drive does."""
+        """``reply`` for what no drive refuses by itself: a refusal is an event and counts as a drive's."""
 
         def conclude(outcome: Outcome) -> None:
-            if not outcome.ok:
-                source = request.target.removeprefix("bus/")
-                self._tell_refusal(request.action, request.identity, source, outcome.message, now)
+            if not outcome.ok and request.action is not Action.READ_PARAMETER:
+                self._tell_refusal(request.action, request.identity, request.target, outcome.message, now)
             reply(outcome)
 
         return conclude
+
+    def count(self, leaf: str, now: float, by: int = 1) -> None:
+        """Count up a point of the bridge's own, such as ``modbus_refused_connections``."""
+        index = self.image.index[f"bridge/{leaf}"]
+        self.image.set(index, int(self.image[index].value) + by, now)
 
     def on_time(self, now: float) -> None:
         """Let the timers of every channel run and bring the image up to date."""

@@ -20,6 +20,13 @@ NMT_STATES: Final = (
     (127, "pre_operational"),
     (255, "unknown"),
 )
+CONNECTION_COUNTS: Final = {
+    "modbus_refused_connections": "Modbus connections that were not let in",
+    "modbus_broken_connections": "Modbus connections that the bridge ended",
+    "opcua_refused_connections": "OPC UA connections, channels and logins that were not let in",
+    "opcua_broken_connections": "OPC UA connections that the bridge ended",
+    "zenoh_broken_connections": "zenoh connections that have ended, by whatever end",
+}
 CONTROLLER_STATES: Final = ((0, "ok"), (1, "warning"), (2, "passive"), (3, "bus_off"), (4, "down"))
 
 
@@ -312,5 +319,9 @@ def bridge_points() -> list[Point]:
             data_type=DataType.FLOAT,
             unit="ms",
             description="longest time since start that a round of the bus process came late",
+        ),
+        *(
+            Point(name=f"bridge/{leaf}", data_type=u32, description=f"{what}, since start")
+            for leaf, what in CONNECTION_COUNTS.items()
         ),
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
@@ -13,8 +14,9 @@ from bridge.command import Code, Event, Outcome, Rejection, Request
 from bridge.errors import OperationFailed
 from bridge.image import Image, Quality
 from bridge.mirror import protocol
-from bridge.mirror.protocol import Asked, Changed, Delta, Malformed, Snapshot
+from bridge.mirror.protocol import Asked, Changed, Counted, Delta, Malformed, Snapshot
 from bridge.mirror.rejections import Rejections
+from bridge.quietlog import about
 from bridge.zenohlink import Message, ZenohLink, zenoh_config
 
 _log = logging.getLogger(__name__)
@@ -55,6 +57,7 @@ class MirrorClient:
         self._points_changed = False
         self._listeners: list[Callable[[Event], None]] = []
         self._rejections = Rejections()
+        self._counts = Counter[str]()
 
     # what a northbound sees
 
@@ -98,9 +101,16 @@ class MirrorClient:
         """Told to the bus process within 0.1 s. While that is away nobody keeps a log, and it is lost."""
         self._rejections.add(rejection, self._clock())
 
+    def count(self, leaf: str) -> None:
+        """Told to the bus process within 0.1 s."""
+        self._counts[leaf] += 1
+
     def _tell_rejections(self) -> None:
         for rejected in self._rejections.take():
             self._link.send(Message(protocol.REJECTED, protocol.encode(rejected)))
+        counts, self._counts = self._counts, Counter[str]()
+        for leaf, by in counts.items():
+            self._link.send(Message(protocol.COUNTED, protocol.encode(Counted(leaf, by))))
 
     # life
 
@@ -236,5 +246,4 @@ class MirrorClient:
 
     def _count_malformed(self, error: Malformed) -> None:
         self.malformed += 1
-        if self.malformed == 1:
-            _log.warning("mirror: a message that is none of ours: %s", error)
+        _log.warning("mirror: a message that is none of ours: %s", error, extra=about("mirror"))

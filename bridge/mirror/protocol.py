@@ -11,6 +11,7 @@ from typing import Final, TypeVar
 import msgspec
 
 from bridge.command import Event, Kind, Outcome, Rejection, Request
+from bridge.command.points import CONNECTION_COUNTS
 from bridge.image import Point, Quality, Reading, Value
 
 SNAPSHOT: Final = "mirror/snapshot"
@@ -18,6 +19,7 @@ DELTA: Final = "mirror/delta"
 EVENT: Final = "mirror/event"
 REQUEST: Final = "mirror/request"
 REJECTED: Final = "mirror/rejected"
+COUNTED: Final = "mirror/counted"
 TOKEN: Final = "mirror/@/bus"
 
 _Model = TypeVar("_Model")
@@ -92,6 +94,13 @@ class Rejected(msgspec.Struct, array_like=True, frozen=True):
     rejection: Rejection
 
 
+class Counted(msgspec.Struct, array_like=True, frozen=True):
+    """What a front has counted since it last said so, for a point of the bridge's own."""
+
+    leaf: str
+    by: int
+
+
 _encoder = msgspec.msgpack.Encoder()
 _snapshot = msgspec.msgpack.Decoder(Snapshot)
 _delta = msgspec.msgpack.Decoder(Delta)
@@ -99,9 +108,10 @@ _told = msgspec.msgpack.Decoder(Told)
 _asked = msgspec.msgpack.Decoder(Asked)
 _outcome = msgspec.msgpack.Decoder(Outcome)
 _rejected = msgspec.msgpack.Decoder(Rejected)
+_counted = msgspec.msgpack.Decoder(Counted)
 
 
-def encode(message: Snapshot | Delta | Told | Asked | Rejected | Outcome) -> bytes:
+def encode(message: Snapshot | Delta | Told | Asked | Rejected | Counted | Outcome) -> bytes:
     return _encoder.encode(message)
 
 
@@ -129,6 +139,13 @@ def decode_request(data: bytes) -> Asked:
 
 def decode_rejected(data: bytes) -> Rejected:
     return _decode(_rejected, data)
+
+
+def decode_counted(data: bytes) -> Counted:
+    counted = _decode(_counted, data)
+    if counted.leaf not in CONNECTION_COUNTS or counted.by < 1:
+        raise Malformed(f"{counted.leaf} is nothing that a front counts")
+    return counted
 
 
 def decode_outcome(data: bytes) -> Outcome:

@@ -76,6 +76,7 @@ class MirrorPublisher:
         self._link.declare_queryable(protocol.SNAPSHOT, self._on_snapshot)
         self._link.declare_queryable(protocol.REQUEST, self._on_request)
         self._link.declare_subscriber(protocol.REJECTED, self._on_rejected)
+        self._link.declare_subscriber(protocol.COUNTED, self._on_counted)
         self._link.declare_token(protocol.TOKEN)
         self._plant.on_event(self._on_event)
         self._tick()
@@ -152,6 +153,14 @@ class MirrorPublisher:
             self.malformed += 1
             return
         self._plant.rejected(told.rejection, told.time_s, told.count)
+
+    def _on_counted(self, message: Message) -> None:
+        try:
+            told = protocol.decode_counted(message.payload)
+        except Malformed:
+            self.malformed += 1
+            return
+        self._plant.count(told.leaf, self._clock(), told.by)
 
     def _on_request(self, asked: Asked) -> None:
         def reply(outcome: Outcome) -> None:

@@ -6,7 +6,7 @@ from typing import Final
 
 from bridge.command import Event, Kind, Plant
 from bridge.command.worst_case import REACTION_BOUND_MS
-from bridge.southbound.ratelimit import RateLimit
+from bridge.ratelimit import RateLimit
 
 _EVENTS: Final = 3
 _EVENT_EVERY_S: Final = 60.0

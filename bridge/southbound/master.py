@@ -15,6 +15,7 @@ from math import inf
 
 from bridge.command import Event, Kind, Plant
 from bridge.errors import OperationFailed
+from bridge.ratelimit import RateLimit
 from bridge.southbound.bus import open_all
 from bridge.southbound.bus.burstend import MOST_FRAMES, BurstEnd
 from bridge.southbound.bus.interface import Bus, ControllerState
@@ -23,7 +24,6 @@ from bridge.southbound.ending import Ending, end, waits_for
 from bridge.southbound.lateness import Lateness
 from bridge.southbound.network import Beats, Network
 from bridge.southbound.process_data import Beat, Told
-from bridge.southbound.ratelimit import RateLimit
 from bridge.southbound.standstill import Alarm
 from bridge.southbound.suspend import SuspendWatch
 from bridge.southbound.timer import LoopTimer
@@ -44,7 +44,7 @@ _RENEWALS = 3
 _BUS_EVENTS = 10
 _BUS_EVENT_EVERY_S = 5.0
 _SEVERITIES = {
-    ControllerState.OK: 300,
+    ControllerState.OK: 200,
     ControllerState.WARNING: 300,
     ControllerState.PASSIVE: 600,
     ControllerState.BUS_OFF: 900,
@@ -354,7 +354,7 @@ class Master:
         message = "the kernel sends the bursts again"
         if refusal:
             message = f"the kernel takes no bursts ({refusal}): the bridge sends them itself, less evenly"
-        self._plant.report(Event(now, Kind.BUS, line.bus.name, 600 if refusal else 300, message))
+        self._plant.report(Event(now, Kind.BUS, line.bus.name, 600 if refusal else 200, message))
 
     def _flush(self, line: _Line, now: float) -> None:
         bus, network = line.bus, line.network

@@ -13,6 +13,7 @@ from typing import Final
 from bridge.command import Action, Event, Kind, Plant, Reply, Request
 from bridge.config import BusTable
 from bridge.config.download import Download
+from bridge.ratelimit import RateLimit
 from bridge.southbound import node_commands
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import BusStatus
@@ -27,7 +28,6 @@ from bridge.southbound.neighbours import Neighbour
 from bridge.southbound.node import NodeCore
 from bridge.southbound.node_wire import Handler
 from bridge.southbound.process_data import Beat
-from bridge.southbound.ratelimit import RateLimit
 from bridge.southbound.schedule import Schedule
 from bridge.southbound.startup import StartGate
 from bridge.southbound.watch import BusWatch

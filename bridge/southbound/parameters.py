@@ -254,6 +254,7 @@ class NodeParameters:
             drive.sdo_abort_code = outcome.abort_code
         if not outcome.ok and request.action is not Action.READ_PARAMETER:
             message = f"{request.action} by {request.identity} refused: {outcome.message}"
+            drive.channel.on_refused(self._now)
             self._plant.report(Event(self._now, Kind.REFUSED, drive.name, 300, message))
         reply(outcome)
 

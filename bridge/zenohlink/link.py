@@ -274,6 +274,19 @@ class ZenohLink:
 
         self.submit(declare)
 
+    def follow_endings(self, handler: Callable[[], None]) -> None:
+        """``handler`` is called for each connection to a peer that has ended."""
+
+        def on_event(event: zenoh.TransportEvent) -> None:
+            if event.kind == zenoh.SampleKind.DELETE:
+                self._inbox.take_in(handler)
+
+        def declare(session: zenoh.Session) -> None:
+            callback = zenoh.handlers.Callback(on_event, indirect=False)
+            self._worker.declared.append(session.info.declare_transport_events_listener(callback))
+
+        self.submit(declare)
+
     def declare_token(self, key: str) -> None:
         """Hold a liveliness token until ``drop_token``."""
 

@@ -90,6 +90,9 @@ class LocalView:
         self.rejections.append(rejection)
         self.plant.rejected(rejection, time.monotonic())
 
+    def count(self, leaf: str) -> None:
+        self.plant.count(leaf, time.monotonic())
+
     def _node_command(self, request: Request, now: float, reply: Reply) -> None:
         allowed = request.identity.role >= Role.OPERATOR
         reply(DONE if allowed else Outcome(Code.NOT_ALLOWED, "may only read"))

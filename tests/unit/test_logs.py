@@ -1,4 +1,4 @@
-"""What nobody caught in the event loop: told once in full, then seldom."""
+"""The log: what others can bring about is one line of each kind and source, then a count."""
 
 from __future__ import annotations
 
@@ -9,6 +9,119 @@ from collections.abc import Iterator
 import pytest
 
 from bridge.cli.logs import LoopFaults
+from bridge.quietlog import about
+from bridge.ratelimit import PAUSE_S
+from tests.support.quiet import QuietLog, quiet_log
+
+_log = logging.getLogger("somebody")
+
+
+@pytest.fixture
+def log() -> Iterator[QuietLog]:
+    with quiet_log() as log:
+        yield log
+
+
+def closed(host: str, number: int = 0) -> None:
+    _log.warning("connection of %s closed: %d", host, number, extra=about(host))
+
+
+def test_the_first_of_each_kind_and_source_is_a_line_and_the_others_a_count(log: QuietLog) -> None:
+    for number in range(1000):
+        closed("10.0.0.1", number)
+    closed("10.0.0.2")
+    assert log.lines == ["connection of 10.0.0.1 closed: 0", "connection of 10.0.0.2 closed: 0"]
+    assert log.pass_minute() == ["connection of 10.0.0.1 closed: 999 (999 more of this kind)"]
+
+
+def test_a_flood_that_goes_on_is_a_line_a_minute_and_then_it_begins_anew(log: QuietLog) -> None:
+    for _ in range(12):
+        for number in range(300):
+            closed("10.0.0.1", number)
+            log.now += PAUSE_S / 300
+        log.handler.sum_up()
+    assert len(log.lines) <= 1 + 12
+    log.pass_minute()
+    log.pass_minute()
+    closed("10.0.0.1", 7)
+    assert log.lines[-1] == "connection of 10.0.0.1 closed: 7"
+
+
+def test_a_kind_hides_no_other_one(log: QuietLog) -> None:
+    for kind in ("trip", "trip", "stop ignored"):
+        _log.error("fu1: %s", kind, extra=about("fu1", kind))
+    assert log.lines == ["fu1: trip", "fu1: stop ignored"]
+
+
+def test_who_makes_sources_up_shares_one_count(log: QuietLog) -> None:
+    for number in range(5000):
+        closed(f"nobody{number}")
+    assert len(log.lines) <= 201
+    assert sum(int(line.split("(")[1].split()[0]) for line in log.pass_minute()) >= 4799
+
+
+def test_a_line_that_nobody_has_thought_of_fills_no_disk(log: QuietLog) -> None:
+    for number in range(5000):
+        _log.warning("something with %d", number)
+        _log.warning("and always the same")
+    assert len(log.lines) <= 200 + 1 + 1
+    assert len(log.pass_minute()) <= 2
+
+
+def test_what_is_said_at_the_start_is_said_whole(log: QuietLog) -> None:
+    for number in range(90):
+        _log.warning("finding %d", number)
+    assert len(log.lines) == 90
+
+
+def test_a_traceback_is_told_once(log: QuietLog) -> None:
+    for _ in range(100):
+        try:
+            raise KeyError("x")
+        except KeyError:
+            _log.exception("unexpected", extra=about("part"))
+    assert sum("Traceback" in line for line in log.lines) == 1
+    assert log.pass_minute() == ["unexpected (99 more of this kind)"]
+
+
+def test_one_timer_waits_for_all_counts_and_the_end_brings_them_too(log: QuietLog) -> None:
+    for number in range(10):
+        closed("10.0.0.1", number)
+        closed("10.0.0.2", number)
+    (timer,) = log.timers
+    assert timer.delay_s == PAUSE_S
+    before = len(log.lines)
+    log.handler.acquire()
+    log.handler.release()
+    log.handler.close()
+    assert len(log.lines) - before == 2
+
+
+def test_no_thread_and_no_fault_of_the_caller_raises_through_the_log(
+    log: QuietLog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(logging, "raiseExceptions", False)
+    _log.warning("%d", "no number")
+
+    def start(self: object) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr("tests.support.quiet.NoTimer.start", start)
+    closed("10.0.0.1")
+    closed("10.0.0.1")
+    monkeypatch.undo()
+    closed("10.0.0.1")
+    assert len(log.timers) == 2, "the next one tries again"
+
+
+def test_what_is_asked_for_with_verbose_is_all_there(log: QuietLog) -> None:
+    logging.getLogger().setLevel(logging.DEBUG)
+    for _ in range(10):
+        _log.debug("frame")
+    assert log.lines == ["frame"] * 10
+
+
+# event loops
 
 
 @pytest.fixture
@@ -32,30 +145,20 @@ def other_fault() -> BaseException:
         return error
 
 
-def test_the_same_fault_is_told_once_a_minute_and_with_its_traceback_once(
-    loop: asyncio.AbstractEventLoop, caplog: pytest.LogCaptureFixture
+def test_what_nobody_caught_is_told_with_its_traceback_once_for_each_place(
+    loop: asyncio.AbstractEventLoop, log: QuietLog
 ) -> None:
-    now = [0.0]
-    faults = LoopFaults(lambda: now[0])
+    faults = LoopFaults()
     for number in range(100):
         faults(loop, {"message": f"in callback {number}", "exception": fault(number)})
-        now[0] += 1.0
-    first, second = caplog.records
-    assert first.levelno == logging.ERROR and first.exc_info and "KeyError(0)" in first.message
-    assert not second.exc_info and "59 more since" in second.message
+        faults(loop, {"message": f"in callback {number}", "exception": other_fault()})
+    assert sum("Traceback" in line for line in log.lines) == 2
+    assert any("KeyError(0)" in line for line in log.lines)
+    assert len(log.pass_minute()) == 2
 
 
-def test_another_place_is_told_too(loop: asyncio.AbstractEventLoop, caplog: pytest.LogCaptureFixture) -> None:
-    faults = LoopFaults(lambda: 0.0)
-    for error in (fault(1), other_fault(), fault(2), other_fault()):
-        faults(loop, {"message": "in callback", "exception": error})
-    assert len(caplog.records) == 2
-
-
-def test_what_has_no_exception_is_told_too(
-    loop: asyncio.AbstractEventLoop, caplog: pytest.LogCaptureFixture
-) -> None:
-    faults = LoopFaults(lambda: 0.0)
+def test_what_has_no_exception_is_told_too(loop: asyncio.AbstractEventLoop, log: QuietLog) -> None:
+    faults = LoopFaults()
     for _ in range(3):
         faults(loop, {"message": "Task was destroyed but it is pending!"})
-    assert [record.message for record in caplog.records] == ["Task was destroyed but it is pending!"]
+    assert log.lines == ["Task was destroyed but it is pending!"]

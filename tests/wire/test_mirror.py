@@ -299,3 +299,17 @@ async def test_a_front_waits_for_its_bus_process(endpoint: str) -> None:
         await asyncio.wait_for(opening, 5)
         assert client.image.points
     await client.close()
+
+
+async def test_what_a_front_counts_is_a_point(endpoint: str) -> None:
+    plant = make_plant()
+    async with publishing(endpoint, plant), front(endpoint) as client:
+        for _ in range(3):
+            client.count("opcua_refused_connections")
+        client.count("opcua_broken_connections")
+
+        def counts(name: str) -> tuple[object, ...]:
+            images = plant.image, client.image
+            return tuple(image.read(f"bridge/opcua_{name}_connections").value for image in images)
+
+        await until(lambda: (counts("refused"), counts("broken")) == ((3, 3), (1, 1)), "the counts")

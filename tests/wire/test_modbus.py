@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import re
 import shutil
 import struct
@@ -316,12 +317,12 @@ async def test_a_frame_in_single_bytes(server: ModbusServer):
     writer.close()
 
 
-async def test_a_wrong_protocol_id_ends_the_connection(server: ModbusServer):
+async def test_a_wrong_protocol_id_ends_the_connection(plant: Plant, server: ModbusServer):
     reader, writer = await asyncio.open_connection(HOST, server.port)
     writer.write(adu(1, 1, bytes.fromhex("03 0000 0001")) + bytes.fromhex("0002 0001 0002 01 03"))
     assert (await one_answer(reader))[0] == 1
     assert await asyncio.wait_for(reader.read(), 5) == b""
-    assert server.broken_connections == 1
+    assert plant.image.read("bridge/modbus_broken_connections").value == 1
     assert server.sessions == 0
     writer.close()
 
@@ -334,8 +335,10 @@ async def test_strangers_are_turned_away(plant: Plant, caplog: pytest.LogCapture
             writer.close()
         async with pymodbus(server) as client:
             assert (await client.read_holding_registers(0, count=1, device_id=1)).registers == [0x0400]
-        assert server.refused_connections == 3
-        assert sum("refused" in record.message for record in caplog.records) == 1  # once a minute
+        assert plant.image.read("bridge/modbus_refused_connections").value == 3
+        assert {source_of(record) for record in caplog.records if "refused" in record.message} == {
+            "127.0.0.2"
+        }
 
 
 async def test_idle_connections_make_room_and_the_owner_goes_last(
@@ -354,7 +357,8 @@ async def test_idle_connections_make_room_and_the_owner_goes_last(
         for _ in range(5):
             idle += [await asyncio.open_connection(HOST, server.port, local_addr=("127.0.0.3", 0))]
         assert not (await plc.write_registers(0, [0x047F, 0], device_id=1)).isError(), "the owner stays"
-        assert sum("closed to make room" in record.message for record in caplog.records) == 1
+        said = [source_of(record) for record in caplog.records if "closed to make room" in record.message]
+        assert set(said) == {"127.0.0.3"}, "of one kind and source: the log has one line and a count"
         for _, writer in idle:
             writer.close()
 
@@ -369,6 +373,11 @@ async def test_where_all_own_a_drive_the_idlest_makes_room(plant: Plant):
             assert server.sessions == 2
 
 
+def source_of(record: logging.LogRecord) -> object:
+    """Whom the log counts a line for."""
+    return vars(record)["line_source"]
+
+
 async def closed_by_the_other_side(reader: asyncio.StreamReader) -> bool:
     try:
         return await asyncio.wait_for(reader.read(), 5) == b""
@@ -377,7 +386,7 @@ async def closed_by_the_other_side(reader: asyncio.StreamReader) -> bool:
 
 
 async def test_a_client_that_reads_nothing_is_dropped_and_harms_no_other(
-    server: ModbusServer, monkeypatch: pytest.MonkeyPatch
+    plant: Plant, server: ModbusServer, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr(session, "STALL_LIMIT_S", 0.3)
     _, writer = await asyncio.open_connection(HOST, server.port)
@@ -391,7 +400,7 @@ async def test_a_client_that_reads_nothing_is_dropped_and_harms_no_other(
             slowest = max(slowest, time.monotonic() - begin)
         assert slowest < 0.5
     await flood
-    assert server.broken_connections == 1
+    assert plant.image.read("bridge/modbus_broken_connections").value == 1
 
 
 async def pour(writer: asyncio.StreamWriter, data: bytes) -> None:

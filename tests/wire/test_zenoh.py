@@ -10,9 +10,19 @@ import time
 import pytest
 
 from bridge.command.link import NodeState
-from tests.support.zenoh_peer import until
+from bridge.config import ZenohTable
+from bridge.northbound.zenoh import ZenohServer
+from tests.support.zenoh_peer import free_port, until, zenoh_peer
 from tests.support.zenoh_rig import FU3, TOP, rig
-from tests.support.zenoh_site import ENABLED, READY, SWITCH_ON_INHIBITED, drive_says, node_is
+from tests.support.zenoh_site import (
+    ENABLED,
+    READY,
+    SWITCH_ON_INHIBITED,
+    drive_says,
+    epoch,
+    make_plant,
+    node_is,
+)
 
 
 async def test_section_6_8_of_the_manual_is_played_through_zenoh() -> None:
@@ -244,3 +254,20 @@ async def test_a_client_that_stalls_costs_the_loop_nothing() -> None:
             return ((r.peer.latest(f"{FU3}/actual/value_1") or {}).get("v") or 0) > 1000
 
         await until(is_served_again, "values after the stall", 20)
+
+
+async def test_connections_that_have_ended_are_counted() -> None:
+    plant, endpoint = make_plant(), f"tcp/127.0.0.1:{free_port()}"
+    table = ZenohTable.model_validate({"listen": [endpoint]})
+    server = ZenohServer(plant, table, "demo", time.monotonic, epoch)
+    await server.start()
+    try:
+        for number in (1, 2):
+            async with zenoh_peer(endpoint):
+                assert plant.image.read("bridge/zenoh_broken_connections").value == number - 1
+            await until(
+                lambda number=number: plant.image.read("bridge/zenoh_broken_connections").value == number,
+                "the end of a connection",
+            )
+    finally:
+        await server.close()

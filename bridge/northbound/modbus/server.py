@@ -15,10 +15,10 @@ from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.modbus.dispatch import Dispatcher
 from bridge.northbound.modbus.session import READ_MOST, Session
 from bridge.northbound.pulse import Pulse
+from bridge.quietlog import about
 
 _log = logging.getLogger(__name__)
 
-_LOG_PAUSE_S: Final = 60.0
 _WINDOW: Final = 4 * READ_MOST
 """Bytes that may wait in the kernel: more than are read at once, so that who fills it is noticed."""
 
@@ -38,11 +38,6 @@ class ModbusServer:
         self._sessions: set[Session] = set()
         self._server: asyncio.Server | None = None
         self._socket: socket.socket | None = None
-        self._logged: dict[str, float] = {}
-        self.refused_connections = 0
-        self.broken_connections = 0
-        """Connections that we ended: not Modbus, a client that did not read its answers, or one that made
-        room for another."""
 
     @property
     def port(self) -> int:
@@ -94,9 +89,12 @@ class ModbusServer:
         """The identity of a client, or None where its address may not connect."""
         address = _normalised(host)
         if not any(address in network for network in self._allowed):
-            self.refused_connections += 1
-            why = "it is in none of the networks of modbus.allow"
-            self._warn("connection of %s refused: %s", str(address), why)
+            self._plant.count("modbus_refused_connections", self._clock())
+            _log.warning(
+                "connection of %s refused: it is in none of the networks of modbus.allow",
+                address,
+                extra=about(str(address)),
+            )
             return None
         if len(self._sessions) >= self._settings.max_connections:
             self._make_room()
@@ -114,8 +112,8 @@ class ModbusServer:
             self._plant.on_connection(identity, self._clock(), is_there=False)
 
     def on_fault(self, session: Session, fault: str) -> None:
-        self.broken_connections += 1
-        self._warn("connection of %s closed: %s", session.address, fault)
+        self._plant.count("modbus_broken_connections", self._clock())
+        _log.warning("connection of %s closed: %s", session.address, fault, extra=about(session.host))
 
     def _make_room(self) -> None:
         """End the connection that is missed least: idle clients must not lock the PLC out."""
@@ -126,21 +124,15 @@ class ModbusServer:
             return identity is not None and any(map(identity.is_same, owners)), session.heard_at
 
         idlest = min(self._sessions, key=is_missed)
-        self.broken_connections += 1
-        self._warn(
-            "connection of %s closed to make room: there are %s, and it was idle the longest",
+        self._plant.count("modbus_broken_connections", self._clock())
+        _log.warning(
+            "connection of %s closed to make room: there are %d, and it was idle the longest",
             idlest.address,
-            str(len(self._sessions)),
+            len(self._sessions),
+            extra=about(idlest.host),
         )
         self._sessions.discard(idlest)
         idlest.close()
-
-    def _warn(self, message: str, *details: str) -> None:
-        """Log at most once a minute per message: what a stranger sends must not fill a disk."""
-        now = self._clock()
-        if now - self._logged.get(message, -_LOG_PAUSE_S) >= _LOG_PAUSE_S:
-            self._logged[message] = now
-            _log.warning(message, *details)
 
 
 def _normalised(host: str) -> IpAddress:

@@ -67,6 +67,11 @@ class Session(asyncio.BufferedProtocol):
     def address(self) -> str:
         return self.identity.address if self.identity else ""
 
+    @property
+    def host(self) -> str:
+        """The client's address without its port."""
+        return self.identity.user if self.identity else ""
+
     def close(self) -> None:
         """End the connection; answers that the client does not take are lost."""
         transport = self._transport

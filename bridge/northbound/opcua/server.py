@@ -162,6 +162,7 @@ class OpcUaServer:
             # It tells every request at INFO.
             library_log.setLevel(logging.WARNING)
         inner = Server(no_security=self._settings.no_security)
+        inner.count = self._view.count
         inner.certificate, inner.private_key = own.certificate, own.private_key
         server = _Outer(inner, bound, trusted, self._pulse)
         await self._describe(server, users)

@@ -211,6 +211,8 @@ class Server(InternalServer):
     def __init__(self, *, no_security: bool) -> None:
         super().__init__()
         self.no_security = no_security
+        self.count: Callable[[str], None] = lambda leaf: None
+        """Counts up a point of the bridge's own."""
         # asyncua's own lets `admin` in with any password, as Admin. Logins are checked in the processor.
         self.user_manager = None  # pyright: ignore[reportAttributeAccessIssue]
         self.allow_remote_admin = False

@@ -114,8 +114,10 @@ class Processor(UaProcessor):
         try:
             return bool(await super().process(header, body))
         except (ServiceError, UaStatusCodeError) as error:
+            self._server.count("opcua_refused_connections")
             code = int(error.code)
         except _MALFORMED as error:
+            self._server.count("opcua_broken_connections")
             _log.warning("closed the connection from %s: malformed message: %r", self.name, error)
             is_open = self._connection.is_open()
             code = StatusCodes.BadTcpInternalError if is_open else StatusCodes.BadSecurityChecksFailed
@@ -150,7 +152,11 @@ class Processor(UaProcessor):
             session = self._session_to_activate(requesthdr)
             params = struct_from_binary(ua.ActivateSessionParameters, body.copy())
             # Nothing awaits between here and activate_session, so this login is for this call.
-            session.admitted = await self._login(session, get(params, "UserIdentityToken"))
+            try:
+                session.admitted = await self._login(session, get(params, "UserIdentityToken"))
+            except ServiceError:
+                self._server.count("opcua_refused_connections")
+                raise
         try:
             return await super()._process_message(typeid, requesthdr, seqhdr, body)
         except InvalidSignature:
@@ -242,6 +248,8 @@ class _Protocol(OPCUAProtocol):
             _log.warning("closed the connection from %s: a chunk without end", self.peer_name)
             self._buffer = b""
             self.transport.close()
+            if isinstance(self.iserver, Server):
+                self.iserver.count("opcua_broken_connections")
 
 
 class Listener(BinaryServer):

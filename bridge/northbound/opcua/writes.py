@@ -22,6 +22,7 @@ from bridge.northbound.opcua.library import GOOD, AttributeIds, StatusCodes, get
 from bridge.northbound.opcua.nodes import VariableNode
 from bridge.northbound.opcua.values import outcome_status, plain_value, point_value, rejection
 from bridge.northbound.view import View
+from bridge.quietlog import about
 
 _log = logging.getLogger(__name__)
 
@@ -81,7 +82,13 @@ async def ask(view: View, request: Request) -> Outcome:
         async with asyncio.timeout(ANSWER_LIMIT_S):
             return await view.request(replace(request, received_at=received_at.get()))
     except TimeoutError:
-        _log.warning("%s on %s: no outcome within %g s", request.action, request.target, ANSWER_LIMIT_S)
+        _log.warning(
+            "%s on %s: no outcome within %g s",
+            request.action,
+            request.target,
+            ANSWER_LIMIT_S,
+            extra=about(request.target),
+        )
         return Outcome(Code.TIMED_OUT, "no outcome in time", forwarded=False)
 
 

@@ -24,6 +24,7 @@ from bridge.northbound.pulse import Pulse
 from bridge.northbound.zenoh import keys
 from bridge.northbound.zenoh.askers import Askers
 from bridge.northbound.zenoh.commands import MALFORMED, BadCommand, Commands, identity_of
+from bridge.quietlog import about
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 
 _log = logging.getLogger(__name__)
@@ -79,6 +80,7 @@ class ZenohServer:
         if self._settings.accept_put:
             self._link.declare_subscriber(self._keys.commands, self._on_put, from_others=True)
         self._link.declare_token(self._keys.bridge_token)
+        self._link.follow_endings(lambda: self._plant.count("zenoh_broken_connections", self._clock()))
         self._plant.on_event(self._on_event)
         self._tick()
 
@@ -247,7 +249,7 @@ class ZenohServer:
             identity = self._identity(message.attachment)
             request = self._commands.request(self._keys.tail(message.key), message.payload, identity)
         except BadCommand as bad:
-            _log.info("zenoh: a put on %s is no command: %s", message.key, bad.message)
+            _log.info("zenoh: a put on %s is no command: %s", message.key, bad.message, extra=about("puts"))
             self._note_refusal(self._keys.tail(message.key), message.attachment, bad)
             return
         self._submit(request, message.received_at, lambda _: None)

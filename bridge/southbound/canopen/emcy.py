@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.southbound.ratelimit import RateLimit
+from bridge.ratelimit import RateLimit
 
 _HEAD: Final = struct.Struct("<HB")
 _HISTORY: Final = 8

@@ -12,11 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Rejection, Request, Role, Source
+from bridge.command.points import CONNECTION_COUNTS
 from bridge.errors import Unavailable
 from bridge.image import DataType, Point, Quality
 from bridge.mirror import protocol, socket_endpoint
 from bridge.mirror.endpoint import prepare_folder
-from bridge.mirror.protocol import Asked, Changed, Delta, Malformed, Rejected, Snapshot, Told
+from bridge.mirror.protocol import Asked, Changed, Counted, Delta, Malformed, Rejected, Snapshot, Told
 from tests.support.zenoh_site import make_plant
 
 values = st.booleans() | st.integers(-(2**31), 2**32 - 1) | st.floats(allow_nan=False) | st.text(max_size=20)
@@ -131,3 +132,14 @@ def test_a_path_that_is_no_socket_path_is_refused(tmp_path: Path) -> None:
         socket_endpoint(tmp_path / ("x" * 100), "hall3")
     with pytest.raises(Unavailable, match="must not contain"):
         socket_endpoint(tmp_path / "a#b", "hall3")
+
+
+@given(st.sampled_from(sorted(CONNECTION_COUNTS)), st.integers(1, 10**6))
+def test_counts_read_back(leaf: str, by: int) -> None:
+    assert protocol.decode_counted(protocol.encode(Counted(leaf, by))) == Counted(leaf, by)
+
+
+@pytest.mark.parametrize(("leaf", "by"), [("refused_writes", 1), ("opcua_refused_connections", 0), ("", -1)])
+def test_a_front_counts_nothing_else(leaf: str, by: int) -> None:
+    with pytest.raises(Malformed):
+        protocol.decode_counted(protocol.encode(Counted(leaf, by)))

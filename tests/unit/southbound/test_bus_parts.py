@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge.ratelimit import RateLimit
 from bridge.southbound.bus import bcm, netlink
 from bridge.southbound.bus.errorframe import ControllerState, describe, judge
 from bridge.southbound.bus.explain import WrongBitrate, explain
@@ -18,7 +19,6 @@ from bridge.southbound.bus.frame import EXTENDED, REMOTE, Frame
 from bridge.southbound.bus.outbox import Outbox
 from bridge.southbound.bus.softbeat import SoftBeat
 from bridge.southbound.bus.wirebits import WireBits, exact_bits
-from bridge.southbound.ratelimit import RateLimit
 
 ERROR = 0x2000_0000
 

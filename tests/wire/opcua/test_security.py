@@ -121,6 +121,13 @@ async def control_word(client: Client) -> int:
     return result.value
 
 
+def counted(served: Served, what: str) -> int:
+    """Connections that were refused or broken, as the point says."""
+    value = served[1].plant.image.read(f"bridge/opcua_{what}_connections").value
+    assert isinstance(value, int)
+    return value
+
+
 class TestEncrypted:
     @pytest.mark.parametrize("policy", POLICIES)
     async def test_an_operator_with_a_password_commands(
@@ -138,9 +145,11 @@ class TestEncrypted:
     async def test_a_wrong_password_or_name_does_not_get_in(
         self, strict: Served, scada: Peer, user: str, password: str
     ) -> None:
+        before = counted(strict, "refused")
         with pytest.raises(Refused):
             async with logged_in(strict, scada, user, password):
                 pass
+        assert counted(strict, "refused") == before + 1
 
     async def test_nobody_gets_in_without_a_name(self, strict: Served, scada: Peer) -> None:
         client = Client(strict[0].endpoint_url, timeout=10)
@@ -206,9 +215,11 @@ class TestTrust:
         async with serving(settings, tmp_path) as served:
             async with logged_in(served, scada, "anna", PASSWORD) as client:
                 assert await control_word(client) == Codes.Good
+            assert counted(served, "refused") == 0
             with pytest.raises((ua.UaError, ConnectionError)):
                 async with logged_in(served, stranger, "anna", PASSWORD):
                     pass
+            assert counted(served, "refused") == 1
             # A copied file is enough, without a restart.
             (trusted / "stranger.der").write_bytes(stranger.certificate)
             async with logged_in(served, stranger, "anna", PASSWORD) as client:
@@ -366,9 +377,11 @@ class TestSessions:
             await client.nodes.server_state.read_value()
 
     async def test_a_chunk_without_end_is_cut_off(self, open_: Served) -> None:
+        before = counted(open_, "broken")
         reader, writer = await asyncio.open_connection("127.0.0.1", open_[0].port)
         writer.write(b"MSGF\xff\xff\xff\xff" + bytes(200_000))
         async with asyncio.timeout(3):
             with suppress(ConnectionError):
                 assert await reader.read(1000) == b""
+        assert counted(open_, "broken") == before + 1
         writer.close()

@@ -1,0 +1,99 @@
+"""How often something may be told: what somebody can bring about at will must not fill a disk. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from typing import Final, Generic, TypeVar
+
+Item = TypeVar("Item")
+
+PAUSE_S: Final = 60.0
+_MOST_SOURCES: Final = 200
+"""Of each kind: a bus has no more nodes. Further ones count as one."""
+_MOST_KINDS: Final = 200
+
+
+class RateLimit:
+    """At most ``burst`` at once and one every ``every_s`` seconds after that."""
+
+    __slots__ = ("_burst", "_every_s", "_filled_at", "_tokens")
+
+    def __init__(self, burst: int, every_s: float) -> None:
+        self._burst = burst
+        self._every_s = every_s
+        self._tokens = float(burst)
+        self._filled_at: float | None = None
+
+    def allows(self, now: float) -> bool:
+        """Take a token, if there is one."""
+        if self._filled_at is not None:
+            fill = max(0.0, now - self._filled_at) / self._every_s
+            self._tokens = min(float(self._burst), self._tokens + fill)
+        self._filled_at = now
+        if self._tokens < 1:
+            return False
+        self._tokens -= 1
+        return True
+
+
+@dataclass(slots=True)
+class _Told(Generic[Item]):
+    """What is kept of one kind and source since ``at``; ``last`` is the newest that was left out."""
+
+    at: float
+    left_out: int = 0
+    last: Item | None = None
+
+
+class Repeats(Generic[Item]):
+    """The first of each kind and source is told, then how many there were: once every ``pause_s``, as long as
+    there are more."""
+
+    def __init__(self, pause_s: float = PAUSE_S) -> None:
+        self._pause_s = pause_s
+        self._told: dict[Hashable, dict[Hashable, _Told[Item]]] = {}
+
+    def admits(self, kind: Hashable, source: Hashable, item: Item, now: float) -> bool:
+        """Whether ``item`` is told now; else it is counted."""
+        if kind not in self._told and len(self._told) >= _MOST_KINDS:
+            self._forget(now)
+            kind = kind if len(self._told) < _MOST_KINDS else None
+        sources = self._told.setdefault(kind, {})
+        if source not in sources and len(sources) >= _MOST_SOURCES:
+            source = None
+        told = sources.get(source)
+        if told is None or self._is_over(told, now):
+            sources[source] = _Told(now)
+            return True
+        told.left_out += 1
+        told.last = item
+        return False
+
+    def due(self, now: float) -> list[tuple[Item, int]]:
+        """The last of each that was left out, and how many were, where that is to be told by ``now``."""
+        self._forget(now)
+        found: list[tuple[Item, int]] = []
+        for sources in self._told.values():
+            for source, told in sources.items():
+                if told.last is not None and now - told.at >= self._pause_s:
+                    found.append((told.last, told.left_out))
+                    sources[source] = _Told(now)
+        return found
+
+    def _is_over(self, told: _Told[Item], now: float) -> bool:
+        return told.last is None and now - told.at >= self._pause_s
+
+    def _forget(self, now: float) -> None:
+        """Those of which there were no more."""
+        for kind, sources in list(self._told.items()):
+            for source in [source for source, told in sources.items() if self._is_over(told, now)]:
+                del sources[source]
+            if not sources:
+                del self._told[kind]
+
+    def next_due(self) -> float | None:
+        """When ``due`` has something to say at the earliest; None where nothing was left out."""
+        waiting = (told.at for sources in self._told.values() for told in sources.values() if told.left_out)
+        first = min(waiting, default=None)
+        return None if first is None else first + self._pause_s

@@ -75,7 +75,10 @@ def _shown(value: Value) -> Value:
 
 class AuditLog:
     """Writes what ``plant`` is asked. ``clock`` is monotonic, ``epoch`` turns such a time into ns since
-    1970 UTC. What is lost is counted in ``bridge/audit_lost``."""
+    1970 UTC. What is lost is counted in ``bridge/audit_lost``.
+
+    ``refused`` takes what was refused: whoever is refused again and again pushes nothing out of ``file``.
+    """
 
     def __init__(
         self, plant: Plant, site: Site, clock: Callable[[], float], epoch: Callable[[float], int]
@@ -84,23 +87,28 @@ class AuditLog:
         self._plant = plant
         self._clock = clock
         self._epoch = epoch
-        self._fault = ""
         path = Path(settings.file) if settings.file else Path(site.site.state_dir) / "audit.jsonl"
         self.file = AuditFile(path, settings.max_bytes, settings.keep)
+        refused = path.with_name(f"{path.stem}-refused{path.suffix}")
+        self.refused = AuditFile(refused, settings.max_bytes, settings.keep)
+        self._files = (self.file, self.refused)
+        self._faults = ["" for _ in self._files]
         self._is_enabled = settings.enabled
         plant.audit.every_telegram = settings.every_telegram
         plant.set("bridge/audit_lost", 0, plant.began)
 
     def start(self) -> None:
         if self._is_enabled:
-            self.file.start()
+            for file in self._files:
+                file.start()
             self._plant.audit.tell = self._on_entry
 
     def close(self) -> None:
         if self._is_enabled:
             self._plant.audit.sum_up(self._clock())
             self._plant.audit.tell = None
-            self.file.close()
+            for file in self._files:
+                file.close()
 
     async def run(self) -> None:
         """Until cancelled: summaries, and whether lines are lost."""
@@ -110,16 +118,21 @@ class AuditLog:
 
     def look(self, now: float) -> None:
         self._plant.audit.on_time(now)
-        lost, fault = self.file.all_lost, self.file.fault
-        self._plant.set("bridge/audit_lost", lost, now)
-        if fault != self._fault:
-            self._fault = fault
-            if fault:
-                message = f"the audit log is not written: {self.file.path}: {fault}"
-                self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", 600, message))
-            else:
-                message = f"the audit log is written again; {lost} lines are missing"
-                self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", 300, message))
+        self._plant.set("bridge/audit_lost", sum(file.all_lost for file in self._files), now)
+        for place, file in enumerate(self._files):
+            fault = file.fault
+            if fault != self._faults[place]:
+                self._faults[place] = fault
+                self._tell(file, fault, now)
+
+    def _tell(self, file: AuditFile, fault: str, now: float) -> None:
+        if fault:
+            message = f"the audit log is not written: {file.path}: {fault}"
+            self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", 600, message))
+        else:
+            message = f"the audit log is written again; {file.all_lost} lines are missing"
+            self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", 300, message))
 
     def _on_entry(self, entry: Entry) -> None:
-        self.file.put(as_line(entry, self._epoch(entry.time)))
+        file = self.refused if entry.is_refused else self.file
+        file.put(as_line(entry, self._epoch(entry.time)))

@@ -7,21 +7,31 @@ disk: its telegrams are told where they change something, and else counted.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
 from bridge.command.request import Action, Code, Identity, Outcome, Reply, Request, Role, Source
 from bridge.image import Image, Value
+from bridge.ratelimit import RateLimit
 
 Values = dict[str, Value]
 
+IGNORED: Final = "ignored"
+"""How a stop ends that the drive did not follow."""
 SUMMARY_S: Final = 60.0
 """How often it is told what was only counted."""
 SETPOINTS_S: Final = 1.0
 """Where setpoints alone change, one telegram of each drive is told in this time, at last the newest."""
-_MOST_IN_A_SECOND: Final = 20
-_MOST_KEYS: Final = 1000
+AT_ONCE: Final = 20
+"""Entries of one share, then one every so many seconds: of what one client is refused, whatever it asks for
+and whatever it calls itself; of what it has done with one drive or node in one way."""
+REFUSED_EVERY_S: Final = 3.0
+DONE_EVERY_S: Final = 1.0
+_MOST_SHARES: Final = 1000
+_CARRIED_OUT: Final = (Code.OK, Code.TIMED_OUT, Code.CANCELLED, Code.REFUSED_BY_DRIVE, IGNORED)
+"""How requests end of which a drive or node has been told; the others were refused before that."""
 _BRIDGE: Final = Identity(Source.NONE, "drivebridge", Role.ENGINEER)
+_ACTIONS: Final = frozenset(Action) | {"call"}
 _READS: Final = "read_"
 """Actions that only read begin with it."""
 
@@ -63,6 +73,11 @@ class Entry:
     new: Values = field(default_factory=dict[str, Value])
     count: int = 1
 
+    @property
+    def is_refused(self) -> bool:
+        """Nobody but who asked has heard of it: anybody can bring about any number of these."""
+        return self.ending.code not in _CARRIED_OUT
+
 
 @dataclass(slots=True)
 class _Telegrams:
@@ -82,17 +97,34 @@ class _Telegrams:
         if now - self.begin >= 1.0:
             self.begin, self.told = now, 0
         self.told += 1
-        return self.told <= _MOST_IN_A_SECOND
+        return self.told <= AT_ONCE
 
 
 @dataclass(slots=True)
-class _Others:
-    """Requests of one kind within the present second, and those since the last summary that were too many."""
+class _Share:
+    """Entries that count together: how many may be told, and those since the last summary that were more."""
 
-    begin: float
-    told: int = 0
+    limit: RateLimit
+    is_new: bool = True
+    is_used: bool = True
     left_out: int = 0
     last: Entry | None = None
+
+    def takes(self, entry: Entry) -> bool:
+        """Whether it is told now; else it is counted."""
+        is_new, self.is_new, self.is_used = self.is_new, False, True
+        # The first of its kind is told whatever else the client was refused.
+        if self.limit.allows(entry.time) or is_new:
+            return True
+        self.left_out += entry.count
+        self.last = entry
+        return False
+
+    def sum_up(self, now: float) -> Entry | None:
+        """The last of those that were left out, for all of them."""
+        last, left_out = self.last, self.left_out
+        self.is_used, self.left_out, self.last = False, 0, None
+        return replace(last, time=now, old={}, new={}, count=left_out) if last else None
 
 
 class AuditTrail:
@@ -106,7 +138,9 @@ class AuditTrail:
         self.every_telegram = False
         self._image = image
         self._telegrams: dict[str, _Telegrams] = {}
-        self._others: dict[tuple[str, str, str, str], _Others] = {}
+        self._shares: dict[tuple[str, ...], _Share] = {}
+        self._limits: dict[tuple[str, ...], RateLimit] = {}
+        """Of what each client may be refused."""
         self._summary_at = float("-inf")
 
     def follow(self, request: Request, now: float, reply: Reply) -> Reply:
@@ -208,20 +242,23 @@ class AuditTrail:
             telegrams.repeated = 0
 
     def _note_other(self, entry: Entry) -> None:
-        identity = entry.identity
-        kind = entry.action if entry.ending.code == Code.OK else f"{entry.action} refused"
-        key = (identity.source.label, identity.user, entry.target, kind)
-        if key not in self._others and len(self._others) >= _MOST_KEYS:
-            key = ("", "", "", kind)  # somebody who invents names
-        others = self._others.setdefault(key, _Others(entry.time))
-        if entry.time - others.begin >= 1.0:
-            others.begin, others.told = entry.time, 0
-        if others.told < _MOST_IN_A_SECOND:
-            others.told += 1
+        if self._share(entry).takes(entry):
             self._tell(entry)
-        else:
-            others.left_out += entry.count
-            others.last = entry
+
+    def _share(self, entry: Entry) -> _Share:
+        """What is refused is counted by how, and limited by client: targets and names can be made up."""
+        client = (entry.identity.source.label, client_of(entry.identity))
+        kind = (entry.action if entry.action in _ACTIONS else "", str(entry.ending.code))
+        key = (*client, *kind) if entry.is_refused else (*client, *kind, entry.target)
+        if key not in self._shares and len(self._shares) >= _MOST_SHARES:
+            client, key = ("", ""), ("", "", *kind)
+        share = self._shares.get(key)
+        if share is None:
+            limit = RateLimit(AT_ONCE, DONE_EVERY_S)
+            if entry.is_refused:
+                limit = self._limits.setdefault(client, RateLimit(AT_ONCE, REFUSED_EVERY_S))
+            share = self._shares[key] = _Share(limit)
+        return share
 
     def on_time(self, now: float) -> None:
         """Tell what has waited long enough; call it about once a second."""
@@ -238,18 +275,29 @@ class AuditTrail:
         """Tell what was only counted."""
         for target, telegrams in self._telegrams.items():
             self._tell_waiting(target, telegrams)
-        for others in self._others.values():
-            if others.left_out and others.last is not None:
-                last = others.last
-                left_out = Entry(
-                    now, last.identity, last.target, last.action, last.ending, count=others.left_out
-                )
+        for key, share in list(self._shares.items()):
+            if not share.is_used:
+                del self._shares[key]
+                continue
+            left_out = share.sum_up(now)
+            if left_out is not None:
                 self._tell(left_out)
-        self._others.clear()
+        used = {key[:2] for key in self._shares}
+        for client in [client for client in self._limits if client not in used]:
+            del self._limits[client]  # a minute has filled it
 
     def _tell(self, entry: Entry) -> None:
         if self.tell is not None:
             self.tell(entry)
+
+
+def client_of(identity: Identity) -> str:
+    """Where a request came from: the client's address without its port, or nothing where the protocol does
+    not know it, whatever its clients call themselves."""
+    address = identity.address
+    if address.startswith("["):
+        return address[1:].partition("]")[0]
+    return address.partition(":")[0] if address.count(":") == 1 else address
 
 
 def _goes_on(before: _Telegrams, entry: Entry) -> bool:

@@ -4,31 +4,43 @@ Sans-IO."""
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Final
 
 from bridge.command import Rejection
+from bridge.command.audit import client_of
 from bridge.mirror.protocol import Rejected
 
 _MOST_KINDS: Final = 20
-"""Told one by one each time; of what comes on top only how many there were."""
-_Kind = tuple[str, str, str, str]
+"""Of one client, told one by one each time; of what comes on top only how many there were."""
+_MOST_CLIENTS: Final = 20
+_Kind = tuple[str, ...]
 
 
 class Rejections:
-    """Rejections that wait to be told: the last one of each kind, and how many."""
+    """Rejections that wait to be told: the last one of each kind, and how many. None is hidden by those of
+    another client."""
 
     def __init__(self) -> None:
         self._waiting: dict[_Kind, Rejected] = {}
+        self._kinds = Counter[str]()
 
     def add(self, rejection: Rejection, now: float) -> None:
         """``now`` in seconds of the monotonic clock."""
-        kind = (rejection.identity.user, rejection.target, rejection.action, rejection.code)
-        if kind not in self._waiting and len(self._waiting) >= _MOST_KINDS:
-            kind = ("", "", "", "")
+        identity = rejection.identity
+        client = client_of(identity)
+        if client not in self._kinds and len(self._kinds) >= _MOST_CLIENTS:
+            client = "others"
+        kind: _Kind = (client, identity.user, rejection.target, rejection.action, rejection.code)
+        if kind not in self._waiting and self._kinds[client] >= _MOST_KINDS:
+            kind = (client,)
         before = self._waiting.get(kind)
+        if before is None:
+            self._kinds[client] += 1
         self._waiting[kind] = Rejected(now, 1 + (before.count if before else 0), rejection)
 
     def take(self) -> list[Rejected]:
         """All of them, in the order in which their kinds first came."""
         waiting, self._waiting = self._waiting, {}
+        self._kinds.clear()
         return list(waiting.values())

@@ -227,3 +227,41 @@ def test_a_disk_that_fails_is_an_event_and_a_count_and_the_drive_is_commanded(tm
     assert [told.message for told in events].count(event.message) == 1
     assert plant.drives["conveyor/fu1"].channel.control_word == SHUT_DOWN
     log.close()
+
+
+def test_what_is_refused_pushes_nothing_out_that_was_done(tmp_path: Path) -> None:
+    """However often, and where every telegram is wanted: it has a file of its own."""
+    plant, log, _ = logged(tmp_path, "[audit]\nmax_bytes = 10000\nkeep = 1\nevery_telegram = true\n")
+    log.start()
+    write(plant, SHUT_DOWN)
+    for number in range(3000):
+        request = Request(Identity(Source.MODBUS, "10.0.0.66"), f"attic/fu{number}", Action.STOP)
+        plant.submit(request, 100.0, lambda outcome: None)
+    write(plant, ENABLE)
+    log.close()
+    folder = tmp_path / "state"
+    told = [json.loads(line) for line in lines(folder / "audit.jsonl")]
+    assert [line["new"]["control_word"] for line in told] == [SHUT_DOWN, ENABLE]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "audit-refused.jsonl",
+        "audit-refused.jsonl.1",
+        "audit.jsonl",
+    ]
+    refused = [json.loads(line) for line in lines(folder / "audit-refused.jsonl")]
+    assert refused[-1]["target"] == "attic/fu2999"
+    assert all(path.stat().st_size <= 10_000 for path in folder.iterdir())
+
+
+def test_a_flood_of_refusals_leaves_room_for_what_is_done(tmp_path: Path) -> None:
+    """Lines wait for the disk in a queue of their own: it may be full of refusals."""
+    plant, log, _ = logged(tmp_path, "[audit]\nevery_telegram = true\n")
+    plant.audit.tell = log._on_entry
+    for number in range(11_000):
+        request = Request(Identity(Source.MODBUS, "10.0.0.66"), f"attic/fu{number}", Action.STOP)
+        plant.submit(request, 100.0, lambda outcome: None)
+    write(plant, SHUT_DOWN)
+    assert log.refused.all_lost == 1000
+    assert log.file.all_lost == 0
+    log.start()
+    log.close()
+    assert len(lines(tmp_path / "state" / "audit.jsonl")) == 1

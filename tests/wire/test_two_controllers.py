@@ -99,8 +99,9 @@ class Arena:
         return (await self.zenoh.command(key, {"ttl_ms": LEASE_MS}, "robot"))["ok"]
 
     def audit(self) -> list[dict[str, Any]]:
-        text = (self.folder / "state" / "audit.jsonl").read_text(encoding="utf-8")
-        return [json.loads(line) for line in text.splitlines()]
+        """What was done, and what was refused."""
+        files = (self.folder / "state").glob("audit*.jsonl")
+        return [json.loads(line) for file in files for line in file.read_text("utf-8").splitlines()]
 
 
 async def fight(

@@ -29,3 +29,20 @@ def test_who_invents_targets_is_told_in_sum() -> None:
     told = waiting.take()
     assert len(told) <= 21
     assert sum(one.count for one in told) == 10_000
+
+
+def test_who_floods_hides_no_other_client() -> None:
+    waiting = Rejections()
+    for number in range(1000):
+        waiting.add(rejection(f"attic/{number}"), 10.0)
+    other = Identity(Source.OPCUA, "guest", address="10.0.0.7")
+    waiting.add(Rejection(other, "conveyor/fu2", Action.WRITE, Code.READ_ONLY, "BadNotWritable"), 10.0)
+    told = waiting.take()
+    assert [one.count for one in told if one.rejection.identity == other] == [1]
+    for number in range(1000):
+        waiting.add(
+            Rejection(Identity(Source.OPCUA, "x", address=f"10.0.{number}.1"), "a", "b", "c", ""), 10.0
+        )
+    told = waiting.take()
+    assert len(told) <= 20 + 21
+    assert sum(one.count for one in told) == 1000

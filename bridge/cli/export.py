@@ -12,7 +12,8 @@ from typing import Annotated
 import typer
 
 from bridge import __version__
-from bridge.command import Plant
+from bridge.command import Plant, Source
+from bridge.command.rights import rights_of
 from bridge.dbc import describe
 from bridge.errors import OperationFailed
 from bridge.image import Point
@@ -56,7 +57,12 @@ def _register(row: Row) -> tuple[object, ...]:
 @app.command()
 def opcua(site: SiteArgument, as_json: AsJson = False) -> None:
     """Every variable: NodeId, data type, unit, access, description."""
-    rows = [(f"nsu={_NAMESPACE};s={point.name}", *_point(point)) for point in _plant(site).image.points]
+    plant = _plant(site)
+    rights = rights_of(plant, Source.OPCUA)
+    rows = [
+        (f"nsu={_NAMESPACE};s={point.name}", *_point(point, is_writable=rights.may_write(plant, point)))
+        for point in plant.image.points
+    ]
     _print(("node_id", *_POINT), rows, as_json)
 
 
@@ -66,9 +72,14 @@ def zenoh(site: SiteArgument, as_json: AsJson = False) -> None:
     project = load_project(site)
     if project.site.zenoh is None:
         raise OperationFailed(f"{site} has no [zenoh] table")
-    points = _plant(site).image.points
+    plant = _plant(site)
+    points = plant.image.points
     space = KeySpace(project.site.zenoh.prefix, project.site.site.name, points)
-    rows = [(key, *_point(point)) for key, point in zip(space.keys, points, strict=True)]
+    rights = rights_of(plant, Source.ZENOH)
+    rows = [
+        (key, *_point(point, is_writable=rights.may_write(plant, point)))
+        for key, point in zip(space.keys, points, strict=True)
+    ]
     _print(("key", *_POINT), rows, as_json)
 
 
@@ -95,8 +106,8 @@ def dbc(
     print(dbc_text(describe(view, words=words)), end="")
 
 
-def _point(point: Point) -> tuple[object, ...]:
-    return (point.data_type.value, point.unit, "rw" if point.writable else "r", point.description)
+def _point(point: Point, *, is_writable: bool) -> tuple[object, ...]:
+    return (point.data_type.value, point.unit, "rw" if is_writable else "r", point.description)
 
 
 def _plant(site: Path) -> Plant:

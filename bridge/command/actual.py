@@ -43,6 +43,11 @@ class FurtherTpdo:
         self.quality = Quality.STALE
         return True
 
+    def quality_at(self, now: float) -> Quality:
+        """Judged now: ``quality`` learns of a passed deadline only when its timer has run."""
+        is_late = self.quality is Quality.GOOD and not self.is_fresh(now)
+        return Quality.STALE if is_late else self.quality
+
     def is_fresh(self, now: float) -> bool:
         """It has come since the boot-up, and is not late."""
         if self.quality is not Quality.GOOD or self.last is None:
@@ -60,11 +65,11 @@ class _Plain(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Judged:
-    """One point of the process data: why it is not served, if so, and the further TPDO it comes by."""
+    """One point of the process data: why it is not served, if so, and the further TPDOs it comes by."""
 
     index: int
     why: str = ""
-    further: FurtherTpdo | None = None
+    further: tuple[FurtherTpdo, ...] = ()
     scaled_by: str = ""
     """The parameter that scales it, where that depends on the parameter set."""
 
@@ -93,6 +98,7 @@ class ActualData:
         self._others: list[ValueCodec] = []
         self._further: list[FurtherTpdo] = []
         self._judged: list[_Judged] = []
+        self._by_leaf: dict[str, _Judged] = {}
         self._status: list[int] = []
         self._indices: list[int] = []
         self._shown: tuple[Quality, str] | None = None
@@ -119,6 +125,8 @@ class ActualData:
             for codec in plain
         ]
         self._judged = list(self._to_judge(unserved))
+        leaves = [f"actual/{word}" for word in self._carried] + [codec.model.leaf for codec in self._codecs]
+        self._by_leaf = dict(zip(leaves, self._judged[len(self._status) :], strict=True))
         self._shown = None
 
     def _to_judge(self, unserved: Mapping[str, str]) -> Iterable[_Judged]:
@@ -132,8 +140,8 @@ class ActualData:
             scaled_by = codec.model.full if self._family.depends_on_set(codec.model) else None
             yield _Judged(next(rest), why, self._further_of(codec.places), scaled_by or "")
 
-    def _further_of(self, places: Sequence[int]) -> FurtherTpdo | None:
-        return next((pdo for pdo in self._further if not pdo.places.isdisjoint(places)), None)
+    def _further_of(self, places: Sequence[int]) -> tuple[FurtherTpdo, ...]:
+        return tuple(pdo for pdo in self._further if not pdo.places.isdisjoint(places))
 
     def set_further(self, further: Sequence[FurtherTpdo]) -> None:
         """The TPDOs beside the one with the status word; ``compile`` follows."""
@@ -144,6 +152,13 @@ class ActualData:
         TPDO with the status word is the link's to judge."""
         late = [pdo.name for pdo in self._further if not (pdo.places.isdisjoint(places) or pdo.is_fresh(now))]
         return f"no {late[0]} from the drive" if late else ""
+
+    def on_heard_again(self) -> None:
+        """The drive could not be heard for a while: what its further TPDOs said before may have changed."""
+        for pdo in self._further:
+            if pdo.quality is Quality.GOOD:
+                pdo.quality = Quality.STALE
+        self._shown = None
 
     def on_further(self, pdo: FurtherTpdo, now: float) -> None:
         """One of them has brought words."""
@@ -211,16 +226,36 @@ class ActualData:
             return
         self._shown = _GOOD if quality is Quality.GOOD else (quality, reason)
         for point in self._judged:
-            own, why = quality, reason
-            unknown = point.why or self._why_unknown(point)
-            if quality.has_value and unknown:
-                own, why = Quality.CONFIG_ERROR, unknown
-            elif quality.has_value and point.further and point.further.quality is not Quality.GOOD:
-                is_worse = quality is Quality.GOOD or point.further.quality is Quality.WAITING
-                if is_worse:
-                    own, why = point.further.quality, f"no {point.further.name} from the drive"
-            self._image.judge((point.index,), own, now, why)
+            own, why = self._quality_of(point, quality, [pdo.quality for pdo in point.further])
+            self._image.judge((point.index,), own, now, why or reason)
+
+    def quality_at(self, leaf: str, now: float) -> Quality:
+        """The quality of a word (``actual/value_2``) or of a value made of words, judged now."""
+        point = self._by_leaf[leaf]
+        further = [pdo.quality_at(now) for pdo in point.further]
+        return self._quality_of(point, self._channel.link.quality(now), further)[0]
+
+    def _quality_of(
+        self, point: _Judged, quality: Quality, further: Sequence[Quality]
+    ) -> tuple[Quality, str]:
+        """A point's quality, and the reason where that is not the one of the drive's: with the ``quality`` of
+        the drive's data and those of its further TPDOs."""
+        if not quality.has_value:
+            return quality, ""
+        unknown = point.why or self._why_unknown(point)
+        if unknown:
+            return Quality.CONFIG_ERROR, unknown
+        for own, pdo in sorted(zip(further, point.further, strict=True), key=_goodness):
+            # Waiting goes first, then stale.
+            is_worse = quality is Quality.GOOD or own is Quality.WAITING
+            if own is not Quality.GOOD and is_worse:
+                return own, f"no {pdo.name} from the drive"
+        return quality, ""
 
     def _why_unknown(self, point: _Judged) -> str:
         """Why a scaled value is not known with the parameter set that the drive tells."""
         return self._set.why_unknown(self.words[0], point.scaled_by) if point.scaled_by else ""
+
+
+def _goodness(pair: tuple[Quality, FurtherTpdo]) -> int:
+    return (Quality.WAITING, Quality.STALE, Quality.GOOD).index(pair[0])

@@ -76,6 +76,7 @@ class Drive:
         """What it does by itself when the bridge falls silent; None until the boot-up has read it, and empty
         where that is not true any more."""
         self.sdo_abort_code = 0
+        """Why the drive last refused an SDO that a client had asked for; 0 before that."""
         self.bus = bus
         self.rpdo_type = _ASYNCHRONOUS
         """Transmission type of the RPDO with the control word; read by the boot-up."""
@@ -136,6 +137,10 @@ class Drive:
     def words(self) -> list[int]:
         """The words of the last TPDOs, the status word first, in the order of ``process.tpdo``."""
         return self._actual.words
+
+    def quality_at(self, leaf: str, now: float) -> Quality:
+        """The quality of process data, such as ``actual/value_2`` or ``actual/frequency``, judged now."""
+        return self._actual.quality_at(leaf, now)
 
     @property
     def rpdo_period_ms(self) -> int:
@@ -199,6 +204,10 @@ class Drive:
         self._actual.set_further(further)
         self._compile()
         self.refresh(now)
+
+    def on_heard_again(self) -> None:
+        """Its node could not be heard for a while, and goes on as it was; the state that follows shows it."""
+        self._actual.on_heard_again()
 
     def on_scale(self, parameter: str, full: float) -> None:
         """The drive's own value of a scaling parameter; it wins over the site file."""

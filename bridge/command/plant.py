@@ -66,6 +66,11 @@ class Node:
     def name(self) -> str:
         return self.table.name
 
+    def on_heard_again(self) -> None:
+        """It could not be heard for a while, and goes on as it was."""
+        for drive in self.drives:
+            drive.on_heard_again()
+
 
 _LONGEST_NAME: Final = 80
 """Clients may call anything a drive."""

@@ -131,7 +131,7 @@ class NodeCore:
         if self.error_control.boot_loop.is_looping:
             return
         if reaction == "nothing" and self.wire.drives and self.error_control.state is NmtState.OPERATIONAL:
-            self.error_control.expect(now)
+            self.node.on_heard_again()
             self._enter_operation("ok; heard again", now)
         elif reaction != "stop_node":
             self.boot_at = self._soon(now)

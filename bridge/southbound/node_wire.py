@@ -202,4 +202,3 @@ class NodeWire:
     def refresh(self, now: float) -> None:
         self._plant.set(f"{self._node.name}/node/rejected_frames", self.rejected + self.sdo.unmatched, now)
         self._emergencies.refresh(now)
-        self.sdo.show_aborts()

@@ -56,7 +56,6 @@ class SdoChannels:
         self._all = tuple(self._channels.values())
         same = (server.number for server in opened_servers(node) if server.slot is None)
         self._for_polls = self._channels[next(same, FIRST)]
-        self._slots = {drive.name: channel_of(node, drive.slot) for drive in node.drives}
 
     def __getitem__(self, number: int) -> SdoChannel:
         """Raises KeyError where this channel is not open."""
@@ -95,10 +94,3 @@ class SdoChannels:
         """End every transfer: the node or the bus is gone."""
         for channel in self._all:
             channel.flush(now)
-
-    def show_aborts(self) -> None:
-        """Give each drive the last abort code of the channel that reaches it."""
-        for drive in self._node.drives:
-            number = self._slots[drive.name]
-            if number is not None:
-                drive.sdo_abort_code = self._channels[number].last_abort

@@ -185,7 +185,7 @@ interface = "virtual"
 name = "spindle"
 id = 9
 mapping = "acme/spin"
-[[bus.node.drive]]
+{node}[[bus.node.drive]]
 slot = "axis"
 control = "modbus"
 fieldbus_timeout_ms = 500
@@ -228,13 +228,15 @@ def spindle() -> PdoNode:
     return node
 
 
-def spin_bench(folder: Path, node: PdoNode, *, mapping: str = SPIN, drive: str = "") -> Bench:
-    """A bench of a site whose own folder has the mapping file."""
+def spin_bench(
+    folder: Path, node: PdoNode, *, mapping: str = SPIN, drive: str = "", table: str = ""
+) -> Bench:
+    """A bench of a site whose own folder has the mapping file. ``table`` is more of the node's table."""
     file = folder / "mappings" / f"{NAME}.toml"
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(mapping, encoding="utf-8")
     path = folder / "site.toml"
-    path.write_text(SITE.format(drive=drive), encoding="utf-8")
+    path.write_text(SITE.format(drive=drive, node=table and f"{table}\n"), encoding="utf-8")
     site, families = load_site_and_families(path)
     return Bench(site, family=families[NAME], mapping=NAME, node=node)
 

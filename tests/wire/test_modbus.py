@@ -16,10 +16,12 @@ import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
 from bridge.command import Code, Identification, Outcome, Plant, Reply, Request
+from bridge.command.actual import FurtherTpdo
 from bridge.command.link import NodeState
 from bridge.config import ModbusTable
 from bridge.errors import Unavailable
 from bridge.northbound.modbus import session
+from bridge.northbound.modbus.registers import DriveMap
 from bridge.northbound.modbus.server import ModbusServer
 from tests.support import sites
 from tests.support.modbus_site import ENABLED, READY, SWITCH_ON_INHIBITED, float_words, make_plant
@@ -453,3 +455,45 @@ async def test_close_ends_every_session(plant: Plant):
         assert await closed_by_the_other_side(reader)
         writer.close()
     assert server.sessions == 0
+
+
+# words that are not good
+
+
+class Lacking:
+    """fu1 with its third word in a TPDO of its own, which never came; a server beside it."""
+
+    def __init__(self, plant: Plant) -> None:
+        self.plant = plant
+        self.drive = plant.drives["conveyor/fu1"]
+        self.further = FurtherTpdo("TPDO2", frozenset((3,)), 0.5)
+        self.drive.on_pdos({}, [self.further], time.monotonic())
+        drive_says(plant, ENABLED, 0x2000, 0x1000, 7)
+
+    def comes(self) -> None:
+        self.drive.on_further_data(self.further, time.monotonic())
+
+
+async def test_mbpoll_sees_which_words_are_not_good(plant: Plant, server: ModbusServer):
+    lacking = Lacking(plant)
+    _, output = await mbpoll(server, "-a", "1", "-r", "21", "-c", "1", "-t", "3")
+    assert polled(output) == {21: "4"}
+    _, output = await mbpoll(server, "-a", "1", "-r", "3", "-c", "1", "-t", "3")
+    assert "target device failed to respond" in output.lower()
+    lacking.comes()
+    _, output = await mbpoll(server, "-a", "1", "-r", "21", "-c", "1", "-t", "3")
+    assert polled(output) == {21: "0"}
+    await asyncio.sleep(0.5)
+    _, output = await mbpoll(server, "-a", "1", "-r", "21", "-c", "1", "-t", "3")
+    assert polled(output) == {21: "4"}
+
+
+async def test_pymodbus_sees_which_words_and_values_are_not_good(plant: Plant, server: ModbusServer):
+    Lacking(plant)
+    async with pymodbus(server) as client:
+        words, high, low = (await client.read_input_registers(21, count=3, device_id=1)).registers
+    assert words == 4
+    rows = [row.name for row in DriveMap(plant.drives["conveyor/fu1"]).inputs]
+    bad = {name for place, name in enumerate(rows[:32]) if (high << 16 | low) >> place & 1}
+    assert "actual/frequency" not in bad
+    assert "identity/serial" in bad, "not read yet"

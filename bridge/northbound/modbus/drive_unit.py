@@ -3,16 +3,18 @@
 Which quality is served how: input registers 0 … 9, the scaled actual values and the discrete inputs of
 the status word are the drive's data. While the drive's quality is waiting, dead or disabled a read that
 touches one of them is answered 0Bh, with config_error 0Ah (for a scaled value whose scale alone is not
-known, only where it is touched). Registers 10 … 31 and the discrete inputs of the quality are what the
-bridge knows: a read wholly within them always succeeds, so that a control program can see *why*. A read
-of 0 … 31 therefore fails while there is no data, a read of 10 … 31 does not. Values from register 32 on
-that are not the drive's actual values (supervision, identity) follow their own quality.
+known, or that comes by a TPDO of its own which never came, only where it is touched). Registers 10 … 31
+and the discrete inputs of the quality are what the bridge knows: a read wholly within them always succeeds,
+so that a control program can see *why*. A read of 0 … 31 therefore fails while there is no data, a read of
+10 … 31 does not. Values from register 32 on that are not the drive's actual values (supervision, identity)
+follow their own quality.
 
 Ranges: 02h where a range leaves the map, begins or ends within a 32-bit value (read or write), or a
 write touches what is not writable, or more than one parameter. Gaps inside the first 32 registers read
 as 0. Setpoint words the drive does not have, and register 9 within a longer write, take 0; anything
 else is 03h. A range of nothing but words that the drive does not have is 02h, of words that its node does
-not carry 0Ah; within a longer range they read as 0 and take 0.
+not carry 0Ah, of words whose own TPDO never came 0Bh; within a longer range they read as 0 and take 0, and
+register 21 says so.
 """
 
 from __future__ import annotations
@@ -32,7 +34,6 @@ from bridge.northbound.modbus.registers import (
     PROCESS_WORDS,
     QUALITY_BITS,
     STOP,
-    TELEGRAMS,
     TIMEOUT,
     VALUES,
     DriveMap,
@@ -45,6 +46,8 @@ from bridge.northbound.modbus.registers import (
 from bridge.northbound.modbus.unit import refuse_quality, state_code
 
 _WORD_BITS: Final = 16
+_FLAGS: Final = 32  # 32-bit values that have a bit in registers 22 and 23
+_ACTUAL: Final = "actual/"
 _RESERVED: Final = 9  # between the setpoints and the keep-alive, so that one write can reach both
 _STOPS: Final = {1: Action.STOP, 2: Action.QUICK_STOP, 3: Action.DISABLE_VOLTAGE}
 
@@ -98,19 +101,19 @@ class DriveUnit:
         end = start + count
         self._check_range(table, start, end)
         if start >= PARAMETERS and not is_input:
-            return self._values(self._parameters, start, end, Quality.GOOD, PARAMETERS)
+            return self._values(self._parameters, start, end, now, PARAMETERS)
         if is_input:
             quality = self._drive.channel.link.quality(now)
             if quality.has_value:
-                self._check_words(table, start, end)
+                self._check_words(table, start, end, now)
             words = self._input_words(start, end, quality, now)
             if end > VALUES:
-                words += self._values(self._inputs, start, end, quality)
+                words += self._values(self._inputs, start, end, now)
         else:
-            self._check_words(table, start, end)
+            self._check_words(table, start, end, now)
             words = self._holding_words(caller)[start:end] if start < VALUES else []
             if end > VALUES:
-                words += self._values(self._setpoints, start, end, Quality.GOOD)
+                words += self._values(self._setpoints, start, end, now)
         return words
 
     def _check_range(self, table: Table, start: int, end: int) -> None:
@@ -122,33 +125,44 @@ class DriveUnit:
         if end > most or start in halves or end in halves:
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
 
-    def _check_words(self, table: Table, start: int, end: int) -> None:
-        """A range of nothing but words that the drive does not have, or that its node does not carry."""
+    def _check_words(self, table: Table, start: int, end: int, now: float) -> None:
+        """A range of nothing but words that the drive does not have, that its node does not carry, or that
+        never came."""
         if not start or end > PROCESS_WORDS + 1:
             return
         words = self._words[table]
         leaves = [words[address] for address in range(start, end) if address in words]
         if not leaves:
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
-        if all(leaf in self._drive.channel.unserved for leaf in leaves):
-            refuse_quality(Quality.CONFIG_ERROR)
+        qualities = [self._word_quality(table, leaf, now) for leaf in leaves]
+        if not any(quality.has_value for quality in qualities):
+            refuse_quality(qualities[0])
+
+    def _word_quality(self, table: Table, leaf: str, now: float) -> Quality:
+        if table is Table.INPUT_REGISTER:
+            return self._drive.quality_at(leaf, now)
+        return Quality.CONFIG_ERROR if leaf in self._drive.channel.unserved else Quality.GOOD
 
     def _input_words(self, start: int, end: int, quality: Quality, now: float) -> list[int]:
         """Those of input registers 0 … 31 that are in the range."""
         words: list[int] = []
         if start < DIAGNOSTICS:
             refuse_quality(quality)
-            words = self._data()[start:end]
+            words = self._data(now)[start:end]
         if start < VALUES and end > DIAGNOSTICS:
             words += self._diagnostics(quality, now)[max(start - DIAGNOSTICS, 0) : end - DIAGNOSTICS]
         return words
 
-    def _data(self) -> list[int]:
+    def _data(self, now: float) -> list[int]:
         """Input registers 0 … 9."""
         channel = self._drive.channel
         values = self._drive.words[1 : PROCESS_WORDS + 1]
         gap = [0] * (PROCESS_WORDS - len(values))
-        return [channel.status_word, *values, *gap, channel.drive_status_word]
+        words = [channel.status_word, *values, *gap, channel.drive_status_word]
+        for place, leaf in self._words[Table.INPUT_REGISTER].items():
+            if not self._drive.quality_at(leaf, now).has_value:
+                words[place] = 0  # what it was before the node restarted says nothing
+        return words
 
     def _diagnostics(self, quality: Quality, now: float) -> list[int]:
         """Input registers 10 … 31."""
@@ -165,27 +179,44 @@ class DriveUnit:
             *from_int(max(channel.link.age_ms(now), 0)),
             *from_int(self._drive.sdo_abort_code),
             owner.source if owner else 0,
+            self._words_not_good(now),
+            *from_int(self._values_not_good(now)),
+            channel.watchdog.telegrams,
         ]
-        words += [0] * (VALUES - DIAGNOSTICS - len(words))
-        words[TELEGRAMS - DIAGNOSTICS] = channel.watchdog.telegrams
-        return words
+        return words + [0] * (VALUES - DIAGNOSTICS - len(words))
+
+    def _words_not_good(self, now: float) -> int:
+        """Bit 0 is actual value word 1; a word that the drive does not have is no bad one."""
+        words = self._words[Table.INPUT_REGISTER].items()
+        bad = (place for place, leaf in words if self._drive.quality_at(leaf, now) is not Quality.GOOD)
+        return sum(1 << place - 1 for place in bad)
+
+    def _values_not_good(self, now: float) -> int:
+        """Bit 0 is the first 32-bit value."""
+        values = enumerate(self._inputs[:_FLAGS])
+        bad = (place for place, (row, index) in values if self._quality(row, index, now) is not Quality.GOOD)
+        return sum(1 << place for place in bad)
+
+    def _quality(self, row: Row, index: int, now: float) -> Quality:
+        """The quality of a 32-bit value. Process data are judged now: the image learns of a passed deadline
+        only when its timer has run."""
+        if row.name.startswith(_ACTUAL):
+            return self._drive.quality_at(row.name, now)
+        return self._image[index].quality
 
     def _values(
         self,
         values: list[tuple[Row, int]],
         start: int,
         end: int,
-        quality: Quality,
+        now: float,
         first: int = VALUES,
     ) -> list[int]:
         """The 32-bit values in the range, which begins and ends between values."""
         words: list[int] = []
         for row, index in values[max(start - first, 0) // 2 : (end - first) // 2]:
-            if row.name.startswith("actual/"):
-                # Judged now: the image learns of an expired deadline only when its timer has run.
-                refuse_quality(quality)
+            refuse_quality(self._quality(row, index, now))
             reading = self._image[index]
-            refuse_quality(reading.quality)
             if row.type == "float32":
                 words += self._words32.from_float(float(reading.value))
             else:
@@ -231,7 +262,7 @@ class DriveUnit:
         """
         end = start + len(words)
         self._check_range(Table.HOLDING_REGISTER, start, end)
-        self._check_words(Table.HOLDING_REGISTER, start, end)
+        self._check_words(Table.HOLDING_REGISTER, start, end, 0.0)
         if start >= PARAMETERS:
             return [self._parameter(start, words, caller)]
         self._check_writable(start, end)

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from typing import Final
 
-from bridge.command import Drive, Plant
+from bridge.command import Drive, Plant, Source
+from bridge.command.rights import rights_of
 from bridge.config import WordOrder
 from bridge.image import DataType, Point, Quality
 
@@ -30,6 +32,8 @@ TIMEOUT: Final = 12
 STOP: Final = 13
 # Input registers of a drive: 0 … 9 are the drive's data, 10 … 31 what the bridge knows about it.
 DIAGNOSTICS: Final = 10
+WORDS_NOT_GOOD: Final = 21
+VALUES_NOT_GOOD: Final = 22
 TELEGRAMS: Final = 24
 VALUES: Final = 32
 """First register of the 32-bit values, input and holding alike."""
@@ -82,6 +86,22 @@ class Row:
         return f"{_REFERENCE[self.table]}{self.address + 1:04d}"
 
 
+@dataclass(frozen=True, slots=True)
+class Allows:
+    """What Modbus clients may write of a drive."""
+
+    write: Callable[[Point], bool] = lambda point: point.writable
+    may_command: bool = True
+    may_stop: bool = True
+
+
+_NOTHING: Final = Allows(lambda point: False, may_command=False, may_stop=False)
+
+
+def _access(is_writable: bool) -> str:
+    return "rw" if is_writable else "r"
+
+
 class DriveMap:
     """The map of one drive. ``inputs`` and ``setpoints`` are the 32-bit values from register 32 on,
     ``parameters`` those from register 1000 on."""
@@ -98,11 +118,13 @@ class DriveMap:
         "unit_id",
     )
 
-    def __init__(self, drive: Drive) -> None:
+    def __init__(self, drive: Drive, allows: Allows | None = None) -> None:
+        """``allows`` is for the column of access: without it, what the drive's family has."""
+        allows = allows or Allows()
         self.drive_name = drive.name
         self.unit_id = drive.unit_id
         points = {point.name[len(drive.name) + 1 :]: point for point in drive.points}
-        fixed = (*_input_rows(drive), *_holding_rows(drive))
+        fixed = (*_input_rows(drive), *_holding_rows(drive, allows))
         values = drive.family.values_of(drive.slot)
         scaled = [value.name for value in values if value.group == "actual"]
         taken = {row.name for row in fixed}
@@ -115,15 +137,15 @@ class DriveMap:
         ]
         first = [f"actual/{name}" for name in scaled]
         chosen = first + [leaf for leaf in more if leaf not in first]
-        self.inputs = _value_rows(Table.INPUT_REGISTER, chosen, points, "r")
+        self.inputs = _value_rows(Table.INPUT_REGISTER, chosen, points, _NOTHING)
         commands = [value.leaf for value in values if value.group == "command"]
-        self.setpoints = _value_rows(Table.HOLDING_REGISTER, commands, points, "rw")
+        self.setpoints = _value_rows(Table.HOLDING_REGISTER, commands, points, allows)
         writable = [
             leaf
             for leaf, point in points.items()
             if leaf.startswith("parameter/") and point.writable and point.data_type is not DataType.STRING
         ]
-        self.parameters = _value_rows(Table.HOLDING_REGISTER, writable, points, "rw", PARAMETERS)
+        self.parameters = _value_rows(Table.HOLDING_REGISTER, writable, points, allows, PARAMETERS)
         self.parameter_end = PARAMETERS + 2 * len(self.parameters)
         self.input_end = VALUES + 2 * len(self.inputs)
         self.holding_end = VALUES + 2 * len(self.setpoints)
@@ -133,7 +155,7 @@ class DriveMap:
             *(row for row in fixed if row.table is Table.HOLDING_REGISTER),
             *self.setpoints,
             *self.parameters,
-            *_bit_rows(drive),
+            *_bit_rows(drive, allows),
         )
 
     def second_halves(self, table: Table) -> frozenset[int]:
@@ -142,8 +164,14 @@ class DriveMap:
 
 
 def drive_maps(plant: Plant) -> tuple[DriveMap, ...]:
-    """The maps of all drives, by unit id."""
-    return tuple(DriveMap(drive) for _, drive in sorted(plant.by_unit.items()))
+    """The maps of all drives, by unit id, with the access that this site gives."""
+    rights = rights_of(plant, Source.MODBUS)
+
+    def allows(drive: Drive) -> Allows:
+        write = partial(rights.may_write, plant)
+        return Allows(write, may_command=rights.may_command(drive), may_stop=rights.may_stop(drive))
+
+    return tuple(DriveMap(drive, allows(drive)) for _, drive in sorted(plant.by_unit.items()))
 
 
 def bridge_rows(plant: Plant) -> tuple[Row, ...]:
@@ -167,6 +195,9 @@ _MODULE_STATE: Final = (
     "bits as NORD P173: 0 pre-operational, 1 operational, 2 a node lost, 3 a watchdog tripped, "
     "4 CAN warning, 5 bus-off"
 )
+
+
+_VALUES_NOT_GOOD: Final = f"bit 0: the first value from {VALUES} on is not good, and so on, up to the 32nd"
 
 
 def _row_maker(table: Table, access: str) -> Callable[[int, str, str, str, str], Row]:
@@ -205,28 +236,38 @@ def _input_rows(drive: Drive) -> list[Row]:
         row(14, "supervision/watchdog_state", "uint16", "", "0 off, 1 idle, 2 running, 3 tripped"),
         row(15, "supervision/watchdog_left_ms", "uint16", "ms", "time left on the watchdog"),
         row(16, "supervision/pdo_age_ms", "uint32", "ms", "age of the last PDO; FFFFFFFFh: none yet"),
-        row(18, "sdo_abort_code", "uint32", "", "last SDO abort code"),
+        row(18, "sdo_abort_code", "uint32", "", "why the drive last refused an SDO of a client; 0: never"),
         row(20, "supervision/owner", "uint16", "", "0 none, 1 opcua, 2 modbus, 3 zenoh, 4 local"),
+        row(
+            WORDS_NOT_GOOD,
+            "words_not_good",
+            "uint16",
+            "",
+            "bit 0: actual value word 1 is not good, and so on",
+        ),
+        row(VALUES_NOT_GOOD, "values_not_good", "uint32", "", _VALUES_NOT_GOOD),
         row(TELEGRAMS, "supervision/telegrams", "uint16", "", "number of the owner's last valid telegram"),
     ]
 
 
-def _holding_rows(drive: Drive) -> list[Row]:
-    row = _row_maker(Table.HOLDING_REGISTER, "rw")
-    timeout_access = "rw" if drive.channel.settings.fieldbus_timeout_writable else "r"
+def _holding_rows(drive: Drive, allows: Allows) -> list[Row]:
+    row = _row_maker(Table.HOLDING_REGISTER, _access(allows.may_command))
+    stop = _row_maker(Table.HOLDING_REGISTER, _access(allows.may_stop))
+    may_set = allows.may_command and drive.channel.settings.fieldbus_timeout_writable
+    timeout = _row_maker(Table.HOLDING_REGISTER, _access(may_set))
     name, text = "supervision/fieldbus_timeout_ms", "watchdog time, twin of P151; 0 is off"
     return [
         row(0, "command/control_word", "uint16", "", "control word"),
         *(row(i, f"command/{leaf}", "uint16", "", "setpoint, raw") for i, leaf in setpoint_words(drive)),
         row(KEEP_ALIVE, "keep_alive", "uint16", "", "not 0: a telegram; 0: release; reads 1 for the owner"),
         row(ACKNOWLEDGE, "acknowledge", "uint16", "", "write 1 to acknowledge a fault; reads 0"),
-        Row(Table.HOLDING_REGISTER, TIMEOUT, name, "uint16", timeout_access, "ms", text),
-        row(STOP, "stop", "uint16", "", "for everybody: 1 stop, 2 quick stop, 3 disable voltage; reads 0"),
+        timeout(TIMEOUT, name, "uint16", "ms", text),
+        stop(STOP, "stop", "uint16", "", "1 stop, 2 quick stop, 3 disable voltage; reads 0"),
     ]
 
 
 def _value_rows(
-    table: Table, leaves: Iterable[str], points: dict[str, Point], access: str, first: int = VALUES
+    table: Table, leaves: Iterable[str], points: dict[str, Point], allows: Allows, first: int = VALUES
 ) -> tuple[Row, ...]:
     """Two registers for each of ``leaves``; an integer stays one, so that no digit of it is lost."""
     rows: list[Row] = []
@@ -237,20 +278,39 @@ def _value_rows(
             kind = "float32"
         elif point.data_type in (DataType.INT16, DataType.INT32):
             kind = "int32"
-        rows.append(Row(table, first + 2 * position, leaf, kind, access, point.unit, point.description))
+        access, place = _access(allows.write(point)), first + 2 * position
+        rows.append(Row(table, place, leaf, kind, access, point.unit, point.description))
     return tuple(rows)
 
 
-def _bit_rows(drive: Drive) -> list[Row]:
-    status, control = drive.family.status_word.bits, drive.family.control_word.bits
+def _bit_rows(drive: Drive, allows: Allows) -> list[Row]:
+    status = _row_maker(Table.DISCRETE_INPUT, "r")
+    coil = _row_maker(Table.COIL, _access(allows.may_command))
     return [
-        *(Row(Table.DISCRETE_INPUT, i, f"status/{name or i}", "bool", "r") for i, name in enumerate(status)),
         *(
-            Row(Table.DISCRETE_INPUT, QUALITY_BITS + quality, f"quality/{quality.label}", "bool", "r")
+            status(i, f"status/{name or i}", "bool", "", _bit_text(i, "status word as served", name))
+            for i, name in enumerate(_padded(drive.family.status_word.bits))
+        ),
+        *(
+            status(
+                QUALITY_BITS + quality, f"quality/{quality.label}", "bool", "", f"quality is {quality.label}"
+            )
             for quality in Quality
         ),
-        *(Row(Table.COIL, i, f"command/{name or i}", "bool", "rw") for i, name in enumerate(control)),
+        *(
+            coil(i, f"command/{name or i}", "bool", "", _bit_text(i, "control word", name))
+            for i, name in enumerate(_padded(drive.family.control_word.bits))
+        ),
     ]
+
+
+def _padded(names: Sequence[str]) -> list[str]:
+    """A name for each bit of a word, empty where the family has none."""
+    return [*names, *[""] * 16][:16]
+
+
+def _bit_text(place: int, word: str, name: str) -> str:
+    return f"bit {place} of the {word}" + ("" if name else ", which has no name")
 
 
 class Words32:

@@ -74,8 +74,6 @@ class SdoChannel:
         """Frames on the reply COB-ID that were no answer."""
         self.late = 0
         """Those of them that answered a request of ours which we had given up."""
-        self.last_abort = 0
-        """Code of the last transfer that the server aborted or that we gave up."""
         self._segment_s = segment_s
         self._queue = SdoQueue()
         self._block = BlockUse()
@@ -296,9 +294,7 @@ class SdoChannel:
     def _end(self, result: Result, now: float) -> None:
         job = self._job
         self._clear()
-        if isinstance(result, SdoError):
-            self.last_abort = result.code
-        elif job and self._owed and self._owed.is_about(job):
+        if not isinstance(result, SdoError) and job and self._owed and self._owed.is_about(job):
             # It may have been the answer to the first attempt: the second's is still to come.
             self._owed.until = now + job.timeout_s
         if job is not None:

@@ -276,7 +276,7 @@ class Folder:
     def __init__(self, at: Path) -> None:
         self.top = at
         self.site = at / "site.toml"
-        self.site.write_text(SITE.format(drive=""))
+        self.site.write_text(SITE.format(drive="", node=""))
 
     def add(self, name: str, text: str) -> Path:
         path = self.top / "mappings" / f"{name}.toml"
@@ -469,7 +469,7 @@ class TestOwnFolder:
 )
 def test_a_pdo_of_the_site_file_is_one_that_the_drive_has(folder: Folder, drive: str, fault: str) -> None:
     folder.add(NAME, SPIN)
-    folder.site.write_text(SITE.format(drive=drive))
+    folder.site.write_text(SITE.format(drive=drive, node=""))
     with pytest.raises(FileFaults, match=r"site\.toml:14: bus\[0\]") as caught:
         load_site_and_families(folder.site)
     assert fault in str(caught.value)

@@ -48,7 +48,7 @@ def test_input_registers_of_a_running_drive():
     assert words[16:18] == [0, 50]  # ms since the last PDO
     assert words[18:20] == [0x0602, 0x0000]
     assert words[20] == 2  # modbus
-    assert words[21:24] == [0, 0, 0]
+    assert words[21] == 0
     assert words[24] == 1  # the first telegram
     assert words[25:] == [0] * 7
 

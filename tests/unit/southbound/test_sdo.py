@@ -38,7 +38,6 @@ def test_an_abort_carries_the_text_of_the_standard(client: Client) -> None:
     assert isinstance(client.result, SdoError)
     assert client.result.by_server
     assert "object does not exist in the object dictionary (06020000h)" in str(client.result)
-    assert client.channel.last_abort == 0x0602_0000
 
 
 def test_a_server_that_does_not_answer_is_told_and_the_next_transfer_begins(client: Client) -> None:
@@ -163,7 +162,6 @@ def test_a_server_that_stays_silent_is_given_up_after_its_retries() -> None:
     assert client.results == []
     client.wait(0.2)
     assert str(client.result) == "2066h:01: no valid answer: SDO protocol timed out (05040000h)"
-    assert client.channel.last_abort == abort.TIMED_OUT
 
 
 def test_what_the_server_refuses_is_not_asked_again() -> None:
@@ -173,7 +171,6 @@ def test_what_the_server_refuses_is_not_asked_again() -> None:
     client.answer("80 99 29 00 00 00 02 06")
     assert client.sent() == []
     assert isinstance(client.result, SdoError)
-    assert client.channel.last_abort == 0x0602_0000
 
 
 @pytest.mark.parametrize("index", [0x1010, 0x1011])

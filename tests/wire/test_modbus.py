@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import re
 import shutil
 import struct
 import time
+from collections import Counter
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
+from bridge.auditlog import AuditLog
 from bridge.command import Code, Identification, Outcome, Plant, Reply, Request
 from bridge.command.actual import FurtherTpdo
 from bridge.command.link import NodeState
 from bridge.config import ModbusTable
+from bridge.config.model import AuditTable
 from bridge.errors import Unavailable
 from bridge.northbound.modbus import session
 from bridge.northbound.modbus.registers import DriveMap
@@ -497,3 +502,35 @@ async def test_pymodbus_sees_which_words_and_values_are_not_good(plant: Plant, s
     bad = {name for place, name in enumerate(rows[:32]) if (high << 16 | low) >> place & 1}
     assert "actual/frequency" not in bad
     assert "identity/serial" in bad, "not read yet"
+
+
+# the audit log
+
+
+async def test_who_writes_to_made_up_units_washes_nothing_out_of_the_audit_log(
+    plant: Plant, server: ModbusServer, tmp_path: Path
+):
+    settings = {"file": str(tmp_path / "audit.jsonl"), "max_bytes": 10_000, "keep": 0}
+    site = plant.site.model_copy(update={"audit": AuditTable.model_validate(settings)})
+    audit = AuditLog(plant, site, time.monotonic, lambda at: round(at * 1e9))
+    audit.start()
+    async with pymodbus(server, "127.0.0.2") as plc, pymodbus(server, "127.0.0.3") as stranger:
+        assert not (await plc.write_registers(0, [0x047E, 0], device_id=1)).isError()
+        for number in range(3000):
+            assert (await stranger.write_register(number, 1, device_id=10 + number % 230)).isError()
+        async with pymodbus(server, "127.0.0.4") as other:
+            assert (await other.write_register(0, 1, device_id=99)).isError()
+        assert not (await plc.write_registers(0, [0x047F, 0], device_id=1)).isError()
+    audit.close()
+
+    def said(name: str) -> list[dict[str, Any]]:
+        return [json.loads(line) for line in (tmp_path / name).read_text("utf-8").splitlines()]
+
+    done = [line["new"]["control_word"] for line in said("audit.jsonl") if line["action"] == "write"]
+    assert done == [0x047E, 0x047F]
+    refused = said("audit-refused.jsonl")
+    assert len(refused) < 60
+    counts = Counter[str]()
+    for line in refused:
+        counts[line["user"]] += line.get("count", 1)
+    assert counts == {"127.0.0.3": 3000, "127.0.0.4": 1}

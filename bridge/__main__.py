@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
-import sys
+import signal
 
-from bridge.cli.signals import ending_signals
+# First of all: the imports take a second, and whoever ends us meanwhile wants no traceback.
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+import sys  # noqa: E402
+
+from bridge.cli.leaving import leave_after  # noqa: E402
+from bridge.cli.signals import ending_signals  # noqa: E402
 
 _STAY_UP = ("run", "demo", "simulate")
 
 
 def main() -> None:
-    # First of all: the imports take a second, and whoever ends us meanwhile wants no traceback.
     if sys.argv[1:2] and sys.argv[1] in _STAY_UP:
         ending_signals.hold()
+    leave_after(_run)
+
+
+def _run() -> None:
     from bridge.cli.app import run_app
 
+    if not ending_signals.is_held:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     run_app()
 
 

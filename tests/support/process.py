@@ -145,6 +145,12 @@ def peer(
     return running(folder, name, sys.executable, str(script), *arguments, files=files)
 
 
+def catches(pid: int, number: signal.Signals) -> bool:
+    """The process has a handler for the signal (SigCgt, proc_pid_status(5))."""
+    [mask] = [line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if "SigCgt" in line]
+    return bool(int(mask.split()[1], 16) >> (number - 1) & 1)
+
+
 def until(condition: object, limit_s: float, what: str, pause_s: float = 0.02) -> None:
     """Wait until ``condition()`` is true; fails with ``what`` after ``limit_s``."""
     assert callable(condition)

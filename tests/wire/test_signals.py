@@ -16,7 +16,7 @@ import pytest
 from pymodbus.client import ModbusTcpClient
 
 from tests.support import sites
-from tests.support.process import REPOSITORY, Process, free_port, only_demo, running, until
+from tests.support.process import REPOSITORY, Process, catches, free_port, only_demo, running, until
 from tests.wire.test_fronts import children, wait_for_front
 
 ENDING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
@@ -156,9 +156,3 @@ def test_a_signal_while_it_starts_ends_it_without_a_trace(
         assert not any(Path(f"/proc/{child}").exists() for child in started)
         assert "Traceback" not in bridge.output()
         assert "KeyboardInterrupt" not in bridge.output()
-
-
-def catches(pid: int, number: signal.Signals) -> bool:
-    """The process has a handler for the signal (SigCgt, proc_pid_status(5))."""
-    [mask] = [line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if "SigCgt" in line]
-    return bool(int(mask.split()[1], 16) >> (number - 1) & 1)

@@ -9,7 +9,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 from typing import Final, TypeVar
@@ -18,6 +18,7 @@ import zenoh
 
 from bridge.errors import OperationFailed, Unavailable
 from bridge.zenohlink.inbox import Inbox
+from bridge.zenohlink.lane import LIMIT, Job, Lane
 from bridge.zenohlink.message import (
     Answer,
     Message,
@@ -35,8 +36,6 @@ Result = TypeVar("Result")
 
 _log = logging.getLogger(__name__)
 
-_QUEUE_LIMIT: Final = 10_000
-"""Most messages that wait for the worker; what comes on top is dropped and counted."""
 _PUTS_AT_ONCE: Final = 100
 """Puts between two other jobs of the worker: with a stalled subscriber each takes up to 1 ms."""
 
@@ -56,18 +55,37 @@ class Asked:
     received_at: float
     """When zenoh has handed it over, in monotonic seconds; it may have waited for the loop since."""
     _query: zenoh.Query
-    _submit: Callable[[Callable[[zenoh.Session], None]], bool]
+    _link: ZenohLink
+    _lane: Lane
+    _is_apart: bool = False
+
+    def apart(self) -> Asked:
+        """The same, answered on a thread of its own, which ``finish`` ends. For what may be long: replies
+        wait for an asker that does not read."""
+        return replace(self, _lane=self._link.own_lane(self._lane), _is_apart=True)
 
     def send(self, messages: Sequence[Message]) -> None:
-        self._submit(lambda _: reply(self._query, messages))
+        self._do(lambda session: reply(session, self._query, messages))
+
+    async def settle(self) -> None:
+        """Wait until what was sent so far has gone, or has been given up."""
+        await self._link.settle(self._lane)
 
     def finish(self) -> None:
         """There are no more replies."""
-        self._submit(lambda _: self._query.drop())
+        self._do(lambda _: self._query.drop())
+        if self._is_apart:
+            self._lane.end()
 
     def fail(self, payload: bytes, encoding: str) -> None:
         """Answer with an error, and finish."""
-        self._submit(lambda _: reply_error(self._query, payload, encoding))
+        self._do(lambda _: reply_error(self._query, payload, encoding))
+        if self._is_apart:
+            self._lane.end()
+
+    def _do(self, job: Job) -> None:
+        if not self._lane.do(job):
+            self._link.note_drop()
 
 
 class ZenohLink:
@@ -75,10 +93,16 @@ class ZenohLink:
 
     ``name`` stands in messages to the user. Handlers are called in the loop. Declarations and messages
     keep their order, except that of several ``put`` on one key only the newest may be sent.
+
+    Queries are answered in two lanes beside that: those of which ``is_prompt`` is true of the key, where no
+    reply may wait (``prompt`` of the session's settings), and all others.
     """
 
-    def __init__(self, config: zenoh.Config, name: str) -> None:
+    def __init__(
+        self, config: zenoh.Config, name: str, is_prompt: Callable[[str], bool] = lambda _: True
+    ) -> None:
         self.name = name
+        self._is_prompt = is_prompt
         self._dropped = 0
         self._worker = Worker(config, name, self._on_opened, self._on_closed)
         self._latest: dict[str, Message] = {}
@@ -146,7 +170,7 @@ class ZenohLink:
         """Publish; where the worker is behind, a newer value takes the place of an older one."""
         if self._worker.is_stopping or not self._worker.is_alive:
             return
-        if len(self._latest) >= _QUEUE_LIMIT and message.key not in self._latest:
+        if len(self._latest) >= LIMIT and message.key not in self._latest:
             self._dropped += 1
             return
         self._latest[message.key] = message
@@ -158,19 +182,25 @@ class ZenohLink:
         """Publish each message in order. False: there was no room, the message is dropped."""
         return self.submit(lambda session: publish(session, message))
 
-    def submit(self, job: Callable[[zenoh.Session], None]) -> bool:
+    def submit(self, job: Job) -> bool:
         """Let the worker do ``job``. False: there was no room, or nobody to do it."""
-        if self._worker.is_stopping or not self._worker.is_alive or self._worker.waiting >= _QUEUE_LIMIT:
+        if self._worker.is_stopping or not self._worker.is_alive or self._worker.waiting >= LIMIT:
             self._dropped += 1
             return False
         self._worker.do(job)
         return True
 
-    async def settle(self) -> None:
-        """Wait until the worker has done what it was given so far."""
+    async def settle(self, lane: Lane | None = None) -> None:
+        """Wait until the worker, or ``lane``, has done what it was given so far."""
         done: asyncio.Future[None] = self._loop.create_future()
-        if self.submit(lambda _: self._inbox.tell(_resolve, done, None)):
+        if (lane.do if lane else self.submit)(lambda _: self._inbox.tell(_resolve, done, None)):
             await asyncio.wait((done, self._closed), return_when=asyncio.FIRST_COMPLETED)
+
+    def own_lane(self, like: Lane) -> Lane:
+        return self._worker.lane(like.session)
+
+    def note_drop(self) -> None:
+        self._dropped += 1
 
     def _hand_over(self) -> None:
         batch = [self._latest.pop(key) for key in list(islice(self._latest, _PUTS_AT_ONCE))]
@@ -233,18 +263,24 @@ class ZenohLink:
     def declare_queryable(self, key: str, handler: Callable[[Asked], None]) -> None:
         """Answer queries on ``key``. A flood of them ends before it reaches the loop."""
 
-        def on_query(query: zenoh.Query) -> None:
-            payload, attachment = to_bytes(query.payload), to_bytes(query.attachment)
-            parameters = str(query.parameters)
-            key, now = str(query.key_expr), time.monotonic()
-            asked = Asked(key, payload, attachment, parameters, now, query, self.submit)
-            if not self._inbox.take_in(partial(handler, asked)):
-                query.drop()
+        def declare(session: zenoh.Session) -> None:
+            prompt, other = self._worker.lane(session), self._worker.lane(session)
 
-        # Complete: whoever stores these keys must not be asked in our place.
-        callback = zenoh.handlers.Callback(on_query, indirect=False)
-        declared = self._worker.declared
-        self.submit(lambda session: declared.append(session.declare_queryable(key, callback, complete=True)))
+            def on_query(query: zenoh.Query) -> None:
+                payload, attachment = to_bytes(query.payload), to_bytes(query.attachment)
+                parameters = str(query.parameters)
+                key, now = str(query.key_expr), time.monotonic()
+                lane = prompt if self._is_prompt(key) else other
+                asked = Asked(key, payload, attachment, parameters, now, query, self, lane)
+                if not self._inbox.take_in(partial(handler, asked)):
+                    # Not here: the end of a query may wait for the asker, and this thread reads for others.
+                    lane.do(lambda _: query.drop())
+
+            # Complete: whoever stores these keys must not be asked in our place.
+            callback = zenoh.handlers.Callback(on_query, indirect=False)
+            self._worker.declared.append(session.declare_queryable(key, callback, complete=True))
+
+        self.submit(declare)
 
     def declare_subscriber(
         self, key: str, handler: Callable[[Message], None], *, from_others: bool = False

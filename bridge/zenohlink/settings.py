@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import zenoh
@@ -19,6 +19,10 @@ _LEASE_MS: Final = 1000
 _STALLED_US: Final = 500_000
 """How long a query or a reply waits for a peer that does not read before the connection is closed."""
 
+_MOST_BATCHES: Final = 16
+"""Of 64 KiB, made when they are needed. With the two of zenoh's default an answer would be dropped when the
+machine is busy for a moment."""
+
 
 def zenoh_config(
     *,
@@ -26,11 +30,15 @@ def zenoh_config(
     listen: Sequence[str] = (),
     connect: Sequence[str] = (),
     users: tuple[str, str, str] | None = None,
+    access: Mapping[str, object] | None = None,
+    prompt: Sequence[str] = (),
 ) -> zenoh.Config:
     """Settings of a session that finds nobody by itself and notices a silent peer within a second.
 
     ``users`` is our own user, its password, and the path of a file with a line ``user:password`` for
-    each who may connect. Raises Unavailable where an endpoint is not one.
+    each who may connect. ``access`` is zenoh's ``access_control``. What answers a query on a key of
+    ``prompt`` never waits: it goes ahead of published values, and is dropped where the asker does not read.
+    Raises Unavailable where an endpoint is not one.
     """
     settings: dict[str, object] = {
         "mode": mode,
@@ -47,6 +55,11 @@ def zenoh_config(
         "transport/link/tx/queue/congestion_control/block/wait_before_close": _STALLED_US,
         "transport/shared_memory/enabled": False,
     }
+    if access:
+        settings["access_control"] = access
+    if prompt:
+        settings["qos/network"] = [_prompt(prompt)]
+        settings["transport/link/tx/queue/size/interactive_high"] = _MOST_BATCHES
     if users:
         user, password, file = users
         settings["transport/auth/usrpwd/user"] = user
@@ -59,3 +72,9 @@ def zenoh_config(
         except zenoh.ZError as error:
             raise Unavailable(f"zenoh does not take {key} = {value!r}: {sentence(error)}") from None
     return config
+
+
+def _prompt(keys: Sequence[str]) -> dict[str, object]:
+    """Replies, and the end of them, have what their query has: so it is changed as it comes in."""
+    overwrite = {"congestion_control": "drop", "priority": "interactive_high"}
+    return {"messages": ["query"], "flows": ["ingress"], "key_exprs": list(keys), "overwrite": overwrite}

@@ -1,4 +1,4 @@
-"""The thread that makes all calls of one zenoh session."""
+"""The thread that opens and closes one zenoh session, and declares and publishes with it."""
 
 # pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false
 # zenoh's stubs leave out the return types of what returns nothing.
@@ -14,9 +14,14 @@ from typing import Final, Protocol
 
 import zenoh
 
+from bridge.zenohlink.lane import Job, Lane
 from bridge.zenohlink.message import sentence
+from bridge.zenohlink.sockets import close_without_waiting
 
 _log = logging.getLogger(__name__)
+
+_LANES_END_S: Final = 1.0
+"""How long a closed session's lanes may take to notice it."""
 
 ZENOH_ERRORS: Final = (zenoh.ZError, RuntimeError, ValueError, TypeError, AttributeError)
 """What zenoh's calls raise: ZError for what goes wrong, the others for what is closed meanwhile."""
@@ -49,16 +54,27 @@ class Worker:
         self._config = config
         self._opened = opened
         self._closed = closed
-        self._jobs: SimpleQueue[Callable[[zenoh.Session], None]] = SimpleQueue()
+        self._jobs: SimpleQueue[Job] = SimpleQueue()
+        self._lanes: set[Lane] = set()
+        self._lanes_lock = threading.Lock()
         self._last_complaint = float("-inf")
         self._thread = threading.Thread(target=self._work, name=f"zenoh-{name}", daemon=True)
 
     def start(self) -> None:
         self._thread.start()
 
-    def do(self, job: Callable[[zenoh.Session], None]) -> None:
+    def do(self, job: Job) -> None:
         """From any thread."""
         self._jobs.put(job)
+
+    def lane(self, session: zenoh.Session) -> Lane:
+        """One more thread for calls of the session. It ends with the session, or before."""
+        lane = Lane(self.name, session, self.complain)
+        with self._lanes_lock:
+            self._lanes = {one for one in self._lanes if one.is_alive} | {lane}
+            if self.is_stopping:
+                lane.stop()
+        return lane
 
     @property
     def waiting(self) -> int:
@@ -96,18 +112,40 @@ class Worker:
             self._opened(error)
             return
         self._opened(None)
+        self._try(lambda: self._watch_links(session))
         try:
             while not self.is_stopping:
                 job = self._jobs.get()
                 self._try(lambda job=job: job(session))
         finally:
-            # Undeclared first: zenoh-python issue 624.
-            for declared in (*self.tokens.values(), *self.declared):
-                self._try(declared.undeclare)
-            self._try(session.close)
+            self._close(session)
+
+    def _watch_links(self, session: zenoh.Session) -> None:
+        def on_link(_: zenoh.LinkEvent) -> None:
+            self.do(_settle_sockets)
+
+        callback = zenoh.handlers.Callback(on_link, indirect=False)
+        self.declared.append(session.info.declare_link_events_listener(callback, history=True))
+
+    def _close(self, session: zenoh.Session) -> None:
+        with self._lanes_lock:
+            lanes = tuple(self._lanes)
+        for lane in lanes:
+            lane.stop()
+        # Undeclared first: zenoh-python issue 624.
+        for declared in (*self.tokens.values(), *self.declared):
+            self._try(declared.undeclare)
+        self._try(session.close)
+        end = time.monotonic() + _LANES_END_S
+        for lane in lanes:
+            lane.join(max(0.0, end - time.monotonic()))
 
     def _try(self, call: Callable[[], object]) -> None:
         try:
             call()
         except Exception as error:  # noqa: BLE001 - one bad job must not end all others
             self.complain(error)
+
+
+def _settle_sockets(_: zenoh.Session) -> None:
+    close_without_waiting()

@@ -1,0 +1,43 @@
+"""No connection of ours waits in close, whoever has asked for that."""
+
+from __future__ import annotations
+
+import socket
+import struct
+from pathlib import Path
+
+from bridge.zenohlink.sockets import close_without_waiting
+
+TEN_SECONDS = struct.pack("ii", 1, 10)
+
+
+def lingers(connection: socket.socket) -> bool:
+    state = connection.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, len(TEN_SECONDS))
+    return struct.unpack("ii", state)[0] != 0
+
+
+def files() -> set[str]:
+    return {file.name for file in Path("/proc/self/fd").iterdir()}
+
+
+def test_every_tcp_connection_is_found_and_no_other_file_is_touched() -> None:
+    close_without_waiting()
+    local, remote = socket.socketpair()
+    with (
+        socket.create_server(("127.0.0.1", 0)) as server,
+        socket.create_connection(server.getsockname()) as client,
+        server.accept()[0] as accepted,
+        local,
+        remote,
+    ):
+        for connection in (client, accepted):
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, TEN_SECONDS)
+        before = files()
+        assert close_without_waiting() == 2
+        assert close_without_waiting() == 0
+        assert files() == before, "nothing is left open"
+        assert not any(map(lingers, (client, accepted)))
+        client.sendall(b"still there")
+        assert accepted.recv(20) == b"still there"
+        local.send(b"x")
+        assert remote.recv(1) == b"x"

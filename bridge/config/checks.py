@@ -5,6 +5,7 @@ Judged on the raw file, so that these faults are found beside those of single va
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import Final, cast
 
@@ -13,6 +14,8 @@ from bridge.tomlfile import Key, RawTable, TomlFile
 
 _RESERVED_NODES: Final = ("bus", "bridge")
 _PROTOCOLS: Final = ("modbus", "opcua", "zenoh")
+_LOCAL: Final = re.compile(r"(unixsock-stream|unixpipe)/.*|[a-z]+/(127\.[0-9.]+|localhost|\[::1\])(:.*)?")
+_MUTUAL_TLS: Final = re.compile(r"(tls|quic)/.*[#;]enable_mtls=(true|1)\b.*")
 _WITHOUT_CONNECTIONS: Final = ("opcua", "zenoh")
 """Whose clients' connections are not known where drives are commanded."""
 _BUS: Final = BusTable.model_construct()
@@ -33,6 +36,7 @@ def check(file: TomlFile) -> None:
             _check_drives(node, units, file)
     _check_users(file)
     _check_ports(file)
+    _check_zenoh(file)
 
 
 @dataclass(slots=True)
@@ -156,3 +160,30 @@ def _check_ports(file: TomlFile) -> None:
     ports = _Unique(file)
     for name in ("modbus", "opcua"):
         ports.add(file.root.table(name), "listen", "address")
+
+
+def _check_zenoh(file: TomlFile) -> None:
+    """Whoever may connect may command: that needs a user or a certificate."""
+    zenoh = file.root.table("zenoh")
+    given = zenoh.content.get("listen")
+    listen = cast("list[object]", given) if isinstance(given, list) else []
+    if zenoh.text("mode") == "client" or "password_file" in zenoh.content:
+        return
+    open_to_all = [
+        i
+        for i, place in enumerate(listen)
+        if isinstance(place, str) and "/" in place and not _MUTUAL_TLS.fullmatch(place)
+    ]
+    if "controllers" in zenoh.content and (open_to_all or not listen):
+        file.fault(
+            ("zenoh", "controllers"),
+            "names users, and nobody has to prove to be one",
+            "user and password_file, or listen on tls with enable_mtls=true",
+        )
+    for i in open_to_all:
+        if not _LOCAL.fullmatch(cast("str", listen[i])) and zenoh.content.get("no_security") is not True:
+            file.fault(
+                ("zenoh", "listen", i),
+                f"{listen[i]} is beyond loopback, and whoever reaches it could command the drives",
+                "user and password_file, or tls with enable_mtls=true; no_security = true is a decision",
+            )

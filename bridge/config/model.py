@@ -40,6 +40,7 @@ LONGEST_TIMEOUT_MS: Final = 32767
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 _PREFIX: Final = re.compile(r"[\w.-]+(/[\w.-]+)*", re.ASCII)
+_CONTROLLER: Final = re.compile(r"[A-Za-z0-9_.\-]{1,64}")
 _OBJECT: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})")
 _MAPPED: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})/([0-9]{1,2})")
 _PDO_BITS: Final = 64
@@ -117,6 +118,12 @@ def _locator(text: str) -> str:
     return text
 
 
+def _controller(text: str) -> str:
+    if not _CONTROLLER.fullmatch(text) or text == "anonymous":
+        raise ValueError("must be a user's name of 1…64 letters, digits and _ . -")
+    return text
+
+
 def _object(text: str) -> str:
     if not _OBJECT.fullmatch(text):
         raise ValueError('must be an object as "2097:01", index and sub-index in hexadecimal')
@@ -129,6 +136,7 @@ ObjectName = Annotated[str, AfterValidator(_object)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Network = Annotated[str, AfterValidator(_network)]
 Locator = Annotated[str, AfterValidator(_locator)]
+ControllerName = Annotated[str, AfterValidator(_controller)]
 Timeout = Annotated[int, Field(ge=0, le=LONGEST_TIMEOUT_MS)]
 Full = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -388,6 +396,8 @@ class ZenohTable(Table):
     parameters: ParameterRights = Field("write", description="write or read")
     user: str | None = Field(None, description="the bridge's own user, one of password_file")
     password_file: str | None = Field(None, description="a file with user:password for each who may connect")
+    controllers: list[ControllerName] | None = None
+    no_security: bool = Field(False, description="true listens beyond loopback for anybody")
 
 
 class AuditTable(Table):

@@ -21,6 +21,10 @@ def check_decisions(site: Site, families: Mapping[str, Family], report: LintRepo
         report.warning(
             ("opcua", "no_security"), "is true: anyone who reaches the port reads everything in clear text"
         )
+    if site.zenoh and site.zenoh.no_security:
+        report.warning(
+            ("zenoh", "no_security"), "is true: anyone who reaches the port commands, under any name"
+        )
 
 
 def _check_commands(node: NodeTable, key: Key, report: LintReport) -> None:

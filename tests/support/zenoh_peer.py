@@ -65,12 +65,12 @@ class Peer:
         return await asyncio.wait_for(future, 10)
 
     async def command(
-        self, key: str, payload: object = None, controller: str | None = None
+        self, key: str, payload: object = None, controller: str | None = None, target: str | None = None
     ) -> dict[str, Any]:
         """The answer to a command query, whether it is an error reply or not."""
         text = payload if isinstance(payload, str) or payload is None else json.dumps(payload)
         attachment = json.dumps({"controller": controller}) if controller else None
-        said = await self.do("get", key, payload=text, attachment=attachment)
+        said = await self.do("get", key, payload=text, attachment=attachment, target=target)
         texts = said["errors"] + [value["payload"] for value in said["values"]]
         assert len(texts) == 1, said
         answer: dict[str, Any] = json.loads(texts[0])
@@ -106,11 +106,12 @@ class Peer:
 
 
 @asynccontextmanager
-async def zenoh_peer(endpoint: str, *user: str) -> AsyncIterator[Peer]:
+async def zenoh_peer(endpoint: str, *user: str, mode: str = "peer") -> AsyncIterator[Peer]:
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         str(SCRIPT),
         endpoint,
+        mode,
         *user,
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,

@@ -17,9 +17,10 @@ FU3 = f"{TOP}/conveyor/fu3"
 
 
 class Rig:
-    def __init__(self, plant: Plant, peer: Peer) -> None:
+    def __init__(self, plant: Plant, peer: Peer, endpoint: str) -> None:
         self.plant = plant
         self.peer = peer
+        self.endpoint = endpoint
 
     @property
     def fu3(self) -> Drive:
@@ -40,15 +41,28 @@ class Rig:
 
 
 @asynccontextmanager
-async def rig(*, login: tuple[str, ...] = (), **settings: object) -> AsyncIterator[Rig]:
+async def rig(
+    *,
+    login: tuple[str, ...] = (),
+    mode: str = "peer",
+    router: str = "",
+    further: int = 0,
+    room: int = 0,
+    **settings: object,
+) -> AsyncIterator[Rig]:
+    """A peer in ``mode``, connected to the server, or to the ``router`` to which the server connects, too.
+    The plant has so many ``further`` nodes. So many bytes find ``room`` in the server's sockets, as on a
+    network: on loopback it would be megabytes."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
-    plant = make_plant()
-    table = ZenohTable.model_validate({"listen": [endpoint], **settings})
+    plant = make_plant(further=further)
+    sockets = f"#so_sndbuf={room}" if room else ""
+    places = {"connect": [router], "listen": []} if router else {"listen": [endpoint + sockets]}
+    table = ZenohTable.model_validate({**places, **settings})
     server = ZenohServer(plant, table, "demo", time.monotonic, epoch)
     await server.start()
     try:
-        async with zenoh_peer(endpoint, *login) as peer:
-            yield Rig(plant, peer)
+        async with zenoh_peer(router or endpoint, *login, mode=mode) as peer:
+            yield Rig(plant, peer, router or endpoint)
     finally:
         begin = time.monotonic()
         await server.close()

@@ -11,13 +11,16 @@ from tests.support import sites
 SWITCH_ON_INHIBITED, READY, ENABLED = 0x0240, 0x0231, 0x0237
 
 
-def make_plant(node: str = "conveyor") -> Plant:
+def make_plant(node: str = "conveyor", further: int = 0) -> Plant:
+    """``further``: nodes with four drives each that are there besides."""
     drives = (
         sites.drive("fu1", "modbus", 1000),
         sites.drive("fu3", "zenoh", 1000),
         sites.drive("fu4", "lease", 0, ""),
     )
-    bus = sites.bus(sites.node(*drives, name=node))
+    idle = [sites.drive(f"fu{i}", "none", 0) for i in range(1, 5)]
+    others = [sites.node(*idle, name=f"more{i}", node_id=20 + i) for i in range(further)]
+    bus = sites.bus(sites.node(*drives, name=node), *others)
     return sites.plant_of(sites.site(bus, sites.modbus(), sites.zenoh(), name="demo"))
 
 

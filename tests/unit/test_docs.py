@@ -24,7 +24,7 @@ from tests.support.docs import (
 )
 from tests.support.process import REPOSITORY
 
-LANGUAGES = {"console", "python", "toml", "json", "ini", "sh", "text"}
+LANGUAGES = {"console", "python", "toml", "json", "json5", "ini", "sh", "text"}
 
 
 # the pages themselves

@@ -12,6 +12,7 @@ import msgspec
 from bridge.command import Action, Code, Identity, Request, Source
 from bridge.command.request import NMT_ACTIONS
 from bridge.image import Point, Value
+from bridge.northbound.zenoh.users import ANONYMOUS, NAME, WANTED_NAME
 
 METHODS: Final = (
     Action.START,
@@ -39,10 +40,8 @@ NODE_METHODS: Final = (
 BUS_METHODS: Final = tuple(action for action in NODE_METHODS if action in NMT_ACTIONS)
 
 MALFORMED: Final = "malformed"
-ANONYMOUS: Final = "anonymous"
 
 _LONGEST: Final = 4096
-_NAME: Final = re.compile(r"[A-Za-z0-9_.\-]{1,64}")
 _PARAMETER: Final = "/parameter/"
 _CACHED_MS: Final = 2**31
 _LONGEST_MS: Final = 2**32 - 1
@@ -82,7 +81,7 @@ _controller = msgspec.json.Decoder(_Controller)
 def identity_of(attachment: bytes | None) -> Identity:
     """Who asks: ``{"controller": "<name>"}`` in the attachment. Raises BadCommand.
 
-    The name is what the asker says; without users and TLS nobody checks it.
+    The name is what the asker says, and nobody checks it: this is for where there are no users.
     """
     if not attachment:
         return Identity(Source.ZENOH, ANONYMOUS)
@@ -93,8 +92,8 @@ def identity_of(attachment: bytes | None) -> Identity:
         name = _controller.decode(attachment).controller
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise BadCommand(MALFORMED, f"{wanted}: {error}") from None
-    if not _NAME.fullmatch(name):
-        raise BadCommand(MALFORMED, "a controller's name has 1…64 letters, digits and _ . -")
+    if not NAME.fullmatch(name):
+        raise BadCommand(MALFORMED, WANTED_NAME)
     return Identity(Source.ZENOH, name)
 
 

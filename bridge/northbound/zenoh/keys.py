@@ -9,6 +9,7 @@ import msgspec
 
 from bridge.command import Event, Outcome
 from bridge.image import DataType, Point, Quality, Reading, Value
+from bridge.northbound.zenoh.users import own_keys
 
 JSON: Final = "application/json"
 TEXT: Final = "text/plain"
@@ -71,8 +72,24 @@ class KeySpace:
         self.index: dict[str, int] = {key: i for i, key in enumerate(self.keys)}
         self.everything = f"{self.top}/**"
         self.commands = f"{self.top}/*/*/command/**"
+        self.controllers = f"{self.top}/@/controller/**"
+        self.own_commands = f"{self.top}/@/controller/*/*/*/command/**"
+        self._owners = frozenset(_owner(point.name) for point in points)
+        self.prompt = (*(f"{self.top}/{owner}/**" for owner in sorted(self._owners)), self.controllers)
+        """What is about one drive, one node, one bus or the bridge: few points, so that its answer finds room
+        on the way to whoever reads at all."""
         self.bridge_token = f"{self.top}/@/bridge"
         self._states = tuple(dict(point.states) for point in points)
+
+    def is_prompt(self, key: str) -> bool:
+        """Whether one of ``prompt`` includes ``key``, which may have wildcards."""
+        if not key.startswith(f"{self.top}/"):
+            return False
+        tail = self.tail(key)
+        return _owner(tail) in self._owners or tail.startswith("@/controller/")
+
+    def own_keys(self, name: str) -> str:
+        return f"{self.top}/{own_keys(name)}"
 
     def node_token(self, node: str) -> str:
         return f"{self.top}/@/{node}"
@@ -109,6 +126,12 @@ class KeySpace:
         if self._states[index] and quality.has_value and isinstance(reading.value, int):
             state = self._states[index].get(reading.value)
         return quality.label, time, state or msgspec.UNSET, reading.reason or msgspec.UNSET
+
+
+def _owner(tail: str) -> str:
+    """``<node>/<drive>``, ``<node>/node``, ``bus/<bus>`` or ``bridge``."""
+    words = tail.split("/", 2)
+    return words[0] if words[0] == "bridge" else "/".join(words[:2])
 
 
 def seconds(epoch_ns: int) -> float:

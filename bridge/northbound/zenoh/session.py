@@ -1,7 +1,7 @@
 """The zenoh server: values and events out, gets and commands in.
 
-A controller is who it says it is (the query's attachment): without ``user`` and ``password_file``
-whoever reaches the port may command, which is why it listens on loopback unless told otherwise.
+With users a controller is whose keys it commands by (``users.py``). Without them it is who it says it is
+(the query's attachment), and whoever reaches the port may command: which is why it listens on loopback.
 """
 
 from __future__ import annotations
@@ -11,19 +11,21 @@ import logging
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Final
 
 import zenoh
 
-from bridge.command import Code, Event, Identity, Outcome, Plant, Rejection, Reply, Request
+from bridge.command import Code, Event, Identity, Outcome, Plant, Rejection, Reply, Request, Source
 from bridge.command.link import NodeState
+from bridge.command.request import STOP_ACTIONS
 from bridge.config import ZenohTable
 from bridge.errors import Unavailable
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.zenoh import keys
+from bridge.northbound.zenoh.access import access_control
 from bridge.northbound.zenoh.askers import Askers
 from bridge.northbound.zenoh.commands import MALFORMED, BadCommand, Commands, identity_of
+from bridge.northbound.zenoh.users import ANONYMOUS, Users, read_users
 from bridge.quietlog import about
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 
@@ -55,7 +57,8 @@ class ZenohServer:
         self._epoch = epoch
         self._keys = keys.KeySpace(settings.prefix, site_name, plant.image.points)
         self._commands = Commands(plant.image.points)
-        self._link = ZenohLink(_config(settings), "zenoh")
+        self._users = read_users(settings)
+        self._link = self._new_link()
         self._pulse = Pulse(clock)
         self._askers = Askers()
         self._feed = plant.image.feed()
@@ -63,6 +66,10 @@ class ZenohServer:
         self._gets: set[asyncio.Task[None]] = set()
         self._tick_timer: asyncio.TimerHandle | None = None
         self._was_started = False
+
+    def _new_link(self) -> ZenohLink:
+        config = _config(self._settings, self._keys, self._users)
+        return ZenohLink(config, "zenoh", self._keys.is_prompt)
 
     async def start(self) -> None:
         """Open the session, also again after ``failed``. Raises Unavailable where zenoh cannot listen."""
@@ -79,6 +86,10 @@ class ZenohServer:
         self._link.declare_queryable(self._keys.everything, self._on_query)
         if self._settings.accept_put:
             self._link.declare_subscriber(self._keys.commands, self._on_put, from_others=True)
+        if self._users.are_proved:
+            self._link.declare_queryable(self._keys.controllers, self._on_query)
+            if self._settings.accept_put:
+                self._link.declare_subscriber(self._keys.own_commands, self._on_put, from_others=True)
         self._link.declare_token(self._keys.bridge_token)
         self._link.follow_endings(lambda: self._plant.count("zenoh_broken_connections", self._clock()))
         self._plant.on_event(self._on_event)
@@ -87,7 +98,8 @@ class ZenohServer:
     async def _start_anew(self) -> None:
         """With a session that knows nothing of the one before."""
         await self.close()
-        self._link = ZenohLink(_config(self._settings), "zenoh")
+        self._users = read_users(self._settings)
+        self._link = self._new_link()
         self._feed = self._plant.image.feed()
         self._present.clear()
 
@@ -142,15 +154,15 @@ class ZenohServer:
 
     def _on_query(self, asked: Asked) -> None:
         is_pattern = "*" in asked.key
-        tail = "" if is_pattern else self._keys.tail(asked.key)
+        owner, tail = ("", "") if is_pattern else self._users.owner(self._keys.tail(asked.key))
         if is_pattern and asked.payload is not None:
             bad = BadCommand(MALFORMED, "a command goes to one key, without wildcards")
-            self._note_refusal(asked.key, asked.attachment, bad)
+            self._note_refusal(owner, asked.key, asked.attachment, bad)
             _refuse(asked, bad)
         elif asked.payload is not None or self._commands.is_method(tail):
-            self._command(asked, tail)
+            self._command(asked, owner, tail)
         elif self._commands.parameter(tail)[1]:
-            self._read_parameter(asked, tail)
+            self._read_parameter(asked, owner, tail)
         elif asked.key in self._keys.index:
             asked.send([self._render(self._keys.index[asked.key], self._epoch(0.0))])
             asked.finish()
@@ -159,7 +171,7 @@ class ZenohServer:
         elif len(self._gets) >= _GETS_AT_ONCE:
             _refuse(asked, BadCommand("busy", "too many gets with wildcards at once; ask again"))
         else:
-            task = asyncio.get_running_loop().create_task(self._answer_get(asked))
+            task = asyncio.get_running_loop().create_task(self._answer_get(asked.apart()))
             self._gets.add(task)
             task.add_done_callback(self._gets.discard)
 
@@ -169,7 +181,7 @@ class ZenohServer:
             for portion in self._matching(zenoh.KeyExpr(asked.key)):
                 at_zero_ns = self._epoch(0.0)
                 asked.send([self._render(index, at_zero_ns) for index in portion])
-                await self._link.settle()
+                await asked.settle()
         finally:
             asked.finish()
 
@@ -178,7 +190,7 @@ class ZenohServer:
             some = self._keys.keys[start : start + _REPLIES_AT_ONCE]
             yield [start + i for i, key in enumerate(some) if wanted.intersects(key)]
 
-    def _command(self, asked: Asked, tail: str) -> None:
+    def _command(self, asked: Asked, owner: str, tail: str) -> None:
         def reply(outcome: Outcome) -> None:
             payload = keys.outcome_json(outcome)
             if outcome.ok:
@@ -188,12 +200,20 @@ class ZenohServer:
                 asked.fail(payload, keys.JSON)
 
         try:
-            request = self._commands.request(tail, asked.payload or b"", self._identity(asked.attachment))
+            request = self._request(owner, tail, asked.payload or b"", asked.attachment)
         except BadCommand as bad:
-            self._note_refusal(tail, asked.attachment, bad)
+            self._note_refusal(owner, tail, asked.attachment, bad)
             _refuse(asked, bad)
             return
         self._submit(request, asked.received_at, reply)
+
+    def _request(self, owner: str, tail: str, payload: bytes, attachment: bytes | None) -> Request:
+        """Raises ``BadCommand``. A stop is taken from whoever it is."""
+        request = self._commands.request(tail, payload, self._identity(owner, attachment))
+        if self._users.are_proved and not owner and request.action not in STOP_ACTIONS:
+            own = f"{self._keys.top}/@/controller/<user>/{tail}"
+            raise BadCommand(Code.NOT_ALLOWED, f"nobody knows who asks by this key; use your own, {own}")
+        return request
 
     def _submit(self, request: Request, received_at: float, reply: Reply) -> None:
         """``received_at``: when zenoh handed it over."""
@@ -201,11 +221,15 @@ class ZenohServer:
         came_at = self._askers.arrival(request.identity.user, received_at, now, self._pulse.look)
         self._plant.submit(replace(request, received_at=came_at), now, reply)
 
-    def _identity(self, attachment: bytes | None) -> Identity:
+    def _identity(self, owner: str, attachment: bytes | None) -> Identity:
         """Raises ``BadCommand``."""
-        return replace(identity_of(attachment), sets_parameters=self._settings.parameters == "write")
+        if self._users.are_proved:
+            identity = Identity(Source.ZENOH, owner or ANONYMOUS)
+        else:
+            identity = identity_of(attachment)
+        return replace(identity, sets_parameters=self._settings.parameters == "write")
 
-    def _read_parameter(self, asked: Asked, tail: str) -> None:
+    def _read_parameter(self, asked: Asked, owner: str, tail: str) -> None:
         """A get on the key of a parameter: asked of the drive, or with ``?cached`` as it was last read."""
         drive, name = self._commands.parameter(tail)
         cached = "cached" in re.split("[;&=]", asked.parameters)
@@ -228,16 +252,17 @@ class ZenohServer:
             asked.finish()
 
         try:
-            request = self._commands.reading(drive, name, self._identity(asked.attachment), cached=cached)
+            identity = self._identity(owner, asked.attachment)
+            request = self._commands.reading(drive, name, identity, cached=cached)
         except BadCommand as bad:
             _refuse(asked, bad)
             return
         self._plant.submit(request, self._clock(), reply)
 
-    def _note_refusal(self, tail: str, attachment: bytes | None, bad: BadCommand) -> None:
+    def _note_refusal(self, owner: str, tail: str, attachment: bytes | None, bad: BadCommand) -> None:
         """A command that was refused before it became a request, for the audit log."""
         try:
-            identity = identity_of(attachment)
+            identity = self._identity(owner, attachment)
         except BadCommand:
             identity = identity_of(None)
         target, action = self._commands.meant(tail)
@@ -245,12 +270,12 @@ class ZenohServer:
 
     def _on_put(self, message: Message) -> None:
         """A plain put on a command key, where the site takes them. Nobody is there to be told."""
+        owner, tail = self._users.owner(self._keys.tail(message.key))
         try:
-            identity = self._identity(message.attachment)
-            request = self._commands.request(self._keys.tail(message.key), message.payload, identity)
+            request = self._request(owner, tail, message.payload, message.attachment)
         except BadCommand as bad:
             _log.info("zenoh: a put on %s is no command: %s", message.key, bad.message, extra=about("puts"))
-            self._note_refusal(self._keys.tail(message.key), message.attachment, bad)
+            self._note_refusal(owner, tail, message.attachment, bad)
             return
         self._submit(request, message.received_at, lambda _: None)
 
@@ -259,27 +284,13 @@ def _refuse(asked: Asked, bad: BadCommand) -> None:
     asked.fail(keys.refusal_json(bad.code, bad.message), keys.JSON)
 
 
-def _config(settings: ZenohTable) -> zenoh.Config:
+def _config(settings: ZenohTable, space: keys.KeySpace, users: Users) -> zenoh.Config:
+    login = users.login
     return zenoh_config(
         mode=settings.mode,
         listen=settings.listen if settings.mode == "peer" else (),
         connect=settings.connect,
-        users=_users(settings),
+        users=(login.user, login.password, login.file) if login else None,
+        access=access_control(space, users, accept_put=settings.accept_put),
+        prompt=space.prompt,
     )
-
-
-def _users(settings: ZenohTable) -> tuple[str, str, str] | None:
-    """Our own user with its password, and the file with everybody's. Raises Unavailable."""
-    if settings.user is None and settings.password_file is None:
-        return None
-    if settings.user is None or settings.password_file is None:
-        raise Unavailable("zenoh: user and password_file belong together; give both or neither")
-    try:
-        lines = Path(settings.password_file).read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise Unavailable(f"zenoh: password_file cannot be read: {error}") from None
-    for line in lines:
-        user, colon, password = line.partition(":")
-        if colon and user == settings.user:
-            return user, password, settings.password_file
-    raise Unavailable(f"zenoh: {settings.password_file} has no line {settings.user}:<password>")

@@ -1,6 +1,6 @@
 """A second process with nothing but plain zenoh: does what it is told in JSON lines, tells what it sees.
 
-Usage: zenoh_peer.py ENDPOINT [USER PASSWORD]
+Usage: zenoh_peer.py ENDPOINT MODE [USER PASSWORD]
 """
 
 from __future__ import annotations
@@ -34,8 +34,13 @@ def show(sample: zenoh.Sample) -> dict[str, object]:
 
 def ask(session: zenoh.Session, order: dict[str, str]) -> None:
     begin = time.monotonic()
+    target = zenoh.QueryTarget.ALL if order.get("target") == "all" else zenoh.QueryTarget.DEFAULT
     replies = session.get(
-        order["key"], payload=order.get("payload"), attachment=order.get("attachment"), timeout=5.0
+        order["key"],
+        payload=order.get("payload"),
+        attachment=order.get("attachment"),
+        target=target,
+        timeout=5.0,
     )
     values: list[dict[str, object]] = []
     errors: list[str] = []
@@ -47,10 +52,38 @@ def ask(session: zenoh.Session, order: dict[str, str]) -> None:
     say(id=order["id"], values=values, errors=errors, took=time.monotonic() - begin)
 
 
+class Storage:
+    """Keeps the newest sample of each key, and answers with it, as zenoh's storages do."""
+
+    def __init__(self, session: zenoh.Session, key: str, *, is_complete: bool) -> None:
+        self._kept: dict[str, zenoh.Sample] = {}
+        self._declared = (
+            session.declare_subscriber(key, self._keep),
+            session.declare_queryable(key, self._answer, complete=is_complete),
+        )
+
+    def _keep(self, sample: zenoh.Sample) -> None:
+        self._kept[str(sample.key_expr)] = sample
+
+    def _answer(self, query: zenoh.Query) -> None:
+        for key, sample in list(self._kept.items()):
+            if query.key_expr.intersects(zenoh.KeyExpr(key)):
+                query.reply(key, sample.payload, encoding=sample.encoding, timestamp=sample.timestamp)
+        query.drop()
+
+
+def answer_always(session: zenoh.Session, key: str, payload: str) -> object:
+    def answer(query: zenoh.Query) -> None:
+        query.reply(query.key_expr, payload, timestamp=session.new_timestamp())
+        query.drop()
+
+    return session.declare_queryable(key, answer, complete=True)
+
+
 def main() -> None:
-    endpoint, *user = sys.argv[1:]
+    endpoint, mode, *user = sys.argv[1:]
     config = zenoh.Config()
-    config.insert_json5("mode", '"peer"')
+    config.insert_json5("mode", json.dumps(mode))
     config.insert_json5("connect/endpoints", json.dumps([endpoint]))
     config.insert_json5("scouting/multicast/enabled", "false")
     config.insert_json5("scouting/gossip/enabled", "false")
@@ -59,7 +92,7 @@ def main() -> None:
         config.insert_json5("transport/auth/usrpwd/password", json.dumps(user[1]))
     session = zenoh.open(config)
     kept: list[object] = []
-    say(id="ready", peers=len(session.info.peers_zid()))
+    say(id="ready", peers=len(session.info.peers_zid()) + len(session.info.routers_zid()))
     for line in sys.stdin:
         order = json.loads(line)
         match order["do"]:
@@ -75,6 +108,18 @@ def main() -> None:
                 say(id=order["id"])
             case "put":
                 session.put(order["key"], order["payload"], attachment=order.get("attachment"))
+                say(id=order["id"])
+            case "delete":
+                session.delete(order["key"])
+                say(id=order["id"])
+            case "token":
+                kept.append(session.liveliness().declare_token(order["key"]))
+                say(id=order["id"])
+            case "answer":
+                kept.append(answer_always(session, order["key"], order["payload"]))
+                say(id=order["id"])
+            case "store":
+                kept.append(Storage(session, order["key"], is_complete=order.get("complete") == "yes"))
                 say(id=order["id"])
             case "get":
                 threading.Thread(target=ask, args=(session, order), daemon=True).start()

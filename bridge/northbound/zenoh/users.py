@@ -1,0 +1,90 @@
+"""Who a zenoh client is. With users, it is who its link has proved to be.
+
+zenoh does not tell by which link a query came. It does let a link through to some keys and not to others:
+each user has command keys of its own, ``…/@/controller/<user>/…``, and by them the bridge knows who asks.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from bridge.config import ZenohTable
+from bridge.errors import Unavailable
+
+ANONYMOUS: Final = "anonymous"
+NAME: Final = re.compile(r"[A-Za-z0-9_.\-]{1,64}")
+WANTED_NAME: Final = "a controller's name has 1…64 letters, digits and _ . -"
+
+_OWN_KEYS: Final = "@/controller/"
+
+
+@dataclass(frozen=True, slots=True)
+class Login:
+    """Our own user, and the file with the lines ``user:password`` of all."""
+
+    user: str
+    password: str
+    file: str
+    everybody: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Users:
+    """Where links prove who their users are, ``controllers`` have command keys of their own. Else whoever
+    asks is who it says it is. ``sole`` is the one user that there is beside the bridge's, where there can
+    be nobody else."""
+
+    login: Login | None = None
+    are_proved: bool = False
+    controllers: tuple[str, ...] = ()
+    sole: str = ""
+
+    def owner(self, tail: str) -> tuple[str, str]:
+        """Whose command key ``tail`` is, a key without prefix and site, and which of the plain keys it stands
+        for. A plain key is nobody's, ``""``, or that of the sole user."""
+        if not self.are_proved or not tail.startswith(_OWN_KEYS):
+            return self.sole, tail
+        name, _, rest = tail.removeprefix(_OWN_KEYS).partition("/")
+        return name, rest
+
+
+def own_keys(name: str) -> str:
+    """The keys of a controller, without prefix and site."""
+    return f"{_OWN_KEYS}{name}/**"
+
+
+def read_users(settings: ZenohTable) -> Users:
+    """Raises Unavailable where the password file cannot be used."""
+    login = _read_login(settings)
+    if settings.mode != "peer" or not settings.listen:
+        # Who is behind the router that we have chosen is the router's to know.
+        return Users(login)
+    if settings.controllers is not None:
+        return Users(login, True, tuple(settings.controllers))
+    if login is None:
+        return Users()
+    others = tuple(name for name in login.everybody if name != login.user) or login.everybody
+    is_sole = len(others) == 1 and not settings.connect
+    return Users(login, True, others, others[0] if is_sole else "")
+
+
+def _read_login(settings: ZenohTable) -> Login | None:
+    user, file = settings.user, settings.password_file
+    if user is None and file is None:
+        return None
+    if user is None or file is None:
+        raise Unavailable("zenoh: user and password_file belong together; give both or neither")
+    try:
+        lines = Path(file).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise Unavailable(f"zenoh: password_file cannot be read: {error}") from None
+    passwords = {name: password for name, colon, password in (line.partition(":") for line in lines) if colon}
+    for name in passwords:
+        if not NAME.fullmatch(name) or name == ANONYMOUS:
+            raise Unavailable(f"zenoh: {file}: {name!r} cannot be a user here: {WANTED_NAME}")
+    if user not in passwords:
+        raise Unavailable(f"zenoh: {file} has no line {user}:<password>")
+    return Login(user, passwords[user], file, tuple(passwords))

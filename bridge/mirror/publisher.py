@@ -73,8 +73,9 @@ class MirrorPublisher:
         except Unavailable as error:
             raise Unavailable(f"{error} (is this site already being run?)") from None
         close_to_others(self._endpoint)
-        self._link.declare_queryable(protocol.SNAPSHOT, self._on_snapshot)
+        # A front that has a snapshot may send requests.
         self._link.declare_queryable(protocol.REQUEST, self._on_request)
+        self._link.declare_queryable(protocol.SNAPSHOT, self._on_snapshot)
         self._link.declare_subscriber(protocol.REJECTED, self._on_rejected)
         self._link.declare_subscriber(protocol.COUNTED, self._on_counted)
         self._link.declare_token(protocol.TOKEN)

@@ -264,7 +264,7 @@ class ZenohLink:
         """Answer queries on ``key``. A flood of them ends before it reaches the loop."""
 
         def declare(session: zenoh.Session) -> None:
-            prompt, other = self._worker.lane(session), self._worker.lane(session)
+            prompt, other = self._worker.answers(session)
 
             def on_query(query: zenoh.Query) -> None:
                 payload, attachment = to_bytes(query.payload), to_bytes(query.attachment)

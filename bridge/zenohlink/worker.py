@@ -56,6 +56,7 @@ class Worker:
         self._closed = closed
         self._jobs: SimpleQueue[Job] = SimpleQueue()
         self._lanes: set[Lane] = set()
+        self._answers: tuple[Lane, Lane] | None = None
         self._lanes_lock = threading.Lock()
         self._last_complaint = float("-inf")
         self._thread = threading.Thread(target=self._work, name=f"zenoh-{name}", daemon=True)
@@ -75,6 +76,12 @@ class Worker:
             if self.is_stopping:
                 lane.stop()
         return lane
+
+    def answers(self, session: zenoh.Session) -> tuple[Lane, Lane]:
+        """Where queries are answered: what never waits, and all else. Only jobs ask."""
+        if self._answers is None:
+            self._answers = self.lane(session), self.lane(session)
+        return self._answers
 
     @property
     def waiting(self) -> int:

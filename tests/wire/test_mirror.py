@@ -158,7 +158,7 @@ async def test_a_start_that_takes_its_time_holds_up_no_other_request(endpoint: s
         keep = Request(SCADA, "conveyor/fu4", Action.KEEP_ALIVE)
         begin = time.monotonic()
         outcomes = await asyncio.gather(*(client.request(keep) for _ in range(300)))
-        assert all(outcome.ok for outcome in outcomes)
+        assert all(outcome.ok for outcome in outcomes), outcomes
         assert time.monotonic() - begin < 3
         assert not start.done()
         drive_says(fu4, ENABLED)

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import copy
 import logging
-import threading
 import time
 from collections.abc import Callable, Hashable
 from math import inf
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from bridge.ratelimit import PAUSE_S, Repeats
 
@@ -25,50 +24,35 @@ def about(source: str, kind: Hashable = None) -> dict[str, Hashable]:
     return {_SOURCE: source, _KIND: kind}
 
 
-class Timer(Protocol):
-    def start(self) -> None: ...
-
-    def cancel(self) -> None: ...
-
-
-def _timer(delay_s: float, call: Callable[[], None]) -> Timer:
-    timer = threading.Timer(delay_s, call)
-    timer.daemon = True
-    timer.name = "log counts"
-    return timer
-
-
 class QuietHandler(logging.StreamHandler[Any]):
-    """Writes to ``stream``, standard error where there is none. ``clock`` is monotonic; ``make_timer`` gives
-    one that has a call made after some seconds."""
+    """Writes to ``stream``, standard error where there is none. ``clock`` is monotonic.
 
-    def __init__(
-        self,
-        stream: Any = None,
-        *,
-        clock: Callable[[], float] = time.monotonic,
-        make_timer: Callable[[float, Callable[[], None]], Timer] = _timer,
-    ) -> None:
+    Counts that are due are written before the next line, and by ``sum_up``, which somebody should call now
+    and then: no thread does, since starting one takes its time where the machine is slow.
+    """
+
+    def __init__(self, stream: Any = None, *, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(stream)
         self._clock = clock
-        self._make_timer = make_timer
         self._repeats = Repeats[logging.LogRecord]()
-        self._waiting: Timer | None = None
+        self._sum_up_at = inf
 
     def emit(self, record: logging.LogRecord) -> None:
         """Called with the handler's lock held. Raises nothing, whatever is to be logged."""
+        now = self._clock()
+        if now >= self._sum_up_at:
+            self._sum_up(now)
         try:
-            is_told = record.levelno <= logging.DEBUG or self._admits(record)
+            is_told = record.levelno <= logging.DEBUG or self._admits(record, now)
         except Exception:  # noqa: BLE001 - such as arguments that do not fit the text
             self.handleError(record)
             return
         if is_told:
             super().emit(record)
-        elif self._waiting is None:
-            self._wait(PAUSE_S)
+        else:
+            self._sum_up_at = min(self._sum_up_at, now + PAUSE_S)
 
-    def _admits(self, record: logging.LogRecord) -> bool:
-        now = self._clock()
+    def _admits(self, record: logging.LogRecord, now: float) -> bool:
         place = record.pathname, record.lineno
         if hasattr(record, _SOURCE):
             kind = place, getattr(record, _KIND)
@@ -76,38 +60,27 @@ class QuietHandler(logging.StreamHandler[Any]):
         # Nobody says what it is about: the text does, which may be different each time.
         return self._repeats.admits(place, record.getMessage(), record, now)
 
-    def _wait(self, delay_s: float) -> None:
-        self._waiting = self._make_timer(delay_s, self.sum_up)
-        try:
-            self._waiting.start()
-        except RuntimeError:  # no thread to be had: the next line that is left out tries again
-            self._waiting = None
-
     def sum_up(self) -> None:
         """Write the counts that are due; from any thread."""
         self.acquire()
         try:
-            self._waiting = None
             now = self._clock()
-            self._write(self._repeats.due(now))
-            next_due = self._repeats.next_due()
-            if next_due is not None:
-                self._wait(max(next_due - now, 1.0))
+            if now >= self._sum_up_at:
+                self._sum_up(now)
         finally:
             self.release()
 
-    def _write(self, counts: list[tuple[logging.LogRecord, int]]) -> None:
-        for record, left_out in counts:
+    def _sum_up(self, now: float) -> None:
+        for record, left_out in self._repeats.due(now):
             super().emit(_counted(record, left_out))
+        next_due = self._repeats.next_due()
+        self._sum_up_at = inf if next_due is None else next_due
 
     def close(self) -> None:
         """The counts that were still to come; called when the process ends."""
         self.acquire()
         try:
-            waiting, self._waiting = self._waiting, None
-            if waiting:
-                waiting.cancel()
-            self._write(self._repeats.due(inf))
+            self._sum_up(inf)
         finally:
             self.release()
         super().close()

@@ -12,6 +12,7 @@ from bridge.quietlog import QuietHandler, about
 
 _log = logging.getLogger(__name__)
 
+_COUNTS_EVERY_S: Final = 1.0
 _PRIORITY: Final = {
     logging.DEBUG: 7,
     logging.INFO: 6,
@@ -49,6 +50,14 @@ def set_up(*, verbose: bool) -> None:
     # Libraries tell their own users; ours need only what goes wrong.
     for name in ("asyncua", "asyncio", "pymodbus", "can"):
         logging.getLogger(name).setLevel(logging.ERROR)
+
+
+def write_counts(loop: asyncio.AbstractEventLoop) -> None:
+    """Now and then, as long as ``loop`` runs: how many lines were left out."""
+    for handler in logging.getLogger().handlers:
+        if isinstance(handler, QuietHandler):
+            handler.sum_up()
+    loop.call_later(_COUNTS_EVERY_S, write_counts, loop)
 
 
 class LoopFaults:

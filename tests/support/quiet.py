@@ -1,38 +1,21 @@
-"""The log as it is written: the handler of the program on a string, a clock by hand, no thread."""
+"""The log as it is written: the handler of the program on a string, a clock by hand."""
 
 from __future__ import annotations
 
 import io
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from bridge.quietlog import QuietHandler
 from bridge.ratelimit import PAUSE_S
 
 
-class NoTimer:
-    """Whose time comes when the test says so."""
-
-    def __init__(self, delay_s: float, call: Callable[[], None]) -> None:
-        self.delay_s = delay_s
-        self.call = call
-
-    def start(self) -> None: ...
-
-    def cancel(self) -> None: ...
-
-
 class QuietLog:
     def __init__(self) -> None:
         self.now = 1000.0
-        self.timers: list[NoTimer] = []
         self._text = io.StringIO()
-        self.handler = QuietHandler(self._text, clock=lambda: self.now, make_timer=self._timer)
-
-    def _timer(self, delay_s: float, call: Callable[[], None]) -> NoTimer:
-        self.timers.append(NoTimer(delay_s, call))
-        return self.timers[-1]
+        self.handler = QuietHandler(self._text, clock=lambda: self.now)
 
     @property
     def lines(self) -> list[str]:

@@ -257,8 +257,8 @@ ON_THE_BUS: Final = (
     restarts,
     nonsense,
 )
-_LINES: Final = 12
-"""A node that is not asked for a minute is lost, the round was late, and so on: a line each."""
+_LINES: Final = 20
+"""A node that is not asked for a minute is lost, the round was late, and so on; hangs take four minutes."""
 
 
 @pytest.mark.parametrize("provoke", ON_THE_BUS)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from bridge.cli.logs import LoopFaults
+from bridge.cli.logs import LoopFaults, write_counts
 from bridge.quietlog import about
 from bridge.ratelimit import PAUSE_S
 from tests.support.quiet import QuietLog, quiet_log
@@ -84,34 +84,32 @@ def test_a_traceback_is_told_once(log: QuietLog) -> None:
     assert log.pass_minute() == ["unexpected (99 more of this kind)"]
 
 
-def test_one_timer_waits_for_all_counts_and_the_end_brings_them_too(log: QuietLog) -> None:
+def test_counts_come_with_the_next_line_and_at_the_end_too(log: QuietLog) -> None:
     for number in range(10):
         closed("10.0.0.1", number)
-        closed("10.0.0.2", number)
-    (timer,) = log.timers
-    assert timer.delay_s == PAUSE_S
-    before = len(log.lines)
-    log.handler.acquire()
-    log.handler.release()
+    log.now += PAUSE_S
+    _log.info("something else")
+    assert log.lines[1:] == ["connection of 10.0.0.1 closed: 9 (9 more of this kind)", "something else"]
+    closed("10.0.0.1", 10)
     log.handler.close()
-    assert len(log.lines) - before == 2
+    assert log.lines[-1] == "connection of 10.0.0.1 closed: 10 (1 more of this kind)"
 
 
-def test_no_thread_and_no_fault_of_the_caller_raises_through_the_log(
+async def test_where_an_event_loop_runs_nobody_has_to_say_anything(log: QuietLog) -> None:
+    for number in range(10):
+        closed("10.0.0.1", number)
+    log.now += PAUSE_S
+    write_counts(asyncio.get_running_loop())
+    assert len(log.lines) == 2
+
+
+def test_no_fault_of_the_caller_raises_through_the_log(
     log: QuietLog, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(logging, "raiseExceptions", False)
     _log.warning("%d", "no number")
-
-    def start(self: object) -> None:
-        raise RuntimeError("can't start new thread")
-
-    monkeypatch.setattr("tests.support.quiet.NoTimer.start", start)
-    closed("10.0.0.1")
-    closed("10.0.0.1")
-    monkeypatch.undo()
-    closed("10.0.0.1")
-    assert len(log.timers) == 2, "the next one tries again"
+    _log.warning("and on")
+    assert log.lines == ["and on"]
 
 
 def test_what_is_asked_for_with_verbose_is_all_there(log: QuietLog) -> None:

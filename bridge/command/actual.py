@@ -86,6 +86,8 @@ class ActualData:
         self.words: list[int] = [0] * len(self._process)
         """The words of the last TPDOs, the status word first."""
         self.quality = Quality.WAITING
+        self.is_even = True
+        """All words are as good as the status word: they come with it."""
         self._carried = family.carried(slot)[1][1:]
         self._places = [self._process.index(word) for word in self._carried]
         self._has_all = len(self._carried) == len(self._process) - 1
@@ -127,6 +129,8 @@ class ActualData:
         self._judged = list(self._to_judge(unserved))
         leaves = [f"actual/{word}" for word in self._carried] + [codec.model.leaf for codec in self._codecs]
         self._by_leaf = dict(zip(leaves, self._judged[len(self._status) :], strict=True))
+        words = self._judged[len(self._status) :][: len(self._carried)]
+        self.is_even = not any(point.why or point.further for point in words)
         self._shown = None
 
     def _to_judge(self, unserved: Mapping[str, str]) -> Iterable[_Judged]:

@@ -138,6 +138,11 @@ class Drive:
         """The words of the last TPDOs, the status word first, in the order of ``process.tpdo``."""
         return self._actual.words
 
+    @property
+    def is_even(self) -> bool:
+        """All of its actual words are as good as the status word."""
+        return self._actual.is_even
+
     def quality_at(self, leaf: str, now: float) -> Quality:
         """The quality of process data, such as ``actual/value_2`` or ``actual/frequency``, judged now."""
         return self._actual.quality_at(leaf, now)

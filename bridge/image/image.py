@@ -81,6 +81,10 @@ class Image:
     def __getitem__(self, index: int) -> Reading:
         return Reading(self._values[index], self._qualities[index], self._times[index], self._reasons[index])
 
+    def qualities(self, indices: Iterable[int]) -> list[Quality]:
+        """The present qualities of these points."""
+        return [self._qualities[index] for index in indices]
+
     def read(self, name: str) -> Reading:
         """The present state of the named point. Raises KeyError where there is none."""
         return self[self.index[name]]

@@ -36,6 +36,7 @@ from bridge.northbound.modbus.registers import (
     STOP,
     TIMEOUT,
     VALUES,
+    WORDS_NOT_GOOD,
     DriveMap,
     Row,
     Table,
@@ -57,6 +58,8 @@ class DriveUnit:
 
     __slots__ = (
         "_drive",
+        "_flagged",
+        "_flagged_actual",
         "_halves",
         "_image",
         "_inputs",
@@ -73,6 +76,10 @@ class DriveUnit:
         self._words32 = words32
         self._map = drive_map = DriveMap(drive)
         self._inputs: Final = [(row, image.index[f"{drive.name}/{row.name}"]) for row in drive_map.inputs]
+        flagged = self._inputs[:_FLAGS]
+        self._flagged: Final = [index for _, index in flagged]
+        actual = (place for place, (row, _) in enumerate(flagged) if row.name.startswith(_ACTUAL))
+        self._flagged_actual: Final = tuple(actual)
         self._setpoints: Final = [(r, image.index[f"{drive.name}/{r.name}"]) for r in drive_map.setpoints]
         self._parameters: Final = [(r, image.index[f"{drive.name}/{r.name}"]) for r in drive_map.parameters]
         self._words: Final = {
@@ -150,7 +157,7 @@ class DriveUnit:
             refuse_quality(quality)
             words = self._data(now)[start:end]
         if start < VALUES and end > DIAGNOSTICS:
-            words += self._diagnostics(quality, now)[max(start - DIAGNOSTICS, 0) : end - DIAGNOSTICS]
+            words += self._diagnostics(quality, end, now)[max(start - DIAGNOSTICS, 0) : end - DIAGNOSTICS]
         return words
 
     def _data(self, now: float) -> list[int]:
@@ -159,13 +166,15 @@ class DriveUnit:
         values = self._drive.words[1 : PROCESS_WORDS + 1]
         gap = [0] * (PROCESS_WORDS - len(values))
         words = [channel.status_word, *values, *gap, channel.drive_status_word]
+        if self._drive.is_even:
+            return words
         for place, leaf in self._words[Table.INPUT_REGISTER].items():
             if not self._drive.quality_at(leaf, now).has_value:
                 words[place] = 0  # what it was before the node restarted says nothing
         return words
 
-    def _diagnostics(self, quality: Quality, now: float) -> list[int]:
-        """Input registers 10 … 31."""
+    def _diagnostics(self, quality: Quality, end: int, now: float) -> list[int]:
+        """Input registers 10 … 31; what takes longer only as far as ``end``."""
         channel = self._drive.channel
         from_int = self._words32.from_int
         owner = channel.owner
@@ -179,23 +188,26 @@ class DriveUnit:
             *from_int(max(channel.link.age_ms(now), 0)),
             *from_int(self._drive.sdo_abort_code),
             owner.source if owner else 0,
-            self._words_not_good(now),
-            *from_int(self._values_not_good(now)),
-            channel.watchdog.telegrams,
         ]
+        if end > WORDS_NOT_GOOD:
+            words += [self._words_not_good(quality, now), *from_int(self._values_not_good(now))]
+            words.append(channel.watchdog.telegrams)
         return words + [0] * (VALUES - DIAGNOSTICS - len(words))
 
-    def _words_not_good(self, now: float) -> int:
+    def _words_not_good(self, quality: Quality, now: float) -> int:
         """Bit 0 is actual value word 1; a word that the drive does not have is no bad one."""
+        if self._drive.is_even and quality is Quality.GOOD:
+            return 0
         words = self._words[Table.INPUT_REGISTER].items()
         bad = (place for place, leaf in words if self._drive.quality_at(leaf, now) is not Quality.GOOD)
         return sum(1 << place - 1 for place in bad)
 
     def _values_not_good(self, now: float) -> int:
         """Bit 0 is the first 32-bit value."""
-        values = enumerate(self._inputs[:_FLAGS])
-        bad = (place for place, (row, index) in values if self._quality(row, index, now) is not Quality.GOOD)
-        return sum(1 << place for place in bad)
+        qualities = self._image.qualities(self._flagged)
+        for place in self._flagged_actual:
+            qualities[place] = self._drive.quality_at(self._inputs[place][0].name, now)
+        return sum(1 << place for place, one in enumerate(qualities) if one is not Quality.GOOD)
 
     def _quality(self, row: Row, index: int, now: float) -> Quality:
         """The quality of a 32-bit value. Process data are judged now: the image learns of a passed deadline

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final
 
-from asyncua.common.event_objects import BaseEvent
-
 from bridge.command import Event, Kind
-from bridge.northbound.opcua.library import ObjectIds, make, node_id, text, ua
+from bridge.northbound.opcua.eventfilter import Occurrence
+from bridge.northbound.opcua.library import ObjectIds, node_id, text, ua, variant
 from bridge.northbound.opcua.nodes import pascal_case
 from bridge.northbound.opcua.subscriptions import Subscriptions
 from bridge.northbound.opcua.values import source_time
@@ -81,31 +80,28 @@ class EventSender:
             self._queue.append(_Told(event, bound.held_back))
             bound.held_back = 0
 
-    async def send_waiting(self) -> None:
+    def send_waiting(self) -> None:
         while self._queue:
             told = self._queue.popleft()
             if self._subscriptions.subscriptions:
-                await self._send(told)
+                self._send(told)
 
-    async def _send(self, told: _Told) -> None:
+    def _send(self, told: _Told) -> None:
         event = told.event
-        source = self._source(event.source)
         more = f" ({told.held_back} more like it before were left out)" if told.held_back else ""
-        made = make(
-            BaseEvent,
-            EventId=uuid.uuid4().bytes,
-            EventType=self._types[event.kind],
-            SourceNode=source,
-            SourceName=event.source,
-            Time=source_time(self._epoch_ns(event.time)),
-            ReceiveTime=datetime.now(UTC),
-            Message=text(event.message + more),
-            Severity=event.severity,
-        )
+        kinds = ua.VariantType
+        fields = {
+            "EventId": variant(uuid.uuid4().bytes, kinds.ByteString),
+            "EventType": variant(self._types[event.kind], kinds.NodeId),
+            "SourceNode": variant(self._source(event.source), kinds.NodeId),
+            "SourceName": variant(event.source, kinds.String),
+            "Time": variant(source_time(self._epoch_ns(event.time)), kinds.DateTime),
+            "ReceiveTime": variant(datetime.now(UTC), kinds.DateTime),
+            "Message": variant(text(event.message + more), kinds.LocalizedText),
+            "Severity": variant(event.severity, kinds.UInt16),
+        }
         for emitter in self._emitters(event.source):
-            made.emitting_node = emitter
-            for subscription in list(self._subscriptions.subscriptions.values()):
-                await subscription.monitored_item_srv.trigger_event(made)
+            self._subscriptions.hear(Occurrence(emitter, fields))
 
     def _source(self, name: str) -> ua.NodeId:
         """The object that an event is about: a drive, a node, a bus, or else the bridge itself."""

@@ -20,6 +20,7 @@ from bridge.command import Kind
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua.address_space import Bindings, Builder
+from bridge.northbound.opcua.browsing import MOST_CONTINUATION_POINTS
 from bridge.northbound.opcua.certificates import (
     OwnCertificate,
     TrustedCertificates,
@@ -27,6 +28,7 @@ from bridge.northbound.opcua.certificates import (
     configured_or_own,
 )
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
+from bridge.northbound.opcua.items import LEAST_SAMPLING_MS
 from bridge.northbound.opcua.library import ObjectIds, node_id, ua, variant
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
@@ -42,6 +44,19 @@ NAMESPACE: Final = "urn:drivebridge:points"
 _PRODUCT: Final = "urn:drivebridge"
 _CHUNK: Final = 65535
 _MOST_CHUNKS: Final = 256
+
+_CAPABILITIES: Final = {
+    ObjectIds.Server_ServerCapabilities_OperationLimits_MaxNodesPerMethodCall: variant(
+        MOST_CALLS, ua.VariantType.UInt32
+    ),
+    ObjectIds.Server_ServerCapabilities_MaxBrowseContinuationPoints: variant(
+        MOST_CONTINUATION_POINTS, ua.VariantType.UInt16
+    ),
+    ObjectIds.Server_ServerCapabilities_MinSupportedSampleRate: variant(
+        LEAST_SAMPLING_MS, ua.VariantType.Double
+    ),
+}
+"""What the server says of itself, where asyncua does not know."""
 
 _log = logging.getLogger(__name__)
 
@@ -194,8 +209,8 @@ class OpcUaServer:
         await server.set_build_info(_PRODUCT, "drivebridge", "drivebridge", version, version, now)
         server.set_security_policy(security_policies(self._settings))
         server.set_identity_tokens(users.tokens)
-        limit = node_id(ObjectIds.Server_ServerCapabilities_OperationLimits_MaxNodesPerMethodCall)
-        await server.get_node(limit).write_value(variant(MOST_CALLS, ua.VariantType.UInt32))
+        for capability, value in _CAPABILITIES.items():
+            await server.get_node(node_id(capability)).write_value(value)
 
     def _events(self, inner: Server, builder: Builder, bindings: Bindings) -> EventSender:
         base = builder.object_type(BASE_TYPE, node_id(ObjectIds.BaseEventType))

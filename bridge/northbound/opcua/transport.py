@@ -1,7 +1,7 @@
 """Connections: what may pass a channel, who may open a session on it, and answers out of turn.
 
 Corrected here (``tests/wire/opcua/test_security.py``): sessions on a channel without security that
-no endpoint offers, a session taken over from another channel, registering servers, a Call of three
+no endpoint offers, a session taken over from another channel, a Call of three
 seconds that held up its own session's keep-alives, connections left hanging after an error, chunks of
 any size.
 """
@@ -15,6 +15,7 @@ import asyncio
 import logging
 import socket
 import struct
+import time
 from collections import deque
 from typing import Any, Final
 
@@ -43,7 +44,9 @@ from bridge.northbound.opcua.library import (
     status,
     ua,
 )
+from bridge.northbound.opcua.routes import ROUTES, Request, carry_out
 from bridge.northbound.opcua.security import read_password
+from bridge.northbound.opcua.services import REFUSED
 from bridge.northbound.opcua.session import Server, Session
 from bridge.northbound.opcua.writes import received_at
 from bridge.northbound.pulse import Pulse
@@ -58,12 +61,6 @@ _DISCOVERY: Final = frozenset(
         node_id(ObjectIds.GetEndpointsRequest_Encoding_DefaultBinary),
         node_id(ObjectIds.FindServersRequest_Encoding_DefaultBinary),
         _CLOSE_CHANNEL,
-    )
-)
-_REGISTRATION: Final = frozenset(
-    (
-        node_id(ObjectIds.RegisterServerRequest_Encoding_DefaultBinary),
-        node_id(ObjectIds.RegisterServer2Request_Encoding_DefaultBinary),
     )
 )
 _SLOW: Final = frozenset(
@@ -145,33 +142,67 @@ class Processor(UaProcessor):
             answer = await super()._process_message(typeid, requesthdr, seqhdr, body)
             if isinstance(self.session, Session):
                 self.session.channel_certificate = certificate
+                self.session.holder = self
             return answer
         if typeid == _ACTIVATE:
             session = self._session_to_activate(requesthdr)
             params = struct_from_binary(ua.ActivateSessionParameters, body.copy())
             # Nothing awaits between here and activate_session, so this login is for this call.
             session.admitted = await self._login(session, get(params, "UserIdentityToken"))
+        if typeid in ROUTES:
+            return await self._carry_out(typeid, requesthdr, seqhdr, body)
         try:
-            return await super()._process_message(typeid, requesthdr, seqhdr, body)
+            answer = await super()._process_message(typeid, requesthdr, seqhdr, body)
         except InvalidSignature:
             raise ServiceError(StatusCodes.BadApplicationSignatureInvalid) from None
+        if typeid == _ACTIVATE and isinstance(self.session, Session):
+            self.session.holder = self
+        return answer
+
+    async def _carry_out(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> bool:
+        """A service that asyncua's processor does not leave to the session."""
+        session = self.session
+        if not isinstance(session, Session):
+            raise ServiceError(StatusCodes.BadSessionIdInvalid)
+        if not session.is_activated():
+            raise ServiceError(StatusCodes.BadSessionNotActivated)
+        self.session_last_activity = time.monotonic()
+        session.touch()
+
+        def send(response: Any) -> None:
+            self.send_response(requesthdr.RequestHandle, seqhdr, response)
+
+        def is_open() -> bool:
+            return session.holder is self and not self._transport.is_closing()
+
+        await carry_out(session, typeid, Request(requesthdr, body, send, is_open))
+        return True
 
     async def close(self) -> None:
         for task in list(self._waiting):
             task.cancel()
         await super().close()
 
+    def _should_close_session_on_transport_loss(self) -> bool:
+        # It may have been activated on another connection meanwhile.
+        if isinstance(self.session, Session) and self.session.holder is not self:
+            return False
+        return super()._should_close_session_on_transport_loss()
+
     # what may pass
 
     def _check(self, typeid: ua.NodeId, requesthdr: Any) -> None:
         """Raises ServiceError for a request that has no business on this channel or in this session."""
-        if typeid in _REGISTRATION:
-            raise ServiceError(StatusCodes.BadServiceUnsupported)
+        if typeid in REFUSED:
+            raise ServiceError(REFUSED[typeid])
         if typeid in _DISCOVERY:
             return
         if not self._is_secured() and not self._server.no_security:
             raise ServiceError(StatusCodes.BadSecurityPolicyRejected)
         session = self.session
+        if isinstance(session, Session) and session.holder is not self:
+            # Activated on another connection; this one has lost it (Part 4 §5.6.3).
+            session = self.session = None
         if session is None or session.state is SessionState.Closed:
             return
         if typeid == _CREATE:

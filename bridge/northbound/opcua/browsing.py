@@ -31,7 +31,12 @@ MOST_CONTINUATION_POINTS: Final = 20
 """Of one session."""
 
 _NULL: Final = node_id(ObjectIds.Null)
-_BATCH: Final = 100
+_BEFORE_YIELD: Final = 5_000
+"""References that are looked at before others have their turn."""
+
+_MOST_REFERENCES: Final = 100_000
+"""In one response."""
+
 _LONGEST_PATH: Final = 100
 _POINT_BYTES: Final = 8
 _WHOLE_PATH: Final = 0xFFFF_FFFF
@@ -63,20 +68,30 @@ class Browser:
         self._space = space
         self._rests: dict[bytes, _Rest] = {}
         self._subtypes: dict[ua.NodeId, set[ua.NodeId]] = {}
+        self._looked_at = 0
 
     async def browse(self, params: ua.BrowseParameters) -> list[ua.BrowseResult]:
         if get(get(params, "View"), "ViewId") != _NULL:
             raise ServiceError(StatusCodes.BadViewIdUnknown)
         most: int = get(params, "RequestedMaxReferencesPerNode")
         results: list[ua.BrowseResult] = []
-        for place, wanted in enumerate(get(params, "NodesToBrowse")):
-            if place % _BATCH == 0:
-                await asyncio.sleep(0)
+        left = _MOST_REFERENCES
+        for wanted in get(params, "NodesToBrowse"):
+            await self._rest()
             try:
-                results.append(self._tell(_Rest(self._references(wanted), most)))
+                result = self._tell(_Rest(self._references(wanted), most))
             except ServiceError as error:
-                results.append(_refused(int(error.code)))
+                result = _refused(int(error.code))
+            left -= len(get(result, "References"))
+            if left < 0:
+                raise ServiceError(StatusCodes.BadResponseTooLarge)
+            results.append(result)
         return results
+
+    async def _rest(self) -> None:
+        if self._looked_at >= _BEFORE_YIELD:
+            self._looked_at = 0
+            await asyncio.sleep(0)
 
     def browse_next(self, params: ua.BrowseNextParameters) -> list[ua.BrowseResult]:
         points: list[bytes] = get(params, "ContinuationPoints")
@@ -111,6 +126,7 @@ class Browser:
         classes: int = get(wanted, "NodeClassMask")
         forward = direction == ua.BrowseDirection.Forward
         mask: int = get(wanted, "ResultMask")
+        self._looked_at += len(node.references) + 1
         return [
             _masked(found, mask)
             for found in node.references
@@ -136,14 +152,9 @@ class Browser:
         return self._subtypes.setdefault(type_id, subtypes(self._space, type_id))
 
     async def translate(self, paths: Sequence[ua.BrowsePath]) -> list[ua.BrowsePathResult]:
-        results: list[ua.BrowsePathResult] = []
-        for place, path in enumerate(paths):
-            if place % _BATCH == 0:
-                await asyncio.sleep(0)
-            results.append(self._translate(path))
-        return results
+        return [await self._translate(path) for path in paths]
 
-    def _translate(self, path: ua.BrowsePath) -> ua.BrowsePathResult:
+    async def _translate(self, path: ua.BrowsePath) -> ua.BrowsePathResult:
         elements: list[ua.RelativePathElement] = get(get(path, "RelativePath"), "Elements") or []
         start: ua.NodeId = get(path, "StartingNode")
         code = StatusCodes.Good
@@ -160,6 +171,7 @@ class Browser:
         there = {start: None}
         for element in elements:
             there = self._step(there, element)
+            await self._rest()
         if not there:
             return make(ua.BrowsePathResult, StatusCode=status(StatusCodes.BadNoMatch))
         targets = [
@@ -177,7 +189,9 @@ class Browser:
         further: dict[ua.NodeId, None] = {}
         for where in there:
             node = self._space.get(where)
-            for found in node.references if node else ():
+            references = node.references if node else []
+            self._looked_at += len(references) + 1
+            for found in references:
                 if get(found, "BrowseName") != name or get(found, "IsForward") == inverse:
                     continue
                 if types is None or get(found, "ReferenceTypeId") in types:

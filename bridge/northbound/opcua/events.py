@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import uuid
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -80,11 +81,13 @@ class EventSender:
             self._queue.append(_Told(event, bound.held_back))
             bound.held_back = 0
 
-    def send_waiting(self) -> None:
+    async def send_waiting(self) -> None:
         while self._queue:
             told = self._queue.popleft()
             if self._subscriptions.subscriptions:
                 self._send(told)
+                # Each client's filter has been asked.
+                await asyncio.sleep(0)
 
     def _send(self, told: _Told) -> None:
         event = told.event

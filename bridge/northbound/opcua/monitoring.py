@@ -10,7 +10,7 @@ from typing import Final, TypeVar
 from asyncua.server.address_space import AddressSpace, NodeData
 
 from bridge.northbound.opcua import ranges
-from bridge.northbound.opcua.eventfilter import EventFilterFault, event_filter
+from bridge.northbound.opcua.eventfilter import EventFilterFault, EventTypes, event_filter
 from bridge.northbound.opcua.filters import change_filter
 from bridge.northbound.opcua.items import EventItem, Item, ValueItem, event_settings, value_settings
 from bridge.northbound.opcua.library import (
@@ -30,6 +30,9 @@ from bridge.northbound.opcua.subscription import Subscription
 MOST_ITEMS: Final = 100_000
 """Monitored items of all clients together."""
 
+MOST_LISTENERS: Final = 1_000
+"""Of these, those for events: each is asked about every event."""
+
 _BATCH: Final = 50
 _SUBSCRIBE_TO_EVENTS: Final = 1
 
@@ -43,6 +46,8 @@ class MonitoredItems:
         self._space = space
         self._numbers = count(1)
         self._there = 0
+        self._listening = 0
+        self.event_types = EventTypes(space)
 
     async def create(
         self, find: Callable[[], Subscription], params: ua.CreateMonitoredItemsParameters
@@ -83,6 +88,7 @@ class MonitoredItems:
             return _faulty(ua.MonitoredItemCreateResult(), error)
         subscription.add(item)
         self._there += 1
+        self._listening += isinstance(item, EventItem)
         if isinstance(item, ValueItem):
             self._watch(subscription, item)
         return change(_agreed(ua.MonitoredItemCreateResult(), item), MonitoredItemId=item.number)
@@ -91,8 +97,10 @@ class MonitoredItems:
         held = self._space.read_attribute_value(node.nodeid, AttributeIds.EventNotifier).Value
         if held is None or not held.Value & _SUBSCRIBE_TO_EVENTS:
             raise ServiceError(StatusCodes.BadNotSupported)
+        if self._listening >= MOST_LISTENERS:
+            raise ServiceError(StatusCodes.BadTooManyMonitoredItems)
         asked: ua.MonitoringParameters = get(wanted, "RequestedParameters")
-        filter_ = event_filter(get(asked, "Filter"), self._space)
+        filter_ = event_filter(get(asked, "Filter"), self.event_types)
         mode = get(wanted, "MonitoringMode")
         return EventItem(next(self._numbers), node.nodeid, event_settings(asked), filter_, mode)
 
@@ -152,7 +160,7 @@ class MonitoredItems:
         try:
             item = _item(subscription, get(wanted, "MonitoredItemId"))
             if isinstance(item, EventItem):
-                item.modify(event_settings(asked), event_filter(get(asked, "Filter"), self._space))
+                item.modify(event_settings(asked), event_filter(get(asked, "Filter"), self.event_types))
             else:
                 node = self._space[get(item.target, "NodeId")]
                 filter_ = change_filter(
@@ -186,6 +194,7 @@ class MonitoredItems:
     def drop(self, subscription: Subscription, item: Item) -> None:
         subscription.drop(item)
         self._there -= 1
+        self._listening -= isinstance(item, EventItem)
         if isinstance(item, ValueItem):
             self._space.delete_datachange_callback(item.handle)
 

@@ -29,7 +29,7 @@ class Publisher:
         feed = self._image.feed()
         try:
             while True:
-                self._events.send_waiting()
+                await self._events.send_waiting()
                 # What changes meanwhile waits for the next tick, or a busy image would never let go.
                 left = len(feed)
                 while left > 0:

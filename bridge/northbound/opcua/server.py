@@ -189,6 +189,7 @@ class OpcUaServer:
             Caller(self._view, inner.aspace, bindings.methods),
         )
         events = self._events(inner, builder, bindings)
+        inner.subscriptions.prepare()
         self._server = server
         await server.start()
         publisher = Publisher(self._view.image, bindings.variables, events)

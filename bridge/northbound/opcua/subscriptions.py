@@ -34,6 +34,10 @@ class Subscriptions:
         self._items = MonitoredItems(space)
         self._timers: dict[int, asyncio.TimerHandle] = {}
 
+    def prepare(self) -> None:
+        """The address space is complete."""
+        self._items.event_types.look()
+
     def of(self, owner: Owner) -> list[Subscription]:
         return [found for found in self.subscriptions.values() if found.owner is owner]
 

@@ -8,16 +8,14 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from functools import partial
+from typing import Any, Final, Protocol
 
-from asyncua.server.address_space import AddressSpace
-
-from bridge.northbound.opcua.hierarchy import subtypes
 from bridge.northbound.opcua.library import AttributeIds, StatusCodes, get, make, status, ua
 
 Operator = ua.FilterOperator
 _MOST_ELEMENTS: Final = 100
-_MOST_OPERANDS: Final = 1_000
+_MOST_OPERANDS: Final = 500
 
 Fields = Mapping[str, ua.Variant]
 _Operand = Callable[[Fields, Sequence[Any]], Any]
@@ -105,13 +103,24 @@ class Where:
         return values[0] is True if values else True
 
 
-def where_clause(
-    asked: ua.ContentFilter, space: AddressSpace, field_fault: Callable[[object], int]
-) -> tuple[Where | None, list[ua.ContentFilterElementResult]]:
-    """The clause, None for one with a fault, and what is to be said of each of its elements.
+class Types(Protocol):
+    """The event types that there are."""
 
-    ``field_fault`` tells what is wrong with an operand that names a field.
-    """
+    def fault(self, operand: object) -> int:
+        """What is wrong with an operand that names a field; Good for nothing."""
+        ...
+
+    def is_of(self, kind: object, wanted: ua.NodeId) -> bool:
+        """Whether the event type ``kind`` is ``wanted`` or below it."""
+        ...
+
+    def __contains__(self, kind: object) -> bool: ...
+
+
+def where_clause(
+    asked: ua.ContentFilter, types: Types
+) -> tuple[Where | None, list[ua.ContentFilterElementResult]]:
+    """The clause, None for one with a fault, and what is to be said of each of its elements."""
     asked_elements: list[ua.ContentFilterElement] = get(asked, "Elements") or []
     operand_count = sum(len(get(one, "FilterOperands") or []) for one in asked_elements)
     if len(asked_elements) > _MOST_ELEMENTS or operand_count > _MOST_OPERANDS:
@@ -120,15 +129,17 @@ def where_clause(
     results: list[ua.ContentFilterElementResult] = []
     for place, one in enumerate(asked_elements):
         operands: list[object] = get(one, "FilterOperands") or []
-        codes = [_operand_fault(o, place, len(asked_elements), field_fault) for o in operands]
-        code = _element_fault(get(one, "FilterOperator"), operands, codes)
+        codes = [_operand_fault(operand, place, len(asked_elements), types) for operand in operands]
+        code = _element_fault(get(one, "FilterOperator"), operands, codes, types)
         results.append(_told(code, codes))
         if not code:
-            elements.append(_element(get(one, "FilterOperator"), operands, space))
+            elements.append(_element(get(one, "FilterOperator"), operands, types))
     return (Where(elements) if len(elements) == len(asked_elements) else None), results
 
 
-def _element_fault(wanted: ua.FilterOperator, operands: Sequence[object], codes: Sequence[int]) -> int:
+def _element_fault(
+    wanted: ua.FilterOperator, operands: Sequence[object], codes: Sequence[int], types: Types
+) -> int:
     if wanted == Operator.OfType:
         low, high = 1, 1
     elif wanted in _OPERATORS:
@@ -139,14 +150,14 @@ def _element_fault(wanted: ua.FilterOperator, operands: Sequence[object], codes:
         return StatusCodes.BadFilterOperandCountMismatch
     if any(codes):
         return StatusCodes.BadFilterOperandInvalid
-    if wanted == Operator.OfType and not isinstance(_literal(operands[0]), ua.NodeId):
+    if wanted == Operator.OfType and _literal(operands[0]) not in types:
         return StatusCodes.BadFilterOperandInvalid
     return StatusCodes.Good
 
 
-def _operand_fault(operand: object, place: int, count: int, field_fault: Callable[[object], int]) -> int:
+def _operand_fault(operand: object, place: int, count: int, types: Types) -> int:
     if isinstance(operand, ua.SimpleAttributeOperand):
-        return field_fault(operand)
+        return types.fault(operand)
     if isinstance(operand, ua.ElementOperand):
         is_later = place < get(operand, "Index") < count
         return StatusCodes.Good if is_later else StatusCodes.BadFilterOperandInvalid
@@ -162,10 +173,10 @@ def _told(code: int, codes: Sequence[int]) -> ua.ContentFilterElementResult:
     )
 
 
-def _element(wanted: ua.FilterOperator, operands: Sequence[object], space: AddressSpace) -> _Element:
+def _element(wanted: ua.FilterOperator, operands: Sequence[object], types: Types) -> _Element:
     if wanted == Operator.OfType:
-        types = subtypes(space, _literal(operands[0]))
-        return _Element(types.__contains__, [_event_type])
+        kind: ua.NodeId = _literal(operands[0])
+        return _Element(partial(types.is_of, wanted=kind), [_event_type])
     return _Element(_OPERATORS[wanted][2], [_value_of(operand) for operand in operands])
 
 

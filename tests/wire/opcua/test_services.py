@@ -100,6 +100,7 @@ async def test_a_service_is_carried_out_or_refused_as_the_table_says(
             Codes.BadNotImplemented,
             Codes.BadInternalError,
             Codes.BadUnexpectedError,
+            Codes.BadUserAccessDenied,
         )
 
 
@@ -577,6 +578,7 @@ class TestBrowse:
     async def test_what_is_left_follows(self, client: Client, most: int) -> None:
         whole = (await self.browse(client)).References
         result = await self.browse(client, most)
+        assert bool(result.ContinuationPoint) == (most < len(whole))
         found = list(result.References)
         while result.ContinuationPoint:
             assert len(result.References) == most
@@ -627,6 +629,11 @@ class TestBrowse:
         self, client: Client, asked: dict[str, object], code: int
     ) -> None:
         assert (await self.browse(client, **asked)).StatusCode.value == code
+
+    async def test_a_response_is_not_without_end(self, client: Client) -> None:
+        wide = ua.BrowseDescription(ua.NodeId(Ids.BaseObjectType), ua.BrowseDirection.Both)
+        with pytest.raises(Errors.BadResponseTooLarge):
+            await ask(client, "Browse", NodesToBrowse=[wide] * 10_000)
 
     async def test_there_are_no_views(self, client: Client) -> None:
         somewhere = [ua.BrowseDescription(NodeId=ua.NodeId(Ids.ObjectsFolder))]

@@ -95,9 +95,13 @@ def _deadband(asked: DataChangeFilter, space: AddressSpace, node: NodeData) -> f
 
 
 def _is_number(space: AddressSpace, node: NodeData) -> bool:
-    held = node.attributes.get(AttributeIds.DataType)
-    kind = held.value.Value.Value if held and held.value and held.value.Value else None
-    return isinstance(kind, ua.NodeId) and _NUMBER in supertypes(space, kind)
+    """Whether the node holds a single number: arrays have no deadband here."""
+    kind = space.read_attribute_value(node.nodeid, AttributeIds.DataType).Value
+    rank = space.read_attribute_value(node.nodeid, AttributeIds.ValueRank).Value
+    if kind is None or not isinstance(kind.Value, ua.NodeId):
+        return False
+    is_array = rank is not None and isinstance(rank.Value, int) and rank.Value >= 0
+    return not is_array and _NUMBER in supertypes(space, kind.Value)
 
 
 def _span(space: AddressSpace, node: NodeData) -> float | None:

@@ -91,6 +91,10 @@ class Session(InternalSession):
         """Who ``activate_session`` is for; set by the processor once the login has been checked."""
 
     @property
+    def is_gone(self) -> bool:
+        return self.state is SessionState.Closed
+
+    @property
     def subscriptions(self) -> Subscriptions:
         return self._server.subscriptions
 
@@ -240,8 +244,7 @@ class Session(InternalSession):
         if self.state is SessionState.Closed:
             return
         self.publishing.close(loop_time())
-        if delete_subs:
-            self.subscriptions.delete(self, [found.number for found in self.subscriptions.of(self)])
+        self.subscriptions.end(self, delete=delete_subs)
         await super().close_session(delete_subs=False)
 
 

@@ -64,6 +64,11 @@ class Owner(Protocol):
     channel_certificate: bytes | None
     publishing: PublishQueue
 
+    @property
+    def is_gone(self) -> bool:
+        """Whether the session has ended. Its subscriptions may be transferred as long as they live."""
+        ...
+
     def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
         """``value`` as this user may see it."""
         ...

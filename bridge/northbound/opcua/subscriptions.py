@@ -53,7 +53,7 @@ class Subscriptions:
 
     def create(self, owner: Owner, params: ua.CreateSubscriptionParameters) -> ua.CreateSubscriptionResult:
         if len(self.subscriptions) >= MOST_SUBSCRIPTIONS:
-            raise ServiceError(StatusCodes.BadTooManySubscriptions)
+            self._make_room()
         enabled: bool = get(params, "PublishingEnabled")
         made = Subscription(next(self._numbers), owner, terms(params), enabled=enabled)
         self.subscriptions[made.number] = made
@@ -81,6 +81,19 @@ class Subscriptions:
         results = [code_of(lambda one: self._close(self._own(owner, one)), number) for number in numbers]
         self._release_requests(owner)
         return results
+
+    def _make_room(self) -> None:
+        """The oldest one that nobody has come for goes. Raises ServiceError where each has its session."""
+        left = next((found for found in self.subscriptions.values() if found.owner.is_gone), None)
+        if left is None:
+            raise ServiceError(StatusCodes.BadTooManySubscriptions)
+        self._close(left)
+
+    def end(self, owner: Owner, *, delete: bool) -> None:
+        """The session ends. What it leaves behind is for the same client; without one it goes, too."""
+        if delete or not _is_known(owner):
+            for found in self.of(owner):
+                self._close(found)
 
     def publish(
         self, owner: Owner, acknowledged: Sequence[ua.SubscriptionAcknowledgement], request: PublishRequest
@@ -191,8 +204,12 @@ def _revised(result: _T, subscription: Subscription) -> _T:
 
 def _is_same_client(before: Owner, now: Owner) -> bool:
     """Part 4 §5.14.7: the same user. Anybody can come without a name: then the same certificate."""
-    if not before.identity.is_same(now.identity):
+    if not before.identity.is_same(now.identity) or not _is_known(now):
         return False
-    certificate = now.channel_certificate
     is_named = now.identity.user != ANONYMOUS
-    return is_named or (certificate is not None and certificate == before.channel_certificate)
+    return is_named or now.channel_certificate == before.channel_certificate
+
+
+def _is_known(owner: Owner) -> bool:
+    """Whether a client can be told from others: by its name or its certificate."""
+    return owner.identity.user != ANONYMOUS or owner.channel_certificate is not None

@@ -8,6 +8,8 @@ import pytest
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeManagementService
 from asyncua.server.standard_address_space import standard_address_space
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from bridge.northbound.opcua.eventfilter import EventFilterFault, EventTypes, Occurrence, event_filter
 from bridge.northbound.opcua.filters import change_filter
@@ -280,3 +282,43 @@ def test_a_deadband_is_for_numbers(space: AddressSpace) -> None:
         with pytest.raises(ServiceError) as refused:
             change_filter(wanted, space, space[ua.NodeId(name)], ua.AttributeIds.Value)
         assert refused.value.code == Codes.BadFilterNotAllowed
+
+
+# whatever a client writes
+
+
+LITERALS = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-(2**31), 2**31 - 1),
+    st.floats(),
+    st.text(max_size=5),
+    st.binary(max_size=5),
+    st.datetimes(),
+    st.lists(st.integers(0, 9), min_size=1, max_size=3),
+    st.sampled_from(
+        [ua.NodeId(Ids.BaseEventType), ua.NodeId("mine", 2), ua.LocalizedText("x"), ua.QualifiedName("x")]
+    ),
+)
+OPERANDS = st.one_of(
+    LITERALS.map(literal),
+    st.integers(0, 12).map(at),
+    st.sampled_from(
+        [SEVERITY, SOURCE, MESSAGE, ABSENT, chosen(), chosen("data_types"), ua.AttributeOperand()]
+    ),
+    st.just(ua.ExtensionObject()),
+)
+ELEMENTS = st.builds(ua.ContentFilterElement, st.sampled_from(list(Op)), st.lists(OPERANDS, max_size=4))
+
+
+@given(st.lists(ELEMENTS, max_size=8))
+@settings(max_examples=300)
+def test_every_clause_is_judged_or_refused(
+    types: EventTypes, elements: list[ua.ContentFilterElement]
+) -> None:
+    try:
+        found = event_filter(asked(*elements), types)
+    except EventFilterFault as refused:
+        assert len(refused.result.WhereClauseResult.ElementResults) == len(elements)
+    else:
+        assert found.passes(EVENT) in (True, False)

@@ -12,6 +12,7 @@ from typing import Final
 from asyncua.common.event_objects import BaseEvent
 
 from bridge.command import Event, Kind
+from bridge.guard import Guard
 from bridge.northbound.opcua.library import ObjectIds, make, node_id, text, ua
 from bridge.northbound.opcua.nodes import pascal_case
 from bridge.northbound.opcua.subscriptions import Subscriptions
@@ -72,6 +73,7 @@ class EventSender:
         self._subscriptions = subscriptions
         self._objects = objects
         self._types = types
+        self._guard = Guard("OPC UA events")
         self._bounds: dict[Kind, Bound] = {}
         self._queue: deque[_Told] = deque(maxlen=_WAITING)
 
@@ -105,7 +107,9 @@ class EventSender:
         for emitter in self._emitters(event.source):
             made.emitting_node = emitter
             for subscription in list(self._subscriptions.subscriptions.values()):
-                await subscription.monitored_item_srv.trigger_event(made)
+                # Each client brings its own filter.
+                with self._guard:
+                    await subscription.monitored_item_srv.trigger_event(made)
 
     def _source(self, name: str) -> ua.NodeId:
         """The object that an event is about: a drive, a node, a bus, or else the bridge itself."""

@@ -20,6 +20,8 @@ from asyncua.server.internal_session import InternalSession
 from asyncua.server.subscription_service import SubscriptionService
 
 from bridge.command.request import Action, Identity, Role, Source
+from bridge.guard import Guard
+from bridge.northbound.opcua.admission import MOST_CONNECTIONS
 from bridge.northbound.opcua.library import (
     AttributeIds,
     ServiceError,
@@ -34,7 +36,9 @@ from bridge.northbound.opcua.library import (
 )
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import pascal_case
+from bridge.northbound.opcua.notices import Notices
 from bridge.northbound.opcua.security import Users
+from bridge.northbound.opcua.shares import make_room
 from bridge.northbound.opcua.structures import READ
 from bridge.northbound.opcua.subscriptions import Subscriptions
 from bridge.northbound.opcua.writes import Writer
@@ -43,7 +47,6 @@ MOST_OPERATIONS: Final = 10_000
 MOST_CALLS: Final = 100
 _BATCH: Final = 500
 _LONGEST_SESSION_MS: Final = 120_000.0
-_MOST_CONNECTIONS: Final = 100
 
 _FOR_ENGINEERS: Final = tuple(
     f"/{pascal_case(action)}" for action in (Action.WRITE_PARAMETER, Action.SAVE_PARAMETERS)
@@ -79,6 +82,10 @@ class Session(InternalSession):
         self.address = str(name[0]) if isinstance(name, tuple) else str(name)
         self.identity = Identity(Source.OPCUA, "", Role.OBSERVER, self.address)
         self.channel_certificate: bytes | None = None
+        self.holder: object | None = None
+        """The processor of the connection that it is activated on."""
+        self.left_at = 0.0
+        """When it lost its last connection; monotonic."""
         self.admitted: Identity | None = None
         """Who ``activate_session`` is for; set by the processor once the login has been checked."""
 
@@ -93,6 +100,10 @@ class Session(InternalSession):
         # Never Admin: that role may change the address space and write anything.
         self.user = User(UserRole.User, admitted.user)
         return result
+
+    def leave(self, now: float) -> None:
+        """Its connection has ended."""
+        self.holder, self.left_at = None, now
 
     # services
 
@@ -148,6 +159,15 @@ class Session(InternalSession):
 
     def _own(self, *ids: int) -> None:
         self._server.subscriptions.check_owner(self.session_id, ids)
+
+    async def create_subscription(
+        self,
+        params: ua.CreateSubscriptionParameters,
+        callback: Callable[..., Any],
+        request_callback: Callable[..., Any] | None = None,
+    ) -> ua.CreateSubscriptionResult:
+        await make_room(self, self._server.sessions, self.subscription_service)
+        return await super().create_subscription(params, callback, request_callback)
 
     async def create_monitored_items(
         self, params: ua.CreateMonitoredItemsParameters
@@ -208,14 +228,18 @@ class Server(InternalServer):
 
     services: Services
 
-    def __init__(self, *, no_security: bool) -> None:
+    def __init__(self, notices: Notices, *, no_security: bool) -> None:
         super().__init__()
+        self.notices = notices
+        self.guard = Guard("OPC UA")
         self.no_security = no_security
         # asyncua's own lets `admin` in with any password, as Admin. Logins are checked in the processor.
         self.user_manager = None  # pyright: ignore[reportAttributeAccessIssue]
         self.allow_remote_admin = False
         self.max_session_timeout_ms = _LONGEST_SESSION_MS
-        self.max_connections = _MOST_CONNECTIONS
+        # Who is let in, and how long one may wait, is decided before asyncua is asked.
+        self.max_connections = 10 * MOST_CONNECTIONS
+        self.max_pending_activation_seconds = 0
         self.subscriptions = Subscriptions(self.aspace, self)
         self.subscription_service = self.subscriptions
         self.isession.subscription_service = self.subscriptions
@@ -223,9 +247,13 @@ class Server(InternalServer):
     def create_session(self, name: str, user: User | None = None, external: bool = False) -> InternalSession:
         return Session(self, self.aspace, self.subscription_service, name)
 
+    @property
+    def sessions(self) -> list[Session]:
+        """Those of clients."""
+        return [one for one in self._external_sessions.values() if isinstance(one, Session)]
+
     def sessions_of(self, identity: Identity) -> list[Session]:
-        sessions = self._external_sessions.values()
-        return [s for s in sessions if isinstance(s, Session) and s.identity.is_same(identity)]
+        return [session for session in self.sessions if session.identity.is_same(identity)]
 
     async def stop(self) -> None:
         # asyncua waits for its clock's next tick, up to a second.

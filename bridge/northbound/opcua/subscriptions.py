@@ -31,13 +31,10 @@ from bridge.northbound.opcua.library import (
     status,
     ua,
 )
+from bridge.northbound.opcua.shares import MOST_SUBSCRIPTIONS, Holder, room_for_items
 
 LEAST_INTERVAL_MS: Final = 50.0
 MOST_INTERVAL_MS: Final = 3_600_000.0
-MOST_ITEMS: Final = 100_000
-"""Monitored items of all clients together."""
-
-MOST_SUBSCRIPTIONS: Final = 200
 _EVENT_QUEUE: Final = 200
 _VALUE_QUEUE: Final = 100
 _UNACKNOWLEDGED: Final = 30
@@ -178,11 +175,11 @@ class Subscriptions(SubscriptionService):
         self, params: ua.CreateMonitoredItemsParameters
     ) -> list[ua.MonitoredItemCreateResult]:
         wanted: list[ua.MonitoredItemCreateRequest] = get(params, "ItemsToCreate")
-        there = sum(_count(subscription) for subscription in self.subscriptions.values())
+        room = self._room(get(params, "SubscriptionId"))
         results: list[ua.MonitoredItemCreateResult] = []
         for start in range(0, len(wanted), _BATCH):
             batch = wanted[start : start + _BATCH]
-            if there + start + len(batch) > MOST_ITEMS:
+            if start + len(batch) > room:
                 code = status(StatusCodes.BadTooManyMonitoredItems)
                 results += [make(ua.MonitoredItemCreateResult, StatusCode=code) for _ in batch]
                 continue
@@ -190,6 +187,15 @@ class Subscriptions(SubscriptionService):
             results += await super().create_monitored_items(params)
             await asyncio.sleep(0)
         return results
+
+    def _room(self, number: int) -> int:
+        """How many more monitored items this subscription may have."""
+        items: dict[ua.NodeId, int] = {}
+        for subscription in self.subscriptions.values():
+            session_id = subscription.session_id
+            items[session_id] = items.get(session_id, 0) + _count(subscription)
+        sessions: list[Holder] = get(self.iserver, "sessions")
+        return room_for_items(self.subscriptions[number].session_id, sessions, items)
 
 
 def _count(subscription: InternalSubscription) -> int:

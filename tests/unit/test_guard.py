@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
+import socket
+from pathlib import Path
 
 import pytest
 
 from bridge.command import Event, Kind
+from bridge.fronts import give_reason
 from bridge.guard import Guard
+from bridge.notify import Notifier
 from tests.support import sites
 
 
@@ -43,3 +48,20 @@ def test_a_listener_that_fails_keeps_an_event_from_nobody() -> None:
     event = Event(1.0, Kind.REFUSED, "bridge", 300, "\udcff")
     plant.report(event)
     assert heard == [event]
+
+
+def test_words_of_others_end_neither_status_nor_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file name that is no UTF-8 is in the message of an error."""
+    path = str(tmp_path / "notify")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+        systemd.bind(path)
+        monkeypatch.setenv("NOTIFY_SOCKET", path)
+        Notifier().status("not served: /state/\udcff")
+        assert systemd.recv(1000) == b"STATUS=not served: /state/?"
+    ear, mouth = os.pipe()
+    give_reason(mouth, "cannot read /state/\udcff")
+    assert os.read(ear, 1000) == b"!cannot read /state/?"
+    os.close(ear)
+    os.close(mouth)

@@ -14,8 +14,10 @@ from __future__ import annotations
 import functools
 import math
 import struct
+import traceback
 from collections.abc import Callable
 from contextvars import ContextVar
+from pathlib import Path
 from typing import Any, Final
 
 from asyncua.common.utils import Buffer, NotEnoughData
@@ -80,6 +82,12 @@ def is_malformed(error: BaseException) -> bool:
     return False
 
 
+def place(error: BaseException) -> str:
+    """Where ``error`` was raised."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return f"at {Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
+
+
 def _string(data: Buffer) -> str | None:
     """A String (Part 6 §5.2.2.4). Raises UnicodeDecodeError for what is no UTF-8."""
     content: bytes | None = ua_binary.Primitives.Bytes.unpack(data)
@@ -114,7 +122,8 @@ def _bounded(make: Callable[[Any], _Decode]) -> Callable[[Any], _Decode]:
                 budget.left -= length
                 if budget.left < 0:
                     raise UaStatusCodeError(StatusCodes.BadEncodingLimitsExceeded)
-            return decode(data)
+            # A null array is an empty one to every service; asyncua has None for it.
+            return decode(data) or []
 
         return checked
 

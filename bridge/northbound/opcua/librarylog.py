@@ -9,6 +9,8 @@ from typing import Final
 
 _PAUSE_S: Final = 60.0
 _LIBRARY: Final = "asyncua"
+_TOLD_BY_US: Final = "Got malformed header"
+"""With the client's address."""
 
 
 class Seldom(logging.Filter):
@@ -20,6 +22,8 @@ class Seldom(logging.Filter):
         self._told: dict[tuple[str, int], tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
+        if str(record.msg).startswith(_TOLD_BY_US):
+            return False
         place = (record.pathname, record.lineno)
         told_at, left_out = self._told.get(place, (float("-inf"), 0))
         now = self._clock()

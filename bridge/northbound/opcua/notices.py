@@ -31,7 +31,7 @@ class Notices:
         self._clock = clock
         self._told: dict[tuple[str, str], _Told] = {}
 
-    def tell(self, kind: str, source: str, detail: str = "") -> None:
+    def tell(self, kind: str, source: str, detail: str = "", level: int = logging.WARNING) -> None:
         """``kind`` is a phrase such as "refused logins", ``detail`` what is known of this one."""
         if (kind, source) not in self._told and len(self._told) >= _MOST_KEYS:
             source = _OTHERS
@@ -41,7 +41,7 @@ class Notices:
             return
         self._told[kind, source] = _Told(self._clock())
         more = f": {detail[:_LONGEST]}" if detail else ""
-        self._log.warning("OPC UA: %s from %s%s", kind, source, more)
+        self._log.log(level, "OPC UA: %s from %s%s", kind, source, more)
 
     def sum_up(self) -> None:
         """Tell the numbers that are due. To be called about once a second."""

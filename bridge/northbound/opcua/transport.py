@@ -12,6 +12,7 @@ any size, a session that ended with a connection it had left.
 from __future__ import annotations
 
 import asyncio
+import logging
 import struct
 from collections import deque
 from typing import Any, Final
@@ -175,7 +176,9 @@ class Processor(UaProcessor):
         if decoding.is_malformed(error):
             self._server.notices.tell(_MALFORMED_KIND, self._source, repr(error))
             return StatusCodes.BadDecodingError
-        self._server.guard.note(error)
+        # Ours or asyncua's fault: its place instead of a traceback, which would cost twenty lines.
+        detail = f"{error!r} {decoding.place(error)}"
+        self._server.notices.tell("requests that failed", self._source, detail, logging.ERROR)
         return StatusCodes.BadInternalError
 
     def send_response(self, requesthandle: Any, seqhdr: Any, response: Any, *rest: Any, **more: Any) -> None:

@@ -21,7 +21,14 @@ from bridge.errors import OperationFailed
 from bridge.mirror import MirrorClient, MirrorPublisher, socket_endpoint
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support.opcua_client import node, write_value
-from tests.support.opcua_hostile import HOSTILE, NOT_UTF8, UNDECODABLE, requests, with_each_string
+from tests.support.opcua_hostile import (
+    HOSTILE,
+    NOT_UTF8,
+    UNDECODABLE,
+    requests,
+    with_each_string,
+    without_arrays,
+)
 from tests.support.opcua_site import OPEN, LocalView, connected, make_plant, namespace, serving, status_of
 from tests.support.zenoh_peer import until
 
@@ -106,6 +113,18 @@ async def test_every_string_of_every_service(served: Served, bystander: Seen, ki
     finally:
         client.disconnect_socket()
     await assert_unharmed(served, bystander)
+
+
+@pytest.mark.parametrize("kind", requests(), ids=lambda kind: kind.__name__)
+async def test_null_arrays_are_empty_ones(
+    served: Served, bystander: Seen, kind: type, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with connected(served[0]) as client:
+        if kind not in (ua.OpenSecureChannelRequest, ua.CloseSecureChannelRequest, ua.PublishRequest):
+            code = await sent(client, without_arrays(kind()))
+            assert code != Codes.BadInternalError
+        await client.uaclient.get_endpoints(ua.GetEndpointsParameters())
+    assert not [record for record in caplog.records if "requests that failed" in record.getMessage()]
 
 
 @pytest.mark.parametrize("hostile", HOSTILE)

@@ -14,6 +14,7 @@ from bridge.auditfile import AuditFile
 from bridge.command import Event, Kind, Plant
 from bridge.command.audit import Entry
 from bridge.config import Site
+from bridge.guard import Guard
 from bridge.image import Value
 
 _PERIOD_S: Final = 0.5
@@ -85,6 +86,7 @@ class AuditLog:
         self._clock = clock
         self._epoch = epoch
         self._fault = ""
+        self._guard = Guard("audit log")
         path = Path(settings.file) if settings.file else Path(site.site.state_dir) / "audit.jsonl"
         self.file = AuditFile(path, settings.max_bytes, settings.keep)
         self._is_enabled = settings.enabled
@@ -110,7 +112,7 @@ class AuditLog:
 
     def look(self, now: float) -> None:
         self._plant.audit.on_time(now)
-        lost, fault = self.file.all_lost, self.file.fault
+        lost, fault = self.file.all_lost + self._guard.faults, self.file.fault
         self._plant.set("bridge/audit_lost", lost, now)
         if fault != self._fault:
             self._fault = fault
@@ -122,4 +124,6 @@ class AuditLog:
                 self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", 300, message))
 
     def _on_entry(self, entry: Entry) -> None:
-        self.file.put(as_line(entry, self._epoch(entry.time)))
+        # Whoever asked waits for the outcome, whatever becomes of the line.
+        with self._guard:
+            self.file.put(as_line(entry, self._epoch(entry.time)))

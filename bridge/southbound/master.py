@@ -78,6 +78,21 @@ class _Line:
         longest sequence that the kernel takes."""
         return min(self.burst_s, MOST_FRAMES * self.network.bus.rpdo_period_s) / _RENEWALS
 
+    def due(self, beats: Beats, now: float, *, renew: bool) -> list[tuple[Beat, bool]]:
+        """What the bus has to be told, and whether that is new: setpoints before the word that enables.
+
+        What is not goes the other way round: told later, it has no more frames until the deadline than what
+        was told before it. So setpoints end before the stop comes.
+        """
+        new, kept = list[tuple[Beat, bool]](), list[tuple[Beat, bool]]()
+        for can_id, beat in beats.items():
+            told = self.beating.get(can_id)
+            if told is None or told.frames != beat.frames:
+                new.append((beat, True))
+            elif renew or not told.ends_as(beat, now):
+                kept.append((beat, False))
+        return [*new, *reversed(kept)]
+
     def beat(self, beat: Beat, now: float, *, at_once: bool) -> None:
         """Have the bus repeat this for the dead-man time, and what follows if its own time is up before."""
         ending = None
@@ -361,15 +376,12 @@ class Master:
         for can_id in [can_id for can_id in line.beating if can_id not in beats]:
             bus.silence(can_id)
             del line.beating[can_id]
-        for can_id, beat in beats.items():
-            told = line.beating.get(can_id)
-            changed = told is None or told.frames != beat.frames
-            if changed or renew or (told and not told.ends_as(beat, now)):
-                # In this order: the process may be stopped at the end of the look at the clock.
-                if self._stood_still(line, now) or self._alarm.rang:
-                    line.beats = None
-                    return
-                line.beat(beat, now, at_once=changed)
+        for beat, changed in line.due(beats, now, renew=renew):
+            # In this order: the process may be stopped at the end of the look at the clock.
+            if self._stood_still(line, now) or self._alarm.rang:
+                line.beats = None
+                return
+            line.beat(beat, now, at_once=changed)
         line.hold_at = min((at for beat in beats.values() for at in beat.hold_at if at > now), default=inf)
         if self._plant.unsent:
             network.on_handed_over(self._clock())

@@ -32,8 +32,14 @@ def proof(*arguments: str, noise_ms: str, out: Path) -> dict[str, Any]:
     done = subprocess.run(
         ["unshare", "--mount", *command], cwd=REPOSITORY, capture_output=True, text=True, check=False
     )
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.returncode == 0, done.stdout + done.stderr + _bridges_said(out)
     return load(out)
+
+
+def _bridges_said(out: Path) -> str:
+    """The machine of the lab is gone afterwards, and the logs with it."""
+    logs = sorted((out.parent / f"{out.stem}-logs").glob("run_*.log"))
+    return "".join(f"\n-- {log.name}\n{log.read_text(encoding='utf-8', errors='replace')}" for log in logs)
 
 
 @pytest.mark.timeout(480)

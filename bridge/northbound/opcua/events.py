@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from typing import Final
 
 from bridge.command import Event, Kind
+from bridge.guard import Guard
 from bridge.northbound.opcua.eventfilter import Occurrence
 from bridge.northbound.opcua.library import ObjectIds, node_id, text, ua, variant
 from bridge.northbound.opcua.nodes import pascal_case
@@ -72,6 +73,7 @@ class EventSender:
         self._subscriptions = subscriptions
         self._objects = objects
         self._types = types
+        self._guard = Guard("OPC UA events")
         self._bounds: dict[Kind, Bound] = {}
         self._queue: deque[_Told] = deque(maxlen=_WAITING)
 
@@ -104,7 +106,10 @@ class EventSender:
             "Severity": variant(event.severity, kinds.UInt16),
         }
         for emitter in self._emitters(event.source):
-            self._subscriptions.hear(Occurrence(emitter, fields))
+            for subscription in list(self._subscriptions.subscriptions.values()):
+                # Each client brings its own filter.
+                with self._guard:
+                    subscription.hear(Occurrence(emitter, fields))
 
     def _source(self, name: str) -> ua.NodeId:
         """The object that an event is about: a drive, a node, a bus, or else the bridge itself."""

@@ -27,11 +27,8 @@ from bridge.northbound.opcua.library import (
 from bridge.northbound.opcua.reading import checked_times, window
 from bridge.northbound.opcua.subscription import Subscription
 
-MOST_ITEMS: Final = 100_000
-"""Monitored items of all clients together."""
-
 MOST_LISTENERS: Final = 1_000
-"""Of these, those for events: each is asked about every event."""
+"""Items for events, of all clients together: each is asked about every event."""
 
 _BATCH: Final = 50
 _SUBSCRIBE_TO_EVENTS: Final = 1
@@ -45,14 +42,14 @@ class MonitoredItems:
     def __init__(self, space: AddressSpace) -> None:
         self._space = space
         self._numbers = count(1)
-        self._there = 0
         self._listening = 0
         self.event_types = EventTypes(space)
 
     async def create(
-        self, find: Callable[[], Subscription], params: ua.CreateMonitoredItemsParameters
+        self, find: Callable[[], Subscription], params: ua.CreateMonitoredItemsParameters, room: int
     ) -> list[ua.MonitoredItemCreateResult]:
-        """``find`` finds the subscription, which may be deleted meanwhile: then it raises ServiceError."""
+        """There is ``room`` for so many. ``find`` finds the subscription, or raises ServiceError: it may be
+        deleted meanwhile."""
         times = checked_times(params)
         found = find()
         results: list[ua.MonitoredItemCreateResult] = []
@@ -60,7 +57,7 @@ class MonitoredItems:
             if place and place % _BATCH == 0:
                 await asyncio.sleep(0)
                 found = find()
-            if self._there >= MOST_ITEMS:
+            if place >= room:
                 code = status(StatusCodes.BadTooManyMonitoredItems)
                 results.append(make(ua.MonitoredItemCreateResult, StatusCode=code))
             else:
@@ -87,7 +84,6 @@ class MonitoredItems:
         except ServiceError as error:
             return _faulty(ua.MonitoredItemCreateResult(), error)
         subscription.add(item)
-        self._there += 1
         self._listening += isinstance(item, EventItem)
         if isinstance(item, ValueItem):
             self._watch(subscription, item)
@@ -193,7 +189,6 @@ class MonitoredItems:
 
     def drop(self, subscription: Subscription, item: Item) -> None:
         subscription.drop(item)
-        self._there -= 1
         self._listening -= isinstance(item, EventItem)
         if isinstance(item, ValueItem):
             self._space.delete_datachange_callback(item.handle)

@@ -6,7 +6,6 @@ import asyncio
 import gc
 import logging
 import socket
-from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
@@ -18,7 +17,9 @@ import bridge
 from bridge import clock
 from bridge.command import Kind
 from bridge.config import OpcUaTable
+from bridge.errors import OperationFailed
 from bridge.northbound.listening import listen, until_deaf
+from bridge.northbound.opcua import decoding
 from bridge.northbound.opcua.address_space import Bindings, Builder
 from bridge.northbound.opcua.browsing import MOST_CONTINUATION_POINTS
 from bridge.northbound.opcua.certificates import (
@@ -30,12 +31,14 @@ from bridge.northbound.opcua.certificates import (
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
 from bridge.northbound.opcua.items import LEAST_SAMPLING_MS
 from bridge.northbound.opcua.library import ObjectIds, node_id, ua, variant
+from bridge.northbound.opcua.librarylog import quieten
+from bridge.northbound.opcua.listener import WINDOW, Listener
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.notices import Notices
 from bridge.northbound.opcua.publisher import Publisher
 from bridge.northbound.opcua.security import CheckedPolicy, Users, security_policies
 from bridge.northbound.opcua.session import MOST_CALLS, Server, Services
-from bridge.northbound.opcua.transport import WINDOW, Listener
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
@@ -76,7 +79,8 @@ class _Outer(LibraryServer):
 
     async def start(self) -> None:
         await self._setup_server_nodes()
-        policies = [CheckedPolicy(policy, self._trusted) for policy in self._policies]
+        tell = self._inner.notices.tell
+        policies = [CheckedPolicy(policy, self._trusted, tell) for policy in self._policies]
         await self._inner.start()
         self.bserver = Listener(self._inner, self._bound, self.limits, self._pulse)
         self.bserver.set_policies(policies)
@@ -106,6 +110,7 @@ class OpcUaServer:
         self._server: _Outer | None = None
         self._socket = bound
         self._pulse = Pulse(clock.now)
+        self._notices = Notices(_log, clock.now)
         self._publisher: asyncio.Task[None] | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
@@ -127,7 +132,7 @@ class OpcUaServer:
         Raises ``FileFaults`` for a user, certificate or key that cannot be used, and ``Unavailable``
         where the port cannot be opened or the folder not be written.
         """
-        self._users = Users(self._settings)
+        self._users = Users(self._settings, self._notices.tell)
         uri = application_uri()
         own = await asyncio.to_thread(configured_or_own, self._settings, self._folder, uri)
         trusted_dir = self._settings.trusted_dir
@@ -146,9 +151,18 @@ class OpcUaServer:
         self._tell()
 
     async def failed(self) -> None:
-        """Wait for ever, or raise ``OperationFailed`` when nobody can connect any more."""
-        if self._socket:
-            await until_deaf(self._socket, "opcua.listen")
+        """Wait for ever, or raise ``OperationFailed`` when nobody can connect any more, or nobody is told of
+        changes."""
+        if self._socket is None or self._publisher is None:
+            return
+        deaf = asyncio.create_task(until_deaf(self._socket, "opcua.listen"))
+        try:
+            await asyncio.wait((deaf, self._publisher), return_when=asyncio.FIRST_COMPLETED)
+            if not deaf.done():
+                raise OperationFailed("OPC UA: clients are told of no change any more")
+            await deaf
+        finally:
+            deaf.cancel()
 
     async def close(self) -> None:
         """Close every session and the port. May be called at any time, also twice."""
@@ -156,8 +170,7 @@ class OpcUaServer:
         task, self._publisher = self._publisher, None
         if task:
             task.cancel()
-            with suppress(asyncio.CancelledError):
-                await task
+            await asyncio.gather(task, return_exceptions=True)
         server, self._server = self._server, None
         if server:
             await server.stop()
@@ -172,11 +185,9 @@ class OpcUaServer:
     async def _serve(
         self, bound: socket.socket, own: OwnCertificate, trusted: TrustedCertificates | None, users: Users
     ) -> None:
-        library_log = logging.getLogger("asyncua")
-        if library_log.level == logging.NOTSET:
-            # It tells every request at INFO.
-            library_log.setLevel(logging.WARNING)
-        inner = Server(no_security=self._settings.no_security)
+        quieten(clock.now)
+        decoding.install()
+        inner = Server(self._notices, no_security=self._settings.no_security)
         inner.certificate, inner.private_key = own.certificate, own.private_key
         server = _Outer(inner, bound, trusted, self._pulse)
         await self._describe(server, users)

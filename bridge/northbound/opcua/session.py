@@ -20,6 +20,8 @@ from asyncua.server.internal_session import InternalSession, SessionState
 from asyncua.server.subscription_service import SubscriptionService
 
 from bridge.command.request import Action, Identity, Role, Source
+from bridge.guard import Guard
+from bridge.northbound.opcua.admission import MOST_CONNECTIONS
 from bridge.northbound.opcua.browsing import Browser
 from bridge.northbound.opcua.library import (
     AttributeIds,
@@ -35,9 +37,11 @@ from bridge.northbound.opcua.library import (
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.monitoring import loop_time
 from bridge.northbound.opcua.nodes import pascal_case
+from bridge.northbound.opcua.notices import Notices
 from bridge.northbound.opcua.publishing import PublishQueue
 from bridge.northbound.opcua.reading import checked_times, window
 from bridge.northbound.opcua.security import Users
+from bridge.northbound.opcua.shares import make_room, room_for_items
 from bridge.northbound.opcua.structures import READ
 from bridge.northbound.opcua.subscriptions import Subscriptions
 from bridge.northbound.opcua.writes import Writer
@@ -46,7 +50,6 @@ MOST_OPERATIONS: Final = 10_000
 MOST_CALLS: Final = 100
 _BATCH: Final = 500
 _LONGEST_SESSION_MS: Final = 120_000.0
-_MOST_CONNECTIONS: Final = 100
 
 _FOR_ENGINEERS: Final = tuple(
     f"/{pascal_case(action)}" for action in (Action.WRITE_PARAMETER, Action.SAVE_PARAMETERS)
@@ -85,8 +88,10 @@ class Session(InternalSession):
         self.channel_certificate: bytes | None = None
         self.publishing = PublishQueue()
         self.browser = Browser(aspace)
-        self.holder: object = None
-        """The processor of the connection that the session is on: it may move from one to another."""
+        self.holder: object | None = None
+        """The processor of the connection that it is activated on."""
+        self.left_at = 0.0
+        """When it lost its last connection; monotonic."""
         self.admitted: Identity | None = None
         """Who ``activate_session`` is for; set by the processor once the login has been checked."""
 
@@ -109,6 +114,10 @@ class Session(InternalSession):
         # Never Admin: that role may change the address space and write anything.
         self.user = User(UserRole.User, admitted.user)
         return result
+
+    def leave(self, now: float) -> None:
+        """Its connection has ended."""
+        self.holder, self.left_at = None, now
 
     # services
 
@@ -197,6 +206,8 @@ class Session(InternalSession):
         request_callback: Callable[..., Any] | None = None,
     ) -> ua.CreateSubscriptionResult:
         """Told through ``publishing``; asyncua's callbacks are not used."""
+        self.subscriptions.drop_left_behind()
+        await make_room(self, self._server.sessions, self.subscription_service)
         return self.subscriptions.create(self, params)
 
     def modify_subscription(self, params: ua.ModifySubscriptionParameters) -> ua.ModifySubscriptionResult:
@@ -223,7 +234,8 @@ class Session(InternalSession):
         self, params: ua.CreateMonitoredItemsParameters
     ) -> list[ua.MonitoredItemCreateResult]:
         _limit(get(params, "ItemsToCreate"), MOST_OPERATIONS)
-        return await self.subscriptions.create_items(self, params)
+        room = room_for_items(self.session_id, self._server.sessions, self.subscriptions.items_by_session())
+        return await self.subscriptions.create_items(self, params, room)
 
     async def modify_monitored_items(
         self, params: ua.ModifyMonitoredItemsParameters
@@ -256,14 +268,18 @@ class Server(InternalServer):
 
     services: Services
 
-    def __init__(self, *, no_security: bool) -> None:
+    def __init__(self, notices: Notices, *, no_security: bool) -> None:
         super().__init__()
+        self.notices = notices
+        self.guard = Guard("OPC UA")
         self.no_security = no_security
         # asyncua's own lets `admin` in with any password, as Admin. Logins are checked in the processor.
         self.user_manager = None  # pyright: ignore[reportAttributeAccessIssue]
         self.allow_remote_admin = False
         self.max_session_timeout_ms = _LONGEST_SESSION_MS
-        self.max_connections = _MOST_CONNECTIONS
+        # Who is let in, and how long one may wait, is decided before asyncua is asked.
+        self.max_connections = 10 * MOST_CONNECTIONS
+        self.max_pending_activation_seconds = 0
         self.subscriptions = Subscriptions(self.aspace)
         # asyncua only looks through it for the subscriptions of a session.
         self.subscription_service = cast("SubscriptionService", self.subscriptions)
@@ -278,6 +294,11 @@ class Server(InternalServer):
         endpoints = await super().get_endpoints(params, sockname)
         profiles: list[str] = (get(params, "ProfileUris") if params else None) or []
         return [one for one in endpoints if not profiles or get(one, "TransportProfileUri") in profiles]
+
+    @property
+    def sessions(self) -> list[Session]:
+        """Those of clients."""
+        return [one for one in self._external_sessions.values() if isinstance(one, Session)]
 
     async def stop(self) -> None:
         # asyncua waits for its clock's next tick, up to a second.

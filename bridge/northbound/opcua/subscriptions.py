@@ -9,18 +9,16 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 from itertools import count
-from typing import Final, TypeVar
+from typing import TypeVar
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.northbound.opcua.eventfilter import Occurrence
 from bridge.northbound.opcua.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.northbound.opcua.monitoring import MonitoredItems, code_of, loop_time
 from bridge.northbound.opcua.passwords import ANONYMOUS
 from bridge.northbound.opcua.publishing import PublishRequest
+from bridge.northbound.opcua.shares import MOST_SUBSCRIPTIONS
 from bridge.northbound.opcua.subscription import Owner, Subscription, terms
-
-MOST_SUBSCRIPTIONS: Final = 200
 
 _T = TypeVar("_T")
 
@@ -52,8 +50,9 @@ class Subscriptions:
     # the Subscription service set
 
     def create(self, owner: Owner, params: ua.CreateSubscriptionParameters) -> ua.CreateSubscriptionResult:
+        self.drop_left_behind()
         if len(self.subscriptions) >= MOST_SUBSCRIPTIONS:
-            self._make_room()
+            raise ServiceError(StatusCodes.BadTooManySubscriptions)
         enabled: bool = get(params, "PublishingEnabled")
         made = Subscription(next(self._numbers), owner, terms(params), enabled=enabled)
         self.subscriptions[made.number] = made
@@ -82,12 +81,18 @@ class Subscriptions:
         self._release_requests(owner)
         return results
 
-    def _make_room(self) -> None:
-        """The oldest one that nobody has come for goes. Raises ServiceError where each has its session."""
-        left = next((found for found in self.subscriptions.values() if found.owner.is_gone), None)
-        if left is None:
-            raise ServiceError(StatusCodes.BadTooManySubscriptions)
-        self._close(left)
+    def drop_left_behind(self) -> None:
+        """Where there are as many as there may be, the oldest one that nobody has come for goes."""
+        left = (found for found in self.subscriptions.values() if found.owner.is_gone)
+        if len(self.subscriptions) >= MOST_SUBSCRIPTIONS and (oldest := next(left, None)):
+            self._close(oldest)
+
+    def items_by_session(self) -> dict[ua.NodeId, int]:
+        """How many monitored items each session has."""
+        items: dict[ua.NodeId, int] = {}
+        for found in self.subscriptions.values():
+            items[found.session_id] = items.get(found.session_id, 0) + len(found.items)
+        return items
 
     def end(self, owner: Owner, *, delete: bool) -> None:
         """The session ends. What it leaves behind is for the same client; without one it goes, too."""
@@ -139,9 +144,10 @@ class Subscriptions:
     # the MonitoredItem service set
 
     async def create_items(
-        self, owner: Owner, params: ua.CreateMonitoredItemsParameters
+        self, owner: Owner, params: ua.CreateMonitoredItemsParameters, room: int
     ) -> list[ua.MonitoredItemCreateResult]:
-        return await self._items.create(lambda: self._of_items(owner, params), params)
+        """There is room for so many."""
+        return await self._items.create(lambda: self._of_items(owner, params), params, room)
 
     def modify_items(
         self, owner: Owner, params: ua.ModifyMonitoredItemsParameters
@@ -159,11 +165,7 @@ class Subscriptions:
     def _of_items(self, owner: Owner, params: object) -> Subscription:
         return self._own(owner, get(params, "SubscriptionId"))
 
-    # events, cycles and ends
-
-    def hear(self, event: Occurrence) -> None:
-        for found in self.subscriptions.values():
-            found.hear(event)
+    # cycles and ends
 
     def _arm(self, subscription: Subscription, at: float) -> None:
         loop = asyncio.get_running_loop()

@@ -6,7 +6,7 @@ from __future__ import annotations
 import errno
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final, Protocol
+from typing import Final, NamedTuple, Protocol
 
 from bridge.southbound.bus import bcm
 from bridge.southbound.bus.burstend import SHORTEST, BurstEnd, Sequence, sequence
@@ -17,6 +17,7 @@ _RETRY_S: Final = 0.001
 _PATIENCE_S: Final = 0.01
 _ON_ITS_WAY_S: Final = 0.001
 """A message that took longer to the kernel than this carries too many frames before the deadline."""
+_ENDED: Final = float("-inf")
 _LINK_IS_GONE: Final = (errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.ENOTCONN)
 
 
@@ -56,6 +57,15 @@ class _Job:
     until: float
 
 
+class _Sent(NamedTuple):
+    frames: int
+    """Frames that the kernel has got."""
+    until: float
+    """The burst surely runs so long."""
+    is_fresh: bool
+    """It was started, and not refilled."""
+
+
 class KernelBeat:
     """Finite bursts by COB-ID. Times are monotonic seconds; ``clock`` tells how late a message went out.
 
@@ -72,6 +82,8 @@ class KernelBeat:
         """Why the bursts have been given up; empty while the kernel takes them."""
         self._manager: Manager | None = None
         self._jobs: dict[int, _Job] = {}
+        self._held: set[int] = set()
+        """What the kernel has, whether it still runs or not."""
         self._wishes: dict[int, _Wish] = {}
         self._retry_at: float | None = None
         self._soft = SoftBeat()
@@ -90,6 +102,7 @@ class KernelBeat:
 
     def _forget_manager(self) -> None:
         self._jobs.clear()
+        self._held.clear()
         self._wishes.clear()
         self._retry_at = None
         if self._manager:
@@ -170,40 +183,65 @@ class KernelBeat:
         return True
 
     def _hand_over(self, can_id: int, wish: _Wish, now: float) -> int:
-        """Give the kernel a burst, or end it; how many frames it has got. What it counts are frames, what it
-        has to keep to is a time: where the message was long on its way, it gets a second one with fewer."""
-        job = self._jobs.get(can_id)
-        # Refilling keeps the phase of a burst that runs and cannot wake one that has ended.
-        runs = job is not None and job.wish.period_s == wish.period_s and now < job.until
-        before = max(now, self._clock()) if wish.ending else now
-        count = self._send(can_id, wish, before, start=not runs)
-        if not wish.frames or not (runs or wish.ending):
-            return count
-        after = self._clock()
-        if job is not None and runs and job.until <= after < now + wish.count * wish.period_s:
-            # It may have ended between ``now`` and the refill. After a longer time nothing that was right
-            # then may go on.
-            return self._send(can_id, wish, after, start=True)
-        if wish.ending and after - before > _ON_ITS_WAY_S:
-            return self._send(can_id, replace(wish, at_once=False), after, start=False)
-        return count
+        """Give the kernel a burst, or end it; how many frames it has got.
 
-    def _send(self, can_id: int, wish: _Wish, now: float, *, start: bool) -> int:
+        What it counts are frames, what it has to keep to is a time: where the message was long on its way, it
+        gets a second one with fewer. Refilling keeps the phase of a burst that runs and cannot wake one that
+        has ended, and we may stand still at any line of this: where it may have ended it is started anew, or
+        no renewal would ever wake it.
+        """
+        job = self._jobs.get(can_id)
+        runs = job is not None and job.wish.period_s == wish.period_s and now < job.until
+        until = job.until if job and runs else _ENDED
+        stale_at = now + wish.count * wish.period_s
+        asked, at = wish, max(now, self._clock()) if wish.ending else now
+        while True:
+            count, until, is_fresh = self._send(can_id, asked, at, until)
+            if not count or not (runs or wish.ending):
+                return count
+            after = self._clock()
+            if after >= stale_at:
+                # Nothing that was right then may go on. The next round renews it.
+                return self._end(can_id)
+            if after >= until and not is_fresh:
+                asked = wish
+            elif wish.ending and after - at > _ON_ITS_WAY_S:
+                asked = replace(wish, at_once=False)
+            else:
+                return count
+            at = after
+
+    def _send(self, can_id: int, wish: _Wish, now: float, until: float) -> _Sent:
+        """Start the burst, or refill the one that surely runs until ``until``."""
         assert self._manager is not None
+        start = until <= now
         frames, count, head = wish.sequence(now, start=start)
         if not count:
-            if can_id in self._jobs:  # what it does not have it refuses to delete
-                self._manager.send(bcm.delete(can_id))
-            return 0
-        if head and not start:
+            return _Sent(self._end(can_id), _ENDED, is_fresh=False)
+        if start:
+            # What runs might send one of the new frames before it goes back to their beginning.
+            self._end(can_id)
+            until = now + (count - 1) * wish.period_s
+        elif head:
             # The kernel takes the new frames before it goes back to their beginning, and may send one
-            # between the two. So it goes back first, with frames that are all alike.
+            # between the two. So it goes back first, with frames that are all alike; with one more, so that
+            # it cannot come to their end before the next message is there.
             alike = (frames[0],) * len(frames)
-            message = bcm.setup(alike, wish.period_s, head, start=False, at_once=False, anew=True)
+            message = bcm.setup(alike, wish.period_s, head + 1, start=False, at_once=False, anew=True)
             self._manager.send(message)
+            until = min(until, now + head * wish.period_s)
         at_once, anew = wish.at_once, bool(head)
         self._manager.send(bcm.setup(frames, wish.period_s, count, start=start, at_once=at_once, anew=anew))
-        return count
+        self._held.add(can_id)
+        return _Sent(count, until, is_fresh=start)
+
+    def _end(self, can_id: int) -> int:
+        """What is not there the kernel refuses to delete."""
+        assert self._manager is not None
+        if can_id in self._held:
+            self._manager.send(bcm.delete(can_id))
+            self._held.remove(can_id)
+        return 0
 
     def _give_up(self, error: OSError, now: float) -> None:
         going = {can_id: job.wish for can_id, job in self._jobs.items()} | self._wishes

@@ -17,8 +17,9 @@ from bridge.northbound.opcua.items import Settings, ValueItem
 from bridge.northbound.opcua.library import ServiceError
 from bridge.northbound.opcua.publishing import PublishQueue, PublishRequest
 from bridge.northbound.opcua.reading import window
+from bridge.northbound.opcua.shares import MOST_SUBSCRIPTIONS
 from bridge.northbound.opcua.subscription import RETRANSMISSIONS, Subscription, Terms, terms
-from bridge.northbound.opcua.subscriptions import MOST_SUBSCRIPTIONS, Subscriptions
+from bridge.northbound.opcua.subscriptions import Subscriptions
 
 Codes, Mode = ua.StatusCodes, ua.MonitoringMode
 TARGET = ua.ReadValueId(AttributeId=ua.AttributeIds.Value)

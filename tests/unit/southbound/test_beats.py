@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from bridge.command import Action, Outcome, Request
 from bridge.command.link import NodeState
+from bridge.config import load_site
+from bridge.southbound.bus.frame import Frame
+from tests.support import sites
 from tests.support.bench import PLC, Bench, write_site
+from tests.support.pausing_bench import MAPPING, PausingBench
 from tests.support.quick import Quick, quick_site
 
 RPDO1 = 0x200
+SETPOINTS = 0x305
 
 
 def operational(folder: Path, nodes: int = 3) -> Quick:
@@ -65,6 +71,28 @@ def test_it_is_right_whatever_becomes_of_the_nodes(tmp_path: Path) -> None:
     quick.network.bus_is_gone(quick.now)
     assert kept_is_right(quick)
     assert RPDO1 + 3 in quick.network.beats(), "stopped words go to a lost node as well"
+
+
+def test_a_setpoint_is_there_before_the_enable_and_renewed_after_the_control_word(tmp_path: Path) -> None:
+    """Each has as many frames until the deadline as are left when it is told: what is told later, no more."""
+    node = sites.node(sites.drive("drive", "modbus", 500, f'name = "fu1"\n{sites.SCALED}'), mapping=MAPPING)
+    bench = PausingBench(load_site(sites.write(tmp_path, sites.bus(node), sites.modbus(), name="bench")))
+    bench.run(3.0)
+    told: list[tuple[int, bool]] = []
+    beat = bench.bus.beat
+
+    def note(frames: tuple[Frame, ...], now: float, period_s: float, count: int, **options: Any) -> None:
+        told.append((frames[0].can_id, options["at_once"]))
+        beat(frames, now, period_s, count, **options)
+
+    bench.bus.beat = note
+    for word in (0x047E, 0x047F):
+        assert bench.write(control_word=word, setpoint_1=0x2000, setpoint_4=word).ok
+        bench.run(0.2)
+    assert [can_id for can_id, at_once in told if at_once] == [SETPOINTS, RPDO1 + 5] * 2
+    renewed = [can_id for can_id, at_once in told if not at_once and can_id in (RPDO1 + 5, SETPOINTS)]
+    assert renewed == [RPDO1 + 5, SETPOINTS] * (len(renewed) // 2)
+    assert len(renewed) >= 10
 
 
 def test_the_transfers_of_three_nodes_are_under_way_at_the_same_time(tmp_path: Path) -> None:

@@ -231,9 +231,9 @@ def test_a_process_stopped_while_it_sends_sends_nothing_that_was_right_before(
         if frames[0].can_id == HEARTBEAT:
             bench.now += 1.0
 
-    # A telegram that comes when all bursts are renewed, the heartbeat's first.
+    # A telegram that comes when the heartbeat's burst begins, which is told before the RPDO's.
     (line,) = bench.master._lines
-    line.renew_at = bench.now
+    del line.beating[HEARTBEAT]
     bench.log.clear()
     with monkeypatch.context() as patched:
         patched.setattr(bench.bus, "beat", stand_still_after)

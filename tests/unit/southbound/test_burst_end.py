@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.southbound.bus.burstend import MOST_FRAMES, BurstEnd, sequence
@@ -25,12 +25,26 @@ class Bench:
     def __init__(self) -> None:
         self.now = 100.0
         self.late = 0.0
+        self.stalls: list[float] = []
+        """How long the process stands still at its next looks at the clock and messages, before each."""
         self.seen: list[tuple[float, Frame]] = []
         self.kernel = BroadcastManager(lambda: self.now, lambda frame: self.seen.append((self.now, frame)))
         self.beats = KernelBeat(self.clock)
-        self.beats.open(self.kernel)
+        self.beats.open(self)
+
+    def send(self, message: bytes, /) -> int:
+        self.stall()
+        return self.kernel.send(message)
+
+    def close(self) -> None:
+        self.kernel.close()
+
+    def stall(self) -> None:
+        if self.stalls:
+            self.run(self.stalls.pop(0))
 
     def clock(self) -> float:
+        self.stall()
         seen = self.now
         if self.late:
             late, self.late = self.late, 0.0
@@ -132,6 +146,41 @@ def test_a_telegram_in_time_moves_the_stop_away() -> None:
     times = bench.times(RUN)
     pauses = [after - before for before, after in pairwise(times)]
     assert max(pauses) <= PERIOD_S + 0.001, "and the phase is kept"
+
+
+STALLS = st.lists(st.sampled_from([0.0, 0.0, 0.004, 0.025, 0.05, 0.2]), max_size=5)
+RENEWALS = st.tuples(
+    st.sampled_from([0.0, 0.015, 0.04, 0.09, 0.3]),
+    st.sampled_from([-0.01, 0.0, 0.005, 0.015, 0.025, 0.045, 0.2]),
+    st.booleans(),
+    STALLS,
+)
+
+
+@settings(max_examples=1000)
+@given(steps=st.lists(RENEWALS, min_size=1, max_size=3), silent=st.booleans())
+def test_who_renews_a_burst_has_it_on_the_bus_wherever_the_bridge_stood_still(
+    steps: list[tuple[float, float, bool, list[float]]], *, silent: bool
+) -> None:
+    bench = Bench()
+    bench.beat(ending=None)
+    ending = BurstEnd(bench.now, None if silent else STOP)
+    for wait_s, left_s, at_once, stalls in steps:
+        bench.run(wait_s)
+        bench.stalls = list(stalls)
+        ending = ending._replace(at=bench.now + left_s)
+        bench.beat(ending=ending, at_once=at_once)
+        bench.stalls.clear()
+    latest = max(ending.at, bench.now) + 2 * PERIOD_S
+    bench.run(0.3)
+    assert all(time < latest for time in bench.times(RUN)), "and nobody who does not keeps it there"
+    # A renewal may have come too late: the next one after it counts.
+    for _ in range(2):
+        bench.seen.clear()
+        bench.beat(STOP, ending=None)
+        bench.run(PERIOD_S * 1.5)
+    assert bench.times(STOP)
+    assert not bench.times(RUN)
 
 
 def test_a_timer_of_ours_keeps_it_as_well() -> None:

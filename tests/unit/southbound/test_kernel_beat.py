@@ -106,7 +106,7 @@ def test_a_burst_that_may_have_ended_while_its_renewal_was_on_its_way_is_started
     assert kernel.said[-1] == (SETUP, 1 | 8, 0x205), "it runs: its phase is kept"
     kernel.now = 0.081
     beats.beat((OTHER,), 0.079, PERIOD_S, 10, at_once=False)
-    assert kernel.said[-2:] == [(SETUP, 1, 0x305), (SETUP, 1 | START, 0x305)]
+    assert kernel.said[-3:] == [(SETUP, 1, 0x305), (DELETE, 0, 0x305), (SETUP, 1 | START, 0x305)]
 
 
 def test_a_renewal_that_was_on_its_way_for_longer_than_its_burst_wakes_none(
@@ -114,7 +114,9 @@ def test_a_renewal_that_was_on_its_way_for_longer_than_its_burst_wakes_none(
 ) -> None:
     kernel.now = 0.02 + 10 * PERIOD_S
     beats.beat((RUN,), 0.02, PERIOD_S, 10, at_once=True)
-    assert kernel.said[-1] == (SETUP, 1 | 8, 0x205)
+    assert kernel.said[-1] == (DELETE, 0, 0x205)
+    beats.beat((RUN,), kernel.now, PERIOD_S, 10, at_once=False)
+    assert kernel.said[-1] == (SETUP, 1 | START, 0x205), "the next one does"
 
 
 def test_a_kernel_that_goes_on_refusing_loses_every_burst_and_we_send_them(

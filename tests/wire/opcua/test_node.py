@@ -61,16 +61,19 @@ async def answers(script: str, home: Path, *arguments: str) -> dict[str, Any]:
     return seen
 
 
-@pytest.mark.parametrize("encrypted", [False, True])
-async def test_node_opcua_browses_reads_writes_subscribes_and_calls(encrypted: bool, tmp_path: Path) -> None:
+def settings_for(*, encrypted: bool) -> OpcUaTable:
     user = UserTable(name="anna", role="operator", password_hash=hash_password("swordfish"))
-    settings = OpcUaTable(
+    return OpcUaTable(
         listen="127.0.0.1:0",
         no_security=not encrypted,
         anonymous="none" if encrypted else "operator",
         user=[user],
     )
-    async with serving(settings, tmp_path) as (server, _):
+
+
+@pytest.mark.parametrize("encrypted", [False, True])
+async def test_node_opcua_browses_reads_writes_subscribes_and_calls(encrypted: bool, tmp_path: Path) -> None:
+    async with serving(settings_for(encrypted=encrypted), tmp_path) as (server, _):
         login = ["anna", "swordfish"] if encrypted else []
         seen = await answers("client.mjs", tmp_path, server.endpoint_url, *login)
     assert seen.pop("children")[:2] == ["Start", "Stop"]
@@ -107,10 +110,8 @@ async def test_node_opcua_walks_through_the_services(tmp_path: Path) -> None:
 
 async def test_node_opcua_goes_on_after_lost_connections(tmp_path: Path) -> None:
     """First its session is still there, then only its subscription is: it is transferred."""
-    user = UserTable(name="anna", role="operator", password_hash=hash_password("swordfish"))
-    settings = OpcUaTable(listen="127.0.0.1:0", user=[user])
     said: list[dict[str, Any]] = []
-    async with serving(settings, tmp_path) as (server, view):
+    async with serving(settings_for(encrypted=True), tmp_path) as (server, view):
         login = (server.endpoint_url, "anna", "swordfish")
         async with node("reconnect.mjs", tmp_path, *login) as process:
             assert process.stdin and process.stdout
@@ -147,3 +148,13 @@ async def test_node_opcua_goes_on_after_lost_connections(tmp_path: Path) -> None
     assert sent.get("TransferSubscriptionsRequest") == 1
     # Asked until there is nothing more, not for ever.
     assert 3 <= sent["RepublishRequest"] <= 12
+
+
+async def test_node_opcua_works_in_the_middle_of_a_crowd(tmp_path: Path) -> None:
+    """Of its own address three hundred sockets that say nothing."""
+    async with serving(settings_for(encrypted=True), tmp_path) as (server, _):
+        crowd = [await asyncio.open_connection("127.0.0.1", server.port) for _ in range(300)]
+        seen = await answers("client.mjs", tmp_path, server.endpoint_url, "anna", "swordfish")
+        for _, writer in crowd:
+            writer.close()
+    assert (seen["run"], seen["stop"]) == ("Good", "Good")

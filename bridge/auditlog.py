@@ -14,6 +14,7 @@ from bridge.auditfile import AuditFile
 from bridge.command import Event, Kind, Plant
 from bridge.command.audit import Entry
 from bridge.config import Site
+from bridge.guard import Guard
 from bridge.image import Value
 
 _PERIOD_S: Final = 0.5
@@ -87,6 +88,7 @@ class AuditLog:
         self._plant = plant
         self._clock = clock
         self._epoch = epoch
+        self._guard = Guard("audit log")
         path = Path(settings.file) if settings.file else Path(site.site.state_dir) / "audit.jsonl"
         self.file = AuditFile(path, settings.max_bytes, settings.keep)
         refused = path.with_name(f"{path.stem}-refused{path.suffix}")
@@ -118,7 +120,9 @@ class AuditLog:
 
     def look(self, now: float) -> None:
         self._plant.audit.on_time(now)
-        self._plant.set("bridge/audit_lost", sum(file.all_lost for file in self._files), now)
+        self._plant.set(
+            "bridge/audit_lost", sum(file.all_lost for file in self._files) + self._guard.faults, now
+        )
         for place, file in enumerate(self._files):
             fault = file.fault
             if fault != self._faults[place]:
@@ -135,4 +139,6 @@ class AuditLog:
 
     def _on_entry(self, entry: Entry) -> None:
         file = self.refused if entry.is_refused else self.file
-        file.put(as_line(entry, self._epoch(entry.time)))
+        # Whoever asked waits for the outcome, whatever becomes of the line.
+        with self._guard:
+            file.put(as_line(entry, self._epoch(entry.time)))

@@ -196,7 +196,7 @@ async def give_signs(pipe: int) -> None:
 def give_reason(pipe: int, reason: str) -> None:
     """A front's last words: why it ends."""
     with contextlib.suppress(OSError):
-        os.write(pipe, _REASON + " ".join(reason.split()).encode()[:_LONGEST_REASON])
+        os.write(pipe, _REASON + " ".join(reason.split()).encode("utf-8", "replace")[:_LONGEST_REASON])
 
 
 def become_front(parent: int) -> None:

@@ -41,7 +41,7 @@ class Notifier:
         if self._socket is None:
             return
         try:
-            self._socket.sendto(message.encode(), self._address)
+            self._socket.sendto(message.encode("utf-8", "replace"), self._address)
         except OSError:
             # systemd that does not listen is no reason to stop driving.
             return

@@ -30,6 +30,7 @@ from bridge.command.request import (
 )
 from bridge.config import BusTable, NodeTable, Site
 from bridge.errors import Fault, FileFaults
+from bridge.guard import Guard
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Family
 from bridge.parameter import Ledger
@@ -105,6 +106,7 @@ class Plant:
         self._deadlines = Deadlines(self._next_of_drives)
         self._listeners: list[Callable[[Event], None]] = []
         self._gate = EventGate()
+        self._guard = Guard("event")
         self._refused_by_others = 0
         self._is_closing = False
         points = bridge_points()
@@ -165,7 +167,8 @@ class Plant:
         if not self._gate.admits(event):
             return
         for listener in tuple(self._listeners):
-            listener(event)
+            with self._guard:
+                listener(event)
 
     def set(
         self, name: str, value: Value, now: float, quality: Quality = Quality.GOOD, reason: str = ""

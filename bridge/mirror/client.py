@@ -12,6 +12,7 @@ from typing import Final
 
 from bridge.command import Code, Event, Outcome, Rejection, Request
 from bridge.errors import OperationFailed
+from bridge.guard import Guard
 from bridge.image import Image, Quality
 from bridge.mirror import protocol
 from bridge.mirror.protocol import Asked, Changed, Counted, Delta, Malformed, Snapshot
@@ -58,6 +59,7 @@ class MirrorClient:
         self._listeners: list[Callable[[Event], None]] = []
         self._rejections = Rejections()
         self._counts = Counter[str]()
+        self._guard = Guard("mirror")
 
     # what a northbound sees
 
@@ -87,8 +89,11 @@ class MirrorClient:
         """
         if request.received_at is None:
             request = replace(request, received_at=self._clock())
-        asked = Asked(self._clock() + timeout_s, request)
-        answers = await self._link.get(protocol.REQUEST, protocol.encode(asked), timeout_s=timeout_s)
+        try:
+            payload = protocol.encode_request(Asked(self._clock() + timeout_s, request))
+        except Malformed as error:
+            return Outcome(Code.NOT_VALID, str(error), forwarded=False)
+        answers = await self._link.get(protocol.REQUEST, payload, timeout_s=timeout_s)
         for answer in answers:
             if answer.ok:
                 try:
@@ -107,7 +112,8 @@ class MirrorClient:
 
     def _tell_rejections(self) -> None:
         for rejected in self._rejections.take():
-            self._link.send(Message(protocol.REJECTED, protocol.encode(rejected)))
+            with self._guard:
+                self._link.send(Message(protocol.REJECTED, protocol.encode(rejected)))
         counts, self._counts = self._counts, Counter[str]()
         for leaf, by in counts.items():
             self._link.send(Message(protocol.COUNTED, protocol.encode(Counted(leaf, by))))
@@ -140,17 +146,19 @@ class MirrorClient:
         async with asyncio.TaskGroup() as tasks:
             watching = tasks.create_task(self._watch_silence())
             while not self._points_changed:
-                if not self._in_step:
-                    await self._take_snapshot()
+                with self._guard:
+                    if not self._in_step:
+                        await self._take_snapshot()
                 await asyncio.sleep(_LOOK_EVERY_S)
             watching.cancel()
         raise PointsChanged("the bus process runs another site now; this process has to start anew")
 
     async def _watch_silence(self) -> None:
         while True:
-            if self._clock() - self._last_in_step > SILENCE_S:
-                self._mark_dead()
-            self._tell_rejections()
+            with self._guard:
+                if self._clock() - self._last_in_step > SILENCE_S:
+                    self._mark_dead()
+                self._tell_rejections()
             await asyncio.sleep(_LOOK_EVERY_S)
 
     async def close(self) -> None:
@@ -242,7 +250,8 @@ class MirrorClient:
             self._count_malformed(error)
             return
         for listener in self._listeners:
-            listener(event)
+            with self._guard:
+                listener(event)
 
     def _count_malformed(self, error: Malformed) -> None:
         self.malformed += 1

@@ -6,7 +6,8 @@ the monotonic clock: both ends run on one machine, and a stepped wall clock must
 
 from __future__ import annotations
 
-from typing import Final, TypeVar
+from collections.abc import Sequence
+from typing import Final, TypeVar, cast
 
 import msgspec
 
@@ -22,6 +23,8 @@ REJECTED: Final = "mirror/rejected"
 COUNTED: Final = "mirror/counted"
 TOKEN: Final = "mirror/@/bus"
 
+_LEAST_INT: Final = -(2**63)
+_MOST_INT: Final = 2**64 - 1
 _Model = TypeVar("_Model")
 
 
@@ -111,8 +114,36 @@ _rejected = msgspec.msgpack.Decoder(Rejected)
 _counted = msgspec.msgpack.Decoder(Counted)
 
 
-def encode(message: Snapshot | Delta | Told | Asked | Rejected | Counted | Outcome) -> bytes:
-    return _encoder.encode(message)
+def encode(message: Snapshot | Delta | Told | Rejected | Counted | Outcome) -> bytes:
+    """Raises nothing: where a text is no Unicode or a number too long for MessagePack, that alone is changed,
+    because one word of somebody must not cost the rest."""
+    try:
+        return _encoder.encode(message)
+    except (UnicodeError, OverflowError):
+        return _encoder.encode(_encodable(msgspec.to_builtins(message)))
+
+
+def encode_request(asked: Asked) -> bytes:
+    """A request is never changed. Raises Malformed for one that cannot be encoded."""
+    try:
+        return _encoder.encode(asked)
+    except (UnicodeError, OverflowError) as error:
+        raise Malformed(f"cannot be passed on: {error}") from None
+
+
+def _encodable(built: object) -> object:
+    match built:
+        case str():
+            return built.encode("utf-8", "replace").decode()
+        case int() if not _LEAST_INT <= built <= _MOST_INT:
+            return min(max(built, _LEAST_INT), _MOST_INT)
+        case dict():
+            entries = cast("dict[object, object]", built)
+            return {_encodable(key): _encodable(value) for key, value in entries.items()}
+        case list() | tuple():
+            return [_encodable(item) for item in cast("Sequence[object]", built)]
+        case _:
+            return built
 
 
 def decode_snapshot(data: bytes) -> Snapshot:

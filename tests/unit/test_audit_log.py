@@ -214,6 +214,21 @@ def test_the_site_file_names_another_file_or_none(tmp_path: Path) -> None:
     assert not (tmp_path / "state").exists()
 
 
+def test_a_line_that_cannot_be_written_costs_the_line_alone(tmp_path: Path) -> None:
+    """Whoever asked gets the outcome, and the service goes on."""
+    plant, _, _ = logged(tmp_path)
+    no_date = 10**40
+    log = AuditLog(plant, plant.site, lambda: 100.0, lambda at: no_date)
+    log.start()
+    outcomes: list[object] = []
+    request = Request(PLC, "conveyor/fu1", Action.WRITE, {"control_word": SHUT_DOWN})
+    plant.submit(request, 100.0, outcomes.append)
+    assert len(outcomes) == 1
+    log.look(200.0)
+    log.close()
+    assert plant.image.read("bridge/audit_lost").value == 1
+
+
 def test_a_disk_that_fails_is_an_event_and_a_count_and_the_drive_is_commanded(tmp_path: Path) -> None:
     plant, log, events = logged(tmp_path, '[audit]\nfile = "/dev/full"\n')
     log.start()

@@ -28,6 +28,7 @@ from bridge.northbound.modbus.pdu import Function
 from bridge.northbound.modbus.registers import DriveMap, Row, Table, bridge_rows, drive_maps
 from bridge.northbound.opcua.events import type_name
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, layout
+from bridge.northbound.opcua.services import SERVICES
 from bridge.northbound.opcua.values import OUTCOME_STATUS, QUALITY_STATUS
 from bridge.northbound.zenoh.commands import MALFORMED, METHODS, NODE_METHODS
 from bridge.project import load_project
@@ -205,6 +206,20 @@ def call(method: MethodNode) -> str:
 def test_the_events_are_those_that_are_sent() -> None:
     rows = page("reference/opcua.md").table("Events")
     assert [(row["type"], row["kind"]) for row in rows] == [(type_name(kind), kind.value) for kind in Kind]
+
+
+def test_the_services_are_those_of_the_table_in_the_code() -> None:
+    rows = page("reference/opcua.md").table("Services")
+    assert [(row["set"], row["service"], row["answer"], row["how"]) for row in rows] == [
+        (
+            name,
+            service.name,
+            "done" if service.refused is None else status_name(service.refused),
+            service.how.replace("`", ""),
+        )
+        for name, services in SERVICES.items()
+        for service in services
+    ]
 
 
 # reference: zenoh

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import uuid
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -9,10 +10,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final
 
-from asyncua.common.event_objects import BaseEvent
-
 from bridge.command import Event, Kind
-from bridge.northbound.opcua.library import ObjectIds, make, node_id, text, ua
+from bridge.guard import Guard
+from bridge.northbound.opcua.eventfilter import Occurrence
+from bridge.northbound.opcua.library import ObjectIds, node_id, text, ua, variant
 from bridge.northbound.opcua.nodes import pascal_case
 from bridge.northbound.opcua.subscriptions import Subscriptions
 from bridge.northbound.opcua.values import source_time
@@ -72,6 +73,7 @@ class EventSender:
         self._subscriptions = subscriptions
         self._objects = objects
         self._types = types
+        self._guard = Guard("OPC UA events")
         self._bounds: dict[Kind, Bound] = {}
         self._queue: deque[_Told] = deque(maxlen=_WAITING)
 
@@ -85,27 +87,29 @@ class EventSender:
         while self._queue:
             told = self._queue.popleft()
             if self._subscriptions.subscriptions:
-                await self._send(told)
+                self._send(told)
+                # Each client's filter has been asked.
+                await asyncio.sleep(0)
 
-    async def _send(self, told: _Told) -> None:
+    def _send(self, told: _Told) -> None:
         event = told.event
-        source = self._source(event.source)
         more = f" ({told.held_back} more like it before were left out)" if told.held_back else ""
-        made = make(
-            BaseEvent,
-            EventId=uuid.uuid4().bytes,
-            EventType=self._types[event.kind],
-            SourceNode=source,
-            SourceName=event.source,
-            Time=source_time(self._epoch_ns(event.time)),
-            ReceiveTime=datetime.now(UTC),
-            Message=text(event.message + more),
-            Severity=event.severity,
-        )
+        kinds = ua.VariantType
+        fields = {
+            "EventId": variant(uuid.uuid4().bytes, kinds.ByteString),
+            "EventType": variant(self._types[event.kind], kinds.NodeId),
+            "SourceNode": variant(self._source(event.source), kinds.NodeId),
+            "SourceName": variant(event.source, kinds.String),
+            "Time": variant(source_time(self._epoch_ns(event.time)), kinds.DateTime),
+            "ReceiveTime": variant(datetime.now(UTC), kinds.DateTime),
+            "Message": variant(text(event.message + more), kinds.LocalizedText),
+            "Severity": variant(event.severity, kinds.UInt16),
+        }
         for emitter in self._emitters(event.source):
-            made.emitting_node = emitter
             for subscription in list(self._subscriptions.subscriptions.values()):
-                await subscription.monitored_item_srv.trigger_event(made)
+                # Each client brings its own filter.
+                with self._guard:
+                    subscription.hear(Occurrence(emitter, fields))
 
     def _source(self, name: str) -> ua.NodeId:
         """The object that an event is about: a drive, a node, a bus, or else the bridge itself."""

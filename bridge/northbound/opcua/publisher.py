@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Sequence
 from typing import Final
 
+from bridge.guard import Guard
 from bridge.image import Image
 from bridge.northbound.opcua.address_space import Binding
 from bridge.northbound.opcua.events import EventSender
@@ -24,12 +25,14 @@ class Publisher:
         self._image = image
         self._variables = variables
         self._events = events
+        self._guard = Guard("OPC UA publisher")
 
     async def run(self) -> None:
         feed = self._image.feed()
         try:
             while True:
-                await self._events.send_waiting()
+                with self._guard:
+                    await self._events.send_waiting()
                 # What changes meanwhile waits for the next tick, or a busy image would never let go.
                 left = len(feed)
                 while left > 0:
@@ -47,9 +50,11 @@ class Publisher:
                 watchers = binding.value.datachange_callbacks
                 if not watchers:
                     continue
-                value = binding.read()
-                for handle, tell in list(watchers.items()):
-                    await tell(handle, value)
+                with self._guard:
+                    value = binding.read()
+                    for handle, tell in list(watchers.items()):
+                        with self._guard:
+                            await tell(handle, value)
                 sent += len(watchers)
                 if sent >= _BEFORE_YIELD:
                     sent = 0

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import struct
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -15,8 +13,11 @@ from cryptography.hazmat.primitives.hashes import SHA1, SHA256
 
 from bridge.command.request import Identity, Role, Source
 from bridge.config import OpcUaTable
+from bridge.northbound.opcua.admission import source_of
 from bridge.northbound.opcua.certificates import TrustedCertificates, fingerprint
 from bridge.northbound.opcua.library import ServiceError, StatusCodes, first_certificate, get, ua
+from bridge.northbound.opcua.logins import PasswordChecks, Verify
+from bridge.northbound.opcua.notices import Tell, tell
 from bridge.northbound.opcua.passwords import ANONYMOUS, check_users, hash_password, verify_password
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
 
 _log = logging.getLogger(__name__)
 
+_LONGEST_NAME: Final = 64
 _LONGEST_PASSWORD: Final = 1024
 _MOST_BLOCKS: Final = 8
 """A password of that length, encrypted, with room for the nonce."""
@@ -52,11 +54,12 @@ class CheckedPolicy:
     """A security policy of asyncua that opens no channel to a certificate without trust.
 
     asyncua looks at the certificate in CreateSession, which anyone can copy; here it is the one
-    whose key the client proves to have.
+    whose key the client proves to have. ``tell`` is given a kind, a source and a detail for the log.
     """
 
-    def __init__(self, policy: Any, trusted: TrustedCertificates | None) -> None:
+    def __init__(self, policy: Any, trusted: TrustedCertificates | None, tell: Tell = tell) -> None:
         self._policy = policy
+        self._tell = tell
         self._trusted = trusted
 
     def matches(self, uri: str, mode: ua.MessageSecurityMode | None = None) -> bool:
@@ -78,7 +81,8 @@ class CheckedPolicy:
         why = self._trusted.refusal(certificate) if self._trusted else None
         if why:
             name = certificate.subject.rfc4514_string()
-            _log.warning("refused the certificate of %s, SHA-256 %s: %s", name, fingerprint(certificate), why)
+            whose = f"{name[:_LONGEST_NAME]}, SHA-256 {fingerprint(certificate)}"
+            self._tell("refused certificates", whose, why)
             # Part 4 §6.1.3: the client is not told more than this.
             raise ServiceError(StatusCodes.BadSecurityChecksFailed)
 
@@ -138,19 +142,22 @@ _ROLES: Final = {"observer": Role.OBSERVER, "operator": Role.OPERATOR, "engineer
 
 
 class Users:
-    """The users of the site file. Nobody is an administrator: the address space is the site's."""
+    """The users of the site file. Nobody is an administrator: the address space is the site's.
 
-    def __init__(self, settings: OpcUaTable) -> None:
+    ``tell`` is given a kind, a source and a detail for the log.
+    """
+
+    def __init__(self, settings: OpcUaTable, tell: Tell = tell, verify: Verify = verify_password) -> None:
+        self._tell = tell
         check_users(settings.user)
         self._accounts = {
             user.name: _Account(_ROLES[user.role], user.password_hash) for user in settings.user
         }
         self._anonymous = _ROLES.get(settings.anonymous)
-        # One at a time: each check takes 64 MiB, and guessing must not take all cores.
-        self._worker = ThreadPoolExecutor(1, thread_name_prefix="password")
+        self._checks = PasswordChecks(verify)
 
     def close(self) -> None:
-        self._worker.shutdown(wait=False, cancel_futures=True)
+        self._checks.close()
 
     @property
     def tokens(self) -> list[type]:
@@ -170,11 +177,10 @@ class Users:
         """Raises ServiceError where name and password do not belong together."""
         account = self._accounts.get(name)
         known = account.password_hash if account else None
-        loop = asyncio.get_running_loop()
-        right = len(password) <= _LONGEST_PASSWORD and await loop.run_in_executor(
-            self._worker, verify_password, known, password
+        is_right = len(password) <= _LONGEST_PASSWORD and await self._checks.is_right(
+            known, password, source_of(address)
         )
-        if account is None or not right:
-            _log.warning("refused the login of %r from %s", name[:64], address)
+        if account is None or not is_right:
+            self._tell("refused logins", address, f"user {name[:_LONGEST_NAME]!r}")
             raise ServiceError(StatusCodes.BadUserAccessDenied)
         return Identity(Source.OPCUA, name, account.role, address)

@@ -6,7 +6,6 @@ import asyncio
 import gc
 import logging
 import socket
-from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
@@ -18,8 +17,11 @@ import bridge
 from bridge import clock
 from bridge.command import Kind
 from bridge.config import OpcUaTable
+from bridge.errors import OperationFailed
 from bridge.northbound.listening import listen, until_deaf
+from bridge.northbound.opcua import decoding
 from bridge.northbound.opcua.address_space import Bindings, Builder
+from bridge.northbound.opcua.browsing import MOST_CONTINUATION_POINTS
 from bridge.northbound.opcua.certificates import (
     OwnCertificate,
     TrustedCertificates,
@@ -27,13 +29,16 @@ from bridge.northbound.opcua.certificates import (
     configured_or_own,
 )
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
+from bridge.northbound.opcua.items import LEAST_SAMPLING_MS
 from bridge.northbound.opcua.library import ObjectIds, node_id, ua, variant
+from bridge.northbound.opcua.librarylog import quieten
+from bridge.northbound.opcua.listener import WINDOW, Listener
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.notices import tell
 from bridge.northbound.opcua.publisher import Publisher
 from bridge.northbound.opcua.security import CheckedPolicy, Users, security_policies
 from bridge.northbound.opcua.session import MOST_CALLS, Server, Services
-from bridge.northbound.opcua.transport import WINDOW, Listener
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
@@ -42,6 +47,19 @@ NAMESPACE: Final = "urn:drivebridge:points"
 _PRODUCT: Final = "urn:drivebridge"
 _CHUNK: Final = 65535
 _MOST_CHUNKS: Final = 256
+
+_CAPABILITIES: Final = {
+    ObjectIds.Server_ServerCapabilities_OperationLimits_MaxNodesPerMethodCall: variant(
+        MOST_CALLS, ua.VariantType.UInt32
+    ),
+    ObjectIds.Server_ServerCapabilities_MaxBrowseContinuationPoints: variant(
+        MOST_CONTINUATION_POINTS, ua.VariantType.UInt16
+    ),
+    ObjectIds.Server_ServerCapabilities_MinSupportedSampleRate: variant(
+        LEAST_SAMPLING_MS, ua.VariantType.Double
+    ),
+}
+"""What the server says of itself, where asyncua does not know."""
 
 _log = logging.getLogger(__name__)
 
@@ -61,7 +79,7 @@ class _Outer(LibraryServer):
 
     async def start(self) -> None:
         await self._setup_server_nodes()
-        policies = [CheckedPolicy(policy, self._trusted) for policy in self._policies]
+        policies = [CheckedPolicy(policy, self._trusted, tell) for policy in self._policies]
         await self._inner.start()
         self.bserver = Listener(self._inner, self._bound, self.limits, self._pulse)
         self.bserver.set_policies(policies)
@@ -112,7 +130,7 @@ class OpcUaServer:
         Raises ``FileFaults`` for a user, certificate or key that cannot be used, and ``Unavailable``
         where the port cannot be opened or the folder not be written.
         """
-        self._users = Users(self._settings)
+        self._users = Users(self._settings, tell)
         uri = application_uri()
         own = await asyncio.to_thread(configured_or_own, self._settings, self._folder, uri)
         trusted_dir = self._settings.trusted_dir
@@ -131,9 +149,18 @@ class OpcUaServer:
         self._tell()
 
     async def failed(self) -> None:
-        """Wait for ever, or raise ``OperationFailed`` when nobody can connect any more."""
-        if self._socket:
-            await until_deaf(self._socket, "opcua.listen")
+        """Wait for ever, or raise ``OperationFailed`` when nobody can connect any more, or nobody is told of
+        changes."""
+        if self._socket is None or self._publisher is None:
+            return
+        deaf = asyncio.create_task(until_deaf(self._socket, "opcua.listen"))
+        try:
+            await asyncio.wait((deaf, self._publisher), return_when=asyncio.FIRST_COMPLETED)
+            if not deaf.done():
+                raise OperationFailed("OPC UA: clients are told of no change any more")
+            await deaf
+        finally:
+            deaf.cancel()
 
     async def close(self) -> None:
         """Close every session and the port. May be called at any time, also twice."""
@@ -141,8 +168,7 @@ class OpcUaServer:
         task, self._publisher = self._publisher, None
         if task:
             task.cancel()
-            with suppress(asyncio.CancelledError):
-                await task
+            await asyncio.gather(task, return_exceptions=True)
         server, self._server = self._server, None
         if server:
             await server.stop()
@@ -157,10 +183,8 @@ class OpcUaServer:
     async def _serve(
         self, bound: socket.socket, own: OwnCertificate, trusted: TrustedCertificates | None, users: Users
     ) -> None:
-        library_log = logging.getLogger("asyncua")
-        if library_log.level == logging.NOTSET:
-            # It tells every request at INFO.
-            library_log.setLevel(logging.WARNING)
+        quieten()
+        decoding.install()
         inner = Server(no_security=self._settings.no_security)
         inner.count = self._view.count
         inner.certificate, inner.private_key = own.certificate, own.private_key
@@ -175,6 +199,7 @@ class OpcUaServer:
             Caller(self._view, inner.aspace, bindings.methods),
         )
         events = self._events(inner, builder, bindings)
+        inner.subscriptions.prepare()
         self._server = server
         await server.start()
         publisher = Publisher(self._view.image, bindings.variables, events)
@@ -195,8 +220,8 @@ class OpcUaServer:
         await server.set_build_info(_PRODUCT, "drivebridge", "drivebridge", version, version, now)
         server.set_security_policy(security_policies(self._settings))
         server.set_identity_tokens(users.tokens)
-        limit = node_id(ObjectIds.Server_ServerCapabilities_OperationLimits_MaxNodesPerMethodCall)
-        await server.get_node(limit).write_value(variant(MOST_CALLS, ua.VariantType.UInt32))
+        for capability, value in _CAPABILITIES.items():
+            await server.get_node(node_id(capability)).write_value(value)
 
     def _events(self, inner: Server, builder: Builder, bindings: Bindings) -> EventSender:
         base = builder.object_type(BASE_TYPE, node_id(ObjectIds.BaseEventType))

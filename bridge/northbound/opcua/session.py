@@ -2,7 +2,7 @@
 
 Corrected here, each with a test in ``tests/wire/opcua/test_security.py``: sequential session tokens,
 writes of anything anywhere, methods that are not executable, reads of what is not readable, calls
-without end, subscriptions of others.
+without end, subscriptions of others; and in ``test_services.py``: services that say Good and do less.
 """
 
 from __future__ import annotations
@@ -11,30 +11,36 @@ import asyncio
 import secrets
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.address_space import AddressSpace
 from asyncua.server.internal_server import InternalServer
-from asyncua.server.internal_session import InternalSession
+from asyncua.server.internal_session import InternalSession, SessionState
 from asyncua.server.subscription_service import SubscriptionService
 
 from bridge.command.request import Action, Identity, Role, Source
+from bridge.guard import Guard
+from bridge.northbound.opcua.admission import MOST_CONNECTIONS
+from bridge.northbound.opcua.browsing import Browser
 from bridge.northbound.opcua.library import (
     AttributeIds,
     ServiceError,
     StatusCodes,
     data_value,
     get,
-    make,
     node_id,
     status,
     ua,
     variant,
 )
 from bridge.northbound.opcua.methods import Caller
+from bridge.northbound.opcua.monitoring import loop_time
 from bridge.northbound.opcua.nodes import pascal_case
+from bridge.northbound.opcua.publishing import PublishQueue
+from bridge.northbound.opcua.reading import checked_times, window
 from bridge.northbound.opcua.security import Users
+from bridge.northbound.opcua.shares import make_room, room_for_items
 from bridge.northbound.opcua.structures import READ
 from bridge.northbound.opcua.subscriptions import Subscriptions
 from bridge.northbound.opcua.writes import Writer
@@ -43,7 +49,6 @@ MOST_OPERATIONS: Final = 10_000
 MOST_CALLS: Final = 100
 _BATCH: Final = 500
 _LONGEST_SESSION_MS: Final = 120_000.0
-_MOST_CONNECTIONS: Final = 100
 
 _FOR_ENGINEERS: Final = tuple(
     f"/{pascal_case(action)}" for action in (Action.WRITE_PARAMETER, Action.SAVE_PARAMETERS)
@@ -52,7 +57,8 @@ _FOR_ENGINEERS: Final = tuple(
 _TOKEN_BYTES: Final = 32
 _OBSERVER_ACCESS: Final = data_value(variant(READ, ua.VariantType.Byte))
 _OBSERVER_EXECUTABLE: Final = data_value(variant(False, ua.VariantType.Boolean))
-_NOT_READABLE: Final = data_value(variant(None, ua.VariantType.Null), status(StatusCodes.BadNotReadable))
+_NOTHING: Final = variant(None, ua.VariantType.Null)
+_NOT_READABLE: Final = data_value(_NOTHING, status(StatusCodes.BadNotReadable))
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +85,22 @@ class Session(InternalSession):
         self.address = str(name[0]) if isinstance(name, tuple) else str(name)
         self.identity = Identity(Source.OPCUA, "", Role.OBSERVER, self.address)
         self.channel_certificate: bytes | None = None
+        self.publishing = PublishQueue()
+        self.browser = Browser(aspace)
+        self.holder: object | None = None
+        """The processor of the connection that it is activated on."""
+        self.left_at = 0.0
+        """When it lost its last connection; monotonic."""
         self.admitted: Identity | None = None
         """Who ``activate_session`` is for; set by the processor once the login has been checked."""
+
+    @property
+    def is_gone(self) -> bool:
+        return self.state is SessionState.Closed
+
+    @property
+    def subscriptions(self) -> Subscriptions:
+        return self._server.subscriptions
 
     def activate_session(
         self, params: ua.ActivateSessionParameters, peer_certificate: bytes | None
@@ -94,20 +114,35 @@ class Session(InternalSession):
         self.user = User(UserRole.User, admitted.user)
         return result
 
+    def leave(self, now: float) -> None:
+        """Its connection has ended."""
+        self.holder, self.left_at = None, now
+
     # services
 
     async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
         wanted: list[ua.ReadValueId] = get(params, "NodesToRead")
         _limit(wanted, MOST_OPERATIONS)
+        times = checked_times(params)
+        # `not >=` refuses NaN, too.
+        if not get(params, "MaxAge") >= 0:
+            raise ServiceError(StatusCodes.BadMaxAgeInvalid)
         results: list[ua.DataValue] = []
-        for start in range(0, len(wanted), _BATCH):
-            batch = wanted[start : start + _BATCH]
-            values = self.iserver.attribute_service.read(make(ua.ReadParameters, NodesToRead=batch))
-            results += [self._seen(*pair) for pair in zip(batch, values, strict=True)]
-            await asyncio.sleep(0)
+        for place, one in enumerate(wanted):
+            if place and place % _BATCH == 0:
+                await asyncio.sleep(0)
+            results.append(self._read(one, times))
         return results
 
-    def _seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
+    def _read(self, wanted: ua.ReadValueId, times: ua.TimestampsToReturn) -> ua.DataValue:
+        try:
+            looked_at = window(wanted, times)
+        except ServiceError as error:
+            return data_value(_NOTHING, status(int(error.code)))
+        value = self.aspace.read_attribute_value(get(wanted, "NodeId"), get(wanted, "AttributeId"))
+        return looked_at.timed(looked_at.part(self.seen(wanted, value)))
+
+    def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
         """``value`` as this user may see it."""
         attribute = get(wanted, "AttributeId")
         if attribute == AttributeIds.Value:
@@ -142,62 +177,86 @@ class Session(InternalSession):
 
     async def browse(self, params: ua.BrowseParameters) -> list[ua.BrowseResult]:
         _limit(get(params, "NodesToBrowse"), MOST_OPERATIONS)
-        return await super().browse(params)
+        return await self.browser.browse(params)
+
+    async def browse_next(self, parameters: ua.BrowseNextParameters) -> list[ua.BrowseResult]:
+        _limit(get(parameters, "ContinuationPoints"), MOST_OPERATIONS)
+        return self.browser.browse_next(parameters)
+
+    async def translate_browsepaths_to_nodeids(
+        self, params: list[ua.BrowsePath]
+    ) -> list[ua.BrowsePathResult]:
+        _limit(params, MOST_OPERATIONS)
+        return await self.browser.translate(params)
+
+    async def register_nodes(self, nodes: list[ua.NodeId]) -> list[ua.NodeId]:
+        _limit(nodes, MOST_OPERATIONS)
+        return nodes
+
+    async def unregister_nodes(self, nodes: list[ua.NodeId]) -> None:
+        _limit(nodes, MOST_OPERATIONS)
 
     # subscriptions, each its own session's
 
-    def _own(self, *ids: int) -> None:
-        self._server.subscriptions.check_owner(self.session_id, ids)
-
-    async def create_monitored_items(
-        self, params: ua.CreateMonitoredItemsParameters
-    ) -> list[ua.MonitoredItemCreateResult]:
-        self._own(get(params, "SubscriptionId"))
-        _limit(get(params, "ItemsToCreate"), MOST_OPERATIONS)
-        return await super().create_monitored_items(params)
-
-    async def modify_monitored_items(
-        self, params: ua.ModifyMonitoredItemsParameters
-    ) -> list[ua.MonitoredItemModifyResult]:
-        self._own(get(params, "SubscriptionId"))
-        return await super().modify_monitored_items(params)
-
-    async def delete_monitored_items(self, params: ua.DeleteMonitoredItemsParameters) -> list[ua.StatusCode]:
-        self._own(get(params, "SubscriptionId"))
-        return await super().delete_monitored_items(params)
-
-    async def set_monitoring_mode(self, params: ua.SetMonitoringModeParameters) -> list[ua.StatusCode]:
-        self._own(get(params, "SubscriptionId"))
-        return await super().set_monitoring_mode(params)
-
-    async def set_publishing_mode(self, params: ua.SetPublishingModeParameters) -> list[ua.StatusCode]:
-        self._own(*get(params, "SubscriptionIds"))
-        return await super().set_publishing_mode(params)
+    async def create_subscription(
+        self,
+        params: ua.CreateSubscriptionParameters,
+        callback: Callable[..., Any],
+        request_callback: Callable[..., Any] | None = None,
+    ) -> ua.CreateSubscriptionResult:
+        """Told through ``publishing``; asyncua's callbacks are not used."""
+        self.subscriptions.drop_left_behind()
+        await make_room(self, self._server.sessions, self.subscription_service)
+        return self.subscriptions.create(self, params)
 
     def modify_subscription(self, params: ua.ModifySubscriptionParameters) -> ua.ModifySubscriptionResult:
-        self._own(get(params, "SubscriptionId"))
-        return super().modify_subscription(params)
+        return self.subscriptions.modify(self, params)
 
-    def republish(self, params: ua.RepublishParameters) -> ua.NotificationMessage:
-        self._own(get(params, "SubscriptionId"))
-        return super().republish(params)
+    async def set_publishing_mode(self, params: ua.SetPublishingModeParameters) -> list[ua.StatusCode]:
+        _limit(get(params, "SubscriptionIds"), MOST_OPERATIONS)
+        return self.subscriptions.set_publishing_mode(self, params)
 
     async def delete_subscriptions(self, ids: list[int]) -> list[ua.StatusCode]:
-        own = self._server.subscriptions.of(self.session_id)
-        deleted = iter(await super().delete_subscriptions([number for number in ids if number in own]))
-        unknown = status(StatusCodes.BadSubscriptionIdInvalid)
-        return [next(deleted) if number in own else unknown for number in ids]
+        _limit(ids, MOST_OPERATIONS)
+        return self.subscriptions.delete(self, ids)
+
+    def republish(self, params: ua.RepublishParameters) -> ua.NotificationMessage:
+        return self.subscriptions.republish(self, params)
 
     async def transfer_subscriptions(
         self, params: ua.TransferSubscriptionsParameters, callback: Callable[..., Any]
     ) -> list[ua.TransferResult]:
-        """Only from a session of the same user, so that a name is worth what its password is."""
-        mine = {session.session_id for session in self._server.sessions_of(self.identity)}
-        for number in get(params, "SubscriptionIds"):
-            found = self._server.subscriptions.subscriptions.get(number)
-            if found is not None and found.session_id not in mine:
-                raise ServiceError(StatusCodes.BadUserAccessDenied)
-        return await super().transfer_subscriptions(params, callback)
+        _limit(get(params, "SubscriptionIds"), MOST_OPERATIONS)
+        return self.subscriptions.transfer(self, params)
+
+    async def create_monitored_items(
+        self, params: ua.CreateMonitoredItemsParameters
+    ) -> list[ua.MonitoredItemCreateResult]:
+        _limit(get(params, "ItemsToCreate"), MOST_OPERATIONS)
+        room = room_for_items(self.session_id, self._server.sessions, self.subscriptions.items_by_session())
+        return await self.subscriptions.create_items(self, params, room)
+
+    async def modify_monitored_items(
+        self, params: ua.ModifyMonitoredItemsParameters
+    ) -> list[ua.MonitoredItemModifyResult]:
+        _limit(get(params, "ItemsToModify"), MOST_OPERATIONS)
+        return self.subscriptions.modify_items(self, params)
+
+    async def delete_monitored_items(self, params: ua.DeleteMonitoredItemsParameters) -> list[ua.StatusCode]:
+        _limit(get(params, "MonitoredItemIds"), MOST_OPERATIONS)
+        return self.subscriptions.delete_items(self, params)
+
+    async def set_monitoring_mode(self, params: ua.SetMonitoringModeParameters) -> list[ua.StatusCode]:
+        _limit(get(params, "MonitoredItemIds"), MOST_OPERATIONS)
+        return self.subscriptions.set_monitoring_mode(self, params)
+
+    async def close_session(self, delete_subs: bool = True) -> None:
+        # asyncua closes it again when its connection ends, and would have the subscriptions deleted then.
+        if self.state is SessionState.Closed:
+            return
+        self.publishing.close(loop_time())
+        self.subscriptions.end(self, delete=delete_subs)
+        await super().close_session(delete_subs=False)
 
 
 class Server(InternalServer):
@@ -210,6 +269,7 @@ class Server(InternalServer):
 
     def __init__(self, *, no_security: bool) -> None:
         super().__init__()
+        self.guard = Guard("OPC UA")
         self.no_security = no_security
         self.count: Callable[[str], None] = lambda leaf: None
         """Counts up a point of the bridge's own."""
@@ -217,17 +277,28 @@ class Server(InternalServer):
         self.user_manager = None  # pyright: ignore[reportAttributeAccessIssue]
         self.allow_remote_admin = False
         self.max_session_timeout_ms = _LONGEST_SESSION_MS
-        self.max_connections = _MOST_CONNECTIONS
-        self.subscriptions = Subscriptions(self.aspace, self)
-        self.subscription_service = self.subscriptions
-        self.isession.subscription_service = self.subscriptions
+        # Who is let in, and how long one may wait, is decided before asyncua is asked.
+        self.max_connections = 10 * MOST_CONNECTIONS
+        self.max_pending_activation_seconds = 0
+        self.subscriptions = Subscriptions(self.aspace)
+        # asyncua only looks through it for the subscriptions of a session.
+        self.subscription_service = cast("SubscriptionService", self.subscriptions)
 
     def create_session(self, name: str, user: User | None = None, external: bool = False) -> InternalSession:
         return Session(self, self.aspace, self.subscription_service, name)
 
-    def sessions_of(self, identity: Identity) -> list[Session]:
-        sessions = self._external_sessions.values()
-        return [s for s in sessions if isinstance(s, Session) and s.identity.is_same(identity)]
+    async def get_endpoints(
+        self, params: ua.GetEndpointsParameters | None = None, sockname: tuple[str, int] | None = None
+    ) -> list[ua.EndpointDescription]:
+        """Those of the transport profiles that are asked for."""
+        endpoints = await super().get_endpoints(params, sockname)
+        profiles: list[str] = (get(params, "ProfileUris") if params else None) or []
+        return [one for one in endpoints if not profiles or get(one, "TransportProfileUri") in profiles]
+
+    @property
+    def sessions(self) -> list[Session]:
+        """Those of clients."""
+        return [one for one in self._external_sessions.values() if isinstance(one, Session)]
 
     async def stop(self) -> None:
         # asyncua waits for its clock's next tick, up to a second.

@@ -1,9 +1,9 @@
-"""Connections: what may pass a channel, who may open a session on it, and answers out of turn.
+"""A connection's messages: what may pass a channel, who may open a session on it, answers out of turn.
 
 Corrected here (``tests/wire/opcua/test_security.py``): sessions on a channel without security that
-no endpoint offers, a session taken over from another channel, registering servers, a Call of three
-seconds that held up its own session's keep-alives, connections left hanging after an error, chunks of
-any size.
+no endpoint offers, a session taken over from another channel, a Call of three
+seconds that held up its own session's keep-alives, connections left hanging after an error, buffers of
+any size, a session that ended with a connection it had left.
 """
 
 # asyncua's UaProcessor has no types:
@@ -13,22 +13,23 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import socket
 import struct
+import time
 from collections import deque
 from typing import Any, Final
 
 from asyncua.common.connection import TransportLimits
 from asyncua.common.utils import Buffer
-from asyncua.server.binary_server_asyncio import BinaryServer, OPCUAProtocol
 from asyncua.server.internal_session import SessionState
 from asyncua.server.uaprocessor import UaProcessor
 from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary, uatcp_to_binary
 from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge import clock
-from bridge.command.freshness import NEVER, Inflow
+from bridge.command.freshness import NEVER
 from bridge.command.request import Identity
+from bridge.northbound.opcua import decoding
+from bridge.northbound.opcua.admission import Stage
 from bridge.northbound.opcua.library import (
     InvalidSignature,
     ObjectIds,
@@ -43,12 +44,12 @@ from bridge.northbound.opcua.library import (
     status,
     ua,
 )
+from bridge.northbound.opcua.notices import tell
+from bridge.northbound.opcua.routes import ROUTES, Request, carry_out
 from bridge.northbound.opcua.security import read_password
+from bridge.northbound.opcua.services import REFUSED
 from bridge.northbound.opcua.session import Server, Session
 from bridge.northbound.opcua.writes import received_at
-from bridge.northbound.pulse import Pulse
-
-_log = logging.getLogger(__name__)
 
 _CREATE: Final = node_id(ObjectIds.CreateSessionRequest_Encoding_DefaultBinary)
 _ACTIVATE: Final = node_id(ObjectIds.ActivateSessionRequest_Encoding_DefaultBinary)
@@ -58,12 +59,6 @@ _DISCOVERY: Final = frozenset(
         node_id(ObjectIds.GetEndpointsRequest_Encoding_DefaultBinary),
         node_id(ObjectIds.FindServersRequest_Encoding_DefaultBinary),
         _CLOSE_CHANNEL,
-    )
-)
-_REGISTRATION: Final = frozenset(
-    (
-        node_id(ObjectIds.RegisterServerRequest_Encoding_DefaultBinary),
-        node_id(ObjectIds.RegisterServer2Request_Encoding_DefaultBinary),
     )
 )
 _SLOW: Final = frozenset(
@@ -76,12 +71,11 @@ _SLOW: Final = frozenset(
 
 _ERROR: Final[Any] = ua.MessageType.Error
 _MOST_WAITING: Final = 32
-_MOST_UNREAD: Final = 64
-"""Messages that a client which waits for its answers has under way at most."""
-_READ_MOST: Final = 64 * 1024
-"""Bytes that are read at once from such a client."""
-WINDOW: Final = 2 * _READ_MOST
-"""Bytes that may wait in the kernel: more than that, so that who fills it is noticed."""
+_LEAST_BUFFER: Final = 8192
+"""Part 6 §7.1.2.3. Answers are cut into chunks that small."""
+_MOST_UNSENT: Final = 16 * 1024 * 1024
+"""Bytes of answers that may wait for a client to read them."""
+_MALFORMED_KIND: Final = "malformed messages"
 
 _MALFORMED: Final = (
     UaError,
@@ -104,42 +98,100 @@ class Processor(UaProcessor):
         super().__init__(server, transport, limits)
         self._server = server
         self._waiting: set[asyncio.Task[Any]] = set()
+        self._source = str(self.name[0]) if isinstance(self.name, tuple) else str(self.name)
+        self._was_greeted = False
         self.arrivals: deque[float] = deque()
         """When the messages that are still to be processed can have come at the earliest, in their order."""
+
+    @property
+    def stage(self) -> Stage:
+        session = self.session
+        if isinstance(session, Session) and session.holder is self and session.is_activated():
+            return Stage.SESSION
+        if self._connection.is_open():
+            return Stage.CHANNEL
+        return Stage.GREETED if self._was_greeted else Stage.CONNECTED
 
     async def process(self, header: Any, body: Buffer) -> bool:
         """False closes the connection; the client is told why first."""
         # For what is carried out from here on, the tasks that are made for it included.
         received_at.set(self.arrivals.popleft() if self.arrivals else NEVER)
+        decoding.begin()
         try:
-            return bool(await super().process(header, body))
+            goes_on = bool(await super().process(header, body))
+            if header.MessageType == ua.MessageType.Hello:
+                self._greeted()
+            return goes_on
         except (ServiceError, UaStatusCodeError) as error:
             self._server.count("opcua_refused_connections")
             code = int(error.code)
         except _MALFORMED as error:
             self._server.count("opcua_broken_connections")
-            _log.warning("closed the connection from %s: malformed message: %r", self.name, error)
-            is_open = self._connection.is_open()
-            code = StatusCodes.BadTcpInternalError if is_open else StatusCodes.BadSecurityChecksFailed
+            tell(_MALFORMED_KIND, self._source, f"connection closed: {error!r}")
+            code = StatusCodes.BadSecurityChecksFailed
+            if self._connection.is_open():
+                is_malformed = decoding.is_malformed(error)
+                code = StatusCodes.BadDecodingError if is_malformed else StatusCodes.BadTcpInternalError
+        except Exception as error:  # noqa: BLE001 - nor may one message end the others' connections
+            self._server.count("opcua_broken_connections")
+            self._server.guard.note(error)
+            code = StatusCodes.BadTcpInternalError
         message = make(ua.ErrorMessage, Error=status(code))
         self._transport.write(uatcp_to_binary(_ERROR, message))
         return False
 
+    def _greeted(self) -> None:
+        if self._limits.max_send_buffer < _LEAST_BUFFER:
+            raise ServiceError(StatusCodes.BadConnectionRejected)
+        self._was_greeted = True
+
     async def process_message(self, seqhdr: Any, body: Buffer) -> bool:
         """Requests that wait for a drive are answered when it has; the others go on meanwhile."""
-        if nodeid_from_binary(body.copy()) not in _SLOW:
-            return bool(await super().process_message(seqhdr, body))
+        typeid = nodeid_from_binary(body)
+        requesthdr = struct_from_binary(ua.RequestHeader, body)
+        if typeid not in _SLOW:
+            return await self._serve(typeid, requesthdr, seqhdr, body)
         if len(self._waiting) >= _MOST_WAITING:
             await asyncio.wait(self._waiting, return_when=asyncio.FIRST_COMPLETED)
-        task = asyncio.create_task(super().process_message(seqhdr, body))
+        task = asyncio.create_task(self._serve(typeid, requesthdr, seqhdr, body))
         self._waiting.add(task)
         task.add_done_callback(self._waiting.discard)
         # One turn, so that it is on its way before the client's next request is looked at.
         await asyncio.sleep(0)
         return True
 
+    async def _serve(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> bool:
+        """Carry out a request. Whatever is wrong with it is its answer, and ends nothing."""
+        try:
+            return bool(await self._process_message(typeid, requesthdr, seqhdr, body))
+        except (ServiceError, UaStatusCodeError) as error:
+            code = int(error.code)
+        except Exception as error:  # noqa: BLE001 - asyncua logs a traceback for each
+            code = self._fault(error)
+        fault = ua.ServiceFault()
+        fault.ResponseHeader.ServiceResult = status(code)
+        self.send_response(requesthdr.RequestHandle, seqhdr, fault)
+        return True
+
+    def _fault(self, error: Exception) -> int:
+        if decoding.is_malformed(error):
+            tell(_MALFORMED_KIND, self._source, repr(error))
+            return StatusCodes.BadDecodingError
+        # Ours or asyncua's fault: its place instead of a traceback, which would cost twenty lines.
+        detail = f"{error!r} {decoding.place(error)}"
+        tell("requests that failed", self._source, detail, logging.ERROR)
+        return StatusCodes.BadInternalError
+
+    def send_response(self, requesthandle: Any, seqhdr: Any, response: Any, *rest: Any, **more: Any) -> None:
+        if self._transport.get_write_buffer_size() > _MOST_UNSENT:
+            tell("answers not read", self._source, "connection closed")
+            self._transport.abort()
+            return
+        super().send_response(requesthandle, seqhdr, response, *rest, **more)
+
     async def _process_message(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> Any:
         self._check(typeid, requesthdr)
+        decoding.begin()
         if typeid == _CREATE:
             params = struct_from_binary(ua.CreateSessionParameters, body.copy())
             certificate = self._channel_certificate()
@@ -147,6 +199,7 @@ class Processor(UaProcessor):
             answer = await super()._process_message(typeid, requesthdr, seqhdr, body)
             if isinstance(self.session, Session):
                 self.session.channel_certificate = certificate
+                self.session.holder = self
             return answer
         if typeid == _ACTIVATE:
             session = self._session_to_activate(requesthdr)
@@ -157,27 +210,63 @@ class Processor(UaProcessor):
             except ServiceError:
                 self._server.count("opcua_refused_connections")
                 raise
+            decoding.begin()
+        if typeid in ROUTES:
+            return await self._carry_out(typeid, requesthdr, seqhdr, body)
         try:
-            return await super()._process_message(typeid, requesthdr, seqhdr, body)
+            answer = await super()._process_message(typeid, requesthdr, seqhdr, body)
         except InvalidSignature:
             raise ServiceError(StatusCodes.BadApplicationSignatureInvalid) from None
+        if typeid == _ACTIVATE and isinstance(self.session, Session):
+            self.session.holder = self
+        return answer
+
+    async def _carry_out(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> bool:
+        """A service that asyncua's processor does not leave to the session."""
+        session = self.session
+        if not isinstance(session, Session):
+            raise ServiceError(StatusCodes.BadSessionIdInvalid)
+        if not session.is_activated():
+            raise ServiceError(StatusCodes.BadSessionNotActivated)
+        self.session_last_activity = time.monotonic()
+        session.touch()
+
+        def send(response: Any) -> None:
+            self.send_response(requesthdr.RequestHandle, seqhdr, response)
+
+        def is_open() -> bool:
+            return session.holder is self and not self._transport.is_closing()
+
+        await carry_out(session, typeid, Request(requesthdr, body, send, is_open))
+        return True
 
     async def close(self) -> None:
         for task in list(self._waiting):
             task.cancel()
         await super().close()
+        if isinstance(self.session, Session) and self.session.holder is self:
+            self.session.leave(clock.now())
+
+    def _should_close_session_on_transport_loss(self) -> bool:
+        # It may have been activated on another connection meanwhile.
+        if isinstance(self.session, Session) and self.session.holder is not self:
+            return False
+        return super()._should_close_session_on_transport_loss()
 
     # what may pass
 
     def _check(self, typeid: ua.NodeId, requesthdr: Any) -> None:
         """Raises ServiceError for a request that has no business on this channel or in this session."""
-        if typeid in _REGISTRATION:
-            raise ServiceError(StatusCodes.BadServiceUnsupported)
+        if typeid in REFUSED:
+            raise ServiceError(REFUSED[typeid])
         if typeid in _DISCOVERY:
             return
         if not self._is_secured() and not self._server.no_security:
             raise ServiceError(StatusCodes.BadSecurityPolicyRejected)
         session = self.session
+        if isinstance(session, Session) and session.holder is not self:
+            # Activated on another connection; this one has lost it (Part 4 §5.6.3).
+            session = self.session = None
         if session is None or session.state is SessionState.Closed:
             return
         if typeid == _CREATE:
@@ -204,7 +293,7 @@ class Processor(UaProcessor):
         if not isinstance(session, Session) or session.state is SessionState.Closed:
             raise ServiceError(StatusCodes.BadSessionIdInvalid)
         if session.channel_certificate != self._channel_certificate():
-            _log.warning("refused %s: the session was made with another certificate", self.name)
+            tell("refused sessions", self._source, "made with another certificate")
             raise ServiceError(StatusCodes.BadSecurityChecksFailed)
         return session
 
@@ -218,60 +307,3 @@ class Processor(UaProcessor):
         if is_null or isinstance(token, ua.AnonymousIdentityToken):
             return users.anonymous(session.address)
         raise ServiceError(StatusCodes.BadIdentityTokenRejected)
-
-
-class _Protocol(OPCUAProtocol):
-    """Notes with each message when it can have come: it may wait here, or in the bus process."""
-
-    def __init__(self, pulse: Pulse, **settings: Any) -> None:
-        super().__init__(**settings)
-        self._pulse = pulse
-        self._inflow = Inflow(clock.now(), pulse.look)
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        super().connection_made(transport)
-        # Its task has not run yet, so no message has seen the other processor.
-        if self.transport is not None and isinstance(self.iserver, Server):
-            self.processor = Processor(self.iserver, self.transport, self.limits)
-            self.processor.set_policies(self.policies)
-
-    def data_received(self, data: bytes) -> None:
-        before = self.messages.qsize()
-        super().data_received(data)
-        waiting = self.messages.qsize()
-        crowded = len(data) >= _READ_MOST or waiting > _MOST_UNREAD
-        came_at = self._inflow.arrive(clock.now(), self._pulse.look, crowded=crowded)
-        if isinstance(self.processor, Processor):
-            self.processor.arrivals += [came_at] * (waiting - before)
-        # What is left is part of one chunk. asyncua would wait for the 4 GiB that a header may ask for.
-        if len(self._buffer) > self.limits.max_recv_buffer and self.transport is not None:
-            _log.warning("closed the connection from %s: a chunk without end", self.peer_name)
-            self._buffer = b""
-            self.transport.close()
-            if isinstance(self.iserver, Server):
-                self.iserver.count("opcua_broken_connections")
-
-
-class Listener(BinaryServer):
-    """Takes connections on a socket that is bound already."""
-
-    def __init__(self, server: Server, bound: socket.socket, limits: TransportLimits, pulse: Pulse) -> None:
-        host, port = bound.getsockname()[:2]
-        super().__init__(server, host, port, limits)
-        self._socket = bound
-        self._pulse = pulse
-
-    def _make_protocol(self) -> OPCUAProtocol:
-        return _Protocol(
-            self._pulse,
-            iserver=self.iserver,
-            policies=self._policies,
-            clients=self.clients,
-            closing_tasks=self.closing_tasks,
-            limits=self.limits,
-        )
-
-    async def start(self) -> None:
-        loop = asyncio.get_running_loop()
-        self._server = await loop.create_server(self._make_protocol, sock=self._socket)
-        self.cleanup_task = asyncio.create_task(self._close_task_loop())

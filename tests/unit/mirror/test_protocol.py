@@ -49,7 +49,9 @@ def test_deltas_read_back(readings: list[Changed]) -> None:
 
 @given(requests, st.floats(0, 1e9))
 def test_requests_read_back_with_their_identity(request: Request, deadline: float) -> None:
-    assert protocol.decode_request(protocol.encode(Asked(deadline, request))) == Asked(deadline, request)
+    assert protocol.decode_request(protocol.encode_request(Asked(deadline, request))) == Asked(
+        deadline, request
+    )
 
 
 @given(identities, st.text(max_size=20), st.dictionaries(st.text(max_size=10), values, max_size=4))
@@ -61,6 +63,41 @@ def test_rejections_read_back(identity: Identity, target: str, written: dict[str
 @given(st.builds(Outcome, st.sampled_from(Code), st.text(), st.booleans()))
 def test_outcomes_read_back(outcome: Outcome) -> None:
     assert protocol.decode_outcome(protocol.encode(outcome)) == outcome
+
+
+any_text = st.text(st.characters(), max_size=10)
+"""With lone surrogates."""
+any_values = st.dictionaries(any_text, any_text | st.integers() | st.floats(), max_size=3)
+any_identities = st.builds(Identity, st.sampled_from(Source), any_text, st.sampled_from(Role), any_text)
+
+
+@given(any_identities, any_text, any_text, any_values)
+def test_whatever_was_refused_can_be_told(
+    who: Identity, target: str, why: str, written: dict[str, str | int | float]
+) -> None:
+    """One that could not would end whoever tells it, and every client with that."""
+    told = Rejected(12.5, 3, Rejection(who, target, Action.WRITE, why, why, written))
+    back = protocol.decode_rejected(protocol.encode(told))
+    assert back.count == 3
+    assert len(back.rejection.target) == len(target)
+
+
+@given(any_text, any_text, any_text | st.integers() | st.floats(allow_nan=False))
+def test_whatever_happens_can_be_told(source: str, message: str, value: str | int | float) -> None:
+    protocol.decode_event(protocol.encode(Told(1, Kind.REFUSED, source, 300, message)))
+    protocol.decode_outcome(protocol.encode(Outcome(Code.NOT_VALID, message)))
+    delta = Delta(1, 1, (Changed(0, 5, Quality.GOOD, 0, ""), Changed(1, value, Quality.GOOD, 0, message)))
+    back = protocol.decode_delta(protocol.encode(delta), 2)
+    assert back.readings[0] == delta.readings[0], "what is well is as it was"
+
+
+@given(any_identities, any_text, any_values)
+def test_a_request_is_passed_on_as_it_is_or_not_at_all(
+    who: Identity, target: str, values: dict[str, str | int | float]
+) -> None:
+    asked = Asked(1.0, Request(who, target, Action.WRITE, values))
+    with contextlib.suppress(Malformed):
+        assert repr(protocol.decode_request(protocol.encode_request(asked))) == repr(asked)
 
 
 def test_a_snapshot_brings_the_nature_of_every_point() -> None:

@@ -10,7 +10,6 @@ from asyncua import ua
 from bridge.command.request import Code, Identity, Outcome, Source
 from bridge.image import DataType, Point, Quality, Reading
 from bridge.northbound.opcua.events import Bound
-from bridge.northbound.opcua.subscriptions import is_reported
 from bridge.northbound.opcua.values import (
     OUTCOME_STATUS,
     QUALITY_STATUS,
@@ -93,40 +92,6 @@ def test_other_types_are_not(point: Point, written: ua.Variant) -> None:
 def test_what_is_no_number_is_out_of_range(number: float) -> None:
     with pytest.raises(ValueError, match="take"):
         point_value(NUMBER, ua.Variant(number, Kind.Double))
-
-
-def value(number: float | None, status: int = Codes.Good) -> ua.DataValue:
-    held = ua.Variant(None, Kind.Null) if number is None else ua.Variant(number, Kind.Double)
-    return ua.DataValue(held, ua.StatusCode(status))
-
-
-def deadband(size: float) -> ua.DataChangeFilter:
-    return ua.DataChangeFilter(
-        Trigger=ua.DataChangeTrigger.StatusValue,
-        DeadbandType=ua.DeadbandType.Absolute,
-        DeadbandValue=size,
-    )
-
-
-def test_the_first_value_and_every_status_is_reported() -> None:
-    dead = value(None, Codes.BadNoCommunication)
-    assert is_reported(None, value(1.0), deadband(5))
-    assert is_reported(value(1.0), dead, deadband(5))
-    assert is_reported(dead, value(1.0), deadband(5))
-    assert is_reported(dead, value(None, Codes.BadDeviceFailure), deadband(5))
-
-
-def test_a_change_is_reported_beyond_the_deadband_only() -> None:
-    assert not is_reported(value(1.0), value(1.0), None)
-    assert is_reported(value(1.0), value(1.1), None)
-    assert not is_reported(value(1.0), value(1.5), deadband(0.5))
-    assert is_reported(value(1.0), value(1.6), deadband(0.5))
-
-
-def test_who_asks_for_the_status_alone_gets_no_values() -> None:
-    wanted = ua.DataChangeFilter(Trigger=ua.DataChangeTrigger.Status)
-    assert not is_reported(value(1.0), value(2.0), wanted)
-    assert is_reported(value(1.0), value(1.0, Codes.UncertainLastUsableValue), wanted)
 
 
 def test_events_are_bounded_to_a_burst_and_a_rate() -> None:

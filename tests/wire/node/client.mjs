@@ -37,11 +37,15 @@ const item = await subscription.monitor(
   { samplingInterval: 50, queueSize: 10, discardOldest: true }, TimestampsToReturn.Both);
 item.on("changed", (value) => told.push(value.value.value));
 
-const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+const state = async (wanted) => {
+  for (let wait = 0; told.at(-1) !== wanted && wait < 100; wait += 1) {
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
+};
 seen.ready = (await write("conveyor/fu1/command/control_word", DataType.Int32, 0x047e)).name;
-await pause(200);
+await state(2);
 seen.run = (await write("conveyor/fu1/command/control_word", DataType.UInt16, 0x047f)).name;
-await pause(200);
+await state(4);
 seen.readOnly = (await write("conveyor/fu1/status/status_word", DataType.UInt16, 1)).name;
 seen.wrongType = (await write("conveyor/fu1/command/control_word", DataType.String, "run")).name;
 seen.notOurs = (await write("conveyor/fu2/command/control_word", DataType.UInt16, 0x047f)).name;
@@ -49,7 +53,7 @@ const stopped = await session.call({
   objectId: id("conveyor/fu1"), methodId: id("conveyor/fu1/Stop"), inputArguments: [],
 });
 seen.stop = stopped.statusCode.name;
-await pause(200);
+await state(2);
 seen.states = told;
 
 await subscription.terminate();

@@ -5,13 +5,18 @@ from __future__ import annotations
 import asyncio
 import json
 import shutil
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from bridge.config import OpcUaTable, UserTable
 from bridge.northbound.opcua.security import hash_password
-from tests.support.opcua_site import serving
+from tests.support.opcua_raw import cut, sessions
+from tests.support.opcua_site import OPEN, serving
 from tests.support.process import REPOSITORY
 
 FOLDER = REPOSITORY / "tests" / "wire" / "node"
@@ -23,32 +28,54 @@ def _needs_node_opcua() -> None:
         pytest.skip(f"node-opcua is not there: install nodejs and npm, then `npm install` in {FOLDER}")
 
 
-@pytest.mark.parametrize("encrypted", [False, True])
-async def test_node_opcua_browses_reads_writes_subscribes_and_calls(encrypted: bool, tmp_path: Path) -> None:
+@asynccontextmanager
+async def node(script: str, home: Path, *arguments: str) -> AsyncIterator[asyncio.subprocess.Process]:
+    process = await asyncio.create_subprocess_exec(
+        "node",
+        str(FOLDER / script),
+        *arguments,
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+        env={"HOME": str(home), "PATH": "/usr/local/bin:/usr/bin:/bin"},
+    )
+    try:
+        async with asyncio.timeout(60):
+            yield process
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()
+
+
+def lines(out: bytes) -> list[dict[str, Any]]:
+    """What a script said. node-opcua writes what it thinks of certificates to the standard output, too."""
+    return [json.loads(line) for line in out.decode().splitlines() if line.startswith("{")]
+
+
+async def answers(script: str, home: Path, *arguments: str) -> dict[str, Any]:
+    async with node(script, home, *arguments) as process:
+        out, errors = await process.communicate()
+    assert process.returncode == 0, errors.decode()
+    (seen,) = lines(out)
+    return seen
+
+
+def settings_for(*, encrypted: bool) -> OpcUaTable:
     user = UserTable(name="anna", role="operator", password_hash=hash_password("swordfish"))
-    settings = OpcUaTable(
+    return OpcUaTable(
         listen="127.0.0.1:0",
         no_security=not encrypted,
         anonymous="none" if encrypted else "operator",
         user=[user],
     )
-    async with serving(settings, tmp_path) as (server, _):
+
+
+@pytest.mark.parametrize("encrypted", [False, True])
+async def test_node_opcua_browses_reads_writes_subscribes_and_calls(encrypted: bool, tmp_path: Path) -> None:
+    async with serving(settings_for(encrypted=encrypted), tmp_path) as (server, _):
         login = ["anna", "swordfish"] if encrypted else []
-        process = await asyncio.create_subprocess_exec(
-            "node",
-            str(FOLDER / "client.mjs"),
-            server.endpoint_url,
-            *login,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-            env={"HOME": str(tmp_path), "PATH": "/usr/local/bin:/usr/bin:/bin"},
-        )
-        async with asyncio.timeout(60):
-            out, errors = await process.communicate()
-    assert process.returncode == 0, errors.decode()
-    # node-opcua writes what it thinks of certificates to the standard output, too.
-    (line,) = [line for line in out.decode().splitlines() if line.startswith("{")]
-    seen = json.loads(line)
+        seen = await answers("client.mjs", tmp_path, server.endpoint_url, *login)
     assert seen.pop("children")[:2] == ["Start", "Stop"]
     assert seen.pop("states")[-3:] == [2, 4, 2]
     assert seen == {
@@ -60,3 +87,74 @@ async def test_node_opcua_browses_reads_writes_subscribes_and_calls(encrypted: b
         "notOurs": "BadUserAccessDenied",
         "stop": "Good",
     }
+
+
+async def test_node_opcua_walks_through_the_services(tmp_path: Path) -> None:
+    async with serving(OPEN, tmp_path) as (server, _):
+        seen = await answers("services.mjs", tmp_path, server.endpoint_url)
+    browsed = seen.pop("browsed")
+    assert set(browsed[:-1]) == {3}
+    assert sum(browsed) > 10
+    assert seen == {
+        "history": "BadServiceUnsupported",
+        "query": "BadServiceUnsupported",
+        "part": 2,
+        "none": "BadIndexRangeNoData",
+        "revised": [50, 21, 7],
+        "percent": "Good",
+        "beyond": "BadDeadbandFilterInvalid",
+        "rangeless": "BadDeadbandFilterInvalid",
+        "events": "Good",
+    }
+
+
+async def test_node_opcua_goes_on_after_lost_connections(tmp_path: Path) -> None:
+    """First its session is still there, then only its subscription is: it is transferred."""
+    said: list[dict[str, Any]] = []
+    async with serving(settings_for(encrypted=True), tmp_path) as (server, view):
+        login = (server.endpoint_url, "anna", "swordfish")
+        async with node("reconnect.mjs", tmp_path, *login) as process:
+            assert process.stdin and process.stdout
+
+            async def until(key: str, value: object = None) -> None:
+                while not any(key in one and value in (None, one[key]) for one in said):
+                    line = await process.stdout.readline()  # pyright: ignore
+                    assert line, said
+                    said.extend(lines(line))
+
+            def load(percent: float) -> None:
+                view.plant.set("bus/can0/load", percent, time.monotonic())
+
+            load(1.0)
+            await until("value", 1)
+            for percent, keeps_session in ((2.0, True), (3.0, True), (4.0, False)):
+                (session,) = sessions(server)
+                if not keeps_session:
+                    await session.close_session(delete_subs=False)
+                cut(server)
+                load(percent)
+                await until("value", percent)
+                assert ([session] == sessions(server)) == keeps_session
+                load(percent + 0.5)
+                await until("value", percent + 0.5)
+            process.stdin.close()
+            await until("sent")
+    told = [line["value"] for line in said if "value" in line]
+    assert sorted(set(told)) == [1, 2, 2.5, 3, 3.5, 4, 4.5]
+    # One subscription all the time: nothing had to be made anew.
+    assert len({line["subscription"] for line in said if "subscription" in line}) == 1
+    sent = said[-1]["sent"]
+    assert sent.get("CreateSubscriptionRequest") == 1
+    assert sent.get("TransferSubscriptionsRequest") == 1
+    # Asked until there is nothing more, not for ever.
+    assert 3 <= sent["RepublishRequest"] <= 12
+
+
+async def test_node_opcua_works_in_the_middle_of_a_crowd(tmp_path: Path) -> None:
+    """Of its own address three hundred sockets that say nothing."""
+    async with serving(settings_for(encrypted=True), tmp_path) as (server, _):
+        crowd = [await asyncio.open_connection("127.0.0.1", server.port) for _ in range(300)]
+        seen = await answers("client.mjs", tmp_path, server.endpoint_url, "anna", "swordfish")
+        for _, writer in crowd:
+            writer.close()
+    assert (seen["run"], seen["stop"]) == ("Good", "Good")

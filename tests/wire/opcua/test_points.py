@@ -17,6 +17,7 @@ from bridge.errors import Unavailable
 from bridge.image import Quality
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support.opcua_client import call, node, word, write, write_all, write_value
+from tests.support.opcua_raw import ask
 from tests.support.opcua_site import OPEN, LocalView, make_plant, namespace
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -111,7 +112,10 @@ class TestQuality:
         self, client: Client, view: LocalView
     ) -> None:
         view.plant.set("bus/can0/rx_errors", 1, time.monotonic() - 60)
-        read = await (await node(client, "bus/can0/rx_errors")).read_data_value()
+        where = (await node(client, "bus/can0/rx_errors")).nodeid
+        wanted = [ua.ReadValueId(NodeId=where, AttributeId=ua.AttributeIds.Value)]
+        both = ua.TimestampsToReturn.Both
+        (read,) = (await ask(client, "Read", NodesToRead=wanted, TimestampsToReturn=both)).Results
         now = datetime.now(UTC)
         assert abs(read.SourceTimestamp - (now - timedelta(seconds=60))) < timedelta(seconds=1)
         assert abs(read.ServerTimestamp - now) < timedelta(seconds=1)

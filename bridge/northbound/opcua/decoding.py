@@ -1,0 +1,143 @@
+"""asyncua's decoder, made strict: what cannot be is refused where it is decoded.
+
+asyncua lets strings pass that are not UTF-8, which break whatever writes them down later; it goes backwards
+for a negative length; and it makes arrays as long as a client says, of elements that take no bytes: a
+message of thirty bytes fills the memory.
+"""
+
+# asyncua's decoder has no types:
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+# pyright: reportPrivateUsage=false, reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+import functools
+import math
+import struct
+import traceback
+from collections.abc import Callable
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Any, Final
+
+from asyncua.common.utils import Buffer, NotEnoughData
+from asyncua.ua import ua_binary
+
+from bridge.northbound.opcua.library import StatusCodes, UaError, UaStatusCodeError, ua
+
+MOST_ELEMENTS: Final = 100_000
+"""Of all arrays in one message that are decoded one by one; a thousand take about 10 ms."""
+
+_MOST_DIMENSIONS: Final = 10
+_LENGTH: Final = struct.Struct("<i")
+_DECODERS: Final = frozenset((ua_binary.struct_from_binary.__code__, ua_binary.nodeid_from_binary.__code__))
+_Decode = Callable[[Any], Any]
+
+
+class _Budget:
+    """What may still be decoded."""
+
+    __slots__ = ("left",)
+
+    def __init__(self) -> None:
+        self.left = MOST_ELEMENTS
+
+
+_budget: ContextVar[_Budget | None] = ContextVar("decoding_budget", default=None)
+"""That of the message which the present task has before it."""
+
+
+def begin() -> None:
+    """A message begins: from here on this task decodes no more than one may contain."""
+    _budget.set(_Budget())
+
+
+def install() -> None:
+    """Make the decoder of this process strict. May be called again."""
+    if ua_binary._String.unpack is _string:
+        return
+    Buffer.read = _read
+    ua_binary._String.unpack = staticmethod(_string)
+    ua_binary._reshape = _checked_shape(ua_binary._reshape)
+    ua_binary._create_list_deserializer = _bounded(ua_binary._create_list_deserializer)
+    ua_binary._create_uatype_array_deserializer = _bounded(ua_binary._create_uatype_array_deserializer)
+    # What was made with the former ones.
+    for made in (
+        "_create_uatype_deserializer",
+        "_create_type_deserializer",
+        "_create_dataclass_deserializer",
+    ):
+        getattr(ua_binary, made).cache_clear()
+
+
+def is_malformed(error: BaseException) -> bool:
+    """Whether ``error`` comes from decoding, and so from what the client has sent."""
+    if isinstance(error, NotEnoughData):
+        return True
+    trace = error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code in _DECODERS:
+            return True
+        trace = trace.tb_next
+    return False
+
+
+def place(error: BaseException) -> str:
+    """Where ``error`` was raised."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return f"at {Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
+
+
+def _string(data: Buffer) -> str | None:
+    """A String (Part 6 §5.2.2.4). Raises UnicodeDecodeError for what is no UTF-8."""
+    content: bytes | None = ua_binary.Primitives.Bytes.unpack(data)
+    return None if content is None else content.decode()
+
+
+def _read(self: Any, size: int) -> bytes:
+    """In place of ``Buffer.read``."""
+    if not 0 <= size <= self._size:
+        raise NotEnoughData(f"{size} bytes asked for where {self._size} are left")
+    begin = self._cur_pos
+    self._size -= size
+    self._cur_pos += size
+    return self._data[begin : self._cur_pos]
+
+
+def _bounded(make: Callable[[Any], _Decode]) -> Callable[[Any], _Decode]:
+    """``make`` for arrays that are no longer than what is left of the message, or of the budget."""
+
+    @functools.cache
+    def made(kind: Any) -> _Decode:
+        decode = make(kind)
+        # Numbers are decoded all at once.
+        is_quick = isinstance(kind, ua.VariantType) and hasattr(ua_binary.Primitives1, kind.name)
+
+        def checked(data: Buffer) -> Any:
+            (length,) = _LENGTH.unpack(data.copy(_LENGTH.size).read(_LENGTH.size))
+            if length < -1 or length > len(data) - _LENGTH.size:
+                raise NotEnoughData(f"an array of {length} elements in {len(data) - _LENGTH.size} bytes")
+            budget = _budget.get()
+            if budget and not is_quick and length > 0:
+                budget.left -= length
+                if budget.left < 0:
+                    raise UaStatusCodeError(StatusCodes.BadEncodingLimitsExceeded)
+            # A null array is an empty one to every service; asyncua has None for it.
+            return decode(data) or []
+
+        return checked
+
+    return made
+
+
+def _checked_shape(reshape: Callable[[Any, list[int]], Any]) -> Callable[[Any, list[int]], Any]:
+    """``reshape`` for dimensions that fit the values: asyncua fills up what they lack."""
+
+    def checked(flat: list[Any], dimensions: list[int]) -> Any:
+        # Counted first: the product of many is slow.
+        fits = 0 < len(dimensions) <= _MOST_DIMENSIONS and min(dimensions) >= 0
+        if not fits or math.prod(dimensions) != len(flat):
+            raise UaError(f"dimensions {dimensions[:9]} of {len(flat)} values")
+        return reshape(flat, dimensions)
+
+    return checked

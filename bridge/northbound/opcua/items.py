@@ -1,0 +1,271 @@
+"""Monitored items: what is sampled, what of it is reported, and the queue of each (OPC 10000-4 §5.13.1).
+
+They are told what has changed and when, and keep no time themselves.
+"""
+
+from __future__ import annotations
+
+import math
+import uuid
+from collections import deque
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Final
+
+from bridge.northbound.opcua.eventfilter import EventFilter, Occurrence
+from bridge.northbound.opcua.filters import ChangeFilter
+from bridge.northbound.opcua.library import (
+    ObjectIds,
+    data_value,
+    get,
+    make,
+    node_id,
+    status,
+    text,
+    ua,
+    variant,
+)
+from bridge.northbound.opcua.reading import Window
+
+LEAST_SAMPLING_MS: Final = 50.0
+"""The publisher's tick: nobody looks more often at what has changed."""
+
+MOST_SAMPLING_MS: Final = 3_600_000.0
+VALUE_QUEUE: Final = 100
+EVENT_QUEUE: Final = 200
+_OVERFLOW: Final = 0x0480
+"""InfoType DataValue and the bit Overflow of a status code (Part 4 §7.39.1)."""
+
+Monitoring = ua.MonitoringMode
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What a client has asked for, as it is really used. ``queue_size`` is at least 1."""
+
+    client_handle: int
+    sampling_ms: float
+    queue_size: int
+    discard_oldest: bool
+
+
+def value_settings(asked: ua.MonitoringParameters, publishing_ms: float) -> Settings:
+    """A negative sampling interval asks for the publishing interval, a queue of 0 for the newest value."""
+    wanted: float = get(asked, "SamplingInterval")
+    if wanted < 0:
+        wanted = publishing_ms
+    # `not >=` puts NaN where the least is, too.
+    sampling = min(wanted, MOST_SAMPLING_MS) if wanted >= LEAST_SAMPLING_MS else LEAST_SAMPLING_MS
+    size = max(1, min(get(asked, "QueueSize"), VALUE_QUEUE))
+    return Settings(get(asked, "ClientHandle"), sampling, size, get(asked, "DiscardOldest"))
+
+
+def event_settings(asked: ua.MonitoringParameters) -> Settings:
+    """Events are not sampled; a queue of 0 or 1 asks for the server's own (Part 4 §7.21)."""
+    size: int = get(asked, "QueueSize")
+    size = min(size, EVENT_QUEUE) if size > 1 else EVENT_QUEUE
+    return Settings(get(asked, "ClientHandle"), 0.0, size, get(asked, "DiscardOldest"))
+
+
+class ValueItem:
+    """Watches one attribute of ``target``."""
+
+    __slots__ = (
+        "_due",
+        "_held",
+        "_last",
+        "filter",
+        "handle",
+        "mode",
+        "number",
+        "queue",
+        "settings",
+        "target",
+        "window",
+    )
+
+    def __init__(
+        self,
+        number: int,
+        target: ua.ReadValueId,
+        window: Window,
+        settings: Settings,
+        filter_: ChangeFilter,
+        mode: ua.MonitoringMode,
+    ) -> None:
+        self.number = number
+        self.target = target
+        self.window = window
+        self.settings = settings
+        self.filter = filter_
+        self.mode = mode
+        self.handle = 0
+        """Of asyncua's callback for changes."""
+        self.queue: deque[ua.DataValue] = deque()
+        self._last: ua.DataValue | None = None
+        self._held: ua.DataValue | None = None
+        self._due = -math.inf
+
+    @property
+    def has_something(self) -> bool:
+        return bool(self.queue)
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether a value waits for the next sample."""
+        return self._held is not None
+
+    def change(self, value: ua.DataValue, now: float) -> None:
+        """The attribute may have changed. Between two samples the newest value waits for the next."""
+        if self.mode == Monitoring.Disabled:
+            return
+        self._held = value
+        self.sample(now)
+
+    def sample(self, now: float) -> None:
+        held = self._held
+        if held is None or now < self._due:
+            return
+        self._held = None
+        if self.settings.sampling_ms > LEAST_SAMPLING_MS:
+            # What changed is looked at in ticks: half of one early is not too early.
+            self._due = now + (self.settings.sampling_ms - LEAST_SAMPLING_MS / 2) / 1000
+        value = self.window.part(held)
+        if self.filter.reports(self._last, value):
+            self._last = value
+            self._append(value)
+
+    def _append(self, value: ua.DataValue) -> None:
+        size = self.settings.queue_size
+        if len(self.queue) < size:
+            self.queue.append(value)
+        elif size == 1:
+            self.queue[0] = value
+        elif self.settings.discard_oldest:
+            self.queue.popleft()
+            self.queue.append(value)
+            self.queue[0] = _overflown(self.queue[0])
+        else:
+            self.queue[-1] = _overflown(value)
+
+    def repeat(self) -> None:
+        """Have something to tell: what is queued, or what was told last."""
+        if not self.queue and self._last is not None and self.mode != Monitoring.Disabled:
+            self.queue.append(self._last)
+
+    def set_mode(self, mode: ua.MonitoringMode) -> None:
+        if Monitoring.Disabled in (mode, self.mode):
+            self.queue.clear()
+            self._last = self._held = None
+            self._due = -math.inf
+        self.mode = mode
+
+    def modify(self, settings: Settings, filter_: ChangeFilter, window: Window) -> None:
+        lost = len(self.queue) - settings.queue_size
+        self.settings, self.filter, self.window = settings, filter_, window
+        self._due = -math.inf
+        if lost <= 0:
+            return
+        kept = list(self.queue)[lost:] if settings.discard_oldest else list(self.queue)[:-lost]
+        if len(kept) > 1:
+            place = 0 if settings.discard_oldest else -1
+            kept[place] = _overflown(kept[place])
+        self.queue = deque(kept)
+
+    def notification(self) -> ua.MonitoredItemNotification:
+        """The next in the queue, which is taken off it."""
+        value = self.window.timed(self.queue.popleft())
+        handle = self.settings.client_handle
+        return make(ua.MonitoredItemNotification, ClientHandle=handle, Value=value)
+
+
+def _overflown(value: ua.DataValue) -> ua.DataValue:
+    """A copy that says that others before or after it were lost; the value may be somebody else's, too."""
+    code = status((value.StatusCode.value if value.StatusCode else 0) | _OVERFLOW)
+    return data_value(value.Value, code, value.SourceTimestamp, value.ServerTimestamp)
+
+
+class EventItem:
+    """Listens to the events of one node."""
+
+    __slots__ = ("_loss", "filter", "mode", "node", "number", "queue", "settings")
+
+    def __init__(
+        self,
+        number: int,
+        node: ua.NodeId,
+        settings: Settings,
+        filter_: EventFilter,
+        mode: ua.MonitoringMode,
+    ) -> None:
+        self.number = number
+        self.node = node
+        self.settings = settings
+        self.filter = filter_
+        self.mode = mode
+        self.queue: deque[list[ua.Variant]] = deque()
+        self._loss: list[ua.Variant] | None = None
+        """The event that says that others were lost. It is kept in addition to the queue's size."""
+
+    @property
+    def has_something(self) -> bool:
+        return bool(self.queue) or self._loss is not None
+
+    def hear(self, event: Occurrence) -> bool:
+        """Whether the event is queued."""
+        if self.mode == Monitoring.Disabled or event.emitter != self.node or not self.filter.passes(event):
+            return False
+        if len(self.queue) >= self.settings.queue_size:
+            if self.settings.discard_oldest:
+                self.queue.popleft()
+            else:
+                self.queue.pop()
+            self._lose()
+        self.queue.append(self.filter.fields(event))
+        return True
+
+    def _lose(self) -> None:
+        if self._loss is None:
+            self._loss = self.filter.fields(_loss(self.node))
+
+    def set_mode(self, mode: ua.MonitoringMode) -> None:
+        if mode == Monitoring.Disabled:
+            self.queue.clear()
+            self._loss = None
+        self.mode = mode
+
+    def modify(self, settings: Settings, filter_: EventFilter) -> None:
+        self.settings, self.filter = settings, filter_
+        while len(self.queue) > settings.queue_size:
+            if settings.discard_oldest:
+                self.queue.popleft()
+            else:
+                self.queue.pop()
+            self._lose()
+
+    def notification(self) -> ua.EventFieldList:
+        """The next to tell. A loss comes before what was kept, or behind it where the newest had to go."""
+        if self._loss is not None and (self.settings.discard_oldest or not self.queue):
+            fields, self._loss = self._loss, None
+        else:
+            fields = self.queue.popleft()
+        return make(ua.EventFieldList, ClientHandle=self.settings.client_handle, EventFields=fields)
+
+
+Item = ValueItem | EventItem
+
+
+def _loss(emitter: ua.NodeId) -> Occurrence:
+    """The event that says that others were lost (Part 5 §6.4.34)."""
+    now = variant(datetime.now(UTC), ua.VariantType.DateTime)
+    fields = {
+        "EventId": variant(uuid.uuid4().bytes, ua.VariantType.ByteString),
+        "EventType": variant(node_id(ObjectIds.EventQueueOverflowEventType), ua.VariantType.NodeId),
+        "SourceNode": variant(node_id(ObjectIds.Server), ua.VariantType.NodeId),
+        "SourceName": variant("Internal/EventQueueOverflow", ua.VariantType.String),
+        "Time": now,
+        "ReceiveTime": now,
+        "Message": variant(text("events were lost: the queue was full"), ua.VariantType.LocalizedText),
+        "Severity": variant(100, ua.VariantType.UInt16),
+    }
+    return Occurrence(emitter, fields)

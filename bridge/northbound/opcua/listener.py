@@ -1,0 +1,137 @@
+"""Connections: which are let in, for how long they may be without a session, and when their bytes came."""
+
+# asyncua's OPCUAProtocol has few types:
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from typing import Any, Final
+
+from asyncua.common.connection import TransportLimits
+from asyncua.server.binary_server_asyncio import BinaryServer, OPCUAProtocol
+from asyncua.ua.ua_binary import uatcp_to_binary
+
+from bridge import clock
+from bridge.command.freshness import Inflow
+from bridge.northbound.opcua.admission import Admission, Stage, Visitor, source_of
+from bridge.northbound.opcua.library import StatusCodes, make, status, ua
+from bridge.northbound.opcua.notices import tell
+from bridge.northbound.opcua.session import Server
+from bridge.northbound.opcua.transport import Processor
+from bridge.northbound.pulse import Pulse
+
+_MOST_UNREAD: Final = 64
+"""Messages that a client which waits for its answers has under way at most."""
+_READ_MOST: Final = 64 * 1024
+"""Bytes that are read at once from such a client."""
+WINDOW: Final = 2 * _READ_MOST
+"""Bytes that may wait in the kernel: more than that, so that who fills it is noticed."""
+_LOOK_EVERY_S: Final = 1.0
+_ERROR: Final[Any] = ua.MessageType.Error
+
+
+class _Protocol(OPCUAProtocol):
+    """Notes with each message when it can have come: it may wait here, or in the bus process."""
+
+    def __init__(self, pulse: Pulse, admission: Admission, **settings: Any) -> None:
+        super().__init__(**settings)
+        self._pulse = pulse
+        self._admission = admission
+        self._inflow = Inflow(clock.now(), pulse.look)
+        self._source = ""
+        self._visitor: Visitor | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        peer = transport.get_extra_info("peername")
+        self._source = str(peer[0]) if isinstance(peer, tuple) else str(peer)
+        assert isinstance(transport, asyncio.Transport)
+        now = clock.now()
+        visitor = Visitor(source_of(self._source), now, self._stage, lambda: _end(transport))
+        if not self._admission.admit(visitor, now):
+            _end(transport, StatusCodes.BadTcpServerTooBusy)
+            return
+        self._visitor = visitor
+        super().connection_made(transport)
+        # Its task has not run yet, so no message has seen the other processor.
+        if self.transport is not None and isinstance(self.iserver, Server):
+            self.processor = Processor(self.iserver, self.transport, self.limits)
+            self.processor.set_policies(self.policies)
+
+    def connection_lost(self, ex: BaseException | None) -> None:
+        if self._visitor:
+            self._admission.leave(self._visitor)
+        super().connection_lost(ex)
+
+    def _stage(self) -> Stage:
+        return self.processor.stage if isinstance(self.processor, Processor) else Stage.CONNECTED
+
+    def data_received(self, data: bytes) -> None:
+        transport, server = self.transport, self.iserver
+        if transport is None or transport.is_closing() or not isinstance(server, Server):
+            return
+        before = self.messages.qsize()
+        super().data_received(data)
+        waiting = self.messages.qsize()
+        crowded = len(data) >= _READ_MOST or waiting > _MOST_UNREAD
+        came_at = self._inflow.arrive(clock.now(), self._pulse.look, crowded=crowded)
+        if isinstance(self.processor, Processor):
+            self.processor.arrivals += [came_at] * (waiting - before)
+        if transport.is_closing():
+            why = "too many requests at once" if self.messages.full() else "no header of a message"
+            server.count("opcua_broken_connections")
+            tell("connections closed", self._source, why)
+        # What is left is part of one chunk. asyncua would wait for the 4 GiB that a header may ask for.
+        elif len(self._buffer) > self.limits.max_recv_buffer:
+            server.count("opcua_broken_connections")
+            tell("connections closed", self._source, "a chunk without end")
+            self._buffer = b""
+            transport.close()
+
+
+def _end(transport: asyncio.Transport, code: int = StatusCodes.BadTimeout) -> None:
+    """Close a connection, with the reason where the client reads."""
+    if transport.get_write_buffer_size():
+        transport.abort()
+        return
+    transport.write(uatcp_to_binary(_ERROR, make(ua.ErrorMessage, Error=status(code))))
+    transport.close()
+
+
+class Listener(BinaryServer):
+    """Takes connections on a socket that is bound already."""
+
+    def __init__(self, server: Server, bound: socket.socket, limits: TransportLimits, pulse: Pulse) -> None:
+        host, port = bound.getsockname()[:2]
+        super().__init__(server, host, port, limits)
+        self._socket = bound
+        self._pulse = pulse
+        self._admission = Admission(tell, server.count)
+        self._timer: asyncio.TimerHandle | None = None
+
+    def _make_protocol(self) -> OPCUAProtocol:
+        return _Protocol(
+            self._pulse,
+            self._admission,
+            iserver=self.iserver,
+            policies=self._policies,
+            clients=self.clients,
+            closing_tasks=self.closing_tasks,
+            limits=self.limits,
+        )
+
+    async def start(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._server = await loop.create_server(self._make_protocol, sock=self._socket)
+        self.cleanup_task = asyncio.create_task(self._close_task_loop())
+        self._look()
+
+    async def stop(self) -> None:
+        if self._timer:
+            self._timer.cancel()
+        await super().stop()
+
+    def _look(self) -> None:
+        self._timer = asyncio.get_running_loop().call_later(_LOOK_EVERY_S, self._look)
+        self._admission.look(clock.now())

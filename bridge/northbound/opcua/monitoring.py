@@ -1,0 +1,229 @@
+"""Monitored items of the address space: made, changed and deleted (OPC 10000-4 §5.13)."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from itertools import count
+from typing import Final, TypeVar
+
+from asyncua.server.address_space import AddressSpace, NodeData
+
+from bridge.northbound.opcua import ranges
+from bridge.northbound.opcua.eventfilter import EventFilterFault, EventTypes, event_filter
+from bridge.northbound.opcua.filters import change_filter
+from bridge.northbound.opcua.items import EventItem, Item, ValueItem, event_settings, value_settings
+from bridge.northbound.opcua.library import (
+    GOOD,
+    AttributeIds,
+    ServiceError,
+    StatusCodes,
+    change,
+    get,
+    make,
+    status,
+    ua,
+)
+from bridge.northbound.opcua.reading import checked_times, window
+from bridge.northbound.opcua.subscription import Subscription
+
+MOST_LISTENERS: Final = 1_000
+"""Items for events, of all clients together: each is asked about every event."""
+
+_BATCH: Final = 50
+_SUBSCRIBE_TO_EVENTS: Final = 1
+
+_T = TypeVar("_T")
+
+
+class MonitoredItems:
+    """The items of all subscriptions. Times are those of the event loop."""
+
+    def __init__(self, space: AddressSpace) -> None:
+        self._space = space
+        self._numbers = count(1)
+        self._listening = 0
+        self.event_types = EventTypes(space)
+
+    async def create(
+        self, find: Callable[[], Subscription], params: ua.CreateMonitoredItemsParameters, room: int
+    ) -> list[ua.MonitoredItemCreateResult]:
+        """There is ``room`` for so many. ``find`` finds the subscription, or raises ServiceError: it may be
+        deleted meanwhile."""
+        times = checked_times(params)
+        found = find()
+        results: list[ua.MonitoredItemCreateResult] = []
+        for place, wanted in enumerate(get(params, "ItemsToCreate")):
+            if place and place % _BATCH == 0:
+                await asyncio.sleep(0)
+                found = find()
+            if place >= room:
+                code = status(StatusCodes.BadTooManyMonitoredItems)
+                results.append(make(ua.MonitoredItemCreateResult, StatusCode=code))
+            else:
+                results.append(self._create(found, wanted, times))
+        return results
+
+    def _create(
+        self,
+        subscription: Subscription,
+        wanted: ua.MonitoredItemCreateRequest,
+        times: ua.TimestampsToReturn,
+    ) -> ua.MonitoredItemCreateResult:
+        target: ua.ReadValueId = get(wanted, "ItemToMonitor")
+        try:
+            node = self._space.get(get(target, "NodeId"))
+            if node is None:
+                raise ServiceError(StatusCodes.BadNodeIdUnknown)
+            if get(target, "AttributeId") not in node.attributes:
+                raise ServiceError(StatusCodes.BadAttributeIdInvalid)
+            if get(target, "AttributeId") == AttributeIds.EventNotifier:
+                item = self._event_item(node, wanted)
+            else:
+                item = self._value_item(node, wanted, times, subscription)
+        except ServiceError as error:
+            return _faulty(ua.MonitoredItemCreateResult(), error)
+        subscription.add(item)
+        self._listening += isinstance(item, EventItem)
+        if isinstance(item, ValueItem):
+            self._watch(subscription, item)
+        return change(_agreed(ua.MonitoredItemCreateResult(), item), MonitoredItemId=item.number)
+
+    def _event_item(self, node: NodeData, wanted: ua.MonitoredItemCreateRequest) -> EventItem:
+        held = self._space.read_attribute_value(node.nodeid, AttributeIds.EventNotifier).Value
+        if held is None or not held.Value & _SUBSCRIBE_TO_EVENTS:
+            raise ServiceError(StatusCodes.BadNotSupported)
+        if self._listening >= MOST_LISTENERS:
+            raise ServiceError(StatusCodes.BadTooManyMonitoredItems)
+        asked: ua.MonitoringParameters = get(wanted, "RequestedParameters")
+        filter_ = event_filter(get(asked, "Filter"), self.event_types)
+        mode = get(wanted, "MonitoringMode")
+        return EventItem(next(self._numbers), node.nodeid, event_settings(asked), filter_, mode)
+
+    def _value_item(
+        self,
+        node: NodeData,
+        wanted: ua.MonitoredItemCreateRequest,
+        times: ua.TimestampsToReturn,
+        subscription: Subscription,
+    ) -> ValueItem:
+        target: ua.ReadValueId = get(wanted, "ItemToMonitor")
+        asked: ua.MonitoringParameters = get(wanted, "RequestedParameters")
+        attribute: AttributeIds = get(target, "AttributeId")
+        looked_at = window(target, times)
+        if looked_at.ranges:
+            there = self._space.read_attribute_value(node.nodeid, attribute).Value
+            if not ranges.can_have(there):
+                raise ServiceError(StatusCodes.BadIndexRangeNoData)
+        return ValueItem(
+            next(self._numbers),
+            target,
+            looked_at,
+            value_settings(asked, subscription.terms.interval_ms),
+            change_filter(get(asked, "Filter"), self._space, node, attribute),
+            get(wanted, "MonitoringMode"),
+        )
+
+    def _watch(self, subscription: Subscription, item: ValueItem) -> None:
+        """Have the item told of every change, and of what there is now."""
+
+        async def tell(_handle: int, value: ua.DataValue) -> None:
+            item.change(subscription.owner.seen(item.target, value), loop_time())
+            subscription.noticed(item)
+
+        where = get(item.target, "NodeId"), get(item.target, "AttributeId")
+        _, item.handle = get(self._space, "add_datachange_callback")(*where, tell)
+        self._look(subscription, item)
+
+    def _look(self, subscription: Subscription, item: ValueItem) -> None:
+        value = self._space.read_attribute_value(get(item.target, "NodeId"), get(item.target, "AttributeId"))
+        item.change(subscription.owner.seen(item.target, value), loop_time())
+        subscription.noticed(item)
+
+    def modify(
+        self, found: Subscription, params: ua.ModifyMonitoredItemsParameters
+    ) -> list[ua.MonitoredItemModifyResult]:
+        times = checked_times(params)
+        return [self._modify(found, wanted, times) for wanted in get(params, "ItemsToModify")]
+
+    def _modify(
+        self,
+        subscription: Subscription,
+        wanted: ua.MonitoredItemModifyRequest,
+        times: ua.TimestampsToReturn,
+    ) -> ua.MonitoredItemModifyResult:
+        asked: ua.MonitoringParameters = get(wanted, "RequestedParameters")
+        try:
+            item = _item(subscription, get(wanted, "MonitoredItemId"))
+            if isinstance(item, EventItem):
+                item.modify(event_settings(asked), event_filter(get(asked, "Filter"), self.event_types))
+            else:
+                node = self._space[get(item.target, "NodeId")]
+                filter_ = change_filter(
+                    get(asked, "Filter"), self._space, node, get(item.target, "AttributeId")
+                )
+                settings = value_settings(asked, subscription.terms.interval_ms)
+                item.modify(settings, filter_, window(item.target, times))
+        except ServiceError as error:
+            return _faulty(ua.MonitoredItemModifyResult(), error)
+        return _agreed(ua.MonitoredItemModifyResult(), item)
+
+    def set_mode(self, found: Subscription, params: ua.SetMonitoringModeParameters) -> list[ua.StatusCode]:
+        mode: ua.MonitoringMode = get(params, "MonitoringMode")
+
+        def set_one(number: int) -> None:
+            item = _item(found, number)
+            was_disabled = item.mode == ua.MonitoringMode.Disabled
+            item.set_mode(mode)
+            if was_disabled and isinstance(item, ValueItem):
+                self._look(found, item)
+            found.noticed(item)
+
+        return [code_of(set_one, number) for number in get(params, "MonitoredItemIds")]
+
+    def delete(self, found: Subscription, params: ua.DeleteMonitoredItemsParameters) -> list[ua.StatusCode]:
+        return [
+            code_of(lambda one: self.drop(found, _item(found, one)), number)
+            for number in get(params, "MonitoredItemIds")
+        ]
+
+    def drop(self, subscription: Subscription, item: Item) -> None:
+        subscription.drop(item)
+        self._listening -= isinstance(item, EventItem)
+        if isinstance(item, ValueItem):
+            self._space.delete_datachange_callback(item.handle)
+
+
+def loop_time() -> float:
+    return asyncio.get_running_loop().time()
+
+
+def _item(subscription: Subscription, number: int) -> Item:
+    item = subscription.items.get(number)
+    if item is None:
+        raise ServiceError(StatusCodes.BadMonitoredItemIdInvalid)
+    return item
+
+
+def code_of(act: Callable[[int], None], number: int) -> ua.StatusCode:
+    """What became of one of the operations of a request."""
+    try:
+        act(number)
+    except ServiceError as error:
+        return status(int(error.code))
+    return GOOD
+
+
+def _agreed(result: _T, item: Item) -> _T:
+    change(
+        result,
+        RevisedSamplingInterval=item.settings.sampling_ms,
+        RevisedQueueSize=item.settings.queue_size,
+    )
+    told = item.filter.result if isinstance(item, EventItem) else None
+    return result if told is None else change(result, FilterResult=told)
+
+
+def _faulty(result: _T, error: ServiceError) -> _T:
+    change(result, StatusCode=status(int(error.code)))
+    return change(result, FilterResult=error.result) if isinstance(error, EventFilterFault) else result

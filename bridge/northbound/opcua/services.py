@@ -1,0 +1,113 @@
+"""Which services of OPC 10000-4 are carried out, and what the others are answered.
+
+The processor asks this table before it looks into a request, and ``docs/reference/opcua.md`` shows it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.northbound.opcua.library import ObjectIds, StatusCodes, get, node_id, ua
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """``refused`` is the status code that every request is answered with, None for what is done."""
+
+    name: str
+    how: str
+    refused: int | None = None
+
+    @property
+    def request(self) -> ua.NodeId:
+        """The type of its requests as it is on the wire."""
+        return node_id(get(ObjectIds, f"{self.name}Request_Encoding_DefaultBinary"))
+
+
+def _no(name: str, why: str) -> Service:
+    return Service(name, why, StatusCodes.BadServiceUnsupported)
+
+
+SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
+    "Discovery": (
+        Service("FindServers", "names this server alone"),
+        _no("FindServersOnNetwork", "this is no discovery server"),
+        Service("GetEndpoints", "those of the transport profiles that are asked for"),
+        _no("RegisterServer", "this is no discovery server"),
+        _no("RegisterServer2", "this is no discovery server"),
+    ),
+    "SecureChannel": (
+        Service("OpenSecureChannel", "new channels and renewals"),
+        Service("CloseSecureChannel", "closes the connection"),
+    ),
+    "Session": (
+        Service("CreateSession", "one for each connection"),
+        Service("ActivateSession", "also on a new connection: the session and its subscriptions move there"),
+        Service(
+            "CloseSession", "without `deleteSubscriptions` they live on for their lifetime, for a transfer"
+        ),
+        _no("Cancel", "a request under way has its outcome"),
+    ),
+    "NodeManagement": (
+        _no("AddNodes", "the address space follows from the site file"),
+        _no("AddReferences", "as above"),
+        _no("DeleteNodes", "as above"),
+        _no("DeleteReferences", "as above"),
+    ),
+    "View": (
+        Service("Browse", "with continuation points, masks and subtypes; without views (BadViewIdUnknown)"),
+        Service("BrowseNext", "goes on where Browse stopped, or releases the continuation point"),
+        Service("TranslateBrowsePathsToNodeIds", "each target once"),
+        Service("RegisterNodes", "gives back the NodeIds as they are: nothing would make them faster"),
+        Service("UnregisterNodes", "see RegisterNodes"),
+    ),
+    "Query": (
+        _no("QueryFirst", "browse instead"),
+        _no("QueryNext", "as above"),
+    ),
+    "Attribute": (
+        Service(
+            "Read",
+            "what the bridge knows now, whatever `maxAge`; `timestampsToReturn` and `indexRange` count; "
+            "`dataEncoding` is ignored, as Part 4 §7.29 says",
+        ),
+        _no("HistoryRead", "no history is kept"),
+        Service("Write", "see [Writing](#writing); with an `indexRange` BadWriteNotSupported"),
+        _no("HistoryUpdate", "no history is kept"),
+    ),
+    "Method": (
+        Service(
+            "Call",
+            "the [methods](#methods-of-a-drive) of drives, nodes and buses; all others are BadMethodInvalid",
+        ),
+    ),
+    "MonitoredItem": (
+        Service("CreateMonitoredItems", "every attribute, events; see [Subscriptions](#subscriptions)"),
+        Service("ModifyMonitoredItems", "all parameters"),
+        Service("SetMonitoringMode", "disabled, sampling, reporting"),
+        _no("SetTriggering", "items do not trigger each other"),
+        Service("DeleteMonitoredItems", "what is queued of them goes, too"),
+    ),
+    "Subscription": (
+        Service("CreateSubscription", "see [Subscriptions](#subscriptions)"),
+        Service("ModifySubscription", "all parameters; counts from the next publishing interval on"),
+        Service("SetPublishingMode", "what is queued stays queued meanwhile"),
+        Service("Publish", "an acknowledgement of what is not there is BadSequenceNumberUnknown"),
+        Service("Republish", "the same message again until it is acknowledged, else BadMessageNotAvailable"),
+        Service(
+            "TransferSubscriptions",
+            "to a session of the same user; without a name to the same certificate; else BadUserAccessDenied",
+        ),
+        Service("DeleteSubscriptions", "Publish requests that wait are answered with the last one"),
+    ),
+}
+"""By service set, in the order of Part 4 §5."""
+
+REFUSED: Final[Mapping[ua.NodeId, int]] = {
+    service.request: service.refused
+    for services in SERVICES.values()
+    for service in services
+    if service.refused is not None
+}

@@ -1,0 +1,244 @@
+"""One subscription: its cycles, its messages and what of them may be asked for again (OPC 10000-4 §5.14.1).
+
+Of time it knows what ``on_cycle`` is told; ``subscriptions`` has the timer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from bridge.command.request import Identity
+from bridge.northbound.opcua.eventfilter import Occurrence
+from bridge.northbound.opcua.items import EventItem, Item, Monitoring, ValueItem
+from bridge.northbound.opcua.library import ServiceError, StatusCodes, get, make, status, ua
+from bridge.northbound.opcua.publishing import PublishQueue, PublishRequest
+
+LEAST_INTERVAL_MS: Final = 50.0
+MOST_INTERVAL_MS: Final = 3_600_000.0
+MOST_QUIET_MS: Final = 600_000.0
+"""A keep-alive comes at least so often, or once in an interval that is longer."""
+
+_KEEP_ALIVES: Final = 10
+"""Intervals without a message until a keep-alive, for clients that leave that to the server."""
+
+MOST_PER_MESSAGE: Final = 1_000
+"""Notifications in one message; what is left follows with the next request."""
+
+RETRANSMISSIONS: Final = 30
+"""Messages of a subscription that are kept until they are acknowledged."""
+
+_LAST_SEQUENCE: Final = 0xFFFF_FFFF
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What a subscription runs on, as revised. ``lifetime`` and ``keep_alive`` count intervals."""
+
+    interval_ms: float
+    lifetime: int
+    keep_alive: int
+    most_per_message: int
+    priority: int
+
+
+def terms(params: object) -> Terms:
+    """The terms for what a CreateSubscription or ModifySubscription request asks for."""
+    asked: float = get(params, "RequestedPublishingInterval")
+    # `not >=` puts NaN where the least is, too.
+    interval = min(asked, MOST_INTERVAL_MS) if asked >= LEAST_INTERVAL_MS else LEAST_INTERVAL_MS
+    most_quiet = max(1, int(MOST_QUIET_MS / interval))
+    keep_alive = min(get(params, "RequestedMaxKeepAliveCount") or _KEEP_ALIVES, most_quiet)
+    # Part 4 §5.14.2: the lifetime is three keep-alives at least.
+    lifetime = min(max(get(params, "RequestedLifetimeCount"), 3 * keep_alive), 3 * most_quiet)
+    most = min(get(params, "MaxNotificationsPerPublish") or MOST_PER_MESSAGE, MOST_PER_MESSAGE)
+    return Terms(interval, lifetime, keep_alive, most, get(params, "Priority"))
+
+
+class Owner(Protocol):
+    """The session that a subscription is told to."""
+
+    session_id: ua.NodeId
+    identity: Identity
+    channel_certificate: bytes | None
+    publishing: PublishQueue
+
+    @property
+    def is_gone(self) -> bool:
+        """Whether the session has ended. Its subscriptions may be transferred as long as they live."""
+        ...
+
+    def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
+        """``value`` as this user may see it."""
+        ...
+
+
+class Subscription:
+    """``items`` by their numbers."""
+
+    # asyncua puts these on each subscription of a session that comes back on another connection.
+    pub_result_callback: object = None
+    pub_request_callback: object = None
+
+    def __init__(self, number: int, owner: Owner, agreed: Terms, *, enabled: bool) -> None:
+        self.number = number
+        self.owner = owner
+        self.terms = agreed
+        self.items: dict[int, Item] = {}
+        self._enabled = enabled
+        self._listeners: dict[int, EventItem] = {}
+        self._ready: dict[int, Item] = {}
+        self._holding: dict[int, ValueItem] = {}
+        self._sent: dict[int, ua.NotificationMessage] = {}
+        self._sequence = 1
+        # The first message comes with the first cycle, if only to say that the subscription is there.
+        self._quiet = agreed.keep_alive - 1
+        self._silent = 0
+
+    @property
+    def session_id(self) -> ua.NodeId:
+        return self.owner.session_id
+
+    @property
+    def priority(self) -> int:
+        return self.terms.priority
+
+    # what there is to tell
+
+    def noticed(self, item: Item) -> None:
+        """Something may have become of an item's value, or of its queue."""
+        if isinstance(item, ValueItem) and item.is_holding:
+            self._holding[item.number] = item
+        if item.has_something:
+            self._ready[item.number] = item
+
+    def add(self, item: Item) -> None:
+        self.items[item.number] = item
+        if isinstance(item, EventItem):
+            self._listeners[item.number] = item
+
+    def drop(self, item: Item) -> None:
+        for held in (self.items, self._listeners, self._ready, self._holding):
+            held.pop(item.number, None)
+
+    def hear(self, event: Occurrence) -> None:
+        for item in self._listeners.values():
+            if item.hear(event):
+                self._ready[item.number] = item
+
+    def repeat_values(self) -> None:
+        """Tell every value again that nothing newer is queued for."""
+        for item in self.items.values():
+            if isinstance(item, ValueItem):
+                item.repeat()
+                self.noticed(item)
+
+    # cycles
+
+    def on_cycle(self, now: float) -> bool:
+        """A publishing interval is over. False when the subscription has outlived its client."""
+        self._silent += 1
+        if self._silent >= self.terms.lifetime:
+            return False
+        for item in list(self._holding.values()):
+            item.sample(now)
+            if not item.is_holding:
+                del self._holding[item.number]
+            self.noticed(item)
+        self._quiet += 1
+        if self._quiet >= self.terms.keep_alive or (self._enabled and any(self._reporting())):
+            self.owner.publishing.ask(self, now)
+        return True
+
+    def touch(self) -> None:
+        """The client has asked for something of this subscription: it is there."""
+        self._silent = 0
+
+    def set_enabled(self, enabled: bool) -> None:
+        self._enabled = enabled
+        self.touch()
+
+    def modify(self, agreed: Terms) -> None:
+        self.terms = agreed
+        self.touch()
+
+    def _reporting(self) -> Iterator[Item]:
+        waiting = (item for item in self._ready.values() if item.has_something)
+        return (item for item in waiting if item.mode == Monitoring.Reporting)
+
+    # messages
+
+    def publish(self, request: PublishRequest) -> bool:
+        values, events = self._collect() if self._enabled else ([], [])
+        data: list[object] = []
+        if values:
+            data.append(make(ua.DataChangeNotification, MonitoredItems=values))
+        if events:
+            data.append(make(ua.EventNotificationList, Events=events))
+        message = make(ua.NotificationMessage, SequenceNumber=self._sequence, NotificationData=data)
+        if data:
+            self._keep(message)
+        more = self._enabled and any(self._reporting())
+        self._quiet = self._silent = 0
+        request.answer(
+            make(
+                ua.PublishResult,
+                SubscriptionId=self.number,
+                AvailableSequenceNumbers=self.available,
+                MoreNotifications=more,
+                NotificationMessage=message,
+                Results=request.results,
+            )
+        )
+        return more
+
+    def _collect(self) -> tuple[list[ua.MonitoredItemNotification], list[ua.EventFieldList]]:
+        """As many notifications as go into one message."""
+        values: list[ua.MonitoredItemNotification] = []
+        events: list[ua.EventFieldList] = []
+        left = self.terms.most_per_message
+        for item in list(self._reporting()):
+            while left and item.has_something:
+                left -= 1
+                if isinstance(item, ValueItem):
+                    values.append(item.notification())
+                else:
+                    events.append(item.notification())
+            if not item.has_something:
+                del self._ready[item.number]
+            if not left:
+                break
+        return values, events
+
+    def _keep(self, message: ua.NotificationMessage) -> None:
+        self._sent[self._sequence] = message
+        # 0 is never a sequence number (Part 4 §7.26).
+        self._sequence = self._sequence % _LAST_SEQUENCE + 1
+        if len(self._sent) > RETRANSMISSIONS:
+            del self._sent[next(iter(self._sent))]
+
+    @property
+    def available(self) -> list[int]:
+        """The sequence numbers that can be asked for again."""
+        return list(self._sent)
+
+    def acknowledge(self, sequence: int) -> ua.StatusCode:
+        known = self._sent.pop(sequence, None) is not None
+        return status(StatusCodes.Good if known else StatusCodes.BadSequenceNumberUnknown)
+
+    def republish(self, sequence: int) -> ua.NotificationMessage:
+        """The message again. Raises ServiceError where it is not kept, or not any more."""
+        self.touch()
+        message = self._sent.get(sequence)
+        if message is None:
+            raise ServiceError(StatusCodes.BadMessageNotAvailable)
+        return message
+
+    def last_word(self, code: int) -> ua.PublishResult:
+        """The message that says why no other follows. It takes no sequence number."""
+        told = make(ua.StatusChangeNotification, Status=status(code))
+        message = make(ua.NotificationMessage, SequenceNumber=self._sequence, NotificationData=[told])
+        return make(
+            ua.PublishResult, SubscriptionId=self.number, MoreNotifications=False, NotificationMessage=message
+        )

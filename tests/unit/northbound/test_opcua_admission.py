@@ -1,0 +1,132 @@
+"""Which connections are let in, closed and made room; no server."""
+
+from __future__ import annotations
+
+import pytest
+
+from bridge.northbound.opcua.admission import (
+    DEADLINE_S,
+    MOST_CONNECTIONS,
+    MOST_OF_ADDRESS,
+    MOST_WAITING,
+    Admission,
+    Stage,
+    Visitor,
+    source_of,
+)
+
+
+class Rig:
+    def __init__(self) -> None:
+        self.told: list[tuple[str, str, str]] = []
+        self.counted: list[str] = []
+        self.admission = Admission(lambda *what: self.told.append(what), self.counted.append)
+        self.closed: list[Client] = []
+        self.now = 0.0
+
+    def client(self, source: str = "10.0.0.1", stage: Stage = Stage.CONNECTED) -> Client:
+        return Client(self, source, stage)
+
+    def crowd(self, count: int, source: str = "10.0.0.1", stage: Stage = Stage.CONNECTED) -> list[Client]:
+        return [self.client(source, stage) for _ in range(count)]
+
+
+class Client:
+    def __init__(self, rig: Rig, source: str, stage: Stage) -> None:
+        self.stage = stage
+        self.visitor = Visitor(source, rig.now, lambda: self.stage, lambda: rig.closed.append(self))
+        self.is_in = rig.admission.admit(self.visitor, rig.now)
+
+
+@pytest.fixture
+def rig() -> Rig:
+    return Rig()
+
+
+@pytest.mark.parametrize("stage", [Stage.CONNECTED, Stage.GREETED, Stage.CHANNEL])
+def test_each_step_has_its_time(rig: Rig, stage: Stage) -> None:
+    client = rig.client(stage=stage)
+    rig.admission.look(DEADLINE_S[stage] - 0.1)
+    assert rig.closed == []
+    rig.admission.look(DEADLINE_S[stage])
+    assert rig.closed == [client]
+    assert len(rig.admission) == 0
+
+
+def test_a_session_may_stay_and_the_time_counts_anew_when_it_is_gone(rig: Rig) -> None:
+    client = rig.client(stage=Stage.SESSION)
+    rig.admission.look(1000.0)
+    client.stage = Stage.CHANNEL
+    rig.admission.look(1000.0 + DEADLINE_S[Stage.CHANNEL] - 0.1)
+    assert rig.closed == []
+    rig.admission.look(1000.0 + DEADLINE_S[Stage.CHANNEL])
+    assert rig.closed == [client]
+
+
+def test_the_oldest_without_a_session_makes_room(rig: Rig) -> None:
+    old = rig.crowd(MOST_WAITING)
+    rig.now = 0.5
+    assert rig.client().is_in
+    assert rig.closed == old[:1]
+
+
+def test_a_flood_of_idle_sockets_pushes_out_no_handshake(rig: Rig) -> None:
+    client = rig.client(stage=Stage.CHANNEL)
+    rig.now = 0.01
+    assert all(one.is_in for one in rig.crowd(1000))
+    assert client not in rig.closed
+    client.stage = Stage.SESSION
+    rig.admission.look(100.0)
+    assert client not in rig.closed
+
+
+def test_channels_that_wait_push_out_no_newcomer(rig: Rig) -> None:
+    """Who sits on open channels goes before a client that has only just connected."""
+    sitting = rig.crowd(MOST_WAITING, stage=Stage.CHANNEL)
+    rig.now = 6.0
+    newcomers = rig.crowd(5)
+    assert rig.closed == sitting[:5]
+    assert all(one.is_in and one not in rig.closed for one in newcomers)
+
+
+def test_one_address_costs_no_other_anything(rig: Rig) -> None:
+    other = rig.client("10.0.0.2")
+    rig.now = 0.1
+    rig.crowd(1000)
+    assert other not in rig.closed
+    rig.crowd(100, stage=Stage.SESSION)
+    assert len(rig.admission) == MOST_OF_ADDRESS + 1
+
+
+def test_sessions_make_no_room_but_leave_some(rig: Rig) -> None:
+    sessions = rig.crowd(MOST_OF_ADDRESS, stage=Stage.SESSION)
+    assert not rig.client().is_in
+    assert rig.client("10.0.0.2").is_in
+    assert rig.closed == []
+    rig.admission.leave(sessions[0].visitor)
+    assert rig.client().is_in
+
+
+def test_when_all_are_taken_only_who_waits_makes_room(rig: Rig) -> None:
+    waiting = rig.client("10.0.9.9")
+    for number in range(MOST_CONNECTIONS - 1):
+        rig.client(f"10.0.1.{number}", Stage.SESSION)
+    assert rig.client("10.0.2.1", Stage.SESSION).is_in
+    assert rig.closed == [waiting]
+    assert not rig.client("10.0.2.2").is_in
+    assert len(rig.admission) == MOST_CONNECTIONS
+
+
+@pytest.mark.parametrize(
+    ("host", "source"),
+    [
+        ("10.0.0.1", "10.0.0.1"),
+        ("::ffff:10.0.0.1", "10.0.0.1"),
+        ("::1", "::1"),
+        ("2001:db8:1:2:3:4:5:6", "2001:db8:1:2::/64"),
+        ("fe80::1%eth0", "fe80::/64"),
+        ("nonsense", "nonsense"),
+    ],
+)
+def test_one_machine_is_one_source(host: str, source: str) -> None:
+    assert source_of(host) == source

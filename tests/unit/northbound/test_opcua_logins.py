@@ -1,0 +1,111 @@
+"""In what order passwords are checked; with a check that the test ends."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from bridge.northbound.opcua.logins import PasswordChecks
+
+RIGHT = "swordfish"
+ATTACKER, CLIENT = "10.0.0.9", "10.0.0.1"
+
+
+class Bench:
+    """Each check waits until it is let go; ``begun`` are the passwords in the order of their checks."""
+
+    def __init__(self) -> None:
+        self.begun: list[str] = []
+        self._go = threading.Semaphore(0)
+        self.checks = PasswordChecks(self._verify)
+
+    def _verify(self, password_hash: str | None, password: str) -> bool:
+        self.begun.append(password)
+        self._go.acquire()
+        if password == "broken":
+            raise MemoryError
+        return password == RIGHT
+
+    def ask(self, password: str, address: str = ATTACKER, known: str | None = "hash") -> asyncio.Task[bool]:
+        return asyncio.create_task(self.checks.is_right(known, password, address))
+
+    async def end(self, count: int) -> None:
+        for _ in range(count):
+            self._go.release()
+            await asyncio.sleep(0.02)
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    made = Bench()
+    yield made
+    made.checks.close()
+    for _ in range(100):
+        made._go.release()  # pyright: ignore[reportPrivateUsage]
+
+
+@pytest.mark.parametrize("address", [CLIENT, ATTACKER], ids=["another address", "the same address"])
+async def test_twenty_wrong_ones_hold_up_a_right_one_for_two_checks_at_most(
+    bench: Bench, address: str
+) -> None:
+    wrong = [bench.ask(f"wrong {n}") for n in range(20)]
+    await bench.end(3)
+    right = bench.ask(RIGHT, address)
+    await bench.end(3)
+    assert right.done()
+    assert await right
+    assert sum(task.done() for task in wrong) <= 5
+    await bench.end(20)
+    assert [await task for task in wrong] == [False] * 20
+
+
+async def test_a_stream_of_new_ones_does_not_hold_up_an_old_one(bench: Bench) -> None:
+    bench.ask("first")
+    right = bench.ask(RIGHT)
+    stream = [bench.ask(f"wrong {n}") for n in range(3)]
+    for n in range(6):
+        await bench.end(1)
+        stream.append(bench.ask(f"later {n}"))
+    assert right.done()
+    await bench.end(20)
+    await asyncio.gather(*stream)
+
+
+async def test_one_that_was_right_is_known(bench: Bench) -> None:
+    first = bench.ask(RIGHT)
+    await bench.end(1)
+    assert await first
+    for n in range(5):
+        bench.ask(f"wrong {n}")
+    await asyncio.sleep(0.01)
+    assert await asyncio.wait_for(bench.ask(RIGHT), 1)
+    again = bench.ask(RIGHT, known="hash of another user")
+    await asyncio.sleep(0.01)
+    assert not again.done(), "known for one hash is nothing for another"
+    await bench.end(10)
+    assert RIGHT not in str(vars(bench.checks))
+
+
+async def test_who_has_gone_is_not_checked(bench: Bench) -> None:
+    bench.ask("first")
+    await asyncio.sleep(0.01)
+    gone = [bench.ask(f"gone {n}") for n in range(3)]
+    await asyncio.sleep(0.01)
+    for task in gone:
+        task.cancel()
+    await asyncio.gather(*gone, return_exceptions=True)
+    await bench.end(3)
+    last = bench.ask(RIGHT)
+    await bench.end(1)
+    assert await last
+    assert bench.begun == ["first", RIGHT]
+
+
+async def test_a_check_that_fails_is_a_wrong_password_and_the_next_one_has_its_turn(bench: Bench) -> None:
+    broken, right = bench.ask("broken"), bench.ask(RIGHT)
+    await bench.end(2)
+    assert not await broken
+    assert await right

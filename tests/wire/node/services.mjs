@@ -1,0 +1,59 @@
+// Asks node-opcua's way for what each service answers, and prints it as one line of JSON.
+// node services.mjs URL
+import {
+  AttributeIds, DataChangeFilter, DataChangeTrigger, DeadbandType, MessageSecurityMode, OPCUAClient,
+  SecurityPolicy, TimestampsToReturn, constructEventFilter, ofType,
+} from "node-opcua-client";
+
+const [url] = process.argv.slice(2);
+const client = OPCUAClient.create({
+  endpointMustExist: false, connectionStrategy: { maxRetry: 0 },
+  securityMode: MessageSecurityMode.None, securityPolicy: SecurityPolicy.None,
+});
+await client.connect(url);
+const session = await client.createSession();
+const namespaces = await session.readNamespaceArray();
+const id = (name) => `ns=${namespaces.indexOf("urn:drivebridge:points")};s=${name}`;
+const seen = {};
+const failed = async (promise) => {
+  try { await promise; return "Good"; } catch (error) { return /Bad\w+/.exec(error.message)?.[0] ?? error.message; }
+};
+
+session.requestedMaxReferencesPerNode = 3;
+let result = await session.browse(id("conveyor/fu1"));
+seen.browsed = [result.references.length];
+while (result.continuationPoint) {
+  result = await session.browseNext(result.continuationPoint, false);
+  seen.browsed.push(result.references.length);
+}
+seen.history = await failed(session.readHistoryValue(id("bus/can0/load"), new Date(0), new Date()));
+seen.query = await failed(session.queryFirst({}));
+const part = await session.read({ nodeId: "i=2255", attributeId: AttributeIds.Value, indexRange: "1:2" });
+seen.part = part.value.value.length;
+const none = await session.read({ nodeId: "i=2267", attributeId: AttributeIds.Value, indexRange: "1" });
+seen.none = none.statusCode.name;
+
+const subscription = await session.createSubscription2({
+  requestedPublishingInterval: 1, requestedLifetimeCount: 1, requestedMaxKeepAliveCount: 7,
+  publishingEnabled: true,
+});
+seen.revised = [subscription.publishingInterval, subscription.lifetimeCount, subscription.maxKeepAliveCount];
+const monitored = async (nodeId, filter, attributeId = AttributeIds.Value) => {
+  const item = await subscription.monitor(
+    { nodeId, attributeId }, { samplingInterval: -1, queueSize: 1000, discardOldest: true, filter },
+    TimestampsToReturn.Both).catch((error) => error);
+  return item.statusCode?.name ?? /Bad\w+/.exec(item.message)?.[0] ?? String(item);
+};
+const percent = (deadbandValue) => new DataChangeFilter({
+  trigger: DataChangeTrigger.StatusValue, deadbandType: DeadbandType.Percent, deadbandValue,
+});
+seen.percent = await monitored(id("conveyor/fu1/actual/frequency"), percent(5));
+seen.beyond = await monitored(id("conveyor/fu1/actual/frequency"), percent(101));
+seen.rangeless = await monitored(id("conveyor/fu1/status/state"), percent(5));
+seen.events = await monitored(
+  "i=2253", constructEventFilter(["EventType", "Message"], ofType("i=2041")), AttributeIds.EventNotifier);
+
+await subscription.terminate();
+await session.close();
+await client.disconnect();
+console.log(JSON.stringify(seen));

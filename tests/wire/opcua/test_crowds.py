@@ -1,0 +1,196 @@
+"""Who is in nobody's way: idle sockets, half a handshake, wrong passwords, one that wants everything."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+
+import pytest
+from asyncua import Client, ua
+
+from bridge.config import OpcUaTable, UserTable
+from bridge.northbound.opcua import admission, shares
+from bridge.northbound.opcua.admission import DEADLINE_S, Stage
+from bridge.northbound.opcua.security import hash_password
+from bridge.northbound.opcua.server import OpcUaServer
+from tests.support.opcua_site import OPEN, connected, serving
+
+Streams = list[tuple[asyncio.StreamReader, asyncio.StreamWriter]]
+HELLO = b"HELF\x20\0\0\0" + bytes(4) + (65535).to_bytes(4, "little") * 2 + bytes(12)
+
+
+@asynccontextmanager
+async def idle(server: OpcUaServer, count: int, says: bytes = b"") -> AsyncIterator[Streams]:
+    streams: Streams = []
+    try:
+        for _ in range(count):
+            reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+            writer.write(says)
+            streams.append((reader, writer))
+        yield streams
+    finally:
+        for _, writer in streams:
+            writer.close()
+
+
+async def is_closed(reader: asyncio.StreamReader, within_s: float) -> bool:
+    """An error message may come before the end."""
+    with suppress(TimeoutError, ConnectionError):
+        async with asyncio.timeout(within_s):
+            await reader.read(-1)
+            return True
+    return reader.at_eof() or reader.exception() is not None
+
+
+async def reads(server: OpcUaServer) -> float:
+    """Seconds that a good client takes to be in and read a value."""
+    began = time.monotonic()
+    async with connected(server) as client:
+        await client.nodes.server_state.read_value()
+    return time.monotonic() - began
+
+
+@pytest.mark.parametrize("says", [b"", HELLO], ids=["nothing", "hello"])
+async def test_idle_sockets_keep_nobody_out(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, says: bytes
+) -> None:
+    async with serving(OPEN, tmp_path) as (server, _):
+        with caplog.at_level(logging.WARNING):
+            caplog.clear()
+            async with connected(server) as present, idle(server, 300, says):
+                assert await reads(server) < 5
+                await present.nodes.server_state.read_value()
+    told = [record.getMessage() for record in caplog.records if "127.0.0.1" in record.getMessage()]
+    assert len(told) == 1, told
+    assert "made room" in told[0]
+
+
+@pytest.mark.parametrize(("says", "stage"), [(b"", Stage.CONNECTED), (HELLO, Stage.GREETED)])
+async def test_who_comes_no_further_is_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, says: bytes, stage: Stage
+) -> None:
+    monkeypatch.setitem(DEADLINE_S, stage, 0.2)
+    async with serving(OPEN, tmp_path) as (server, _), idle(server, 3, says) as streams:
+        for reader, _ in streams:
+            assert await is_closed(reader, 3)
+
+
+async def test_a_channel_without_a_session_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(DEADLINE_S, Stage.CHANNEL, 0.2)
+    async with serving(OPEN, tmp_path) as (server, _):
+        client = Client(server.endpoint_url, timeout=2)
+        await client.connect_socket()
+        await client.send_hello()
+        await client.open_secure_channel(renew=False)
+        async with connected(server) as other:
+            await asyncio.sleep(1.5)
+            with pytest.raises((ConnectionError, ua.UaError, TimeoutError)):
+                await client.create_session()
+            await other.nodes.server_state.read_value()
+        client.disconnect_socket()
+
+
+async def test_a_connection_whose_session_has_ended_is_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(DEADLINE_S, Stage.CHANNEL, 0.5)
+    async with serving(OPEN, tmp_path) as (server, _), connected(server) as client:
+        await asyncio.sleep(1.5)
+        await client.nodes.server_state.read_value()
+        await client.close_session()
+        await asyncio.sleep(2.5)
+        with pytest.raises((ConnectionError, ua.UaError, TimeoutError)):
+            await client.create_session()
+
+
+async def test_one_address_has_its_share_of_sessions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(admission, "MOST_OF_ADDRESS", 4)
+    async with serving(OPEN, tmp_path) as (server, _):
+        clients = [Client(server.endpoint_url, timeout=2) for _ in range(4)]
+        for client in clients:
+            await client.connect()
+        with pytest.raises((ConnectionError, ua.UaError, TimeoutError)):
+            await Client(server.endpoint_url, timeout=2).connect()
+        for client in clients:
+            await client.nodes.server_state.read_value()
+        await clients[0].disconnect()
+        assert await reads(server) < 5
+        for client in clients[1:]:
+            await client.disconnect()
+
+
+async def test_wrong_passwords_hold_up_no_right_one(tmp_path: Path) -> None:
+    line = hash_password("swordfish")
+    user = UserTable(name="anna", role="operator", password_hash=line)
+    settings = OpcUaTable(listen="127.0.0.1:0", no_security=True, anonymous="observer", user=[user])
+
+    async def log_in(password: str) -> float:
+        client = Client(server.endpoint_url, timeout=60)
+        client.set_user("anna")
+        client.set_password(password)
+        began = time.monotonic()
+        try:
+            await client.connect()
+            await client.disconnect()
+        except ua.UaError:
+            client.disconnect_socket()
+        return time.monotonic() - began
+
+    async with serving(settings, tmp_path) as (server, _):
+        alone = await log_in("wrong")
+        wrong = [asyncio.create_task(log_in(f"wrong {n}")) for n in range(20)]
+        await asyncio.sleep(alone)
+        for _ in range(2):  # the first time by its turn, then as one that is known
+            right = await log_in("swordfish")
+        assert not all(task.done() for task in wrong), "the wrong ones still wait"
+        assert right < max(3 * alone, 0.5)
+        await asyncio.gather(*wrong)
+
+
+class TestSubscriptions:
+    async def test_one_session_and_one_address_have_their_share(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(shares, "MOST_OF_SESSION", 3)
+        monkeypatch.setattr(shares, "MOST_OF_ADDRESS", 5)
+        async with serving(OPEN, tmp_path) as (server, _), connected(server) as greedy:
+            for _ in range(3):
+                await greedy.create_subscription(1000, None)
+            with pytest.raises(ua.uaerrors.BadTooManySubscriptions):
+                await greedy.create_subscription(1000, None)
+            async with connected(server) as second:
+                for _ in range(2):
+                    await second.create_subscription(1000, None)
+                with pytest.raises(ua.uaerrors.BadTooManySubscriptions):
+                    await second.create_subscription(1000, None)
+
+    async def test_what_a_client_left_behind_makes_room(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """A client that is started anew again and again has its old sessions still there."""
+        monkeypatch.setattr(shares, "MOST_OF_ADDRESS", 3)
+        async with serving(OPEN, tmp_path) as (server, _):
+            for _ in range(3):
+                crashed = Client(server.endpoint_url, timeout=2)
+                await crashed.connect()
+                for _ in range(2):
+                    await crashed.create_subscription(1000, None)
+                crashed.disconnect_socket()
+                await asyncio.sleep(0.1)
+
+    async def test_monitored_items_are_shared_out(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(shares, "MOST_ITEMS_OF_ADDRESS", 10)
+        async with serving(OPEN, tmp_path) as (server, _), connected(server) as client:
+            subscription = await client.create_subscription(1000, None)
+            nodes = [client.nodes.server_state] * 10
+            assert all(isinstance(one, int) for one in await subscription.subscribe_data_change(nodes))
+            refused = await subscription.subscribe_data_change(nodes)
+            assert {getattr(one, "value", None) for one in refused} == {
+                ua.StatusCodes.BadTooManyMonitoredItems
+            }

@@ -1,0 +1,150 @@
+"""The good clients: one of each protocol, each with a drive that it keeps turning.
+
+good.py FILE MODBUS OPCUA ZENOH
+
+FILE gets a line ``<monotonic time> <protocol> <milliseconds> <ok or what was wrong>`` for each exchange from
+the moment on at which all drives turn, which is told by the word "running".
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import sys
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import zenoh
+from asyncua import Client, ua
+from pymodbus.client import AsyncModbusTcpClient
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from tests.fuzz.rig import CONTROL_WORD, GOOD, PASSWORD, SETPOINT
+
+SHUT_DOWN, ENABLED_MASK, ENABLED = 0x047E, 0x6F, 0x27
+PERIOD_S = 0.1
+PATIENCE_S = 5.0
+DRIVES = "drives/hall/conveyor"
+FILE = os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+
+Exchange = Callable[[int], Awaitable[int]]
+"""Write a control word with its setpoint; the status word. Raises where anything was not answered well."""
+
+
+class Wrong(Exception):
+    pass
+
+
+def check(condition: object, what: object) -> None:
+    if not condition:
+        raise Wrong(str(what))
+
+
+async def by_modbus(port: int) -> Exchange:
+    client = AsyncModbusTcpClient("127.0.0.1", port=port, timeout=PATIENCE_S, retries=0)
+    check(await client.connect(), "no connection")
+
+    async def exchange(word: int) -> int:
+        answer = await client.write_registers(0, [word, SETPOINT], device_id=1)
+        check(not answer.isError(), answer)
+        answer = await client.read_input_registers(0, count=21, device_id=1)
+        check(not answer.isError(), answer)
+        return answer.registers[0]
+
+    return exchange
+
+
+async def by_opcua(port: int) -> Exchange:
+    client = Client(f"opc.tcp://127.0.0.1:{port}", timeout=PATIENCE_S)
+    client.set_user(GOOD)
+    client.set_password(PASSWORD)
+    await client.connect()
+    space = await client.get_namespace_index("urn:drivebridge:points")
+    status = client.get_node(f"ns={space};s=conveyor/fu2/status/status_word")
+    names = ("control_word", "setpoint_1")
+    nodes = [ua.NodeId(f"conveyor/fu2/command/{name}", space) for name in names]
+
+    async def exchange(word: int) -> int:
+        values = [ua.DataValue(ua.Variant(value, ua.VariantType.UInt16)) for value in (word, SETPOINT)]
+        wanted = [
+            ua.WriteValue(NodeId=node, AttributeId=ua.AttributeIds.Value, Value=value)
+            for node, value in zip(nodes, values, strict=True)
+        ]
+        results = await client.uaclient.write(ua.WriteParameters(NodesToWrite=wanted))
+        check(all(result.is_good() for result in results), results)
+        return await status.read_value()
+
+    return exchange
+
+
+async def by_zenoh(port: int) -> Exchange:
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{port}"]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    config.insert_json5("transport/auth/usrpwd/user", json.dumps(GOOD))
+    config.insert_json5("transport/auth/usrpwd/password", json.dumps(PASSWORD))
+    session = zenoh.open(config)
+    who = json.dumps({"controller": GOOD})
+
+    def ask(key: str, payload: str | None) -> dict[str, object]:
+        replies = session.get(f"{DRIVES}/fu3/{key}", payload=payload, attachment=who, timeout=PATIENCE_S)
+        found = [reply.ok or reply.err for reply in replies]
+        check(len(found) == 1 and found[0] is not None, f"{len(found)} replies")
+        return json.loads(found[0].payload.to_string())  # type: ignore[union-attr]
+
+    async def exchange(word: int) -> int:
+        telegram = json.dumps({"control_word": word, "setpoint_1": SETPOINT})
+        answer = await asyncio.to_thread(ask, "command", telegram)
+        check(answer.get("ok") is True and answer.get("forwarded") is True, answer)
+        answer = await asyncio.to_thread(ask, "status/status_word", None)
+        value = answer.get("v")
+        check(isinstance(value, int), answer)
+        return int(str(value))
+
+    return exchange
+
+
+async def lead(exchange: Exchange) -> None:
+    """To operation enabled."""
+    end = time.monotonic() + 30
+    for word in (SHUT_DOWN, CONTROL_WORD):
+        while True:
+            try:
+                status = await exchange(word)
+                if word == SHUT_DOWN or status & ENABLED_MASK == ENABLED:
+                    break
+            except Wrong as error:
+                if time.monotonic() > end:
+                    raise
+                print(error, flush=True)
+            await asyncio.sleep(PERIOD_S)
+
+
+async def go_on(name: str, exchange: Exchange) -> None:
+    while True:
+        begin = time.monotonic()
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                status = await exchange(CONTROL_WORD)
+            verdict = "ok" if status & ENABLED_MASK == ENABLED else f"status word {status:04X}h"
+        except Exception as error:  # noqa: BLE001 - whatever it is, it is noted
+            verdict = " ".join(f"{type(error).__name__} {error}".split())
+        now = time.monotonic()
+        os.write(FILE, f"{now:.3f} {name} {(now - begin) * 1000:.2f} {verdict}\n".encode())
+        await asyncio.sleep(max(0.0, begin + PERIOD_S - now))
+
+
+async def main(modbus: int, opcua: int, zenoh_port: int) -> None:
+    makers = {"modbus": by_modbus(modbus), "opcua": by_opcua(opcua), "zenoh": by_zenoh(zenoh_port)}
+    exchanges = {name: await maker for name, maker in makers.items()}
+    # Each has a watchdog: whoever is led first has to go on while the others are.
+    await asyncio.gather(*(lead(exchange) for exchange in exchanges.values()))
+    print("running", flush=True)
+    await asyncio.gather(*(go_on(name, exchange) for name, exchange in exchanges.items()))
+
+
+asyncio.run(main(*map(int, sys.argv[2:5])))

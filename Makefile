@@ -6,7 +6,8 @@
 # JOBS=n      how many tests run at a time; 0 in this process, as a debugger wants  (default: CPUs)
 # FUZZ=s      how long make fuzz takes for each protocol, in seconds  (default: 600)
 # PROTOCOL=.. the one that make fuzz throws at: opcua, modbus, zenoh or can  (default: all)
-# SEED=n      a number that make fuzz has printed, to throw the same again; or REPLAY=build/fuzz/...jsonl
+# SEED=n      a number that make fuzz has printed, to throw the same again
+# REPLAY=...  a file that make fuzz has kept: throw what it has; REDUCE=1 finds the few cases that do it
 # ARGS=...    further arguments, e.g. make unit ARGS='-k watchdog -x'
 
 SHELL := /bin/bash
@@ -91,7 +92,7 @@ fuzz-short: compiled ## a minute of fuzzing for each protocol, two at a time, al
 FUZZ ?= 600
 
 fuzz: compiled ## throw changed messages at the bridge, 10 minutes for each protocol
-	@$(IN) -m tests.fuzz $(PROTOCOL) --seconds $(FUZZ) $(SEED:%=--seed %) $(REPLAY:%=--replay %)
+	@$(IN) -m tests.fuzz $(PROTOCOL) --seconds $(FUZZ) $(SEED:%=--seed %) $(REPLAY:%=--replay %) $(if $(REDUCE),--reduce)
 
 bench: compiled packages ## print the measured figures
 	@echo "== figures: this machine"

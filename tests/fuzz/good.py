@@ -2,8 +2,9 @@
 
 good.py FILE MODBUS OPCUA ZENOH
 
-FILE gets a line ``<monotonic time> <protocol> <milliseconds> <ok or what was wrong>`` for each exchange from
-the moment on at which all drives turn, which is told by the word "running".
+Beside them somebody connects anew every few seconds. When all drives turn the word "running" is said. From
+then on FILE gets a line ``<monotonic time>;<protocol>;<milliseconds>;<ok or what was wrong>``
+for each exchange.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from tests.fuzz.rig import CONTROL_WORD, GOOD, PASSWORD, SETPOINT
 SHUT_DOWN, ENABLED_MASK, ENABLED = 0x047E, 0x6F, 0x27
 PERIOD_S = 0.1
 PATIENCE_S = 5.0
+NEW_S = 3.0
 DRIVES = "drives/hall/conveyor"
 FILE = os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT | os.O_APPEND)
 
@@ -41,6 +43,16 @@ class Wrong(Exception):
 def check(condition: object, what: object) -> None:
     if not condition:
         raise Wrong(str(what))
+
+
+def good_zenoh(port: int) -> zenoh.Session:
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{port}"]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    config.insert_json5("transport/auth/usrpwd/user", json.dumps(GOOD))
+    config.insert_json5("transport/auth/usrpwd/password", json.dumps(PASSWORD))
+    return zenoh.open(config)
 
 
 async def by_modbus(port: int) -> Exchange:
@@ -81,13 +93,7 @@ async def by_opcua(port: int) -> Exchange:
 
 
 async def by_zenoh(port: int) -> Exchange:
-    config = zenoh.Config()
-    config.insert_json5("mode", '"client"')
-    config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{port}"]))
-    config.insert_json5("scouting/multicast/enabled", "false")
-    config.insert_json5("transport/auth/usrpwd/user", json.dumps(GOOD))
-    config.insert_json5("transport/auth/usrpwd/password", json.dumps(PASSWORD))
-    session = zenoh.open(config)
+    session = good_zenoh(port)
     who = json.dumps({"controller": GOOD})
 
     def ask(key: str, payload: str | None) -> dict[str, object]:
@@ -108,6 +114,37 @@ async def by_zenoh(port: int) -> Exchange:
     return exchange
 
 
+# newcomers: nobody may be locked out
+
+
+async def new_on_modbus(port: int) -> int:
+    client = AsyncModbusTcpClient("127.0.0.1", port=port, timeout=PATIENCE_S, retries=0)
+    try:
+        check(await client.connect(), "no connection")
+        answer = await client.read_input_registers(0, count=21, device_id=1)
+        check(not answer.isError(), answer)
+        return answer.registers[0]
+    finally:
+        client.close()
+
+
+async def new_on_opcua(port: int) -> int:
+    async with Client(f"opc.tcp://127.0.0.1:{port}", timeout=PATIENCE_S) as client:
+        space = await client.get_namespace_index("urn:drivebridge:points")
+        return await client.get_node(f"ns={space};s=conveyor/fu1/status/status_word").read_value()
+
+
+async def new_on_zenoh(port: int) -> int:
+    def ask() -> int:
+        with good_zenoh(port) as session:
+            replies = session.get(f"{DRIVES}/fu1/status/status_word", timeout=PATIENCE_S)
+            found = [json.loads(reply.ok.payload.to_string()) for reply in replies if reply.ok]
+        check(len(found) == 1, f"{len(found)} replies")
+        return int(found[0]["v"])
+
+    return await asyncio.to_thread(ask)
+
+
 async def lead(exchange: Exchange) -> None:
     """To operation enabled."""
     end = time.monotonic() + 30
@@ -124,7 +161,7 @@ async def lead(exchange: Exchange) -> None:
             await asyncio.sleep(PERIOD_S)
 
 
-async def go_on(name: str, exchange: Exchange) -> None:
+async def go_on(name: str, exchange: Exchange, is_noted: asyncio.Event, period_s: float = PERIOD_S) -> None:
     while True:
         begin = time.monotonic()
         try:
@@ -134,17 +171,39 @@ async def go_on(name: str, exchange: Exchange) -> None:
         except Exception as error:  # noqa: BLE001 - whatever it is, it is noted
             verdict = " ".join(f"{type(error).__name__} {error}".split())
         now = time.monotonic()
-        os.write(FILE, f"{now:.3f} {name} {(now - begin) * 1000:.2f} {verdict}\n".encode())
-        await asyncio.sleep(max(0.0, begin + PERIOD_S - now))
+        if is_noted.is_set():
+            os.write(FILE, f"{now:.3f};{name};{(now - begin) * 1000:.2f};{verdict}\n".encode())
+        await asyncio.sleep(max(0.0, begin + period_s - now))
 
 
 async def main(modbus: int, opcua: int, zenoh_port: int) -> None:
     makers = {"modbus": by_modbus(modbus), "opcua": by_opcua(opcua), "zenoh": by_zenoh(zenoh_port)}
     exchanges = {name: await maker for name, maker in makers.items()}
-    # Each has a watchdog: whoever is led first has to go on while the others are.
-    await asyncio.gather(*(lead(exchange) for exchange in exchanges.values()))
-    print("running", flush=True)
-    await asyncio.gather(*(go_on(name, exchange) for name, exchange in exchanges.items()))
+    running = asyncio.Event()
+    led: set[str] = set()
+
+    async def serve(name: str, exchange: Exchange) -> None:
+        await lead(exchange)
+        led.add(name)
+        if len(led) == len(exchanges):
+            running.set()
+            print("running", flush=True)
+        # Whose drive turns goes on while the others are led: it has a watchdog.
+        await go_on(name, exchange, running)
+
+    async def come_anew(name: str, new: Callable[[int], Awaitable[int]], port: int) -> None:
+        await running.wait()
+        await go_on(f"{name}, newly connected", lambda _: new(port), running, NEW_S)
+
+    newcomers = (
+        ("modbus", new_on_modbus, modbus),
+        ("opcua", new_on_opcua, opcua),
+        ("zenoh", new_on_zenoh, zenoh_port),
+    )
+    await asyncio.gather(
+        *(serve(name, exchange) for name, exchange in exchanges.items()),
+        *(come_anew(*newcomer) for newcomer in newcomers),
+    )
 
 
 asyncio.run(main(*map(int, sys.argv[2:5])))

@@ -33,7 +33,7 @@ ODD_TEXTS: Final = (
     b"",
     b"\0",
     b"a\0b",
-    b"\r\n2026-01-01 00:00:00 ERROR   forged",
+    b"\r\n00:00:00 ERROR   forged",
     b"\x1b[2J",
     "\u202e\ufeff\U0001f4a5".encode(),
     b"%s%n{0.__class__}",

@@ -1,7 +1,8 @@
 """What is thrown at: the bridge as its user runs it, on simulated drives, with a good client per protocol.
 
 The good clients own fu1 (Modbus), fu2 (OPC UA) and fu3 (zenoh) and keep them turning. fu4 may be leased by
-whoever asks. The spare nodes have one of each family; nobody may move them.
+whoever asks, the drive of the node ``spare`` belongs to whoever comes first by Modbus. The other nodes have
+one of each family; nobody may move them.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ GOOD, PASSWORD = "good", "good-password"
 FUZZ, FUZZ_PASSWORD = "fuzz", "fuzz-password"
 GOOD_NODE: Final = 5
 GOOD_RPDOS: Final = {0x205: "fu1", 0x305: "fu2", 0x405: "fu3"}
-SPARE_NODES: Final = (6, 7, 8, 9)
+SPARE: Final = 9
+SPARE_NODES: Final = (6, 7, 8, SPARE)
+_NODES: Final = 1 + len(SPARE_NODES)
 CONTROL_WORD, SETPOINT = 0x047F, 0x1000
 _TIMEOUT_MS: Final = 2000
 _READY_S: Final = 90.0
@@ -95,7 +98,7 @@ def _bus() -> str:
         sites.node(
             _drive("drive", "none", 7, ""), name="fan", node_id=8, mapping="cia402/velocity", more=slow
         ),
-        sites.node(_drive("fu1", "none", 8, ""), name="spare", node_id=9, more=slow),
+        sites.node(_drive("fu1", "modbus", 8, sites.SCALED), name="spare", node_id=SPARE, more=slow),
     )
     return sites.bus(*nodes, more='deadman_ms = 500\nsync_period_ms = 20\non_intruder = "report"')
 
@@ -121,7 +124,7 @@ def running_rig(folder: Path) -> Iterator[Rig]:
     good = [sys.executable, str(here / "good.py"), str(folder / "exchanges"), *map(str, ports)]
     with running(folder, "bridge", *bridge, notify=True) as process:
         process.wait_ready(_READY_S)
-        until(lambda: process.output().count(": node operational") >= 5, _READY_S, process.output())
+        until(lambda: process.output().count(": node operational") >= _NODES, _READY_S, "all nodes operate")
         with running(folder, "good", *good) as clients:
             clients.wait_output("running", _READY_S)
             yield Rig(folder, process, clients, *ports)

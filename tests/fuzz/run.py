@@ -125,7 +125,7 @@ def fuzz(
         faults += judge.conclude()
     took_s = time.monotonic() - begin
     report = Report(seed, took_s, {hand.protocol: hand.thrown for hand in hands}, faults, judge.figures)
-    if faults:
+    if faults and replay is None:
         report.kept = keep(rig, hands, seed)
     return report
 

@@ -43,7 +43,7 @@ import sys, time
 while True:
     with open(sys.argv[1], "a") as file:
         for name in ("modbus", "opcua", "zenoh"):
-            file.write(f"{time.monotonic()} {name} 1.5 ok\\n")
+            file.write(f"{time.monotonic()};{name};1.5;ok\\n")
     time.sleep(0.05)
 """
 
@@ -103,8 +103,8 @@ def test_what_a_bridge_must_not_do_is_seen(tmp_path: Path, done: str, seen: str)
     ("file", "line", "seen"),
     [
         ("words", "1.0 205 7e0400000000", "the telegram of conveyor/fu1 has changed"),
-        ("words", "1.0 209 7f0400100000", "node 9 is enabled"),
-        ("exchanges", "1.0 opcua 5000.0 TimeoutError", "good client on opcua: TimeoutError"),
+        ("words", "1.0 208 0f0400100000", "node 8 is enabled"),
+        ("exchanges", "1.0;opcua;5000.0;TimeoutError", "good client on opcua: TimeoutError"),
         (
             "state/audit.jsonl",
             '{"source":"zenoh","user":"fuzz","target":"conveyor/fu2","action":"write","code":"ok"}',

@@ -4,25 +4,30 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import struct
 import subprocess
 from collections.abc import Sequence
+from dataclasses import fields
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 from asyncua import Client, ua
 from asyncua.common.utils import Buffer
-from asyncua.ua.ua_binary import struct_from_binary
+from asyncua.ua.ua_binary import get_safe_type_hints, struct_from_binary
 
 from tests.fuzz.case import Case, Recorded, save
 from tests.fuzz.recorder.proxy import Link, Proxy, recording
 from tests.fuzz.rig import Rig
-from tests.fuzz.targets.opcua_channel import HEAD, SESSION, type_name
+from tests.fuzz.targets.opcua_channel import HEAD, SESSION, SUBSCRIPTION, type_name
 from tests.support.process import REPOSITORY
 
 _MOST_OF_A_KIND: Final = 6
+_HEADER: Final = 4 + 39 + 8 + 4
+"""Type, session token, time and handle."""
 _NODE_CLIENT: Final = REPOSITORY / "tests" / "wire" / "node" / "client.mjs"
 _FU4: Final = "conveyor/fu4"
+_ENDING: Final = ("CloseSessionRequest", "CloseSecureChannelRequest", "OpenSecureChannelRequest")
 
 
 def record(rig: Rig) -> list[Path]:
@@ -43,9 +48,9 @@ def _noted(proxy: Proxy) -> list[Recorded]:
     recorded: list[Recorded] = []
     counts: dict[str, int] = {}
     for link in proxy.links:
-        token = _session_token(link)
+        known = _known(link)
         for message in _messages(link.sent):
-            what, case = _case(message, token)
+            what, case = _case(message, known)
             counts[what] = counts.get(what, 0) + 1
             if counts[what] <= _MOST_OF_A_KIND and all(case != one.case for one in recorded):
                 recorded.append(Recorded(what, case))
@@ -61,23 +66,31 @@ def _messages(stream: bytes) -> list[bytes]:
     return found
 
 
-def _case(message: bytes, token: bytes) -> tuple[str, Case]:
+def _case(message: bytes, known: dict[bytes, bytes]) -> tuple[str, Case]:
     if message[:3] != b"MSG":
         return message[:3].decode(), Case("raw", (message,))
     body = message[HEAD.size :]
-    if token:
-        body = body.replace(token, SESSION)
+    # A subscription's id is a small number, which stands in the header of a request for something else.
+    for value, marker in known.items():
+        begin = 0 if marker == SESSION else _HEADER
+        body = body[:begin] + body[begin:].replace(value, marker)
     return type_name(body) or "an unknown message", Case("service", (body,))
 
 
-def _session_token(link: Link) -> bytes:
-    """The token that the server has given in this connection."""
+def _known(link: Link) -> dict[bytes, bytes]:
+    """What the server has given in this connection, and the markers for it."""
+    known: dict[bytes, bytes] = {}
     for message in _messages(link.received):
-        body = Buffer(message[HEAD.size :])
-        if message[:3] == b"MSG" and type_name(message[HEAD.size :]) == "CreateSessionResponse":
-            answer = struct_from_binary(ua.CreateSessionResponse, body)
-            return bytes(answer.Parameters.AuthenticationToken.Identifier)
-    return b""
+        body = message[HEAD.size :]
+        if message[:3] != b"MSG":
+            continue
+        if type_name(body) == "CreateSessionResponse":
+            session = struct_from_binary(ua.CreateSessionResponse, Buffer(body))
+            known[bytes(session.Parameters.AuthenticationToken.Identifier)] = SESSION
+        elif type_name(body) == "CreateSubscriptionResponse":
+            made = struct_from_binary(ua.CreateSubscriptionResponse, Buffer(body))
+            known[struct.pack("<I", made.Parameters.SubscriptionId)] = SUBSCRIPTION
+    return known
 
 
 # a walk
@@ -183,21 +196,26 @@ async def _subscribe(client: Client, node: Any) -> None:
 
 
 async def _rare(client: Client, node: Any) -> None:
-    """Services that asyncua's client has no call for, or seldom makes."""
+    """Services that asyncua's client seldom calls, and all that there are with nothing in them."""
     point = node(f"{_FU4}/actual/frequency")
     history = client.get_node(point)
     await _try(history.read_raw_history(datetime(2026, 1, 1, tzinfo=UTC), numvalues=1))
     session = client.uaclient
-    requests: list[Any] = [
-        ua.TransferSubscriptionsRequest(),
-        ua.RepublishRequest(),
-        ua.BrowseNextRequest(),
-        ua.SetTriggeringRequest(),
-        ua.CancelRequest(),
-        ua.AddNodesRequest(),
-        ua.DeleteNodesRequest(),
-        ua.HistoryUpdateRequest(),
-        ua.QueryFirstRequest(),
-    ]
-    for request in requests:
-        await _try(session.protocol.send_request(request, 3))
+    for name in sorted(dir(ua)):
+        request = getattr(ua, name)
+        if name.endswith("Request") and hasattr(request, "RequestHeader") and name not in _ENDING:
+            await _try(session.protocol.send_request(_filled(request()), 1))
+
+
+def _filled(request: Any) -> Any:
+    """The request with one element in each list, and a text in its header."""
+    request.RequestHeader.AuditEntryId = "audit"
+    parameters = getattr(request, "Parameters", request)
+    hints = get_safe_type_hints(type(parameters), {"ua": ua})
+    for field in fields(parameters):
+        inner = get_args(hints.get(field.name))
+        if getattr(parameters, field.name) == [] and len(inner) == 1:
+            with contextlib.suppress(TypeError):
+                one = inner[0](1) if issubclass(inner[0], int) else inner[0]()
+                setattr(parameters, field.name, [one])
+    return request

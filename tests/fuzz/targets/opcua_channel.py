@@ -1,7 +1,7 @@
 """A plain OPC UA client: bytes on a socket, with a channel and a session where they are wanted.
 
 Markers in a message stand for what only a running connection knows: the ids of the channel and its security
-token, the next sequence number, and the session's authentication token.
+token, the next sequence number, the session's authentication token, and the id of its subscription.
 """
 
 from __future__ import annotations
@@ -30,11 +30,13 @@ from tests.fuzz.rig import STRANGER
 CHANNEL: Final = b"\xc5\x01\xc5\x01"
 TOKEN: Final = b"\xc5\x02\xc5\x02"
 SEQUENCE: Final = b"\xc5\x03\xc5\x03"
+SUBSCRIPTION: Final = b"\xc5\x05\xc5\x05"
 SESSION: Final = b"\xc5\x04" * 16
 HEAD: Final = struct.Struct("<4sI4s4s4sI")
 """Message type with its chunk flag, size, channel, token, sequence number, request id."""
 _ANSWER_S: Final = 5.0
 _SESSION_MS: Final = 10_000.0
+_GOODBYE_S: Final = 0.1
 
 
 def chunk(body: bytes, kind: bytes = b"MSGF", request: int = 1) -> bytes:
@@ -54,6 +56,8 @@ class Channel:
         self.socket = socket.create_connection(("127.0.0.1", port), timeout=2.0, source_address=(STRANGER, 0))
         self._connection = SecureConnection(SecurityPolicyNone(), TransportLimits(65535, 65535, 0, 0))
         self._session: bytes = SESSION
+        self._subscription = 0
+        self._authentication = ua.NodeId()
         self._request = 0
         self._sequence = 0
         self._rest = b""
@@ -79,7 +83,7 @@ class Channel:
         self._connection.set_channel(answer.Parameters, request.Parameters.RequestType, b"")
 
     def activate(self) -> None:
-        """Make a session as ``anonymous``."""
+        """Make a session as ``anonymous``, with a subscription."""
         create = ua.CreateSessionRequest()
         create.Parameters.EndpointUrl = self._url
         create.Parameters.SessionName = "fuzz"
@@ -98,6 +102,29 @@ class Channel:
         self._ask(activate, ua.ActivateSessionResponse)
         identifier = made.Parameters.AuthenticationToken.Identifier
         self._session = identifier if isinstance(identifier, bytes) else SESSION
+        self._authentication = made.Parameters.AuthenticationToken
+        with contextlib.suppress(Closed):  # there may be as many as there can be
+            self._subscribe()
+
+    def _subscribe(self) -> None:
+        subscribe = ua.CreateSubscriptionRequest()
+        subscribe.RequestHeader.AuthenticationToken = self._authentication
+        subscribe.Parameters.RequestedPublishingInterval = 50.0
+        subscribe.Parameters.RequestedLifetimeCount = 100
+        subscribe.Parameters.RequestedMaxKeepAliveCount = 10
+        self._subscription = self._ask(subscribe, ua.CreateSubscriptionResponse).Parameters.SubscriptionId
+
+    def leave(self) -> None:
+        """Close the session and the connection, as a client does that comes to its end."""
+        with contextlib.suppress(OSError, Closed):
+            if self._session == SESSION:
+                raise Closed("there is no session")
+            request = ua.CloseSessionRequest()
+            request.RequestHeader.AuthenticationToken = self._authentication
+            request.DeleteSubscriptions = True
+            self.send(chunk(struct_to_binary(request)))
+            self.listen(_GOODBYE_S)
+        self.close()
 
     def _ask(
         self, request: Any, answer_type: type[Any], kind: ua.MessageType = ua.MessageType.SecureMessage
@@ -122,6 +149,8 @@ class Channel:
                 if len(buffer) >= header.body_size:
                     message = self._connection.receive_from_header_and_body(header, buffer)
                     self._rest = bytes(buffer)
+                    if isinstance(message, ua.ErrorMessage):
+                        raise Closed(str(message))
                     if message is not None:
                         return message
                     continue
@@ -140,6 +169,7 @@ class Channel:
         """Send these bytes, with what their markers stand for."""
         token = self._connection.security_token
         raw = raw.replace(CHANNEL, struct.pack("<I", token.ChannelId))
+        raw = raw.replace(SUBSCRIPTION, struct.pack("<I", self._subscription))
         raw = raw.replace(TOKEN, struct.pack("<I", token.TokenId)).replace(SESSION, self._session)
         while SEQUENCE in raw:
             self._sequence += 1

@@ -9,6 +9,8 @@ from __future__ import annotations
 from random import Random
 from typing import Final
 
+from asyncua import ua
+
 from tests.fuzz.case import Case, load
 from tests.fuzz.mutate import Mutator
 from tests.fuzz.rig import Rig
@@ -73,7 +75,7 @@ class Thrower:
     def throw(self, case: Case) -> None:
         try:
             self._throw(case)
-        except (OSError, Closed, StopIteration):
+        except (OSError, Closed, StopIteration, ua.UaError):
             self.close()
 
     def _throw(self, case: Case) -> None:
@@ -84,7 +86,10 @@ class Thrower:
         self._thrown += 1
         for part in case.parts:
             channel.send(part if case.kind == "chunk" else chunk(part))
-        if case.kind == "left" or self._thrown > _MOST_ON_ONE:
+        if case.kind == "left":
+            channel.close()
+            self._channel = None
+        elif self._thrown > _MOST_ON_ONE:
             self.close()
         else:
             channel.listen(_ANSWER_S)
@@ -112,4 +117,4 @@ class Thrower:
     def close(self) -> None:
         channel, self._channel = self._channel, None
         if channel:
-            channel.close()
+            channel.leave()

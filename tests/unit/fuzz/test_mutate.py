@@ -104,6 +104,7 @@ def test_memory_that_grows_for_ever_is_not_flat() -> None:
     ("target", "action", "is_right"),
     [
         ("conveyor/fu4", "start", True),
+        ("spare/fu1", "write", True),
         ("conveyor/fu1", "write", False),
         ("pump/drive", "take_control", False),
         ("pump/drive", "stop", True),

@@ -7,6 +7,7 @@
 # FUZZ=s      how long make fuzz takes for each protocol, in seconds  (default: 600)
 # PROTOCOL=.. the one that make fuzz throws at: opcua, modbus, zenoh or can  (default: all)
 # SEED=n      a number that make fuzz has printed, to throw the same again
+# KNOWN=...   a regular expression: faults that make fuzz lets pass, to find others
 # REPLAY=...  a file that make fuzz has kept: throw what it has; REDUCE=1 finds the few cases that do it
 # ARGS=...    further arguments, e.g. make unit ARGS='-k watchdog -x'
 
@@ -92,7 +93,7 @@ fuzz-short: compiled ## a minute of fuzzing for each protocol, two at a time, al
 FUZZ ?= 600
 
 fuzz: compiled ## throw changed messages at the bridge, 10 minutes for each protocol
-	@$(IN) -m tests.fuzz $(PROTOCOL) --seconds $(FUZZ) $(SEED:%=--seed %) $(REPLAY:%=--replay %) $(if $(REDUCE),--reduce)
+	@$(IN) -m tests.fuzz $(PROTOCOL) --seconds $(FUZZ) $(SEED:%=--seed %) $(REPLAY:%=--replay %) $(if $(REDUCE),--reduce) $(if $(KNOWN),--known '$(KNOWN)')
 
 bench: compiled packages ## print the measured figures
 	@echo "== figures: this machine"

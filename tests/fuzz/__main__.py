@@ -23,6 +23,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, help="of an earlier run, to throw the same again")
     parser.add_argument("--replay", type=Path, help="a file of build/fuzz: throw what it has, once")
     parser.add_argument("--reduce", action="store_true", help="of --replay: find the few cases that do it")
+    parser.add_argument("--known", default="", help="a regular expression: faults to let pass")
     given = parser.parse_args()
     unknown = set(given.protocols) - set(PROTOCOLS)
     if unknown:
@@ -33,13 +34,13 @@ def main() -> int:
     if given.reduce and not given.replay:
         parser.error("--reduce needs --replay")
     if given.reduce:
-        return _reduce(protocols[0], given.replay)
+        return _reduce(protocols[0], given.replay, given.known)
     replay = read_cases(given.replay) if given.replay else None
     seed = secrets.randbelow(2**32) if given.seed is None else given.seed
     failed: list[str] = []
     for protocol in protocols:
         print(f"== {protocol}: {given.seconds:g} s, seed {seed}", flush=True)
-        report = _run(protocol, given.seconds, seed, replay)
+        report = _run(protocol, given.seconds, seed, replay, given.known)
         print(report.told(), flush=True)
         if report.faults:
             failed.append(protocol)
@@ -48,17 +49,19 @@ def main() -> int:
     return 1 if failed else 0
 
 
-def _run(protocol: str, seconds: float, seed: int, replay: Sequence[Case] | None = None) -> Report:
+def _run(
+    protocol: str, seconds: float, seed: int, replay: Sequence[Case] | None = None, known: str = ""
+) -> Report:
     """On a bridge of its own."""
     with tempfile.TemporaryDirectory(prefix="drivebridge-fuzz-") as folder, running_rig(Path(folder)) as rig:
-        return fuzz(rig, [protocol], seconds, seed, replay)
+        return fuzz(rig, [protocol], seconds, seed, replay, known)
 
 
-def _reduce(protocol: str, path: Path) -> int:
+def _reduce(protocol: str, path: Path, known: str) -> int:
     """Each try takes a new bridge: some minutes for a file of hundreds."""
 
     def fails(cases: Sequence[Case]) -> bool:
-        report = _run(protocol, 600.0, 0, cases)
+        report = _run(protocol, 600.0, 0, cases, known)
         print(f"{len(cases)} cases: {report.faults[0] if report.faults else 'borne'}", flush=True)
         return bool(report.faults)
 

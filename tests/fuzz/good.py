@@ -3,8 +3,8 @@
 good.py FILE MODBUS OPCUA ZENOH
 
 Beside them somebody connects anew every few seconds. When all drives turn the word "running" is said. From
-then on FILE gets a line ``<monotonic time>;<protocol>;<milliseconds>;<ok or what was wrong>``
-for each exchange.
+then on FILE gets a line ``<monotonic time>;<protocol>;<milliseconds>;<ok, busy or what was wrong>`` for each
+exchange.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ SHUT_DOWN, ENABLED_MASK, ENABLED = 0x047E, 0x6F, 0x27
 PERIOD_S = 0.1
 PATIENCE_S = 5.0
 NEW_S = 3.0
+MODBUS_BUSY = 6
 DRIVES = "drives/hall/conveyor"
 FILE = os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT | os.O_APPEND)
 
@@ -38,6 +39,10 @@ Exchange = Callable[[int], Awaitable[int]]
 
 class Wrong(Exception):
     pass
+
+
+class Busy(Exception):
+    """The telegram may have waited too long: an answer, and to be asked again. A busy machine is no fault."""
 
 
 def check(condition: object, what: object) -> None:
@@ -61,6 +66,8 @@ async def by_modbus(port: int) -> Exchange:
 
     async def exchange(word: int) -> int:
         answer = await client.write_registers(0, [word, SETPOINT], device_id=1)
+        if answer.isError() and answer.exception_code == MODBUS_BUSY:
+            raise Busy
         check(not answer.isError(), answer)
         answer = await client.read_input_registers(0, count=21, device_id=1)
         check(not answer.isError(), answer)
@@ -86,6 +93,8 @@ async def by_opcua(port: int) -> Exchange:
             for node, value in zip(nodes, values, strict=True)
         ]
         results = await client.uaclient.write(ua.WriteParameters(NodesToWrite=wanted))
+        if {result.value for result in results} == {ua.StatusCodes.BadTimeout}:
+            raise Busy
         check(all(result.is_good() for result in results), results)
         return await status.read_value()
 
@@ -105,6 +114,8 @@ async def by_zenoh(port: int) -> Exchange:
     async def exchange(word: int) -> int:
         telegram = json.dumps({"control_word": word, "setpoint_1": SETPOINT})
         answer = await asyncio.to_thread(ask, "command", telegram)
+        if answer.get("code") == "stale":
+            raise Busy
         check(answer.get("ok") is True and answer.get("forwarded") is True, answer)
         answer = await asyncio.to_thread(ask, "status/status_word", None)
         value = answer.get("v")
@@ -154,7 +165,7 @@ async def lead(exchange: Exchange) -> None:
                 status = await exchange(word)
                 if word == SHUT_DOWN or status & ENABLED_MASK == ENABLED:
                     break
-            except Wrong as error:
+            except (Wrong, Busy) as error:
                 if time.monotonic() > end:
                     raise
                 print(error, flush=True)
@@ -168,6 +179,8 @@ async def go_on(name: str, exchange: Exchange, is_noted: asyncio.Event, period_s
             async with asyncio.timeout(PATIENCE_S):
                 status = await exchange(CONTROL_WORD)
             verdict = "ok" if status & ENABLED_MASK == ENABLED else f"status word {status:04X}h"
+        except Busy:
+            verdict = "busy"
         except Exception as error:  # noqa: BLE001 - whatever it is, it is noted
             verdict = " ".join(f"{type(error).__name__} {error}".split())
         now = time.monotonic()

@@ -61,6 +61,8 @@ class Figures:
     """What was measured: milliseconds of each exchange by protocol, memory in MB by process, log lines."""
 
     answers_ms: dict[str, list[float]] = field(default_factory=dict[str, list[float]])
+    busy: dict[str, int] = field(default_factory=dict[str, int])
+    """How many of them were answered by "too late, try again"."""
     memory_mb: dict[int, list[float]] = field(default_factory=dict[int, list[float]])
     lines: int = 0
 
@@ -70,7 +72,7 @@ class Figures:
             ordered = sorted(times)
             p50, p99 = (ordered[int((len(ordered) - 1) * part)] for part in (0.5, 0.99))
             told.append(
-                f"good client on {name}: {len(times)} exchanges, all answered; "
+                f"good client on {name}: {len(times)} exchanges, {self.busy.get(name, 0)} told to try again; "
                 f"p50 {p50:.1f} ms, p99 {p99:.1f} ms, max {ordered[-1]:.1f} ms"
             )
         for place, samples in enumerate(self.memory_mb.values()):
@@ -152,7 +154,9 @@ class Judge:
             _, name, took_ms, verdict = line.split(";", 3)
             self._heard[name] = now
             self.figures.answers_ms.setdefault(name, []).append(float(took_ms))
-            if verdict != "ok":
+            if verdict == "busy":
+                self.figures.busy[name] = self.figures.busy.get(name, 0) + 1
+            elif verdict != "ok":
                 faults.append(f"good client on {name}: {verdict} after {took_ms} ms")
         silent = [name for name, heard in self._heard.items() if now - heard > SILENT_S]
         return faults + [f"good client on {name}: no exchange for {SILENT_S:g} s" for name in silent]

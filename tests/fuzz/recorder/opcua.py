@@ -97,15 +97,16 @@ def _known(link: Link) -> dict[bytes, bytes]:
 
 
 async def _walk(port: int) -> None:
-    client = Client(f"opc.tcp://127.0.0.1:{port}", timeout=10)
+    url = f"opc.tcp://127.0.0.1:{port}"
+    await _try(Client(url, timeout=10).connect_and_get_server_endpoints())
+    await _try(Client(url, timeout=10).connect_and_find_servers())
+    client = Client(url, timeout=10)
     await client.connect()
     space = await client.get_namespace_index("urn:drivebridge:points")
 
     def node(name: str) -> ua.NodeId:
         return ua.NodeId(name, space)
 
-    await _try(client.connect_and_get_server_endpoints())
-    await _try(client.find_servers())
     await _browse(client, node)
     await _read_and_write(client, node)
     await _call(client, node)
@@ -116,7 +117,7 @@ async def _walk(port: int) -> None:
 
 async def _try(work: Any) -> Any:
     """A refusal is an answer, too: what was sent counts."""
-    with contextlib.suppress(ua.UaError, TimeoutError, AttributeError, TypeError):
+    with contextlib.suppress(ua.UaError, OSError, AttributeError, TypeError):
         return await work
 
 

@@ -9,9 +9,10 @@ from random import Random
 
 import pytest
 
-from tests.fuzz.case import Case, read_cases, write_cases
+from tests.fuzz.case import Case, load, read_cases, write_cases
 from tests.fuzz.judge import growth_mb, unrightful
 from tests.fuzz.mutate import LONGEST, Mutator
+from tests.fuzz.targets import PROTOCOLS
 from tests.fuzz.targets.can_target import FRAME, is_allowed
 from tests.fuzz.targets.zenoh_target import batches, with_length
 
@@ -79,6 +80,11 @@ def test_cases_are_kept_as_they_were(tmp_path: Path) -> None:
     cases = [Case("stream", (b"\0\xff", b"")), Case("raw", ())]
     write_cases(tmp_path / "deep" / "cases.jsonl", cases)
     assert read_cases(tmp_path / "deep" / "cases.jsonl") == cases
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_each_protocol_has_its_recorded_messages(protocol: str) -> None:
+    assert len(load(protocol).recorded) >= 20
 
 
 def test_frames_that_command_by_themselves_are_not_thrown() -> None:

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Final
 
-from bridge.cli.terminal import printable_lines
+from bridge.cli.terminal import printable, printable_lines
 
 _log = logging.getLogger(__name__)
 
@@ -24,7 +24,10 @@ _PRIORITY: Final = {
 
 
 class _Formatter(logging.Formatter):
-    """What devices call themselves is in the log, too."""
+    """What devices and clients call themselves is in the log, too: it makes no line of its own there."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:
+        return printable(super().formatMessage(record))
 
     def format(self, record: logging.LogRecord) -> str:
         return printable_lines(super().format(record))

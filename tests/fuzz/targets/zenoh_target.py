@@ -25,6 +25,8 @@ _HANDSHAKE: Final = 2
 _TAMPERED_S: Final = 1.0
 _TARGETS: Final = ("conveyor/fu1", "conveyor/fu2", "conveyor/fu3", "conveyor/fu4", "pump/drive", "spare/fu1")
 _TOP: Final = "drives/hall"
+_LONGEST_ENCODING: Final = 60
+"""The library panics at more than 255 bytes."""
 
 
 def configure(port: int) -> zenoh.Config:
@@ -83,11 +85,16 @@ class Thrower:
         except (OSError, zenoh.ZError, ValueError, TypeError):
             # The connection has gone, or the library itself does not send such a thing.
             time.sleep(0.001)
+        except BaseException as panic:
+            if type(panic).__name__ != "PanicException":
+                raise
+            # That is the library's own fault, at our end. Its session cannot even be closed any more.
+            self._session = None
 
     def _throw_call(self, case: Case) -> None:
         key, parameters, payload, attachment, encoding = case.parts
         session = self._open()
-        name, options = _text(key), _text(parameters)
+        name, options, what = _text(key), _text(parameters), _text(encoding)[:_LONGEST_ENCODING]
         if case.kind == "declare":
             with contextlib.suppress(zenoh.ZError):
                 session.liveliness().declare_token(name).undeclare()
@@ -96,13 +103,13 @@ class Thrower:
         if case.kind == "put":
             if len(payload) % 5 == 4:
                 session.delete(name, attachment=attachment or None)
-            session.put(name, payload, attachment=attachment or None, encoding=_text(encoding) or None)
+            session.put(name, payload, attachment=attachment or None, encoding=what or None)
             return
         replies = session.get(
             f"{name}?{options}" if options else name,
             payload=payload or None,
             attachment=attachment or None,
-            encoding=_text(encoding) or None,
+            encoding=what or None,
             timeout=_ANSWER_S,
         )
         for _ in replies:

@@ -20,6 +20,8 @@ from tests.fuzz.rig import FUZZ, FUZZ_PASSWORD, STRANGER, Rig
 
 _KINDS: Final = {"get": 70, "put": 12, "declare": 8, "tampered": 3, "raw": 7}
 _ANSWER_S: Final = 0.3
+_MOST_ASKED: Final = 8
+_PATIENCE_S: Final = 10.0
 _HANDSHAKE: Final = 2
 """Messages of a client until its session is open: InitSyn and OpenSyn."""
 _TAMPERED_S: Final = 1.0
@@ -52,6 +54,7 @@ class Thrower:
         self._queries = corpus.of("get")
         self._batches = corpus.parts("raw")
         self._session: zenoh.Session | None = None
+        self._room = threading.BoundedSemaphore(_MOST_ASKED)
 
     def case(self) -> Case:
         kind = self._random.choices(tuple(_KINDS), tuple(_KINDS.values()))[0]
@@ -89,7 +92,7 @@ class Thrower:
             if type(panic).__name__ != "PanicException":
                 raise
             # That is the library's own fault, at our end. Its session cannot even be closed any more.
-            self._session = None
+            self._session, self._room = None, threading.BoundedSemaphore(_MOST_ASKED)
 
     def _throw_call(self, case: Case) -> None:
         key, parameters, payload, attachment, encoding = case.parts
@@ -105,15 +108,31 @@ class Thrower:
                 session.delete(name, attachment=attachment or None)
             session.put(name, payload, attachment=attachment or None, encoding=what or None)
             return
-        replies = session.get(
-            f"{name}?{options}" if options else name,
+        if not self._room.acquire(timeout=_PATIENCE_S):
+            raise OSError("queries do not come to their end")
+        try:
+            self._ask(session, f"{name}?{options}" if options else name, payload, attachment, what)
+        except BaseException:
+            self._make_room()
+            raise
+
+    def _ask(
+        self, session: zenoh.Session, selector: str, payload: bytes, attachment: bytes, what: str
+    ) -> None:
+        """Some queries are under way at a time; the end of each makes room."""
+        session.get(
+            selector,
+            zenoh.handlers.Callback(lambda _: None, self._make_room, indirect=False),
             payload=payload or None,
             attachment=attachment or None,
             encoding=what or None,
             timeout=_ANSWER_S,
         )
-        for _ in replies:
-            pass
+
+    def _make_room(self) -> None:
+        # A query that could not be asked may have come to its end all the same.
+        with contextlib.suppress(ValueError):
+            self._room.release()
 
     def _throw_raw(self, case: Case) -> None:
         with _connect(self._port) as sock:

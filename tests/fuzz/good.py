@@ -18,7 +18,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import zenoh
-from asyncua import Client, ua
+from asyncua import Client, Node, ua
 from pymodbus.client import AsyncModbusTcpClient
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
@@ -42,7 +42,8 @@ class Wrong(Exception):
 
 
 class Busy(Exception):
-    """The telegram may have waited too long: an answer, and to be asked again. A busy machine is no fault."""
+    """The telegram may have waited too long, or the value is said to be old: an answer, and to ask again. A
+    busy machine is no fault."""
 
 
 def check(condition: object, what: object) -> None:
@@ -76,6 +77,15 @@ async def by_modbus(port: int) -> Exchange:
     return exchange
 
 
+async def opcua_value(node: Node) -> int:
+    found = await node.read_data_value(raise_on_bad_status=False)
+    code = found.StatusCode or ua.StatusCode(ua.StatusCodes.Good)
+    if code.value == ua.StatusCodes.UncertainLastUsableValue:
+        raise Busy
+    code.check()
+    return int(found.Value.Value)
+
+
 async def by_opcua(port: int) -> Exchange:
     client = Client(f"opc.tcp://127.0.0.1:{port}", timeout=PATIENCE_S)
     client.set_user(GOOD)
@@ -96,7 +106,7 @@ async def by_opcua(port: int) -> Exchange:
         if {result.value for result in results} == {ua.StatusCodes.BadTimeout}:
             raise Busy
         check(all(result.is_good() for result in results), results)
-        return await status.read_value()
+        return await opcua_value(status)
 
     return exchange
 
@@ -118,6 +128,8 @@ async def by_zenoh(port: int) -> Exchange:
             raise Busy
         check(answer.get("ok") is True and answer.get("forwarded") is True, answer)
         answer = await asyncio.to_thread(ask, "status/status_word", None)
+        if answer.get("q") == "stale":
+            raise Busy
         value = answer.get("v")
         check(isinstance(value, int), answer)
         return int(str(value))
@@ -142,7 +154,7 @@ async def new_on_modbus(port: int) -> int:
 async def new_on_opcua(port: int) -> int:
     async with Client(f"opc.tcp://127.0.0.1:{port}", timeout=PATIENCE_S) as client:
         space = await client.get_namespace_index("urn:drivebridge:points")
-        return await client.get_node(f"ns={space};s=conveyor/fu1/status/status_word").read_value()
+        return await opcua_value(client.get_node(f"ns={space};s=conveyor/fu1/status/status_word"))
 
 
 async def new_on_zenoh(port: int) -> int:

@@ -29,7 +29,7 @@ SPARE: Final = 9
 SPARE_NODES: Final = (6, 7, 8, SPARE)
 _NODES: Final = 1 + len(SPARE_NODES)
 CONTROL_WORD, SETPOINT = 0x047F, 0x1000
-_TIMEOUT_MS: Final = 10_000
+_TIMEOUT_MS: Final = 30_000
 """A busy machine is no fault of the bridge: what its clients wait for is measured, not found by a trip."""
 _READY_S: Final = 90.0
 

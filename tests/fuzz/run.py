@@ -25,7 +25,7 @@ BUILD: Final = REPOSITORY / "build" / "fuzz"
 _KEPT: Final = 400
 """Cases of each protocol that a reproducer has: the last ones before the failure was seen."""
 _LOOK_S: Final = 1.0
-_END_S: Final = 30.0
+_END_S: Final = 45.0
 _AFTER_S: Final = 2.0
 """How long is looked on after the last throw."""
 

@@ -25,6 +25,7 @@ _PATIENCE_S: Final = 10.0
 _HANDSHAKE: Final = 2
 """Messages of a client until its session is open: InitSyn and OpenSyn."""
 _TAMPERED_S: Final = 1.0
+_GIVEN_UP_S: Final = 25.0
 _TARGETS: Final = ("conveyor/fu1", "conveyor/fu2", "conveyor/fu3", "conveyor/fu4", "pump/drive", "spare/fu1")
 _TOP: Final = "drives/hall"
 _LONGEST_ENCODING: Final = 60
@@ -55,6 +56,7 @@ class Thrower:
         self._batches = corpus.parts("raw")
         self._session: zenoh.Session | None = None
         self._room = threading.BoundedSemaphore(_MOST_ASKED)
+        self._tampering: threading.Thread | None = None
 
     def case(self) -> Case:
         kind = self._random.choices(tuple(_KINDS), tuple(_KINDS.values()))[0]
@@ -82,7 +84,7 @@ class Thrower:
             if case.kind == "raw":
                 self._throw_raw(case)
             elif case.kind == "tampered":
-                tamper(self._port, Random(case.parts[0]))
+                self._tamper(case)
             else:
                 self._throw_call(case)
         except (OSError, zenoh.ZError, ValueError, TypeError):
@@ -93,6 +95,13 @@ class Thrower:
                 raise
             # That is the library's own fault, at our end. Its session cannot even be closed any more.
             self._session, self._room = None, threading.BoundedSemaphore(_MOST_ASKED)
+
+    def _tamper(self, case: Case) -> None:
+        """Beside everything else, one at a time: the library takes ten seconds to give a bad session up."""
+        if self._tampering is None or not self._tampering.is_alive():
+            arguments = (self._port, Random(case.parts[0]))
+            self._tampering = threading.Thread(target=tamper, args=arguments, daemon=True)
+            self._tampering.start()
 
     def _throw_call(self, case: Case) -> None:
         key, parameters, payload, attachment, encoding = case.parts
@@ -150,6 +159,8 @@ class Thrower:
         if self._session is not None:
             self._session.close()
             self._session = None
+        if self._tampering is not None:
+            self._tampering.join(_GIVEN_UP_S)
 
 
 def _text(raw: bytes) -> str:

@@ -79,7 +79,8 @@ class Figures:
             who = "bus process" if place == 0 else f"front {place}"
             told.append(
                 f"memory of the {who}: {samples[0]:.1f} MB at the beginning, "
-                f"{max(samples):.1f} MB at most, {samples[-1]:.1f} MB at the end"
+                f"{max(samples):.1f} MB at most, {samples[-1]:.1f} MB at the end; "
+                f"{growth_mb(samples):+.1f} MB after the warm-up"
             )
         told.append(f"log: {self.lines} lines")
         return told

@@ -56,8 +56,6 @@ def good_zenoh(port: int) -> zenoh.Session:
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{port}"]))
     config.insert_json5("scouting/multicast/enabled", "false")
-    config.insert_json5("transport/auth/usrpwd/user", json.dumps(GOOD))
-    config.insert_json5("transport/auth/usrpwd/password", json.dumps(PASSWORD))
     return zenoh.open(config)
 
 

@@ -22,7 +22,6 @@ from tests.support.process import REPOSITORY, Process, free_port, running, until
 STRANGER: Final = "127.0.0.9"
 """Where what is thrown comes from, as far as a protocol can tell."""
 GOOD, PASSWORD = "good", "good-password"
-FUZZ, FUZZ_PASSWORD = "fuzz", "fuzz-password"
 GOOD_NODE: Final = 5
 GOOD_RPDOS: Final = {0x205: "fu1", 0x305: "fu2", 0x405: "fu3"}
 SPARE: Final = 9
@@ -106,12 +105,10 @@ def _bus() -> str:
 
 def write_site(folder: Path, modbus: int, opcua: int, zenoh: int) -> Path:
     """The site as ``folder/site.toml``."""
-    users = folder / "zenoh-users"
-    users.write_text(f"bridge:bridge\n{GOOD}:{PASSWORD}\n{FUZZ}:{FUZZ_PASSWORD}\n", encoding="utf-8")
     user = (
         f'[[opcua.user]]\nname = "{GOOD}"\nrole = "operator"\npassword_hash = "{hash_password(PASSWORD)}"\n'
     )
-    zenoh_table = f'{sites.zenoh(zenoh)}user = "bridge"\npassword_file = "{users}"\naccept_put = true\n'
+    zenoh_table = f"{sites.zenoh(zenoh)}accept_put = true\n"
     return sites.write(folder, _bus(), sites.modbus(modbus), sites.opcua(opcua), user, zenoh_table)
 
 

@@ -16,7 +16,7 @@ import zenoh
 
 from tests.fuzz.case import Case, load
 from tests.fuzz.mutate import Mutator
-from tests.fuzz.rig import FUZZ, FUZZ_PASSWORD, STRANGER, Rig
+from tests.fuzz.rig import STRANGER, Rig
 
 _KINDS: Final = {"get": 70, "put": 12, "declare": 8, "tampered": 3, "raw": 7}
 _ANSWER_S: Final = 0.3
@@ -28,6 +28,8 @@ _TAMPERED_S: Final = 1.0
 _GIVEN_UP_S: Final = 25.0
 _TARGETS: Final = ("conveyor/fu1", "conveyor/fu2", "conveyor/fu3", "conveyor/fu4", "pump/drive", "spare/fu1")
 _TOP: Final = "drives/hall"
+_OF_USERS: Final = f"{_TOP}/@/controller/fuzz"
+"""Keys that a site with users has."""
 _LONGEST_ENCODING: Final = 60
 """The library panics at more than 255 bytes."""
 
@@ -38,8 +40,6 @@ def configure(port: int) -> zenoh.Config:
     config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{port}"]))
     config.insert_json5("connect/timeout_ms", "2000")
     config.insert_json5("scouting/multicast/enabled", "false")
-    config.insert_json5("transport/auth/usrpwd/user", json.dumps(FUZZ))
-    config.insert_json5("transport/auth/usrpwd/password", json.dumps(FUZZ_PASSWORD))
     return config
 
 
@@ -76,7 +76,8 @@ class Thrower:
     def _key(self, key: bytes) -> bytes:
         _, found, leaf = key.rpartition(b"/command")
         if found and self._random.randrange(2):
-            key = f"{_TOP}/{self._random.choice(_TARGETS)}/command".encode() + leaf
+            top = _TOP if self._random.randrange(4) else _OF_USERS
+            key = f"{top}/{self._random.choice(_TARGETS)}/command".encode() + leaf
         return self._mutator.mutate_text(key) if self._random.randrange(4) == 0 else key
 
     def throw(self, case: Case) -> None:

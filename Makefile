@@ -4,6 +4,11 @@
 # LAB=0       leave out the tests that need a CAN interface, and the Debian packages they need
 # APT=0       install no Debian packages, only say which are missing
 # JOBS=n      how many tests run at a time; 0 in this process, as a debugger wants  (default: CPUs)
+# FUZZ=s      how long make fuzz takes for each protocol, in seconds  (default: 600)
+# PROTOCOL=.. the one that make fuzz throws at: opcua, modbus, zenoh or can  (default: all)
+# SEED=n      a number that make fuzz has printed, to throw the same again
+# KNOWN=...   a regular expression: faults that make fuzz lets pass, to find others
+# REPLAY=...  a file that make fuzz has kept: throw what it has; REDUCE=1 finds the few cases that do it
 # ARGS=...    further arguments, e.g. make unit ARGS='-k watchdog -x'
 
 SHELL := /bin/bash
@@ -42,7 +47,7 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 	@exec $(IN) -m bridge demo $(ARGS)
 
 ##@ Test
-test: unit wire lab ## all tests: unit, wire, lab
+test: unit wire fuzz-short lab ## all tests: unit, wire, a minute of fuzzing, lab
 
 unit: $(VENV)/dev.stamp ## tests of the code alone
 	@echo "== unit tests"
@@ -80,6 +85,15 @@ endif
 # Each test that starts a process would compile all of it anew where nothing may be written.
 compiled: $(VENV)/dev.stamp
 	@$(IN) -m compileall -q bridge tests/peers tests/support
+
+fuzz-short: compiled ## a minute of fuzzing for each protocol, two at a time, always the same
+	@echo "== fuzzing, a minute for each protocol"
+	@$(PYTEST) -p no:cacheprovider -rs tests/fuzz $(ARGS)
+
+FUZZ ?= 600
+
+fuzz: compiled ## throw changed messages at the bridge, 10 minutes for each protocol
+	@$(IN) -m tests.fuzz $(PROTOCOL) --seconds $(FUZZ) $(SEED:%=--seed %) $(REPLAY:%=--replay %) $(if $(REDUCE),--reduce) $(if $(KNOWN),--known '$(KNOWN)')
 
 bench: compiled packages ## print the measured figures
 	@echo "== figures: this machine"
@@ -166,5 +180,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test unit wire lab packages clients compiled bench proof proof-mutants check check-style check-format check-types \
+.PHONY: demo test unit wire lab packages clients compiled fuzz fuzz-short bench proof proof-mutants check check-style check-format check-types \
   check-imports format docs setup lock wheel clean help

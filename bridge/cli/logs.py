@@ -7,7 +7,7 @@ import logging
 import os
 from typing import Any, Final
 
-from bridge.cli.terminal import printable_lines
+from bridge.cli.terminal import printable, printable_lines
 from bridge.quietlog import QuietHandler, about
 
 _log = logging.getLogger(__name__)
@@ -23,7 +23,10 @@ _PRIORITY: Final = {
 
 
 class _Formatter(logging.Formatter):
-    """What devices call themselves is in the log, too."""
+    """What devices and clients call themselves is in the log, too: it makes no line of its own there."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:
+        return printable(super().formatMessage(record))
 
     def format(self, record: logging.LogRecord) -> str:
         return printable_lines(super().format(record))

@@ -85,7 +85,7 @@ def test_an_error_is_shown_escaped_line_by_line(
 
 
 @pytest.mark.parametrize("journal", [True, False])
-def test_so_is_the_log(
+def test_what_the_log_is_told_is_one_line(
     journal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delenv("JOURNAL_STREAM", raising=False)
@@ -100,7 +100,7 @@ def test_so_is_the_log(
         root.handlers[:], root.level = before
     shown = capsys.readouterr().err
     assert "\x1b" not in shown
-    assert shown.count("\n") == 2
+    assert shown.count("\n") == 1
 
 
 def run(words: list[str]) -> None:

@@ -30,7 +30,7 @@ from bridge.zenohlink.message import (
     to_bytes,
     to_message,
 )
-from bridge.zenohlink.worker import Worker
+from bridge.zenohlink.worker import ZENOH_ERRORS, Worker
 
 Result = TypeVar("Result")
 
@@ -65,7 +65,13 @@ class Asked:
         return replace(self, _lane=self._link.own_lane(self._lane), _is_apart=True)
 
     def send(self, messages: Sequence[Message]) -> None:
-        self._do(lambda session: reply(session, self._query, messages))
+        """With the time of now: what is published later is newer, whenever this goes out."""
+        try:
+            stamp = self._lane.session.new_timestamp()
+        except ZENOH_ERRORS:
+            self._link.note_drop()
+            return
+        self._do(lambda _: reply(self._query, messages, stamp))
 
     async def settle(self) -> None:
         """Wait until what was sent so far has gone, or has been given up."""

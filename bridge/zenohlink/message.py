@@ -47,16 +47,16 @@ def publish(session: zenoh.Session, message: Message) -> None:
     )
 
 
-def reply(session: zenoh.Session, query: zenoh.Query, messages: Sequence[Message]) -> None:
-    """Each with the time of now: where a storage has an older sample of the key, the asker's zenoh takes the
-    newer one, and takes one without a time for older than any."""
+def reply(query: zenoh.Query, messages: Sequence[Message], stamp: zenoh.Timestamp) -> None:
+    """``stamp``: where a storage has an older sample of the key, the asker's zenoh takes the newer one, and
+    takes one without a time for older than any."""
     for message in messages:
         query.reply(
             message.key,
             message.payload,
             encoding=message.encoding or None,
             attachment=message.attachment,
-            timestamp=session.new_timestamp(),
+            timestamp=stamp,
         )
 
 

@@ -18,7 +18,10 @@ _LEASE_MS: Final = 1000
 """A peer that falls silent is noticed within this time; zenoh's default is 10 s."""
 _STALLED_US: Final = 500_000
 """How long a query or a reply waits for a peer that does not read before the connection is closed."""
+_STALLED_AMONG_OTHERS_US: Final = 100_000
+"""The same where others must not notice: inside zenoh they do, now and then."""
 
+_WAIT: Final = "transport/link/tx/queue/congestion_control/block/wait_before_close"
 _MOST_BATCHES: Final = 16
 """Of 64 KiB, made when they are needed. With the two of zenoh's default an answer would be dropped when the
 machine is busy for a moment."""
@@ -32,12 +35,15 @@ def zenoh_config(
     users: tuple[str, str, str] | None = None,
     access: Mapping[str, object] | None = None,
     prompt: Sequence[str] = (),
+    waiting: Sequence[str] = (),
 ) -> zenoh.Config:
     """Settings of a session that finds nobody by itself and notices a silent peer within a second.
 
     ``users`` is our own user, its password, and the path of a file with a line ``user:password`` for
-    each who may connect. ``access`` is zenoh's ``access_control``. What answers a query on a key of
-    ``prompt`` never waits: it goes ahead of published values, and is dropped where the asker does not read.
+    each who may connect. ``access`` is zenoh's ``access_control``. With ``prompt``, what answers a query
+    never waits and is dropped where the asker does not read, except on the keys of ``waiting``; on those of
+    ``prompt``, which may be among them, it does not wait either and goes ahead of published values.
+
     Raises Unavailable where an endpoint is not one.
     """
     settings: dict[str, object] = {
@@ -52,14 +58,16 @@ def zenoh_config(
         "scouting/gossip/enabled": False,
         "timestamping/enabled": True,
         "transport/link/tx/lease": _LEASE_MS,
-        "transport/link/tx/queue/congestion_control/block/wait_before_close": _STALLED_US,
+        _WAIT: _STALLED_US,
         "transport/shared_memory/enabled": False,
     }
     if access:
         settings["access_control"] = access
     if prompt:
-        settings["qos/network"] = [_prompt(prompt)]
+        settings["qos/network"] = _replies(prompt, waiting)
+        settings[_WAIT] = _STALLED_AMONG_OTHERS_US
         settings["transport/link/tx/queue/size/interactive_high"] = _MOST_BATCHES
+        settings["transport/link/tx/queue/size/background"] = _MOST_BATCHES
     if users:
         user, password, file = users
         settings["transport/auth/usrpwd/user"] = user
@@ -74,7 +82,22 @@ def zenoh_config(
     return config
 
 
-def _prompt(keys: Sequence[str]) -> dict[str, object]:
-    """Replies, and the end of them, have what their query has: so it is changed as it comes in."""
-    overwrite = {"congestion_control": "drop", "priority": "interactive_high"}
-    return {"messages": ["query"], "flows": ["ingress"], "key_exprs": list(keys), "overwrite": overwrite}
+def _replies(prompt: Sequence[str], waiting: Sequence[str]) -> list[dict[str, object]]:
+    """Replies, and the end of them, have what their query has: so it is changed as it comes in, by each of
+    these after the other. Each kind has a queue, and with it a lock, of its own: what may be dropped would
+    else wait for what waits. zenoh ends a query that is for nobody on a thread that reads for all
+    connections."""
+    rules: tuple[tuple[Sequence[str], str, str], ...] = (
+        (("**", "*/**/@/**"), "drop", "background"),
+        (waiting, "block", "data_low"),
+        (prompt, "drop", "interactive_high"),
+    )
+    return [
+        {
+            "messages": ["query"],
+            "flows": ["ingress"],
+            "key_exprs": list(keys),
+            "overwrite": {"congestion_control": control, "priority": priority},
+        }
+        for keys, control, priority in rules
+    ]

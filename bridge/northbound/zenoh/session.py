@@ -293,4 +293,5 @@ def _config(settings: ZenohTable, space: keys.KeySpace, users: Users) -> zenoh.C
         users=(login.user, login.password, login.file) if login else None,
         access=access_control(space, users, accept_put=settings.accept_put),
         prompt=space.prompt,
+        waiting=(space.everything,),
     )

@@ -72,6 +72,30 @@ def test_it_is_booted_supervised_read_written_and_exchanges_pdos(foreign: Foreig
     within(5.0, lambda: foreign.inputs(0, 2) == [READY, 0], "stands")
 
 
+def test_one_that_keeps_an_error_is_back_by_itself(tmp_path: Path) -> None:
+    """One SYNC of two bytes, and it refuses Operational until its communication is reset."""
+    site = lab_site(tmp_path, timeout_ms=2000, controls=("modbus",), bus='on_intruder = "report"')
+    with ExitStack() as stack:
+        bus = stack.enter_context(sniffing())
+        slave = stack.enter_context(peer(tmp_path, "foreign_slave", "vcan0", "5", "latches"))
+        slave.wait_output("is there")
+        arguments = ("run", str(site.path), "--role", "bus")
+        bridge = stack.enter_context(drivebridge(tmp_path, "run", *arguments, notify=True))
+        bridge.wait_ready()
+        bridge.wait_output("node operational")
+        begun = time.time()
+        bus.send(0x80, b"\0\0")
+        bridge.wait_output("1001h is 11h (generic error, communication), 1003h: 8240h", 30.0)
+        bridge.wait_output("reset communication by the bridge, once", 30.0)
+        (reset,) = [frame for frame in bus.of(0, begun) if frame.data[:1] == b"\x82"]
+        assert reset.data == b"\x82\x05"
+        within(
+            20.0,
+            lambda: any(frame.data == b"\x05" for frame in bus.of(0x705, reset.time)),
+            "operational again",
+        )
+
+
 def test_it_is_lost_when_it_dies_and_back_when_it_is_back(foreign: Foreign, tmp_path: Path) -> None:
     foreign.write(0x047E, 0, 0, 0)
     within(5.0, lambda: foreign.inputs(11) == [GOOD], "good")

@@ -1,10 +1,11 @@
 """A CANopen slave that we did not write: canopen.LocalNode, dressed as a SK TU4-CAO with one drive.
 
-foreign_slave.py CHANNEL NODE_ID [asked]
+foreign_slave.py CHANNEL NODE_ID [asked] [latches]
 
 Its object dictionary has what the master asks for. Each RPDO is answered by a TPDO whose status word is
 that of a simple drive and whose first actual value is the setpoint. With ``asked`` the TPDO has type 253 and
-comes on a remote frame only.
+comes on a remote frame only. With ``latches`` it keeps a SYNC of a wrong length as an error (EMCY 8240h) and
+refuses Operational until its communication is reset.
 """
 
 import sys
@@ -23,6 +24,8 @@ from canopen.objectdictionary import (
 )
 
 ON_REMOTE_FRAME = 253
+START, ENTER_PRE_OPERATIONAL, RESET_NODE, RESET_COMMUNICATION = 0x01, 0x80, 0x81, 0x82
+WRONG_LENGTH = 0x8240
 READY, RUNNING, INHIBITED = 0x0B31, 0x0B37, 0x0B40
 
 
@@ -57,6 +60,7 @@ def dictionary(node_id: int) -> canopen.ObjectDictionary:
     od.node_id = node_id
     od.add_object(variable("device type", 0x1000, 0, UNSIGNED32, 0x00010192, "ro"))
     od.add_object(variable("error register", 0x1001, 0, UNSIGNED8, 0, "ro"))
+    record(od, 0x1003, "errors", (UNSIGNED32, 0))
     od.add_object(variable("device name", 0x1008, 0, VISIBLE_STRING, "canopen.LocalNode", "const"))
     od.add_object(variable("heartbeat", 0x1017, 0, UNSIGNED16, 0))
     record(od, 0x1018, "identity", *((UNSIGNED32, value) for value in (0x1234, 2, 3, 4)))
@@ -93,7 +97,41 @@ class Asked(can.Listener):
             self._node.tpdo[1].transmit()
 
 
-def main(channel: str, node_id: int, *, asked: bool) -> None:
+class Latch:
+    """Between the network and the node's NMT."""
+
+    def __init__(self, network: canopen.Network, node: canopen.LocalNode) -> None:
+        self._node = node
+        self._is_set = False
+        network.unsubscribe(0, node.nmt.on_command)
+        network.subscribe(0, self.on_nmt)
+        network.subscribe(0x80, self.on_sync)
+
+    def on_sync(self, can_id: int, data: bytes, timestamp: float) -> None:
+        if data and not self._is_set:
+            self._set(True)
+            self._node.emcy.send(WRONG_LENGTH, 0x11)
+            self._node.nmt.send_command(ENTER_PRE_OPERATIONAL)
+
+    def on_nmt(self, can_id: int, data: bytes, timestamp: float) -> None:
+        command, node_id = data
+        if node_id not in (0, self._node.id) or (command == START and self._is_set):
+            return
+        if command not in (RESET_NODE, RESET_COMMUNICATION):
+            self._node.nmt.on_command(can_id, data, timestamp)
+            return
+        if command == RESET_COMMUNICATION:
+            self._set(False)
+        self._node.nmt.send_command(command)  # boot-up
+        self._node.nmt.send_command(ENTER_PRE_OPERATIONAL)
+
+    def _set(self, is_set: bool) -> None:
+        self._is_set = is_set
+        self._node.sdo[0x1001].raw = 0x11 if is_set else 0
+        self._node.sdo[0x1003][1].raw = WRONG_LENGTH
+
+
+def main(channel: str, node_id: int, *, asked: bool, latches: bool) -> None:
     network = canopen.Network()
     node = network.create_node(node_id, dictionary(node_id))
     if asked:
@@ -112,6 +150,8 @@ def main(channel: str, node_id: int, *, asked: bool) -> None:
 
     node.rpdo[1].subscribe()
     node.rpdo[1].add_callback(answer)
+    if latches:
+        Latch(network, node)
     node.nmt.send_command(0)  # boot-up
     print("the foreign slave is there", flush=True)
     while True:
@@ -119,4 +159,9 @@ def main(channel: str, node_id: int, *, asked: bool) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]), asked="asked" in sys.argv[3:])
+    main(
+        sys.argv[1],
+        int(sys.argv[2]),
+        asked="asked" in sys.argv[3:],
+        latches="latches" in sys.argv[3:],
+    )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
@@ -18,6 +17,7 @@ from bridge.northbound.opcua.admission import DEADLINE_S, Stage
 from bridge.northbound.opcua.security import hash_password
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support.opcua_site import OPEN, connected, serving
+from tests.support.quiet import quiet_log
 
 Streams = list[tuple[asyncio.StreamReader, asyncio.StreamWriter]]
 HELLO = b"HELF\x20\0\0\0" + bytes(4) + (65535).to_bytes(4, "little") * 2 + bytes(12)
@@ -55,16 +55,13 @@ async def reads(server: OpcUaServer) -> float:
 
 
 @pytest.mark.parametrize("says", [b"", HELLO], ids=["nothing", "hello"])
-async def test_idle_sockets_keep_nobody_out(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, says: bytes
-) -> None:
+async def test_idle_sockets_keep_nobody_out(tmp_path: Path, says: bytes) -> None:
     async with serving(OPEN, tmp_path) as (server, _):
-        with caplog.at_level(logging.WARNING):
-            caplog.clear()
+        with quiet_log() as log:
             async with connected(server) as present, idle(server, 300, says):
                 assert await reads(server) < 5
                 await present.nodes.server_state.read_value()
-    told = [record.getMessage() for record in caplog.records if "127.0.0.1" in record.getMessage()]
+    told = [line for line in log.lines if "127.0.0.1" in line]
     assert len(told) == 1, told
     assert "made room" in told[0]
 

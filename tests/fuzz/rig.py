@@ -100,7 +100,7 @@ def _bus() -> str:
         ),
         sites.node(_drive("fu1", "modbus", 8, sites.SCALED), name="spare", node_id=SPARE, more=slow),
     )
-    return sites.bus(*nodes, more='deadman_ms = 500\nsync_period_ms = 20\non_intruder = "report"')
+    return sites.bus(*nodes, more='deadman_ms = 2000\nsync_period_ms = 20\non_intruder = "report"')
 
 
 def write_site(folder: Path, modbus: int, opcua: int, zenoh: int) -> Path:

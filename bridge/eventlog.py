@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 
 from bridge.command import Event
-from bridge.quietlog import about
+from bridge.command.event import REPEATING
+from bridge.quietlog import A_FEW, about
 
 _log = logging.getLogger("bridge.events")
 
@@ -16,13 +17,8 @@ class EventLog:
 
     def __call__(self, event: Event) -> None:
         kind = event.kind, event.severity
-        _log.log(
-            _level(event.severity),
-            "%s: %s",
-            event.source,
-            event.message,
-            extra=about(event.source, kind),
-        )
+        extra = about(event.source, kind, first=1 if event.kind in REPEATING else A_FEW)
+        _log.log(_level(event.severity), "%s: %s", event.source, event.message, extra=extra)
 
 
 def _level(severity: int) -> int:

@@ -14,6 +14,7 @@ from typing import Final, Protocol
 from bridge.command import Event, Kind, Plant
 from bridge.errors import BridgeError
 from bridge.notify import Notifier
+from bridge.quietlog import about
 
 _log = logging.getLogger(__name__)
 
@@ -116,7 +117,7 @@ class Parts:
         except (BridgeError, OSError) as error:
             return f"has failed: {error}"
         except Exception as error:  # noqa: BLE001 - one of them must not stop the drives of the others
-            _log.exception("unexpected")
+            _log.exception("unexpected", extra=about(part.name))
             return f"has failed: {error!r}"
 
     def _fails(self, part: Part, how: str, pause_s: float) -> None:

@@ -1,4 +1,5 @@
-"""Lines of the log that others can bring about: the first of each kind and source, then how many.
+"""Lines of the log that others can bring about: the first of each kind and source, then how many. Of what is
+told of the plant the first few, so that a node that is lost and comes back twice is there twice.
 
 All of them go through one handler, so that a line that nobody has thought of fills no disk either.
 """
@@ -16,12 +17,14 @@ from bridge.ratelimit import PAUSE_S, Repeats
 
 _KIND: Final = "line_kind"
 _SOURCE: Final = "line_source"
+_FIRST: Final = "line_first"
+A_FEW: Final = 3
 
 
-def about(source: str, kind: Hashable = None) -> dict[str, Hashable]:
-    """For ``extra`` of a call that others bring about: who or what it is about. Lines of one call are of one
-    kind unless ``kind`` tells them apart."""
-    return {_SOURCE: source, _KIND: kind}
+def about(source: str, kind: Hashable = None, *, first: int = 1) -> dict[str, Hashable]:
+    """For ``extra`` of a call that others bring about: who or what it is about, and how many are told before
+    they are counted. Lines of one call are of one kind unless ``kind`` tells them apart."""
+    return {_SOURCE: source, _KIND: kind, _FIRST: first}
 
 
 class QuietHandler(logging.StreamHandler[Any]):
@@ -56,9 +59,9 @@ class QuietHandler(logging.StreamHandler[Any]):
         place = record.pathname, record.lineno
         if hasattr(record, _SOURCE):
             kind = place, getattr(record, _KIND)
-            return self._repeats.admits(kind, getattr(record, _SOURCE), record, now)
+            return self._repeats.admits(kind, getattr(record, _SOURCE), record, now, getattr(record, _FIRST))
         # Nobody says what it is about: the text does, which may be different each time.
-        return self._repeats.admits(place, record.getMessage(), record, now)
+        return self._repeats.admits(place, record.getMessage(), record, now, A_FEW)
 
     def sum_up(self) -> None:
         """Write the counts that are due; from any thread."""

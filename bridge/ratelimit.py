@@ -39,23 +39,25 @@ class RateLimit:
 
 @dataclass(slots=True)
 class _Told(Generic[Item]):
-    """What is kept of one kind and source since ``at``; ``last`` is the newest that was left out."""
+    """What is kept of one kind and source since ``at``: ``lines`` were told, and ``last`` is the newest of
+    those that were not."""
 
     at: float
+    lines: int = 1
     left_out: int = 0
     last: Item | None = None
 
 
 class Repeats(Generic[Item]):
-    """The first of each kind and source is told, then how many there were: once every ``pause_s``, as long as
-    there are more."""
+    """The first of each kind and source are told, then how many there were: once every ``pause_s``, as long
+    as there are more."""
 
     def __init__(self, pause_s: float = PAUSE_S) -> None:
         self._pause_s = pause_s
         self._told: dict[Hashable, dict[Hashable, _Told[Item]]] = {}
 
-    def admits(self, kind: Hashable, source: Hashable, item: Item, now: float) -> bool:
-        """Whether ``item`` is told now; else it is counted."""
+    def admits(self, kind: Hashable, source: Hashable, item: Item, now: float, first: int = 1) -> bool:
+        """Whether ``item`` is told now, as one of the ``first``; else it is counted."""
         if kind not in self._told and len(self._told) >= _MOST_KINDS:
             self._forget(now)
             kind = kind if len(self._told) < _MOST_KINDS else None
@@ -65,6 +67,9 @@ class Repeats(Generic[Item]):
         told = sources.get(source)
         if told is None or self._is_over(told, now):
             sources[source] = _Told(now)
+            return True
+        if told.lines < first:
+            told.lines += 1
             return True
         told.left_out += 1
         told.last = item

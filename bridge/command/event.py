@@ -32,7 +32,8 @@ class Event:
     message: str
 
 
-_REPEATING: Final = frozenset((Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION, Kind.INTRUDER))
+REPEATING: Final = frozenset((Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION, Kind.INTRUDER))
+"""Kinds of which somebody can cause as many as he likes."""
 _MOST_A_SECOND: Final = 10
 
 
@@ -47,7 +48,7 @@ class EventGate:
 
     def admits(self, event: Event) -> bool:
         """Whether this event is told: of a kind that repeats, at most ten a second of each source."""
-        if event.kind not in _REPEATING:
+        if event.kind not in REPEATING:
             return True
         key = (event.source, event.kind)
         begin, told = self._told.get(key, (event.time, 0))

@@ -136,7 +136,11 @@ class Judge:
 
     def _measure_memory(self) -> None:
         for pid in self._pids:
-            pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
+            try:
+                pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
+            except (OSError, IndexError):
+                # It has just ended: the next look says so.
+                continue
             self.figures.memory_mb.setdefault(pid, []).append(pages * _PAGE_MB)
 
     def _look_at_log(self) -> list[str]:

@@ -101,16 +101,19 @@ class ZenohLink:
     keep their order, except that of several ``put`` on one key only the newest may be sent.
 
     Queries are answered in two lanes beside that: those of which ``is_prompt`` is true of the key, where no
-    reply may wait (``prompt`` of the session's settings), and all others.
+    reply may wait (``prompt`` of the session's settings), and all others. It is given where strangers
+    connect.
     """
 
     def __init__(
-        self, config: zenoh.Config, name: str, is_prompt: Callable[[str], bool] = lambda _: True
+        self, config: zenoh.Config, name: str, is_prompt: Callable[[str], bool] | None = None
     ) -> None:
         self.name = name
-        self._is_prompt = is_prompt
+        self._is_prompt = is_prompt or (lambda _: True)
         self._dropped = 0
-        self._worker = Worker(config, name, self._on_opened, self._on_closed)
+        self._worker = Worker(
+            config, name, self._on_opened, self._on_closed, is_for_strangers=is_prompt is not None
+        )
         self._latest: dict[str, Message] = {}
         self._batch_is_out = False
 

@@ -36,6 +36,10 @@ class Worker:
 
     ``opened`` (None, or the error) and ``closed`` are called on the worker's thread. The thread is a
     daemon: where zenoh does not come back, the process can end without it.
+
+    ``is_for_strangers``: peers may hang, and must not hold up the others (``sockets.py``). Not for a session
+    between our own processes: with it a front that was stopped itself often did not find back (the fault
+    "front stopped" of tests/proof).
     """
 
     def __init__(
@@ -44,6 +48,8 @@ class Worker:
         name: str,
         opened: Callable[[Exception | None], None],
         closed: Callable[[], None],
+        *,
+        is_for_strangers: bool = False,
     ) -> None:
         self.name = name
         self.errors = 0
@@ -52,6 +58,7 @@ class Worker:
         """What is undeclared before the session is closed; only jobs touch it."""
         self.tokens: dict[str, zenoh.LivelinessToken] = {}
         self._config = config
+        self._is_for_strangers = is_for_strangers
         self._opened = opened
         self._closed = closed
         self._jobs: SimpleQueue[Job] = SimpleQueue()
@@ -119,7 +126,8 @@ class Worker:
             self._opened(error)
             return
         self._opened(None)
-        self._try(lambda: self._watch_links(session))
+        if self._is_for_strangers:
+            self._try(lambda: self._watch_links(session))
         try:
             while not self.is_stopping:
                 job = self._jobs.get()

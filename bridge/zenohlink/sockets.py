@@ -12,6 +12,8 @@ from typing import Final
 
 _OFF: Final = struct.pack("ii", 0, 0)
 _IP: Final = (socket.AF_INET, socket.AF_INET6)
+_SO_DOMAIN: Final = 39
+"""asm-generic/socket.h; Python's socket has no name for it."""
 _FILES: Final = Path("/proc/self/fd")
 
 
@@ -31,14 +33,25 @@ def close_without_waiting() -> int:
 def _stop_waiting(number: int) -> bool:
     # It may be closed, and its number be another's, at any moment: what is asked and set is our own copy's.
     copy = os.dup(number)
-    if not stat.S_ISSOCK(os.fstat(copy).st_mode):
+    try:
+        return stat.S_ISSOCK(os.fstat(copy).st_mode) and _let_go(copy)
+    finally:
+        # Always: a copy of the broadcast manager's socket would keep its bursts on the bus.
         os.close(copy)
-        return False
-    with socket.socket(fileno=copy) as connection:
-        if connection.family not in _IP or connection.type != socket.SOCK_STREAM:
+
+
+def _let_go(copy: int) -> bool:
+    # Family and type are named, or Python would ask for the address, which not every socket has.
+    connection = socket.socket(socket.AF_INET, socket.SOCK_STREAM, 0, fileno=copy)
+    try:
+        if connection.getsockopt(socket.SOL_SOCKET, _SO_DOMAIN) not in _IP:
+            return False
+        if connection.getsockopt(socket.SOL_SOCKET, socket.SO_TYPE) != socket.SOCK_STREAM:
             return False
         state = connection.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, len(_OFF))
         if state[: len(_OFF) // 2] == _OFF[: len(_OFF) // 2]:
             return False
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _OFF)
         return True
+    finally:
+        connection.detach()

@@ -37,9 +37,8 @@ class Worker:
     ``opened`` (None, or the error) and ``closed`` are called on the worker's thread. The thread is a
     daemon: where zenoh does not come back, the process can end without it.
 
-    ``is_for_strangers``: peers may hang, and must not hold up the others (``sockets.py``). Not for a session
-    between our own processes: with it a front that was stopped itself often did not find back (the fault
-    "front stopped" of tests/proof).
+    ``is_for_strangers``: peers may hang, and must not hold up the others (``sockets.py``). Between our own
+    processes the supervisor ends a front that does.
     """
 
     def __init__(

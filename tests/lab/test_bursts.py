@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import time
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +13,7 @@ from bridge.southbound.bus.burstend import BurstEnd
 from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.socketcan import SocketCanBus
 from bridge.southbound.canopen.sync import burst_length
+from bridge.zenohlink.sockets import close_without_waiting
 from tests.support.sniffer import sniffing
 
 DEADMAN_MS = 100
@@ -125,3 +128,13 @@ async def renew(bus: SocketCanBus, period_s: float, count: int, seconds: float) 
             renew_at = now + DEADMAN_MS / 3000
         bus.on_time(now)
         await asyncio.sleep(0.003)
+
+
+def test_zenohs_look_at_the_sockets_leaves_no_copy_of_the_manager() -> None:
+    """It would keep the bursts on the bus when the bridge has closed its own."""
+    manager = socket.socket(socket.AF_CAN, socket.SOCK_DGRAM, socket.CAN_BCM)
+    with manager, socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW):
+        manager.connect(("vcan0",))
+        before = len(list(Path("/proc/self/fd").iterdir()))
+        close_without_waiting()
+        assert len(list(Path("/proc/self/fd").iterdir())) == before

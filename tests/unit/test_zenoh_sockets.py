@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 import struct
 from pathlib import Path
+
+import pytest
 
 from bridge.zenohlink.sockets import close_without_waiting
 
@@ -41,3 +44,18 @@ def test_every_tcp_connection_is_found_and_no_other_file_is_touched() -> None:
         assert accepted.recv(20) == b"still there"
         local.send(b"x")
         assert remote.recv(1) == b"x"
+
+
+def test_no_copy_is_left_whatever_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A copy of the broadcast manager's socket would keep its bursts on the bus."""
+
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(errno.EOPNOTSUPP, "no address")
+
+    with socket.socket(socket.AF_UNIX), socket.socket(socket.AF_INET):
+        before = len(list(Path("/proc/self/fd").iterdir()))
+        close_without_waiting()
+        monkeypatch.setattr(socket, "socket", refuse)
+        for _ in range(10):
+            close_without_waiting()
+        assert len(list(Path("/proc/self/fd").iterdir())) == before

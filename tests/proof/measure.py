@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Final
@@ -14,7 +15,8 @@ from tests.proof.witness import Run
 
 _SILENT_S: Final = max(0.1, 3 * PLANT.rpdo_period_ms / 1000)
 _STOPPED: Final = 0x04
-"""NMT state, in a heartbeat or, with the toggle bit, in an answer to node guarding."""
+_OPERATIONAL: Final = 0x05
+"""NMT states, in a heartbeat or, with the toggle bit, in an answer to node guarding."""
 _BOOT_UP: Final = b"\0"
 _BEFORE_S: Final = 2.0
 _TINY_S: Final = 1e-6
@@ -163,12 +165,20 @@ def sent_at(rig: Rig, drive: Drive, run: Run) -> float:
     return rig.board.sent_at(drive.place, drive.telegram(run.data) % NUMBERS)
 
 
-def stopping(rig: Rig, drive: Drive, bus: float) -> bytes | None:
+def stopping(rig: Rig, drive: Drive, bus: float, until: float = math.inf) -> bytes | None:
     """The first RPDO that did not enable, from the moment ``bus`` on when the bus began to stop the drive."""
     for run in rig.told.runs(drive.rpdo, bus):
-        if run.first >= bus and not drive.enabling(run.data):
+        if bus <= run.first < until and not drive.enabling(run.data):
             return run.data
     return None
+
+
+def spoken_to(rig: Rig, drive: Drive, bus: float, own: float) -> bytes | None:
+    """The first RPDO that did not enable a drive which silence was to stop, and which stopped at ``own``. A
+    machine that stood still meanwhile may have lost the node: its new boot-up begins with a stop."""
+    states = rig.heard.runs(0x700 + drive.node_id, own)
+    has_left = any(run.last >= own and run.data[0] & 0x7F != _OPERATIONAL for run in states)
+    return stopping(rig, drive, bus, own if has_left else math.inf)
 
 
 def keeps_setpoint(rig: Rig, drive: Drive, bus: float) -> bool:

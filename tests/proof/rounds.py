@@ -90,7 +90,7 @@ def _wrong(rig: Rig, fault: Fault, drive: Drive, times: tuple[float, float], wor
     if not fault.of_controller:
         return ""
     if drive.reaction == "silence":
-        word = measure.stopping(rig, drive, times[0])
+        word = measure.spoken_to(rig, drive, *times)
         return f"stopped by {word.hex()}, and not by silence" if word else ""
     if not fault.leaves_silence and (word is None or not drive.reacts(word)):
         return f"stopped by {word.hex() if word else 'nothing'}, and not by {drive.reaction}"

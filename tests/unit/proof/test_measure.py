@@ -16,6 +16,7 @@ from tests.proof.measure import (
     handed_on,
     held,
     keeps_setpoint,
+    spoken_to,
     stopping,
     was_enabled,
     was_moving,
@@ -46,6 +47,7 @@ class Scene:
 
     told: Seen = field(default_factory=Seen)
     said: Seen = field(default_factory=Seen)
+    heard: Seen = field(default_factory=Seen)
     time: float = 20.0
 
     def now(self) -> float:
@@ -207,3 +209,13 @@ def test_what_exceeds_its_bound_by_more_than_the_machine_stood_still_has_failed(
     change: dict[str, Any], verdict: str
 ) -> None:
     assert replace(SAMPLE, **change).verdict == verdict
+
+
+def test_a_drive_that_silence_stops_is_not_spoken_to() -> None:
+    enabled = bytes.fromhex("09000d2000000000")
+    rig = scene(told=[Run(9.0, 12.0, enabled), Run(14.0, 15.0, bytes(8))], drive=PUMP)
+    rig.heard.frames[0x700 + PUMP.node_id] = [Run(0.0, 15.0, b"\x05")]
+    assert spoken_to(rig, PUMP, 12.1, 12.5) == bytes(8)
+    rig.heard.frames[0x700 + PUMP.node_id] = [Run(0.0, 14.1, b"\x05"), Run(14.2, 15.0, b"\x7f")]
+    assert spoken_to(rig, PUMP, 12.1, 12.5) is None, "a boot-up of its node"
+    assert spoken_to(rig, PUMP, 12.1, 14.1) == bytes(8), "before it had stopped by itself"

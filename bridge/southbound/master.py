@@ -18,6 +18,7 @@ from bridge.errors import OperationFailed
 from bridge.ratelimit import RateLimit
 from bridge.southbound.bus import open_all
 from bridge.southbound.bus.burstend import MOST_FRAMES, BurstEnd
+from bridge.southbound.bus.frame import Frame
 from bridge.southbound.bus.interface import Bus, ControllerState
 from bridge.southbound.canopen.sync import burst_length
 from bridge.southbound.ending import Ending, end, waits_for
@@ -79,6 +80,10 @@ class _Line:
         """How often bursts are renewed. Those that have to end in a stop reach no further ahead than the
         longest sequence that the kernel takes."""
         return min(self.burst_s, MOST_FRAMES * self.network.bus.rpdo_period_s) / _RENEWALS
+
+    def ended(self, beats: Beats, frames: list[Frame]) -> set[int]:
+        """The bursts that end: what is sent once takes their place, too."""
+        return self.beating.keys() - (beats.keys() - {frame.can_id for frame in frames})
 
     def due(self, beats: Beats, now: float, *, renew: bool) -> list[tuple[Beat, bool]]:
         """What the bus has to be told, and whether that is new: setpoints before the word that enables.
@@ -362,21 +367,25 @@ class Master:
         if routes is not None:
             bus.accept(routes)
             bus.watch(network.ours)
-        for frame in network.take_frames():
+        renew = now >= line.renew_at
+        beats = network.beats(anew=renew)
+        frames = network.take_frames()
+        is_same = beats is line.beats and not frames
+        ended = set[int]() if is_same else line.ended(beats, frames)
+        # First: the kernel must not repeat an enabling word once more after a stopped one.
+        for can_id in ended:
+            bus.silence(can_id)
+            del line.beating[can_id]
+        for frame in frames:
             bus.send(frame, now, now + _SEND_LIMIT_S)
         if not line.was_up:
             return
-        renew = now >= line.renew_at
         if renew:
             line.renew_at = now + line.renew_s
-        beats = network.beats(anew=renew)
-        if beats is line.beats and not renew and now < line.hold_at:
+        if beats is line.beats and not (renew or ended) and now < line.hold_at:
             return
         line.beats = beats
         self._alarm.set(line.burst_s)
-        for can_id in [can_id for can_id in line.beating if can_id not in beats]:
-            bus.silence(can_id)
-            del line.beating[can_id]
         for beat, changed in line.due(beats, now, renew=renew):
             # In this order: the process may be stopped at the end of the look at the clock.
             if self._stood_still(line, now) or self._alarm.rang:

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from bridge.command import Action
 from bridge.config import load_site
-from bridge.southbound.bus.burstend import BurstEnd
 from bridge.southbound.bus.frame import Frame
 from tests.support import sites
 from tests.support.pausing_bench import MAPPING, KernelBus, PausingBench
@@ -37,17 +37,8 @@ class SlowBus(KernelBus):
         super().send(frame, now, deadline)
         self._wait()
 
-    def beat(
-        self,
-        frames: tuple[Frame, ...],
-        now: float,
-        period_s: float,
-        count: int,
-        *,
-        at_once: bool = False,
-        ending: BurstEnd | None = None,
-    ) -> None:
-        super().beat(frames, now, period_s, count, at_once=at_once, ending=ending)
+    def beat(self, *burst: Any, **options: Any) -> None:
+        super().beat(*burst, **options)
         self._wait()
 
     def silence(self, can_id: int) -> None:

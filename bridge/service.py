@@ -12,12 +12,17 @@ from typing import Final
 
 from bridge import __version__, clock
 from bridge.auditlog import AuditLog
+from bridge.can import Bus, open_bus
 from bridge.command import Plant
 from bridge.config import BusTable
 from bridge.errors import BridgeError, OperationFailed
 from bridge.eventlog import EventLog
 from bridge.fronts import Front
 from bridge.lint import Severity, lint
+from bridge.master.ending import Ending
+from bridge.master.master import Master
+from bridge.master.network import Network
+from bridge.master.standstill import Alarm
 from bridge.mirror.endpoint import socket_endpoint
 from bridge.mirror.publisher import MirrorPublisher
 from bridge.northbound.listening import Port
@@ -27,11 +32,6 @@ from bridge.notify import Notifier
 from bridge.parts import Parts, ServerPart
 from bridge.preflight import check_files
 from bridge.project import Project, count
-from bridge.southbound.bus import Bus, open_bus
-from bridge.southbound.ending import Ending
-from bridge.southbound.master import Master
-from bridge.southbound.network import Network
-from bridge.southbound.standstill import Alarm
 from bridge.wear import WearKeeper
 
 _log = logging.getLogger(__name__)

@@ -16,11 +16,11 @@ from bridge.cli.terminal import progress
 from bridge.command import Plant
 from bridge.command.plant import Node
 from bridge.drive import OwnJudgement, OwnVerdict
+from bridge.errands.own_check import AuditErrand
 from bridge.errors import Unavailable
 from bridge.lint import WorstCase, lint
 from bridge.mapping.own_places import OwnWant, channels_needed, suggested, suggested_ms
 from bridge.project import Project, load_project
-from bridge.southbound.audit import AuditErrand
 
 _COLUMNS = ("drive", "watches", "setting", "reaction", "dead controller", "dead bridge", "verdict")
 _WATCHES = {

@@ -12,16 +12,16 @@ from typing import Annotated, Protocol, TypeVar
 import typer
 
 from bridge import clock
+from bridge.can import Bus, open_bus
+from bridge.can.interface import ControllerState
+from bridge.canopen.frame import Frame
 from bridge.cli.stopping import until_stopped
 from bridge.cli.terminal import printable
 from bridge.config import BusTable
 from bridge.mapping import Family
 from bridge.mapping.model import SdoServer
+from bridge.node.sdo_channels import FIRST
 from bridge.project import load_project
-from bridge.southbound.bus import Bus, open_bus
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.interface import ControllerState
-from bridge.southbound.sdo_channels import FIRST
 
 BusName = Annotated[str | None, typer.Option("--bus", help="the bus of SITE; not needed where it has one")]
 Interface = Annotated[str | None, typer.Option(help="without SITE: socketcan, or one of python-can's")]

@@ -12,7 +12,7 @@ from typing import Any
 
 from bridge import __version__
 from bridge.command.plant import Node
-from bridge.southbound.drop_test import DropOutcome, DropTest
+from bridge.errands.drop_test import DropOutcome, DropTest
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,15 +19,15 @@ from bridge.cli.bus import AsJson, Line, carry_out, tell
 from bridge.cli.stopping import until_stopped
 from bridge.command import Plant
 from bridge.config import BusTable, NodeTable, Site
+from bridge.errands.drop_test import DropTest, ForeignMaster, Phase
+from bridge.errands.muted_bus import MutableBus
 from bridge.errors import OperationFailed
 from bridge.mapping import Family
+from bridge.master.master import Master
+from bridge.master.network import Network
 from bridge.parameter.ledger_file import LedgerFile
 from bridge.project import Project, load_project
 from bridge.service import make_bus
-from bridge.southbound.drop_test import DropTest, ForeignMaster, Phase
-from bridge.southbound.master import Master
-from bridge.southbound.muted_bus import MutableBus
-from bridge.southbound.network import Network
 
 _LISTEN_S = 1.0
 

@@ -10,6 +10,8 @@ from typing import Annotated, TypeVar
 
 import typer
 
+from bridge.canopen.lss import BIT_RATES, NO_NODE_ID, Identity, LssError, Service
+from bridge.canopen.lss_scan import Scanned, find_all
 from bridge.cli.bus import (
     AsJson,
     Bitrate,
@@ -23,11 +25,9 @@ from bridge.cli.bus import (
     tell,
 )
 from bridge.cli.terminal import progress
+from bridge.errands import lss as lss_errand
+from bridge.errands.lss import LssErrand
 from bridge.errors import OperationFailed
-from bridge.southbound import lss_errand
-from bridge.southbound.canopen.lss import BIT_RATES, NO_NODE_ID, Identity, LssError, Service
-from bridge.southbound.lss_errand import LssErrand
-from bridge.southbound.lss_scan import Scanned, find_all
 
 app = typer.Typer(help="Give devices node ids and bit rates (CiA 305).", no_args_is_help=True)
 

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from bridge import clock
+from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.cli.bus import (
     AsJson,
     Bitrate,
@@ -24,10 +25,9 @@ from bridge.cli.bus import (
     tell,
 )
 from bridge.cli.terminal import printable
+from bridge.errands.decode import Decoder, Kind, Meaning
+from bridge.errands.statistics import Statistics
 from bridge.errors import OperationFailed
-from bridge.southbound.bus.frame import EXTENDED, REMOTE, Frame
-from bridge.southbound.decode import Decoder, Kind, Meaning
-from bridge.southbound.statistics import Statistics
 
 _IDENTIFIER = 0x1FFF_FFFF
 

@@ -8,11 +8,11 @@ from typing import Annotated
 
 import typer
 
+from bridge.canopen.nmt import NmtCommand
 from bridge.cli.bus import AsJson, Bitrate, BusName, Channel, Interface, carry_out, choose_line, split_site
 from bridge.cli.terminal import progress
+from bridge.errands.single import NmtErrand
 from bridge.errors import OperationFailed
-from bridge.southbound.canopen.nmt import NmtCommand
-from bridge.southbound.errand import NmtErrand
 
 _USAGE = "drivebridge nmt [SITE] COMMAND NODE|all"
 

@@ -13,14 +13,14 @@ from bridge import clock
 from bridge.cli.bus import Line, carry_out, tell
 from bridge.cli.terminal import progress
 from bridge.config import BusTable, NodeTable
+from bridge.errands.bystander import Bystander, Standstill
+from bridge.errands.parameter import ParameterErrand
 from bridge.errors import OperationFailed
 from bridge.mapping.model import Family, Slot
+from bridge.node.parameters.run import Procedure
 from bridge.parameter import DriveParameters, Entry, Ledger, Names, ParameterError
 from bridge.parameter.ledger_file import LedgerFile
 from bridge.project import load_project
-from bridge.southbound.bystander import Bystander, Standstill
-from bridge.southbound.parameter_errand import ParameterErrand
-from bridge.southbound.parameter_run import Procedure
 
 SiteArgument = Annotated[Path, typer.Argument(metavar="SITE", help="the site file")]
 DriveArgument = Annotated[

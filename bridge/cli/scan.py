@@ -23,9 +23,9 @@ from bridge.cli.bus import (
     tell,
 )
 from bridge.cli.terminal import progress
+from bridge.errands.scan import FoundNode, Scanner
 from bridge.mapping import Family, family_names, load_family
 from bridge.mapping.match import Found, Match, best_match
-from bridge.southbound.scan import FoundNode, Scanner
 
 _PASSIVE_S = 3.0
 _ACTIVE_S = 0.5

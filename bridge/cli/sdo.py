@@ -12,6 +12,8 @@ from typing import Annotated
 
 import typer
 
+from bridge.canopen.decode_sdo import shown
+from bridge.canopen.sdo import SdoError
 from bridge.cli.bus import (
     AsJson,
     Bitrate,
@@ -24,12 +26,10 @@ from bridge.cli.bus import (
     split_site,
 )
 from bridge.cli.terminal import printable, progress
+from bridge.errands.single import SdoErrand
 from bridge.errors import OperationFailed
 from bridge.mapping.model import SdoServer
 from bridge.parameter import Address, Names
-from bridge.southbound.canopen.sdo import SdoError
-from bridge.southbound.decode_sdo import shown
-from bridge.southbound.errand import SdoErrand
 
 app = typer.Typer(help="Read or write an object of a node.", no_args_is_help=True)
 

@@ -22,9 +22,9 @@ from bridge.fronts import Front, become_front, give_reason
 
 # The service is not imported for a front: where one has ended, its clients wait for the next.
 if TYPE_CHECKING:
+    from bridge.can import Bus
     from bridge.project import Project
     from bridge.sim.shell import Simulation
-    from bridge.southbound.bus import Bus
 
 SiteArgument = Annotated[Path, typer.Argument(metavar="SITE", help="the site file")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="log more")]
@@ -81,10 +81,10 @@ def demo(verbose: Verbose = False) -> None:
 
 def simulate(site: SiteArgument, verbose: Verbose = False) -> None:
     """Play every node of SITE on its buses, for a bridge that runs as another process."""
+    from bridge.can import open_all
     from bridge.cli.simulation import simulation
     from bridge.project import load_project
     from bridge.service import make_bus
-    from bridge.southbound.bus import open_all
 
     logs.set_up(verbose=verbose)
     project = load_project(site)
@@ -129,9 +129,9 @@ async def _serve(
     ready: Callable[[], None] = lambda: None,
 ) -> None:
     """The service, with simulated nodes on its virtual buses."""
+    from bridge.master.standstill import SignalAlarm
     from bridge.memory import lock_memory
     from bridge.service import Service, make_bus
-    from bridge.southbound.standstill import SignalAlarm
 
     why_not = lock_memory()
     if why_not:
@@ -142,8 +142,8 @@ async def _serve(
     def open_bus(table: BusTable) -> Bus:
         if table.interface != "virtual":
             return make_bus(table)
+        from bridge.can.virtual import VirtualWire
         from bridge.cli.simulation import simulation
-        from bridge.southbound.bus.virtual import VirtualWire
 
         wire = VirtualWire()
         simulations.append(simulation(wire.end(f"{table.name}-simulation"), table, project.path))

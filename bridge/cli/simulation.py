@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bridge.can import Bus
 from bridge.config import BusTable
 from bridge.mapping.loader import lineage, mapping_folders
 from bridge.sim.catalogue import SIMULATED, simulate_node
 from bridge.sim.node import SimulatedNode
 from bridge.sim.shell import Simulation
-from bridge.southbound.bus import Bus
 
 
 def simulation(bus: Bus, table: BusTable, site: Path) -> Simulation:

@@ -169,7 +169,7 @@ class Drive:
             return None
         return self.own.process_data_ms if self.channel.silence_stops else 0.0
 
-    # fed by the southbound side
+    # fed by its node
 
     def on_process_data(self, words: Sequence[int], now: float) -> None:
         """The TPDO with the status word, changed; ``words`` are raw, in the order of ``process.tpdo``."""

@@ -12,7 +12,7 @@ from bridge.image import Quality
 
 
 class NodeState(Enum):
-    """What the southbound side knows of the node behind a drive."""
+    """What the master knows of the node behind a drive."""
 
     ABSENT = "not seen yet"
     BOOTING = "booting"

@@ -1,6 +1,6 @@
 """The plant: every drive of the site with its channel and its points, and the image they share.
 
-Northbounds read the image and submit requests; southbounds feed it. Neither knows the other.
+Northbounds read the image and submit requests; the master feeds it. Neither knows the other.
 """
 
 from __future__ import annotations
@@ -304,7 +304,7 @@ class Plant:
         self._deadlines.on_change()
 
     def on_readings(self) -> None:
-        """The southbound side has taken in frames: timers of drives may have moved."""
+        """The master has taken in frames: timers of drives may have moved."""
         self._deadlines.on_readings()
 
     def _next_of_drives(self, now: float) -> float | None:
@@ -312,7 +312,7 @@ class Plant:
         return min((time for time in times if time is not None), default=None)
 
     def on_node(self, node: Node, state: NodeState, now: float, *, tell: bool = True) -> None:
-        """The southbound side says that a node is in another state; ``tell`` makes that an event."""
+        """The master says that a node is in another state; ``tell`` makes that an event."""
         self._deadlines.on_change()
         for drive in node.drives:
             drive.channel.on_node(state, now)

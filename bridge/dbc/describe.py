@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
+from bridge.canopen.pdo import Entry
 from bridge.config import NodeTable, PdoTable
 from bridge.dbc.fields import lay_out
 from bridge.dbc.model import BRIDGE, BusDescription, Message
@@ -15,8 +16,7 @@ from bridge.drive import ValueCodec, scale_of
 from bridge.errors import OperationFailed
 from bridge.lint.bus import BusView, DriveView, NodeView, PdoView
 from bridge.mapping.model import Family, Pdo, Slot
-from bridge.southbound.boot import factory_entries, layouts, match_words
-from bridge.southbound.canopen.pdo import Entry
+from bridge.node.boot import factory_entries, layouts, match_words
 
 _WARNING: Final = (
     "Made by drivebridge from the site file and the mapping files, not from the nodes. A node whose own "

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bridge.southbound.canopen.pdo import Entry
-from bridge.southbound.words import WORD_BITS, Place
+from bridge.canopen.pdo import Entry
+from bridge.node.process.words import WORD_BITS, Place
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from bridge.canopen import cobid
+from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.config import BusTable, NodeTable
 from bridge.dbc.model import BRIDGE, Message, Signal
 from bridge.mapping.model import EmcyTable, Family
-from bridge.southbound.boot.error_control import heartbeat_period_ms
-from bridge.southbound.canopen import cobid
-from bridge.southbound.canopen.nmt import NmtCommand, NmtState
+from bridge.node.boot.error_control import heartbeat_period_ms
 
 _NMT_BYTES: Final = 2
 _EMCY_BYTES: Final = 8

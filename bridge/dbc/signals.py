@@ -12,7 +12,7 @@ from bridge.dbc.fields import Field, Layout
 from bridge.dbc.model import Signal
 from bridge.drive import ValueCodec
 from bridge.image.point import INTEGER_RANGE
-from bridge.southbound.words import WORD_BITS
+from bridge.node.process.words import WORD_BITS
 
 Groups = dict[str, tuple[str, ...]]
 

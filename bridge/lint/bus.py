@@ -11,15 +11,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from bridge.canopen import cobid
+from bridge.canopen.sync import LAST_SYNCHRONOUS, REMOTE_TYPES
 from bridge.config import BusTable, DriveTable, NodeTable, PdoTable
 from bridge.config.download import Download
 from bridge.eds import Description
 from bridge.eds.pdos import PdoSummary, pdos
 from bridge.lint.settings import RPDO, TPDO, Settings, pdo_cob_id
 from bridge.mapping.model import Family, Pdo
-from bridge.southbound.boot import factory_entries
-from bridge.southbound.canopen import cobid
-from bridge.southbound.canopen.sync import LAST_SYNCHRONOUS, REMOTE_TYPES
+from bridge.node.boot import factory_entries
 from bridge.tomlfile import Key
 
 EVENT_DRIVEN: Final = 254

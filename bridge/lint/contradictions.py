@@ -7,12 +7,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from bridge.canopen import cobid
 from bridge.config import NodeTable, PdoTable
 from bridge.lint.bus import BusView, NodeView
 from bridge.lint.report import LintReport
 from bridge.lint.settings import RPDO, TPDO, pdo_cob_id
-from bridge.southbound.boot import heartbeat_period_ms
-from bridge.southbound.canopen import cobid
+from bridge.node.boot import heartbeat_period_ms
 
 _CONSUMER: Final = 0x1016
 _SYNC: Final = (0x1005, 0)

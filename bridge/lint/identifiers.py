@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.canopen import cobid
 from bridge.lint.bus import BusView, NodeView
 from bridge.lint.report import LintReport
-from bridge.southbound.canopen import cobid
 from bridge.tomlfile import Key
 
 _LSS: Final = (0x7E4, 0x7E5)

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.can.wirebits import STUFFED_BITS, UNSTUFFED_BITS
 from bridge.lint.bus import BusView, NodeView, PdoView
 from bridge.lint.report import LintReport
-from bridge.southbound.boot.error_control import heartbeat_period_ms
-from bridge.southbound.bus.wirebits import STUFFED_BITS, UNSTUFFED_BITS
+from bridge.node.boot.error_control import heartbeat_period_ms
 
 _SDO_BYTES: Final = 8
 _TIME_BYTES: Final = 6

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
+from bridge.canopen import cobid
+from bridge.canopen.sync import LAST_SYNCHRONOUS, REMOTE_TYPES
 from bridge.lint.bus import BusView, DriveView, NodeView, PdoView
 from bridge.lint.report import LintReport
 from bridge.mapping.model import Family
-from bridge.southbound.canopen import cobid
-from bridge.southbound.canopen.sync import LAST_SYNCHRONOUS, REMOTE_TYPES
 
 _MOST_BYTES: Final = 8
 _FIRST_EVENT: Final = 254

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.canopen import cobid
 from bridge.config import NodeTable
 from bridge.config.download import Download
 from bridge.mapping.aliases import aliases
 from bridge.mapping.model import Family
-from bridge.southbound.canopen import cobid
 from bridge.tomlfile import Key
 
 _EMCY: Final = 0x1014

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
+from bridge.canopen.sync import LAST_SYNCHRONOUS, tpdo_deadline_s
 from bridge.config import IGNORE_ALL_S
 from bridge.lint.bus import BusView, DriveView, NodeView
 from bridge.lint.report import LintReport
-from bridge.southbound.canopen.sync import LAST_SYNCHRONOUS, tpdo_deadline_s
-from bridge.southbound.held import held_s, least_deadman_ms
+from bridge.node.process.held import held_s, least_deadman_ms
 
 _SLOW_ANSWER_MS: Final = 50
 """What an SDO answer may take: 30 + 20 ms in an 8400 motec (EDS84DMOTCAN 3.0 §9), 50 ms and more behind

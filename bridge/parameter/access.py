@@ -1,7 +1,7 @@
 """How one drive's parameters are read and written: the policy, as procedures without a bus.
 
 A procedure yields the transfers it needs and is sent what each brought and when; whoever runs it
-carries them out on the SDO channel of the drive (``southbound.parameters``, or the command line).
+carries them out on the SDO channel of the drive (``node.parameters``, or the command line).
 """
 
 from __future__ import annotations

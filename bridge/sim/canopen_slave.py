@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final, Protocol
 
+from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
 from bridge.sim.dictionary import Dictionary
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.nmt_slave import COMMANDED_STATE, ErrorControl, NmtCommand, NmtState, nmt_command_for
@@ -16,7 +17,6 @@ from bridge.sim.pdo import Rpdo, Tpdo, pack, unpack
 from bridge.sim.sdo_server import SdoServer
 from bridge.sim.settings import CommunicationSettings, PdoSettings
 from bridge.sim.store import Store
-from bridge.southbound.bus.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
 
 _ERROR_CONTROL: Final = 0x700
 _OUTBOX_MAX: Final = 256

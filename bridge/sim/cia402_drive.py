@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
 from bridge.sim.canopen_slave import CanopenSlave
 from bridge.sim.cia402_axis import Cia402Axis
 from bridge.sim.cia402_objects import Cia402Objects
@@ -18,7 +19,6 @@ from bridge.sim.nmt_slave import NmtCommand, NmtState
 from bridge.sim.pdo_objects import PdoObjects
 from bridge.sim.sdo_server import SdoServer
 from bridge.sim.store import Store
-from bridge.southbound.bus.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
 
 _HEARTBEAT: Final = 0x700
 _MASTER_LOST: Final = 0x8130

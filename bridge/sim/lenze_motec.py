@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
 from bridge.sim.canopen_slave import CanopenSlave
 from bridge.sim.dictionary import DataType, Dictionary, Number
 from bridge.sim.emcy_producer import EmcyProducer
@@ -18,7 +19,6 @@ from bridge.sim.nmt_slave import NmtCommand, NmtState
 from bridge.sim.pdo import pack
 from bridge.sim.sdo_server import SdoServer
 from bridge.sim.store import Store
-from bridge.southbound.bus.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
 
 _HEARTBEAT: Final = 0x700
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from bridge.southbound.bus.frame import Frame
+from bridge.canopen.frame import Frame
 
 
 class SimulatedNode(Protocol):

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from bridge.canopen.frame import STANDARD_MASK, Frame
 from bridge.sim.canopen_slave import CanopenSlave
 from bridge.sim.dictionary import Dictionary
 from bridge.sim.emcy_producer import EmcyProducer
@@ -17,7 +18,6 @@ from bridge.sim.pdo_objects import PdoObjects
 from bridge.sim.sdo_server import SdoServer
 from bridge.sim.settings import CommunicationSettings
 from bridge.sim.store import Store
-from bridge.southbound.bus.frame import STANDARD_MASK, Frame
 
 
 class NordNode(ABC):

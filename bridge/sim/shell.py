@@ -6,9 +6,9 @@ import asyncio
 from collections.abc import Sequence
 from typing import Final
 
+from bridge.can.interface import Bus
+from bridge.canopen.frame import STANDARD_MASK
 from bridge.sim.node import SimulatedNode
-from bridge.southbound.bus.frame import STANDARD_MASK
-from bridge.southbound.bus.interface import Bus
 
 _SEND_WITHIN_S: Final = 0.1
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+from bridge.canopen.frame import STANDARD_MASK, Frame
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.nmt_slave import NmtCommand, NmtState
 from bridge.sim.sdo_server import SdoServer
@@ -19,7 +20,6 @@ from bridge.sim.stoeber_pdo_objects import StoeberPdoObjects
 from bridge.sim.stoeber_settings import CHANNELS, RULES, factory_communication, factory_settings
 from bridge.sim.stoeber_slave import StoeberSlave, SyncWatch
 from bridge.sim.store import Store
-from bridge.southbound.bus.frame import STANDARD_MASK, Frame
 
 
 class Stoeber5000:

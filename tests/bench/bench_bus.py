@@ -9,12 +9,12 @@ from pathlib import Path
 import canopen
 from canopen.objectdictionary import UNSIGNED16
 
+from bridge.canopen.frame import Frame
+from bridge.canopen.pdo import Entry, PdoCodec
 from bridge.command.link import NodeState
-from bridge.southbound.boot import PdoPlan
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.canopen.pdo import Entry, PdoCodec
-from bridge.southbound.process_data import DrivePdos
-from bridge.southbound.words import Place
+from bridge.node.boot import PdoPlan
+from bridge.node.process.process_data import DrivePdos
+from bridge.node.process.words import Place
 from tests.bench.figures import cpu_us, milliseconds, show
 from tests.peers.foreign_slave import variable
 from tests.support.bench import Bench, write_site

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bridge.canopen.frame import Frame
 from bridge.command.link import NodeState
-from bridge.southbound.bus.frame import Frame
 from tests.bench.figures import cpu_us, show
 from tests.support.quick import Quick, quick_site
 

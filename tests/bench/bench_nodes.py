@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from bridge.canopen.frame import Frame
 from bridge.config import Site, load_site
 from bridge.sim.nord_tu4 import NordTu4
-from bridge.southbound.bus.frame import Frame
 from tests.bench.figures import show
 from tests.support.bench import Bench
 

@@ -19,8 +19,8 @@ from pathlib import Path
 import canopen
 import pytest
 
-from bridge.southbound.bus.socketcan import SocketCanBus
-from bridge.southbound.network import Network
+from bridge.can.socketcan import SocketCanBus
+from bridge.master.network import Network
 from tests.bench.canopen_node import with_four_words
 from tests.bench.crowd import crowd
 from tests.bench.figures import show

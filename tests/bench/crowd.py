@@ -10,12 +10,12 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from bridge.can.socketcan import SocketCanBus
+from bridge.canopen.frame import Frame
 from bridge.command import Event, Kind, Plant
 from bridge.command.link import NodeState
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.socketcan import SocketCanBus
-from bridge.southbound.master import Master
-from bridge.southbound.network import Network
+from bridge.master.master import Master
+from bridge.master.network import Network
 from tests.bench.figures import as_the_service, lateness, show
 from tests.support.process import Process, peer
 from tests.support.quick import MAPPING, NORD, quick_site

@@ -14,9 +14,9 @@ from collections.abc import Collection, Iterator
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-from bridge.southbound.bus.cansockets import CanSockets
-from bridge.southbound.bus.netlink import Link
-from bridge.southbound.bus.socketcan import SocketCanBus
+from bridge.can.cansockets import CanSockets
+from bridge.can.netlink import Link
+from bridge.can.socketcan import SocketCanBus
 
 _SO_TIMESTAMPNS = 35
 

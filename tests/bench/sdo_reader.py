@@ -7,8 +7,8 @@ import time
 from collections.abc import Sequence
 from functools import partial
 
-from bridge.southbound.bus.interface import Bus
-from bridge.southbound.canopen.sdo import Priority, Result, SdoChannel
+from bridge.can.interface import Bus
+from bridge.canopen.sdo import Priority, Result, SdoChannel
 
 ANSWER = b"\x2a\0\0\0"
 

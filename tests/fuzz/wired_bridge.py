@@ -17,8 +17,8 @@ import time
 from pathlib import Path
 
 from bridge.__main__ import main
-from bridge.southbound.bus import virtual
-from bridge.southbound.bus.frame import STANDARD_MASK, Frame
+from bridge.can import virtual
+from bridge.canopen.frame import STANDARD_MASK, Frame
 
 FOLDER = Path(sys.argv.pop(1))
 RPDOS = (0x200, 0x300, 0x400, 0x500)

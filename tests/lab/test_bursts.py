@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from bridge.southbound.bus.burstend import BurstEnd
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.socketcan import SocketCanBus
-from bridge.southbound.canopen.sync import burst_length
+from bridge.can.burstend import BurstEnd
+from bridge.can.socketcan import SocketCanBus
+from bridge.canopen.frame import Frame
+from bridge.canopen.sync import burst_length
 from bridge.zenohlink.sockets import close_without_waiting
 from tests.support.sniffer import sniffing
 

@@ -15,11 +15,11 @@ from collections.abc import AsyncIterator, Callable
 
 import pytest
 
+from bridge.can import netlink
+from bridge.can.interface import ControllerState
+from bridge.can.socketcan import SocketCanBus
+from bridge.canopen.frame import ERROR, Frame
 from bridge.errors import Unavailable
-from bridge.southbound.bus import netlink
-from bridge.southbound.bus.frame import ERROR, Frame
-from bridge.southbound.bus.interface import ControllerState
-from bridge.southbound.bus.socketcan import SocketCanBus
 from tests.support.sniffer import Sniffer, sniffing
 
 LIMIT_S = 15.0

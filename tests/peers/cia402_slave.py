@@ -9,9 +9,9 @@ import asyncio
 import signal
 import sys
 
+from bridge.can import open_bus
 from bridge.sim.cia402_drive import Cia402Drive
 from bridge.sim.shell import Simulation
-from bridge.southbound.bus import open_bus
 
 
 async def main(channel: str, node_id: int, bitrate: int) -> None:

@@ -20,7 +20,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from bridge.southbound.bus.frame import Frame
+from bridge.canopen.frame import Frame
 from tests.peers.can_end import FRAME, can_end
 from tests.support.quick import OPERATIONAL, QuickNode
 

@@ -9,7 +9,7 @@ import sys
 
 import can
 
-from bridge.southbound.bus.frame import Frame
+from bridge.canopen.frame import Frame
 from tests.support.sdo_device import SdoDevice, u32
 
 OBJECTS = {

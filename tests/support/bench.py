@@ -1,4 +1,4 @@
-"""A whole southbound side on a virtual clock: master, networks, simulated nodes, one wire.
+"""A whole CANopen side on a virtual clock: master, networks, simulated nodes, one wire.
 
 Time passes only by ``run``; a lost frame is a line in a test.
 """
@@ -9,17 +9,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from bridge.can.burstend import BurstEnd
+from bridge.can.interface import BusStatus, ControllerState
+from bridge.can.softbeat import SoftBeat
+from bridge.canopen.frame import Frame
 from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Source
 from bridge.config import Site, load_site
 from bridge.mapping import Family, load_family
+from bridge.master.listening import Listening, listen_s
+from bridge.master.master import Master
+from bridge.master.network import Network
 from bridge.sim.nord_tu4 import NordTu4
-from bridge.southbound.bus.burstend import BurstEnd
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.interface import BusStatus, ControllerState
-from bridge.southbound.bus.softbeat import SoftBeat
-from bridge.southbound.listening import Listening, listen_s
-from bridge.southbound.master import Master
-from bridge.southbound.network import Network
 from tests.support import sites
 
 NORD = load_family("nord/sk-tu4-cao")

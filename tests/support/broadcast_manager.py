@@ -9,7 +9,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bridge.southbound.bus.frame import Frame
+from bridge.canopen.frame import Frame
 
 _HEAD = struct.Struct("@IIIllllII0q")
 _FRAME = struct.Struct("=IB3x8s")

@@ -3,9 +3,9 @@ babbles."""
 
 from __future__ import annotations
 
+from bridge.can.wirebits import exact_bits
+from bridge.canopen.frame import Frame
 from bridge.config import Site
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.wirebits import exact_bits
 from tests.support.bench import Bench, ClockBus
 
 _STEP_S = 1e-3

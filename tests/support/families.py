@@ -9,6 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final, TypeVar
 
+from bridge.can import Bus
+from bridge.can.virtual import VirtualWire
+from bridge.canopen.frame import Frame
 from bridge.command import Action, Identity, Outcome, Request
 from bridge.config import BusTable
 from bridge.drive import DriveState
@@ -23,9 +26,6 @@ from bridge.sim.nord_single import NordSingle
 from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
 from bridge.sim.stoeber_5000 import Stoeber5000
-from bridge.southbound.bus import Bus
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.virtual import VirtualWire
 from tests.support import sites
 from tests.support.process import free_port, until
 

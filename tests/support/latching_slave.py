@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from bridge.southbound.bus.frame import Frame
+from bridge.canopen.frame import Frame
 
 START, RESETS = 0x01, (0x81, 0x82)
 WRONG_LENGTH = 0x8240

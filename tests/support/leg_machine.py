@@ -148,7 +148,7 @@ class LegMachine:
         elif event in TIMES:
             self._pass_time(event)
         else:
-            self._southbound(event)
+            self._canopen(event)
         seen = tuple((state, stimulus, gate) for state, stimulus in self._recorder.seen)
         self.trips += self._channel.trips - trips
         self._rig.events.clear()
@@ -278,7 +278,7 @@ class LegMachine:
                 self._model.now = self._rig.now
                 self._hung = True
 
-    def _southbound(self, event: str) -> None:
+    def _canopen(self, event: str) -> None:
         """What is read from the bus; the timers run after it has been drained."""
         channel, model, now = self._channel, self._model, self._rig.now
         match event:

@@ -10,13 +10,13 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from bridge.can.virtual import VirtualBus, VirtualWire
+from bridge.canopen.frame import Frame
 from bridge.command import Action, Identity, Kind, Request, Source
 from bridge.project import load_project
 from bridge.service import Service
 from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.virtual import VirtualBus, VirtualWire
 from tests.support import sites
 from tests.support.process import free_port
 

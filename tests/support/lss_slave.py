@@ -1,5 +1,5 @@
 """An LSS slave after CiA 305. It shares no code with our master, but an author; what keeps both honest is
-canopen's own LSS master, which is run against it (``tests/unit/southbound/test_lss_foreign.py``)."""
+canopen's own LSS master, which is run against it (``tests/unit/canopen/test_lss_foreign.py``)."""
 
 from __future__ import annotations
 

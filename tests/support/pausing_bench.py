@@ -8,14 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
+from bridge.can.burstend import BurstEnd
+from bridge.can.interface import ControllerState
+from bridge.can.kernelbeat import KernelBeat
+from bridge.canopen.frame import Frame
 from bridge.config import Site
 from bridge.mapping import load_family
 from bridge.sim.nord_single import NordSingle
 from bridge.sim.nord_single_settings import RJ45_54X
-from bridge.southbound.bus.burstend import BurstEnd
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.interface import ControllerState
-from bridge.southbound.bus.kernelbeat import KernelBeat
 from tests.support.bench import Bench, ClockBus
 from tests.support.broadcast_manager import BroadcastManager
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Sequence
 
-from bridge.southbound.bus.frame import Frame
+from bridge.canopen.frame import Frame
 from tests.support.quick import OPERATIONAL, QuickNode
 
 _OFF = 1 << 31

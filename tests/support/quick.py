@@ -7,15 +7,15 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from bridge.can.interface import BusStatus
+from bridge.canopen.frame import REMOTE, Frame
+from bridge.canopen.nmt import NmtState
 from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Role, Source
 from bridge.config import Site, load_site
 from bridge.mapping import load_family
-from bridge.southbound.bus.frame import REMOTE, Frame
-from bridge.southbound.bus.interface import BusStatus
-from bridge.southbound.canopen.nmt import NmtState
-from bridge.southbound.listening import Listening
-from bridge.southbound.network import Network
-from bridge.southbound.node import NodeCore
+from bridge.master.listening import Listening
+from bridge.master.network import Network
+from bridge.node.node import NodeCore
 
 NORD = load_family("nord/sk-tu4-cao")
 MAPPING = "nord/sk-tu4-cao"

@@ -5,10 +5,10 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 
+from bridge.canopen.frame import Frame
+from bridge.canopen.sdo import Result, SdoChannel, SdoError
 from bridge.sim.dictionary import Dictionary, Domain
 from bridge.sim.sdo_server import SdoServer
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.canopen.sdo import Result, SdoChannel, SdoError
 
 REQUEST, REPLY = 0x605, 0x585
 LONG = bytes(range(256)) * 4

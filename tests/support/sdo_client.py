@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.canopen.sdo import Priority, Result, SdoChannel, SdoJob
+from bridge.canopen.frame import Frame
+from bridge.canopen.sdo import Priority, Result, SdoChannel, SdoJob
 
 REQUEST, REPLY = 0x605, 0x585
 

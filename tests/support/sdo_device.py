@@ -6,7 +6,7 @@ import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from bridge.southbound.bus.frame import REMOTE, Frame
+from bridge.canopen.frame import REMOTE, Frame
 
 _MUX = struct.Struct("<BHB")
 

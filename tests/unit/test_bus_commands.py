@@ -11,16 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from bridge.canopen.frame import Frame
+from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.cli.app import make_app
 from bridge.cli.bus import choose_line, split_site
 from bridge.cli.sdo import ValueType, decode, encode, parse_object, why_forced
 from bridge.config.download import encode as as_site_file
 from bridge.config.model import ObjectType
+from bridge.errands.single import NmtErrand, SdoErrand
 from bridge.image import DataType
 from bridge.parameter import Address
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.canopen.nmt import NmtCommand, NmtState
-from bridge.southbound.errand import NmtErrand, SdoErrand
 
 SITE = """
 [site]

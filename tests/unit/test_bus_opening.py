@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from bridge.can import open_all
 from bridge.cli.app import make_app
 from bridge.errors import Unavailable
-from bridge.southbound.bus import open_all
-from bridge.southbound.master import Master
+from bridge.master.master import Master
 from bridge.witness import shell
 from tests.support import sites
 from tests.support.bench import Bench, ClockBus, write_site

@@ -12,6 +12,8 @@ from typing import Final, cast
 
 import pytest
 
+from bridge.can.interface import ControllerState
+from bridge.canopen.frame import Frame
 from bridge.command import Action, Identity, Plant, Rejection, Request, Source
 from bridge.command.link import NodeState
 from bridge.config import ModbusTable, ZenohTable
@@ -24,8 +26,6 @@ from bridge.northbound.zenoh.session import ZenohServer
 from bridge.notify import Notifier
 from bridge.parts import Parts
 from bridge.quietlog import A_FEW
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.interface import ControllerState
 from bridge.zenohlink import Message, zenoh_config
 from bridge.zenohlink.worker import Worker
 from tests.support import sites

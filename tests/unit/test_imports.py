@@ -11,7 +11,16 @@ from typer.core import TyperGroup
 
 from bridge.cli.app import make_app
 
-_OTHERS = ("bridge.service", "bridge.sim", "bridge.southbound", "bridge.lint", "bridge.eds", "bridge.dbc")
+_OTHERS = (
+    "bridge.service",
+    "bridge.sim",
+    "bridge.master",
+    "bridge.node",
+    "bridge.errands",
+    "bridge.lint",
+    "bridge.eds",
+    "bridge.dbc",
+)
 
 
 @pytest.mark.parametrize(("word", "imported"), [("version", ""), ("run", "import bridge.front; ")])

@@ -13,7 +13,7 @@ from bridge.cli import lss
 from bridge.cli.app import make_app
 from bridge.errors import OperationFailed
 from tests.support.lss_slave import LssSlave
-from tests.unit.southbound.test_lss import NORD, OTHER, LssBus
+from tests.unit.canopen.test_lss import NORD, OTHER, LssBus
 
 SCAN = ["lss", "scan", "--interface", "socketcan", "--channel", "can0"]
 

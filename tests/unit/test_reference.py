@@ -23,6 +23,7 @@ from bridge.drive import STATES
 from bridge.image import Point, Quality
 from bridge.mapping.model import Family, ObjectRef
 from bridge.mapping.model import MappedObject as MappingObject
+from bridge.node.boot.status import TEXTS as BOOT_TEXTS
 from bridge.northbound.modbus.dispatch import EXCEPTIONS
 from bridge.northbound.modbus.pdu import Function
 from bridge.northbound.modbus.registers import DriveMap, Row, Table, bridge_rows, drive_maps
@@ -32,7 +33,6 @@ from bridge.northbound.opcua.services import SERVICES
 from bridge.northbound.opcua.values import OUTCOME_STATUS, QUALITY_STATUS
 from bridge.northbound.zenoh.commands import MALFORMED, METHODS, NODE_METHODS
 from bridge.project import load_project
-from bridge.southbound.boot.status import TEXTS as BOOT_TEXTS
 from tests.support.docs import (
     page,
 )

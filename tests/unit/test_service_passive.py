@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from bridge.can.virtual import VirtualWire
 from bridge.project import load_project
 from bridge.service import Service
-from bridge.southbound.bus.virtual import VirtualWire
 from tests.support import sites
 
 

@@ -12,14 +12,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge.canopen.frame import Frame
 from bridge.cli import logs, monitor, sdo
 from bridge.cli.app import run_app
 from bridge.cli.bus import print_table
 from bridge.cli.terminal import printable, progress
+from bridge.errands.decode import Kind, Meaning
+from bridge.errands.single import SdoErrand
 from bridge.errors import OperationFailed
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.decode import Kind, Meaning
-from bridge.southbound.errand import SdoErrand
 
 CLEAR = "\x1b[2J"
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
+from bridge.canopen.frame import REMOTE, Frame
 from bridge.command import Action, Code, Identity, Source
 from bridge.image import Quality
 from bridge.sim.catalogue import SIMULATED
-from bridge.southbound.bus.frame import REMOTE, Frame
 from tests.support.families import FamilyBridge, family_bridge, setpoint_of
 from tests.support.process import REPOSITORY, until
 

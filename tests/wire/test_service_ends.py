@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
+from bridge.can.virtual import VirtualWire
+from bridge.canopen.frame import Frame
 from bridge.command import Action, Event, Identity, Kind, Request, Source
 from bridge.project import load_project
 from bridge.service import Service
 from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.virtual import VirtualWire
 from tests.support import sites
 from tests.support.process import free_port
 from tests.support.zenoh_peer import until

@@ -5,8 +5,8 @@ from __future__ import annotations
 import canopen
 import pytest
 
+from bridge.canopen.frame import Frame
 from bridge.sim.nord_tu4 import NordTu4
-from bridge.southbound.bus.frame import Frame
 
 
 class DirectNetwork(canopen.Network):

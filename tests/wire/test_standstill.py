@@ -13,7 +13,7 @@ from tests.support.process import until
 # Each turn ends with a system call, at whose end the process is stopped.
 SCRIPT = """
 import os, signal, sys, time
-from bridge.southbound.standstill import SignalAlarm
+from bridge.master.standstill import SignalAlarm
 
 alarm = SignalAlarm()
 for turn in range(20):

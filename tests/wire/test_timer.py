@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from bridge.southbound.timer import LoopTimer
+from bridge.master.timer import LoopTimer
 
 
 def woken(use: Callable[[LoopTimer, list[float]], None], seconds: float = 0.08) -> list[float]:

@@ -15,13 +15,13 @@ from typing import Any
 from asyncua import Client, ua
 from pymodbus.client import AsyncModbusTcpClient
 
+from bridge.can.virtual import VirtualWire
+from bridge.canopen.frame import Frame
 from bridge.command import Kind, Source
 from bridge.project import load_project
 from bridge.service import Service
 from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.virtual import VirtualWire
 from tests.support import sites
 from tests.support.opcua_client import call, word, write_all, write_value
 from tests.support.opcua_site import namespace

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from bridge.can.virtual import VirtualWire
 from bridge.errors import OperationFailed, Unavailable
 from bridge.mirror import protocol
 from bridge.project import load_project
 from bridge.service import Service
-from bridge.southbound.bus.virtual import VirtualWire
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 from bridge.zenohlink import link as link_module
 from tests.support import sites

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bridge.southbound.bus.socketcan import SocketCanBus
+from bridge.can.socketcan import SocketCanBus
 from tests.bench.crowd import KEYS, NODES, crowd, measure
 
 

@@ -6,8 +6,8 @@ import asyncio
 import contextlib
 import time
 
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.socketcan import SocketCanBus
+from bridge.can.socketcan import SocketCanBus
+from bridge.canopen.frame import Frame
 from tests.bench.figures import show
 
 SECONDS = 5.0

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import canopen
 
+from bridge.can.socketcan import SocketCanBus
+from bridge.canopen.pdo import Entry, PdoCodec
 from bridge.command.link import NodeState
-from bridge.southbound.boot import PdoPlan
-from bridge.southbound.bus.socketcan import SocketCanBus
-from bridge.southbound.canopen.pdo import Entry, PdoCodec
-from bridge.southbound.process_data import DrivePdos
+from bridge.node.boot import PdoPlan
+from bridge.node.process.process_data import DrivePdos
 from tests.bench.canopen_node import with_four_words
 from tests.bench.figures import show
 from tests.support.bench import Bench, write_site

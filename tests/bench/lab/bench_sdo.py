@@ -9,7 +9,7 @@ from pathlib import Path
 
 import canopen
 
-from bridge.southbound.bus.socketcan import SocketCanBus
+from bridge.can.socketcan import SocketCanBus
 from tests.bench.figures import show
 from tests.bench.sdo_reader import ANSWER, Reader
 from tests.support.process import peer

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from bridge.config import BusTable
 from bridge.lint import Severity
-from bridge.southbound.held import held_s, least_deadman_ms
+from bridge.node.process.held import held_s, least_deadman_ms
 from tests.support.lint_site import judge
 
 

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from bridge.can.wirebits import exact_bits
+from bridge.canopen.frame import Frame
 from bridge.config.download import Download
 from bridge.lint import Severity
 from bridge.lint.load import longest_bits
 from bridge.mapping import Family
 from bridge.mapping.model import Pdo, SdoServer
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.wirebits import exact_bits
 from tests.support.lint_site import DICTIONARY, FAMILY, NORD, OTHER, TIMEOUT, findings, judge, only
 
 

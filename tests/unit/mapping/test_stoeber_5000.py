@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from bridge.canopen.emcy import decode
 from bridge.drive import ControlWords, DriveState
 from bridge.mapping import family_names, load_family
 from bridge.mapping.loader import mapping_folders
 from bridge.mapping.model import pattern_bits
 from bridge.mapping.parameters import object_of
 from bridge.sim.stoeber_events import CODES
-from bridge.southbound.canopen.emcy import decode
 
 ONE = load_family("stoeber/5000")
 FOUR = load_family("stoeber/5000-four-axes")

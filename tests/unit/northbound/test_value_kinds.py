@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from bridge.canopen.frame import Frame
+from bridge.errands.decode import Decoder
 from bridge.northbound.modbus.dispatch import Dispatcher
 from bridge.northbound.modbus.registers import DriveMap, Table
 from bridge.northbound.opcua.nodes import ObjectNode, VariableKind, VariableNode, layout
 from bridge.northbound.zenoh.keys import KeySpace
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.decode import Decoder
 from tests.support.bench import PLC, Bench
 from tests.support.invented import NAME, command, spin_bench, spindle
 

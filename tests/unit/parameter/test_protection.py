@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge.canopen.frame import Frame
 from bridge.command import Action, Code, Identity, Outcome, Request, Role, Source
 from bridge.config import load_site
 from bridge.drive import DriveState
@@ -21,7 +22,6 @@ from bridge.parameter import Address, DriveParameters, Entry, Ledger, Names, Par
 from bridge.parameter.definition import leaf_of
 from bridge.parameter.error import Why
 from bridge.sim.catalogue import simulate_node
-from bridge.southbound.bus.frame import Frame
 from tests.support import sites
 from tests.support.bench import PLC, Bench
 

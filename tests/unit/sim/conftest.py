@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from bridge.canopen.frame import REMOTE, Frame
 from bridge.sim.nord_tu4 import NordTu4
-from bridge.southbound.bus.frame import REMOTE, Frame
 
 NODE = 5
 RPDO = (0x205, 0x305, 0x405, 0x505)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.southbound.bus.frame import EXTENDED, REMOTE, Frame
+from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 
 START, STOP, PRE_OP, RESET_NODE, RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82
 

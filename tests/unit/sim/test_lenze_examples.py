@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import pytest
 
+from bridge.canopen.frame import Frame
+from bridge.canopen.sdo import SdoChannel, SdoError
 from bridge.mapping import load_family
 from bridge.sim.lenze_motec import LenzeMotec
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.canopen.sdo import SdoChannel, SdoError
 
 LENZE = load_family("lenze/8400-motec")
 

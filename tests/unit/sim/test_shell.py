@@ -7,11 +7,11 @@ from collections.abc import Callable
 
 import pytest
 
+from bridge.can.interface import BusStatus
+from bridge.canopen.frame import Frame
 from bridge.errors import Unavailable
 from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.bus.interface import BusStatus
 
 
 class Wire:

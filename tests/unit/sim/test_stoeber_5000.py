@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from bridge.canopen.frame import Frame
 from bridge.sim.nmt_slave import NmtState
 from bridge.sim.stoeber_5000 import Stoeber5000
 from bridge.sim.stoeber_axis import AxisState
 from bridge.sim.stoeber_settings import coordinate
-from bridge.southbound.bus.frame import Frame
 
 ENABLE, ACKNOWLEDGE, QUICK_STOP = 1, 2, 4
 WRONG_STATE = "08000022"

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
+from bridge.canopen import emcy
+from bridge.canopen.frame import Frame
+from bridge.canopen.pdo import Entry
+from bridge.canopen.sdo import SdoChannel
 from bridge.mapping import load_family
 from bridge.sim.dictionary import Dictionary, Domain
 from bridge.sim.sdo_server import SdoServer
 from bridge.sim.stoeber_5000 import Stoeber5000
-from bridge.southbound.bus.frame import Frame
-from bridge.southbound.canopen import emcy
-from bridge.southbound.canopen.pdo import Entry
-from bridge.southbound.canopen.sdo import SdoChannel
 
 SIXTEEN = bytes(range(1, 17))
 

@@ -10,8 +10,8 @@ import sys
 import time
 
 from bridge.__main__ import main
-from bridge.southbound.bus import virtual
-from bridge.southbound.bus.frame import Frame
+from bridge.can import virtual
+from bridge.canopen.frame import Frame
 
 FILE = os.open(sys.argv.pop(1), os.O_WRONLY | os.O_CREAT | os.O_APPEND)
 RPDOS = (0x200, 0x300, 0x400, 0x500)

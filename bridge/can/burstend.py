@@ -1,0 +1,54 @@
+"""A burst that turns into a stop by itself: the controller's deadline, kept by whoever sends the burst."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from bridge.canopen.frame import Frame
+
+MOST_FRAMES: Final = 256
+"""The longest sequence that the kernel's broadcast manager takes (MAX_NFRAMES of net/can/bcm.c)."""
+SHORTEST: Final = 4
+"""A burst of fewer frames is none for the kernel: it counts the first, and would end before it is renewed."""
+_ROUNDING: Final = 1e-9
+
+
+class BurstEnd(NamedTuple):
+    """From ``at`` on (monotonic seconds) a burst sends ``frame``; with None it ends then."""
+
+    at: float
+    frame: Frame | None
+
+
+class Sequence(NamedTuple):
+    """What the broadcast manager is told: it sends ``frames`` in turn, ``total`` of them in all. The first
+    ``head`` may enable the drive, where others follow them; 0 where all are the same."""
+
+    frames: tuple[Frame, ...]
+    total: int
+    head: int = 0
+
+
+def sequence(
+    frame: Frame, ending: BurstEnd | None, now: float, period_s: float, count: int, *, extra: int = 0
+) -> Sequence:
+    """A burst of ``count`` times ``frame`` that is handed over ``now`` and keeps to ``ending``.
+
+    Of a burst that runs the next frame comes at any time within a period. So the frames until the deadline
+    are rounded up: the stop comes never before it, and at most two periods after it. ``extra`` is the number
+    of frames that are sent at once, out of turn. The sequence has the same length always, because the
+    manager lets none grow; one that is too long for it is cut at the deadline.
+    """
+    length = min(count, MOST_FRAMES)
+    if ending is None:
+        return Sequence((frame,) * length, count)
+    left = ending.at - now
+    head = math.ceil(left / period_s - _ROUNDING) + extra if left > 0 else 0
+    if head >= count:
+        return Sequence((frame,) * length, count)
+    if ending.frame is None or head >= length:
+        return Sequence((frame,) * length, head)
+    if not head:
+        return Sequence((ending.frame,) * length, length)
+    return Sequence((frame,) * head + (ending.frame,) * (length - head), length, head)

@@ -1,0 +1,72 @@
+"""What others send on identifiers that are ours alone, on a socket of its own.
+
+All that we send comes back there, so nobody is woken for it: it is looked at a hundred times a second.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from typing import Final
+
+from bridge.can.cansockets import CanSockets
+from bridge.can.ownframes import OwnFrames
+from bridge.can.receiver import BATCH, Stamps, WatchReceiver
+from bridge.canopen.frame import Frame
+
+LOOK_S: Final = 0.01
+_MOST_PER_LOOK: Final = 1024
+
+
+class ForeignWatch:
+    """``own`` is told of everything that we send. Times are monotonic seconds."""
+
+    def __init__(self, sockets: CanSockets) -> None:
+        self.own = OwnFrames()
+        self._sockets = sockets
+        self._can_ids: frozenset[int] = frozenset()
+        self._socket: socket.socket | None = None
+        self._receiver: WatchReceiver | None = None
+        self._looked_at = 0.0
+
+    def __contains__(self, can_id: int) -> bool:
+        return can_id in self._can_ids
+
+    def watch(self, can_ids: frozenset[int]) -> None:
+        """Look at these from now on."""
+        if can_ids != self._can_ids:
+            self._can_ids = can_ids
+            if self._socket:
+                self._sockets.let_in(can_ids, self._socket)
+
+    def open(self, now: float) -> None:
+        """Raises OSError."""
+        self._socket = self._sockets.watching(self._can_ids)
+        self._receiver = WatchReceiver(self._socket)
+        self._looked_at = now
+
+    def close(self) -> None:
+        self._receiver = None
+        if self._socket:
+            self._socket.close()
+            self._socket = None
+
+    def next_deadline(self) -> float | None:
+        return self._looked_at + LOOK_S if self._receiver and self._can_ids else None
+
+    def take(self, now: float) -> list[Frame]:
+        """What has come from others since the last look, if it is time for one."""
+        frames: list[Frame] = []
+        if self._receiver is None or now < self._looked_at + LOOK_S:
+            return frames
+        stamps = Stamps(now - time.time(), self._looked_at, now)
+        self._looked_at = now
+        try:
+            for _ in range(_MOST_PER_LOOK // BATCH):
+                if self._receiver.receive(frames, stamps, self.own.is_own) < BATCH:
+                    break
+        except OSError:
+            # The interface is gone, and the socket that everything else comes from says so, too.
+            pass
+        # The filter may be wider than what was asked for.
+        return [frame for frame in frames if frame.can_id in self._can_ids]

@@ -1,0 +1,255 @@
+"""Bursts in the kernel's broadcast manager, and what is done where it does not take them. Sans-I/O but for
+the message to the manager."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple, Protocol
+
+from bridge.can import bcm
+from bridge.can.burstend import SHORTEST, BurstEnd, Sequence, sequence
+from bridge.can.softbeat import SoftBeat
+from bridge.canopen.frame import Frame
+
+_RETRY_S: Final = 0.001
+_PATIENCE_S: Final = 0.01
+_ON_ITS_WAY_S: Final = 0.001
+"""A message that took longer to the kernel than this carries too many frames before the deadline."""
+_ENDED: Final = float("-inf")
+_LINK_IS_GONE: Final = (errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.ENOTCONN)
+
+
+class Manager(Protocol):
+    """A connected socket of the broadcast manager. Closing it ends all of its bursts."""
+
+    def send(self, message: bytes, /) -> int: ...
+
+    def close(self) -> None: ...
+
+
+@dataclass(slots=True)
+class _Wish:
+    """What the kernel is to send. Without ``frames`` its burst is to end."""
+
+    frames: tuple[Frame, ...]
+    period_s: float
+    count: int
+    at_once: bool
+    since: float
+    ending: BurstEnd | None = None
+
+    def sequence(self, now: float, *, start: bool) -> Sequence:
+        """As the broadcast manager takes it."""
+        if len(self.frames) != 1:
+            return Sequence(self.frames, self.count)
+        frame = self.frames[0]
+        extra = int(self.at_once and not start)
+        return sequence(frame, self.ending, now, self.period_s, self.count, extra=extra)
+
+
+@dataclass(slots=True)
+class _Job:
+    """What the kernel has taken; it surely runs until ``until``."""
+
+    wish: _Wish
+    until: float
+
+
+class _Sent(NamedTuple):
+    frames: int
+    """Frames that the kernel has got."""
+    until: float
+    """The burst surely runs so long."""
+    is_fresh: bool
+    """It was started, and not refilled."""
+
+
+class KernelBeat:
+    """Finite bursts by COB-ID. Times are monotonic seconds; ``clock`` tells how late a message went out.
+
+    A message that the manager refuses (no memory, no room) leaves the old data on the bus, so it is sent
+    again every millisecond. After ten the bursts are given up: the manager is closed, which ends all of
+    them for certain, and a timer of ours goes on with them until ``open`` gives another manager.
+
+    ``beat``, ``silence``, ``silence_all`` and ``on_time`` raise OSError where the interface is gone or down.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self.refusal = ""
+        """Why the bursts have been given up; empty while the kernel takes them."""
+        self._manager: Manager | None = None
+        self._jobs: dict[int, _Job] = {}
+        self._held: set[int] = set()
+        """What the kernel has, whether it still runs or not."""
+        self._wishes: dict[int, _Wish] = {}
+        self._retry_at: float | None = None
+        self._soft = SoftBeat()
+        self._first: list[Frame] = []
+
+    def open(self, manager: Manager) -> None:
+        self._manager = manager
+        self.refusal = ""
+
+    def close(self) -> None:
+        """End every burst."""
+        self._forget_manager()
+        self._soft.clear()
+        self._first.clear()
+        self.refusal = ""
+
+    def _forget_manager(self) -> None:
+        self._jobs.clear()
+        self._held.clear()
+        self._wishes.clear()
+        self._retry_at = None
+        if self._manager:
+            self._manager.close()
+            self._manager = None
+
+    def beat(
+        self,
+        frames: tuple[Frame, ...],
+        now: float,
+        period_s: float,
+        count: int,
+        *,
+        at_once: bool,
+        ending: BurstEnd | None = None,
+    ) -> Frame | None:
+        """Start or renew a burst; gives the frame that whoever calls has to send now, if any."""
+        can_id = frames[0].can_id
+        # The kernel counts the first frame of a burst, so one of a frame or two ends before it can be
+        # renewed. What is that slow needs no kernel: a round sends it.
+        if self._manager is None or count < SHORTEST:
+            return self._soft.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
+        waiting = self._wishes.get(can_id)
+        wish = _Wish(frames, period_s, count, at_once, now, ending)
+        if waiting:
+            wish.at_once, wish.since = at_once or waiting.at_once, waiting.since
+        if not self._try(can_id, wish, now) and can_id in self._soft:
+            return self._soft.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
+        return None
+
+    def silence(self, can_id: int, now: float) -> None:
+        """End the burst of this identifier."""
+        self._soft.silence(can_id)
+        waiting = self._wishes.get(can_id)
+        if can_id in self._jobs or waiting:
+            self._try(can_id, _Wish((), 0.0, 0, False, waiting.since if waiting else now), now)
+
+    def silence_all(self, now: float) -> None:
+        self._soft.clear()
+        for can_id in {**self._jobs, **self._wishes}:
+            self.silence(can_id, now)
+
+    def next_deadline(self) -> float | None:
+        times = (self._retry_at, self._soft.next_deadline())
+        return min((time for time in times if time is not None), default=None)
+
+    def on_time(self, now: float) -> list[Frame]:
+        """Try again what the kernel has refused; gives the frames to be sent now."""
+        if self._retry_at is not None and now >= self._retry_at:
+            for can_id, wish in list(self._wishes.items()):
+                self._try(can_id, wish, now)
+        first, self._first = self._first, []
+        return first + self._soft.due(now)
+
+    def _try(self, can_id: int, wish: _Wish, now: float) -> bool:
+        """Tell the kernel; False where it does not take it now."""
+        if self._manager is None:
+            return False
+        try:
+            count = self._hand_over(can_id, wish, now)
+        except OSError as error:
+            if error.errno in _LINK_IS_GONE:
+                raise
+            self._wishes[can_id] = wish
+            self._retry_at = now + _RETRY_S
+            if now >= wish.since + _PATIENCE_S:
+                self._give_up(error, now)
+            return False
+        self._wishes.pop(can_id, None)
+        if not self._wishes:
+            self._retry_at = None
+        self._soft.silence(can_id)
+        if count:
+            # The last frame of a burst comes up to a period before its count of periods is over.
+            self._jobs[can_id] = _Job(wish, now + (count - 2) * wish.period_s)
+        else:
+            self._jobs.pop(can_id, None)
+        return True
+
+    def _hand_over(self, can_id: int, wish: _Wish, now: float) -> int:
+        """Give the kernel a burst, or end it; how many frames it has got.
+
+        What it counts are frames, what it has to keep to is a time: where the message was long on its way, it
+        gets a second one with fewer. Refilling keeps the phase of a burst that runs and cannot wake one that
+        has ended, and we may stand still at any line of this: where it may have ended it is started anew, or
+        no renewal would ever wake it.
+        """
+        job = self._jobs.get(can_id)
+        runs = job is not None and job.wish.period_s == wish.period_s and now < job.until
+        until = job.until if job and runs else _ENDED
+        stale_at = now + wish.count * wish.period_s
+        asked, at = wish, max(now, self._clock()) if wish.ending else now
+        while True:
+            count, until, is_fresh = self._send(can_id, asked, at, until)
+            if not count or not (runs or wish.ending):
+                return count
+            after = self._clock()
+            if after >= stale_at:
+                # Nothing that was right then may go on. The next round renews it.
+                return self._end(can_id)
+            if after >= until and not is_fresh:
+                asked = wish
+            elif wish.ending and after - at > _ON_ITS_WAY_S:
+                asked = replace(wish, at_once=False)
+            else:
+                return count
+            at = after
+
+    def _send(self, can_id: int, wish: _Wish, now: float, until: float) -> _Sent:
+        """Start the burst, or refill the one that surely runs until ``until``."""
+        assert self._manager is not None
+        start = until <= now
+        frames, count, head = wish.sequence(now, start=start)
+        if not count:
+            return _Sent(self._end(can_id), _ENDED, is_fresh=False)
+        if start:
+            # What runs might send one of the new frames before it goes back to their beginning.
+            self._end(can_id)
+            until = now + (count - 1) * wish.period_s
+        elif head:
+            # The kernel takes the new frames before it goes back to their beginning, and may send one
+            # between the two. So it goes back first, with frames that are all alike; with one more, so that
+            # it cannot come to their end before the next message is there.
+            alike = (frames[0],) * len(frames)
+            message = bcm.setup(alike, wish.period_s, head + 1, start=False, at_once=False, anew=True)
+            self._manager.send(message)
+            until = min(until, now + head * wish.period_s)
+        at_once, anew = wish.at_once, bool(head)
+        self._manager.send(bcm.setup(frames, wish.period_s, count, start=start, at_once=at_once, anew=anew))
+        self._held.add(can_id)
+        return _Sent(count, until, is_fresh=start)
+
+    def _end(self, can_id: int) -> int:
+        """What is not there the kernel refuses to delete."""
+        assert self._manager is not None
+        if can_id in self._held:
+            self._manager.send(bcm.delete(can_id))
+            self._held.remove(can_id)
+        return 0
+
+    def _give_up(self, error: OSError, now: float) -> None:
+        going = {can_id: job.wish for can_id, job in self._jobs.items()} | self._wishes
+        self._forget_manager()
+        self.refusal = error.strerror or str(error)
+        for wish in going.values():
+            if wish.frames:
+                first = self._soft.beat(
+                    wish.frames, now, wish.period_s, wish.count, at_once=True, ending=wish.ending
+                )
+                self._first += [first] if first else []

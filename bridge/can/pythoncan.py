@@ -1,0 +1,251 @@
+"""Every interface that python-can knows and SocketCAN does not: USB adapters, serial lines, UDP.
+
+python-can blocks, so one thread receives and one sends; the loop only ever touches queues.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import queue
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final
+
+import can
+
+from bridge.can.burstend import BurstEnd
+from bridge.can.interface import BusStatus, ControllerState
+from bridge.can.softbeat import SoftBeat
+from bridge.can.wirebits import WireBits
+from bridge.canopen.frame import EXTENDED, REMOTE, Frame
+from bridge.errors import Unavailable
+
+_MOST_WAITING: Final = 1 << 14
+_MOST_TO_SEND: Final = 256
+_POLL_S: Final = 0.2
+_BEAT_WITHIN_S: Final = 0.05
+_REOPEN_S: Final = (0.2, 5.0)
+_ERROR_BYTES: Final = 8
+_FAILURES: Final = (can.CanError, OSError, ValueError, ImportError, TypeError, AttributeError)
+
+
+class PythonCanBus:
+    """A python-can bus behind two threads."""
+
+    def __init__(self, name: str, interface: str, channel: str, bitrate: int) -> None:
+        self._name = name
+        self._interface, self._channel, self._bitrate = interface, channel, bitrate
+        self._status = BusStatus()
+        self._beats = SoftBeat()
+        self._received: deque[Frame] = deque(maxlen=_MOST_WAITING)
+        self._to_send: queue.Queue[tuple[Frame, float] | None] = queue.Queue(_MOST_TO_SEND)
+        self._accepted: frozenset[int] | None = None
+        self._ours: frozenset[int] = frozenset()
+        self._foreign: deque[Frame] = deque(maxlen=_MOST_WAITING)
+        self._bus: can.BusABC | None = None
+        self._bits = WireBits()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._wake: Callable[[], None] = lambda: None
+        self._woken = False
+        self._stopping = threading.Event()
+        self._threads: list[threading.Thread] = []
+
+    @property
+    def name(self) -> str:
+        return self._name
+
+    @property
+    def status(self) -> BusStatus:
+        self._status.bits = int(self._bits.total)
+        return self._status
+
+    def open(self, wake: Callable[[], None]) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._wake = wake
+        try:
+            self._bus = self._make()
+        except _FAILURES as error:
+            raise Unavailable(
+                f"bus {self._name}: interface {self._interface!r}, channel {self._channel!r}: {error}"
+            ) from error
+        for work in (self._receive, self._transmit):
+            thread = threading.Thread(target=work, name=f"{self._name}-{work.__name__}", daemon=True)
+            thread.start()
+            self._threads.append(thread)
+
+    def _make(self) -> can.BusABC:
+        options: dict[str, Any] = {"bitrate": self._bitrate}
+        return can.Bus(interface=self._interface, channel=self._channel, **options)
+
+    def accept(self, can_ids: list[int]) -> None:
+        self._accepted = frozenset(can_ids)
+
+    def watch(self, can_ids: frozenset[int]) -> None:
+        self._ours = can_ids
+
+    def take_foreign(self, now: float) -> list[Frame]:
+        frames: list[Frame] = []
+        while self._foreign:
+            frames.append(self._foreign.popleft())
+        return frames
+
+    def _receive(self) -> None:
+        """Thread: everything that comes, each frame stamped as it comes."""
+        while not self._stopping.is_set():
+            bus = self._bus
+            if bus is None:
+                return
+            try:
+                message = bus.recv(_POLL_S)
+            except (can.CanError, OSError, ValueError) as error:
+                self._break_down(bus, error)
+                continue
+            if message is not None:
+                self._take(message)
+
+    def _take(self, message: can.Message) -> None:
+        if message.is_error_frame:
+            self._status.error_frames += 1
+            data = bytes(message.data)
+            if len(data) == _ERROR_BYTES:
+                self._status.note_error((message.arbitration_id, data))
+            return
+        if message.is_fd:
+            return
+        flags = (EXTENDED if message.is_extended_id else 0) | (REMOTE if message.is_remote_frame else 0)
+        frame = Frame(message.arbitration_id | flags, bytes(message.data), time.monotonic())
+        self._bits.add(frame)
+        if frame.can_id in self._ours:
+            # python-can gives no bus its own frames.
+            self._foreign.append(frame)
+            self._rouse()
+        if self._accepted is None or frame.can_id in self._accepted:
+            self._give(frame)
+
+    def _give(self, frame: Frame) -> None:
+        if len(self._received) == _MOST_WAITING:
+            self._status.frames_lost += 1
+        self._received.append(frame)
+        self._rouse()
+
+    def _break_down(self, broken: can.BusABC, error: Exception) -> None:
+        """Receiving thread: the adapter is gone. Looks for it, less and less often, until it is back."""
+        self._status.outages += 1
+        self._status.state = ControllerState.DOWN
+        self._status.note_error(f"{self._interface} {self._channel}: {error}")
+        self._rouse()
+        _shut_down(broken)
+        pause_s = _REOPEN_S[0]
+        while not self._stopping.wait(pause_s):
+            pause_s = min(2 * pause_s, _REOPEN_S[1])
+            try:
+                self._bus = self._make()
+            except _FAILURES:
+                continue
+            # What was to be sent to the adapter that is gone is stale.
+            self._status.frames_expired += self._to_send.qsize()
+            self._to_send.queue.clear()
+            self._status.state = ControllerState.OK
+            self._rouse()
+            return
+
+    def _transmit(self) -> None:
+        """Thread: sends in order; what is past its deadline is dropped."""
+        while (item := self._to_send.get()) is not None:
+            frame, deadline = item
+            bus = self._bus
+            if bus is None or self._status.state is ControllerState.DOWN or time.monotonic() > deadline:
+                self._status.frames_expired += 1
+                continue
+            remote = bool(frame.can_id & REMOTE)
+            message = can.Message(
+                arbitration_id=frame.can_id & 0x1FFF_FFFF,
+                is_extended_id=bool(frame.can_id & EXTENDED),
+                is_remote_frame=remote,
+                # A remote frame has the length of what it asks for, and no data.
+                data=b"" if remote else frame.data,
+                dlc=len(frame.data) or int(remote),
+            )
+            try:
+                bus.send(message, timeout=max(0.0, deadline - time.monotonic()))
+                self._status.frames_sent += 1
+                self._bits.add(frame)
+            except (can.CanError, OSError, ValueError):
+                self._status.frames_expired += 1
+
+    def _rouse(self) -> None:
+        if self._loop and not self._woken:
+            self._woken = True
+            self._loop.call_soon_threadsafe(self._wake_up)
+
+    def _wake_up(self) -> None:
+        self._woken = False
+        self._wake()
+
+    def drain(self, now: float) -> list[Frame]:
+        frames: list[Frame] = []
+        while self._received:
+            frames.append(self._received.popleft())
+        self._status.frames_received += len(frames)
+        return frames
+
+    def send(self, frame: Frame, now: float, deadline: float) -> None:
+        if self._status.state is ControllerState.DOWN:
+            self._status.frames_expired += 1
+            return
+        try:
+            self._to_send.put_nowait((frame, deadline))
+        except queue.Full:
+            self._status.frames_expired += 1
+
+    def beat(
+        self,
+        frames: tuple[Frame, ...],
+        now: float,
+        period_s: float,
+        count: int,
+        *,
+        at_once: bool = False,
+        ending: BurstEnd | None = None,
+    ) -> None:
+        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
+        if frame is not None:
+            self._send_beat(frame, now, period_s)
+
+    def _send_beat(self, frame: Frame, now: float, within_s: float) -> None:
+        self.send(frame, now, now + within_s)
+        if self._accepted is not None and frame.can_id in self._accepted:
+            self._give(frame._replace(time=now))
+
+    def silence(self, can_id: int) -> None:
+        self._beats.silence(can_id)
+
+    def next_deadline(self) -> float | None:
+        return self._beats.next_deadline()
+
+    def on_time(self, now: float) -> None:
+        for frame in self._beats.due(now):
+            self._send_beat(frame, now, _BEAT_WITHIN_S)
+
+    def close(self) -> None:
+        self._beats.clear()
+        self._stopping.set()
+        try:
+            self._to_send.put_nowait(None)
+        except queue.Full:
+            self._to_send.queue.clear()
+            self._to_send.put_nowait(None)
+        for thread in self._threads:
+            thread.join(2 * _POLL_S)
+        if self._bus:
+            _shut_down(self._bus)
+            self._bus = None
+
+
+def _shut_down(bus: can.BusABC) -> None:
+    """An adapter that is gone may fail here, too: nothing is left to be done about it."""
+    with contextlib.suppress(can.CanError, OSError, ValueError):
+        bus.shutdown()

@@ -1,0 +1,188 @@
+"""A CAN bus in memory, for the demo and for tests: it can lose, delay and be cut."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+from collections import deque
+from collections.abc import Callable
+
+from bridge.can.burstend import BurstEnd
+from bridge.can.interface import BusStatus, ControllerState
+from bridge.can.softbeat import SoftBeat
+from bridge.can.wirebits import WireBits
+from bridge.canopen.frame import Frame
+
+_MOST_WAITING = 1 << 16
+
+
+class VirtualWire:
+    """What the ends are attached to. Faults are set on it: ``loss`` (0 … 1), ``delay_s``, ``cut``."""
+
+    def __init__(self, seed: int = 0) -> None:
+        self.loss = 0.0
+        self.delay_s = 0.0
+        self.cut = False
+        self.listeners: list[Callable[[Frame], None]] = []
+        """Called with every frame put on the wire, whoever sends it."""
+        self._random = random.Random(seed)
+        self._ends: list[VirtualBus] = []
+
+    def end(self, name: str) -> VirtualBus:
+        """A new end of this wire."""
+        bus = VirtualBus(name, self)
+        self._ends.append(bus)
+        return bus
+
+    def put(self, frame: Frame, sender: VirtualBus, now: float) -> None:
+        frame = frame._replace(time=now + self.delay_s)
+        for listener in self.listeners:
+            listener(frame)
+        if self.cut or (self.loss and self._random.random() < self.loss):
+            return
+        for end in self._ends:
+            if end is not sender:
+                end.pass_by(frame, now)
+                end.deliver(frame, now)
+
+
+class VirtualBus:
+    """One end. Everything runs in the event loop of the one who opened it."""
+
+    def __init__(self, name: str, wire: VirtualWire) -> None:
+        self._name = name
+        self._wire = wire
+        self._status = BusStatus()
+        self._beats = SoftBeat()
+        self._bits = WireBits()
+        self._waiting: deque[Frame] = deque()
+        self._accepted: frozenset[int] | None = None
+        self._ours: frozenset[int] = frozenset()
+        self._foreign: list[Frame] = []
+        self._wake: Callable[[], None] | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._woken = False
+
+    @property
+    def name(self) -> str:
+        return self._name
+
+    @property
+    def status(self) -> BusStatus:
+        self._status.bits = int(self._bits.total)
+        return self._status
+
+    def open(self, wake: Callable[[], None]) -> None:
+        self._wake = wake
+        self._loop = asyncio.get_running_loop()
+
+    def accept(self, can_ids: list[int]) -> None:
+        self._accepted = frozenset(can_ids)
+
+    def watch(self, can_ids: frozenset[int]) -> None:
+        self._ours = can_ids
+
+    def take_foreign(self, now: float) -> list[Frame]:
+        foreign, self._foreign = self._foreign, []
+        return foreign
+
+    def pass_by(self, frame: Frame, now: float) -> None:
+        """Somebody else's frame is on the wire."""
+        self._bits.add(frame)
+        is_down = self._wake is None or self._status.state is ControllerState.DOWN
+        if frame.can_id in self._ours and not is_down and len(self._foreign) < _MOST_WAITING:
+            self._foreign.append(frame)
+            self._rouse(frame.time - now)
+
+    def deliver(self, frame: Frame, now: float) -> None:
+        """The wire brings a frame."""
+        if self._wake is None or self._loop is None or self._status.state is ControllerState.DOWN:
+            return
+        if self._accepted is not None and frame.can_id not in self._accepted:
+            return
+        if len(self._waiting) >= _MOST_WAITING:
+            self._status.frames_lost += 1
+            return
+        self._waiting.append(frame)
+        self._rouse(frame.time - now)
+
+    def _rouse(self, delay_s: float) -> None:
+        if self._woken or self._loop is None:
+            return
+        self._woken = True
+        if delay_s > 0:
+            self._loop.call_later(delay_s, self._wake_up)
+        else:
+            self._loop.call_soon(self._wake_up)
+
+    def _wake_up(self) -> None:
+        self._woken = False
+        if self._wake:
+            self._wake()
+
+    def drain(self, now: float) -> list[Frame]:
+        waiting = self._waiting
+        frames: list[Frame] = []
+        while waiting and waiting[0].time <= now:
+            frames.append(waiting.popleft())
+        if waiting:
+            self._rouse(waiting[0].time - now)
+        self._status.frames_received += len(frames)
+        return frames
+
+    def send(self, frame: Frame, now: float, deadline: float) -> None:
+        if self._wake is None or self._status.state is ControllerState.DOWN:
+            self._status.frames_expired += 1
+            return
+        self._status.frames_sent += 1
+        self._bits.add(frame)
+        self._wire.put(frame, self, now)
+
+    def beat(
+        self,
+        frames: tuple[Frame, ...],
+        now: float,
+        period_s: float,
+        count: int,
+        *,
+        at_once: bool = False,
+        ending: BurstEnd | None = None,
+    ) -> None:
+        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
+        if frame is not None:
+            self._send_beat(frame, now)
+
+    def _send_beat(self, frame: Frame, now: float) -> None:
+        self.send(frame, now, now)
+        if self._accepted is not None and frame.can_id in self._accepted:
+            self.deliver(frame._replace(time=now), now)
+
+    def silence(self, can_id: int) -> None:
+        self._beats.silence(can_id)
+
+    def next_deadline(self) -> float | None:
+        return self._beats.next_deadline()
+
+    def on_time(self, now: float) -> None:
+        for frame in self._beats.due(now):
+            self._send_beat(frame, now)
+
+    def break_down(self) -> None:
+        """The interface goes away, as by ``ip link set down``."""
+        self._status.state = ControllerState.DOWN
+        self._status.note_error("the interface is down")
+        self._beats.clear()
+        self._waiting.clear()
+        self._foreign.clear()
+        if self._loop and self._wake:
+            self._loop.call_soon(self._wake)
+
+    def repair(self) -> None:
+        self._status.state = ControllerState.OK
+        if self._loop and self._wake:
+            self._loop.call_soon(self._wake)
+
+    def close(self) -> None:
+        self._wake = None
+        self._beats.clear()
+        self._waiting.clear()

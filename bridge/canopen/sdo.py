@@ -1,0 +1,303 @@
+"""SDO client (CiA 301 §7.2.4): one channel to one server, its queue and its time-outs.
+
+The transfers themselves are generators (``sdo_transfer``, ``sdo_block``). Everything the server says that
+is no answer to what was asked last — late, doubled, about another object — is counted and passed over,
+never taken for an answer.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, TypeVar
+
+from bridge.canopen import abort
+from bridge.canopen.frame import Frame
+from bridge.canopen.sdo_block import BlockUse, read_object, write_object
+from bridge.canopen.sdo_queue import Priority, SdoJob, SdoQueue
+from bridge.canopen.sdo_transfer import (
+    ABORT,
+    MUX,
+    U32,
+    Exchange,
+    Result,
+    SdoError,
+    Transfer,
+    abort_request,
+)
+
+__all__ = ["Priority", "Result", "SdoChannel", "SdoError", "SdoJob"]
+
+SEGMENTS_AT_ONCE: Final = 8
+"""So many frames of a block go out together: a block is up to 127, more than a driver's queue holds."""
+_COMMANDS: Final = frozenset((0x1010, 0x1011))
+"""Writing them does something each time (store and restore, CiA 301 §7.5.2.13–14): never repeated."""
+_COMMAND_S: Final = 10.0
+"""So long a node may take for one: it writes all its parameters to its memory before it answers."""
+_MOST_OWED: Final = 8
+"""So many late answers are expected; a node that is silent for long owes no more."""
+
+T = TypeVar("T")
+
+
+@dataclass(slots=True)
+class _Owed:
+    """Answers that may still come, after we have given up waiting for them or have asked again."""
+
+    index: int
+    sub: int
+    until: float
+    answers: int = 1
+
+    def is_about(self, job: SdoJob) -> bool:
+        return (self.index, self.sub) == (job.index, job.sub)
+
+
+class SdoChannel:
+    """One client channel. One transfer at a time; the others wait, by priority and then in order.
+
+    ``on_frame`` and ``on_time`` take monotonic seconds; ``take_frames`` gives what is to be sent. A
+    transfer that fails by time-out or by a damaged answer is repeated ``retries`` times. ``done`` of each
+    transfer is called once, possibly before ``read`` or ``write`` returns. ``segment_s`` is the time to
+    leave to each frame of a block, so that it does not fill the bus and the driver's queue.
+    """
+
+    def __init__(
+        self, request_id: int, reply_id: int, timeout_s: float, *, retries: int = 0, segment_s: float = 0.001
+    ) -> None:
+        self.request_id = request_id
+        self.reply_id = reply_id
+        self.timeout_s = timeout_s
+        self.retries = retries
+        self.unmatched = 0
+        """Frames on the reply COB-ID that were no answer."""
+        self.late = 0
+        """Those of them that answered a request of ours which we had given up."""
+        self._segment_s = segment_s
+        self._queue = SdoQueue()
+        self._block = BlockUse()
+        self._job: SdoJob | None = None
+        self._transfer: Transfer | None = None
+        self._exchange: Exchange | None = None
+        self._deadline: float | None = None
+        self._frames: list[Frame] = []
+        self._unsent: deque[bytes] = deque()
+        self._send_at: float | None = None
+        self._owed: _Owed | None = None
+        self._hold_until: float | None = None
+
+    @property
+    def waiting(self) -> int:
+        """Transfers that have not ended yet."""
+        return len(self._queue) + (self._job is not None)
+
+    # asking
+
+    def read(
+        self,
+        index: int,
+        sub: int,
+        now: float,
+        done: Callable[[Result], None],
+        *,
+        priority: Priority = Priority.COMMAND,
+    ) -> SdoJob:
+        """Read an object: expedited, segmented or by blocks, as the server offers it."""
+
+        def start(block: BlockUse) -> Transfer:
+            return read_object(index, sub, block)
+
+        return self._submit(SdoJob(index, sub, start, done, priority, self.retries, self.timeout_s), now)
+
+    def write(
+        self,
+        index: int,
+        sub: int,
+        data: bytes,
+        now: float,
+        done: Callable[[Result], None],
+        *,
+        priority: Priority = Priority.COMMAND,
+        repeatable: bool = True,
+        may_begin: Callable[[], bool] | None = None,
+    ) -> SdoJob:
+        """Write an object. ``repeatable`` is false where writing the same twice does more than once.
+        ``may_begin`` is asked when its turn has come: where it may not, nothing is sent, and the result is
+        an error."""
+
+        def start(block: BlockUse) -> Transfer:
+            return write_object(index, sub, data, block)
+
+        is_command = index in _COMMANDS
+        retries = self.retries if repeatable and not is_command else 0
+        timeout_s = max(self.timeout_s, _COMMAND_S) if is_command else self.timeout_s
+        return self._submit(SdoJob(index, sub, start, done, priority, retries, timeout_s, may_begin), now)
+
+    def cancel(self, job: SdoJob, now: float) -> bool:
+        """End this transfer without calling its ``done``; False where it has ended already."""
+        if job is not self._job:
+            return self._queue.remove(job)
+        self._tell_abort(job, abort.GENERAL)
+        self._owe(job, now)
+        self._clear()
+        self._next(now)
+        return True
+
+    def flush(self, now: float) -> None:
+        """End everything that waits: the node or the bus is gone. Nothing more is sent."""
+        jobs = [self._job] if self._job else []
+        jobs += self._queue
+        self._queue.clear()
+        self._clear()
+        self._frames.clear()
+        self._hold_until = None
+        self._block = BlockUse()
+        for job in jobs:
+            job.done(SdoError(job.index, job.sub, abort.TIMED_OUT, by_server=False))
+
+    def _submit(self, job: SdoJob, now: float) -> SdoJob:
+        refused = self._queue.add(job)
+        if self._job is None:
+            self._next(now)
+        if refused:
+            refused.done(SdoError(refused.index, refused.sub, abort.BUSY, by_server=False))
+        return job
+
+    # frames and time
+
+    def on_frame(self, frame: Frame) -> None:
+        """A frame on the reply COB-ID."""
+        data, exchange, job, transfer = frame.data, self._exchange, self._job, self._transfer
+        if len(data) != 8 or job is None or transfer is None or exchange is None or exchange.reply is None:
+            self._pass_over(data)
+        elif data[0] == ABORT:
+            if MUX.unpack_from(data, 1) == (job.index, job.sub):
+                code: int = U32.unpack_from(data, 4)[0]
+                error = SdoError(job.index, job.sub, code, by_server=True)
+                self._resume(transfer.throw, error, frame.time)
+            else:
+                self._pass_over(data)
+        elif exchange.reply.fits(data, len(self._unsent)):
+            self._resume(transfer.send, data, frame.time)
+        else:
+            self._pass_over(data)
+
+    def _pass_over(self, data: bytes) -> None:
+        self.unmatched += 1
+        owed = self._owed
+        if owed and len(data) == 8 and MUX.unpack_from(data, 1) == (owed.index, owed.sub):
+            self.late += 1
+            owed.answers -= 1
+            self._owed = owed if owed.answers else None
+
+    def on_time(self, now: float) -> None:
+        if self._send_at is not None and now >= self._send_at:
+            self._send_some(now)
+        job, transfer = self._job, self._transfer
+        if job is None or transfer is None:
+            if self._hold_until is not None and (now >= self._hold_until or self._owed is None):
+                self._next(now)
+        elif self._deadline is not None and now >= self._deadline:
+            error = SdoError(job.index, job.sub, abort.TIMED_OUT, by_server=False)
+            self._resume(transfer.throw, error, now)
+
+    def next_deadline(self) -> float | None:
+        times = (self._send_at, self._hold_until, self._deadline)
+        return min((time for time in times if time is not None), default=None)
+
+    def take_frames(self) -> list[Frame]:
+        frames, self._frames = self._frames, []
+        return frames
+
+    # the transfer that runs
+
+    def _next(self, now: float) -> None:
+        """Begin the next transfer. One about an object that still owes us an answer has to wait: that
+        answer could be taken for its own."""
+        self._hold_until = None
+        owed = self._owed if self._owed and now < self._owed.until else None
+        for job in self._queue:
+            if owed is None or not owed.is_about(job):
+                self._queue.remove(job)
+                self._begin(job, now)
+                return
+        if owed and len(self._queue):
+            self._hold_until = owed.until
+
+    def _begin(self, job: SdoJob, now: float) -> None:
+        self._job = job
+        if job.may_begin is not None and not job.may_begin():
+            self._end(SdoError(job.index, job.sub, abort.GENERAL, by_server=False), now)
+            return
+        transfer = self._transfer = job.start(self._block)
+        self._resume(next, transfer, now)
+
+    def _resume(self, step: Callable[[T], Exchange], argument: T, now: float) -> None:
+        """Let the transfer go on and send what it wants to be sent."""
+        transfer = self._transfer
+        if transfer is None:
+            return
+        self._unsent.clear()
+        self._send_at = None
+        try:
+            exchange = step(argument)
+            while exchange.reply is None:
+                self._frames += [Frame(self.request_id, request) for request in exchange.requests]
+                exchange = transfer.send(b"")
+        except StopIteration as end:
+            self._end(end.value, now)
+        except SdoError as error:
+            self._fail(error, now)
+        else:
+            self._exchange = exchange
+            self._unsent.extend(exchange.requests)
+            self._send_some(now)
+
+    def _send_some(self, now: float) -> None:
+        """Send the next frames of the exchange; the time for the answer begins with the last one."""
+        most = SEGMENTS_AT_ONCE if self._segment_s else len(self._unsent)
+        for _ in range(min(most, len(self._unsent))):
+            self._frames.append(Frame(self.request_id, self._unsent.popleft()))
+        self._send_at = now + SEGMENTS_AT_ONCE * self._segment_s if self._unsent else None
+        if self._job:
+            self._deadline = now + self._job.timeout_s
+
+    def _fail(self, error: SdoError, now: float) -> None:
+        """The transfer has failed: try it again, or tell the one who asked."""
+        job = self._job
+        if job is None:
+            return
+        if not error.by_server:
+            self._tell_abort(job, error.code)
+            self._owe(job, now)
+        if job.retries_left and error.code in abort.TRANSIENT:
+            job.retries_left -= 1
+            self._begin(job, now)
+        else:
+            self._end(error, now)
+
+    def _tell_abort(self, job: SdoJob, code: int) -> None:
+        self._frames.append(Frame(self.request_id, abort_request(job.index, job.sub, code)))
+
+    def _owe(self, job: SdoJob, now: float) -> None:
+        before = self._owed.answers if self._owed and self._owed.is_about(job) else 0
+        answers = min(before + 1, _MOST_OWED)
+        self._owed = _Owed(job.index, job.sub, now + job.timeout_s, answers)
+
+    def _clear(self) -> None:
+        if self._transfer:
+            self._transfer.close()
+        self._job = self._transfer = self._exchange = self._deadline = self._send_at = None
+        self._unsent.clear()
+
+    def _end(self, result: Result, now: float) -> None:
+        job = self._job
+        self._clear()
+        if not isinstance(result, SdoError) and job and self._owed and self._owed.is_about(job):
+            # It may have been the answer to the first attempt: the second's is still to come.
+            self._owed.until = now + job.timeout_s
+        if job is not None:
+            job.done(result)
+        if self._job is None:
+            self._next(now)

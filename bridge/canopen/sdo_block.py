@@ -1,0 +1,228 @@
+"""SDO block transfer with CRC (CiA 301 §7.2.4.3.9–15), and the choice between it and segments."""
+
+from __future__ import annotations
+
+import binascii
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.canopen import abort
+from bridge.canopen.sdo_transfer import (
+    MOST_BYTES,
+    MUX,
+    SEGMENT,
+    U32,
+    BlockAck,
+    BlockSegment,
+    BlockStart,
+    Exchange,
+    Reply,
+    SdoError,
+    Transfer,
+    abort_request,
+    announced_bytes,
+    check_length,
+    download,
+    initiate_upload,
+    upload_segments,
+)
+
+BLOCK_FROM_BYTES: Final = 112
+"""Sixteen segments: below, the frames that open and close a block transfer cost more than they save."""
+MOST_SEGMENTS: Final = 127
+_LEAST_SEGMENTS: Final = 4
+_MOST_REPEATS: Final = 3
+"""How many blocks in a row may bring nothing new before the transfer is given up."""
+
+_DOWNLOAD: Final = 0xC6  # with our CRC and the length
+_DOWNLOAD_END: Final = 0xC1
+_UPLOAD: Final = 0xA4  # with our CRC
+_UPLOAD_START: Final = b"\xa3" + bytes(7)
+_UPLOAD_ACK: Final = 0xA2
+_UPLOAD_DONE: Final = b"\xa1" + bytes(7)
+_CRC: Final = 0x04
+_LAST: Final = 0x80
+
+
+def crc16(data: bytes | bytearray) -> int:
+    """CRC of a block transfer: x¹⁶ + x¹² + x⁵ + 1 from 0 (CiA 301 §7.2.4.3.16)."""
+    return binascii.crc_hqx(data, 0)
+
+
+@dataclass(slots=True)
+class BlockUse:
+    """What a channel has learned of its server: whether it does block transfer at all, and how many
+    segments in a row arrive whole."""
+
+    offered: bool = True
+    segments: int = MOST_SEGMENTS
+
+    def on_block(self, whole: bool) -> None:
+        """Half as many after a loss, twice as many after a block without one."""
+        if whole:
+            self.segments = min(MOST_SEGMENTS, self.segments * 2)
+        else:
+            self.segments = max(_LEAST_SEGMENTS, self.segments // 2)
+
+
+def read_object(index: int, sub: int, block: BlockUse) -> Transfer:
+    """Read an object: by blocks where it is announced as long and the server does that."""
+    value, announced = yield from initiate_upload(index, sub)
+    if value is not None:
+        return value
+    if block.offered and announced is not None and announced >= BLOCK_FROM_BYTES:
+        value = yield from block_upload(index, sub, block)
+        if value is not None:
+            return value
+        value, announced = yield from initiate_upload(index, sub)
+        if value is not None:
+            return value
+    return (yield from upload_segments(index, sub, announced))
+
+
+def write_object(index: int, sub: int, data: bytes, block: BlockUse) -> Transfer:
+    """Write an object: by blocks where it is long and the server does that."""
+    if block.offered and len(data) >= BLOCK_FROM_BYTES:
+        done = yield from block_download(index, sub, data, block)
+        if done:
+            return b""
+    return (yield from download(index, sub, data))
+
+
+def _initiate(
+    requests: tuple[bytes, ...], reply: Reply | BlockStart, block: BlockUse
+) -> Generator[Exchange, bytes, bytes | None]:
+    """The server's answer, or None where it knows no block transfer. A server that keeps silent may know
+    none either: the next attempt goes without."""
+    try:
+        return (yield Exchange(requests, reply))
+    except SdoError as error:
+        if error.by_server and error.code == abort.UNKNOWN_COMMAND:
+            block.offered = False
+            return None
+        block.offered = error.by_server
+        raise
+
+
+def block_upload(index: int, sub: int, block: BlockUse) -> Generator[Exchange, bytes, bytes | None]:
+    """Read by blocks; None where the server knows no block transfer. The segmented upload that has been
+    initiated is given up first."""
+    mux = MUX.pack(index, sub)
+    give_up = abort_request(index, sub, abort.GENERAL)
+    request = bytes((_UPLOAD,)) + mux + bytes((block.segments, 0, 0, 0))
+    reply = yield from _initiate((give_up, request), BlockStart(mux), block)
+    if reply is None:
+        return None
+    if reply[0] & 0xE1 != 0xC0:
+        # An ordinary upload, which was not allowed to it; or the answer to ours, doubled. Begin anew.
+        block.offered = False
+        yield Exchange((give_up,), None)
+        return None
+    with_crc = bool(reply[0] & _CRC)
+    announced = announced_bytes(index, sub, reply) if reply[0] & 2 else None
+    data, last = yield from _upload_blocks(index, sub, announced, block)
+    ack = bytes((_UPLOAD_ACK, last[0] & 0x7F, block.segments)) + bytes(5)
+    end = yield Exchange((ack,), Reply(0xE1, 0xC1, before=last))
+    if unused := end[0] >> 2 & 7:
+        del data[-unused:]
+    check_length(index, sub, len(data), announced)
+    if with_crc and int.from_bytes(end[1:3], "little") != crc16(data):
+        raise SdoError(index, sub, abort.CRC, by_server=False)
+    yield Exchange((_UPLOAD_DONE,), None)
+    return bytes(data)
+
+
+def _upload_blocks(
+    index: int, sub: int, announced: int | None, block: BlockUse
+) -> Generator[Exchange, bytes, tuple[bytearray, bytes]]:
+    """All data of an upload, filled up to whole segments, and the frame of the last segment, which has
+    not been acknowledged yet."""
+    most = (MOST_BYTES if announced is None else announced) + SEGMENT
+    data = bytearray()
+    request, repeats = _UPLOAD_START, 0
+    while True:
+        size = block.segments
+        frames = yield from _upload_block(request, size)
+        data += b"".join(frame[1:] for frame in frames)
+        if len(data) >= most:
+            raise SdoError(index, sub, abort.LENGTH_TOO_HIGH, by_server=False)
+        if frames and frames[-1][0] & _LAST:
+            return data, frames[-1]
+        repeats = 0 if frames else repeats + 1
+        if repeats > _MOST_REPEATS:
+            raise SdoError(index, sub, abort.SEQUENCE, by_server=False)
+        block.on_block(whole=len(frames) == size)
+        # The server goes on behind the last segment that came in sequence.
+        request = bytes((_UPLOAD_ACK, len(frames), block.segments)) + bytes(5)
+
+
+def _upload_block(request: bytes, size: int) -> Generator[Exchange, bytes, list[bytes]]:
+    """The segments of one block up to the first that is missing.
+
+    In silence, what has come is acknowledged. Where nothing has come, ``request`` may have been lost and is
+    repeated once, unless it was the start, which a server takes only once.
+    """
+    frames: list[bytes] = []
+    requests, repeated = (request,), request == _UPLOAD_START
+    while True:
+        due = len(frames) + 1
+        try:
+            frame = yield Exchange(requests, BlockSegment(due, size))
+        except SdoError as error:
+            if not error.by_server and frames:
+                return frames
+            if error.by_server or repeated:
+                raise
+            repeated = True
+            continue
+        requests = ()
+        number = frame[0] & 0x7F
+        if number == due:
+            frames.append(frame)
+        if number == size or frame[0] & _LAST:
+            return frames
+
+
+def block_download(index: int, sub: int, data: bytes, block: BlockUse) -> Generator[Exchange, bytes, bool]:
+    """Write by blocks; False where the server knows no block transfer."""
+    mux = MUX.pack(index, sub)
+    request = bytes((_DOWNLOAD,)) + mux + U32.pack(len(data))
+    reply = yield from _initiate((request,), Reply(0xE3, 0xA0, mux), block)
+    if reply is None:
+        return False
+    segments = [data[start : start + SEGMENT] for start in range(0, len(data), SEGMENT)]
+    with_crc = bool(reply[0] & _CRC)
+    size, done, repeats = reply[4], 0, 0
+    while done < len(segments):
+        if not 1 <= size <= MOST_SEGMENTS:
+            raise SdoError(index, sub, abort.BLOCK_SIZE, by_server=False)
+        part = segments[done : done + size]
+        ack = yield from _download_block(part, done + len(part) == len(segments), with_crc)
+        done += ack[1]
+        size = ack[2]
+        repeats = 0 if ack[1] else repeats + 1
+        if repeats > _MOST_REPEATS:
+            raise SdoError(index, sub, abort.SEQUENCE, by_server=False)
+    command = _DOWNLOAD_END | (SEGMENT - len(segments[-1])) << 2
+    crc = crc16(data) if with_crc else 0
+    end = bytes((command,)) + crc.to_bytes(2, "little") + bytes(5)
+    yield Exchange((end,), Reply(0xE3, 0xA1))
+    return True
+
+
+def _download_block(part: list[bytes], is_last: bool, with_crc: bool) -> Transfer:
+    """Send one block; returns the server's acknowledge.
+
+    In silence the last segment is repeated once: without it the server goes on waiting. If it was the
+    acknowledge that was lost, the block comes twice, which only a CRC tells.
+    """
+    frames = [bytes((number,)) + segment.ljust(SEGMENT, b"\0") for number, segment in enumerate(part, 1)]
+    if is_last:
+        frames[-1] = bytes((frames[-1][0] | _LAST,)) + frames[-1][1:]
+    try:
+        return (yield Exchange(tuple(frames), BlockAck(len(frames))))
+    except SdoError as error:
+        if error.by_server or not with_crc:
+            raise
+    return (yield Exchange((frames[-1],), BlockAck(len(frames))))

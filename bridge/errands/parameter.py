@@ -1,0 +1,71 @@
+"""A procedure on one drive's parameters as an errand for the command line. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+from bridge.canopen import cobid
+from bridge.canopen.frame import Frame
+from bridge.canopen.sdo import SdoChannel
+from bridge.config import NodeTable
+from bridge.mapping.model import Family, Slot
+from bridge.node.parameters.run import Procedure, run
+from bridge.parameter import ParameterError, Transfer
+
+T = TypeVar("T")
+
+
+class ParameterErrand(Generic[T]):
+    """``make`` gives the procedure, of now. ``result`` is None until it has ended."""
+
+    def __init__(
+        self, node: NodeTable, family: Family, slot: Slot, make: Callable[[float], Procedure[T]], now: float
+    ) -> None:
+        self.result: T | ParameterError | None = None
+        self.is_done = False
+        self._now = now
+
+        def channel(request: int, reply: int) -> SdoChannel:
+            return SdoChannel(
+                request + node.id, reply + node.id, node.sdo_timeout_ms / 1000, retries=node.sdo_retries
+            )
+
+        self._first = self._of_drive = channel(cobid.SDO_REQUEST, cobid.SDO_REPLY)
+        if not slot.parameters_by_sdo:
+            server = next((server for server in family.sdo if server.slot == slot.name), None)
+            if server is not None:
+                self._of_drive = channel(server.request, server.reply)
+        run(make(now), self._channel_for, lambda: self._now, self._done)
+
+    def _channel_for(self, transfer: Transfer) -> SdoChannel:
+        return self._first if transfer.of_node else self._of_drive
+
+    def _done(self, result: T | ParameterError) -> None:
+        self.result = result
+        self.is_done = True
+
+    @property
+    def _channels(self) -> tuple[SdoChannel, ...]:
+        return (self._first,) if self._of_drive is self._first else (self._first, self._of_drive)
+
+    def is_finished(self, now: float) -> bool:
+        return self.is_done
+
+    def on_frame(self, frame: Frame) -> None:
+        self._now = max(self._now, frame.time)
+        for channel in self._channels:
+            if frame.can_id == channel.reply_id:
+                channel.on_frame(frame)
+
+    def on_time(self, now: float) -> None:
+        self._now = max(self._now, now)
+        for channel in self._channels:
+            channel.on_time(now)
+
+    def next_deadline(self) -> float | None:
+        times = (channel.next_deadline() for channel in self._channels)
+        return min((time for time in times if time is not None), default=None)
+
+    def take_frames(self) -> list[Frame]:
+        return [frame for channel in self._channels for frame in channel.take_frames()]

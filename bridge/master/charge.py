@@ -1,0 +1,104 @@
+"""Who is in charge of a bus, this bridge or another one, and what is said of it. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from bridge.command import Code, Event, Kind, Outcome, Plant, Reply, Request
+from bridge.command.plant import NodeCommand
+from bridge.config import BusTable
+from bridge.master.listening import Listening, listen_s
+from bridge.node.node import NodeCore
+
+
+class Charge:
+    """Knows by ``listening`` whether this bridge acts. ``forget`` drops all that is known of the bus: now,
+    and why."""
+
+    def __init__(
+        self,
+        bus: BusTable,
+        nodes: Sequence[NodeCore],
+        plant: Plant,
+        forget: Callable[[float, str], None],
+        listening: Listening | None,
+    ) -> None:
+        self._bus = bus
+        self._nodes = nodes
+        self._plant = plant
+        self._forget = forget
+        self._listening = listening or Listening(listen_s(bus))
+        for node in nodes:
+            if node.node.command:
+                node.node.command = self.guarded(node.node.command)
+
+    def acts(self) -> bool:
+        """Whether this bridge acts: otherwise nothing is sent."""
+        return self._listening.acts
+
+    @property
+    def is_left(self) -> bool:
+        """Whether another bridge is in charge."""
+        return self._listening.is_passive
+
+    def guarded(self, command: NodeCommand) -> NodeCommand:
+        """``command``, which is refused as long as nothing may be sent."""
+
+        def take(request: Request, now: float, reply: Reply) -> None:
+            if self.acts():
+                command(request, now, reply)
+            else:
+                why = f"on {self._bus.name} the bridge {self._listening.part.value}"
+                reply(Outcome(Code.NOT_READY, why, forwarded=False))
+
+        return take
+
+    def heard(self, sign: str, now: float) -> None:
+        """``sign`` shows another bridge. If this one gives way it sends nothing any more, no stops either."""
+        if not self._listening.heard(now):
+            return
+        self._forget(now, f"another bridge is in charge of {self._bus.name}")
+        until_ms = self._listening.silence_s * 1000
+        self._tell(
+            f"passive: another bridge is in charge of this bus: it sent {sign}. Nothing is sent until that "
+            f"has been silent for {until_ms:.0f} ms",
+            now,
+        )
+        self._say_passive(now)
+
+    def on_time(self, now: float) -> None:
+        """Begin to act when it is time for it: like at any start, with everything stopped."""
+        was_left = self.is_left
+        if not self._listening.on_time(now) or not was_left:
+            return
+        silent_ms = self._listening.silence_s * 1000
+        self._tell(f"the other bridge has been silent for {silent_ms:.0f} ms: this one takes over", now)
+        for node in self._nodes:
+            if not node.is_out_of_service:
+                node.say("waiting", now)
+            for drive in node.node.drives:
+                drive.channel.on_bridge_gap(now)
+                drive.refresh(now)
+
+    def next_deadline(self) -> float | None:
+        return self._listening.next_deadline()
+
+    def came_back(self, now: float) -> None:
+        """The bridge was away for longer than its bursts last."""
+        self._listening.returns(now)
+
+    def bus_is_gone(self) -> None:
+        self._listening.bus_is_gone()
+
+    def bus_is_back(self, now: float) -> None:
+        self._listening.bus_is_back(now)
+        if self.is_left:
+            self._say_passive(now)
+
+    def _say_passive(self, now: float) -> None:
+        for node in self._nodes:
+            if not node.is_out_of_service:
+                node.say(f"passive: another bridge is in charge of {self._bus.name}", now)
+
+    def _tell(self, message: str, now: float) -> None:
+        self._plant.report(Event(now, Kind.BUS, self._bus.name, 800, message))

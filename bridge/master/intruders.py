@@ -1,0 +1,207 @@
+"""Frames of others on identifiers that are the bridge's alone: counted, told in words, answered. Sans-IO.
+
+What the site file has the bridge send is its own: RPDOs, SYNC, TIME, its heartbeat, requests to the SDO
+servers of its nodes. A site where it sends no SYNC or TIME may have another producer of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Final
+
+from bridge.canopen import cobid, nmt
+from bridge.canopen.decode_sdo import SdoListener
+from bridge.canopen.frame import Frame
+from bridge.command import Event, Kind, Plant
+from bridge.config import BusTable
+from bridge.node.node import NodeCore
+from bridge.node.process.command_frames import Command, commands_of
+from bridge.node.process.process_data import DrivePdos
+from bridge.node.wire import Handler
+
+_AGAIN_S: Final = 10.0
+"""One who goes on is told so often, with the number of frames since the last time."""
+_STOP_AGAIN_S: Final = 1.0
+"""So often a node gets its NMT stop as long as the frames go on."""
+_SEVERE: Final = 900
+_HARMLESS: Final = 500
+
+Stop = Callable[[Sequence[NodeCore], str, float], None]
+"""Stops these nodes: who they are, why, and now."""
+
+
+class Intruders:
+    """``count`` is of all frames since the start; ``last`` the latest one that was told."""
+
+    def __init__(
+        self,
+        bus: BusTable,
+        nodes: Sequence[NodeCore],
+        plant: Plant,
+        acts: Callable[[], bool],
+        stop: Stop,
+    ) -> None:
+        """``acts`` says whether this bridge is in charge: while another one is, nobody is an intruder."""
+        self.count = 0
+        self.last = ""
+        self._bus = bus
+        self._nodes = nodes
+        self._plant = plant
+        self._acts = acts
+        self._stop = stop
+        self._commands: dict[int, tuple[NodeCore, Command]] = {}
+        self._heartbeat_id = cobid.ERROR_CONTROL + bus.master_node_id if bus.heartbeat_ms else None
+        self._sdo: dict[int, SdoListener] = {}
+        self._told: dict[tuple[int, bool], tuple[float, int]] = {}
+        """When an identifier was told, and how many frames have come since."""
+        self._stopped: dict[int, float] = {}
+        self._spoken = frozenset(
+            tpdo.cob_id for node in nodes for drive in node.table.drive for tpdo in drive.tpdo
+        )
+        """Where the site file has TPDOs put: they come before the boot-up has ended."""
+        self._given = {can_id: node for node in nodes for can_id in node.wire.stop_words.given_ids}
+        """Whose identifier it is by the site's files."""
+        self._known: dict[int, tuple[Mapping[str, DrivePdos], dict[int, Command]]] = {}
+        """What each node is commanded by, as long as it has these PDOs."""
+
+    # whose identifiers
+
+    def watched(self, taken: Mapping[int, Handler]) -> frozenset[int]:
+        """What we repeat, and nobody else may send, as the nodes are now; without what is ``taken``: a node
+        of the site says something on it."""
+        self._commands = {
+            can_id: (node, command)
+            for node in self._nodes
+            for can_id, command in self._commands_of(node).items()
+            if can_id not in taken and can_id not in self._spoken and self._given.get(can_id, node) is node
+        }
+        watched = set(self._commands)
+        if self._bus.sync_period_ms:
+            watched.add(cobid.SYNC)
+        if self._heartbeat_id is not None:
+            watched.add(self._heartbeat_id)
+        return frozenset(watched)
+
+    def _commands_of(self, node: NodeCore) -> dict[int, Command]:
+        connected = node.wire.drives
+        known = self._known.get(node.table.id)
+        if known is None or known[0] is not connected:
+            commands = commands_of(node.node, connected, node.wire.stop_words)
+            known = self._known[node.table.id] = connected, commands
+        return known[1]
+
+    def routes(self, others: Mapping[int, Handler]) -> dict[int, Handler]:
+        """What only single frames of ours are sent on, which do not come back: TIME, and SDO requests. What
+        others do with these goes on being done."""
+        routes: dict[int, Handler] = {}
+        if self._bus.time_period_s:
+            routes[cobid.TIME] = self._on_time
+        for node in self._nodes:
+            for can_id in (channel.request_id for channel in node.wire.sdo):
+                routes[can_id] = partial(self._on_sdo, node, others.get(can_id))
+        for node in self._nodes:
+            # Servers that the node has and the bridge does not use, where nobody else has the identifier.
+            for can_id in (server.request + node.table.id for server in node.node.family.sdo):
+                if not (can_id in routes or can_id in others or can_id in self._commands):
+                    routes[can_id] = partial(self._on_sdo, node, None)
+        return routes
+
+    def is_sign(self, frame: Frame, *, acts: bool) -> bool:
+        """Whether this frame says that another bridge is in charge. Of one that acts itself RPDOs alone do
+        not: whoever sends them is an intruder and no bridge."""
+        return frame.can_id == self._heartbeat_id or (not acts and frame.can_id in self._commands)
+
+    def name(self, frame: Frame) -> str:
+        """What this frame is."""
+        if frame.can_id == self._heartbeat_id:
+            what = f"the heartbeat of node {self._bus.master_node_id}, the bridge's own"
+        elif frame.can_id in self._commands:
+            what = self._commands[frame.can_id][1].label
+        else:
+            what = "SYNC"
+        return f"{what} ({frame.can_id:03X}h)"
+
+    # what comes
+
+    def on_frame(self, frame: Frame) -> None:
+        """A frame of somebody else on one of those that are watched."""
+        if frame.can_id in self._commands:
+            node, command = self._commands[frame.can_id]
+            enables = command.enables(frame.data)
+            self._meet(frame, [node], lambda: f"{self.name(frame)}: {command.said(frame.data)}", enables)
+        elif frame.can_id == cobid.SYNC:
+            self._meet(frame, [node for node in self._nodes if _follows_sync(node)], lambda: self.name(frame))
+        else:
+            self._meet(frame, self._nodes, lambda: f"{self.name(frame)}: {_said_state(frame.data)}")
+
+    def _on_time(self, frame: Frame) -> None:
+        self._meet(frame, [], lambda: f"TIME ({frame.can_id:03X}h)")
+
+    def _on_sdo(self, node: NodeCore, then: Handler | None, frame: Frame) -> None:
+        """Somebody asks or sets an object of a node. To read stops nobody: a tool may look."""
+        if then:
+            then(frame)
+        said = self._sdo.setdefault(frame.can_id, SdoListener()).request(frame.data)
+        writes = ("operation", "write") in said.values
+        self._meet(
+            frame,
+            [node] if writes else None,
+            lambda: f"SDO request to {node.node.name} ({frame.can_id:03X}h): {said.text}",
+            writes,
+        )
+
+    def _meet(
+        self,
+        frame: Frame,
+        affected: Sequence[NodeCore] | None,
+        said: Callable[[], str],
+        is_worse: bool = False,
+    ) -> None:
+        """Count it, answer it, and tell it, not with every frame. ``affected``: None for what changes
+        nothing. ``is_worse``: it is told even where another one on its identifier has been told just now."""
+        if not self._acts():
+            return
+        self.count += 1
+        stopped = self._to_be_stopped(affected)
+        told_at, since = self._told.get((frame.can_id, is_worse), (float("-inf"), 0))
+        if frame.time - told_at < _AGAIN_S:
+            self._told[frame.can_id, is_worse] = told_at, since + 1
+        else:
+            self._told[frame.can_id, is_worse] = frame.time, 0
+            more = f" ({since + 1} frames since the last message)" if since else ""
+            self.last = f"{said()}, from somebody else{more}{_answer(stopped, self._nodes)}"
+            severity = _HARMLESS if affected is None else _SEVERE
+            event = Event(frame.time, Kind.INTRUDER, self._bus.name, severity, f"intruder: {self.last}")
+            self._plant.report(event)
+        due = [node for node in stopped if frame.time >= self._stopped.get(node.table.id, frame.time)]
+        if due:
+            for node in due:
+                self._stopped[node.table.id] = frame.time + _STOP_AGAIN_S
+            self._stop(due, f"the bridge, because of an intruder: {said()}", frame.time)
+
+    def _to_be_stopped(self, affected: Sequence[NodeCore] | None) -> Sequence[NodeCore]:
+        if affected is None or self._bus.on_intruder == "report":
+            return ()
+        return self._nodes if self._bus.on_intruder == "stop_all" else affected
+
+
+def _follows_sync(node: NodeCore) -> bool:
+    return any(pdo.is_synchronous for pdos in node.wire.drives.values() for pdo in (*pdos.rpdos, *pdos.tpdos))
+
+
+def _answer(stopped: Sequence[NodeCore], nodes: Sequence[NodeCore]) -> str:
+    if not stopped:
+        return ""
+    if len(stopped) == len(nodes) > 1:
+        return "; all nodes get an NMT stop"
+    return f"; NMT stop of {', '.join(node.node.name for node in stopped)}"
+
+
+def _said_state(data: bytes) -> str:
+    state = nmt.state_of(data[0]) if len(data) == 1 else None
+    said = "nonsense" if state is None else "that it starts" if not state else state.words
+    return (
+        f"the id seems to be used twice: another device said {said}. A second bridge, or a device with this "
+        "id: switch it off, give it another id, or change master_node_id"
+    )

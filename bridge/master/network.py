@@ -1,0 +1,398 @@
+"""One CANopen network: its nodes, its SYNC and TIME, our own heartbeat. Sans-IO.
+
+Says which frames are to be sent once and which are to be repeated; whoever holds the bus does it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from types import MappingProxyType
+from typing import Final
+
+from bridge.can.interface import BusStatus
+from bridge.canopen import cobid, nmt
+from bridge.canopen.frame import Frame
+from bridge.canopen.nmt import NmtCommand, NmtState
+from bridge.canopen.sync import SyncWindow, sync_frames
+from bridge.canopen.time_stamp import TimeProducer
+from bridge.command import Action, Event, Kind, Plant, Reply, Request
+from bridge.config import BusTable
+from bridge.config.download import Download
+from bridge.master.charge import Charge
+from bridge.master.intruders import Intruders
+from bridge.master.listening import Listening
+from bridge.master.schedule import Schedule
+from bridge.master.startup import StartGate
+from bridge.master.watch import BusWatch
+from bridge.node import nmt_commands as node_commands
+from bridge.node.neighbours import Neighbour
+from bridge.node.node import NodeCore
+from bridge.node.process.process_data import Beat
+from bridge.node.wire import Handler
+from bridge.ratelimit import RateLimit
+
+_LOAD_PERIOD_S: Final = 1.0
+_ERRORS_EVERY_S: Final = 10.0
+"""A broken wire gives thousands of error frames a second: one line tells of all of them."""
+
+NOTHING: Final[Mapping[str, Sequence[Download]]] = MappingProxyType({})
+
+Beats = dict[int, Beat]
+"""What is to be repeated, by COB-ID."""
+
+
+class Network:
+    """All configured nodes of one bus.
+
+    ``epoch_ns`` gives the wall clock at a monotonic time, for TIME; without it none is sent.
+    """
+
+    def __init__(
+        self,
+        bus: BusTable,
+        plant: Plant,
+        epoch_ns: Callable[[float], int] | None = None,
+        downloads: Mapping[str, Sequence[Download]] = NOTHING,
+        listening: Listening | None = None,
+    ) -> None:
+        """``downloads`` has the configuration of nodes that a file gives, by the node's name. ``listening``
+        is as the bus has it, unless given."""
+        self.bus = bus
+        self._plant = plant
+        self.nodes = [
+            NodeCore(node, plant, self, downloads.get(node.name, ()))
+            for node in plant.nodes.values()
+            if node.bus is bus
+        ]
+        for node in self.nodes:
+            others = [other for other in self.nodes if other is not node]
+            node.wire.is_taken = partial(_is_taken, others)
+            node.wire.is_foreign = partial(_is_foreign, others)
+        self._gate = StartGate(bus.mandatory_missing, self.nodes)
+        self._schedule = Schedule(self.nodes)
+        own_id = bus.master_node_id if bus.heartbeat_ms else None
+        known = {node.table.id: node.node.name for node in self.nodes}
+        self.charge = Charge(bus, self.nodes, plant, self._forget_bus, listening)
+        self._watch = BusWatch(bus.name, own_id, self.charge.acts, known, plant)
+        self._intruders = Intruders(bus, self.nodes, plant, self.charge.acts, self._stop_nodes)
+        self.ours: frozenset[int] = frozenset()
+        """Identifiers on which nobody else may send what we repeat; brought up to date by ``take_routes``."""
+        self._has_booted = False
+        self._nmt_for_all: Frame | None = None
+        plant.bus_commands[f"bus/{bus.name}"] = self.charge.guarded(self.command)
+        self.unrouted = 0
+        self._routes_changed = True
+        self._routes: dict[int, Handler] = {}
+        self._routings = 0
+        self._beats: Beats = {}
+        self._beats_for: tuple[int, int, NmtState, bool] | None = None
+        self._measured: tuple[float, int] | None = None
+        self._sync = sync_frames(bus.sync_counter)
+        self._window = SyncWindow(bus.sync_window_us / 1e6) if bus.sync_window_us else None
+        self._time = TimeProducer(bus.time_period_s, epoch_ns) if bus.time_period_s and epoch_ns else None
+        self._frames: list[Frame] = []
+        self._errors_told = 0
+        self._error_limit = RateLimit(1, _ERRORS_EVERY_S)
+
+    def on_frames(self, frames: list[Frame], now: float) -> None:
+        """Everything received, in order. A frame nobody waits for is counted."""
+        routes = self._routes
+        for frame in frames:
+            handler = routes.get(frame.can_id)
+            if handler is None:
+                self.unrouted += 1
+            else:
+                handler(frame)
+        self._pump(now)
+
+    def on_foreign(self, frames: list[Frame], now: float) -> None:
+        """What others have sent on identifiers that are ours."""
+        for frame in frames:
+            if frame.can_id == cobid.ERROR_CONTROL + self.bus.master_node_id:
+                self._watch.on_own_id(now)
+            if self._intruders.is_sign(frame, acts=self.charge.acts()):
+                self.charge.heard(self._intruders.name(frame), now)
+            self._intruders.on_frame(frame)
+        self._pump(now)
+
+    def _pump(self, now: float) -> None:
+        """Let every boot-up go on to which something has happened, and start who may start."""
+        while touched := self._schedule.take_touched():
+            for node in touched:
+                node.booting.pump(now)
+            self._gate.judge()
+            for node in self.nodes:
+                if node.booting.is_held and self._gate.may_start(node):
+                    node.booting.pump(now)
+                    self._schedule.touch(node)
+            for node in touched:
+                self._frames += node.wire.take_frames()
+                self._routes_changed |= node.wire.routes_changed
+                self._schedule.plan(node)
+
+    def on_time(self, now: float) -> None:
+        self.charge.on_time(now)
+        if not self.charge.acts():
+            return
+        if not self._has_booted:
+            self._boot_up(now)
+        if self._time:
+            frame = self._time.on_time(now)
+            self._frames += [frame] if frame else []
+        for node in self._schedule.take_due(now):
+            node.on_time(now)
+            self._schedule.touch(node)
+        self._pump(now)
+
+    def next_deadline(self) -> float | None:
+        if not self.charge.acts():
+            return self.charge.next_deadline()
+        times = (self._schedule.next_deadline(), self._time.next_deadline() if self._time else None)
+        return min((time for time in times if time is not None), default=None)
+
+    def came_back(self, now: float) -> None:
+        """The bridge was away for longer than its bursts last."""
+        self.charge.came_back(now)
+
+    def _stop_nodes(self, nodes: Sequence[NodeCore], why: str, now: float) -> None:
+        are_all = len(nodes) == len(self.nodes) > 1 and not self._takes_over(nodes)
+        for node in nodes:
+            node.carry_out_command(Action.STOP_NODE, why, now, send=not are_all)
+        if are_all:
+            self._nmt_for_all = nmt.command(NmtCommand.STOP, 0)
+
+    @staticmethod
+    def _takes_over(nodes: Sequence[NodeCore]) -> bool:
+        """Whether one has to take over stopped words before its NMT stop: each gets its own in its time."""
+        return any(node.leaving.takeover_s for node in nodes)
+
+    # NMT
+
+    def _boot_up(self, now: float) -> None:
+        """The bus is there: say that we have started (CiA 301 §7.2.8.3.3), and reset who is to be reset."""
+        self._has_booted = True
+        if self.bus.heartbeat_ms:
+            self._frames.append(Frame(cobid.ERROR_CONTROL + self.bus.master_node_id, b"\0"))
+        if self.bus.reset_at_start == "none":
+            return
+        whole = self.bus.reset_at_start == "node"
+        action = Action.RESET if whole else Action.RESET_COMMUNICATION
+        for node in sorted(self.nodes, key=lambda node: node.table.start_order):
+            if node.table.enabled:
+                node.carry_out_command(action, "the bridge at its start", now, send=False)
+                self._frames.append(nmt.command(node_commands.NMT[action], node.table.id))
+
+    @property
+    def nmt_state(self) -> NmtState:
+        """Our own: pre-operational while a mandatory node keeps the others waiting (CiA 302-2)."""
+        if not self._has_booted:
+            return NmtState.INITIALISING
+        return NmtState.OPERATIONAL if self._gate.is_open else NmtState.PRE_OPERATIONAL
+
+    def command(self, request: Request, now: float, reply: Reply) -> None:
+        """NMT for every node of the bus."""
+        is_for_all = node_commands.answer(request, self.bus.name, self.nodes, self._plant, now, reply)
+        if is_for_all:
+            self._nmt_for_all = nmt.command(node_commands.NMT[request.action], 0)
+
+    # as its nodes see it
+
+    def touched(self, node: Neighbour) -> None:
+        self._schedule.touch(node)
+
+    def may_start(self, node: Neighbour) -> bool:
+        self._gate.judge()
+        return self._gate.may_start(node)
+
+    def stop_others(self, node: Neighbour, why: str, now: float) -> None:
+        """A node is lost without which the others must not go on."""
+        self._gate.stopped_by(node)
+        self._plant.report(Event(now, Kind.BUS, self.bus.name, 800, f"all nodes are stopped: {why}"))
+        each = self._takes_over(self.nodes)
+        for other in self.nodes:
+            # The lost one included, if it still hears us.
+            other.told_to_stop = True
+            if other is not node:
+                other.hold(why, now)
+                self._schedule.touch(other)
+            if each:
+                other.leaving.send(NmtCommand.STOP, now)
+        if not each:
+            self._nmt_for_all = nmt.command(NmtCommand.STOP, 0)
+
+    def duplicate(self, node: Neighbour, sign: str, now: float) -> None:
+        self._watch.on_duplicate(node.table.id, sign, now)
+
+    # sending
+
+    @property
+    def waiting(self) -> int:
+        """Plans and frames that it holds: bounded, whatever comes."""
+        return len(self._schedule) + len(self._frames)
+
+    def take_frames(self) -> list[Frame]:
+        """Frames to be sent once, now."""
+        frames, self._frames = self._frames, []
+        if not self.charge.acts():
+            self._nmt_for_all = None
+            return []
+        if self._nmt_for_all:
+            # Last: the stopped words of the drives go before it.
+            frames.append(self._nmt_for_all)
+            self._nmt_for_all = None
+        return frames
+
+    def take_routes(self) -> list[int] | None:
+        """The identifiers to be received, if they have changed since the last call."""
+        if not self._routes_changed:
+            return None
+        self._routes_changed = False
+        self._routings += 1
+        self._routes = self._watch.routes()
+        for node in self.nodes:
+            node.wire.routes_changed = False
+            self._routes.update(node.wire.routes)
+        self.ours = self._intruders.watched(self._routes)
+        self._routes |= self._intruders.routes(self._routes)
+        if self._window:
+            self._judge_by_window(self._window)
+        return list(self._routes)
+
+    def _judge_by_window(self, window: SyncWindow) -> None:
+        """SYNC comes back to us, and every synchronous TPDO is looked at before its drive gets it."""
+
+        def judged(handler: Handler) -> Handler:
+            def judge(frame: Frame) -> None:
+                window.on_tpdo(frame)
+                handler(frame)
+
+            return judge
+
+        self._routes[cobid.SYNC] = window.on_sync
+        for node in self.nodes:
+            for tpdo in (tpdo for pdos in node.wire.drives.values() for tpdo in pdos.tpdos):
+                if tpdo.is_synchronous and tpdo.cob_id in self._routes:
+                    self._routes[tpdo.cob_id] = judged(self._routes[tpdo.cob_id])
+
+    def beats(self, *, anew: bool = False) -> Beats:
+        """The frames to be repeated: the same object while they are the same.
+
+        A drive's settling, a node's new PDOs and our own state change them; asked ``anew``, every drive is
+        looked at.
+        """
+        made_for = self._plant.settled, self._routings, self.nmt_state, self.charge.acts()
+        if anew or made_for != self._beats_for:
+            self._beats_for = made_for
+            self._beats = self._make_beats()
+        return self._beats
+
+    def _make_beats(self) -> Beats:
+        beats: Beats = {}
+        if not self.charge.acts():
+            return beats
+        # The state before that is said once, by the boot-up message.
+        if self.bus.heartbeat_ms and self._has_booted:
+            frame = Frame(cobid.ERROR_CONTROL + self.bus.master_node_id, bytes((self.nmt_state,)))
+            beats[frame.can_id] = Beat((frame,), self.bus.heartbeat_ms / 1000)
+        period_s = self.bus.rpdo_period_s
+        hold_at: list[float] = []
+        for node in self.nodes:
+            if node.sends_process_data:
+                for pdos in node.wire.drives.values():
+                    if not pdos.is_silent:
+                        for beat in pdos.beats(period_s):
+                            beats[beat.frames[0].can_id] = beat
+                            if pdos.needs_sync:
+                                hold_at += beat.hold_at
+        # SYNC last: what goes out together with it is taken over by it (CiA 301 §7.2.2.2).
+        if self.bus.sync_period_ms:
+            beats[cobid.SYNC] = Beat(self._sync, self.bus.sync_period_ms / 1000, hold_at=tuple(hold_at))
+        return beats
+
+    def on_handed_over(self, now: float) -> None:
+        """What ``beats`` has said is on the bus: the bounds of stops begin (``command/follow.py``)."""
+        unsent = self._plant.unsent
+        for node in self.nodes:
+            for drive in node.node.drives:
+                is_sent = node.sends_process_data and drive.name in node.wire.drives
+                if drive in unsent and (is_sent or not drive.following.awaits_sending):
+                    self._plant.on_handed_over(drive, now)
+
+    def bus_is_gone(self, now: float) -> None:
+        self.charge.bus_is_gone()
+        self._forget_bus(now)
+
+    def _forget_bus(self, now: float, why: str = "the bus is down") -> None:
+        self._frames.clear()
+        if self._window:
+            self._window.reset()
+        self._has_booted = False
+        self._nmt_for_all = None
+        for node in self.nodes:
+            node.bus_is_gone(now, why)
+            self._schedule.touch(node)
+
+    def bus_is_back(self, now: float) -> None:
+        """What was written while the bus was gone does not go out first."""
+        self.charge.bus_is_back(now)
+        for node in self.nodes:
+            node.bus_is_back(now)
+            self._schedule.touch(node)
+
+    def refresh(self, status: BusStatus, now: float) -> None:
+        """Bring the points of the bus and its nodes up to date; a few times a second."""
+        top = f"bus/{self.bus.name}"
+        self._plant.set(f"{top}/state", int(status.state), now)
+        self._plant.set(f"{top}/tx_errors", status.tx_errors, now)
+        self._plant.set(f"{top}/rx_errors", status.rx_errors, now)
+        self._plant.set(f"{top}/frames_lost", status.frames_lost, now)
+        self._plant.set(f"{top}/frames_expired", status.frames_expired, now)
+        self._plant.set(f"{top}/error_frames", status.error_frames, now)
+        self._plant.set(f"{top}/last_error", status.last_error, now)
+        self._plant.set(f"{top}/sync_window_misses", self._window.misses if self._window else 0, now)
+        self._show_load(status, now)
+        self._tell_errors(status, now)
+        self._plant.set(f"{top}/nmt_state", int(self.nmt_state), now)
+        self._plant.set(f"{top}/held_by", ", ".join(self._gate.missing), now)
+        self._watch.refresh(now)
+        self._plant.set(f"{top}/intruders", self._intruders.count, now)
+        self._plant.set(f"{top}/last_intruder", self._intruders.last, now)
+        self._plant.set(f"{top}/passive", self.charge.is_left, now)
+        for node in self.nodes:
+            node.wire.refresh(now)
+            # Whoever has asked it for something meanwhile: its deadlines are looked at.
+            self._schedule.plan(node)
+
+    def _show_load(self, status: BusStatus, now: float) -> None:
+        bits = status.bits
+        if self._measured is None:
+            self._measured = now, bits
+            return
+        since, before = self._measured
+        if now >= since + _LOAD_PERIOD_S:
+            load = 100 * (bits - before) / (now - since) / self.bus.bitrate
+            self._plant.set(f"bus/{self.bus.name}/load", round(min(100.0, load), 1), now)
+            self._measured = now, bits
+
+    def _tell_errors(self, status: BusStatus, now: float) -> None:
+        """Error frames since the last time, in one event."""
+        number = status.error_frames - self._errors_told
+        if number and self._error_limit.allows(now):
+            self._errors_told = status.error_frames
+            what = "an error frame" if number == 1 else f"{number} error frames"
+            self._plant.report(Event(now, Kind.BUS, self.bus.name, 500, f"{what}: {status.last_error}"))
+
+
+def _is_foreign(others: list[NodeCore], cob_id: int) -> bool:
+    """Whether an identifier is one of the other nodes', or will be."""
+    return _is_taken(others, cob_id) or any(cob_id in node.wire.stop_words.given_ids for node in others)
+
+
+def _is_taken(others: list[NodeCore], cob_id: int) -> bool:
+    """Whether one of the other nodes of the bus has a PDO, or anything else, on this identifier."""
+    return any(
+        cob_id in node.wire.routes
+        or any(cob_id == rpdo.cob_id for pdos in node.wire.drives.values() for rpdo in pdos.rpdos)
+        for node in others
+    )

@@ -1,0 +1,60 @@
+"""Which nodes of a bus have something to do now: 127 nodes cost as much as those that are due."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable
+from typing import Generic, TypeVar
+
+from bridge.node.neighbours import Neighbour
+
+N = TypeVar("N", bound=Neighbour)
+
+
+class Schedule(Generic[N]):
+    """Deadlines of nodes. A deadline that was put off, as each heartbeat does, is noticed when it comes;
+    one that was brought forward has to be told by ``plan``, or by ``touch`` and the round that follows."""
+
+    def __init__(self, nodes: Iterable[N]) -> None:
+        self._nodes = tuple(nodes)
+        self._touched: dict[int, None] = dict.fromkeys(range(len(self._nodes)))
+        self._places = {id(node): place for place, node in enumerate(self._nodes)}
+        self._planned: list[float | None] = [None] * len(self._nodes)
+        self._heap: list[tuple[float, int]] = []
+
+    def touch(self, node: Neighbour) -> None:
+        self._touched[self._places[id(node)]] = None
+
+    def take_touched(self) -> list[N]:
+        """Each node once, in the order in which they were touched."""
+        touched, self._touched = self._touched, {}
+        return [self._nodes[place] for place in touched]
+
+    def plan(self, node: Neighbour) -> None:
+        """Look at the deadline of this node."""
+        place = self._places[id(node)]
+        at, planned = node.next_deadline(), self._planned[place]
+        if at is not None and (planned is None or at < planned):
+            self._planned[place] = at
+            heapq.heappush(self._heap, (at, place))
+
+    def take_due(self, now: float) -> list[N]:
+        """The nodes whose deadline may have come; each is touched or planned again by the caller."""
+        due: list[N] = []
+        heap = self._heap
+        while heap and heap[0][0] <= now:
+            at, place = heapq.heappop(heap)
+            # An entry that was overtaken by an earlier one is stale.
+            if self._planned[place] == at:
+                self._planned[place] = None
+                due.append(self._nodes[place])
+        return due
+
+    def __len__(self) -> int:
+        """Entries it holds, stale ones included."""
+        return len(self._heap) + len(self._touched)
+
+    def next_deadline(self) -> float | None:
+        if self._touched:
+            return float("-inf")
+        return self._heap[0][0] if self._heap else None

@@ -1,0 +1,106 @@
+"""What is on the bus and should not be there: other NMT masters, foreign nodes, node ids used twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from bridge.canopen import cobid, nmt
+from bridge.canopen.frame import Frame
+from bridge.command import Event, Kind, Plant
+
+_NODES: Final = range(1, 128)
+_FORGET_S: Final = 60.0
+"""So long after the last sign a point is back, and so long nothing is told twice."""
+
+
+class BusWatch:
+    """Reports each finding as an event, at most once a minute, and as a point of the bus."""
+
+    def __init__(
+        self,
+        bus: str,
+        own_id: int | None,
+        acts: Callable[[], bool],
+        known: dict[int, str],
+        plant: Plant,
+    ) -> None:
+        """``own_id`` is the bridge's own node id where it produces a heartbeat; where the bridge does not
+        act, another one is the NMT master. ``known`` has the configured nodes."""
+        self._bus = bus
+        self._own_id = own_id
+        self._acts = acts
+        self._known = known
+        self._plant = plant
+        self._master_at = float("-inf")
+        self._strangers: dict[int, float] = {}
+        self._duplicates: dict[int, float] = {}
+        self._told: dict[str, float] = {}
+
+    def routes(self) -> dict[int, Callable[[Frame], None]]:
+        """NMT commands, and the error control messages of every node that is not configured."""
+        routes: dict[int, Callable[[Frame], None]] = {cobid.NMT: self._on_nmt}
+        for node_id in _NODES:
+            if node_id not in self._known and node_id != self._own_id:
+                routes[cobid.ERROR_CONTROL + node_id] = self._on_stranger
+        return routes
+
+    def _on_nmt(self, frame: Frame) -> None:
+        """An NMT command that we did not send: our own do not come back."""
+        if not self._acts():
+            return
+        self._master_at = frame.time
+        what = nmt.describe(frame.data)
+        self._tell(
+            "master",
+            f"another NMT master is on the bus: it sent {what}. A second controller, a tool, or a drive set "
+            "as quasi master (Lenze: C00352 = 1) must be found and switched off",
+            frame.time,
+            700,
+        )
+
+    def _on_stranger(self, frame: Frame) -> None:
+        node_id = frame.can_id - cobid.ERROR_CONTROL
+        self._strangers[node_id] = frame.time
+        does = "starts" if frame.data == b"\0" else "is on the bus"
+        self._tell(
+            f"stranger {node_id}",
+            f"A: node {node_id} {does} and is not in the site file: add it or take it off the bus",
+            frame.time,
+            500,
+        )
+
+    def on_own_id(self, now: float) -> None:
+        """Somebody else uses the bridge's own id; who holds this watch tells it."""
+        if self._own_id is not None:
+            self._duplicates[self._own_id] = now
+
+    def on_duplicate(self, node_id: int, sign: str, now: float) -> None:
+        """A configured node id behaves as if two devices had it."""
+        self._duplicates[node_id] = now
+        self._tell(
+            f"duplicate {node_id}",
+            f"node id {node_id} ({self._known.get(node_id, 'unknown')}) seems to be used twice: {sign}",
+            now,
+            700,
+        )
+
+    def _tell(self, key: str, message: str, now: float, severity: int) -> None:
+        if now - self._told.get(key, float("-inf")) < _FORGET_S:
+            return
+        self._told[key] = now
+        self._plant.report(Event(now, Kind.BUS, self._bus, severity, message))
+
+    def refresh(self, now: float) -> None:
+        """Bring the points of the bus up to date."""
+        top = f"bus/{self._bus}"
+        self._plant.set(f"{top}/second_master", now - self._master_at < _FORGET_S, now)
+        self._plant.set(f"{top}/unexpected_nodes", _listed(self._strangers, now), now)
+        self._plant.set(f"{top}/duplicate_ids", _listed(self._duplicates, now), now)
+
+
+def _listed(seen: dict[int, float], now: float) -> str:
+    """The ids seen within the last minute; the others are forgotten."""
+    for node_id in [node_id for node_id, at in seen.items() if now - at >= _FORGET_S]:
+        del seen[node_id]
+    return ", ".join(str(node_id) for node_id in sorted(seen))

@@ -1,0 +1,201 @@
+"""What the boot-up asks of the one who runs it, and what it finds."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridge.canopen.nmt import NmtCommand, NmtState
+from bridge.canopen.sdo import SdoError
+from bridge.command import Identification
+from bridge.drive import OwnJudgement
+from bridge.node.boot.memory import BootMemory
+from bridge.node.boot.pdo_plan import PdoPlan
+from bridge.node.boot.status import BootError
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What the boot-up is doing now, for ``boot_status``; ``letter`` is the error status if it fails."""
+
+    text: str
+    letter: str
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """Read an object over one of the node's SDO channels, by number."""
+
+    index: int
+    sub: int = 0
+    channel: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    index: int
+    sub: int
+    data: bytes
+    channel: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Nmt:
+    command: NmtCommand
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """The node is there."""
+
+
+@dataclass(frozen=True, slots=True)
+class SendStopped:
+    """Send a stopped word to every drive, by every identifier under which it may listen: the node may still
+    be operational."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """Go on after this time, in seconds."""
+
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Wake:
+    """Tell a node that does not answer to go pre-operational, after a stopped word for every drive: it
+    may be stopped, and answers no SDO then."""
+
+
+@dataclass(frozen=True, slots=True)
+class StartSupervision:
+    """From now on the node is expected to be heard."""
+
+
+@dataclass(frozen=True, slots=True)
+class Await:
+    """Wait until the node reports this state, or any with None. Without supervision there is nothing
+    to wait for."""
+
+    state: NmtState | None
+    timeout_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceErrors:
+    """What the node says of its errors: 1001h, the newest codes of 1003h, and both in words (empty where it
+    has none)."""
+
+    register: int = 0
+    codes: tuple[int, ...] = ()
+    text: str = ""
+
+    @property
+    def cause(self) -> tuple[int, int]:
+        """By which an error is known again."""
+        return self.register, self.codes[0] if self.codes else 0
+
+
+@dataclass(frozen=True, slots=True)
+class ResetCommunication:
+    """NMT reset communication, because of ``why``, after a stopped word for every drive."""
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class AwaitRelease:
+    """Wait until the network lets the node start (start order, mandatory nodes). No time limit."""
+
+
+Action = (
+    Step
+    | Read
+    | Write
+    | Nmt
+    | Found
+    | SendStopped
+    | Pause
+    | Wake
+    | DeviceErrors
+    | ResetCommunication
+    | StartSupervision
+    | Await
+    | AwaitRelease
+)
+
+
+@dataclass(frozen=True, slots=True)
+class NodePdoPlan:
+    """A TPDO of the node itself: which polls it saves. ``names`` has one for each entry, "" for what
+    nobody shows."""
+
+    pdo: PdoPlan
+    names: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class DrivePlan:
+    """The PDOs of one drive, those with control and status word first, or the reason why it cannot be
+    served. ``unserved`` has the reason for each word that they do not carry, by its leaf such as
+    ``actual/value_2``."""
+
+    rpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
+    tpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
+    problem: str = ""
+    unserved: dict[str, str] = field(default_factory=dict[str, str])
+
+
+@dataclass(slots=True)
+class BootResult:
+    identification: Identification = field(default_factory=Identification)
+    software_version: str = ""
+    drives: dict[str, DrivePlan] = field(default_factory=dict[str, DrivePlan])
+    scales: dict[str, dict[str, float]] = field(default_factory=dict[str, dict[str, float]])
+    node_tpdos: list[NodePdoPlan] = field(default_factory=list[NodePdoPlan])
+    notes: list[str] = field(default_factory=list[str])
+    emcy_id: int | None = None
+    """Where emergency messages come; None where the node sends none."""
+    heartbeat_ms: int = 0
+    """The heartbeat period that the node keeps; 0 for none."""
+    own: dict[str, OwnJudgement] = field(default_factory=dict[str, OwnJudgement])
+    """What each drive does by itself when the bridge falls silent."""
+    errors: DeviceErrors = field(default_factory=DeviceErrors)
+    memory: BootMemory = field(default_factory=BootMemory)
+
+
+Boot = Generator[Action, bytes | None, BootResult]
+Ask = Generator[Action, bytes | None, bytes | None]
+Do = Generator[Action, bytes | None, None]
+
+
+_LONGEST_NUMBER: Final = 8
+
+
+def optional(index: int, sub: int = 0, channel: int = 1) -> Ask:
+    """An object that the node need not have: None where it aborts. A time-out is still an error."""
+    try:
+        return (yield Read(index, sub, channel))
+    except SdoError as error:
+        if error.by_server:
+            return None
+        raise
+
+
+def number(data: bytes | None, default: int = 0) -> int:
+    """The number in an answer. Raises BootError where it is longer than any number of CANopen."""
+    if data is None:
+        return default
+    if len(data) > _LONGEST_NUMBER:
+        raise BootError("J", f"the node answers with {len(data)} bytes where a number belongs")
+    return int.from_bytes(data, "little")
+
+
+def same(have: bytes | None, want: bytes) -> bool:
+    """Whether the node's bytes are ours. An expedited answer without a size always has four."""
+    if have is None:
+        return False
+    padded = len(have) == 4 > len(want) and not any(have[len(want) :])
+    return have == want or (padded and have[: len(want)] == want)

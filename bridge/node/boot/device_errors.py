@@ -1,0 +1,76 @@
+"""What a node says of its own errors, and the one thing that is tried where it does not start because of
+them.
+
+Objects 1001h and 1003h (CiA 301 §7.5.2.2, §7.5.2.4). A slave may keep a communication error, such as one SYNC
+of a wrong length, and refuse *operational* until its communication is reset (1029h, CiA 301 §7.5.2.32).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.command.plant import Node
+from bridge.mapping import emcy_codes
+from bridge.node.boot.actions import (
+    BootResult,
+    DeviceErrors,
+    Do,
+    Pause,
+    ResetCommunication,
+    Step,
+    optional,
+)
+from bridge.node.boot.status import BootError
+
+_REGISTER: Final = 0x1001
+_HISTORY: Final = 0x1003
+_MOST: Final = 4
+"""Of the errors in 1003h the newest are shown."""
+_LONGEST: Final = 4
+_RESTARTS_S: Final = 2.0
+"""A node that is reset has said so by then; one that is slower is booted when it says so."""
+
+
+def read_errors(node: Node, result: BootResult) -> Do:
+    """Note and show the error register, and the newest errors where there is one."""
+    yield Step("reading its errors", "J")
+    register = _number((yield from optional(_REGISTER))) & 0xFF
+    codes: list[int] = []
+    count = _number((yield from optional(_HISTORY))) if register else 0
+    for sub in range(1, min(count, _MOST) + 1):
+        error = yield from optional(_HISTORY, sub)
+        if error is None:
+            break
+        # The low word is the code, the high one the manufacturer's.
+        codes.append(_number(error) & 0xFFFF)
+    result.errors = DeviceErrors(register, tuple(codes), _text(node, register, codes))
+    yield result.errors
+
+
+def reset_once(node: Node, result: BootResult) -> Do:
+    """Reset the communication of a node that did not start and has an error: once for each error, and not
+    while a drive may be running."""
+    errors, memory = result.errors, result.memory
+    if not errors.register or node.table.on_failed_start != "reset_communication":
+        return
+    if not memory.may_reset_for(errors.cause):
+        return
+    memory.note_reset(errors.cause)
+    yield Step("resetting its communication", "J")
+    yield ResetCommunication(f"the node did not start: {errors.text}")
+    # Its boot-up message ends this boot-up, and begins the next one.
+    yield Pause(_RESTARTS_S)
+    raise BootError("J", f"no boot-up message after reset communication; {errors.text}", absent=False)
+
+
+def _number(data: bytes | None) -> int:
+    """What the node says of its errors is shown and nothing more: an odd answer is none."""
+    return int.from_bytes(data, "little") if data and len(data) <= _LONGEST else 0
+
+
+def _text(node: Node, register: int, codes: list[int]) -> str:
+    if not register:
+        return ""
+    text = f"1001h is {register:02X}h ({emcy_codes.register_text(register)})"
+    named = ", ".join(f"{code:04X}h {node.family.emcy.text(code)}" for code in codes)
+    return f"{text}, 1003h: {named}" if named else text

@@ -1,0 +1,24 @@
+"""On which identifier the node sends its emergency messages: object 1014h of CiA 301."""
+
+from __future__ import annotations
+
+from bridge.canopen import cobid
+from bridge.node.boot.actions import BootResult, Do, Step, number, optional
+
+
+def read_emcy_id(node_id: int, result: BootResult) -> Do:
+    """A node without the object sends them on 80h + node id; one that names what is no identifier for
+    them is noted, and taken to do the same."""
+    default = cobid.EMCY + node_id
+    result.emcy_id = default
+    yield Step("reading the identifier of emergency messages", "J")
+    value = number((yield from optional(0x1014)), default)
+    cob_id = value & cobid.COB_ID_MASK
+    if value & cobid.PDO_DISABLED:  # bit 31 means the same here
+        result.emcy_id = None
+        result.notes.append("emergency messages are off (1014h, bit 31)")
+    elif value & cobid.PDO_EXTENDED or not cobid.is_for_emcy(cob_id):
+        result.notes.append(f"1014h is {value:08X}h: no identifier for emergency messages")
+    elif cob_id != default:
+        result.emcy_id = cob_id
+        result.notes.append(f"emergency messages come on {cob_id:03X}h (1014h)")

@@ -1,0 +1,74 @@
+"""Heartbeat or node guarding, never both (CiA 301 §7.2.8.3.2); written only where it differs."""
+
+from __future__ import annotations
+
+import struct
+from typing import Final
+
+from bridge.canopen.sdo import SdoError
+from bridge.config import NodeTable
+from bridge.node.boot.actions import BootResult, Do, Step, Write, number, optional, same
+from bridge.node.boot.memory import NOT_AGAIN
+from bridge.node.boot.status import BootError
+
+_PERIOD: Final = 0x1017
+
+
+def heartbeat_period_ms(supervision_ms: int) -> int:
+    """The producer time for a consumer time: two heartbeats in a row may be lost."""
+    return max(1, supervision_ms // 3)
+
+
+def set_error_control(table: NodeTable, result: BootResult) -> Do:
+    """Bring 1017h, 100Ch and 100Dh to what the site file asks for. Raises BootError J.
+
+    A heartbeat period that the node rounds is adopted.
+    """
+    yield Step("setting error control", "J")
+    heartbeat_ms = heartbeat_period_ms(table.supervision_ms) if table.supervision == "heartbeat" else 0
+    guard = (table.supervision_ms, table.life_time_factor) if table.supervision == "guarding" else (0, 0)
+    wanted = [
+        (_PERIOD, struct.pack("<H", heartbeat_ms)),
+        (0x100C, struct.pack("<H", guard[0])),
+        (0x100D, struct.pack("<B", guard[1])),
+    ]
+    # What is to be off goes off first.
+    wanted.sort(key=lambda item: any(item[1]))
+    result.heartbeat_ms = heartbeat_ms
+    for index, data in wanted:
+        have = yield from optional(index)
+        if same(have, data) or (have is None and not any(data)):
+            continue
+        if index == _PERIOD and heartbeat_ms:
+            yield from _set_period(table, data, have, result)
+            continue
+        yield from _write(table, index, data)
+        result.notes.append(f"{index:04X}h was {number(have)}, is {number(data)} now")
+
+
+def _set_period(table: NodeTable, data: bytes, have: bytes | None, result: BootResult) -> Do:
+    """1017h, which some nodes round: Lenze keeps multiples of 5 ms (C00381)."""
+    want_ms, kept_ms = number(data), number(have)
+    if not result.memory.was_not_kept(_PERIOD, 0, data):
+        yield from _write(table, _PERIOD, data)
+        kept_ms = number((yield from optional(_PERIOD)), want_ms)
+        written = ""
+        if kept_ms != want_ms:
+            result.memory.note_not_kept(_PERIOD, 0, data)
+            written = f" ({want_ms} was written)"
+        result.notes.append(f"1017h was {number(have)}, is {kept_ms} now{written}")
+    least_ms, most_ms = (want_ms + 1) // 2, table.supervision_ms // 2
+    if not least_ms <= kept_ms <= most_ms:
+        raise BootError(
+            "J", f"1017h is {kept_ms} after {want_ms} was written, {least_ms}…{most_ms} would do; {NOT_AGAIN}"
+        )
+    result.heartbeat_ms = kept_ms
+
+
+def _write(table: NodeTable, index: int, data: bytes) -> Do:
+    try:
+        yield Write(index, 0, data)
+    except SdoError as error:
+        if not error.by_server:
+            raise
+        raise BootError("J", f"{table.supervision} is not possible: {error}") from None

@@ -1,0 +1,103 @@
+"""Who the node is: 1000h, 1008h, 100Ah and 1018h, compared with mapping and site file (CiA 302-2)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Generator
+from dataclasses import dataclass
+
+from bridge.canopen.sdo import SdoError
+from bridge.command import Identification
+from bridge.command.plant import Node
+from bridge.node.boot.actions import Action, BootResult, Do, Read, Step, Wake, number, optional
+from bridge.node.boot.status import BootError
+
+_ALL = 0xFFFF_FFFF
+_LONGEST_TEXT = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """``read & mask`` must be ``expected & mask``; a rule without a value compares nothing."""
+
+    letter: str
+    index: int
+    sub: int
+    expected: int | None
+    mask: int | None = None
+
+    def check(self, read: int | None, where: str) -> None:
+        """Raises BootError where the value is another one; ``read`` is None where the node has none."""
+        mask = _ALL if self.mask is None else self.mask
+        if self.expected is None or not ((read or 0) ^ self.expected) & mask:
+            return
+        masked = "" if mask == _ALL else f" (mask {mask:08X}h)"
+        name = f"{self.index:04X}h:{self.sub:02X}"
+        found = f"the node has no {name}" if read is None else f"{name} is {read:08X}h"
+        raise BootError(self.letter, f"{found}, expected {self.expected:08X}h{masked} {where}")
+
+
+def _rules(expected: object, where: str) -> list[tuple[Rule, str]]:
+    """The rules of an identity table; the mapping's has fewer keys than the site file's."""
+    rules: list[tuple[Rule, str]] = []
+    for letter, index, sub, name in (
+        ("C", 0x1000, 0, "device_type"),
+        ("D", 0x1018, 1, "vendor_id"),
+        ("M", 0x1018, 2, "product_code"),
+        ("N", 0x1018, 3, "revision"),
+        ("O", 0x1018, 4, "serial"),
+    ):
+        value = getattr(expected, name, None)
+        mask = getattr(expected, f"{name}_mask", None)
+        rules.append((Rule(letter, index, sub, value, mask), where))
+    return rules
+
+
+def identify(node: Node, device_type: int, result: BootResult) -> Do:
+    """Read who the node is and compare. Raises BootError C, D, M, N or O.
+
+    The mapping's device name is a hint for ``scan``; the site file's is a rule.
+    """
+    rules = _rules(node.table.identity, "by the site file")
+    # What the site file says of a field stands in place of what the mapping says.
+    given = {rule.letter for rule, _ in rules if rule.expected is not None}
+    rules += [
+        (rule, where)
+        for rule, where in _rules(node.family.identity, "by the mapping")
+        if rule.letter not in given
+    ]
+    read: dict[tuple[int, int], int | None] = {(0x1000, 0): device_type}
+    for sub, letter in ((1, "D"), (2, "M"), (3, "N"), (4, "O")):
+        yield Step("reading the identity", letter)
+        data = yield from optional(0x1018, sub)
+        read[0x1018, sub] = None if data is None else number(data)
+    for rule, where in rules:
+        rule.check(read[rule.index, rule.sub], where)
+    wanted = node.table.identity
+    name = yield from _text("M", 0x1008, wanted.device_name)
+    result.software_version = yield from _text("N", 0x100A, wanted.software_version)
+    vendor, product, revision, serial = (read[0x1018, sub] or 0 for sub in (1, 2, 3, 4))
+    result.identification = Identification(vendor, product, revision, serial, name)
+
+
+def look_for() -> Generator[Action, bytes | None, int]:
+    """Device type of the node; SdoError where nobody answers, and a second time after it was woken."""
+    yield Step("looking for the node", "B")
+    try:
+        return number((yield Read(0x1000)))
+    except SdoError as error:
+        if error.by_server:
+            raise
+    yield Wake()
+    return number((yield Read(0x1000)))
+
+
+def _text(letter: str, index: int, wanted: str | None) -> Generator[Action, bytes | None, str]:
+    """A text of the node, in which the regular expression ``wanted`` has to be found."""
+    yield Step("reading name and version", letter)
+    data = yield from optional(index)
+    text = (data or b"")[:_LONGEST_TEXT].split(b"\0", 1)[0].decode("latin-1").strip()
+    if wanted is not None and not re.search(wanted, text, re.IGNORECASE):
+        found = f"the node has no {index:04X}h" if data is None else f"{index:04X}h is {text!r}"
+        raise BootError(letter, f"{found}, expected {wanted!r} by the site file")
+    return text

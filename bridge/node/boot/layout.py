@@ -1,0 +1,86 @@
+"""Which mapped object is which word, by the layouts that the mapping file knows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from bridge.canopen.pdo import Entry
+from bridge.mapping.model import MappedObject, Pdo
+from bridge.node.process.words import WORD_BITS, Place
+
+Layouts = Mapping[int, Sequence[MappedObject]]
+"""By the word's place, the objects that may stand for it; those at one position belong together."""
+_Object = tuple[int, int]
+
+
+def layouts(pdos: Sequence[Pdo], words: Sequence[Sequence[str]], process: Sequence[str]) -> Layouts:
+    """What may stand for each word of a drive. ``words`` has the names of the words of each PDO."""
+    return {
+        process.index(name): refs
+        for pdo, names in zip(pdos, words, strict=True)
+        for name, refs in zip(names, pdo.objects, strict=True)
+    }
+
+
+def factory_entries(pdo: Pdo) -> tuple[Entry, ...]:
+    """The mapping as the mapping file has it. An object that is named for several words in a row fills
+    them all."""
+    entries: list[Entry] = []
+    before: MappedObject | None = None
+    for refs in pdo.objects:
+        first = refs[0]
+        if before is not None and before.parts == first.parts and not first.is_composite:
+            last = entries[-1]
+            if not first.bits[0]:
+                entries[-1] = Entry(last.index, last.sub, last.bits + WORD_BITS)
+        else:
+            for part, bits in zip(first.parts, first.lengths, strict=True):
+                entries.append(Entry(part.index, part.sub, bits))
+        before = first
+    return tuple(entries)
+
+
+def match_words(entries: Sequence[Entry], known: Layouts) -> tuple[Place | None, ...]:
+    """For each entry its place, by the layout of the mapping file that explains the most of them."""
+    best: tuple[Place | None, ...] = (None,) * len(entries)
+    for layout in range(max((len(refs) for refs in known.values()), default=0)):
+        places = _places(known, layout)
+        found = tuple(places.get((entry.index, entry.sub)) for entry in entries)
+        if best.count(None) > found.count(None):
+            best = found
+    return best
+
+
+def _places(known: Layouts, layout: int) -> dict[_Object, Place]:
+    places: dict[_Object, Place] = {}
+    for word in sorted(known):
+        refs = known[word]
+        mapped = refs[min(layout, len(refs) - 1)]
+        shift = 0
+        for part, bits in zip(mapped.parts, mapped.lengths, strict=True):
+            key = (part.index, part.sub)
+            first = places.get(key)
+            if mapped.is_composite:
+                places.setdefault(key, Place(word, 1, shift, bits))
+                shift += bits
+            elif first is None:
+                places[key] = Place(word)
+            elif first.word + first.span == word:
+                # An object that fills several words begins with the first.
+                places[key] = first._replace(span=first.span + 1)
+    return places
+
+
+def differences(
+    entries: Sequence[Entry], expected: Sequence[Entry], places: Sequence[Place | None]
+) -> list[str]:
+    """What the node has otherwise than the mapping file, entry by entry."""
+    told: list[str] = []
+    bits = {(entry.index, entry.sub): entry.bits for entry in expected}
+    for entry, place in zip(entries, places, strict=True):
+        wants = bits.get((entry.index, entry.sub))
+        if place is None and not entry.is_dummy:
+            told.append(f"{entry} is no word that the mapping file knows")
+        elif wants is not None and wants != entry.bits:
+            told.append(f"{entry} has {wants} bits in the mapping file")
+    return told

@@ -1,0 +1,124 @@
+"""What is remembered of a node from one boot-up to the next: so that none of them wears out its EEPROM, and
+that a stop reaches it wherever it listens."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridge.canopen.sync import LAST_SYNCHRONOUS
+from bridge.config.download import COMMANDS
+from bridge.mapping.aliases import COMMUNICATION
+from bridge.node.boot.pdo_plan import PdoPlan
+
+_RPDOS: Final = 2
+"""Identifiers that are remembered of one RPDO: a node that lies does not fill the memory."""
+
+_RESETS: Final = 3
+"""Errors in a row for which a node that does not start is reset: one with ever new ones is left alone."""
+
+NOT_AGAIN: Final = "it is not written again until the node restarts or is reset"
+
+
+CountWrite = Callable[[str, str, str], str]
+"""One more write to an EEPROM: owner, object, name. Returns a warning or an empty text, and raises
+``ParameterError`` where it is one too many (``parameter.ledger``)."""
+
+
+def _not_counted(owner: str, address: str, name: str) -> str:
+    del owner, address, name
+    return ""
+
+
+@dataclass(slots=True)
+class BootMemory:
+    """Kept for as long as the bridge runs; ``start_anew`` is called when the node has started or an
+    operator has reset it."""
+
+    may_run: bool = True
+    """Drives may be running: the node has not started since it was in operation, or since the bridge has."""
+    is_at_rest: bool = False
+    """The node has said that it is in a state in which its drives do not run, and has not been in operation
+    since."""
+    did_not_start: bool = False
+    """The boot-up before this one has come as far as the start, and the node did not follow."""
+    unsaved: bool = False
+    """Something was written that has not been stored (1010h) yet."""
+    unanswered_stores: int = 0
+    count_write: CountWrite = _not_counted
+    _not_kept: dict[tuple[int, int], bytes] = field(default_factory=dict[tuple[int, int], bytes])
+    _commands: set[tuple[int, int, bytes]] = field(default_factory=set[tuple[int, int, bytes]])
+    _resets: set[tuple[int, int]] = field(default_factory=set[tuple[int, int]])
+    _rpdos: dict[tuple[str, int], list[PdoPlan]] = field(default_factory=dict[tuple[str, int], list[PdoPlan]])
+
+    def start_anew(self) -> None:
+        self.unanswered_stores = 0
+        self.did_not_start = False
+        self._not_kept.clear()
+        self._commands.clear()
+        self._resets.clear()
+
+    def was_reset(self) -> None:
+        """A boot-up that failed has reset the node: its communication objects are as they were stored. That
+        is no reason to write its EEPROM once more."""
+        self.did_not_start = False
+        self._not_kept = {
+            key: data
+            for key, data in self._not_kept.items()
+            if key[0] not in COMMUNICATION or key[0] in COMMANDS
+        }
+
+    def note_not_kept(self, index: int, sub: int, data: bytes) -> None:
+        """The node has taken these bytes and holds others."""
+        self._not_kept[index, sub] = data
+
+    def was_not_kept(self, index: int, sub: int, data: bytes) -> bool:
+        """Whether writing these bytes has been tried, in vain."""
+        return self._not_kept.get((index, sub)) == data
+
+    def note_command(self, index: int, sub: int, data: bytes) -> None:
+        """A command was carried out by a boot-up that may still fail."""
+        self._commands.add((index, sub, data))
+
+    def has_done(self, index: int, sub: int, data: bytes) -> bool:
+        return (index, sub, data) in self._commands
+
+    def boot_succeeded(self) -> None:
+        """The next boot-up begins with all its commands."""
+        self._commands.clear()
+        self._resets.clear()
+        self.may_run = True
+        self.is_at_rest = self.did_not_start = False
+
+    def may_reset_for(self, cause: tuple[int, int]) -> bool:
+        """Whether a node that did not start may be reset because of this error: no drive may be running, and
+        it was not tried before, since the node was in operation or somebody else has restarted it."""
+        is_new = cause not in self._resets and len(self._resets) < _RESETS
+        return self.did_not_start and is_new and (self.is_at_rest or not self.may_run)
+
+    def note_reset(self, cause: tuple[int, int]) -> None:
+        self._resets.add(cause)
+        self.did_not_start = False
+
+    def note_rpdo(self, drive: str, number: int, plan: PdoPlan) -> None:
+        """The node listens for the words of ``drive`` in this RPDO."""
+        known = self._rpdos.get((drive, number), [])
+        others = [one for one in known if one.cob_id != plan.cob_id]
+        self._rpdos[drive, number] = [*others, plan][-_RPDOS:]
+
+    def rpdos_of(self, drive: str) -> Iterator[PdoPlan]:
+        """Where the node has listened for this drive; of one RPDO the last comes last."""
+        for (name, _), plans in self._rpdos.items():
+            if name == drive:
+                yield from plans
+
+    @property
+    def rpdo_types(self) -> set[int]:
+        """Transmission types of the RPDOs that the node has named last."""
+        return {plans[-1].transmission_type for plans in self._rpdos.values()}
+
+    @property
+    def waits_for_sync(self) -> bool:
+        """Whether an RPDO takes effect with the next SYNC only (CiA 301 §7.5.2.35)."""
+        return any(kind <= LAST_SYNCHRONOUS for kind in self.rpdo_types)

@@ -1,0 +1,128 @@
+"""What each drive does by itself when the bridge falls silent: set where the site file enforces it, read."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+from bridge.canopen.sdo import SdoError
+from bridge.command import Drive
+from bridge.command.plant import Node
+from bridge.drive import OwnJudgement, OwnVerdict
+from bridge.drive.own_supervision import judge
+from bridge.mapping.model import Family
+from bridge.mapping.own_places import OwnPlace, OwnWant, places, wanted
+from bridge.node.boot.actions import Action, BootResult, Do, Step, Write, optional
+from bridge.node.boot.memory import NOT_AGAIN
+from bridge.node.boot.status import BootError
+from bridge.node.sdo_channels import FIRST, channel_of
+from bridge.parameter import ParameterError
+
+Raws = dict[tuple[int, int], int]
+
+
+def set_own_supervision(node: Node, result: BootResult) -> Do:
+    """Read every drive's own supervision into ``result.own``; what ``own_timeout_ms`` says is written
+    first where ``enforce`` is true and the node holds something else.
+
+    Raises BootError J where a value that is enforced is not taken.
+    """
+    if not node.family.own_supervision:
+        for drive in node.drives:
+            result.own[drive.name] = OwnJudgement(accepted=drive.table.accepts.runs_on or "")
+        return
+    yield Step("reading the drives' own supervision", "J")
+    of_node = yield from read_places(node, None)
+    for want in wanted(node.family, node.bus, node.table):
+        if not want.place.per_drive:
+            yield from _bring(node, want, of_node, FIRST, node.name, result)
+    for drive in node.drives:
+        of_drive = yield from read_places(node, drive)
+        channel = channel_of(node, drive.slot)
+        for want in wanted(node.family, node.bus, node.table):
+            if want.place.per_drive and want.place.key in of_drive and channel is not None:
+                yield from _bring(node, want, of_drive, channel, drive.name, result)
+        raw = {**of_node, **of_drive}
+        own = judge(node.family, raw, node.bus, node.table, drive.table.accepts.runs_on or "")
+        result.own[drive.name] = own
+    _note_who_runs_on(node, result)
+
+
+def read_places(
+    node: Node, drive: Drive | None, *, link: bool = False
+) -> Generator[Action, bytes | None, Raws]:
+    """The node's own objects, or those that each drive has for itself. What cannot be read is left out."""
+    raw: Raws = {}
+    channel = FIRST if drive is None else channel_of(node, drive.slot)
+    if channel is None:
+        return raw
+    for place in places(node.family, link=link):
+        if place.per_drive is not (drive is not None):
+            continue
+        try:
+            data = yield from optional(place.ref.index, place.ref.sub, channel)
+        except SdoError:
+            if channel == FIRST:
+                raise
+            return raw  # the drive behind the channel may be away while the node itself is there
+        if data is not None:
+            raw[place.key] = place.decode(data)
+    return raw
+
+
+def _bring(node: Node, want: OwnWant, raw: Raws, channel: int, owner: str, result: BootResult) -> Do:
+    """Bring one object to what is wanted, once; ``raw`` has what it holds, and will hold."""
+    place = want.place
+    have = raw.get(place.key)
+    if have is not None and want.met_by(have):
+        return
+    if not node.table.enforce:
+        held = "not known" if have is None else str(have)
+        result.notes.append(f"{owner}: {place.name} is {held}, the site file says {want.value}")
+        return
+    if have is None:
+        raise BootError("J", f"{owner}: {place.name} ({place.ref}) is to be {want.value}, and is not there")
+    memory, data = result.memory, place.encode(want.value)
+    # Each drive has its own object of the same number.
+    tried = place.ref.index | channel << 16
+    if memory.was_not_kept(tried, place.ref.sub, data):
+        raise BootError("J", f"{owner}: {place.name} stays {have}, expected {want.value}; {NOT_AGAIN}")
+    if _wears(node.family, place):
+        try:
+            warning = memory.count_write(owner, str(place.ref).upper(), place.name)
+        except ParameterError as error:
+            raise BootError("J", f"{owner}: {error}") from None
+        result.notes += [warning] if warning else []
+    try:
+        yield Write(place.ref.index, place.ref.sub, data, channel)
+    except SdoError as error:
+        if not error.by_server:
+            raise
+        memory.note_not_kept(tried, place.ref.sub, data)
+        raise BootError("J", f"{owner}: {place.name} was to become {want.value}: {error}") from None
+    read = yield from optional(place.ref.index, place.ref.sub, channel)
+    kept = None if read is None else place.decode(read)
+    if kept != want.value:
+        memory.note_not_kept(tried, place.ref.sub, data)
+        raise BootError("J", f"{owner}: {place.name} is {kept} after {want.value} was written; {NOT_AGAIN}")
+    raw[place.key] = want.value
+    result.notes.append(f"{owner}: {place.name} was {have}, is {want.value} now (enforced)")
+
+
+def _wears(family: Family, place: OwnPlace) -> bool:
+    """Whether writing it may go to an EEPROM. A switch that keeps writes in the RAM is not asked: one write
+    too many counted does no harm."""
+    if family.eeprom is None or family.eeprom.written_on_save_only:
+        return False
+    return not any(parameter.volatile and parameter.name == place.name for parameter in family.parameter)
+
+
+def _note_who_runs_on(node: Node, result: BootResult) -> None:
+    """One note for all drives of the node about which the same is to be said."""
+    names: dict[str, list[str]] = {}
+    for drive in node.drives:
+        own = result.own[drive.name]
+        if own.verdict is OwnVerdict.RUNS_ON and not own.accepted:
+            names.setdefault(own.reason, []).append(drive.name.partition("/")[2])
+    for reason, drives in names.items():
+        who = "" if len(drives) == len(node.drives) else f" ({', '.join(drives)})"
+        result.notes.append(f"the drive runs on when the bridge falls silent{who}: {reason}")

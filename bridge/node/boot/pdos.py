@@ -1,0 +1,250 @@
+"""The PDOs of a drive: written where the site file or the mapping asks for it, then read back.
+
+What the node says of itself wins over the mapping file. A node without an object is taken by the mapping
+file's word, and that is noted. A drive works as long as control and status word are there; what else the
+node does not carry is noted and not served.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.canopen import cobid
+from bridge.canopen.pdo import Entry, MappingError, PdoCodec
+from bridge.canopen.sdo import SdoError
+from bridge.command import Drive
+from bridge.command.plant import Node
+from bridge.config import PdoTable
+from bridge.image import DataType
+from bridge.mapping.model import Pdo
+from bridge.node.boot.actions import (
+    Action,
+    BootResult,
+    Do,
+    DrivePlan,
+    NodePdoPlan,
+    PdoPlan,
+    Read,
+    Step,
+    number,
+    optional,
+)
+from bridge.node.boot.layout import Layouts, differences, factory_entries, layouts, match_words
+from bridge.node.boot.pdo_settings import MOST_ENTRIES, PdoObjects, set_pdo, table_for
+from bridge.node.boot.start import write_start
+
+RPDO: Final = (0x1400, 0x1600)
+"""First communication and first mapping object."""
+_TPDO: Final = (0x1800, 0x1A00)
+_BYTES: Final = 2
+
+
+class _Off(MappingError):
+    """The PDO is switched off in the node."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Direction:
+    """RPDOs or TPDOs of one drive. ``words`` has the names of each PDO's words, ``process`` all names."""
+
+    name: str
+    group: str
+    bases: tuple[int, int]
+    process: Sequence[str]
+    pdos: Sequence[Pdo]
+    words: Sequence[Sequence[str]]
+    tables: Sequence[PdoTable]
+    known: Layouts
+
+    def asked(self, pdo: Pdo) -> PdoTable | None:
+        """What the site file asks of this PDO."""
+        return next(
+            (table for table in self.tables if (table.number or self.pdos[0].number) == pdo.number), None
+        )
+
+
+def plan_drive(node: Node, drive: Drive, result: BootResult) -> Generator[Action, bytes | None, DrivePlan]:
+    """The PDOs of one drive; what does not fit is the drive's problem, not the node's."""
+    plan = DrivePlan()
+    slot, family, table = drive.slot, drive.family, drive.table
+    process = family.process
+    receives = [family.rpdo_words(pdo) for pdo in slot.rpdo]
+    sends = [family.tpdo_words(pdo) for pdo in slot.tpdo]
+    yield Step(f"setting and reading the process data mapping of {slot.name}", "J")
+    try:
+        yield from write_start(drive, result)
+        for direction, found in (
+            (
+                _Direction(
+                    "RPDO", "command", RPDO, process.rpdo, slot.rpdo, receives, table.rpdo,
+                    layouts(slot.rpdo, receives, process.rpdo),
+                ),
+                plan.rpdos,
+            ),
+            (
+                _Direction(
+                    "TPDO", "actual", _TPDO, process.tpdo, slot.tpdo, sends, table.tpdo,
+                    layouts(slot.tpdo, sends, process.tpdo),
+                ),
+                plan.tpdos,
+            ),
+        ):  # fmt: skip
+            yield from _plan(node, drive, direction, found, plan, result)
+        _require_followed(drive, plan)
+    except MappingError as error:
+        plan.problem = str(error)
+        result.notes.append(f"{slot.name}: {error}")
+    return plan
+
+
+def _require_followed(drive: Drive, plan: DrivePlan) -> None:
+    """A command that follows an actual value needs it: without it, enabling might make the drive jump."""
+    for value in drive.family.values_of(drive.slot):
+        if value.follows is None:
+            continue
+        followed = next(
+            one for one in drive.family.value if (one.group, one.name) == ("actual", value.follows)
+        )
+        for word in followed.word_names:
+            why = plan.unserved.get(f"actual/{word}")
+            if why:
+                raise MappingError(f"{value.leaf} has to follow {followed.leaf}: {why}")
+
+
+def _plan(
+    node: Node, drive: Drive, direction: _Direction, found: list[PdoPlan], plan: DrivePlan, result: BootResult
+) -> Do:
+    """All PDOs of one direction, into ``found``. Raises MappingError where the first word is in none."""
+    first = direction.process[0]
+    reasons: dict[str, str] = {}
+    for pdo, words in zip(direction.pdos, direction.words, strict=True):
+        try:
+            one = yield from _pdo(node, drive, pdo, direction, result)
+            if direction.name == "RPDO" and node.family.process.exact_length:
+                _check_length(one, len(words))
+            found.append(one)
+        except MappingError as error:
+            if first in words:
+                raise
+            reasons |= dict.fromkeys(words, str(error))
+            expected = pdo.optional and isinstance(error, _Off) and direction.asked(pdo) is None
+            if not expected:
+                result.notes.append(f"{drive.slot.name}: {error}")
+    carried = {place for one in found for place in one.words}
+    if 0 not in carried:
+        names = " and ".join(one.name for one in found)
+        message = f"{names} does not carry" if len(found) == 1 else f"{names} do not carry"
+        raise MappingError(f"{message} the {first.replace('_', ' ')}")
+    found.sort(key=lambda one: 0 not in one.words)
+    for pdo, words in zip(direction.pdos, direction.words, strict=True):
+        for word in words:
+            if direction.process.index(word) in carried:
+                continue
+            why = reasons.get(word) or f"{direction.name}{pdo.number} of the node does not carry it"
+            plan.unserved[f"{direction.group}/{word}"] = why
+            if word not in reasons:
+                missing = f"{word} is not in {direction.name}{pdo.number}"
+                result.notes.append(f"{drive.slot.name}: {missing}")
+
+
+def _check_length(pdo: PdoPlan, words: int) -> None:
+    if pdo.codec.length != _BYTES * words:
+        plural = "word" if words == 1 else "words"
+        raise MappingError(
+            f"{pdo.name} maps {pdo.codec.length} bytes; the interface evaluates only {words} {plural}"
+        )
+
+
+def _pdo(
+    node: Node, drive: Drive, pdo: Pdo, direction: _Direction, result: BootResult
+) -> Generator[Action, bytes | None, PdoPlan]:
+    """One PDO as the node has it. Raises MappingError where it is off or cannot be used."""
+    name = f"{direction.name}{pdo.number}"
+    parameter, mapping = (base + pdo.number - 1 for base in direction.bases)
+    default_id = pdo.cob_id + node.table.id
+    expected = factory_entries(pdo)
+    wanted = table_for(pdo, expected, direction.asked(pdo))
+    if wanted is not None:
+        yield from set_pdo(PdoObjects(parameter, mapping, default_id), wanted, result)
+    has_object = yield from optional(parameter, 1)
+    if has_object is None and pdo.optional:
+        raise _Off(f"the node has no {name}")
+    cob_id = number(has_object, default_id)
+    if cob_id & cobid.PDO_DISABLED:
+        raise _Off(f"{parameter:04X}h:01: the PDO is switched off in the node")
+    if cob_id & cobid.PDO_EXTENDED or not cobid.is_for_pdos(cob_id & cobid.COB_ID_MASK):
+        raise MappingError(f"{parameter:04X}h:01 is {cob_id:08X}h: no identifier for a PDO")
+    kind = number((yield from optional(parameter, 2)), 255)
+    event_ms = 0
+    if direction.bases is _TPDO and kind >= 254:
+        event_ms = number((yield from optional(parameter, 5)))
+    entries = expected
+    if not pdo.static:
+        count = yield from optional(mapping, 0)
+        if count is None:
+            result.notes.append(f"the node has no {mapping:04X}h: taken as the mapping file has it")
+        else:
+            entries = yield from read_entries(mapping, number(count))
+    places = match_words(entries, direction.known)
+    told = differences(entries, expected, places)
+    result.notes += [f"{drive.slot.name}: {name}: {difference}" for difference in told]
+    codec = PdoCodec(entries, {(ref.index, ref.sub) for each in direction.pdos for ref in each.signed})
+    remote_allowed = not cob_id & cobid.NO_REMOTE
+    return PdoPlan(cob_id & cobid.COB_ID_MASK, kind, event_ms, codec, places, remote_allowed, name)
+
+
+def refuse_doubles(result: BootResult) -> None:
+    """Two drives behind one identifier would get each other's words: neither is served."""
+    users: dict[int, list[DrivePlan]] = {}
+    for plan in result.drives.values():
+        for pdo in (*plan.rpdos, *plan.tpdos):
+            users.setdefault(pdo.cob_id, []).append(plan)
+    for cob_id, plans in users.items():
+        for plan in plans if len(plans) > 1 else ():
+            plan.problem = plan.problem or f"{cob_id:03X}h is the identifier of more than one PDO"
+            if plan.problem not in result.notes:
+                result.notes.append(plan.problem)
+
+
+def plan_node_tpdos(node: Node, result: BootResult) -> Generator[Action, bytes | None, None]:
+    """TPDOs that carry what is polled otherwise, where the node has them switched on."""
+    polls = {(poll.object.index, poll.object.sub): poll for poll in node.family.poll}
+    signed = {at for at, poll in polls.items() if poll.data_type in (DataType.INT16, DataType.INT32)}
+    for tpdo in node.family.node_tpdo:
+        parameter, mapping = (base + tpdo.number - 1 for base in _TPDO)
+        cob_id = number((yield from optional(parameter, 1)), cobid.PDO_DISABLED)
+        count = number((yield from optional(mapping, 0)))
+        if cob_id & cobid.PDO_DISABLED or not count:
+            continue
+        try:
+            entries = yield from read_entries(mapping, count)
+            codec = PdoCodec(entries, signed)
+        except MappingError as error:
+            result.notes.append(f"TPDO{tpdo.number} is not used: {error}")
+            continue
+        found = [polls.get((entry.index, entry.sub)) for entry in entries]
+        if any(found):
+            kind = number((yield from optional(parameter, 2)), 255)
+            event_ms = number((yield from optional(parameter, 5)))
+            plan = PdoPlan(cob_id & cobid.COB_ID_MASK, kind, event_ms, codec, (None,) * len(entries))
+            names = tuple(poll.name if poll else "" for poll in found)
+            result.node_tpdos.append(NodePdoPlan(plan, names))
+
+
+def read_entries(mapping: int, count: int) -> Generator[Action, bytes | None, tuple[Entry, ...]]:
+    """The mapping as the node has it. Raises MappingError where it cannot be one."""
+    if count > MOST_ENTRIES:
+        raise MappingError(f"{mapping:04X}h:00 is {count}, at most {MOST_ENTRIES} objects can be mapped")
+    entries: tuple[Entry, ...] = ()
+    for sub in range(1, count + 1):
+        try:
+            value = number((yield Read(mapping, sub)))
+        except SdoError as error:
+            if not error.by_server:
+                raise
+            raise MappingError(str(error)) from None
+        if value:  # some nodes have a fixed count, and 0 in the places that they do not use
+            entries = (*entries, Entry.from_object(value))
+    return entries

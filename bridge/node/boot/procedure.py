@@ -1,0 +1,101 @@
+"""Boot-up of one node as a generator (after CiA 302-2): it asks, is answered, and ends with a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from bridge.canopen.nmt import NmtCommand, NmtState
+from bridge.command.plant import Node
+from bridge.command.worst_case import takeover_ms
+from bridge.config import NodeTable
+from bridge.config.download import Download
+from bridge.node.boot.actions import (
+    Await,
+    AwaitRelease,
+    Boot,
+    BootResult,
+    Do,
+    Found,
+    Nmt,
+    Pause,
+    SendStopped,
+    StartSupervision,
+    Step,
+)
+from bridge.node.boot.configuration import configure
+from bridge.node.boot.device_errors import read_errors, reset_once
+from bridge.node.boot.emergency import read_emcy_id
+from bridge.node.boot.error_control import set_error_control
+from bridge.node.boot.identity import identify, look_for
+from bridge.node.boot.listening import find_rpdos
+from bridge.node.boot.memory import BootMemory
+from bridge.node.boot.own_supervision import set_own_supervision
+from bridge.node.boot.pdos import plan_drive, plan_node_tpdos, refuse_doubles
+from bridge.node.boot.scales import read_scales
+from bridge.node.boot.sdo_servers import open_sdo_servers
+from bridge.node.boot.status import BootError
+
+_GOES_OPERATIONAL_S: Final = 2.0
+_SYNCS: Final = 2
+"""Of so many SYNC periods one has a SYNC in it, however late that is."""
+
+
+def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | None = None) -> Boot:
+    """Boot ``node``; returns what is to be known of it.
+
+    Raises BootError where it is another device, cannot be configured or does not go operational,
+    SdoError where it does not answer. ``downloads`` go before what the tables of the site file say.
+    ``memory`` is what the node's boot-ups before this one have left.
+    """
+    result = BootResult(memory=memory or BootMemory())
+    # Outside Operational it takes no RPDO: what stops its drives goes first, and what may fail afterwards.
+    yield SendStopped()
+    device_type = yield from look_for()
+    yield Found()
+    if result.memory.may_run:
+        yield from find_rpdos(node, result)
+        yield SendStopped()
+        if result.memory.waits_for_sync:
+            needed_ms = [takeover_ms(node.bus, kind) for kind in result.memory.rpdo_types]
+            yield Pause(max(_SYNCS * node.bus.sync_period_ms, *needed_ms) / 1000)
+    yield Nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+    yield from identify(node, device_type, result)
+    yield from read_errors(node, result)
+    yield from reset_once(node, result)
+    wanted = (*downloads, *(entry.download for entry in node.table.configure))
+    yield from configure(wanted, store=node.table.configuration_store, result=result)
+    yield from read_emcy_id(node.table.id, result)
+    yield from open_sdo_servers(node, result)
+    yield from set_error_control(node.table, result)
+    for drive in node.drives:
+        result.drives[drive.name] = yield from plan_drive(node, drive, result)
+    refuse_doubles(result)
+    yield from plan_node_tpdos(node, result)
+    yield from set_own_supervision(node, result)
+    yield Step("reading the scaling parameters", "J")
+    for drive in node.drives:
+        result.scales[drive.name] = yield from read_scales(node, drive, result)
+    yield from _start(node.table, result)
+    result.memory.boot_succeeded()
+    return result
+
+
+def _start(table: NodeTable, result: BootResult) -> Do:
+    """Error control first, then NMT start; both are seen from the node's own messages. Raises BootError where
+    they do not come."""
+    not_heard = "F" if table.supervision == "guarding" else "K"
+    yield Step(f"waiting for {table.supervision}", not_heard)
+    yield StartSupervision()
+    # It says its state when it is asked, or every so often.
+    limit_s = max(_GOES_OPERATIONAL_S, 3 * table.supervision_ms / 1000)
+    yield Await(None, limit_s)
+    yield AwaitRelease()
+    yield Step("starting", "J")
+    yield Nmt(NmtCommand.START)
+    try:
+        yield Await(NmtState.OPERATIONAL, limit_s)
+    except BootError as error:
+        result.memory.did_not_start = True
+        detail = "; ".join(text for text in (error.detail, result.errors.text) if text)
+        raise BootError(error.letter, detail, absent=error.absent) from None

@@ -1,0 +1,66 @@
+"""Opening the node's further SDO servers, where the site file asks for them (CiA 301 §7.5.2.33)."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import Final
+
+from bridge.canopen import cobid
+from bridge.canopen.nmt import NmtCommand
+from bridge.canopen.sdo import SdoError
+from bridge.command.plant import Node
+from bridge.mapping.model import SdoServer
+from bridge.node.boot.actions import Action, BootResult, Do, Nmt, Read, Step, Write, number, optional
+from bridge.node.boot.status import BootError
+from bridge.node.sdo_channels import opened_servers
+
+_PARAMETER: Final = 0x1200
+_OFF: Final = cobid.PDO_DISABLED
+"""Bit 31 means the same as in a PDO's COB-ID."""
+_COMPARED: Final = _OFF | cobid.COB_ID_MASK
+
+
+def open_sdo_servers(node: Node, result: BootResult) -> Do:
+    """Bring 120xh:1 (to the node) and :2 (from the node) to the COB-IDs of the mapping file, switched on.
+
+    Written only where they differ, and read back. Raises BootError J where the node refuses.
+    """
+    must_stop = False
+    for server in opened_servers(node):
+        yield Step(f"opening SDO channel {server.number}", "J")
+        try:
+            changed = yield from _open(server, node.table.id, result)
+        except SdoError as error:
+            if not error.by_server:
+                raise
+            raise BootError("J", f"SDO channel {server.number} cannot be opened: {error}") from None
+        must_stop = must_stop or (changed and server.after_stop)
+    if must_stop:
+        yield Nmt(NmtCommand.STOP)
+        yield Nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+
+
+def _open(server: SdoServer, node_id: int, result: BootResult) -> Generator[Action, bytes | None, bool]:
+    """Open one server; True where something had to be changed."""
+    index = _PARAMETER + server.number - 1
+    changed = False
+    for sub, base in ((1, server.request), (2, server.reply)):
+        want = base + node_id
+        have = number((yield from optional(index, sub)), _OFF)
+        if have & _COMPARED == want:
+            continue
+        changed = True
+        if not have & _OFF:  # a COB-ID that is in use does not change
+            yield Write(index, sub, _bytes(have | _OFF))
+        yield Write(index, sub, _bytes(want))
+        kept = number((yield Read(index, sub)))
+        if kept & _COMPARED != want:
+            raise BootError("J", f"{index:04X}h:{sub:02X} is {kept:08X}h, expected {want:08X}h")
+    if changed:
+        ids = f"{server.request + node_id:03X}h/{server.reply + node_id:03X}h"
+        result.notes.append(f"SDO channel {server.number} opened at {ids}")
+    return changed
+
+
+def _bytes(value: int) -> bytes:
+    return value.to_bytes(4, "little")

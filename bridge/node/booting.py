@@ -1,0 +1,164 @@
+"""Runs a node's boot-up generator: carries its questions to the SDO channel, brings the answers back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from bridge.canopen.nmt import NmtState
+from bridge.canopen.sdo import Priority, Result, SdoError
+from bridge.node import boot
+from bridge.node.sdo_channels import SdoChannels
+
+
+class Host(Protocol):
+    """The node that is booted."""
+
+    def carry_out(self, action: boot.Action, now: float) -> None:
+        """A step that needs no answer."""
+        ...
+
+    def begin_await(self, state: NmtState | None) -> bool:
+        """Whether there is anything to wait for: a node without supervision never says its state."""
+        ...
+
+    def may_start(self) -> bool:
+        """Whether start order and mandatory nodes let the node start now."""
+        ...
+
+    def boot_ended(self, result: boot.BootResult | boot.BootError, now: float) -> None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class _Awaited:
+    state: NmtState | None
+    deadline: float
+
+
+class Booting:
+    """One boot-up at a time. Answers are kept until ``pump``: the generator never runs inside the
+    channel's own bookkeeping."""
+
+    def __init__(self, host: Host, make: Callable[[], boot.Boot], sdo: SdoChannels) -> None:
+        self._host = host
+        self._make = make
+        self._sdo = sdo
+        self._boot: boot.Boot | None = None
+        self._awaited: _Awaited | None = None
+        self._goes_on_at: float | None = None
+        self._answers: list[Result] = []
+        self._step = boot.Step("", "B")
+        self.is_held = False
+
+    @property
+    def is_running(self) -> bool:
+        return self._boot is not None
+
+    def begin(self, now: float) -> None:
+        self.cancel(now)
+        self._boot = self._make()
+        self._go_on(None, now)
+
+    def cancel(self, now: float) -> None:
+        """End the boot-up, if there is one, and everything that waits on the SDO channel."""
+        if self._boot:
+            self._boot.close()
+            self._boot = None
+        self._awaited = self._goes_on_at = None
+        self.is_held = False
+        self._sdo.flush(now)
+        self._answers.clear()
+
+    def pump(self, now: float) -> None:
+        """Give the boot-up the answers that have come since the last call."""
+        while self._answers:
+            self._go_on(self._answers.pop(0), now)
+        if self.is_held and self._host.may_start():
+            self.is_held = False
+            self._go_on(None, now)
+
+    def on_nmt_state(self, state: NmtState, now: float) -> None:
+        """The node has reported its state."""
+        if self._awaited and self._awaited.state in (None, state):
+            self._awaited = None
+            self._go_on(None, now)
+
+    def on_time(self, now: float, state: NmtState) -> None:
+        if self._goes_on_at is not None and now >= self._goes_on_at:
+            self._goes_on_at = None
+            self._go_on(None, now)
+        if self._awaited and now >= self._awaited.deadline:
+            awaited, self._awaited = self._awaited, None
+            if awaited.state is None:
+                error = boot.BootError(self._step.letter, f"nothing was heard while {self._step.text}")
+            else:
+                wants, stays = awaited.state.words, state.words
+                error = boot.BootError("J", f"the node stays {stays}, expected {wants}", absent=False)
+            self._go_on(error, now)
+
+    def next_deadline(self) -> float | None:
+        return self._awaited.deadline if self._awaited else self._goes_on_at
+
+    def _go_on(self, answer: Result | boot.BootError | None, now: float) -> None:
+        """Run until the boot-up waits for something, from an answer, or from what has become of waiting."""
+        while self._boot is not None:
+            try:
+                action = _resume(self._boot, answer)
+            except StopIteration as end:
+                self._end(end.value, now)
+                return
+            except SdoError as error:
+                self._end(_failure(error, self._step.letter), now)
+                return
+            except boot.BootError as error:
+                self._end(error, now)
+                return
+            answer = None
+            if self._waits(action, now):
+                return
+
+    def _waits(self, action: boot.Action, now: float) -> bool:
+        """Do one step; True where its answer comes later."""
+        match action:
+            case boot.Read(index, sub, channel):
+                self._sdo[channel].read(index, sub, now, self._answers.append, priority=Priority.BOOT)
+                return True
+            case boot.Write(index, sub, data, channel):
+                self._sdo[channel].write(index, sub, data, now, self._answers.append, priority=Priority.BOOT)
+                return True
+            case boot.Await(state, timeout_s):
+                if not self._host.begin_await(state):
+                    return False
+                self._awaited = _Awaited(state, now + timeout_s)
+                return True
+            case boot.Pause(seconds):
+                self._goes_on_at = now + seconds
+                return True
+            case boot.AwaitRelease():
+                self.is_held = not self._host.may_start()
+                return self.is_held
+            case boot.Step():
+                self._step = action
+                self._host.carry_out(action, now)
+                return False
+            case _:
+                self._host.carry_out(action, now)
+                return False
+
+    def _end(self, result: boot.BootResult | boot.BootError, now: float) -> None:
+        self._boot = None
+        self._host.boot_ended(result, now)
+
+
+def _failure(error: SdoError, letter: str) -> boot.BootError:
+    """What the boot-up ends with. Silence says nothing about what was asked for."""
+    if error.by_server or letter == "B":
+        return boot.BootError(letter, str(error), absent=not error.by_server)
+    return boot.BootError(letter, f"the node does not answer: {error}", absent=True)
+
+
+def _resume(generator: boot.Boot, answer: Result | boot.BootError | None) -> boot.Action:
+    if isinstance(answer, SdoError | boot.BootError):
+        return generator.throw(answer)
+    return generator.send(answer)

@@ -1,0 +1,63 @@
+"""Emergency messages of one node: each to the drive it is about, and their history as points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from bridge.canopen import emcy
+from bridge.canopen.frame import Frame
+from bridge.command import Drive, Plant
+from bridge.command.plant import Node
+from bridge.drive import EmergencyReader
+from bridge.node.emergency_log import EmergencyLog
+
+
+class Emergencies:
+    """``reject`` is called with what is no emergency message, ``told`` with each drive that one was
+    about."""
+
+    def __init__(
+        self,
+        node: Node,
+        plant: Plant,
+        reject: Callable[[Frame, str], None],
+        told: Callable[[Drive, float], None] = lambda drive, now: None,
+    ) -> None:
+        self._node = node
+        self._plant = plant
+        self._reject = reject
+        self._told = told
+        self._reader = EmergencyReader(node.family.emcy)
+        self._log = EmergencyLog()
+
+    def on_frame(self, frame: Frame) -> None:
+        emergency = emcy.decode(frame.data)
+        if emergency is None:
+            self._reject(frame, "an emergency message has 8 bytes")
+            return
+        byte = self._node.family.emcy.drive_byte
+        number = frame.data[byte] if byte is not None and byte < len(frame.data) else None
+        if self._log.add(emergency, number, frame.time):
+            self._tell(emergency, number, frame.time)
+
+    def on_time(self, now: float) -> None:
+        for emergency, number, at in self._log.on_time(now):
+            self._tell(emergency, number, at)
+
+    def next_deadline(self) -> float | None:
+        return self._log.next_deadline()
+
+    def _tell(self, emergency: emcy.Emergency, number: int | None, at: float) -> None:
+        told = self._reader.read(emergency.code, emergency.vendor)
+        for drive in self._node.drives:
+            if drive.slot.emcy_drive is None or drive.slot.emcy_drive == number:
+                drive.channel.on_emcy(told, at)
+                drive.refresh(at)
+                self._told(drive, at)
+
+    def refresh(self, now: float) -> None:
+        top = f"{self._node.name}/node"
+        if self._log.changed:
+            history = self._log.as_json(lambda one: self._reader.read(one.code, one.vendor).text)
+            self._plant.set(f"{top}/emcy_history", history, now)
+        self._plant.set(f"{top}/emcy_suppressed", self._log.suppressed, now)

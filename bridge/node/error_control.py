@@ -1,0 +1,123 @@
+"""Error control of one node: is it there, in which state, once or twice, does it start again and again?
+
+What is known of the state is what the node has said, never what it was told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+
+from bridge.canopen import nmt
+from bridge.canopen.bootloop import BootLoop
+from bridge.canopen.duplicate import DuplicateCheck
+from bridge.canopen.frame import Frame
+from bridge.canopen.heartbeat import HeartbeatConsumer, NodeGuard
+from bridge.canopen.nmt import NmtState
+from bridge.config import NodeTable
+from bridge.node.boot.status import HINTS
+
+
+class Sign(Enum):
+    """What an error control message says."""
+
+    MALFORMED = "malformed"
+    BOOT_UP = "boot-up"
+    WRONG_TOGGLE = "an answer to node guarding that does not count"
+    SAME = "the state it had before"
+    CHANGED = "another state"
+
+
+class ErrorControl:
+    """``duplicate`` is called where two devices seem to have this node id."""
+
+    def __init__(self, table: NodeTable, duplicate: Callable[[str, float], None]) -> None:
+        self._table = table
+        self._duplicate = duplicate
+        self._duplicates = DuplicateCheck()
+        self.boot_loop = BootLoop()
+        self.state = NmtState.UNKNOWN
+        self._toggle_errors_before = 0
+        self._supervisor: HeartbeatConsumer | NodeGuard | None = None
+        if table.supervision == "heartbeat":
+            self._supervisor = HeartbeatConsumer(table.supervision_ms / 1000)
+        elif table.supervision == "guarding":
+            self._supervisor = NodeGuard(table.id, table.supervision_ms / 1000, table.life_time_factor)
+
+    @property
+    def supervises(self) -> bool:
+        """False for "none": such a node never says its state."""
+        return self._supervisor is not None
+
+    @property
+    def loss(self) -> str:
+        """How a loss is called: error status E or F of CiA 302-2."""
+        if self._table.supervision != "guarding":
+            return f"E: lost: no heartbeat for {self._table.supervision_ms} ms: {HINTS['E']}"
+        wrong = self.toggle_errors - self._toggle_errors_before
+        if wrong:
+            return f"F: lost: no right answer to node guarding, {wrong} with the wrong toggle bit"
+        return f"F: lost: no answer to node guarding: {HINTS['E']}"
+
+    @property
+    def toggle_errors(self) -> int:
+        """Answers to node guarding whose toggle bit was not the one that is due."""
+        return self._supervisor.toggle_errors if isinstance(self._supervisor, NodeGuard) else 0
+
+    def on_frame(self, frame: Frame) -> Sign:
+        if len(frame.data) != 1:
+            return Sign.MALFORMED
+        state = nmt.state_of(frame.data[0])
+        if state is NmtState.INITIALISING:
+            self._duplicates.restart()
+            self.state = NmtState.PRE_OPERATIONAL
+            return Sign.BOOT_UP
+        if self._supervisor and not self._supervisor.on_frame(frame):
+            return Sign.WRONG_TOGGLE
+        found = self._duplicates.on_heartbeat(state, frame.time)
+        if found:
+            self._duplicate(found, frame.time)
+        if state is self.state:
+            return Sign.SAME
+        self.state = state
+        return Sign.CHANGED
+
+    def on_foreign_request(self, frame: Frame) -> None:
+        """Another SDO client asks this node: its answers are not for us."""
+        self._duplicates.on_foreign_request(frame.time)
+
+    def on_reply(self, frame: Frame, *, matched: bool) -> None:
+        """An SDO answer; ``matched`` where it belonged to a request of ours."""
+        found = self._duplicates.on_reply(frame.data, frame.time, matched=matched)
+        if found:
+            self._duplicate(found, frame.time)
+
+    def produces_every(self, period_s: float | None) -> None:
+        """The heartbeat period that the node has kept at boot-up; None where there is none."""
+        self._duplicates.period_s = period_s
+
+    def expect(self, now: float) -> None:
+        """From now on the node has to be heard."""
+        self._duplicates.restart()
+        self._toggle_errors_before = self.toggle_errors
+        if self._supervisor:
+            self._supervisor.expect(now)
+
+    def stop(self, now: float, *, lost: bool = False) -> None:
+        """No longer expect the node. A guarded one whose loss is only reported goes on being asked: there
+        is no other way to hear that it is back."""
+        if self._supervisor is None:
+            return
+        self._supervisor.reset()
+        if lost and self._table.on_loss == "nothing" and isinstance(self._supervisor, NodeGuard):
+            self._supervisor.expect(now)
+
+    def on_time(self, now: float) -> bool:
+        """True once when the node has been silent for too long."""
+        return self._supervisor is not None and self._supervisor.on_time(now)
+
+    def next_deadline(self) -> float | None:
+        return self._supervisor.next_deadline() if self._supervisor else None
+
+    def take_frames(self) -> list[Frame]:
+        return self._supervisor.take_frames() if self._supervisor else []

@@ -1,0 +1,102 @@
+"""How a node is taken out of operation without its drives running on. Sans-IO.
+
+What stops a drive is its stopped word: NMT stop does not stop those of every family. So the command goes
+out when the words have been taken over, and a drive that cannot say any more whether it has stopped is
+told of (``command/follow.py``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from bridge.canopen.nmt import NmtCommand, NmtState
+from bridge.command.plant import Node
+from bridge.command.worst_case import takeover_ms
+from bridge.node.boot import BootMemory
+from bridge.node.wire import NodeWire
+
+
+class Leaving:
+    """Of one node. ``takes_words``: it may be in Operational, as far as is known."""
+
+    def __init__(
+        self, node: Node, wire: NodeWire, memory: BootMemory, takes_words: Callable[[], bool]
+    ) -> None:
+        self._node = node
+        self._wire = wire
+        self._memory = memory
+        self._takes_words = takes_words
+        self._owed: NmtCommand | None = None
+        """What was put off when the bus went down."""
+
+    @property
+    def is_due(self) -> bool:
+        """A command waits for stopped words to be taken over."""
+        return self._wire.put_off is not None
+
+    @property
+    def is_stopped_by_nmt(self) -> bool:
+        """Whether the node's drives do not run in the state Stopped."""
+        return self._node.family.family.stopped_by == "stop_node"
+
+    @property
+    def takeover_s(self) -> float:
+        """How long stopped words may take from the bus to the drives: 0 where they wait for no SYNC, or where
+        the node takes none any more."""
+        if not self._takes_words():
+            return 0.0
+        known = [takeover_ms(self._node.bus, kind) / 1000 for kind in self._memory.rpdo_types]
+        return max((*known, *(drive.takeover_s for drive in self._node.drives)), default=0.0)
+
+    def has_told(self, now: float) -> bool:
+        """Every drive that gets process data has had stopped words for long enough to take them over."""
+        told = [drive for drive in self._node.drives if drive.name in self._wire.drives]
+        return all(drive.following.told_for_s(now) >= self.takeover_s for drive in told)
+
+    def send(self, command: NmtCommand, now: float, *, at_once: bool = False) -> None:
+        """A command after which the node takes no words: when it has taken over the stopped ones.
+        ``at_once``: it has had them for long."""
+        wait_s = 0.0 if at_once else self.takeover_s
+        if wait_s or self.is_due:
+            self._wire.put_nmt_off(command, now, wait_s)
+        else:
+            self._wire.send_nmt(command)
+
+    def silence(self, now: float, *, only_heard: bool = False) -> None:
+        """It leaves operation because we say so: its drives are not heard any more, and may still run.
+        ``only_heard``: the node itself is silent, and so nothing is known of a drive that is."""
+        for drive in self._node.drives:
+            if not only_heard or drive.channel.link.is_fresh(now):
+                drive.on_silenced(now)
+
+    # what happens to the node
+
+    def on_state(self, state: NmtState, now: float) -> None:
+        """The node has said its state."""
+        if state is NmtState.OPERATIONAL:
+            self._memory.is_at_rest = False
+        if state is NmtState.STOPPED and self.is_stopped_by_nmt:
+            self._memory.is_at_rest = True
+            for drive in self._node.drives:
+                drive.following.on_node_stopped(now)
+
+    def on_restart(self) -> None:
+        """The node has started: whatever it was told before is over."""
+        self.forget()
+        for drive in self._node.drives:
+            drive.following.on_restart()
+
+    def forget(self) -> None:
+        self._owed = None
+        self._wire.drop_put_off()
+
+    def on_bus_gone(self, *, stays_stopped: bool) -> None:
+        """``stays_stopped``: the node is not booted again by itself when the bus is back."""
+        if stays_stopped:
+            self._owed = self._wire.put_off or self._owed
+
+    def on_bus_back(self, now: float) -> None:
+        command, self._owed = self._owed, None
+        if command is not None:
+            self._wire.send_stopped()
+            self.send(command, now)

@@ -1,0 +1,158 @@
+"""Commands on nodes: who may give them, and what each does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, Protocol
+
+from bridge.canopen.nmt import NmtCommand
+from bridge.command import Action, Code, Drive, Event, Kind, Outcome, Plant, Reply, Request, Role
+from bridge.command.link import NodeState
+from bridge.command.plant import Node, NodeCommand
+from bridge.node.leaving import Leaving
+from bridge.node.put_off import CANCELS_WORDS
+from bridge.node.wire import NodeWire
+
+NMT: Final = {
+    Action.RESET: NmtCommand.RESET_NODE,
+    Action.RESET_COMMUNICATION: NmtCommand.RESET_COMMUNICATION,
+    Action.START_NODE: NmtCommand.START,
+    Action.STOP_NODE: NmtCommand.STOP,
+    Action.ENTER_PRE_OPERATIONAL: NmtCommand.ENTER_PRE_OPERATIONAL,
+}
+_AFTER_RESET_S: Final = 1.0
+"""A node that resets is asked again after this time if its boot-up message was not heard."""
+
+
+class Commanded(Protocol):
+    """The node as a command sees it."""
+
+    @property
+    def state(self) -> NodeState: ...
+
+    @property
+    def wire(self) -> NodeWire: ...
+
+    leaving: Leaving
+    boot_at: float | None
+    told_to_stop: bool
+
+    def stop_drives(self, now: float) -> None: ...
+    def leave_operation(self, now: float) -> None: ...
+    def set_state(self, state: NodeState, now: float) -> None: ...
+    def say(self, text: str, now: float) -> None: ...
+
+
+class Commandable(Protocol):
+    """A node that takes commands."""
+
+    @property
+    def node(self) -> Node: ...
+
+    leaving: Leaving
+
+    def carry_out_command(self, action: Action, who: str, now: float, *, send: bool = True) -> None: ...
+
+
+def taker(name: str, nodes: Sequence[Commandable], plant: Plant) -> NodeCommand:
+    """Takes every request for these nodes."""
+
+    def take(request: Request, now: float, reply: Reply) -> None:
+        answer(request, name, nodes, plant, now, reply)
+
+    return take
+
+
+def answer(
+    request: Request, name: str, nodes: Sequence[Commandable], plant: Plant, now: float, reply: Reply
+) -> bool:
+    """A request for these nodes, ``name`` in the log; True where it was carried out and one frame is to be
+    sent to them all.
+
+    For a whole bus all commands but Start go out as one frame, which the caller sends: an unchecked node
+    is not started. Where a node has to take over its stopped words first each gets its own.
+    """
+    is_bus = request.target.startswith("bus/")
+    why = refusal(request, [drive for one in nodes for drive in one.node.drives])
+    if is_bus and request.action not in NMT:
+        reply(Outcome(Code.UNKNOWN_TARGET, f"a bus has no {request.action}", forwarded=False))
+        return False
+    if why:
+        reply(Outcome(Code.NOT_ALLOWED, why, forwarded=False))
+        return False
+    who = str(request.identity)
+    plant.report(Event(now, Kind.OWNER, name, 400, f"{request.action} by {who}"))
+    each = not is_bus or request.action is Action.START_NODE
+    each |= NMT.get(request.action) in CANCELS_WORDS and any(one.leaving.takeover_s for one in nodes)
+    for one in nodes:
+        one.carry_out_command(request.action, who, now, send=each)
+    reply(Outcome(Code.OK))
+    return not each
+
+
+def refusal(request: Request, drives: Sequence[Drive]) -> str | None:
+    """Why this identity may not command the node now, or None if it may.
+
+    A command on the node touches all its drives, so nobody gives one while another identity controls
+    one of them; an engineer may.
+    """
+    if request.identity.role < Role.OPERATOR:
+        return f"{request.identity} may only read"
+    if request.identity.role >= Role.ENGINEER:
+        return None
+    for drive in drives:
+        owner = drive.channel.owner
+        if owner is not None and not request.identity.is_same(owner):
+            return f"{drive.name} is controlled by {owner}"
+    return None
+
+
+def carry_out(
+    node: Commanded, action: Action, who: str, now: float, *, send: bool = True, at_once: bool = False
+) -> None:
+    """Do what ``action`` asks of a node. ``send`` is false where one frame tells all nodes; ``at_once``: its
+    drives have had their stopped words for long."""
+    if action in NMT:
+        _nmt(node, NMT[action], who, now, send=send, at_once=at_once)
+    elif action is Action.DISABLE:
+        node.leave_operation(now)
+        node.boot_at = None
+        node.say("switched off by an operator", now)
+        node.set_state(NodeState.DISABLED, now)
+    elif action is Action.ENABLE and node.state is NodeState.DISABLED:
+        node.say("waiting", now)
+        node.set_state(NodeState.ABSENT, now)
+        node.boot_at = now
+
+
+def _nmt(node: Commanded, command: NmtCommand, who: str, now: float, *, send: bool, at_once: bool) -> None:
+    """NMT on a node that is switched off goes on the bus and changes nothing here."""
+    if command is NmtCommand.START and node.state is not NodeState.OPERATIONAL:
+        # It is booted first, and started at the end of that: an unchecked node gets no process data.
+        if node.state is NodeState.DISABLED:
+            return
+        node.leave_operation(now)
+        node.set_state(NodeState.BOOTING, now)
+        node.boot_at = now
+        return
+    if command is not NmtCommand.START:
+        node.stop_drives(now)
+        node.wire.send_stopped()
+    if send and command in CANCELS_WORDS:
+        node.leaving.send(command, now, at_once=at_once)
+    elif send:
+        node.wire.send_nmt(command)
+    if command in CANCELS_WORDS:
+        node.leaving.silence(now)
+    if command is NmtCommand.START or node.state is NodeState.DISABLED:
+        return
+    node.leave_operation(now)
+    node.told_to_stop = command is NmtCommand.STOP
+    if command in (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION):
+        node.set_state(NodeState.LOST, now)
+        node.boot_at = now + _AFTER_RESET_S
+    else:
+        node.boot_at = None
+        verb = "stopped" if command is NmtCommand.STOP else "set to pre-operational"
+        node.say(f"{verb} by {who}", now)
+        node.set_state(NodeState.STOPPED, now)

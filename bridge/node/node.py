@@ -1,0 +1,399 @@
+"""One node on one bus: frames and time in, frames and readings out. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Final
+
+from bridge.canopen.bootloop import BootLoop
+from bridge.canopen.nmt import NmtCommand, NmtState
+from bridge.command import Action, Plant
+from bridge.command.link import NodeState
+from bridge.command.plant import Node
+from bridge.config.download import Download
+from bridge.node import boot
+from bridge.node import nmt_commands as node_commands
+from bridge.node.backoff import BETWEEN_BOOTS_S, BackOff
+from bridge.node.booting import Booting
+from bridge.node.error_control import Sign
+from bridge.node.leaving import Leaving
+from bridge.node.neighbours import Neighbours
+from bridge.node.parameters.service import NodeParameters
+from bridge.node.process.stop_words import StopWords
+from bridge.node.sdo_channels import SdoChannels
+from bridge.node.view import NodeView
+from bridge.node.wire import Listener, NodeWire
+
+_SETTLE_S: Final = 2.0
+_OWN_RESET_S: Final = 30.0
+"""A boot-up message within this time is the answer to our own reset."""
+
+
+class NodeCore:
+    """Boots one node, keeps it in operation and reacts to its loss."""
+
+    def __init__(
+        self, node: Node, plant: Plant, neighbours: Neighbours, downloads: Sequence[Download] = ()
+    ) -> None:
+        self.node = node
+        self.plant = plant
+        self._neighbours = neighbours
+        table = self.table = node.table
+        self.state = NodeState.ABSENT
+        self._view = NodeView(node, plant)
+        self._touch = partial(neighbours.touched, self)
+        listener = Listener(self._on_sign, self._touch, partial(neighbours.duplicate, self))
+        self._memory = boot.BootMemory(count_write=self._count_write)
+        configured = (*downloads, *(entry.download for entry in table.configure))
+        self.wire = NodeWire(node, plant, listener, StopWords(node, configured, self._memory))
+        self.leaving = Leaving(node, self.wire, self._memory, self._takes_words)
+        self.error_control = self.wire.error_control
+        self.booting = Booting(self, partial(boot.boot, node, downloads, self._memory), self.wire.sdo)
+        self.parameters = NodeParameters(node, plant, lambda: self.sdo)
+        self.boot_at: float | None = 0.0
+        self.has_concluded = False
+        """Whether a boot-up has ended, well or not, since the bus is there."""
+        self.told_to_stop = False
+        """A stopped node answers no SDO: it has to be woken before it is asked."""
+        self._reset_at = float("-inf")
+        """When a boot-up has last reset the node, or its communication."""
+        self._back_off = BackOff()
+        self._last_boot = float("-inf")
+        self._operational_since = 0.0
+        node.command = node_commands.taker(node.name, [self], plant)
+        node.enforce = self.enforce
+        if not table.enabled:
+            self.boot_at = None
+            self.set_state(NodeState.DISABLED, plant.began)
+        self.say("waiting", plant.began)
+        self._show(plant.began)
+
+    def _on_sign(self, sign: Sign, now: float) -> None:
+        """An error control message."""
+        if sign is Sign.SAME and self.is_operational and self.error_control.state is NmtState.OPERATIONAL:
+            return
+        self._touch()
+        if sign is Sign.BOOT_UP:
+            self._on_boot_up(now)
+            return
+        if sign is Sign.WRONG_TOGGLE:
+            self._show(now)
+            return
+        if sign is Sign.CHANGED:
+            self._show(now)
+        self.leaving.on_state(self.error_control.state, now)
+        if not self.leaving.is_due:
+            self._judge_nmt_state(now)
+
+    def _on_boot_up(self, now: float) -> None:
+        """The node has started: whatever it was told before is forgotten."""
+        self.told_to_stop = False
+        self._memory.may_run = False
+        self.leaving.on_restart()
+        if now > self._reset_at + _OWN_RESET_S:
+            self._memory.start_anew()
+        else:
+            self._memory.was_reset()
+        loop = self.error_control.boot_loop
+        pause_s = loop.on_boot_up(now)
+        self._view.loops(loop, now)
+        if self.state is NodeState.DISABLED:
+            return
+        if self.is_operational:
+            self._view.restarted(now)
+        self.leave_operation(now)
+        self.stop_drives(now)
+        if pause_s:
+            self.say(f"starts again and again; asked again in {pause_s:g} s", now)
+        self.set_state(NodeState.LOST if pause_s else NodeState.BOOTING, now)
+        self.boot_at = max(now + pause_s, self._last_boot + BETWEEN_BOOTS_S)
+        self._back_off.reset()
+
+    def _judge_nmt_state(self, now: float) -> None:
+        seen = self.error_control.state
+        self.booting.on_nmt_state(seen, now)
+        if self.state is NodeState.LOST and not self.booting.is_running:
+            self._heard_again(now)
+        elif (
+            self.is_operational
+            and seen is not NmtState.OPERATIONAL
+            and now > self._operational_since + _SETTLE_S
+        ):
+            self._lose(f"lost: the node went {seen.words} by itself", now)
+            self.error_control.state = seen
+            self._show(now)
+            if self.boot_at is not None:
+                self.boot_at = self._soon(now)
+
+    def _heard_again(self, now: float) -> None:
+        """Heard again without a boot-up message: the cable was the fault, not the node."""
+        reaction = self.table.on_loss
+        if self.error_control.boot_loop.is_looping:
+            return
+        if reaction == "nothing" and self.wire.drives and self.error_control.state is NmtState.OPERATIONAL:
+            self.node.on_heard_again()
+            self._enter_operation("ok; heard again", now)
+        elif reaction != "stop_node":
+            self.boot_at = self._soon(now)
+
+    def _soon(self, now: float) -> float:
+        """When a node that is there may be booted, by the time since the boot-up before."""
+        return max(now, self._last_boot + self._back_off.between_boots_s)
+
+    @property
+    def sdo(self) -> SdoChannels:
+        """For whoever wants a transfer: the node's deadlines are looked at in the next round."""
+        self._touch()
+        return self.wire.sdo
+
+    # time
+
+    def on_time(self, now: float) -> None:
+        self.wire.on_time(now)
+        if self.error_control.on_time(now):
+            self._lose(self.error_control.loss, now)
+        if self._back_off.steady_at is not None and now >= self._back_off.steady_at:
+            self._back_off.reset()
+            self._view.stays(now)
+        self.booting.on_time(now, self.error_control.state)
+        if self.boot_at is not None and now >= self.boot_at and not self._is_busy:
+            self.boot_at = None
+            self._last_boot = now
+            self.leaving.forget()
+            if self.told_to_stop or self.error_control.state is NmtState.STOPPED:
+                self.wire.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+            self.booting.begin(now)
+        self.wire.polling.on_time(now)
+        self.parameters.on_time(now)
+
+    def next_deadline(self) -> float | None:
+        times = (
+            self.wire.next_deadline(),
+            self.booting.next_deadline(),
+            self.parameters.next_deadline(),
+            None if self._is_busy else self.boot_at,
+            self._back_off.steady_at,
+        )
+        return min((time for time in times if time is not None), default=None)
+
+    # boot-up
+
+    @property
+    def _is_busy(self) -> bool:
+        return self.booting.is_running or self.leaving.is_due
+
+    @property
+    def is_on_its_way(self) -> bool:
+        if self.is_out_of_service:
+            return False
+        return not self.has_concluded or (self.state is NodeState.BOOTING and self.booting.is_running)
+
+    @property
+    def is_out_of_service(self) -> bool:
+        return self.state in (NodeState.DISABLED, NodeState.STOPPED)
+
+    @property
+    def is_ready(self) -> bool:
+        return self.state is NodeState.OPERATIONAL or self.booting.is_held
+
+    def may_start(self) -> bool:
+        return self._neighbours.may_start(self)
+
+    def carry_out(self, action: boot.Action, now: float) -> None:
+        match action:
+            case boot.Step(text):
+                # Looking for a node that was never there is nothing to report every ten seconds.
+                if self.state is not NodeState.ABSENT:
+                    self.say(text, now)
+            case boot.Found():
+                self.set_state(NodeState.BOOTING, now)
+            case boot.DeviceErrors():
+                self._view.errors(action.text, now)
+            case boot.StartSupervision():
+                self.error_control.expect(now)
+            case _:
+                if isinstance(action, boot.ResetCommunication):
+                    self._reset_at = now
+                    self._view.resets(action.why, now)
+                self.wire.carry_out(action)
+
+    def begin_await(self, state: NmtState | None) -> bool:
+        if not self.error_control.supervises:
+            self.error_control.state = state or self.error_control.state
+            return False
+        # What was reported before the command does not count.
+        self.error_control.state = NmtState.UNKNOWN
+        return True
+
+    def boot_ended(self, result: boot.BootResult | boot.BootError, now: float) -> None:
+        self.has_concluded = True
+        if isinstance(result, boot.BootError):
+            self._fail_boot(result, now)
+            return
+        self.wire.connect(result, now)
+        problems = [f"J: {name}" for name, plan in result.drives.items() if plan.problem]
+        self._enter_operation("; ".join([", ".join(problems) or "ok", *result.notes]), now)
+
+    def _enter_operation(self, text: str, now: float) -> None:
+        self.told_to_stop = False
+        self._operational_since = now
+        self._back_off.entered_operation(now)
+        # The guard may have run out between the start command and the node's answer.
+        self.error_control.expect(now)
+        self.error_control.state = NmtState.OPERATIONAL
+        self.boot_at = None
+        self.set_state(NodeState.OPERATIONAL, now)
+        self.wire.start_polling(now)
+        for drive in self.node.drives:
+            if drive.name not in self.wire.drives:
+                drive.channel.on_node(NodeState.CONFIG_ERROR, now)
+                drive.refresh(now)
+        self._view.succeeded(text, now)
+
+    def _fail_boot(self, error: boot.BootError, now: float) -> None:
+        self.error_control.stop(now)
+        self._view.failed(error, now)
+        if self.state is NodeState.BOOTING:
+            self.set_state(NodeState.LOST if error.absent else NodeState.CONFIG_ERROR, now)
+        self._stop_unbooted(now)
+        self.boot_at = now + self._back_off.failed(absent=error.absent)
+
+    def _stop_unbooted(self, now: float) -> None:
+        """Nobody watches over its drives: they are told to stop, and it to take no more words. Also where
+        it seems to be absent: it may hear all the same, and our heartbeat would keep it running."""
+        self.stop_drives(now)
+        self.wire.send_stopped()
+        self.told_to_stop = True
+        if self._memory.may_run and not self.leaving.is_stopped_by_nmt:
+            self._reset_at = now
+            self.wire.send_nmt(NmtCommand.RESET_NODE)
+        else:
+            self.leaving.send(NmtCommand.STOP, now)
+
+    def enforce(self, action: Action, why: str, now: float) -> None:
+        """Because a drive ignores its stop, whose words have been on the bus for long."""
+        self.carry_out_command(action, why, now, at_once=self.leaving.has_told(now))
+
+    # states
+
+    def _lose(self, why: str, now: float) -> None:
+        """The node is silent, or not in the state it was put in."""
+        self.error_control.state = NmtState.UNKNOWN
+        if not self.is_operational and not self.booting.is_held:
+            self.error_control.stop(now, lost=self.state is NodeState.LOST)
+            self._show(now)
+            return
+        self.say(why, now)
+        pause_s = self._back_off.lost(now)
+        self._view.flaps(self._back_off, now)
+        reaction = self.table.on_loss
+        policy = self.node.bus.mandatory_missing
+        stops_all = reaction == "stop_all" or (self.table.mandatory and policy == "stop_all")
+        if reaction == "stop_node" or stops_all:
+            self.stop_drives(now)
+            self.wire.send_stopped()
+            self.leaving.silence(now, only_heard=True)
+        self.set_state(NodeState.LOST, now)
+        self.leave_operation(now)
+        if reaction == "stop_node":
+            self.leaving.send(NmtCommand.STOP, now)
+            self.told_to_stop = True
+        elif reaction != "nothing":
+            self.boot_at = now + pause_s
+        if stops_all:
+            self._neighbours.stop_others(self, f"{self.node.name} is lost", now)
+
+    def stop_drives(self, now: float) -> None:
+        """Every drive of the node has to be enabled anew."""
+        for drive in self.node.drives:
+            drive.channel.start_anew(now)
+
+    def leave_operation(self, now: float) -> None:
+        self.error_control.stop(now, lost=self.state is NodeState.LOST)
+        self.wire.stop_polling()
+        self.booting.cancel(now)
+
+    def hold(self, why: str, now: float) -> None:
+        """All nodes are stopped: leave operation, and be booted up to the point where it would start.
+
+        Whoever is in operation or at its boot-up begins again, and so does a node that cannot be used: it
+        stays no longer in Stopped than it has to. The others are woken when their time comes.
+        """
+        self.stop_drives(now)
+        begins_again = self.is_operational or self.booting.is_running
+        if begins_again:
+            self.wire.send_stopped()
+            self.leaving.silence(now)
+            self.leave_operation(now)
+            self.say(f"stopped: {why}", now)
+        if self.is_operational:
+            self.set_state(NodeState.BOOTING, now)
+        if begins_again or self.state is NodeState.CONFIG_ERROR:
+            self.boot_at = now + BETWEEN_BOOTS_S
+
+    def bus_is_gone(self, now: float, why: str = "the bus is down") -> None:
+        """The bus is down, or another's: everything on it is lost at once."""
+        self.error_control.state = NmtState.UNKNOWN
+        self.stop_drives(now)
+        self.leaving.on_bus_gone(stays_stopped=self.state is NodeState.STOPPED)
+        self.wire.clear()
+        gave_up = self.boot_at is None and self.state is NodeState.LOST and self.table.on_loss == "stop_node"
+        was_stopped = self.state is NodeState.STOPPED or gave_up
+        if self.state is NodeState.DISABLED or was_stopped:
+            # Who was stopped on purpose is not started by a bus that comes back.
+            return
+        if self.state is not NodeState.ABSENT:
+            self.say(f"lost: {why}", now)
+            self.set_state(NodeState.LOST, now)
+        self.leave_operation(now)
+        self.has_concluded = False
+        self.boot_at = now + self._back_off.pause_s
+
+    def bus_is_back(self, now: float) -> None:
+        self.stop_drives(now)
+        self.leaving.on_bus_back(now)
+
+    def set_state(self, state: NodeState, now: float) -> None:
+        if state is self.state:
+            return
+        self.state = state
+        self.plant.on_node(self.node, state, now, tell=not self._back_off.is_flapping)
+        self._show(now)
+
+    def _takes_words(self) -> bool:
+        return self.state is not NodeState.STOPPED or self.error_control.state is NmtState.OPERATIONAL
+
+    @property
+    def is_operational(self) -> bool:
+        return self.state is NodeState.OPERATIONAL
+
+    @property
+    def sends_process_data(self) -> bool:
+        """RPDOs go on while it is lost, for it may hear us, and until it has taken over its last ones."""
+        states = (NodeState.OPERATIONAL, NodeState.LOST, NodeState.DISABLED)
+        return self.leaving.is_due or self.state in states
+
+    def say(self, text: str, now: float) -> None:
+        self._view.say(text, now)
+
+    def _show(self, now: float) -> None:
+        self._view.show(self.error_control.state, self.state, self.error_control.toggle_errors, now)
+
+    def _count_write(self, owner: str, address: str, name: str) -> str:
+        """The boot-up writes to an EEPROM: counted as of its beginning."""
+        ledger, eeprom = self.plant.eeprom_writes, self.node.family.eeprom
+        cycles = eeprom.cycles if eeprom else None
+        ledger.check((owner, address), name, self._last_boot, cycles)
+        return ledger.count((owner, address), name, cycles, self._last_boot)
+
+    def carry_out_command(
+        self, action: Action, who: str, now: float, *, send: bool = True, at_once: bool = False
+    ) -> None:
+        """A command that may be given; ``send`` is false where one frame has told all nodes."""
+        self.error_control.boot_loop = BootLoop()
+        self._back_off.reset()
+        if action in (Action.RESET, Action.RESET_COMMUNICATION):
+            self._memory.start_anew()
+        node_commands.carry_out(self, action, who, now, send=send, at_once=at_once)
+        self._touch()

@@ -1,0 +1,1 @@
+"""Parameters of drives, read and written by SDO."""

@@ -1,0 +1,81 @@
+"""Runs procedures that read and write parameters on SDO channels. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from functools import partial
+from typing import TypeVar
+
+from bridge.canopen.sdo import Priority, Result, SdoChannel, SdoError
+from bridge.parameter import ParameterError, Transfer, TransferFailed, Why
+
+T = TypeVar("T")
+Procedure = Generator[Transfer, tuple[bytes, float], T]
+ChannelFor = Callable[[Transfer], SdoChannel]
+
+
+def run(
+    procedure: Procedure[T],
+    channel_for: ChannelFor,
+    clock: Callable[[], float],
+    done: Callable[[T | ParameterError], None],
+    *,
+    priority: Priority = Priority.COMMAND,
+) -> None:
+    """Carry ``procedure`` out; ``done`` is called once with what it returns or why it failed, possibly
+    before this returns.
+
+    ``clock`` gives the latest time that is known, in monotonic seconds. What was read counts as of the
+    time at which it was asked for.
+    """
+
+    refused: list[str] = []
+    """Why the write that is under way was not begun."""
+
+    def advance(resume: Callable[[], Transfer]) -> None:
+        try:
+            transfer = resume()
+        except StopIteration as end:
+            done(end.value)
+        except ParameterError as error:
+            done(error)
+        else:
+            carry_out(transfer)
+
+    def carry_out(transfer: Transfer) -> None:
+        now = clock()
+        index, sub = transfer.address.index, transfer.address.sub
+        concluded = partial(conclude, now)
+        channel = channel_for(transfer)
+        if transfer.data is None:
+            channel.read(index, sub, now, concluded, priority=priority)
+            return
+
+        def may_begin() -> bool:
+            if transfer.why_not is not None:
+                refused[:] = filter(None, [transfer.why_not()])
+            return not refused
+
+        # Not repeated where no answer comes: an EEPROM is written once, and read to see whether it was.
+        channel.write(
+            index,
+            sub,
+            transfer.data,
+            now,
+            concluded,
+            priority=priority,
+            repeatable=False,
+            may_begin=may_begin,
+        )
+
+    def conclude(asked: float, result: Result) -> None:
+        if refused:
+            why = refused.pop()
+            advance(lambda: procedure.throw(ParameterError(Why.PROTECTED, why)))
+        elif isinstance(result, SdoError):
+            failure = TransferFailed(str(result), result.code, by_drive=result.by_server)
+            advance(lambda: procedure.throw(failure))
+        else:
+            advance(lambda: procedure.send((result, asked)))
+
+    advance(lambda: next(procedure))

@@ -1,0 +1,318 @@
+"""The parameters of one node's drives: requests, and the points that show them. Sans-IO.
+
+Each drive's parameters go over the SDO channel that reaches it. Requests of clients come before polls;
+several who read the same parameter at once share one answer, and one parameter is written by one client
+at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Final
+
+from bridge.canopen.sdo import Priority, SdoChannel
+from bridge.command import Action, Code, Drive, Event, Identity, Kind, Outcome, Plant, Reply, Request, Role
+from bridge.command.link import NodeState
+from bridge.command.plant import Node
+from bridge.drive import MOVING
+from bridge.node.parameters.own_watch import OwnWatch
+from bridge.node.parameters.polling import Came, ParameterPolling
+from bridge.node.parameters.run import Procedure, run
+from bridge.node.parameters.view import NO_CHANNEL, ParameterView
+from bridge.node.sdo_channels import FIRST, SdoChannels, channel_of
+from bridge.parameter import (
+    Address,
+    DriveParameters,
+    Entry,
+    Names,
+    ParameterError,
+    Reading,
+    Transfer,
+    Why,
+    Written,
+)
+from bridge.parameter.codec import shown
+
+_CODES: Final = {
+    Why.UNKNOWN_NAME: Code.UNKNOWN_PARAMETER,
+    Why.READ_ONLY: Code.READ_ONLY,
+    Why.WRITE_ONLY: Code.WRITE_ONLY,
+    Why.OUT_OF_RANGE: Code.OUT_OF_RANGE,
+    Why.PROTECTED: Code.NOT_ALLOWED,
+    Why.TOO_OFTEN: Code.TOO_OFTEN,
+    Why.REFUSED: Code.REFUSED_BY_DRIVE,
+    Why.NO_ANSWER: Code.TIMED_OUT,
+    Why.NOT_TAKEN: Code.REFUSED_BY_DRIVE,
+    Why.NOT_CONFIGURED: Code.NOT_CONFIGURED,
+}
+Waiting = list[Callable[[Reading | ParameterError], None]]
+
+
+class NodeParameters:
+    """``sdo`` gives the channels, and lets whoever holds the node look at its deadlines."""
+
+    def __init__(self, node: Node, plant: Plant, sdo: Callable[[], SdoChannels]) -> None:
+        self._node = node
+        self._plant = plant
+        self._sdo = sdo
+        self._now = plant.began
+        self._state = NodeState.ABSENT
+        names = self._names = Names(node.family)
+        self._drives = {
+            drive.name: DriveParameters(
+                drive.name,
+                node.name,
+                node.family,
+                names,
+                plant.eeprom_writes,
+                on_first=drive.slot.parameters_by_sdo,
+            )
+            for drive in node.drives
+        }
+        self._own_watch = OwnWatch(node, names)
+        self._view = ParameterView(node, plant.image, names)
+        sharing = sum(other.bus is node.bus for other in plant.nodes.values())
+        self._polling = ParameterPolling(node, names, sharing, self._poll)
+        self._scaling = {value.full for value in node.family.value} & {
+            parameter.name for parameter in node.family.parameter if parameter.read
+        }
+        self._reading: dict[tuple[str, Address], Waiting] = {}
+        self._writing: set[tuple[str, Address]] = set()
+        node.parameters = self
+
+    # the node
+
+    def on_node(self, state: NodeState, now: float) -> None:
+        """The node is in another state."""
+        self._now = max(now, self._now)
+        before, self._state = self._state, state
+        if state is before:
+            return
+        self._view.on_node(state, now)
+        self._polling.stop()
+        if state is NodeState.OPERATIONAL:
+            for drive in self._drives.values():
+                drive.forget()
+            reached = [drive for drive in self._node.drives if channel_of(self._node, drive.slot)]
+            self._view.unreached([drive for drive in self._node.drives if drive not in reached], now)
+            self._polling.start(reached, now)
+
+    def on_time(self, now: float) -> None:
+        self._now = max(now, self._now)
+        self._polling.on_time(now)
+        self._view.on_time(now)
+
+    def next_deadline(self) -> float | None:
+        times = (self._polling.next_deadline(), self._view.next_deadline())
+        return min((time for time in times if time is not None), default=None)
+
+    # requests
+
+    def submit(self, request: Request, drive: Drive, now: float, reply: Reply) -> None:
+        """Carry out a request for a parameter; ``reply`` is called once, when the drive has answered."""
+        self._now = max(now, self._now)
+        refusal = self._refusal(request, drive)
+        if refusal:
+            self._conclude(request, drive, reply, refusal)
+            return
+        try:
+            self._begin(request, drive, now, reply)
+        except ParameterError as error:
+            self._conclude(request, drive, reply, _failed(error))
+
+    def _refusal(self, request: Request, drive: Drive) -> Outcome | None:
+        """Why this is not even asked of the drive."""
+        why = "" if request.action is Action.READ_PARAMETER else _why_not_set(request.identity, drive)
+        if why:
+            return _no(Code.NOT_ALLOWED, why)
+        if self._state is not NodeState.OPERATIONAL:
+            return _no(Code.NOT_READY, f"the drive's node is {self._state.value}")
+        if request.action is not Action.SAVE_PARAMETERS and channel_of(self._node, drive.slot) is None:
+            return _no(
+                Code.NOT_CONFIGURED,
+                f"{drive.name}: {NO_CHANNEL}",
+            )
+        return None
+
+    def _begin(self, request: Request, drive: Drive, now: float, reply: Reply) -> None:
+        """Raises ``ParameterError`` where the request itself is wrong."""
+        access = self._drives[drive.name]
+        conclude = partial(self._conclude, request, drive, reply)
+        if request.action is Action.SAVE_PARAMETERS:
+            self._run(access.save(now), drive, partial(self._on_saved, conclude))
+            return
+        entry = access.names.resolve(request.parameter)
+        if request.action is Action.READ_PARAMETER:
+            self._read(drive, entry, request.max_age_ms / 1000, partial(self._on_read, conclude))
+            return
+        access.check_writable(entry)
+        level = access.names.protection.level(entry.address)
+        refusal = _why_protected(level, entry, request.identity, drive)
+        if refusal:
+            conclude(_no(Code.NOT_ALLOWED, refusal))
+            return
+        key = (drive.name, entry.address)
+        if request.value is None:
+            conclude(_no(Code.OUT_OF_RANGE, f"{entry.name}: there is no value to write"))
+        elif why := self._own_watch.why_kept(drive, entry, request.value):
+            conclude(_no(Code.NOT_ALLOWED, why))
+        elif key in self._writing:
+            conclude(_no(Code.BUSY, f"{entry.name} of {drive.name} is being written"))
+        else:
+            self._writing.add(key)
+            # Who asks may enable the drive while this waits for its turn.
+            steps = access.write(
+                entry,
+                request.value,
+                now,
+                why_not=lambda: _why_protected(level, entry, request.identity, drive),
+            )
+            self._run(steps, drive, partial(self._on_written, request, drive, entry, conclude))
+
+    def _read(
+        self,
+        drive: Drive,
+        entry: Entry,
+        max_age_s: float,
+        done: Callable[[Reading | ParameterError], None],
+        priority: Priority = Priority.COMMAND,
+    ) -> None:
+        key = (drive.name, entry.address)
+        shares = priority is Priority.COMMAND
+        if shares and key in self._reading:
+            self._reading[key].append(done)
+            return
+        if shares:
+            self._reading[key] = [done]
+
+        def on_result(result: Reading | ParameterError) -> None:
+            self._show(drive, entry, result)
+            for one in self._reading.pop(key) if shares else [done]:
+                one(result)
+
+        steps = self._drives[drive.name].read(entry, self._now, max_age_s)
+        self._run(steps, drive, on_result, priority)
+
+    def _run(
+        self,
+        procedure: Procedure[object],
+        drive: Drive,
+        done: Callable[..., None],
+        priority: Priority = Priority.COMMAND,
+    ) -> None:
+        def channel_for(transfer: Transfer) -> SdoChannel:
+            number = None if transfer.of_node else channel_of(self._node, drive.slot)
+            return self._sdo()[number or FIRST]
+
+        run(procedure, channel_for, lambda: self._now, done, priority=priority)
+
+    # results
+
+    def _on_read(self, conclude: Reply, result: Reading | ParameterError) -> None:
+        if isinstance(result, ParameterError):
+            conclude(_failed(result))
+        else:
+            conclude(Outcome(Code.OK, value=result.value, time=result.time))
+
+    def _on_written(
+        self,
+        request: Request,
+        drive: Drive,
+        entry: Entry,
+        conclude: Reply,
+        result: Written | ParameterError,
+    ) -> None:
+        self._writing.discard((drive.name, entry.address))
+        if isinstance(result, ParameterError):
+            if result.why in (Why.NO_ANSWER, Why.NOT_TAKEN):
+                self._own_watch.forget(drive, entry, "may have been changed", self._now)
+            conclude(_failed(result))
+            return
+        reading = result.reading
+        self._show(drive, entry, reading)
+        if result.changed:
+            self._own_watch.forget(drive, entry, "was changed", self._now)
+        if result.changed:
+            was = "" if result.before is None else f" (was {shown(entry, result.before)})"
+            self._tell(drive.name, 400, f"{reading}{was}, by {request.identity}")
+        self._warn(drive.name, result.warning)
+        message = "" if result.changed else "the drive holds this value already: not written again"
+        conclude(Outcome(Code.OK, message, value=reading.value, time=reading.time))
+
+    def _on_saved(self, conclude: Reply, result: str | ParameterError) -> None:
+        if isinstance(result, ParameterError):
+            conclude(_failed(result))
+            return
+        self._tell(self._node.name, 400, "parameters saved in the EEPROM")
+        self._warn(self._node.name, result)
+        conclude(Outcome(Code.OK, "saved"))
+
+    def _conclude(self, request: Request, drive: Drive, reply: Reply, outcome: Outcome) -> None:
+        """Tell the outcome; a refusal of a write is an event, too."""
+        if outcome.abort_code:
+            drive.sdo_abort_code = outcome.abort_code
+        if not outcome.ok and request.action is not Action.READ_PARAMETER:
+            message = f"{request.action} by {request.identity} refused: {outcome.message}"
+            drive.channel.on_refused(self._now)
+            self._plant.report(Event(self._now, Kind.REFUSED, drive.name, 300, message))
+        reply(outcome)
+
+    def _tell(self, source: str, severity: int, message: str) -> None:
+        self._plant.report(Event(self._now, Kind.CONFIGURATION, source, severity, message))
+
+    def _warn(self, source: str, warning: str) -> None:
+        if warning:
+            self._tell(source, 600, warning)
+
+    # points
+
+    def _poll(self, drive: Drive, entry: Entry, done: Callable[[Came], None]) -> None:
+        """Read a point."""
+
+        def on_result(result: Reading | ParameterError) -> None:
+            if isinstance(result, ParameterError):
+                done(Came.NEVER if self._view.is_final(result) else Came.FAILED)
+            else:
+                done(Came.READ)
+
+        self._read(drive, entry, 0.0, on_result, Priority.POLL)
+
+    def _show(self, drive: Drive, entry: Entry, result: Reading | ParameterError) -> None:
+        if isinstance(result, ParameterError):
+            self._view.failed(drive.name, entry, result, self._now)
+            return
+        self._view.show(drive.name, result)
+        name = entry.definition.name if entry.definition else ""
+        if name in self._scaling and entry.address == self._names.resolve(name).address:
+            # It scales the process data, which follow at once.
+            drive.on_scale(name, float(result.value))
+
+
+def _why_not_set(identity: Identity, drive: Drive) -> str:
+    """Why ``identity`` may not set parameters: an engineer may, and where its protocol knows no roles, who
+    controls the drive or could."""
+    if identity.role >= Role.ENGINEER:
+        return ""
+    if not identity.may_set_parameters:
+        return f"{identity} may not set parameters: an engineer may"
+    return drive.channel.authority.refusal(identity, owner_is_silent=False) or ""
+
+
+def _why_protected(protection: str, entry: Entry, identity: Identity, drive: Drive) -> str:
+    """Why a parameter that more depends on than its own value is not written now."""
+    if protection == "communication" and identity.role < Role.ENGINEER:
+        return f"{entry.name} decides who commands the drive and what supervises it: an engineer may set it"
+    channel = drive.channel
+    is_enabled = channel.state in MOVING or channel.words.enables(channel.output.words[0])
+    if protection in ("communication", "while_enabled") and is_enabled:
+        return f"{entry.name} is not written while the drive is enabled: stop and disable it first"
+    return ""
+
+
+def _failed(error: ParameterError) -> Outcome:
+    return Outcome(_CODES[error.why], str(error), forwarded=False, abort_code=error.abort_code)
+
+
+def _no(code: Code, message: str) -> Outcome:
+    return Outcome(code, message, forwarded=False)

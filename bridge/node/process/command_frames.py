@@ -1,0 +1,60 @@
+"""By which identifiers the drives of a node are commanded, and what a frame on one of them asks. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from bridge.command.plant import Node
+from bridge.drive import ControlWords
+from bridge.node.boot import rpdo_plan
+from bridge.node.process.process_data import DrivePdos, Rpdo
+from bridge.node.process.stop_words import StopWords
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One RPDO."""
+
+    label: str
+    words: ControlWords
+    rpdo: Rpdo
+
+    def said(self, data: bytes) -> str:
+        """What ``data`` asks of the drive, in words."""
+        raw = data.hex(" ").upper()
+        word = self.rpdo.control_word(data)
+        if word is None:
+            return raw
+        does = "enables" if self.words.enables(word) else "does not enable"
+        return f"{raw}, control word {word:04X}h, which {does}"
+
+    def enables(self, data: bytes) -> bool:
+        word = self.rpdo.control_word(data)
+        return word is not None and self.words.enables(word)
+
+
+def commands_of(node: Node, connected: Mapping[str, DrivePdos], stop_words: StopWords) -> dict[int, Command]:
+    """By COB-ID: of drives that are ``connected`` the RPDOs that the node has; of the others those under
+    which they may listen; of drives that the site leaves out those of the factory."""
+    family = node.family
+    words, count = ControlWords(family.control_word), len(family.process.rpdo)
+    drives = {drive.slot.name: drive for drive in node.drives}
+    found: dict[int, Command] = {}
+    for slot in family.slot:
+        drive = drives.get(slot.name)
+        if drive is None:
+            plans = [
+                rpdo_plan(family, slot, pdo, pdo.cob_id + node.table.id)
+                for pdo in slot.rpdo
+                if not pdo.optional
+            ]
+            rpdos = [Rpdo(plan, count) for plan in plans]
+        elif drive.name in connected:
+            rpdos = list(connected[drive.name].rpdos)
+        else:
+            rpdos = [Rpdo(plan, count) for plan in stop_words.plans(drive).values()]
+        label = f"RPDO of {drive.name if drive else f'{node.name}, {slot.name}'}"
+        for rpdo in rpdos:
+            found.setdefault(rpdo.cob_id, Command(label, words, rpdo))
+    return found

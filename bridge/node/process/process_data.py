@@ -1,0 +1,314 @@
+"""Process data of one drive: its PDOs as the node has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import NamedTuple
+
+from bridge.canopen.frame import Frame
+from bridge.canopen.sync import LAST_SYNCHRONOUS, REMOTE_SYNCHRONOUS, REMOTE_TYPES, tpdo_deadline_s
+from bridge.command import Drive
+from bridge.command.actual import FurtherTpdo
+from bridge.command.channel import DriveChannel
+from bridge.command.output import Output
+from bridge.command.plant import Node
+from bridge.config import BusTable
+from bridge.image import Quality
+from bridge.node.boot import BootResult, PdoPlan
+from bridge.node.process.held import held_s
+from bridge.node.process.words import WordMap
+
+Reject = Callable[[Frame, str], None]
+
+
+class Beat(NamedTuple):
+    """One identifier: the frames that are to be repeated in turn, and how often. With ``until`` they may be
+    on the bus no longer than that, and ``then`` gives the frame that takes their place; None for silence.
+
+    A burst that is handed over at one of ``hold_at`` or later goes on for as long as a drive needs it in
+    order to stop without us (``held.py``)."""
+
+    frames: tuple[Frame, ...]
+    period_s: float
+    until: float | None = None
+    then: Callable[[], Frame | None] = lambda: None
+    hold_at: tuple[float, ...] = ()
+
+
+class Told(NamedTuple):
+    """What a bus repeats at present: ``frames`` until then, ``ends`` at the latest if nobody renews it, as it
+    has been told ``at`` that time."""
+
+    frames: tuple[Frame, ...]
+    until: float | None
+    ends: float
+    at: float
+
+    def ends_as(self, beat: Beat, now: float) -> bool:
+        """Whether it does so at the right time without being told again."""
+        if any(self.at < at <= now for at in beat.hold_at):
+            return False
+        earliest = min((time for time in (self.until, beat.until) if time is not None), default=self.ends)
+        return self.until == beat.until or earliest >= self.ends
+
+
+class Tpdo:
+    """Unpacks one TPDO of a drive into the drive's words. ``further`` is None for the one with the status
+    word, by which the drive's freshness is judged."""
+
+    __slots__ = (
+        "_codec",
+        "_drive",
+        "_in_order",
+        "_last",
+        "_length",
+        "_map",
+        "_reject",
+        "_words",
+        "cob_id",
+        "further",
+        "plan",
+        "rtr_poll_s",
+    )
+
+    def __init__(self, drive: Drive, plan: PdoPlan, further: FurtherTpdo | None, reject: Reject) -> None:
+        self._drive = drive
+        self._reject = reject
+        self.plan = plan
+        self.further = further
+        self.cob_id = plan.cob_id
+        self.rtr_poll_s = drive.table.rtr_poll_ms / 1000
+        self._codec = plan.codec
+        self._length = plan.codec.length
+        self._map = WordMap(plan.codec.entries, plan.places, len(drive.words))
+        self._in_order = self._map.is_in_order and not plan.codec.has_signed
+        """The codec's values are the words as they are."""
+        self._words = list(drive.words)
+        self._last: bytes | None = None
+
+    @property
+    def is_synchronous(self) -> bool:
+        return self.plan.transmission_type <= LAST_SYNCHRONOUS
+
+    def on_frame(self, frame: Frame) -> None:
+        """The TPDO with the status word."""
+        data = frame.data
+        if data == self._last:
+            self._drive.on_unchanged_data(frame.time)
+            return
+        if self._in_order and len(data) == self._length:
+            self._last = data
+            self._drive.on_process_data(self._codec.unpack(data), frame.time)
+            return
+        values = self._values(frame)
+        if values is None:
+            return
+        words = self._words
+        words[:] = self._drive.words
+        self._map.unpack(values, words)
+        self._drive.on_process_data(words, frame.time)
+
+    def on_further(self, frame: Frame) -> None:
+        """Another TPDO."""
+        further = self.further
+        if further is None:
+            return
+        if frame.data == self._last and further.quality is Quality.GOOD:
+            further.last = frame.time
+            return
+        values = self._values(frame)
+        if values is not None:
+            self._map.unpack(values, self._drive.words)
+            self._drive.on_further_data(further, frame.time)
+
+    def _values(self, frame: Frame) -> tuple[int, ...] | None:
+        """The values of a frame; None where it is too short."""
+        data = frame.data
+        length = self._length
+        if len(data) != length:
+            self._reject(frame, f"{length} bytes are mapped")
+            if len(data) < length:
+                return None
+            # CiA 301 §7.2.2.5: of a PDO that is too long the mapped bytes count.
+            data = data[:length]
+            self._last = None
+        else:
+            self._last = data
+        return self._codec.unpack(data)
+
+
+class Rpdo:
+    """Packs one RPDO of a drive from the channel's output."""
+
+    __slots__ = (
+        "_codec",
+        "_count",
+        "_has_control_word",
+        "_last",
+        "_last_words",
+        "_map",
+        "_packed",
+        "_words",
+        "cob_id",
+        "is_synchronous",
+    )
+
+    def __init__(self, plan: PdoPlan, words: int) -> None:
+        self.cob_id = plan.cob_id
+        self.is_synchronous = plan.transmission_type <= LAST_SYNCHRONOUS
+        self._count = words
+        self._has_control_word = any(place is not None and place.word == 0 for place in plan.places)
+        self._codec = plan.codec
+        self._map = WordMap(plan.codec.entries, plan.places, words)
+        self._words: Sequence[int] = ()
+        self._packed = (Frame(plan.cob_id),)
+        self._last_words: Sequence[int] = ()
+        self._last = Frame(plan.cob_id)
+
+    def frames(self, words: Sequence[int]) -> tuple[Frame, ...]:
+        """The burst that carries these words; the same one while they stay."""
+        if words != self._words:
+            self._words = words
+            self._packed = (self.frame(words),)
+        return self._packed
+
+    def last_frame(self, output: Output) -> Frame | None:
+        """The frame in which a burst ends, kept as well; None where it ends in silence."""
+        if output.silent:
+            return None
+        if output.words != self._last_words:
+            self._last_words = output.words
+            self._last = self.frame(output.words)
+        return self._last
+
+    def frame(self, words: Sequence[int]) -> Frame:
+        """The frame that carries these words, the control word first; what is mapped beside them is 0."""
+        return Frame(self.cob_id, self._codec.pack(self._map.pack(words)))
+
+    def control_word(self, data: bytes) -> int | None:
+        """The control word of a frame with this data; None where it has none."""
+        if not self._has_control_word or len(data) < self._codec.length:
+            return None
+        words = [0] * self._count
+        self._map.unpack(self._codec.unpack(data[: self._codec.length]), words)
+        return words[0]
+
+
+class DrivePdos:
+    """All PDOs of one drive. Of several the one with the status word is the first of ``tpdos``, and the
+    one with the control word the last of ``rpdos``: setpoints are there when an enable comes."""
+
+    __slots__ = ("_drive", "_endings", "_held_s", "needs_sync", "rpdos", "tpdos")
+
+    def __init__(
+        self, drive: Drive, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan], reject: Reject
+    ) -> None:
+        self._drive = drive
+        words = len(drive.family.process.rpdo)
+        self.rpdos = tuple(Rpdo(plan, words) for plan in reversed(rpdos))
+        self._endings = {rpdo: partial(_last_frame, rpdo, drive.channel) for rpdo in self.rpdos}
+        kind = rpdos[0].transmission_type
+        self._held_s = held_s(drive.bus, kind)
+        self.needs_sync = kind <= LAST_SYNCHRONOUS
+        """Whether a stop has to be taken over by SYNC."""
+        main, *others = tpdos
+        self.tpdos = (
+            Tpdo(drive, main, None, reject),
+            *(Tpdo(drive, plan, _further(drive, plan), reject) for plan in others),
+        )
+
+    @property
+    def handlers(self) -> dict[int, Callable[[Frame], None]]:
+        """Who takes which identifier."""
+        main, *others = self.tpdos
+        return {main.cob_id: main.on_frame, **{tpdo.cob_id: tpdo.on_further for tpdo in others}}
+
+    @property
+    def further(self) -> list[FurtherTpdo]:
+        return [tpdo.further for tpdo in self.tpdos if tpdo.further is not None]
+
+    @property
+    def is_silent(self) -> bool:
+        return self._drive.channel.output.silent
+
+    def beats(self, period_s: float) -> list[Beat]:
+        """The frames that belong on the bus now, those of each identifier together."""
+        channel = self._drive.channel
+        words, until = channel.output.words, channel.until
+        hold_at = (until - self._held_s,) if until is not None and self._held_s else ()
+        return [Beat(one.frames(words), period_s, until, self._endings[one], hold_at) for one in self.rpdos]
+
+    def frames_with(self, words: Sequence[int]) -> list[Frame]:
+        """The frames that carry these words."""
+        return [rpdo.frame(words) for rpdo in self.rpdos]
+
+
+def _last_frame(rpdo: Rpdo, channel: DriveChannel) -> Frame | None:
+    return rpdo.last_frame(channel.output_then())
+
+
+def _further(drive: Drive, plan: PdoPlan) -> FurtherTpdo:
+    return FurtherTpdo(plan.name, plan.words, _deadline_s(drive, plan))
+
+
+def _deadline_s(drive: Drive, tpdo: PdoPlan) -> float | None:
+    """When a TPDO is late."""
+    given_ms = drive.table.tpdo_deadline_ms
+    if given_ms is not None:
+        return given_ms / 1000 or None
+    return tpdo_deadline_s(
+        tpdo.transmission_type, tpdo.event_timer_ms, drive.sync_period_ms, drive.table.rtr_poll_ms
+    )
+
+
+def connect(
+    node: Node,
+    result: BootResult,
+    reject: Reject,
+    is_taken: Callable[[int], bool],
+    now: float,
+) -> dict[str, DrivePdos]:
+    """Give the drives what the boot-up has found: identity, scales, PDOs. Those without PDOs that can be
+    used are left out, and those whose identifiers another node of the bus has (``is_taken``)."""
+    connected: dict[str, DrivePdos] = {}
+    for drive in node.drives:
+        drive.on_identification(result.identification, now)
+        drive.on_own_supervision(result.own[drive.name], now)
+        for name, full in result.scales.get(drive.name, {}).items():
+            drive.on_scale(name, full)
+        plan = result.drives[drive.name]
+        if not plan.rpdos or not plan.tpdos or plan.problem:
+            continue
+        if any(is_taken(pdo.cob_id) for pdo in (*plan.rpdos, *plan.tpdos)):
+            plan.problem = "another node has its PDO on the same identifier"
+            result.notes.append(f"{drive.slot.name}: {plan.problem}")
+            continue
+        pdos = connected[drive.name] = DrivePdos(drive, plan.rpdos, plan.tpdos, reject)
+        _set_times(drive, plan.rpdos[0], plan.tpdos[0])
+        drive.on_pdos(plan.unserved, pdos.further, now)
+        missing = _without_effect(node.bus, plan.rpdos, plan.tpdos)
+        result.notes += [f"{drive.slot.name}: {why}" for why in missing]
+    return connected
+
+
+def _set_times(drive: Drive, rpdo: PdoPlan, tpdo: PdoPlan) -> None:
+    """When the drive's TPDO is late, and what takes its RPDO over: those with status and control word."""
+    drive.channel.link.pdo_deadline_s = _deadline_s(drive, tpdo)
+    drive.rpdo_type = rpdo.transmission_type
+
+
+def _without_effect(bus: BusTable, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan]) -> list[str]:
+    """What these PDOs wait for and will not get from us."""
+    found: list[str] = []
+    listed = [("RPDO", plan, LAST_SYNCHRONOUS) for plan in rpdos]
+    listed += [("TPDO", plan, REMOTE_SYNCHRONOUS) for plan in tpdos]
+    for name, plan, last in listed:
+        kind = plan.transmission_type
+        if not bus.sync_period_ms and (kind <= LAST_SYNCHRONOUS or kind == last):
+            found.append(f"{name} of type {kind} waits for SYNC, which the bridge does not send")
+    for tpdo in tpdos:
+        kind = tpdo.transmission_type
+        if kind in REMOTE_TYPES and not tpdo.remote_allowed:
+            found.append(f"TPDO of type {kind} with a COB-ID that allows no remote frames")
+    return found

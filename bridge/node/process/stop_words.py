@@ -1,0 +1,115 @@
+"""Stop words for the drives of a node, by every identifier under which it may listen.
+
+A bridge that was started anew does not know what the node holds: the factory's identifiers, the site
+file's, and those that the node has named in a boot-up get a frame each, packed by the best that is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Final
+
+from bridge.canopen import cobid
+from bridge.canopen.frame import Frame
+from bridge.canopen.pdo import Entry
+from bridge.command import Drive
+from bridge.command.plant import Node
+from bridge.config import PdoTable
+from bridge.config.download import Download
+from bridge.mapping.model import Pdo
+from bridge.node.boot import MOST_ENTRIES, BootMemory, PdoPlan, rpdo_plan
+from bridge.node.process.process_data import DrivePdos, Rpdo
+
+_RPDO: Final = 0x1400
+_TPDO: Final = 0x1800
+_MAPPING: Final = 0x1600
+_MOST_PDOS: Final = 512
+
+IsForeign = Callable[[int], bool]
+
+
+class StopWords:
+    """``downloads`` are what the site's files configure; ``memory`` has what the node has said."""
+
+    def __init__(self, node: Node, downloads: Sequence[Download], memory: BootMemory) -> None:
+        self._node = node
+        self._memory = memory
+        self._known = {drive.name: list(_known(node, drive, downloads)) for drive in node.drives}
+        self._given_ids = frozenset(_given_ids(node, downloads))
+
+    @property
+    def given_ids(self) -> frozenset[int]:
+        """Identifiers of PDOs that the site's files give this node: no other node's stop goes there."""
+        return self._given_ids
+
+    def plans(self, drive: Drive) -> dict[int, PdoPlan]:
+        """The RPDOs under which this drive may listen, by their COB-IDs."""
+        # Of one identifier what the node itself has said of it counts, and that comes last.
+        plans = [*self._known[drive.name], *self._memory.rpdos_of(drive.name)]
+        return {plan.cob_id: plan for plan in plans}
+
+    def frames(self, connected: Mapping[str, DrivePdos], is_foreign: IsForeign) -> list[Frame]:
+        """A stop for every drive and no setpoints: by its PDOs what stops it at present, which may be a ramp;
+        where they are not known a stopped word. Identifiers of other nodes (``is_foreign``) are left alone.
+        """
+        frames: list[Frame] = []
+        for drive in self._node.drives:
+            channel = drive.channel
+            count = len(drive.family.process.rpdo)
+            words: Sequence[int] = (channel.words.stopped, *([0] * (count - 1)))
+            pdos = connected.get(drive.name)
+            if pdos and not channel.output.silent and not channel.words.enables(channel.output.words[0]):
+                words = channel.output.words
+            # Nothing is sent into objects that nobody knows.
+            plans = [plan for plan in self.plans(drive).values() if plan.words]
+            packed = {plan.cob_id: Rpdo(plan, count).frame(words) for plan in plans}
+            for frame in pdos.frames_with(words) if pdos else []:
+                packed.pop(frame.can_id, None)
+                packed[frame.can_id] = frame
+            frames += [frame for can_id, frame in packed.items() if not is_foreign(can_id)]
+        return frames
+
+
+def _known(node: Node, drive: Drive, downloads: Sequence[Download]) -> Iterator[PdoPlan]:
+    """The RPDOs of a drive as the mapping file has them, those that are off at factory left out, then as the
+    configuration and the site file want them."""
+    for pdo in drive.slot.rpdo:
+        factory_id = pdo.cob_id + node.table.id
+        if not pdo.optional:
+            yield rpdo_plan(drive.family, drive.slot, pdo, factory_id)
+        configured = _configured(pdo, downloads)
+        if configured is not None:
+            yield rpdo_plan(drive.family, drive.slot, pdo, *configured)
+        asked = _asked(drive, pdo)
+        if asked is not None and asked.enable:
+            entries = [Entry(ref.index, ref.sub, ref.bits) for ref in asked.mapping]
+            yield rpdo_plan(drive.family, drive.slot, pdo, asked.cob_id or factory_id, entries)
+
+
+def _asked(drive: Drive, pdo: Pdo) -> PdoTable | None:
+    """What the site file asks of this PDO."""
+    first = drive.slot.rpdo[0].number
+    return next((table for table in drive.table.rpdo if (table.number or first) == pdo.number), None)
+
+
+def _configured(pdo: Pdo, downloads: Sequence[Download]) -> tuple[int, list[Entry]] | None:
+    """COB-ID and mapping that are downloaded for this PDO; no entries where none are."""
+    held = {(one.index, one.sub): int.from_bytes(one.data, "little") for one in downloads}
+    cob_id = held.get((_RPDO + pdo.number - 1, 1), cobid.PDO_DISABLED)
+    if cob_id & (cobid.PDO_DISABLED | cobid.PDO_EXTENDED):
+        return None
+    mapping = _MAPPING + pdo.number - 1
+    count = min(MOST_ENTRIES, held.get((mapping, 0), 0))
+    words = [held.get((mapping, sub), 0) for sub in range(1, count + 1)]
+    return cob_id & cobid.COB_ID_MASK, [Entry.from_object(word) for word in words if word]
+
+
+def _given_ids(node: Node, downloads: Sequence[Download]) -> Iterator[int]:
+    """Identifiers that the site file and the configuration name for PDOs of this node."""
+    for drive in node.drives:
+        for table in (*drive.table.rpdo, *drive.table.tpdo):
+            if table.cob_id is not None:
+                yield table.cob_id
+    for one in downloads:
+        if one.sub == 1 and any(base <= one.index < base + _MOST_PDOS for base in (_RPDO, _TPDO)):
+            yield int.from_bytes(one.data, "little") & cobid.COB_ID_MASK

@@ -1,0 +1,49 @@
+"""TPDOs that belong to a node and to none of its drives: they bring what is polled otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from bridge.canopen.frame import Frame
+from bridge.canopen.sync import tpdo_deadline_s
+from bridge.node.boot import NodePdoPlan
+
+Show = Callable[[str, int, float, float], None]
+Reject = Callable[[Frame, str], None]
+
+
+def node_tpdos(
+    plans: Sequence[NodePdoPlan], sync_period_ms: int, show: Show, reject: Reject
+) -> dict[int, Callable[[Frame], None]]:
+    """Who takes these TPDOs, by COB-ID."""
+    return {plan.pdo.cob_id: NodeTpdo(plan, sync_period_ms, show, reject).on_frame for plan in plans}
+
+
+class NodeTpdo:
+    """One of them. ``show`` gets name, value and time, and until when nobody need ask by SDO."""
+
+    def __init__(
+        self,
+        plan: NodePdoPlan,
+        sync_period_ms: int,
+        show: Show,
+        reject: Reject,
+    ) -> None:
+        pdo = plan.pdo
+        self._codec = pdo.codec
+        self._names = plan.names
+        self._show = show
+        self._reject = reject
+        deadline_s = tpdo_deadline_s(pdo.transmission_type, pdo.event_timer_ms, sync_period_ms)
+        self._holds_s = float("inf") if deadline_s is None else deadline_s
+
+    def on_frame(self, frame: Frame) -> None:
+        length = self._codec.length
+        if len(frame.data) != length:
+            self._reject(frame, f"{length} bytes are mapped")
+            if len(frame.data) < length:
+                return
+        values = self._codec.unpack(frame.data[:length])
+        for name, value in zip(self._names, values, strict=True):
+            if name:
+                self._show(name, value, frame.time, frame.time + self._holds_s)

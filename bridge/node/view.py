@@ -1,0 +1,73 @@
+"""How a node is shown: its points of state and boot-up, and the events about it."""
+
+from __future__ import annotations
+
+from bridge.canopen.bootloop import BootLoop
+from bridge.canopen.nmt import NmtState
+from bridge.command import Event, Kind, Plant
+from bridge.command.link import NodeState
+from bridge.command.plant import Node
+from bridge.node.backoff import BackOff
+from bridge.node.boot import BootError
+
+
+class NodeView:
+    def __init__(self, node: Node, plant: Plant) -> None:
+        self._node = node
+        self._plant = plant
+        self._top = f"{node.name}/node"
+        self._failure = ""
+        self._errors = ""
+
+    def say(self, text: str, now: float) -> None:
+        """Step or result of the boot-up."""
+        self._plant.set(f"{self._top}/boot_status", text, now)
+
+    def show(self, nmt_state: NmtState, state: NodeState, toggle_errors: int, now: float) -> None:
+        self._plant.set(f"{self._top}/nmt_state", int(nmt_state), now)
+        text = f"{self._node.table.supervision}: {state.value}"
+        if toggle_errors:
+            text += f", {toggle_errors} wrong toggle bit{'s' if toggle_errors > 1 else ''}"
+        self._plant.set(f"{self._top}/supervision_state", text, now)
+
+    def succeeded(self, text: str, now: float) -> None:
+        self._failure = ""
+        self.say(text, now)
+
+    def failed(self, error: BootError, now: float) -> None:
+        """The boot-up has failed; each way of failing is an event once until it succeeds."""
+        self.say(str(error), now)
+        if self._failure != str(error):
+            self._failure = str(error)
+            self._tell(Kind.CONFIGURATION, 600, f"boot-up failed: {error}", now)
+
+    def errors(self, text: str, now: float) -> None:
+        """What the node says of its errors, empty where it has none; an event when it is something else."""
+        self._plant.set(f"{self._top}/device_errors", text, now)
+        if text and text != self._errors:
+            self._tell(Kind.EMERGENCY, 300, f"the node says: {text}", now)
+        self._errors = text
+
+    def resets(self, why: str, now: float) -> None:
+        self._tell(Kind.OWNER, 500, f"reset communication by the bridge, once: {why}", now)
+
+    def restarted(self, now: float) -> None:
+        self._tell(Kind.NODE_LOST, 800, "the node has restarted", now)
+
+    def loops(self, loop: BootLoop, now: float) -> None:
+        """Once a minute, where the node starts again and again."""
+        told = loop.report(now)
+        if told:
+            self._tell(Kind.CONFIGURATION, 600, told, now)
+
+    def flaps(self, back_off: BackOff, now: float) -> None:
+        """Once a minute, where the node is lost soon after each boot-up."""
+        told = back_off.report(now)
+        if told:
+            self._tell(Kind.NODE_LOST, 800, told, now)
+
+    def stays(self, now: float) -> None:
+        self._tell(Kind.NODE_BACK, 200, "node operational, and no longer lost again and again", now)
+
+    def _tell(self, kind: Kind, severity: int, message: str, now: float) -> None:
+        self._plant.report(Event(now, kind, self._node.name, severity, message))

@@ -1,0 +1,204 @@
+"""What one node sends and is sent: routes, SDO, emergencies, error control, process data. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from bridge.canopen import cobid, nmt
+from bridge.canopen.frame import Frame
+from bridge.canopen.nmt import NmtCommand
+from bridge.canopen.sdo import SdoChannel
+from bridge.command import Event, Kind, Plant
+from bridge.command.plant import Node
+from bridge.node import boot
+from bridge.node.emergencies import Emergencies
+from bridge.node.error_control import ErrorControl, Sign
+from bridge.node.fault_reading import FaultReading
+from bridge.node.process.polling import Polling
+from bridge.node.process.process_data import DrivePdos, connect
+from bridge.node.process.stop_words import StopWords
+from bridge.node.process.tpdo import node_tpdos
+from bridge.node.put_off import PutOff
+from bridge.node.sdo_channels import SdoChannels
+
+Handler = Callable[[Frame], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Listener:
+    """Who is told what comes in."""
+
+    on_sign: Callable[[Sign, float], None]
+    """An error control message, and when it came."""
+    touch: Callable[[], None]
+    """Something came that may change frames to be sent or deadlines."""
+    on_duplicate: Callable[[str, float], None]
+    """Two devices seem to have this node id."""
+
+
+class NodeWire:
+    """``rejected`` counts frames that did not fit what the node says it sends."""
+
+    def __init__(self, node: Node, plant: Plant, listener: Listener, stop_words: StopWords) -> None:
+        self._node = node
+        self.stop_words = stop_words
+        self._plant = plant
+        self._listener = listener
+        self.sdo = SdoChannels(node)
+        self.rejected = 0
+        self.is_taken: Callable[[int], bool] = lambda cob_id: False
+        """Whether another node of the bus has something on this identifier."""
+        self.is_foreign: Callable[[int], bool] = self.is_taken
+        """Whether it is that of another node, or will be by the site's files."""
+        self.faults = FaultReading(node, self.sdo)
+        self._emergencies = Emergencies(node, plant, self.reject, self.faults.on_emcy)
+        self.error_control = ErrorControl(node.table, listener.on_duplicate)
+        self.polling = Polling(node.family.poll, self.sdo.for_polls, self._show_poll)
+        self.drives: dict[str, DrivePdos] = {}
+        self._emcy_id: int | None = cobid.EMCY + node.table.id
+        self.routes: dict[int, Handler] = self._basic_routes()
+        self.routes_changed = True
+        self._frames: list[Frame] = []
+        self._put_off = PutOff()
+
+    def _basic_routes(self) -> dict[int, Handler]:
+        routes: dict[int, Handler] = {
+            **{channel.reply_id: partial(self._on_sdo, channel) for channel in self.sdo},
+            # What we send does not come back.
+            **{channel.request_id: self.error_control.on_foreign_request for channel in self.sdo},
+            cobid.ERROR_CONTROL + self._node.table.id: self._on_error_control,
+        }
+        if self._emcy_id is not None:
+            routes[self._emcy_id] = self._on_emcy
+        return routes
+
+    def take_frames(self) -> list[Frame]:
+        frames = self._frames + self.sdo.take_frames() + self.error_control.take_frames()
+        frames += self.polling.take_frames()
+        self._frames = []
+        return frames
+
+    def clear(self) -> None:
+        """Send nothing that waits: the bus is gone."""
+        self._frames.clear()
+        self._put_off.clear()
+
+    @property
+    def put_off(self) -> NmtCommand | None:
+        """The NMT command that waits for stopped words to be taken over; stopped words go on until then."""
+        return self._put_off.command
+
+    def put_nmt_off(self, command: NmtCommand, now: float, wait_s: float) -> None:
+        """Send it when the stopped words that go before it have been taken over. Takes the place of another
+        one that waits, and goes at the time of that."""
+        self._put_off.begin(command, now, wait_s)
+
+    def drop_put_off(self) -> None:
+        self._put_off.clear()
+
+    def send_nmt(self, command: NmtCommand) -> None:
+        """Now, and nothing that waits after it."""
+        self._put_off.clear()
+        self._frames.append(nmt.command(command, self._node.table.id))
+
+    def carry_out(self, action: boot.Action) -> None:
+        """What a boot-up has sent and needs no answer."""
+        match action:
+            case boot.Nmt(command):
+                self.send_nmt(command)
+            case boot.SendStopped():
+                self.send_stopped()
+            case boot.Wake():
+                self.send_stopped()
+                self.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+            case boot.ResetCommunication():
+                self.send_stopped()
+                self.send_nmt(NmtCommand.RESET_COMMUNICATION)
+            case _:
+                raise AssertionError(f"{action} waits for an answer")
+
+    def send_stopped(self) -> None:
+        self._frames += self.stop_words.frames(self.drives, self.is_foreign)
+
+    def _on_sdo(self, channel: SdoChannel, frame: Frame) -> None:
+        unmatched, late = channel.unmatched, channel.late
+        channel.on_frame(frame)
+        if channel.late == late:
+            self.error_control.on_reply(frame, matched=channel.unmatched == unmatched)
+        self._listener.touch()
+
+    def _on_emcy(self, frame: Frame) -> None:
+        self._emergencies.on_frame(frame)
+        self._listener.touch()
+
+    def _on_error_control(self, frame: Frame) -> None:
+        sign = self.error_control.on_frame(frame)
+        if sign is Sign.MALFORMED:
+            self.reject(frame, "an error control message has 1 byte")
+        else:
+            self._listener.on_sign(sign, frame.time)
+
+    def reject(self, frame: Frame, why: str) -> None:
+        """A frame that does not fit: counted, told at most once a minute, nothing changed."""
+        self.rejected += 1
+        message = f"{frame!r} does not fit: {why}"
+        self._plant.report(Event(frame.time, Kind.CONFIGURATION, self._node.name, 300, message))
+
+    def on_time(self, now: float) -> None:
+        self._emergencies.on_time(now)
+        self.faults.on_time(now)
+        self.sdo.on_time(now)
+        command = self._put_off.on_time(now)
+        if command is not None:
+            self.send_nmt(command)
+
+    def next_deadline(self) -> float | None:
+        times = (
+            self.sdo.next_deadline(),
+            self.error_control.next_deadline(),
+            self.polling.next_deadline(),
+            self._emergencies.next_deadline(),
+            self.faults.next_deadline(),
+            self._put_off.next_deadline(),
+        )
+        return min((time for time in times if time is not None), default=None)
+
+    def start_polling(self, now: float) -> None:
+        """The node is in operation: ask it what has to be asked for."""
+        self.polling.start(self.drives.values(), now)
+        self.faults.start(now)
+
+    def stop_polling(self) -> None:
+        self.polling.stop()
+        self.faults.stop()
+
+    def _show_poll(self, name: str, value: int, now: float) -> None:
+        self._plant.set(f"{self._node.name}/node/{name}", value, now)
+
+    def connect(self, result: boot.BootResult, now: float) -> None:
+        """Take over what the boot-up found."""
+        self.error_control.produces_every(result.heartbeat_ms / 1000 or None)
+        self._emcy_id = self._usable_emcy_id(result)
+        self._plant.set(f"{self._node.name}/node/software_version", result.software_version, now)
+        self.drives = connect(self._node, result, self.reject, self.is_taken, now)
+        self.routes = self._basic_routes()
+        for pdos in self.drives.values():
+            self.routes |= pdos.handlers
+        sync_ms = self._node.bus.sync_period_ms
+        self.routes |= node_tpdos(result.node_tpdos, sync_ms, self.polling.on_pdo, self.reject)
+        self.routes_changed = True
+
+    def _usable_emcy_id(self, result: boot.BootResult) -> int | None:
+        """Where emergency messages come, unless that is somebody else's."""
+        default = cobid.EMCY + self._node.table.id
+        wanted = result.emcy_id
+        if wanted in (None, default) or not self.is_taken(wanted):
+            return wanted
+        result.notes.append(f"another node has {wanted:03X}h, too: emergency messages are not taken there")
+        return default
+
+    def refresh(self, now: float) -> None:
+        self._plant.set(f"{self._node.name}/node/rejected_frames", self.rejected + self.sdo.unmatched, now)
+        self._emergencies.refresh(now)

@@ -1,0 +1,103 @@
+"""What is repeated on the bus is kept from round to round, and never longer than it is right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from bridge.canopen.frame import Frame
+from bridge.command import Action, Outcome, Request
+from bridge.command.link import NodeState
+from bridge.config import load_site
+from tests.support import sites
+from tests.support.bench import PLC, Bench, write_site
+from tests.support.pausing_bench import MAPPING, PausingBench
+from tests.support.quick import Quick, quick_site
+
+RPDO1 = 0x200
+SETPOINTS = 0x305
+
+
+def operational(folder: Path, nodes: int = 3) -> Quick:
+    quick = Quick(quick_site(folder, nodes, bus="sync_period_ms = 10"))
+    quick.run(3.0)
+    assert all(node.state is NodeState.OPERATIONAL for node in quick.network.nodes)
+    return quick
+
+
+def kept_is_right(quick: Quick) -> bool:
+    quick.network.take_routes()
+    kept = quick.network.beats()
+    return kept == quick.network.beats(anew=True)
+
+
+def test_heartbeats_do_not_make_it_anew(tmp_path: Path) -> None:
+    quick = operational(tmp_path)
+    quick.network.take_routes()
+    before = quick.network.beats()
+    quick.run(0.5)
+    assert quick.network.beats() is before
+
+
+def test_a_changed_word_is_in_it_at_once(tmp_path: Path) -> None:
+    bench = Bench(write_site(tmp_path))
+    bench.run(3.0)
+    before = bench.network.beats()[RPDO1 + 5]
+    request = Request(PLC, "conveyor/fu1", Action.WRITE, {"control_word": 0x047E})
+    outcomes: list[Outcome] = []
+    bench.plant.submit(request, bench.now, outcomes.append)
+    assert outcomes[0].forwarded
+    assert bench.network.beats()[RPDO1 + 5] != before
+
+
+def test_it_is_right_whatever_becomes_of_the_nodes(tmp_path: Path) -> None:
+    quick = operational(tmp_path)
+    quick.nodes[1].present = False
+    for _ in range(20):
+        quick.run(0.1)
+        assert kept_is_right(quick)
+    assert quick.core(1).state is NodeState.LOST
+    quick.nodes[1].present = True
+    quick.nodes[1].start(quick.now)
+    for _ in range(40):
+        quick.run(0.1)
+        assert kept_is_right(quick)
+    assert quick.core(1).state is NodeState.OPERATIONAL
+    for action in (Action.STOP_NODE, Action.START_NODE):
+        quick.ask(action, "n2")
+        for _ in range(20):
+            assert kept_is_right(quick)
+            quick.run(0.1)
+    quick.network.bus_is_gone(quick.now)
+    assert kept_is_right(quick)
+    assert RPDO1 + 3 in quick.network.beats(), "stopped words go to a lost node as well"
+
+
+def test_a_setpoint_is_there_before_the_enable_and_renewed_after_the_control_word(tmp_path: Path) -> None:
+    """Each has as many frames until the deadline as are left when it is told: what is told later, no more."""
+    node = sites.node(sites.drive("drive", "modbus", 500, f'name = "fu1"\n{sites.SCALED}'), mapping=MAPPING)
+    bench = PausingBench(load_site(sites.write(tmp_path, sites.bus(node), sites.modbus(), name="bench")))
+    bench.run(3.0)
+    told: list[tuple[int, bool]] = []
+    beat = bench.bus.beat
+
+    def note(frames: tuple[Frame, ...], now: float, period_s: float, count: int, **options: Any) -> None:
+        told.append((frames[0].can_id, options["at_once"]))
+        beat(frames, now, period_s, count, **options)
+
+    bench.bus.beat = note
+    for word in (0x047E, 0x047F):
+        assert bench.write(control_word=word, setpoint_1=0x2000, setpoint_4=word).ok
+        bench.run(0.2)
+    assert [can_id for can_id, at_once in told if at_once] == [SETPOINTS, RPDO1 + 5] * 2
+    renewed = [can_id for can_id, at_once in told if not at_once and can_id in (RPDO1 + 5, SETPOINTS)]
+    assert renewed == [RPDO1 + 5, SETPOINTS] * (len(renewed) // 2)
+    assert len(renewed) >= 10
+
+
+def test_the_transfers_of_three_nodes_are_under_way_at_the_same_time(tmp_path: Path) -> None:
+    quick = Quick(quick_site(tmp_path, 3))
+    quick.lose = lambda frame: frame.can_id & 0x780 == 0x580
+    quick.run(0.05)
+    asked = {frame.can_id for frame in quick.log if frame.can_id & 0x780 == 0x600}
+    assert asked == {0x601, 0x602, 0x603}, "none has waited for another's answer"

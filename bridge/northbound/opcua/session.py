@@ -8,6 +8,7 @@ without end, subscriptions of others; and in ``test_services.py``: services that
 from __future__ import annotations
 
 import asyncio
+import math
 import secrets
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ from bridge.northbound.opcua.library import (
     AttributeIds,
     ServiceError,
     StatusCodes,
+    change,
     data_value,
     get,
     node_id,
@@ -101,6 +103,14 @@ class Session(InternalSession):
     @property
     def subscriptions(self) -> Subscriptions:
         return self._server.subscriptions
+
+    async def create_session(
+        self, params: ua.CreateSessionParameters, sockname: tuple[str, int] | None = None
+    ) -> ua.CreateSessionResult:
+        if math.isnan(get(params, "RequestedSessionTimeout")):
+            # asyncua's `min` and `max` let it pass, and the session would never end.
+            change(params, RequestedSessionTimeout=0.0)
+        return await super().create_session(params, sockname)
 
     def activate_session(
         self, params: ua.ActivateSessionParameters, peer_certificate: bytes | None

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import tempfile
 import time
-from collections.abc import AsyncIterator
-from contextlib import suppress
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, suppress
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +16,19 @@ import msgspec
 import pytest
 import pytest_asyncio
 from asyncua import Client, ua
-from asyncua.ua.ua_binary import struct_to_binary
+from asyncua.ua.ua_binary import struct_from_binary, struct_to_binary
 
 from bridge.errors import OperationFailed
 from bridge.mirror import MirrorClient, MirrorPublisher, socket_endpoint
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support.opcua_client import node, write_value
 from tests.support.opcua_hostile import (
+    DOUBLES,
     HOSTILE,
     NOT_UTF8,
     UNDECODABLE,
     requests,
-    with_each_string,
+    with_each,
     without_arrays,
 )
 from tests.support.opcua_site import OPEN, LocalView, connected, make_plant, namespace, serving, status_of
@@ -88,11 +91,15 @@ async def assert_unharmed(served: Served, bystander: Seen) -> None:
         assert len(msgspec.msgpack.encode(rejection)) < 2_000, "what the bus process is told"
 
 
-WITH_STRINGS = [kind for kind in requests() if next(with_each_string(kind, ""), None)]
+WITH_STRINGS = [kind for kind in requests() if next(with_each(kind, ""), None)]
 
 
-@pytest.mark.parametrize("kind", WITH_STRINGS, ids=lambda kind: kind.__name__)
-async def test_every_string_of_every_service(served: Served, bystander: Seen, kind: type) -> None:
+WITH_DOUBLES = [kind for kind in requests() if next(with_each(kind, math.nan), None)]
+
+
+@asynccontextmanager
+async def come_far_enough_for(kind: type, served: Served) -> AsyncIterator[Client]:
+    """A client that may ask for this service."""
     client = Client(served[0].endpoint_url, timeout=10)
     await client.connect_socket()
     try:
@@ -102,16 +109,59 @@ async def test_every_string_of_every_service(served: Served, bystander: Seen, ki
             await client.create_session()
         if kind not in (ua.CreateSessionRequest, ua.ActivateSessionRequest):
             await client.activate_session()
+        yield client
+    finally:
+        client.disconnect_socket()
+
+
+def doubles_in(answer: Any) -> Iterator[float]:
+    if isinstance(answer, float):
+        yield answer
+    elif isinstance(answer, list):
+        for one in answer:
+            yield from doubles_in(one)
+    elif is_dataclass(answer):
+        for field in fields(answer):
+            yield from doubles_in(getattr(answer, field.name))
+
+
+@pytest.mark.parametrize("kind", WITH_DOUBLES, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("hostile", DOUBLES)
+async def test_every_double_of_every_service(
+    served: Served, bystander: Seen, kind: type, hostile: float
+) -> None:
+    """NaN passes every `min` and `max`, and no clock ever reaches it."""
+    for request in with_each(kind, hostile):
+        async with come_far_enough_for(kind, served) as client:
+            if found := getattr(getattr(request, "Parameters", None), "SubscriptionId", None):
+                made = await client.create_subscription(1000, Seen())
+                request.Parameters.SubscriptionId = made.subscription_id if found else found
+            try:
+                answer = await client.uaclient.protocol.send_request(request)
+                told = list(doubles_in(struct_from_binary(type_of_answer(kind), answer)))
+                assert all(0 <= one <= 3_600_000 for one in told), (request, told)
+            except ua.UaStatusCodeError as error:
+                assert status_of(error) != Codes.BadInternalError, request
+            loop: Any = asyncio.get_running_loop()
+            assert all(math.isfinite(timer.when()) for timer in loop._scheduled), request
+    await assert_unharmed(served, bystander)
+
+
+def type_of_answer(kind: type) -> type:
+    return getattr(ua, kind.__name__.replace("Request", "Response"))
+
+
+@pytest.mark.parametrize("kind", WITH_STRINGS, ids=lambda kind: kind.__name__)
+async def test_every_string_of_every_service(served: Served, bystander: Seen, kind: type) -> None:
+    async with come_far_enough_for(kind, served) as client:
         for hostile, words in HOSTILE.items():
-            for request in with_each_string(kind, words):
+            for request in with_each(kind, words):
                 code = await sent(client, request)
                 if hostile in UNDECODABLE:
                     assert code in NOT_DECODED, (hostile, request)
                 assert code != Codes.BadInternalError, (hostile, request)
             # The connection and its session are not the worse for it.
             await client.uaclient.get_endpoints(ua.GetEndpointsParameters())
-    finally:
-        client.disconnect_socket()
     await assert_unharmed(served, bystander)
 
 
@@ -231,7 +281,7 @@ def bad_write(number: int) -> ua.WriteRequest:
 
 
 async def test_a_stream_of_malformed_requests_costs_one_line(served: Served) -> None:
-    (write, *_) = with_each_string(ua.WriteRequest, NOT_UTF8)
+    (write, *_) = with_each(ua.WriteRequest, NOT_UTF8)
     with quiet_log() as log:
         async with connected(served[0]) as client:
             for _ in range(200):
@@ -271,7 +321,7 @@ async def test_what_a_front_refuses_does_not_end_it() -> None:
             async with connected(server) as client:
                 for kind in (ua.WriteRequest, ua.CallRequest):
                     for hostile in HOSTILE.values():
-                        for request in with_each_string(kind, hostile):
+                        for request in with_each(kind, hostile):
                             await sent(client, request)
                 await asyncio.sleep(0.3)
                 assert not running.done()

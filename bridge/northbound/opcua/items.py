@@ -29,6 +29,7 @@ from bridge.northbound.opcua.reading import Window
 
 LEAST_SAMPLING_MS: Final = 50.0
 """The publisher's tick: nobody looks more often at what has changed."""
+_HALF_TICK_S: Final = LEAST_SAMPLING_MS / 2000
 
 MOST_SAMPLING_MS: Final = 3_600_000.0
 VALUE_QUEUE: Final = 100
@@ -119,6 +120,9 @@ class ValueItem:
         """The attribute may have changed. Between two samples the newest value waits for the next."""
         if self.mode == Monitoring.Disabled:
             return
+        if self._held is not None and now - self._due > 2 * _HALF_TICK_S:
+            # Nobody has looked since: what was there when the sample was due is told, too.
+            self.sample(self._due + _HALF_TICK_S)
         self._held = value
         self.sample(now)
 
@@ -129,7 +133,7 @@ class ValueItem:
         self._held = None
         if self.settings.sampling_ms > LEAST_SAMPLING_MS:
             # What changed is looked at in ticks: half of one early is not too early.
-            self._due = now + (self.settings.sampling_ms - LEAST_SAMPLING_MS / 2) / 1000
+            self._due = now + self.settings.sampling_ms / 1000 - _HALF_TICK_S
         value = self.window.part(held)
         if self.filter.reports(self._last, value):
             self._last = value

@@ -130,6 +130,35 @@ def test_between_two_samples_the_newest_value_waits() -> None:
     assert not item.is_holding
 
 
+@given(
+    st.lists(st.integers(1, 60), min_size=1, max_size=15),
+    st.sampled_from((50, 100, 250, 500, 1000)),
+    st.integers(1, 250),
+)
+def test_what_stands_for_a_sampling_interval_is_told(gaps: list[int], sampling_ms: int, every: int) -> None:
+    """However seldom anybody looks: ``gaps`` and ``every`` publishing cycle are in ticks of 50 ms."""
+    item, changes = make_item(size=100, sampling_ms=sampling_ms), {0: 0.0}
+    for number, gap in enumerate(gaps, 1):
+        changes[max(changes) + gap] = float(number)
+    last = max(changes) + every + sampling_ms // 50
+    for tick in range(last + 1):
+        if tick in changes:
+            item.change(value(changes[tick]), tick / 20)
+        if tick % every == 0:
+            item.sample(tick / 20)
+    item.sample((last + every) / 20)
+    came = [number for number, _ in told(item)]
+    assert came == sorted(set(came)), "in their order, and each once"
+    ends = [*list(changes)[1:], last + every]
+    stood = [
+        number
+        for (begin, number), end in zip(changes.items(), ends, strict=True)
+        if (end - begin) * 50 > sampling_ms
+    ]
+    assert set(stood) <= set(came)
+    assert len(came) <= 1 + (last + every) * 50 / (sampling_ms - 25)
+
+
 def test_a_change_after_a_quiet_time_is_told_at_once() -> None:
     item = make_item(sampling_ms=1000)
     item.change(value(1.0), 0.0)

@@ -69,6 +69,7 @@ _SLOW: Final = frozenset(
 )
 """Services that wait for the bus process."""
 
+_TIME_AND_HANDLE: Final = struct.Struct("<qI")
 _ERROR: Final[Any] = ua.MessageType.Error
 _MOST_WAITING: Final = 32
 _LEAST_BUFFER: Final = 8192
@@ -148,7 +149,12 @@ class Processor(UaProcessor):
     async def process_message(self, seqhdr: Any, body: Buffer) -> bool:
         """Requests that wait for a drive are answered when it has; the others go on meanwhile."""
         typeid = nodeid_from_binary(body)
-        requesthdr = struct_from_binary(ua.RequestHeader, body)
+        handle = _request_handle(body.copy())
+        try:
+            requesthdr = struct_from_binary(ua.RequestHeader, body)
+        except _MALFORMED as error:
+            self._refuse(handle, seqhdr, self._fault(error))
+            return True
         if typeid not in _SLOW:
             return await self._serve(typeid, requesthdr, seqhdr, body)
         if len(self._waiting) >= _MOST_WAITING:
@@ -168,10 +174,13 @@ class Processor(UaProcessor):
             code = int(error.code)
         except Exception as error:  # noqa: BLE001 - asyncua logs a traceback for each
             code = self._fault(error)
+        self._refuse(requesthdr.RequestHandle, seqhdr, code)
+        return True
+
+    def _refuse(self, handle: int, seqhdr: Any, code: int) -> None:
         fault = ua.ServiceFault()
         fault.ResponseHeader.ServiceResult = status(code)
-        self.send_response(requesthdr.RequestHandle, seqhdr, fault)
-        return True
+        self.send_response(handle, seqhdr, fault)
 
     def _fault(self, error: Exception) -> int:
         if decoding.is_malformed(error):
@@ -307,3 +316,10 @@ class Processor(UaProcessor):
         if is_null or isinstance(token, ua.AnonymousIdentityToken):
             return users.anonymous(session.address)
         raise ServiceError(StatusCodes.BadIdentityTokenRejected)
+
+
+def _request_handle(header: Buffer) -> int:
+    """That of a RequestHeader of which nothing else need be sound. Raises for one that ends before it."""
+    nodeid_from_binary(header)
+    _, handle = _TIME_AND_HANDLE.unpack(header.read(_TIME_AND_HANDLE.size))
+    return int(handle)

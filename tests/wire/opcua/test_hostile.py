@@ -182,8 +182,9 @@ async def test_the_strings_of_a_requests_header(served: Served, bystander: Seen,
     async with connected(served[0]) as client:
         request = ua.ReadRequest()
         request.RequestHeader.AuditEntryId = HOSTILE[hostile]
-        with suppress(ConnectionError, asyncio.TimeoutError, ua.UaError):
-            await client.uaclient.protocol.send_request(request, 1)
+        code = await sent(client, request)
+        assert code == (Codes.BadDecodingError if hostile in UNDECODABLE else Codes.BadNothingToDo)
+        await client.nodes.server_state.read_value()
     await assert_unharmed(served, bystander)
 
 

@@ -1,4 +1,4 @@
-"""Every request of OPC UA with every of its strings and Doubles, one at a time, as no honest client would send it.
+"""Every request of OPC UA with each of its strings and Doubles, as no honest client would send it.
 
 Made from asyncua's classes, so that a service or a field that comes with another version is among them.
 """

@@ -9,6 +9,9 @@ from typing import Final, Protocol
 
 from bridge.northbound.opcua.library import StatusCodes, ua
 
+MOST_BYTES: Final = 1024 * 1024
+"""Of the notifications in one message, about; what is left follows with the next request."""
+
 _MORE_THAN_SUBSCRIPTIONS: Final = 10
 """A server takes more Publish requests than there are subscriptions, but not without end."""
 
@@ -24,6 +27,8 @@ class PublishRequest:
     is_open: Callable[[], bool]
     answer: Callable[[ua.PublishResult], None]
     refuse: Callable[[int], None]
+    most_bytes: int = MOST_BYTES
+    """That notifications may take; one that takes more comes alone, as the last."""
     results: list[ua.StatusCode] = field(default_factory=list[ua.StatusCode])
 
 

@@ -40,7 +40,7 @@ from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.monitoring import loop_time
 from bridge.northbound.opcua.nodes import pascal_case
 from bridge.northbound.opcua.publishing import PublishQueue
-from bridge.northbound.opcua.reading import checked_times, window
+from bridge.northbound.opcua.reading import checked_times, weight, window
 from bridge.northbound.opcua.security import Users
 from bridge.northbound.opcua.shares import make_room, room_for_items
 from bridge.northbound.opcua.structures import READ
@@ -91,6 +91,8 @@ class Session(InternalSession):
         self.browser = Browser(aspace)
         self.holder: object | None = None
         """The processor of the connection that it is activated on."""
+        self.most_bytes = 0
+        """Of an answer, as its client takes it on that connection."""
         self.left_at = 0.0
         """When it lost its last connection; monotonic."""
         self.admitted: Identity | None = None
@@ -138,10 +140,15 @@ class Session(InternalSession):
         if not get(params, "MaxAge") >= 0:
             raise ServiceError(StatusCodes.BadMaxAgeInvalid)
         results: list[ua.DataValue] = []
+        left = self.most_bytes
         for place, one in enumerate(wanted):
             if place and place % _BATCH == 0:
                 await asyncio.sleep(0)
-            results.append(self._read(one, times))
+            result = self._read(one, times)
+            left -= weight(result)
+            if left < 0:
+                raise ServiceError(StatusCodes.BadResponseTooLarge)
+            results.append(result)
         return results
 
     def _read(self, wanted: ua.ReadValueId, times: ua.TimestampsToReturn) -> ua.DataValue:

@@ -12,8 +12,9 @@ from typing import Final, Protocol
 from bridge.command.request import Identity
 from bridge.northbound.opcua.eventfilter import Occurrence
 from bridge.northbound.opcua.items import EventItem, Item, Monitoring, ValueItem
-from bridge.northbound.opcua.library import ServiceError, StatusCodes, get, make, status, ua
+from bridge.northbound.opcua.library import ServiceError, StatusCodes, data_value, get, make, status, ua
 from bridge.northbound.opcua.publishing import PublishQueue, PublishRequest
+from bridge.northbound.opcua.reading import weight
 
 LEAST_INTERVAL_MS: Final = 50.0
 MOST_INTERVAL_MS: Final = 3_600_000.0
@@ -170,7 +171,7 @@ class Subscription:
     # messages
 
     def publish(self, request: PublishRequest) -> bool:
-        values, events = self._collect() if self._enabled else ([], [])
+        values, events = self._collect(request.most_bytes) if self._enabled else ([], [])
         data: list[object] = []
         if values:
             data.append(make(ua.DataChangeNotification, MonitoredItems=values))
@@ -193,18 +194,22 @@ class Subscription:
         )
         return more
 
-    def _collect(self) -> tuple[list[ua.MonitoredItemNotification], list[ua.EventFieldList]]:
+    def _collect(self, most_bytes: int) -> tuple[list[ua.MonitoredItemNotification], list[ua.EventFieldList]]:
         """As many notifications as go into one message."""
         values: list[ua.MonitoredItemNotification] = []
         events: list[ua.EventFieldList] = []
-        left = self.terms.most_per_message
+        left, bytes_left = self.terms.most_per_message, most_bytes
         for item in list(self._reporting()):
             while left and item.has_something:
                 left -= 1
                 if isinstance(item, ValueItem):
                     values.append(item.notification())
+                    bytes_left -= weight(get(values[-1], "Value"))
                 else:
                     events.append(item.notification())
+                    bytes_left -= _weight(events[-1])
+                if bytes_left < 0:
+                    left = 0
             if not item.has_something:
                 del self._ready[item.number]
             if not left:
@@ -242,3 +247,8 @@ class Subscription:
         return make(
             ua.PublishResult, SubscriptionId=self.number, MoreNotifications=False, NotificationMessage=message
         )
+
+
+def _weight(event: ua.EventFieldList) -> int:
+    fields: list[ua.Variant] = get(event, "EventFields")
+    return sum(weight(data_value(field)) for field in fields)

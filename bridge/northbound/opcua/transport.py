@@ -22,7 +22,7 @@ from asyncua.common.connection import TransportLimits
 from asyncua.common.utils import Buffer
 from asyncua.server.internal_session import SessionState
 from asyncua.server.uaprocessor import UaProcessor
-from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary, uatcp_to_binary
+from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary, struct_to_binary, uatcp_to_binary
 from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge import clock
@@ -191,12 +191,19 @@ class Processor(UaProcessor):
         tell("requests that failed", self._source, detail, logging.ERROR)
         return StatusCodes.BadInternalError
 
-    def send_response(self, requesthandle: Any, seqhdr: Any, response: Any, *rest: Any, **more: Any) -> None:
+    def send_response(
+        self, requesthandle: Any, seqhdr: Any, response: Any, msgtype: Any = ua.MessageType.SecureMessage
+    ) -> None:
+        """Raises ServiceError for an answer that is larger than the client takes it."""
         if self._transport.get_write_buffer_size() > _MOST_UNSENT:
             tell("answers not read", self._source, "connection closed")
             self._transport.abort()
             return
-        super().send_response(requesthandle, seqhdr, response, *rest, **more)
+        response.ResponseHeader.RequestHandle = requesthandle
+        body = struct_to_binary(response)
+        if len(body) > self._limits.max_message_size:
+            raise ServiceError(StatusCodes.BadResponseTooLarge)
+        self._transport.write(self._connection.message_to_binary(body, msgtype, seqhdr.RequestId))
 
     async def _process_message(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> Any:
         self._check(typeid, requesthdr)
@@ -208,7 +215,7 @@ class Processor(UaProcessor):
             answer = await super()._process_message(typeid, requesthdr, seqhdr, body)
             if isinstance(self.session, Session):
                 self.session.channel_certificate = certificate
-                self.session.holder = self
+                self._hold(self.session)
             return answer
         if typeid == _ACTIVATE:
             session = self._session_to_activate(requesthdr)
@@ -227,8 +234,11 @@ class Processor(UaProcessor):
         except InvalidSignature:
             raise ServiceError(StatusCodes.BadApplicationSignatureInvalid) from None
         if typeid == _ACTIVATE and isinstance(self.session, Session):
-            self.session.holder = self
+            self._hold(self.session)
         return answer
+
+    def _hold(self, session: Session) -> None:
+        session.holder, session.most_bytes = self, self._limits.max_message_size
 
     async def _carry_out(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> bool:
         """A service that asyncua's processor does not leave to the session."""

@@ -53,6 +53,7 @@ from bridge.northbound.opcua.writes import received_at
 
 _CREATE: Final = node_id(ObjectIds.CreateSessionRequest_Encoding_DefaultBinary)
 _ACTIVATE: Final = node_id(ObjectIds.ActivateSessionRequest_Encoding_DefaultBinary)
+_CLOSE: Final = node_id(ObjectIds.CloseSessionRequest_Encoding_DefaultBinary)
 _CLOSE_CHANNEL: Final = node_id(ObjectIds.CloseSecureChannelRequest_Encoding_DefaultBinary)
 _DISCOVERY: Final = frozenset(
     (
@@ -240,6 +241,10 @@ class Processor(UaProcessor):
     def _hold(self, session: Session) -> None:
         session.holder, session.most_bytes = self, self._limits.max_message_size
 
+    async def _session_watchdog_loop(self) -> None:
+        """Not needed: a session watches its own time-out, or ends with the connection it was made on.
+        asyncua's loop would stay behind for each session that was closed."""
+
     async def _carry_out(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> bool:
         """A service that asyncua's processor does not leave to the session."""
         session = self.session
@@ -287,6 +292,8 @@ class Processor(UaProcessor):
             # Activated on another connection; this one has lost it (Part 4 §5.6.3).
             session = self.session = None
         if session is None or session.state is SessionState.Closed:
+            if typeid == _CLOSE:
+                raise ServiceError(StatusCodes.BadSessionIdInvalid)
             return
         if typeid == _CREATE:
             raise ServiceError(StatusCodes.BadTooManySessions)

@@ -28,7 +28,7 @@ class PublishRequest:
     answer: Callable[[ua.PublishResult], None]
     refuse: Callable[[int], None]
     most_bytes: int = MOST_BYTES
-    """That notifications may take; one that takes more comes alone, as the last."""
+    """Of the notifications, about: the last one may go beyond it."""
     results: list[ua.StatusCode] = field(default_factory=list[ua.StatusCode])
 
 

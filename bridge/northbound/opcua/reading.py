@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final
 
-from asyncua.ua.ua_binary import variant_to_binary
-
 from bridge.northbound.opcua import ranges
 from bridge.northbound.opcua.library import (
     AttributeIds,
@@ -24,9 +22,6 @@ _SOURCE: Final = (ua.TimestampsToReturn.Source, ua.TimestampsToReturn.Both)
 _SERVER: Final = (ua.TimestampsToReturn.Server, ua.TimestampsToReturn.Both)
 _NO_DATA: Final = status(StatusCodes.BadIndexRangeNoData)
 _NOTHING: Final = variant(None, ua.VariantType.Null)
-_SCALAR: Final = (bool, int, float, datetime)
-_SCALAR_BYTES: Final = 32
-"""With its status and its times."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,14 +66,6 @@ def checked_times(params: object) -> ua.TimestampsToReturn:
     if times is ua.TimestampsToReturn.Invalid:
         raise ServiceError(StatusCodes.BadTimestampsToReturnInvalid)
     return times
-
-
-def weight(value: ua.DataValue) -> int:
-    """Bytes that it takes on the wire, about."""
-    held = value.Value
-    if held is None or held.Value is None or isinstance(held.Value, _SCALAR):
-        return _SCALAR_BYTES
-    return _SCALAR_BYTES + len(variant_to_binary(held))
 
 
 def _is_bad(value: ua.DataValue) -> bool:

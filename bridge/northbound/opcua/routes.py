@@ -27,7 +27,7 @@ from bridge.northbound.opcua.library import (
     ua,
 )
 from bridge.northbound.opcua.monitoring import loop_time
-from bridge.northbound.opcua.publishing import PublishRequest
+from bridge.northbound.opcua.publishing import MOST_BYTES, PublishRequest
 from bridge.northbound.opcua.session import MOST_OPERATIONS, Session
 
 _log = logging.getLogger(__name__)
@@ -79,6 +79,8 @@ def _publish(session: Session, request: Request) -> None:
     def answer(result: ua.PublishResult) -> None:
         try:
             request.send(make(ua.PublishResponse, Parameters=result))
+        except ServiceError as error:
+            refuse(int(error.code))
         except _UNSENDABLE as error:
             _log.warning("a message of a subscription cannot be sent: %r", error)
             refuse(StatusCodes.BadEncodingError)
@@ -90,5 +92,7 @@ def _publish(session: Session, request: Request) -> None:
 
     hint_ms: int = request.header.TimeoutHint
     expires_at = loop_time() + hint_ms / 1000 if hint_ms else float("inf")
-    waiting = PublishRequest(expires_at, request.is_open, answer, refuse)
+    # Half: one more notification may go beyond it.
+    most_bytes = min(MOST_BYTES, session.most_bytes // 2)
+    waiting = PublishRequest(expires_at, request.is_open, answer, refuse, most_bytes)
     session.subscriptions.publish(session, acknowledged, waiting)

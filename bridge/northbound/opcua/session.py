@@ -24,6 +24,7 @@ from bridge.command.request import Action, Identity, Role, Source
 from bridge.guard import Guard
 from bridge.northbound.opcua.admission import MOST_CONNECTIONS
 from bridge.northbound.opcua.browsing import Browser
+from bridge.northbound.opcua.encoding import Results
 from bridge.northbound.opcua.library import (
     AttributeIds,
     ServiceError,
@@ -40,7 +41,7 @@ from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.monitoring import loop_time
 from bridge.northbound.opcua.nodes import pascal_case
 from bridge.northbound.opcua.publishing import PublishQueue
-from bridge.northbound.opcua.reading import checked_times, weight, window
+from bridge.northbound.opcua.reading import checked_times, window
 from bridge.northbound.opcua.security import Users
 from bridge.northbound.opcua.shares import make_room, room_for_items
 from bridge.northbound.opcua.structures import READ
@@ -49,7 +50,6 @@ from bridge.northbound.opcua.writes import Writer
 
 MOST_OPERATIONS: Final = 10_000
 MOST_CALLS: Final = 100
-_BATCH: Final = 500
 _LONGEST_SESSION_MS: Final = 120_000.0
 
 _FOR_ENGINEERS: Final = tuple(
@@ -139,16 +139,9 @@ class Session(InternalSession):
         # `not >=` refuses NaN, too.
         if not get(params, "MaxAge") >= 0:
             raise ServiceError(StatusCodes.BadMaxAgeInvalid)
-        results: list[ua.DataValue] = []
-        left = self.most_bytes
-        for place, one in enumerate(wanted):
-            if place and place % _BATCH == 0:
-                await asyncio.sleep(0)
-            result = self._read(one, times)
-            left -= weight(result)
-            if left < 0:
-                raise ServiceError(StatusCodes.BadResponseTooLarge)
-            results.append(result)
+        results: Results[ua.DataValue] = Results(self.most_bytes)
+        for one in wanted:
+            await results.add(self._read(one, times))
         return results
 
     def _read(self, wanted: ua.ReadValueId, times: ua.TimestampsToReturn) -> ua.DataValue:
@@ -194,7 +187,7 @@ class Session(InternalSession):
 
     async def browse(self, params: ua.BrowseParameters) -> list[ua.BrowseResult]:
         _limit(get(params, "NodesToBrowse"), MOST_OPERATIONS)
-        return await self.browser.browse(params)
+        return await self.browser.browse(params, self.most_bytes)
 
     async def browse_next(self, parameters: ua.BrowseNextParameters) -> list[ua.BrowseResult]:
         _limit(get(parameters, "ContinuationPoints"), MOST_OPERATIONS)

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from bridge.command.request import Identity
+from bridge.northbound.opcua.encoding import weight
 from bridge.northbound.opcua.eventfilter import Occurrence
 from bridge.northbound.opcua.items import EventItem, Item, Monitoring, ValueItem
-from bridge.northbound.opcua.library import ServiceError, StatusCodes, data_value, get, make, status, ua
+from bridge.northbound.opcua.library import ServiceError, StatusCodes, get, make, status, ua
 from bridge.northbound.opcua.publishing import PublishQueue, PublishRequest
-from bridge.northbound.opcua.reading import weight
 
 LEAST_INTERVAL_MS: Final = 50.0
 MOST_INTERVAL_MS: Final = 3_600_000.0
@@ -204,10 +204,10 @@ class Subscription:
                 left -= 1
                 if isinstance(item, ValueItem):
                     values.append(item.notification())
-                    bytes_left -= weight(get(values[-1], "Value"))
+                    bytes_left -= weight(get(values[-1], "Value").Value)
                 else:
                     events.append(item.notification())
-                    bytes_left -= _weight(events[-1])
+                    bytes_left -= weight(get(events[-1], "EventFields"))
                 if bytes_left < 0:
                     left = 0
             if not item.has_something:
@@ -247,8 +247,3 @@ class Subscription:
         return make(
             ua.PublishResult, SubscriptionId=self.number, MoreNotifications=False, NotificationMessage=message
         )
-
-
-def _weight(event: ua.EventFieldList) -> int:
-    fields: list[ua.Variant] = get(event, "EventFields")
-    return sum(weight(data_value(field)) for field in fields)

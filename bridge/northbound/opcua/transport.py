@@ -22,7 +22,7 @@ from asyncua.common.connection import TransportLimits
 from asyncua.common.utils import Buffer
 from asyncua.server.internal_session import SessionState
 from asyncua.server.uaprocessor import UaProcessor
-from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary, struct_to_binary, uatcp_to_binary
+from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary, uatcp_to_binary
 from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge import clock
@@ -30,6 +30,7 @@ from bridge.command.freshness import NEVER
 from bridge.command.request import Identity
 from bridge.northbound.opcua import decoding
 from bridge.northbound.opcua.admission import Stage
+from bridge.northbound.opcua.encoding import encode
 from bridge.northbound.opcua.library import (
     InvalidSignature,
     ObjectIds,
@@ -143,7 +144,7 @@ class Processor(UaProcessor):
         return False
 
     def _greeted(self) -> None:
-        if self._limits.max_send_buffer < _LEAST_BUFFER:
+        if min(self._limits.max_send_buffer, self._limits.max_message_size) < _LEAST_BUFFER:
             raise ServiceError(StatusCodes.BadConnectionRejected)
         self._was_greeted = True
 
@@ -201,7 +202,7 @@ class Processor(UaProcessor):
             self._transport.abort()
             return
         response.ResponseHeader.RequestHandle = requesthandle
-        body = struct_to_binary(response)
+        body = encode(response)
         if len(body) > self._limits.max_message_size:
             raise ServiceError(StatusCodes.BadResponseTooLarge)
         self._transport.write(self._connection.message_to_binary(body, msgtype, seqhdr.RequestId))

@@ -6,9 +6,11 @@ who comes after it, and takes no more than the share of one address.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import lru_cache
 from ipaddress import IPv6Address, ip_address
 from typing import Final
 
@@ -96,12 +98,14 @@ class Admission:
     def _make_room(self, candidates: Sequence[Visitor], now: float) -> bool:
         if not candidates:
             return False
+        crowds = Counter(one.source for one in candidates)
 
-        def order(visitor: Visitor) -> tuple[bool, int, float]:
-            """Who is slow goes first, the oldest of them; else who has said least: a flood of idle sockets
-            must not push out a client in the middle of its handshake."""
+        def order(visitor: Visitor) -> tuple[int, bool, int, float]:
+            """Who comes in the largest crowd goes first, then who is slow, the oldest of them; else who has
+            said least: a flood of idle sockets must not push out a client in the middle of its handshake."""
             is_slow = now - visitor.since > _SLOW_S
-            return not is_slow, 0 if is_slow else visitor.stage(), visitor.since
+            stage = 0 if is_slow else visitor.stage()
+            return -crowds[visitor.source], not is_slow, stage, visitor.since
 
         self._end(min(candidates, key=order), "connections without a session that made room", "")
         return True
@@ -113,6 +117,7 @@ class Admission:
         visitor.close()
 
 
+@lru_cache(1024)
 def source_of(host: str) -> str:
     """Whom the limits of one address are for: an IPv4 address, or an IPv6 network of 64 bits, because a
     single machine has all addresses of that."""

@@ -60,6 +60,11 @@ class EventFilter:
     where: Where
     result: ua.EventFilterResult | None
 
+    @property
+    def weight(self) -> int:
+        """How long it takes to judge and to tell an event, in tens of fields and operands."""
+        return 1 + (len(self.names) + self.where.operands) // 10
+
     def passes(self, event: Occurrence) -> bool:
         return self.where.passes(event.fields)
 

@@ -87,11 +87,9 @@ class EventSender:
         while self._queue:
             told = self._queue.popleft()
             if self._subscriptions.subscriptions:
-                self._send(told)
-                # Each client's filter has been asked.
-                await asyncio.sleep(0)
+                await self._send(told)
 
-    def _send(self, told: _Told) -> None:
+    async def _send(self, told: _Told) -> None:
         event = told.event
         more = f" ({told.held_back} more like it before were left out)" if told.held_back else ""
         kinds = ua.VariantType
@@ -107,9 +105,11 @@ class EventSender:
         }
         for emitter in self._emitters(event.source):
             for subscription in list(self._subscriptions.subscriptions.values()):
-                # Each client brings its own filter.
-                with self._guard:
-                    subscription.hear(Occurrence(emitter, fields))
+                if subscription.listening:
+                    # Each client brings its own filter.
+                    with self._guard:
+                        subscription.hear(Occurrence(emitter, fields))
+                    await asyncio.sleep(0)
 
     def _source(self, name: str) -> ua.NodeId:
         """The object that an event is about: a drive, a node, a bus, or else the bridge itself."""

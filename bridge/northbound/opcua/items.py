@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import uuid
 from collections import deque
+from collections.abc import Hashable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final
@@ -81,6 +82,7 @@ class ValueItem:
         "number",
         "queue",
         "settings",
+        "share",
         "target",
         "window",
     )
@@ -93,6 +95,7 @@ class ValueItem:
         settings: Settings,
         filter_: ChangeFilter,
         mode: ua.MonitoringMode,
+        share: Hashable = None,
     ) -> None:
         self.number = number
         self.target = target
@@ -102,6 +105,8 @@ class ValueItem:
         self.mode = mode
         self.handle = 0
         """Of asyncua's callback for changes."""
+        self.share = share
+        """What it is counted as."""
         self.queue: deque[ua.DataValue] = deque()
         self._last: ua.DataValue | None = None
         self._held: ua.DataValue | None = None
@@ -192,7 +197,7 @@ def _overflown(value: ua.DataValue) -> ua.DataValue:
 class EventItem:
     """Listens to the events of one node."""
 
-    __slots__ = ("_loss", "filter", "mode", "node", "number", "queue", "settings")
+    __slots__ = ("_loss", "filter", "mode", "node", "number", "queue", "settings", "weight")
 
     def __init__(
         self,
@@ -207,6 +212,7 @@ class EventItem:
         self.settings = settings
         self.filter = filter_
         self.mode = mode
+        self.weight = filter_.weight
         self.queue: deque[list[ua.Variant]] = deque()
         self._loss: list[ua.Variant] | None = None
         """The event that says that others were lost. It is kept in addition to the queue's size."""
@@ -240,6 +246,7 @@ class EventItem:
 
     def modify(self, settings: Settings, filter_: EventFilter) -> None:
         self.settings, self.filter = settings, filter_
+        self.weight = filter_.weight
         while len(self.queue) > settings.queue_size:
             if settings.discard_oldest:
                 self.queue.popleft()

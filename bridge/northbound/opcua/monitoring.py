@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Hashable
 from itertools import count
 from typing import Final, TypeVar
 
 from asyncua.server.address_space import AddressSpace, NodeData
 
 from bridge.northbound.opcua import ranges
+from bridge.northbound.opcua.admission import source_of
 from bridge.northbound.opcua.eventfilter import EventFilterFault, EventTypes, event_filter
 from bridge.northbound.opcua.filters import change_filter
 from bridge.northbound.opcua.items import EventItem, Item, ValueItem, event_settings, value_settings
@@ -25,10 +27,8 @@ from bridge.northbound.opcua.library import (
     ua,
 )
 from bridge.northbound.opcua.reading import checked_times, window
+from bridge.northbound.opcua.shares import MOST_ON_ONE, Share
 from bridge.northbound.opcua.subscription import Subscription
-
-MOST_LISTENERS: Final = 1_000
-"""Items for events, of all clients together: each is asked about every event."""
 
 _BATCH: Final = 50
 _SUBSCRIBE_TO_EVENTS: Final = 1
@@ -42,25 +42,34 @@ class MonitoredItems:
     def __init__(self, space: AddressSpace) -> None:
         self._space = space
         self._numbers = count(1)
-        self._listening = 0
+        self._watching: Counter[Hashable] = Counter()
         self.event_types = EventTypes(space)
 
     async def create(
-        self, find: Callable[[], Subscription], params: ua.CreateMonitoredItemsParameters, room: int
+        self,
+        find: Callable[[], Subscription],
+        params: ua.CreateMonitoredItemsParameters,
+        room: Callable[[], Share],
     ) -> list[ua.MonitoredItemCreateResult]:
-        """There is ``room`` for so many. ``find`` finds the subscription, or raises ServiceError: it may be
-        deleted meanwhile."""
+        """``room`` tells how much there is now, ``find`` the subscription. It raises ServiceError where that has
+        been deleted meanwhile."""
         times = checked_times(params)
-        found = find()
+        found, left = find(), room()
+        items_left = left.items
         results: list[ua.MonitoredItemCreateResult] = []
         for place, wanted in enumerate(get(params, "ItemsToCreate")):
             if place and place % _BATCH == 0:
                 await asyncio.sleep(0)
                 found = find()
-            if place >= room:
+            is_event = get(get(wanted, "ItemToMonitor"), "AttributeId") == AttributeIds.EventNotifier
+            if is_event or place % _BATCH == 0:
+                left = room()
+                items_left = left.items
+            if items_left <= 0 or (is_event and left.listeners <= 0):
                 code = status(StatusCodes.BadTooManyMonitoredItems)
                 results.append(make(ua.MonitoredItemCreateResult, StatusCode=code))
             else:
+                items_left -= 1
                 results.append(self._create(found, wanted, times))
         return results
 
@@ -84,7 +93,6 @@ class MonitoredItems:
         except ServiceError as error:
             return _faulty(ua.MonitoredItemCreateResult(), error)
         subscription.add(item)
-        self._listening += isinstance(item, EventItem)
         if isinstance(item, ValueItem):
             self._watch(subscription, item)
         return change(_agreed(ua.MonitoredItemCreateResult(), item), MonitoredItemId=item.number)
@@ -93,8 +101,6 @@ class MonitoredItems:
         held = self._space.read_attribute_value(node.nodeid, AttributeIds.EventNotifier).Value
         if held is None or not held.Value & _SUBSCRIBE_TO_EVENTS:
             raise ServiceError(StatusCodes.BadNotSupported)
-        if self._listening >= MOST_LISTENERS:
-            raise ServiceError(StatusCodes.BadTooManyMonitoredItems)
         asked: ua.MonitoringParameters = get(wanted, "RequestedParameters")
         filter_ = event_filter(get(asked, "Filter"), self.event_types)
         mode = get(wanted, "MonitoringMode")
@@ -110,6 +116,9 @@ class MonitoredItems:
         target: ua.ReadValueId = get(wanted, "ItemToMonitor")
         asked: ua.MonitoringParameters = get(wanted, "RequestedParameters")
         attribute: AttributeIds = get(target, "AttributeId")
+        share = source_of(subscription.owner.address), node.nodeid, attribute
+        if self._watching[share] >= MOST_ON_ONE:
+            raise ServiceError(StatusCodes.BadTooManyMonitoredItems)
         looked_at = window(target, times)
         if looked_at.ranges:
             there = self._space.read_attribute_value(node.nodeid, attribute).Value
@@ -122,6 +131,7 @@ class MonitoredItems:
             value_settings(asked, subscription.terms.interval_ms),
             change_filter(get(asked, "Filter"), self._space, node, attribute),
             get(wanted, "MonitoringMode"),
+            share,
         )
 
     def _watch(self, subscription: Subscription, item: ValueItem) -> None:
@@ -133,6 +143,7 @@ class MonitoredItems:
 
         where = get(item.target, "NodeId"), get(item.target, "AttributeId")
         _, item.handle = get(self._space, "add_datachange_callback")(*where, tell)
+        self._watching[item.share] += 1
         self._look(subscription, item)
 
     def _look(self, subscription: Subscription, item: ValueItem) -> None:
@@ -189,9 +200,11 @@ class MonitoredItems:
 
     def drop(self, subscription: Subscription, item: Item) -> None:
         subscription.drop(item)
-        self._listening -= isinstance(item, EventItem)
         if isinstance(item, ValueItem):
             self._space.delete_datachange_callback(item.handle)
+            self._watching[item.share] -= 1
+            if not self._watching[item.share]:
+                del self._watching[item.share]
 
 
 def loop_time() -> float:

@@ -53,10 +53,14 @@ class Publisher:
                 with self._guard:
                     value = binding.read()
                     for handle, tell in list(watchers.items()):
+                        if handle not in watchers:  # deleted while others had their turn
+                            continue
                         with self._guard:
                             await tell(handle, value)
-                sent += len(watchers)
-                if sent >= _BEFORE_YIELD:
-                    sent = 0
-                    await asyncio.sleep(0)
+                        sent += 1
+                        if sent >= _BEFORE_YIELD:
+                            sent = 0
+                            await asyncio.sleep(0)
+                            # Who was told a newer one meanwhile must not be told an older one now.
+                            value = binding.read()
         await asyncio.sleep(0)

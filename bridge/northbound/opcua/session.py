@@ -43,7 +43,7 @@ from bridge.northbound.opcua.nodes import pascal_case
 from bridge.northbound.opcua.publishing import PublishQueue
 from bridge.northbound.opcua.reading import checked_times, window
 from bridge.northbound.opcua.security import Users
-from bridge.northbound.opcua.shares import make_room, room_for_items
+from bridge.northbound.opcua.shares import make_room
 from bridge.northbound.opcua.structures import READ
 from bridge.northbound.opcua.subscriptions import Subscriptions
 from bridge.northbound.opcua.writes import Writer
@@ -243,8 +243,7 @@ class Session(InternalSession):
         self, params: ua.CreateMonitoredItemsParameters
     ) -> list[ua.MonitoredItemCreateResult]:
         _limit(get(params, "ItemsToCreate"), MOST_OPERATIONS)
-        room = room_for_items(self.session_id, self._server.sessions, self.subscriptions.items_by_session())
-        return await self.subscriptions.create_items(self, params, room)
+        return await self.subscriptions.create_items(self, params)
 
     async def modify_monitored_items(
         self, params: ua.ModifyMonitoredItemsParameters

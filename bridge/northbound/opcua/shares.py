@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Final, Protocol
 
 from asyncua.server.subscription_service import SubscriptionService
 
 from bridge.northbound.opcua.admission import source_of
 from bridge.northbound.opcua.library import ServiceError, StatusCodes, ua
+from bridge.northbound.opcua.subscription import Subscription
 
 MOST_SUBSCRIPTIONS: Final = 200
 MOST_OF_SESSION: Final = 50
@@ -16,6 +18,11 @@ MOST_OF_ADDRESS: Final = 100
 MOST_ITEMS: Final = 100_000
 """Monitored items of all clients together."""
 MOST_ITEMS_OF_ADDRESS: Final = 50_000
+MOST_ON_ONE: Final = 200
+"""Of one address on one attribute: each is told of every change of it."""
+MOST_LISTENERS: Final = 1_000
+"""What the items for events of all clients weigh: each is asked about every event."""
+MOST_LISTENERS_OF_ADDRESS: Final = 500
 
 
 class Holder(Protocol):
@@ -49,9 +56,25 @@ async def make_room(session: Holder, sessions: Sequence[Holder], subscriptions: 
     raise ServiceError(StatusCodes.BadTooManySubscriptions)
 
 
-def room_for_items(owner: ua.NodeId, sessions: Sequence[Holder], items: dict[ua.NodeId, int]) -> int:
-    """How many more the session ``owner`` may have; ``items`` are those that there are, by session."""
-    of_address = {one.session_id: source_of(one.address) for one in sessions}
-    source = of_address.get(owner)
-    same = sum(count for session_id, count in items.items() if of_address.get(session_id) == source)
-    return min(MOST_ITEMS - sum(items.values()), MOST_ITEMS_OF_ADDRESS - same)
+@dataclass(frozen=True, slots=True)
+class Share:
+    """So many monitored items, those for events of that weight."""
+
+    items: int
+    listeners: int
+
+
+def room_for_items(address: str, subscriptions: Iterable[Subscription]) -> Share:
+    """What a session of this address may have in addition to what all ``subscriptions`` have."""
+    items = listeners = items_of_address = listeners_of_address = 0
+    source = source_of(address)
+    for one in subscriptions:
+        items += len(one.items)
+        listeners += one.listening
+        if source_of(one.owner.address) == source:
+            items_of_address += len(one.items)
+            listeners_of_address += one.listening
+    return Share(
+        min(MOST_ITEMS - items, MOST_ITEMS_OF_ADDRESS - items_of_address),
+        min(MOST_LISTENERS - listeners, MOST_LISTENERS_OF_ADDRESS - listeners_of_address),
+    )

@@ -61,6 +61,7 @@ class Owner(Protocol):
     """The session that a subscription is told to."""
 
     session_id: ua.NodeId
+    address: str
     identity: Identity
     channel_certificate: bytes | None
     publishing: PublishQueue
@@ -104,6 +105,11 @@ class Subscription:
     @property
     def priority(self) -> int:
         return self.terms.priority
+
+    @property
+    def listening(self) -> int:
+        """What its items for events weigh."""
+        return sum(item.weight for item in self._listeners.values())
 
     # what there is to tell
 

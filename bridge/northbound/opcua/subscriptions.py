@@ -17,7 +17,7 @@ from bridge.northbound.opcua.library import ServiceError, StatusCodes, change, g
 from bridge.northbound.opcua.monitoring import MonitoredItems, code_of, loop_time
 from bridge.northbound.opcua.passwords import ANONYMOUS
 from bridge.northbound.opcua.publishing import PublishRequest
-from bridge.northbound.opcua.shares import MOST_SUBSCRIPTIONS
+from bridge.northbound.opcua.shares import MOST_SUBSCRIPTIONS, Share, room_for_items
 from bridge.northbound.opcua.subscription import Owner, Subscription, terms
 
 _T = TypeVar("_T")
@@ -87,13 +87,6 @@ class Subscriptions:
         if len(self.subscriptions) >= MOST_SUBSCRIPTIONS and (oldest := next(left, None)):
             self._close(oldest)
 
-    def items_by_session(self) -> dict[ua.NodeId, int]:
-        """How many monitored items each session has."""
-        items: dict[ua.NodeId, int] = {}
-        for found in self.subscriptions.values():
-            items[found.session_id] = items.get(found.session_id, 0) + len(found.items)
-        return items
-
     def end(self, owner: Owner, *, delete: bool) -> None:
         """The session ends. What it leaves behind is for the same client; without one it goes, too."""
         if delete or not _is_known(owner):
@@ -144,9 +137,11 @@ class Subscriptions:
     # the MonitoredItem service set
 
     async def create_items(
-        self, owner: Owner, params: ua.CreateMonitoredItemsParameters, room: int
+        self, owner: Owner, params: ua.CreateMonitoredItemsParameters
     ) -> list[ua.MonitoredItemCreateResult]:
-        """There is room for so many."""
+        def room() -> Share:
+            return room_for_items(owner.address, self.subscriptions.values())
+
         return await self._items.create(lambda: self._of_items(owner, params), params, room)
 
     def modify_items(

@@ -94,6 +94,10 @@ class Where:
 
     elements: Sequence[_Element]
 
+    @property
+    def operands(self) -> int:
+        return sum(len(element.operands) for element in self.elements)
+
     def passes(self, fields: Fields) -> bool:
         # An element refers to later ones only, so each is worked out once, from the last to the first.
         values: list[Any] = [None] * len(self.elements)

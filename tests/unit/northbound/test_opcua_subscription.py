@@ -28,6 +28,7 @@ TARGET = ua.ReadValueId(AttributeId=ua.AttributeIds.Value)
 @dataclass
 class Session:
     session_id: ua.NodeId = field(default_factory=lambda: ua.NodeId(7))
+    address: str = "10.0.0.1"
     identity: Identity = field(default_factory=lambda: Identity(Source.OPCUA, "anna"))
     channel_certificate: bytes | None = None
     publishing: PublishQueue = field(default_factory=PublishQueue)

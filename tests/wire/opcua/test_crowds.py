@@ -12,7 +12,7 @@ import pytest
 from asyncua import Client, ua
 
 from bridge.config import OpcUaTable, UserTable
-from bridge.northbound.opcua import admission, shares
+from bridge.northbound.opcua import admission, monitoring, shares
 from bridge.northbound.opcua.admission import DEADLINE_S, Stage
 from bridge.northbound.opcua.security import hash_password
 from bridge.northbound.opcua.server import OpcUaServer
@@ -191,3 +191,58 @@ class TestSubscriptions:
             assert {getattr(one, "value", None) for one in refused} == {
                 ua.StatusCodes.BadTooManyMonitoredItems
             }
+
+    async def test_requests_that_come_at_once_share_what_there_is(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(shares, "MOST_ITEMS_OF_ADDRESS", 150)
+        async with serving(OPEN, tmp_path) as (server, _), connected(server) as one, connected(server) as two:
+
+            async def watch(client: Client) -> int:
+                subscription = await client.create_subscription(1000, None)
+                made = await subscription.subscribe_data_change([client.nodes.server_state] * 150)
+                return sum(isinstance(result, int) for result in made)
+
+            assert sum(await asyncio.gather(watch(one), watch(two))) == 150
+
+    async def test_one_address_watches_one_value_so_often(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(monitoring, "MOST_ON_ONE", 10)
+        async with serving(OPEN, tmp_path) as (server, _), connected(server) as client:
+            subscription = await client.create_subscription(1000, None)
+            for _ in range(2):  # what is deleted makes room
+                made = await subscription.subscribe_data_change([client.nodes.server_state] * 11)
+                assert [isinstance(one, int) for one in made] == [True] * 10 + [False]
+                assert made[10].value == ua.StatusCodes.BadTooManyMonitoredItems
+                other = await subscription.subscribe_data_change(client.nodes.namespace_array)
+                await subscription.unsubscribe([*made[:10], other])
+
+    async def test_one_address_does_not_take_all_items_for_events(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(shares, "MOST_LISTENERS_OF_ADDRESS", 5)
+        message = ua.SimpleAttributeOperand(
+            TypeDefinitionId=ua.NodeId(ua.ObjectIds.BaseEventType),
+            BrowsePath=[ua.QualifiedName("Message", 0)],
+            AttributeId=ua.AttributeIds.Value,
+        )
+        server_events = ua.ReadValueId(
+            NodeId=ua.NodeId(ua.ObjectIds.Server), AttributeId=ua.AttributeIds.EventNotifier
+        )
+        wanted = [
+            ua.MonitoredItemCreateRequest(
+                ItemToMonitor=server_events,
+                MonitoringMode=ua.MonitoringMode.Reporting,
+                RequestedParameters=ua.MonitoringParameters(
+                    ClientHandle=number, QueueSize=10, Filter=ua.EventFilter(SelectClauses=[message])
+                ),
+            )
+            for number in range(1000, 1007)
+        ]
+        async with serving(OPEN, tmp_path) as (server, _), connected(server) as client:
+            subscription = await client.create_subscription(1000, None)
+            made = await subscription.create_monitored_items(wanted)
+            assert sum(isinstance(one, int) for one in made) == 5
+            values = await subscription.subscribe_data_change([client.nodes.server_state] * 10)
+            assert all(isinstance(one, int) for one in values), "but values may be watched"

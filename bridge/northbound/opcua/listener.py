@@ -57,7 +57,7 @@ class _Protocol(OPCUAProtocol):
         # Its task has not run yet, so no message has seen the other processor.
         if self.transport is not None and isinstance(self.iserver, Server):
             self.processor = Processor(self.iserver, self.transport, self.limits)
-            self.processor.set_policies(self.policies)
+            self.processor.set_policies([policy.of(self._source) for policy in self.policies])
 
     def connection_lost(self, ex: BaseException | None) -> None:
         if self._visitor:

@@ -57,10 +57,17 @@ class CheckedPolicy:
     whose key the client proves to have. ``tell`` is given a kind, a source and a detail for the log.
     """
 
-    def __init__(self, policy: Any, trusted: TrustedCertificates | None, tell: Tell = tell) -> None:
+    def __init__(
+        self, policy: Any, trusted: TrustedCertificates | None, tell: Tell = tell, source: str = ""
+    ) -> None:
         self._policy = policy
         self._tell = tell
         self._trusted = trusted
+        self._source = source
+
+    def of(self, source: str) -> CheckedPolicy:
+        """The same for connections of ``source``. What the log counts by must not be made up by a client."""
+        return CheckedPolicy(self._policy, self._trusted, self._tell, source)
 
     def matches(self, uri: str, mode: ua.MessageSecurityMode | None = None) -> bool:
         return self._policy.matches(uri, mode)
@@ -81,8 +88,8 @@ class CheckedPolicy:
         why = self._trusted.refusal(certificate) if self._trusted else None
         if why:
             name = certificate.subject.rfc4514_string()
-            whose = f"{name[:_LONGEST_NAME]}, SHA-256 {fingerprint(certificate)}"
-            self._tell("refused certificates", whose, why)
+            whose = f"SHA-256 {fingerprint(certificate)}, {name[:_LONGEST_NAME]}"
+            self._tell("refused certificates", self._source, f"{whose}: {why}")
             # Part 4 §6.1.3: the client is not told more than this.
             raise ServiceError(StatusCodes.BadSecurityChecksFailed)
 
@@ -181,6 +188,6 @@ class Users:
             known, password, source_of(address)
         )
         if account is None or not is_right:
-            self._tell("refused logins", address, f"user {name[:_LONGEST_NAME]!r}")
+            self._tell("refused logins", source_of(address), f"user {name[:_LONGEST_NAME]!r}")
             raise ServiceError(StatusCodes.BadUserAccessDenied)
         return Identity(Source.OPCUA, name, account.role, address)

@@ -29,7 +29,7 @@ from bridge import clock
 from bridge.command.freshness import NEVER
 from bridge.command.request import Identity
 from bridge.northbound.opcua import decoding
-from bridge.northbound.opcua.admission import Stage
+from bridge.northbound.opcua.admission import Stage, source_of
 from bridge.northbound.opcua.encoding import encode
 from bridge.northbound.opcua.library import (
     InvalidSignature,
@@ -101,7 +101,7 @@ class Processor(UaProcessor):
         super().__init__(server, transport, limits)
         self._server = server
         self._waiting: set[asyncio.Task[Any]] = set()
-        self._source = str(self.name[0]) if isinstance(self.name, tuple) else str(self.name)
+        self._source = source_of(str(self.name[0]) if isinstance(self.name, tuple) else str(self.name))
         self._was_greeted = False
         self.arrivals: deque[float] = deque()
         """When the messages that are still to be processed can have come at the earliest, in their order."""

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from asyncua import ua
+from asyncua.common.connection import TransportLimits
 from asyncua.common.utils import ServiceError
 from asyncua.crypto.security_policies import SecurityPolicyAes256Sha256RsaPss, encrypt_asymmetric
 from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey, generate_private_key
@@ -23,6 +26,7 @@ from bridge.northbound.opcua.security import (
     security_policies,
     verify_password,
 )
+from bridge.northbound.opcua.transport import Processor
 
 URI = "urn:test:drivebridge"
 Policy = ua.SecurityPolicyType
@@ -202,3 +206,16 @@ def test_an_open_endpoint_is_there_only_where_the_site_file_says_so() -> None:
     assert Policy.NoSecurity not in security_policies(OpcUaTable())
     assert Policy.NoSecurity in security_policies(OpcUaTable(no_security=True))
     assert all("SignAndEncrypt" in policy.name for policy in security_policies(OpcUaTable()))
+
+
+def test_the_log_names_the_network_of_a_client_that_has_all_its_addresses(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    for host in ("2001:db8:1:2::7", "2001:db8:1:2:3:4:5:6"):
+        peer = {"peername": (host, 50000, 0, 0)}
+        transport: Any = SimpleNamespace(get_extra_info=peer.get)
+        server: Any = None
+        Processor(server, transport, TransportLimits())._fault(KeyError("x"))
+    told = [record.getMessage() for record in caplog.records]
+    assert len(told) == 2
+    assert all("from 2001:db8:1:2::/64: " in line for line in told), told

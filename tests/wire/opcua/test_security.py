@@ -28,6 +28,7 @@ from bridge.config import OpcUaTable, UserTable
 from bridge.northbound.opcua.security import hash_password
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support.opcua_site import LocalView, connected, namespace, serving
+from tests.support.quiet import quiet_log
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 Codes, Refused = ua.StatusCodes, ua.uaerrors.BadUserAccessDenied
@@ -224,6 +225,24 @@ class TestTrust:
             (trusted / "stranger.der").write_bytes(stranger.certificate)
             async with logged_in(served, stranger, "anna", PASSWORD) as client:
                 assert await control_word(client) == Codes.Good
+
+    async def test_certificates_that_an_address_makes_up_are_one_line(
+        self, users: list[UserTable], tmp_path: Path
+    ) -> None:
+        """Their names are the client's own: a new one each time must not be a new line each time."""
+        trusted = tmp_path / "trusted"
+        trusted.mkdir()
+        settings = OpcUaTable(listen="127.0.0.1:0", user=users, trusted_dir=str(trusted))
+        async with serving(settings, tmp_path) as served:
+            with quiet_log() as log:
+                for number in range(3):
+                    with pytest.raises((ua.UaError, ConnectionError)):
+                        async with logged_in(served, make_peer(f"made-up-{number}"), "anna", PASSWORD):
+                            pass
+        told = [line for line in log.lines if "refused certificates" in line]
+        assert len(told) == 1, told
+        assert "refused certificates from 127.0.0.1: SHA-256 " in told[0]
+        assert "made-up-0" in told[0]
 
     async def test_the_own_certificate_stays_over_a_restart(
         self, users: list[UserTable], scada: Peer, tmp_path: Path

@@ -20,6 +20,8 @@ MOST_CONNECTIONS: Final = 100
 MOST_OF_ADDRESS: Final = 50
 MOST_WAITING: Final = 25
 """Connections of one address that have no session yet."""
+MOST_HELD: Final = 64 * 1024 * 1024
+"""Bytes of messages and answers, of all connections together."""
 _SLOW_S: Final = 5.0
 
 
@@ -45,6 +47,8 @@ class Visitor:
     since: float
     """When it began to be without a session."""
     stage: Callable[[], Stage]
+    held: Callable[[], int]
+    """Bytes of messages and answers that are kept for it."""
     close: Callable[[], None]
 
     def is_waiting(self) -> bool:
@@ -86,7 +90,8 @@ class Admission:
             self._visitors.remove(visitor)
 
     def look(self, now: float) -> None:
-        """Close those whose time is up. To be called about once a second."""
+        """Close those whose time is up, or who hold too much. To be called about once a second."""
+        self.weigh()
         for visitor in tuple(self._visitors):
             stage = visitor.stage()
             if stage is Stage.SESSION:
@@ -94,6 +99,17 @@ class Admission:
             elif now - visitor.since >= DEADLINE_S[stage]:
                 detail = f"no {_MISSING[stage]} within {DEADLINE_S[stage]:g} s"
                 self._end(visitor, "connections closed that came no further", detail)
+
+    def weigh(self) -> None:
+        """Close who holds the most, of the address that does, until all together hold no more than they may."""
+        held = {visitor: visitor.held() for visitor in self._visitors}
+        of_source: Counter[str] = Counter()
+        for visitor, size in held.items():
+            of_source[visitor.source] += size
+        while sum(held.values()) > MOST_HELD:
+            heaviest = max(held, key=lambda one: (of_source[one.source], held[one]))
+            of_source[heaviest.source] -= held.pop(heaviest)
+            self._end(heaviest, "connections closed that had too much under way", "")
 
     def _make_room(self, candidates: Sequence[Visitor], now: float) -> bool:
         if not candidates:

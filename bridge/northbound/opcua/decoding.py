@@ -25,8 +25,11 @@ from asyncua.ua import ua_binary
 
 from bridge.northbound.opcua.library import StatusCodes, UaError, UaStatusCodeError, ua
 
-MOST_ELEMENTS: Final = 100_000
-"""Of all arrays in one message that are decoded one by one; a thousand take about 10 ms."""
+MOST_ELEMENTS: Final = 30_000
+"""Of all arrays in one message that are decoded one by one, while nobody else has a turn; a thousand take
+about 10 ms. Ten thousand operations with arrays of two fit in."""
+MOST_BEFORE_SESSION: Final = 1_000
+"""Of the messages that open a session, which name a few."""
 
 _MOST_DIMENSIONS: Final = 10
 _LENGTH: Final = struct.Struct("<i")
@@ -39,17 +42,17 @@ class _Budget:
 
     __slots__ = ("left",)
 
-    def __init__(self) -> None:
-        self.left = MOST_ELEMENTS
+    def __init__(self, left: int) -> None:
+        self.left = left
 
 
 _budget: ContextVar[_Budget | None] = ContextVar("decoding_budget", default=None)
 """That of the message which the present task has before it."""
 
 
-def begin() -> None:
-    """A message begins: from here on this task decodes no more than one may contain."""
-    _budget.set(_Budget())
+def begin(most: int) -> None:
+    """A message begins: from here on this task decodes no more than ``most`` elements of arrays."""
+    _budget.set(_Budget(most))
 
 
 def install() -> None:

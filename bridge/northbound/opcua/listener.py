@@ -16,10 +16,11 @@ from asyncua.ua.ua_binary import uatcp_to_binary
 from bridge import clock
 from bridge.command.freshness import Inflow
 from bridge.northbound.opcua.admission import Admission, Stage, Visitor, source_of
+from bridge.northbound.opcua.inbox import Inbox
 from bridge.northbound.opcua.library import StatusCodes, make, status, ua
 from bridge.northbound.opcua.notices import tell
 from bridge.northbound.opcua.session import Server
-from bridge.northbound.opcua.transport import Processor
+from bridge.northbound.opcua.transport import MOST_BEFORE_SESSION, Processor
 from bridge.northbound.pulse import Pulse
 
 _MOST_UNREAD: Final = 64
@@ -28,6 +29,8 @@ _READ_MOST: Final = 64 * 1024
 """Bytes that are read at once from such a client."""
 WINDOW: Final = 2 * _READ_MOST
 """Bytes that may wait in the kernel: more than that, so that who fills it is noticed."""
+_UNWEIGHED: Final = 1024 * 1024
+"""Bytes that a connection may hold before anybody adds up what all hold, at once."""
 _LOOK_EVERY_S: Final = 1.0
 _ERROR: Final[Any] = ua.MessageType.Error
 
@@ -42,13 +45,14 @@ class _Protocol(OPCUAProtocol):
         self._inflow = Inflow(clock.now(), pulse.look)
         self._source = ""
         self._visitor: Visitor | None = None
+        self.messages = self._inbox = Inbox(self.messages.maxsize, self._most_bytes)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         peer = transport.get_extra_info("peername")
-        self._source = str(peer[0]) if isinstance(peer, tuple) else str(peer)
+        self._source = source_of(str(peer[0]) if isinstance(peer, tuple) else str(peer))
         assert isinstance(transport, asyncio.Transport)
         now = clock.now()
-        visitor = Visitor(source_of(self._source), now, self._stage, lambda: _end(transport))
+        visitor = Visitor(self._source, now, self._stage, self._held, lambda: _end(transport))
         if not self._admission.admit(visitor, now):
             _end(transport, StatusCodes.BadTcpServerTooBusy)
             return
@@ -66,6 +70,15 @@ class _Protocol(OPCUAProtocol):
 
     def _stage(self) -> Stage:
         return self.processor.stage if isinstance(self.processor, Processor) else Stage.CONNECTED
+
+    def _held(self) -> int:
+        transport, processor = self.transport, self.processor
+        unsent = transport.get_write_buffer_size() if transport else 0
+        incoming = processor.incoming if isinstance(processor, Processor) else 0
+        return len(self._buffer) + self._inbox.held_bytes + incoming + unsent
+
+    def _most_bytes(self) -> int:
+        return self.processor.most_bytes if isinstance(self.processor, Processor) else MOST_BEFORE_SESSION
 
     def data_received(self, data: bytes) -> None:
         transport, server = self.transport, self.iserver
@@ -88,6 +101,14 @@ class _Protocol(OPCUAProtocol):
             tell("connections closed", self._source, "a chunk without end")
             self._buffer = b""
             transport.close()
+        elif self._held() > _UNWEIGHED:
+            self._admission.weigh()
+
+    async def _process_one_msg(self, header: Any, buf: Any) -> bool:
+        goes_on = await super()._process_one_msg(header, buf)
+        # A queue that is not empty does not let go, and many requests are carried out without a pause.
+        await asyncio.sleep(0)
+        return goes_on
 
 
 def _end(transport: asyncio.Transport, code: int = StatusCodes.BadTimeout) -> None:

@@ -8,6 +8,7 @@ any size, a session that ended with a connection it had left.
 
 # asyncua's UaProcessor has no types:
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+# pyright: reportPrivateUsage=false
 
 from __future__ import annotations
 
@@ -76,8 +77,10 @@ _ERROR: Final[Any] = ua.MessageType.Error
 _MOST_WAITING: Final = 32
 _LEAST_BUFFER: Final = 8192
 """Part 6 §7.1.2.3. Answers are cut into chunks that small."""
-_MOST_UNSENT: Final = 16 * 1024 * 1024
-"""Bytes of answers that may wait for a client to read them."""
+MOST_BEFORE_SESSION: Final = 256 * 1024
+"""Bytes of messages of a connection; what comes before a session is some kilobytes."""
+_MOST_UNDER_WAY: Final = 16 * 1024 * 1024
+"""Bytes of messages that may wait for their turn, and of answers for a client to read them."""
 _MALFORMED_KIND: Final = "malformed messages"
 
 _MALFORMED: Final = (
@@ -115,19 +118,46 @@ class Processor(UaProcessor):
             return Stage.CHANNEL
         return Stage.GREETED if self._was_greeted else Stage.CONNECTED
 
+    @property
+    def most_bytes(self) -> int:
+        """Of messages that wait for their turn: little as long as nobody has a session."""
+        return _MOST_UNDER_WAY if self.stage is Stage.SESSION else MOST_BEFORE_SESSION
+
+    @property
+    def incoming(self) -> int:
+        """Bytes of a message of which chunks are still to come."""
+        return self._connection._incoming_size
+
+    def _begin(self) -> None:
+        most = decoding.MOST_ELEMENTS if self.stage is Stage.SESSION else decoding.MOST_BEFORE_SESSION
+        decoding.begin(most)
+
+    def _check_size(self, header: Any) -> None:
+        """asyncua's own limits, and less before there is a session. Raises ServiceError."""
+        is_too_large = (
+            header.packet_size > self._limits.max_recv_buffer
+            or self.incoming + header.body_size > min(self.most_bytes, self._limits.max_message_size)
+            or len(self._connection._incoming_parts) >= self._limits.max_chunk_count
+        )
+        if is_too_large:
+            tell("messages too large", self._source, "connection closed")
+            raise ServiceError(StatusCodes.BadRequestTooLarge)
+
     async def process(self, header: Any, body: Buffer) -> bool:
         """False closes the connection; the client is told why first."""
         # For what is carried out from here on, the tasks that are made for it included.
         received_at.set(self.arrivals.popleft() if self.arrivals else NEVER)
-        decoding.begin()
+        self._begin()
         try:
+            self._check_size(header)
             goes_on = bool(await super().process(header, body))
             if header.MessageType == ua.MessageType.Hello:
                 self._greeted()
             return goes_on
         except (ServiceError, UaStatusCodeError) as error:
-            self._server.count("opcua_refused_connections")
             code = int(error.code)
+            is_too_large = code == StatusCodes.BadRequestTooLarge
+            self._server.count("opcua_broken_connections" if is_too_large else "opcua_refused_connections")
         except _MALFORMED as error:
             self._server.count("opcua_broken_connections")
             tell(_MALFORMED_KIND, self._source, f"connection closed: {error!r}")
@@ -197,7 +227,8 @@ class Processor(UaProcessor):
         self, requesthandle: Any, seqhdr: Any, response: Any, msgtype: Any = ua.MessageType.SecureMessage
     ) -> None:
         """Raises ServiceError for an answer that is larger than the client takes it."""
-        if self._transport.get_write_buffer_size() > _MOST_UNSENT:
+        if self._transport.get_write_buffer_size() > _MOST_UNDER_WAY:
+            self._server.count("opcua_broken_connections")
             tell("answers not read", self._source, "connection closed")
             self._transport.abort()
             return
@@ -209,7 +240,7 @@ class Processor(UaProcessor):
 
     async def _process_message(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> Any:
         self._check(typeid, requesthdr)
-        decoding.begin()
+        self._begin()
         if typeid == _CREATE:
             params = struct_from_binary(ua.CreateSessionParameters, body.copy())
             certificate = self._channel_certificate()
@@ -228,7 +259,7 @@ class Processor(UaProcessor):
             except ServiceError:
                 self._server.count("opcua_refused_connections")
                 raise
-            decoding.begin()
+            self._begin()
         if typeid in ROUTES:
             return await self._carry_out(typeid, requesthdr, seqhdr, body)
         try:
@@ -320,6 +351,7 @@ class Processor(UaProcessor):
         if not isinstance(session, Session) or session.state is SessionState.Closed:
             raise ServiceError(StatusCodes.BadSessionIdInvalid)
         if session.channel_certificate != self._channel_certificate():
+            self._server.count("opcua_refused_connections")
             tell("refused sessions", self._source, "made with another certificate")
             raise ServiceError(StatusCodes.BadSecurityChecksFailed)
         return session

@@ -7,6 +7,7 @@ import pytest
 from bridge.northbound.opcua.admission import (
     DEADLINE_S,
     MOST_CONNECTIONS,
+    MOST_HELD,
     MOST_OF_ADDRESS,
     MOST_WAITING,
     Admission,
@@ -34,7 +35,10 @@ class Rig:
 class Client:
     def __init__(self, rig: Rig, source: str, stage: Stage) -> None:
         self.stage = stage
-        self.visitor = Visitor(source, rig.now, lambda: self.stage, lambda: rig.closed.append(self))
+        self.held = 0
+        self.visitor = Visitor(
+            source, rig.now, lambda: self.stage, lambda: self.held, lambda: rig.closed.append(self)
+        )
         self.is_in = rig.admission.admit(self.visitor, rig.now)
 
 
@@ -87,6 +91,37 @@ def test_channels_that_wait_push_out_no_newcomer(rig: Rig) -> None:
     newcomers = rig.crowd(5)
     assert rig.closed == sitting[:5]
     assert all(one.is_in and one not in rig.closed for one in newcomers)
+
+
+def test_crowds_of_several_addresses_push_out_no_newcomer_of_another(rig: Rig) -> None:
+    """They have said more than it, and come again before it can say anything."""
+    hosts = [f"10.0.1.{number}" for number in range(MOST_CONNECTIONS // MOST_WAITING)]
+    for host in hosts:
+        rig.crowd(MOST_WAITING, host, Stage.CHANNEL)
+    newcomer = rig.client("10.0.2.1")
+    assert newcomer.is_in
+    for number in range(100):
+        rig.now += 0.01
+        rig.client(hosts[number % len(hosts)], Stage.CHANNEL)
+    assert newcomer not in rig.closed
+
+
+def test_who_holds_the_most_of_the_address_that_does_is_closed(rig: Rig) -> None:
+    reader = rig.client("10.0.0.2", Stage.SESSION)
+    reader.held = MOST_HELD // 3
+    crowd = rig.crowd(40, stage=Stage.SESSION)
+    for one in crowd:
+        one.held = MOST_HELD // 50
+    crowd[7].held += 1
+    rig.admission.look(0.0)
+    assert rig.closed[0] is crowd[7]
+    assert reader not in rig.closed
+    left = sum(one.held for one in [reader, *crowd] if one not in rig.closed)
+    assert MOST_HELD * 0.9 < left <= MOST_HELD
+    assert rig.counted == ["opcua_broken_connections"] * len(rig.closed)
+    before = len(rig.closed)
+    rig.admission.weigh()
+    assert len(rig.closed) == before
 
 
 def test_one_address_costs_no_other_anything(rig: Rig) -> None:

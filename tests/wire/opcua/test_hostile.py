@@ -21,6 +21,7 @@ from asyncua.ua.ua_binary import struct_from_binary, struct_to_binary
 from bridge.errors import OperationFailed
 from bridge.mirror import MirrorClient, MirrorPublisher, socket_endpoint
 from bridge.northbound.opcua.server import OpcUaServer
+from bridge.northbound.opcua.session import Session
 from tests.support.opcua_client import node, write_value
 from tests.support.opcua_hostile import (
     DOUBLES,
@@ -215,6 +216,66 @@ async def test_no_variant_holds_the_server(served: Served, bystander: Seen, vari
             assert code in (Codes.BadDecodingError, Codes.BadEncodingLimitsExceeded)
         assert time.monotonic() - began < 3
     await assert_unharmed(served, bystander)
+
+
+def with_many(kind: type, count: int) -> Any:
+    """A request of this kind with an array of so many elements."""
+    request = kind()
+    if kind is ua.GetEndpointsRequest:
+        request.Parameters.ProfileUris = [""] * count
+    elif kind is ua.FindServersRequest:
+        request.Parameters.LocaleIds = [""] * count
+    elif kind is ua.CreateSessionRequest:
+        request.Parameters.ClientDescription.DiscoveryUrls = [""] * count
+    else:
+        request.Parameters.ClientSoftwareCertificates = [ua.SignedSoftwareCertificate()] * count
+    return request
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [ua.GetEndpointsRequest, ua.FindServersRequest, ua.CreateSessionRequest, ua.ActivateSessionRequest],
+    ids=lambda kind: kind.__name__,
+)
+async def test_before_a_session_little_is_decoded(served: Served, bystander: Seen, kind: type) -> None:
+    """A message that is decoded holds up everybody, and who sends these may be anybody."""
+    client = Client(served[0].endpoint_url, timeout=10)
+    await client.connect_socket()
+    try:
+        await client.send_hello()
+        await client.open_secure_channel()
+        if kind is ua.ActivateSessionRequest:
+            await client.create_session()
+        assert await sent(client, with_many(kind, 1_001)) == Codes.BadEncodingLimitsExceeded
+        assert await sent(client, with_many(kind, 300)) != Codes.BadEncodingLimitsExceeded
+    finally:
+        client.disconnect_socket()
+    await assert_unharmed(served, bystander)
+
+
+async def test_requests_that_come_together_leave_others_their_turn(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    turn = 0
+    turns: list[int] = []
+    read = Session.read
+
+    async def count_turns() -> None:
+        nonlocal turn
+        while True:
+            turn += 1
+            await asyncio.sleep(0)
+
+    async def noted(self: Session, params: ua.ReadParameters) -> list[ua.DataValue]:
+        turns.append(turn)
+        return await read(self, params)
+
+    async with connected(served[0]) as client:
+        monkeypatch.setattr(Session, "read", noted)
+        counting = asyncio.create_task(count_turns())
+        await asyncio.gather(*(client.nodes.server_state.read_value() for _ in range(30)))
+        counting.cancel()
+    assert len(set(turns)) >= 30
 
 
 async def sent_raw(client: Client, request: Any, variant: bytes) -> int:

@@ -101,7 +101,7 @@ class Admission:
                 self._end(visitor, "connections closed that came no further", detail)
 
     def weigh(self) -> None:
-        """Close who holds the most, of the address that does, until all together hold no more than they may."""
+        """Close who holds the most of the address that does, until all together hold what they may."""
         held = {visitor: visitor.held() for visitor in self._visitors}
         of_source: Counter[str] = Counter()
         for visitor, size in held.items():

@@ -51,8 +51,8 @@ class MonitoredItems:
         params: ua.CreateMonitoredItemsParameters,
         room: Callable[[], Share],
     ) -> list[ua.MonitoredItemCreateResult]:
-        """``room`` tells how much there is now, ``find`` the subscription. It raises ServiceError where that has
-        been deleted meanwhile."""
+        """``room`` tells how much there is now, ``find`` the subscription; ServiceError where that has been
+        deleted meanwhile."""
         times = checked_times(params)
         found, left = find(), room()
         items_left = left.items

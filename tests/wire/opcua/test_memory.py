@@ -57,16 +57,21 @@ def is_closed(client: Client) -> bool:
     return protocol is None or protocol.transport is None or protocol.transport.is_closing()
 
 
+def send(client: Client, content: bytes) -> None:
+    if not is_closed(client):
+        client.uaclient.protocol.transport.write(content)
+
+
 async def test_a_message_without_end_before_a_session_ends_soon(tmp_path: Path) -> None:
     async with serving(OPEN, tmp_path) as (server, view), connected(server) as other:
         before = ended(view)
         with quiet_log() as log:
             async with channel(server) as client:
                 for _ in range(MOST_BEFORE_SESSION // CHUNK):
-                    client.uaclient.protocol.transport.write(chunk(client))
+                    send(client, chunk(client))
                     await asyncio.sleep(0.02)
                 assert not is_closed(client)
-                client.uaclient.protocol.transport.write(chunk(client))
+                send(client, chunk(client))
                 await until(lambda: is_closed(client), "the end of the connection")
         assert any("messages too large from 127.0.0.1" in line for line in log.lines), log.lines
         assert ended(view) == before + 1
@@ -78,7 +83,7 @@ async def test_messages_that_wait_before_a_session_are_few(tmp_path: Path) -> No
     async with serving(OPEN, tmp_path) as (server, view), channel(server) as client:
         before = ended(view)
         chunks = b"".join(chunk(client) for _ in range(2 * MOST_BEFORE_SESSION // CHUNK))
-        client.uaclient.protocol.transport.write(chunks)
+        send(client, chunks)
         await until(lambda: is_closed(client), "the end of the connection")
         assert ended(view) > before
 
@@ -99,7 +104,7 @@ async def test_all_together_hold_a_fixed_sum(tmp_path: Path, monkeypatch: pytest
         async with session(server) as small, session(server) as large:
             for client, chunks in ((small, 6), (large, 12)):
                 for _ in range(chunks):
-                    client.uaclient.protocol.transport.write(chunk(client))
+                    send(client, chunk(client))
                     await asyncio.sleep(0.02)
             await until(lambda: is_closed(large), "the end of who holds the most")
             assert ended(view) == before + 1

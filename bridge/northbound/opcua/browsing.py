@@ -75,7 +75,7 @@ class Browser:
         if get(get(params, "View"), "ViewId") != _NULL:
             raise ServiceError(StatusCodes.BadViewIdUnknown)
         most: int = get(params, "RequestedMaxReferencesPerNode")
-        results: Results[ua.BrowseResult] = Results(most_bytes)
+        found: list[ua.BrowseResult] = []
         left = _MOST_REFERENCES
         for wanted in get(params, "NodesToBrowse"):
             await self._rest()
@@ -86,6 +86,9 @@ class Browser:
             left -= len(get(result, "References"))
             if left < 0:
                 raise ServiceError(StatusCodes.BadResponseTooLarge)
+            found.append(result)
+        results: Results[ua.BrowseResult] = Results(most_bytes)
+        for result in found:
             await results.add(result)
         return results
 

@@ -14,7 +14,6 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.northbound.opcua.encoding import Results
 from bridge.northbound.opcua.hierarchy import subtypes
 from bridge.northbound.opcua.library import (
     AttributeIds,
@@ -71,11 +70,11 @@ class Browser:
         self._subtypes: dict[ua.NodeId, set[ua.NodeId]] = {}
         self._looked_at = 0
 
-    async def browse(self, params: ua.BrowseParameters, most_bytes: int) -> list[ua.BrowseResult]:
+    async def browse(self, params: ua.BrowseParameters) -> list[ua.BrowseResult]:
         if get(get(params, "View"), "ViewId") != _NULL:
             raise ServiceError(StatusCodes.BadViewIdUnknown)
         most: int = get(params, "RequestedMaxReferencesPerNode")
-        found: list[ua.BrowseResult] = []
+        results: list[ua.BrowseResult] = []
         left = _MOST_REFERENCES
         for wanted in get(params, "NodesToBrowse"):
             await self._rest()
@@ -86,10 +85,7 @@ class Browser:
             left -= len(get(result, "References"))
             if left < 0:
                 raise ServiceError(StatusCodes.BadResponseTooLarge)
-            found.append(result)
-        results: Results[ua.BrowseResult] = Results(most_bytes)
-        for result in found:
-            await results.add(result)
+            results.append(result)
         return results
 
     async def _rest(self) -> None:

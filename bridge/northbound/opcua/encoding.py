@@ -1,7 +1,7 @@
 """The results of a service on the wire: no larger than the client takes them, and encoded in turns.
 
-Encoding takes longer than finding what is encoded: a hundred thousand references in one go held up
-everybody for seconds.
+Encoding takes longer than finding what is encoded: a hundred thousand references in one go hold up
+everybody.
 """
 
 # asyncua's encoder has no types:

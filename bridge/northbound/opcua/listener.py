@@ -74,8 +74,8 @@ class _Protocol(OPCUAProtocol):
     def _held(self) -> int:
         transport, processor = self.transport, self.processor
         unsent = transport.get_write_buffer_size() if transport else 0
-        incoming = processor.incoming if isinstance(processor, Processor) else 0
-        return len(self._buffer) + self._inbox.held_bytes + incoming + unsent
+        under_way = processor.held if isinstance(processor, Processor) else 0
+        return len(self._buffer) + self._inbox.held_bytes + under_way + unsent
 
     def _most_bytes(self) -> int:
         return self.processor.most_bytes if isinstance(self.processor, Processor) else MOST_BEFORE_SESSION

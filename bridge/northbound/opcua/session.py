@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import math
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, cast
 
@@ -91,6 +91,8 @@ class Session(InternalSession):
         self.browser = Browser(aspace)
         self.holder: object | None = None
         """The processor of the connection that it is activated on."""
+        self.answer: Results[Any] | None = None
+        """What is being encoded for it."""
         self.most_bytes = 0
         """Of an answer, as its client takes it on that connection."""
         self.left_at = 0.0
@@ -139,9 +141,13 @@ class Session(InternalSession):
         # `not >=` refuses NaN, too.
         if not get(params, "MaxAge") >= 0:
             raise ServiceError(StatusCodes.BadMaxAgeInvalid)
-        results: Results[ua.DataValue] = Results(self.most_bytes)
-        for one in wanted:
-            await results.add(self._read(one, times))
+        return await self._encoded(self._read(one, times) for one in wanted)
+
+    async def _encoded(self, found: Iterable[Any]) -> list[Any]:
+        """The results of an answer, encoded in turns with others."""
+        results = self.answer = Results[Any](self.most_bytes)
+        for one in found:
+            await results.add(one)
         return results
 
     def _read(self, wanted: ua.ReadValueId, times: ua.TimestampsToReturn) -> ua.DataValue:
@@ -187,7 +193,7 @@ class Session(InternalSession):
 
     async def browse(self, params: ua.BrowseParameters) -> list[ua.BrowseResult]:
         _limit(get(params, "NodesToBrowse"), MOST_OPERATIONS)
-        return await self.browser.browse(params, self.most_bytes)
+        return await self._encoded(await self.browser.browse(params))
 
     async def browse_next(self, parameters: ua.BrowseNextParameters) -> list[ua.BrowseResult]:
         _limit(get(parameters, "ContinuationPoints"), MOST_OPERATIONS)

@@ -124,9 +124,15 @@ class Processor(UaProcessor):
         return _MOST_UNDER_WAY if self.stage is Stage.SESSION else MOST_BEFORE_SESSION
 
     @property
-    def incoming(self) -> int:
+    def _incoming(self) -> int:
         """Bytes of a message of which chunks are still to come."""
         return self._connection._incoming_size
+
+    @property
+    def held(self) -> int:
+        """Bytes of messages and answers that are neither complete nor sent."""
+        answer = self.session.answer if isinstance(self.session, Session) else None
+        return self._incoming + (len(answer.encoded) if answer else 0)
 
     def _begin(self) -> None:
         most = decoding.MOST_ELEMENTS if self.stage is Stage.SESSION else decoding.MOST_BEFORE_SESSION
@@ -136,7 +142,7 @@ class Processor(UaProcessor):
         """asyncua's own limits, and less before there is a session. Raises ServiceError."""
         is_too_large = (
             header.packet_size > self._limits.max_recv_buffer
-            or self.incoming + header.body_size > min(self.most_bytes, self._limits.max_message_size)
+            or self._incoming + header.body_size > min(self.most_bytes, self._limits.max_message_size)
             or len(self._connection._incoming_parts) >= self._limits.max_chunk_count
         )
         if is_too_large:
@@ -188,7 +194,11 @@ class Processor(UaProcessor):
             self._refuse(handle, seqhdr, self._fault(error))
             return True
         if typeid not in _SLOW:
-            return await self._serve(typeid, requesthdr, seqhdr, body)
+            try:
+                return await self._serve(typeid, requesthdr, seqhdr, body)
+            finally:
+                if isinstance(self.session, Session):
+                    self.session.answer = None
         if len(self._waiting) >= _MOST_WAITING:
             await asyncio.wait(self._waiting, return_when=asyncio.FIRST_COMPLETED)
         task = asyncio.create_task(self._serve(typeid, requesthdr, seqhdr, body))

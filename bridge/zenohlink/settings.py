@@ -15,7 +15,11 @@ from bridge.errors import Unavailable
 from bridge.zenohlink.message import sentence
 
 _LEASE_MS: Final = 1000
-"""A peer that falls silent is noticed within this time; zenoh's default is 10 s."""
+"""A peer that falls silent is noticed within this time, and one that does not come to a session in it is
+closed; zenoh's default is 10 s for both."""
+_MOST_PENDING: Final = 1000
+"""Connections without a session. zenoh closes what comes on top: with the 100 of its default a hundred that
+say nothing lock everybody out."""
 _STALLED_US: Final = 500_000
 """How long a query or a reply waits for a peer that does not read before the connection is closed."""
 _STALLED_AMONG_OTHERS_US: Final = 100_000
@@ -58,6 +62,8 @@ def zenoh_config(
         "scouting/gossip/enabled": False,
         "timestamping/enabled": True,
         "transport/link/tx/lease": _LEASE_MS,
+        "transport/unicast/accept_timeout": _LEASE_MS,
+        "transport/unicast/accept_pending": _MOST_PENDING,
         _WAIT: _STALLED_US,
         "transport/shared_memory/enabled": False,
     }

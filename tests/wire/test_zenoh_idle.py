@@ -1,0 +1,68 @@
+"""Connections to zenoh's port that say nothing lock nobody out."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from tests.support.zenoh_peer import zenoh_peer
+from tests.support.zenoh_rig import TOP, rig
+
+MANY = 300
+"""More than zenoh itself lets wait."""
+SOON_S = 3.0
+"""The peer is a new Python, too."""
+
+
+def is_open(one: socket.socket) -> bool:
+    try:
+        return one.recv(1) != b""
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+
+
+@asynccontextmanager
+async def idle_connections(endpoint: str, count: int) -> AsyncIterator[list[socket.socket]]:
+    """So many, which are replaced when they end."""
+    host, port = endpoint.removeprefix("tcp/").rsplit(":", 1)
+    there: list[socket.socket] = []
+
+    async def keep() -> None:
+        while True:
+            for one in [one for one in there if not is_open(one)]:
+                there.remove(one)
+                one.close()
+            while len(there) < count:
+                there.append(socket.create_connection((host, int(port)), timeout=2))
+                there[-1].setblocking(False)
+            await asyncio.sleep(0.02)
+
+    keeping = asyncio.create_task(keep())
+    try:
+        await asyncio.sleep(0.5)
+        yield there
+    finally:
+        keeping.cancel()
+        await asyncio.gather(keeping, return_exceptions=True)
+        for one in there:
+            one.close()
+
+
+async def test_idle_connections_lock_no_client_out() -> None:
+    async with rig(mode="client") as r, idle_connections(r.endpoint, MANY):
+        begin = time.monotonic()
+        async with zenoh_peer(r.endpoint, mode="client") as newcomer:
+            assert (await newcomer.do("get", f"{TOP}/bridge/version"))["values"]
+        assert time.monotonic() - begin < SOON_S
+
+
+async def test_who_says_nothing_is_shown_the_door() -> None:
+    async with rig(mode="client") as r, idle_connections(r.endpoint, 1) as there:
+        first = there[0]
+        await asyncio.sleep(1.5)
+        assert first not in there

@@ -534,3 +534,33 @@ async def test_who_writes_to_made_up_units_washes_nothing_out_of_the_audit_log(
     for line in refused:
         counts[line["user"]] += line.get("count", 1)
     assert counts == {"127.0.0.3": 3000, "127.0.0.4": 1}
+
+
+async def test_a_crowd_from_one_address_pushes_out_itself_alone(plant: Plant):
+    """Also one that owns a drive."""
+    async with serving(plant, max_connections=6) as server, pymodbus(server, "127.0.0.2") as hmi:
+        assert not (await hmi.read_holding_registers(0, count=1, device_id=1)).isError()
+        async with pymodbus(server, "127.0.0.3") as intruder:
+            assert not (await intruder.write_registers(0, [0x047E, 0], device_id=1)).isError()
+            crowd = [
+                await asyncio.open_connection(HOST, server.port, local_addr=("127.0.0.3", 0))
+                for _ in range(20)
+            ]
+            assert not (await hmi.read_holding_registers(0, count=1, device_id=1)).isError()
+            async with pymodbus(server, "127.0.0.4") as other:
+                assert not (await other.read_holding_registers(0, count=1, device_id=1)).isError()
+            for _, writer in crowd:
+                writer.close()
+
+
+async def test_a_crowd_that_says_nothing_leaves_those_alone_who_poll(plant: Plant):
+    """Each connection from another address: no address has more than its share."""
+    async with serving(plant, max_connections=6) as server, pymodbus(server, "127.0.0.2") as hmi:
+        assert not (await hmi.read_holding_registers(0, count=1, device_id=1)).isError()
+        crowd = [
+            await asyncio.open_connection(HOST, server.port, local_addr=(f"127.0.1.{number}", 0))
+            for number in range(1, 21)
+        ]
+        assert not (await hmi.read_holding_registers(0, count=1, device_id=1)).isError()
+        for _, writer in crowd:
+            writer.close()

@@ -6,6 +6,7 @@ import asyncio
 import ipaddress
 import logging
 import socket
+from collections import Counter
 from collections.abc import Callable
 from typing import Final
 
@@ -15,6 +16,7 @@ from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.modbus.dispatch import Dispatcher
 from bridge.northbound.modbus.session import READ_MOST, Session
 from bridge.northbound.pulse import Pulse
+from bridge.northbound.sources import source_of
 from bridge.quietlog import about
 
 _log = logging.getLogger(__name__)
@@ -97,7 +99,7 @@ class ModbusServer:
             )
             return None
         if len(self._sessions) >= self._settings.max_connections:
-            self._make_room()
+            self._make_room(source_of(str(address)))
         self._sessions.add(session)
         shown = f"[{address}]" if address.version == 6 else str(address)
         sets = self._settings.parameters == "write"
@@ -115,18 +117,24 @@ class ModbusServer:
         self._plant.count("modbus_broken_connections", self._clock())
         _log.warning("connection of %s closed: %s", session.address, fault, extra=about(session.host))
 
-    def _make_room(self) -> None:
-        """End the connection that is missed least: idle clients must not lock the PLC out."""
+    def _make_room(self, newcomer: str) -> None:
+        """End the connection that is missed least: one of the address that has the most, so that a crowd
+        pushes out itself; of them one that has said nothing yet, or the one that is idle the longest."""
         owners = [drive.channel.owner for drive in self._plant.drives.values()]
+        crowds = Counter(source_of(session.host) for session in self._sessions)
+        crowds[newcomer] += 1
 
-        def is_missed(session: Session) -> tuple[bool, float]:
-            identity = session.identity
-            return identity is not None and any(map(identity.is_same, owners)), session.heard_at
+        def is_missed(session: Session) -> tuple[bool, int, bool, float]:
+            identity, crowd = session.identity, crowds[source_of(session.host)]
+            # An owner's address has its share before all others, but no more than that.
+            owns = identity is not None and any(map(identity.is_same, owners))
+            has_share = crowd <= max(1, self._settings.max_connections // 2)
+            return owns and has_share, -crowd, session.has_spoken, session.heard_at
 
         idlest = min(self._sessions, key=is_missed)
         self._plant.count("modbus_broken_connections", self._clock())
         _log.warning(
-            "connection of %s closed to make room: there are %d, and it was idle the longest",
+            "connection of %s closed to make room: there are %d, and it is missed least",
             idlest.address,
             len(self._sessions),
             extra=about(idlest.host),

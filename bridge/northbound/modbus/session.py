@@ -59,6 +59,7 @@ class Session(asyncio.BufferedProtocol):
         """Who the hall says it is; None until it is admitted."""
         self.heard_at = float("-inf")
         """When the client last sent something, or connected; in the plant's time."""
+        self.has_spoken = False
         self._transport: asyncio.Transport | None = None
         self._stalled: asyncio.TimerHandle | None = None
         self._scheduled = False
@@ -101,6 +102,7 @@ class Session(asyncio.BufferedProtocol):
 
     def buffer_updated(self, nbytes: int) -> None:
         self.heard_at = now = self._clock()
+        self.has_spoken = True
         received_at = self._inflow.arrive(now, self._pulse.look, crowded=nbytes == READ_MOST)
         self._conversation.receive(memoryview(self._room)[:nbytes], received_at)
         self._go_on()

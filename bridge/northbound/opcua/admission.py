@@ -10,8 +10,6 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import lru_cache
-from ipaddress import IPv6Address, ip_address
 from typing import Final
 
 from bridge.northbound.opcua.notices import Tell
@@ -131,20 +129,3 @@ class Admission:
         self._count("opcua_broken_connections")
         self._tell(kind, visitor.source, detail)
         visitor.close()
-
-
-@lru_cache(1024)
-def source_of(host: str) -> str:
-    """Whom the limits of one address are for: an IPv4 address, or an IPv6 network of 64 bits, because a
-    single machine has all addresses of that."""
-    try:
-        address = ip_address(host.partition("%")[0])
-    except ValueError:
-        return host
-    if not isinstance(address, IPv6Address):
-        return str(address)
-    if address.ipv4_mapped:
-        return str(address.ipv4_mapped)
-    if address.is_loopback:
-        return str(address)
-    return f"{IPv6Address(int(address) >> 64 << 64)}/64"

@@ -15,13 +15,14 @@ from asyncua.ua.ua_binary import uatcp_to_binary
 
 from bridge import clock
 from bridge.command.freshness import Inflow
-from bridge.northbound.opcua.admission import Admission, Stage, Visitor, source_of
+from bridge.northbound.opcua.admission import Admission, Stage, Visitor
 from bridge.northbound.opcua.inbox import Inbox
 from bridge.northbound.opcua.library import StatusCodes, make, status, ua
 from bridge.northbound.opcua.notices import tell
 from bridge.northbound.opcua.session import Server
 from bridge.northbound.opcua.transport import MOST_BEFORE_SESSION, Processor
 from bridge.northbound.pulse import Pulse
+from bridge.northbound.sources import source_of
 
 _MOST_UNREAD: Final = 64
 """Messages that a client which waits for its answers has under way at most."""

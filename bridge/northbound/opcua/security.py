@@ -13,12 +13,12 @@ from cryptography.hazmat.primitives.hashes import SHA1, SHA256
 
 from bridge.command.request import Identity, Role, Source
 from bridge.config import OpcUaTable
-from bridge.northbound.opcua.admission import source_of
 from bridge.northbound.opcua.certificates import TrustedCertificates, fingerprint
 from bridge.northbound.opcua.library import ServiceError, StatusCodes, first_certificate, get, ua
 from bridge.northbound.opcua.logins import PasswordChecks, Verify
 from bridge.northbound.opcua.notices import Tell, tell
 from bridge.northbound.opcua.passwords import ANONYMOUS, check_users, hash_password, verify_password
+from bridge.northbound.sources import source_of
 
 __all__ = [
     "CheckedPolicy",

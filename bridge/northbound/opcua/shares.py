@@ -8,9 +8,9 @@ from typing import Final, Protocol
 
 from asyncua.server.subscription_service import SubscriptionService
 
-from bridge.northbound.opcua.admission import source_of
 from bridge.northbound.opcua.library import ServiceError, StatusCodes, ua
 from bridge.northbound.opcua.subscription import Subscription
+from bridge.northbound.sources import source_of
 
 MOST_SUBSCRIPTIONS: Final = 200
 MOST_OF_SESSION: Final = 50

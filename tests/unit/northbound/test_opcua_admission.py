@@ -13,8 +13,8 @@ from bridge.northbound.opcua.admission import (
     Admission,
     Stage,
     Visitor,
-    source_of,
 )
+from bridge.northbound.sources import source_of
 
 
 class Rig:

@@ -87,17 +87,8 @@ class _Telegrams:
     new: Values
     ending: Ending
     told_at: float
-    begin: float
-    told: int
     repeated: int = 0
     waiting: Entry | None = None
-
-    def may_tell(self, now: float) -> bool:
-        """Whether one more entry of this second is told at once."""
-        if now - self.begin >= 1.0:
-            self.begin, self.told = now, 0
-        self.told += 1
-        return self.told <= AT_ONCE
 
 
 @dataclass(slots=True)
@@ -207,10 +198,8 @@ class AuditTrail:
         if before is None or not before.identity.is_same(entry.identity):
             if before is not None:
                 self._tell_waiting(entry.target, before)
-            self._tell(entry)
-            self._telegrams[entry.target] = _Telegrams(
-                entry.identity, entry.new, entry.ending, entry.time, begin=entry.time, told=1
-            )
+            self._note_other(entry)
+            self._telegrams[entry.target] = _Telegrams(entry.identity, entry.new, entry.ending, entry.time)
             return
         goes_on = _goes_on(before, entry)
         new = {**before.new, **entry.new}
@@ -218,7 +207,7 @@ class AuditTrail:
             before.repeated += 1
             return
         before.new, before.ending = new, entry.ending
-        if not goes_on and before.may_tell(entry.time):
+        if not goes_on and self._share(entry).limit.allows(entry.time):
             self._tell_waiting(entry.target, before)
             self._tell(entry)
             before.told_at = entry.time

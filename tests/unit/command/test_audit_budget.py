@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.command import Action, Code, Identity, Rejection, Request, Source
-from bridge.command.audit import AT_ONCE, REFUSED_EVERY_S, SUMMARY_S, Entry, client_of
+from bridge.command.audit import AT_ONCE, DONE_EVERY_S, REFUSED_EVERY_S, SUMMARY_S, Entry, client_of
 from bridge.command.link import NodeState
 from bridge.northbound.modbus.dispatch import Dispatcher
 from tests.support import sites
@@ -99,6 +99,39 @@ def test_who_makes_things_up_has_one_budget(refuse: Callable[[Hall, int], None])
     assert len(lines) <= AT_ONCE + 60 * minutes / REFUSED_EVERY_S + 2 * (minutes + 1)
     hall.plant.audit.sum_up(hall.now)
     assert sum(entry.count for entry in hall.entries if entry.is_refused) == times, "none is forgotten"
+
+
+def write_and_release(hall: Hall, number: int) -> None:
+    hall.write(SHUT_DOWN, stranger(number))
+    request = Request(stranger(number), FU1, Action.RELEASE_CONTROL)
+    hall.plant.submit(request, hall.now, lambda outcome: None)
+
+
+def take_turns(hall: Hall, number: int) -> None:
+    hall.write((SHUT_DOWN, ENABLE)[number % 2], stranger(1))
+
+
+def new_names(hall: Hall, number: int) -> None:
+    who = Identity(Source.ZENOH, f"c{number}")
+    hall.plant.submit(
+        Request(who, FU1, Action.WRITE, {"control_word": SHUT_DOWN}), hall.now, lambda outcome: None
+    )
+    hall.plant.submit(Request(who, FU1, Action.RELEASE_CONTROL), hall.now, lambda outcome: None)
+
+
+@pytest.mark.parametrize("act", [write_and_release, take_turns, new_names])
+def test_what_one_client_does_with_one_drive_has_a_budget(act: Callable[[Hall, int], None]) -> None:
+    """Accepted: else who may write washes the log of what was done."""
+    hall = Hall()
+    times, minutes, kinds = 6000, 3, 3
+    for number in range(times):
+        act(hall, number)
+        hall.pass_time(60 * minutes / times)
+    lines = len(hall.entries)
+    assert lines <= kinds * (AT_ONCE + 60 * minutes / DONE_EVERY_S + 2 * (minutes + 1))
+    hall.plant.audit.sum_up(hall.now)
+    told = sum(entry.count for entry in hall.entries)
+    assert told == times * (1 if act is take_turns else 2), "none is forgotten"
 
 
 def test_another_clients_refusals_are_told_all_the_same() -> None:

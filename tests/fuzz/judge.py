@@ -1,7 +1,8 @@
 """Whether the bridge bears what is thrown at it. One judge for all protocols.
 
 The processes are the same and alive, their memory does not grow, each exchange of the good clients is
-answered, their drives turn as they say and nobody else's does, the log is short and has no fault of ours.
+answered and soon, their drives turn as they say and nobody else's does, the log is short and has no fault of
+ours.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ import json
 import re
 import statistics
 import time
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -25,10 +28,21 @@ MOST_LINES: Final = 100
 LINES_PER_S: Final = 1.0
 """So many lines may be told at once, and so many a second on top."""
 MOST_GROWTH_MB: Final = 24.0
+MOST_SPIKE_MB: Final = 160.0
+"""At any moment above the beginning. A password alone takes 64 MB while it is checked."""
 WARM_UP: Final = 0.4
 """Part of the time after which memory is to be flat."""
 SILENT_S: Final = 9.0
 """More than the good clients' own patience and the pause between two newcomers."""
+LATE_MS: Final = 500.0
+MOST_LATE: Final = 0.02
+"""Part of a good client's exchanges that may take longer, or be told to try again, while the machine was not
+busy."""
+FEW_LATE: Final = 3
+"""So many may in any case: a newcomer has few exchanges."""
+STARVED: Final = 0.5
+"""Part of the time between two looks for which the main thread of a process of the bridge, or of the good
+clients, was ready and did not run. What takes long then is no fault of the bridge."""
 _PAGE_MB: Final = 4096 / 2**20
 _FAMILIES: Final = {6: "lenze/8400-motec", 7: "stoeber/5000", 8: "cia402/velocity"}
 """Of the nodes that nobody may move."""
@@ -63,7 +77,13 @@ class Figures:
     answers_ms: dict[str, list[float]] = field(default_factory=dict[str, list[float]])
     busy: dict[str, int] = field(default_factory=dict[str, int])
     """How many of them were answered by "too late, try again"."""
+    judged: dict[str, int] = field(default_factory=dict[str, int])
+    """How many began when the machine was not busy,"""
+    late: dict[str, int] = field(default_factory=dict[str, int])
+    """and how many of those were told to try again, or took long."""
     memory_mb: dict[int, list[float]] = field(default_factory=dict[int, list[float]])
+    peak_mb: dict[int, float] = field(default_factory=dict[int, float])
+    """What each has had at most at any moment."""
     lines: int = 0
 
     def told(self) -> list[str]:
@@ -73,13 +93,14 @@ class Figures:
             p50, p99 = (ordered[int((len(ordered) - 1) * part)] for part in (0.5, 0.99))
             told.append(
                 f"good client on {name}: {len(times)} exchanges, {self.busy.get(name, 0)} told to try again; "
+                f"{self.late.get(name, 0)} of {self.judged.get(name, 0)} while the machine was not busy were late; "
                 f"p50 {p50:.1f} ms, p99 {p99:.1f} ms, max {ordered[-1]:.1f} ms"
             )
-        for place, samples in enumerate(self.memory_mb.values()):
+        for place, (pid, samples) in enumerate(self.memory_mb.items()):
             who = "bus process" if place == 0 else f"front {place}"
             told.append(
                 f"memory of the {who}: {samples[0]:.1f} MB at the beginning, "
-                f"{max(samples):.1f} MB at most, {samples[-1]:.1f} MB at the end; "
+                f"{self.peak_mb[pid]:.1f} MB at most, {samples[-1]:.1f} MB at the end; "
                 f"{growth_mb(samples):+.1f} MB after the warm-up"
             )
         told.append(f"log: {self.lines} lines")
@@ -99,6 +120,9 @@ class Judge:
         self._words = Tail(rig.words)
         self._audit = Tail(rig.audit)
         self._began = time.monotonic()
+        self._waits = Waits([*self._pids, rig.good.popen.pid])
+        self._busy_until = float("-inf")
+        self._first_mb = {pid: restart_peak_mb(pid) for pid in self._pids}
         self._heard: dict[str, float] = {}
         self._enabling = {node: load_family(name).control_word.enabling for node, name in _FAMILIES.items()}
         # What went on while this was set up is no matter of ours.
@@ -106,9 +130,11 @@ class Judge:
 
     def look(self) -> list[str]:
         """What is wrong now."""
+        if self._waits.is_busy():
+            self._busy_until = time.monotonic()
         faults = [*self._processes()]
         if not faults:
-            self._measure_memory()
+            faults += self._measure_memory()
         faults += [*self._look_at_log(), *self._look_at_exchanges(), *self._look_at_words()]
         return faults + self._look_at_audit()
 
@@ -122,6 +148,13 @@ class Judge:
             grown = growth_mb(samples)
             if grown > MOST_GROWTH_MB:
                 faults.append(f"memory of process {pid} is not flat: {grown:.1f} MB more after the warm-up")
+        for name, late in self.figures.late.items():
+            judged = self.figures.judged[name]
+            if late > max(FEW_LATE, MOST_LATE * judged):
+                faults.append(
+                    f"good client on {name}: {late} of {judged} exchanges on a machine that was not busy "
+                    f"were told to try again, or took more than {LATE_MS:g} ms"
+                )
         return faults
 
     def _processes(self) -> list[str]:
@@ -134,14 +167,21 @@ class Judge:
             return [f"the good clients have ended: {self._rig.good.output()[-2000:]}"]
         return []
 
-    def _measure_memory(self) -> None:
+    def _measure_memory(self) -> list[str]:
+        faults: list[str] = []
         for pid in self._pids:
             try:
                 pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
+                peak = peak_mb(pid)
             except (OSError, IndexError):
                 # It has just ended: the next look says so.
                 continue
             self.figures.memory_mb.setdefault(pid, []).append(pages * _PAGE_MB)
+            self.figures.peak_mb[pid] = peak
+            if peak - self._first_mb[pid] > MOST_SPIKE_MB:
+                first = self._first_mb[pid]
+                faults.append(f"memory of process {pid}: {first:.1f} MB before, {peak:.1f} MB at most")
+        return faults
 
     def _look_at_log(self) -> list[str]:
         lines = self._log.take()
@@ -156,13 +196,17 @@ class Judge:
         faults: list[str] = []
         now = time.monotonic()
         for line in self._exchanges.take():
-            _, name, took_ms, verdict = line.split(";", 3)
+            ended_at, name, took_ms, verdict = line.split(";", 3)
             self._heard[name] = now
             self.figures.answers_ms.setdefault(name, []).append(float(took_ms))
             if verdict == "busy":
                 self.figures.busy[name] = self.figures.busy.get(name, 0) + 1
             elif verdict != "ok":
                 faults.append(f"good client on {name}: {verdict} after {took_ms} ms")
+            if float(ended_at) - float(took_ms) / 1000 >= self._busy_until:
+                is_late = verdict == "busy" or float(took_ms) > LATE_MS
+                self.figures.judged[name] = self.figures.judged.get(name, 0) + 1
+                self.figures.late[name] = self.figures.late.get(name, 0) + is_late
         silent = [name for name, heard in self._heard.items() if now - heard > SILENT_S]
         return faults + [f"good client on {name}: no exchange for {SILENT_S:g} s" for name in silent]
 
@@ -192,6 +236,30 @@ class Judge:
         return [fault for line in lines if (fault := unrightful(line))]
 
 
+class Waits:
+    """Whether processes got the CPU: for how long their main threads were ready and did not run."""
+
+    def __init__(self, pids: Sequence[int]) -> None:
+        self._pids = pids
+        self._at = time.monotonic()
+        self._before = self._accounts()
+
+    def is_busy(self) -> bool:
+        """Whether one of them has waited for too much of the time since this was asked last."""
+        begin, self._at = self._at, time.monotonic()
+        before, self._before = self._before, self._accounts()
+        longest = max((now - before.get(pid, now) for pid, now in self._before.items()), default=0.0)
+        return longest > STARVED * (self._at - begin)
+
+    def _accounts(self) -> dict[int, float]:
+        accounts: dict[int, float] = {}
+        for pid in self._pids:
+            with suppress(OSError, IndexError):
+                words = Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii").split()
+                accounts[pid] = int(words[1]) / 1e9
+        return accounts
+
+
 def unrightful(line: dict[str, Any]) -> str:
     """What is wrong with a line of the audit log; nothing with what was refused, or asked by who may."""
     if line["code"] != "ok" or line["source"] in ("none", "local"):
@@ -204,6 +272,21 @@ def unrightful(line: dict[str, Any]) -> str:
     if target.split("/")[0] in _NODES and line["action"] in moves:
         return f"{line['source']}:{line['user']} was let do {line['action']} on {target}, which is nobody's"
     return ""
+
+
+def peak_mb(pid: int) -> float:
+    """What a process has had at most; 0 where it has ended."""
+    for line in Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines():
+        if line.startswith("VmHWM:"):
+            return int(line.split()[1]) / 1024
+    return 0.0
+
+
+def restart_peak_mb(pid: int) -> float:
+    """The same from now on, and what it is now (proc_pid_clear_refs(5))."""
+    with suppress(OSError):
+        Path(f"/proc/{pid}/clear_refs").write_text("5", encoding="ascii")
+    return peak_mb(pid)
 
 
 def growth_mb(samples: list[float]) -> float:

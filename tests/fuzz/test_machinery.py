@@ -3,6 +3,8 @@ what was thrown at it is kept and kills it again."""
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -31,7 +33,9 @@ while True:
         order.unlink()
         if text == "die":
             sys.exit(1)
-        if text == "lose the front":
+        if text == "a spike":
+            len(b"x" * 300_000_000)
+        elif text == "lose the front":
             front.kill()
             front.wait()
         else:
@@ -87,8 +91,9 @@ def faults_of(judge: Judge, limit_s: float = 10.0) -> str:
         ("Traceback (most recent call last):", "log: Traceback"),
         ("WARNING Task exception was never retrieved", "never retrieved"),
         ("\n".join(["INFO a line"] * 500), "the log has"),
+        ("a spike", "MB at most"),
     ],
-    ids=["a lost front", "a lost bus process", "a traceback", "a lost task", "a flood"],
+    ids=["a lost front", "a lost bus process", "a traceback", "a lost task", "a flood", "a spike"],
 )
 def test_what_a_bridge_must_not_do_is_seen(tmp_path: Path, done: str, seen: str) -> None:
     with faulty(tmp_path) as rig:
@@ -121,6 +126,40 @@ def test_what_must_not_happen_to_others_is_seen(tmp_path: Path, file: str, line:
         with path.open("a", encoding="ascii") as notes:
             notes.write(f"{line}\n")
         assert seen in faults_of(judge)
+
+
+@pytest.mark.parametrize("exchange", ["5.0;busy", "800.0;ok"], ids=["told to try again", "slow"])
+@pytest.mark.parametrize("is_busy", [False, True], ids=["not busy", "busy"])
+def test_late_answers_are_a_fault_where_the_machine_was_not_busy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exchange: str, is_busy: bool
+) -> None:
+    monkeypatch.setattr(judges, "STARVED", -1.0 if is_busy else float("inf"))
+    with faulty(tmp_path) as rig:
+        judge = Judge(rig)
+        with rig.exchanges.open("a", encoding="ascii") as notes:
+            notes.write(f"{time.monotonic()};opcua, newly connected;{exchange}\n" * 20)
+        time.sleep(0.5)
+        faults = judge.conclude()
+    assert [fault for fault in faults if "20 of 20 exchanges" in fault] == faults
+    assert len(faults) == (not is_busy)
+
+
+def test_who_waits_for_the_cpu_is_known() -> None:
+    """By the account of the kernel: three that only compute have two thirds of a CPU too few."""
+    here = min(os.sched_getaffinity(0))
+    spin = f"import os; os.sched_setaffinity(0, {{{here}}})\nwhile True: pass"
+    spinning = [subprocess.Popen([sys.executable, "-c", spin]) for _ in range(3)]
+    try:
+        waits = judges.Waits([one.pid for one in spinning])
+        time.sleep(1.0)
+        assert waits.is_busy()
+    finally:
+        for one in spinning:
+            one.kill()
+            one.wait()
+    idle = judges.Waits([os.getpid()])
+    time.sleep(1.0)
+    assert not idle.is_busy()
 
 
 def test_good_clients_that_fall_silent_are_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -101,11 +101,16 @@ class _Share:
     left_out: int = 0
     last: Entry | None = None
 
+    def allows(self, now: float) -> bool:
+        """Whether one more is told at once."""
+        self.is_new, self.is_used = False, True
+        return self.limit.allows(now)
+
     def takes(self, entry: Entry) -> bool:
         """Whether it is told now; else it is counted."""
-        is_new, self.is_new, self.is_used = self.is_new, False, True
         # The first of its kind is told whatever else the client was refused.
-        if self.limit.allows(entry.time) or is_new:
+        is_new = self.is_new
+        if self.allows(entry.time) or is_new:
             return True
         self.left_out += entry.count
         self.last = entry
@@ -207,7 +212,7 @@ class AuditTrail:
             before.repeated += 1
             return
         before.new, before.ending = new, entry.ending
-        if not goes_on and self._share(entry).limit.allows(entry.time):
+        if not goes_on and self._share(entry).allows(entry.time):
             self._tell_waiting(entry.target, before)
             self._tell(entry)
             before.told_at = entry.time

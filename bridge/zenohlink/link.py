@@ -332,6 +332,10 @@ class ZenohLink:
 
         self.submit(declare)
 
+    def follow_strangers(self, handler: Callable[[list[str]], None]) -> None:
+        """``handler`` is given the addresses of connections that came to no session."""
+        self._worker.on_strangers = lambda places: self._inbox.take_in(partial(handler, places))
+
     def declare_token(self, key: str) -> None:
         """Hold a liveliness token until ``drop_token``."""
 

@@ -17,9 +17,9 @@ from bridge.zenohlink.message import sentence
 _LEASE_MS: Final = 1000
 """A peer that falls silent is noticed within this time, and one that does not come to a session in it is
 closed; zenoh's default is 10 s for both."""
-_MOST_PENDING: Final = 1000
+_MOST_PENDING: Final = 500
 """Connections without a session. zenoh closes what comes on top: with the 100 of its default a hundred that
-say nothing lock everybody out."""
+say nothing lock everybody out. Each is a file of the bus process, which often has no more than 1024."""
 _STALLED_US: Final = 500_000
 """How long a query or a reply waits for a peer that does not read before the connection is closed."""
 _STALLED_AMONG_OTHERS_US: Final = 100_000
@@ -44,9 +44,11 @@ def zenoh_config(
     """Settings of a session that finds nobody by itself and notices a silent peer within a second.
 
     ``users`` is our own user, its password, and the path of a file with a line ``user:password`` for
-    each who may connect. ``access`` is zenoh's ``access_control``. With ``prompt``, what answers a query
-    never waits and is dropped where the asker does not read, except on the keys of ``waiting``; on those of
-    ``prompt``, which may be among them, it does not wait either and goes ahead of published values.
+    each who may connect. ``access`` is zenoh's ``access_control``.
+
+    With ``prompt``, answers are dropped where the asker does not read. On the keys of ``prompt`` they go
+    ahead of published values. On those of ``waiting`` that are not among ``prompt``, they wait for the asker
+    instead.
 
     Raises Unavailable where an endpoint is not one.
     """

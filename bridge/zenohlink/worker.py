@@ -9,7 +9,9 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from queue import SimpleQueue
+from contextlib import suppress
+from functools import partial
+from queue import Empty, SimpleQueue
 from typing import Final, Protocol
 
 import zenoh
@@ -17,11 +19,14 @@ import zenoh
 from bridge.zenohlink.lane import Job, Lane
 from bridge.zenohlink.message import sentence
 from bridge.zenohlink.sockets import close_without_waiting
+from bridge.zenohlink.strangers import Strangers
 
 _log = logging.getLogger(__name__)
 
 _LANES_END_S: Final = 1.0
 """How long a closed session's lanes may take to notice it."""
+_LOOK_S: Final = 1.0
+"""Between two looks for connections that come to no session."""
 
 ZENOH_ERRORS: Final = (zenoh.ZError, RuntimeError, ValueError, TypeError, AttributeError)
 """What zenoh's calls raise: ZError for what goes wrong, the others for what is closed meanwhile."""
@@ -56,8 +61,12 @@ class Worker:
         self.declared: list[Declared] = []
         """What is undeclared before the session is closed; only jobs touch it."""
         self.tokens: dict[str, zenoh.LivelinessToken] = {}
+        self.on_strangers: Callable[[list[str]], object] = lambda _: None
+        """Is told, on the worker's thread, whose connections came to no session."""
         self._config = config
         self._is_for_strangers = is_for_strangers
+        self._strangers = Strangers()
+        self._look_at = time.monotonic()
         self._opened = opened
         self._closed = closed
         self._jobs: SimpleQueue[Job] = SimpleQueue()
@@ -129,17 +138,36 @@ class Worker:
             self._try(lambda: self._watch_links(session))
         try:
             while not self.is_stopping:
-                job = self._jobs.get()
-                self._try(lambda job=job: job(session))
+                self._do_next(session)
         finally:
             self._close(session)
 
+    def _do_next(self, session: zenoh.Session) -> None:
+        with suppress(Empty):
+            job = self._jobs.get(timeout=_LOOK_S if self._is_for_strangers else None)
+            self._try(lambda: job(session))
+        if self._is_for_strangers and time.monotonic() >= self._look_at:
+            self._try(self._settle_sockets)
+
     def _watch_links(self, session: zenoh.Session) -> None:
-        def on_link(_: zenoh.LinkEvent) -> None:
-            self.do(_settle_sockets)
+        def on_link(event: zenoh.LinkEvent) -> None:
+            _, _, place = str(event.link.dst).partition("/")
+            self.do(partial(self._on_link, place, event.kind == zenoh.SampleKind.PUT))
 
         callback = zenoh.handlers.Callback(on_link, indirect=False)
         self.declared.append(session.info.declare_link_events_listener(callback, history=True))
+
+    def _on_link(self, place: str, is_there: bool, _: zenoh.Session) -> None:
+        self._strangers.on_link(place, is_there=is_there)
+        self._settle_sockets()
+
+    def _settle_sockets(self) -> None:
+        now = time.monotonic()
+        self._look_at = now + _LOOK_S
+        self._strangers.on_connections(close_without_waiting(), now)
+        strangers = self._strangers.take(now)
+        if strangers:
+            self.on_strangers(strangers)
 
     def _close(self, session: zenoh.Session) -> None:
         with self._lanes_lock:
@@ -159,7 +187,3 @@ class Worker:
             call()
         except Exception as error:  # noqa: BLE001 - one bad job must not end all others
             self.complain(error)
-
-
-def _settle_sockets(_: zenoh.Session) -> None:
-    close_without_waiting()

@@ -36,14 +36,26 @@ def test_every_tcp_connection_is_found_and_no_other_file_is_touched() -> None:
         for connection in (client, accepted):
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, TEN_SECONDS)
         before = files()
-        assert close_without_waiting() == 2
-        assert close_without_waiting() == 0
+        ends = {"{}:{}".format(*connection.getpeername()) for connection in (client, accepted)}
+        found = close_without_waiting()
+        assert len(found) == 2
+        assert set(found) == ends, "where they lead"
+        assert close_without_waiting() == []
         assert files() == before, "nothing is left open"
         assert not any(map(lingers, (client, accepted)))
         client.sendall(b"still there")
         assert accepted.recv(20) == b"still there"
         local.send(b"x")
         assert remote.recv(1) == b"x"
+
+
+def test_an_ipv6_connection_is_named_as_zenoh_does() -> None:
+    with (
+        socket.create_server(("::1", 0), family=socket.AF_INET6) as server,
+        socket.create_connection(server.getsockname()[:2]) as client,
+    ):
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, TEN_SECONDS)
+        assert close_without_waiting() == [f"[::1]:{server.getsockname()[1]}"]
 
 
 def test_no_copy_is_left_whatever_fails(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,8 +8,11 @@ import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from tests.support.zenoh_peer import zenoh_peer
-from tests.support.zenoh_rig import TOP, rig
+import pytest
+
+from bridge.zenohlink.strangers import PATIENCE_S
+from tests.support.zenoh_peer import until, zenoh_peer
+from tests.support.zenoh_rig import TOP, Rig, rig
 
 MANY = 300
 """More than zenoh itself lets wait."""
@@ -25,6 +28,9 @@ def is_open(one: socket.socket) -> bool:
     except OSError:
         return False
 
+
+def broken(r: Rig) -> int:
+    return int(r.plant.image.read("bridge/zenoh_broken_connections").value)
 
 @asynccontextmanager
 async def idle_connections(endpoint: str, count: int) -> AsyncIterator[list[socket.socket]]:
@@ -66,3 +72,17 @@ async def test_who_says_nothing_is_shown_the_door() -> None:
         first = there[0]
         await asyncio.sleep(1.5)
         assert first not in there
+
+
+async def test_who_says_nothing_is_counted_and_named(caplog: pytest.LogCaptureFixture) -> None:
+    async with rig(mode="client") as r, idle_connections(r.endpoint, 20):
+        await until(lambda: broken(r) >= 20, "they are counted")
+    sources = {vars(line)["line_source"] for line in caplog.records if "no zenoh session" in line.message}
+    assert sources == {"127.0.0.1"}
+
+
+async def test_who_comes_to_a_session_is_no_stranger(caplog: pytest.LogCaptureFixture) -> None:
+    async with rig(mode="client") as r, zenoh_peer(r.endpoint):
+        await asyncio.sleep(PATIENCE_S + 2.0)
+        assert broken(r) == 0
+    assert not [line for line in caplog.records if "no zenoh session" in line.message]

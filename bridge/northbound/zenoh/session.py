@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Final
@@ -92,6 +93,7 @@ class ZenohServer:
                 self._link.declare_subscriber(self._keys.own_commands, self._on_put, from_others=True)
         self._link.declare_token(self._keys.bridge_token)
         self._link.follow_endings(lambda: self._plant.count("zenoh_broken_connections", self._clock()))
+        self._link.follow_strangers(self._on_strangers)
         self._plant.on_event(self._on_event)
         self._tick()
 
@@ -149,6 +151,12 @@ class ZenohServer:
     def _on_event(self, event: Event) -> None:
         payload = keys.event_json(event, self._epoch(event.time))
         self._link.send(Message(self._keys.event_key(event), payload, keys.JSON))
+
+    def _on_strangers(self, places: list[str]) -> None:
+        """They said nothing, or zenoh has refused them."""
+        self._plant.count("zenoh_broken_connections", self._clock(), len(places))
+        for host, count in Counter(place.rpartition(":")[0].strip("[]") for place in places).items():
+            _log.warning("connections of %s came to no zenoh session: %d", host, count, extra=about(host))
 
     # in
 

@@ -40,7 +40,7 @@ class AuditFile:
         self._file: int | None = None
         self._size = 0
         self._try_at = 0.0
-        self._thread = threading.Thread(target=self._run, name="audit log", daemon=True)
+        self._thread = threading.Thread(target=self._run, name=self.path.name, daemon=True)
 
     def start(self) -> None:
         self._thread.start()

@@ -49,7 +49,7 @@ class NodeView:
         self._errors = text
 
     def resets(self, why: str, now: float) -> None:
-        self._tell(Kind.OWNER, 500, f"reset communication by the bridge, once: {why}", now)
+        self._tell(Kind.CONFIGURATION, 500, f"reset communication by the bridge, once: {why}", now)
 
     def restarted(self, now: float) -> None:
         self._tell(Kind.NODE_LOST, 800, "the node has restarted", now)

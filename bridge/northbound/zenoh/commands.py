@@ -44,9 +44,9 @@ MALFORMED: Final = "malformed"
 _LONGEST: Final = 4096
 _PARAMETER: Final = "/parameter/"
 _CACHED_MS: Final = 2**31
+"""As old as can be: whatever was read last."""
 _LONGEST_MS: Final = 2**32 - 1
 """As OPC UA's UInt32 argument."""
-"""As old as can be: whatever was read last."""
 _HEXADECIMAL: Final = re.compile(r"0[xX][0-9A-Fa-f]{1,8}")
 
 

@@ -39,6 +39,13 @@ _log = logging.getLogger(__name__)
 _PUTS_AT_ONCE: Final = 100
 """Puts between two other jobs of the worker: with a stalled subscriber each takes up to 1 ms."""
 
+Share = Callable[[str, bytes | None], str]
+"""Whose turn a query or a sample takes on its way to the loop, by key and payload (``Inbox``)."""
+
+
+def _one_for_all(key: str, payload: bytes | None) -> str:
+    return ""
+
 
 @dataclass(frozen=True, slots=True)
 class Asked:
@@ -269,7 +276,9 @@ class ZenohLink:
 
     # declaring
 
-    def declare_queryable(self, key: str, handler: Callable[[Asked], None]) -> None:
+    def declare_queryable(
+        self, key: str, handler: Callable[[Asked], None], share: Share = _one_for_all
+    ) -> None:
         """Answer queries on ``key``. A flood of them ends before it reaches the loop."""
 
         def declare(session: zenoh.Session) -> None:
@@ -281,7 +290,7 @@ class ZenohLink:
                 key, now = str(query.key_expr), time.monotonic()
                 lane = prompt if self._is_prompt(key) else other
                 asked = Asked(key, payload, attachment, parameters, now, query, self, lane)
-                if not self._inbox.take_in(partial(handler, asked)):
+                if not self._inbox.take_in(partial(handler, asked), share(key, payload)):
                     # Not here: the end of a query may wait for the asker, and this thread reads for others.
                     lane.do(lambda _: query.drop())
 
@@ -292,14 +301,20 @@ class ZenohLink:
         self.submit(declare)
 
     def declare_subscriber(
-        self, key: str, handler: Callable[[Message], None], *, from_others: bool = False
+        self,
+        key: str,
+        handler: Callable[[Message], None],
+        share: Share = _one_for_all,
+        *,
+        from_others: bool = False,
     ) -> None:
         """Follow ``key``; ``from_others`` leaves out what this session itself publishes."""
         origin = zenoh.Locality.REMOTE if from_others else zenoh.Locality.ANY
 
         def on_sample(sample: zenoh.Sample) -> None:
             if sample.kind == zenoh.SampleKind.PUT:
-                self._inbox.take_in(partial(handler, to_message(sample)))
+                message = to_message(sample)
+                self._inbox.take_in(partial(handler, message), share(message.key, message.payload))
 
         def declare(session: zenoh.Session) -> None:
             callback = zenoh.handlers.Callback(on_sample, indirect=False)

@@ -88,6 +88,14 @@ class KeySpace:
         tail = self.tail(key)
         return _owner(tail) in self._owners or tail.startswith("@/controller/")
 
+    def share(self, key: str, payload: bytes | None) -> str:
+        """Whose turn a query or put takes while others wait. zenoh does not tell who asks, but a user has
+        keys of his own; and who reads is not to crowd out who commands."""
+        words = self.tail(key).split("/")
+        if words[:2] == ["@", "controller"]:
+            return "/".join(words[:3])
+        return "commands" if payload is not None or "command" in words else "reads"
+
     def own_keys(self, name: str) -> str:
         return f"{self.top}/{own_keys(name)}"
 

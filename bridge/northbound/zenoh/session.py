@@ -12,6 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import zenoh
@@ -35,7 +36,9 @@ _log = logging.getLogger(__name__)
 _POINTS_PER_TICK: Final = 500
 _REPLIES_AT_ONCE: Final = 200
 _GETS_AT_ONCE: Final = 16
-"""Gets with wildcards that are answered side by side; further ones are told to come again."""
+"""Gets with wildcards that are answered side by side."""
+_SLOW_GET_S: Final = 5.0
+"""After this time one of them makes room for another; until then further ones are told to come again."""
 
 
 class ZenohServer:
@@ -64,7 +67,8 @@ class ZenohServer:
         self._askers = Askers()
         self._feed = plant.image.feed()
         self._present: set[str] = set()
-        self._gets: set[asyncio.Task[None]] = set()
+        self._gets: dict[asyncio.Task[None], float] = {}
+        """Since when they are answered, the oldest first."""
         self._tick_timer: asyncio.TimerHandle | None = None
         self._was_started = False
 
@@ -84,14 +88,15 @@ class ZenohServer:
             listen = ", ".join(self._settings.listen)
             raise Unavailable(f"{error} (is another bridge running? [zenoh] listen = {listen})") from None
         self._pulse.start()
-        self._link.declare_queryable(self._keys.everything, self._on_query)
+        space, share = self._keys, self._keys.share
+        self._link.declare_queryable(space.everything, self._on_query, share)
         if self._settings.accept_put:
-            self._link.declare_subscriber(self._keys.commands, self._on_put, from_others=True)
+            self._link.declare_subscriber(space.commands, self._on_put, share, from_others=True)
         if self._users.are_proved:
-            self._link.declare_queryable(self._keys.controllers, self._on_query)
+            self._link.declare_queryable(space.controllers, self._on_query, share)
             if self._settings.accept_put:
-                self._link.declare_subscriber(self._keys.own_commands, self._on_put, from_others=True)
-        self._link.declare_token(self._keys.bridge_token)
+                self._link.declare_subscriber(space.own_commands, self._on_put, share, from_others=True)
+        self._link.declare_token(space.bridge_token)
         self._link.follow_endings(lambda: self._plant.count("zenoh_broken_connections", self._clock()))
         self._link.follow_strangers(self._on_strangers)
         self._plant.on_event(self._on_event)
@@ -176,22 +181,36 @@ class ZenohServer:
             asked.finish()
         elif not is_pattern:
             _refuse(asked, BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}"))
-        elif len(self._gets) >= _GETS_AT_ONCE:
+        elif not self._has_room_for_get():
             _refuse(asked, BadCommand("busy", "too many gets with wildcards at once; ask again"))
         else:
             task = asyncio.get_running_loop().create_task(self._answer_get(asked.apart()))
-            self._gets.add(task)
-            task.add_done_callback(self._gets.discard)
+            self._gets[task] = self._clock()
+            task.add_done_callback(lambda task: self._gets.pop(task, None))
+
+    def _has_room_for_get(self) -> bool:
+        """Who reads slowly must not keep all others waiting."""
+        if len(self._gets) < _GETS_AT_ONCE:
+            return True
+        oldest, since = next(iter(self._gets.items()))
+        if self._clock() - since < _SLOW_GET_S:
+            return False
+        del self._gets[oldest]
+        oldest.cancel()
+        return True
 
     async def _answer_get(self, asked: Asked) -> None:
         """The present values of all points that match, a portion at a time."""
+        # Part of them must not look like all.
+        end = partial(_refuse, asked, BadCommand("busy", "others wait and this is read slowly; ask for less"))
         try:
             for portion in self._matching(zenoh.KeyExpr(asked.key)):
                 at_zero_ns = self._epoch(0.0)
                 asked.send([self._render(index, at_zero_ns) for index in portion])
                 await asked.settle()
+            end = asked.finish
         finally:
-            asked.finish()
+            end()
 
     def _matching(self, wanted: zenoh.KeyExpr) -> Iterator[list[int]]:
         for start in range(0, len(self._keys.keys), _REPLIES_AT_ONCE):

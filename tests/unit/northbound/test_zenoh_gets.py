@@ -1,0 +1,80 @@
+"""Gets with wildcards have so many places, which nobody keeps for ever."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from typing import Any, cast
+
+from bridge.config import ZenohTable
+from bridge.northbound.zenoh import ZenohServer
+from tests.support.zenoh_site import epoch, make_plant
+
+PLACES = 16
+
+
+class Get:
+    """Is read by nobody until it is told to be."""
+
+    def __init__(self) -> None:
+        self.key = "drives/demo/**"
+        self.payload = self.attachment = None
+        self.parameters = ""
+        self.received_at = 100.0
+        self.said: list[str] = []
+        self.is_read = asyncio.Event()
+
+    def apart(self) -> Get:
+        return self
+
+    def send(self, messages: object) -> None:
+        self.said.append("values")
+
+    async def settle(self) -> None:
+        await self.is_read.wait()
+
+    def finish(self) -> None:
+        self.said.append("end")
+
+    def fail(self, payload: bytes, encoding: str) -> None:
+        self.said.append(json.loads(payload)["code"])
+
+
+class Hall:
+    def __init__(self) -> None:
+        self.now = 100.0
+        self._server = ZenohServer(make_plant(), ZenohTable(), "demo", lambda: self.now, epoch)
+
+    async def ask(self) -> Get:
+        get = Get()
+        self._server._on_query(cast(Any, get))
+        for _ in range(5):
+            await asyncio.sleep(0)
+        return get
+
+
+async def test_a_get_that_is_read_slowly_makes_room_and_says_so() -> None:
+    hall = Hall()
+    slow = [await hall.ask() for _ in range(PLACES)]
+    assert (await hall.ask()).said == ["busy"], "all of them are young"
+    hall.now += 10.0
+    newcomers = [await hall.ask() for _ in range(2)]
+    for get in newcomers:
+        assert get.said == ["values"]
+    for get in slow[:2]:
+        assert get.said == ["values", "busy"], "part of the values must not look like all"
+    assert all(get.said == ["values"] for get in slow[2:])
+    for get in (*slow[2:], *newcomers):
+        get.is_read.set()
+    await asyncio.sleep(0.01)
+    assert all(get.said[-1] == "end" for get in (*slow[2:], *newcomers))
+
+
+async def test_a_slow_get_is_answered_in_whole_where_nobody_else_wants_its_place() -> None:
+    hall = Hall()
+    slow = [await hall.ask() for _ in range(PLACES)]
+    hall.now += 1000.0
+    for get in slow:
+        get.is_read.set()
+    await asyncio.sleep(0.01)
+    assert all(get.said[-1] == "end" for get in slow)

@@ -12,20 +12,21 @@ _MORE: Final = re.compile(r"%[^\]]*|[?#].*")
 
 
 class Strangers:
-    """Places are the other ends of connections, ``10.0.0.1:40000`` or ``[fe80::1]:40000``."""
+    """Places are the other ends of connections, ``10.0.0.1:40000`` or ``[fe80::1]:40000``. ``came`` may be
+    called from another thread."""
 
     def __init__(self) -> None:
         self._links: set[str] = set()
         self._waiting: dict[str, float] = {}
 
-    def on_link(self, place: str, *, is_there: bool) -> None:
-        """A session has a connection to this place, or has it no longer."""
+    def came(self, place: str) -> None:
+        """A session has a connection to this place."""
         place = _bare(place)
-        if is_there:
-            self._links.add(place)
-            self._waiting.pop(place, None)
-        else:
-            self._links.discard(place)
+        self._links.add(place)
+        self._waiting.pop(place, None)
+
+    def went(self, place: str) -> None:
+        self._links.discard(_bare(place))
 
     def on_connections(self, places: Iterable[str], now: float) -> None:
         """These are new."""
@@ -33,10 +34,10 @@ class Strangers:
 
     def take(self, now: float) -> list[str]:
         """Those that have had their time, each once."""
-        gone = [place for place, since in self._waiting.items() if now - since >= PATIENCE_S]
+        gone = [place for place, since in tuple(self._waiting.items()) if now - since >= PATIENCE_S]
         for place in gone:
-            del self._waiting[place]
-        return gone
+            self._waiting.pop(place, None)
+        return [place for place in gone if place not in self._links]
 
 
 def _bare(place: str) -> str:

@@ -10,7 +10,6 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Final, Protocol
 
@@ -152,14 +151,14 @@ class Worker:
     def _watch_links(self, session: zenoh.Session) -> None:
         def on_link(event: zenoh.LinkEvent) -> None:
             _, _, place = str(event.link.dst).partition("/")
-            self.do(partial(self._on_link, place, event.kind == zenoh.SampleKind.PUT))
+            if event.kind == zenoh.SampleKind.PUT:
+                self._strangers.came(place)  # now: jobs may be late
+                self.do(lambda _: self._settle_sockets())
+            else:
+                self.do(lambda _: self._strangers.went(place))
 
         callback = zenoh.handlers.Callback(on_link, indirect=False)
         self.declared.append(session.info.declare_link_events_listener(callback, history=True))
-
-    def _on_link(self, place: str, is_there: bool, _: zenoh.Session) -> None:
-        self._strangers.on_link(place, is_there=is_there)
-        self._settle_sockets()
 
     def _settle_sockets(self) -> None:
         now = time.monotonic()

@@ -32,6 +32,7 @@ def is_open(one: socket.socket) -> bool:
 def broken(r: Rig) -> int:
     return int(r.plant.image.read("bridge/zenoh_broken_connections").value)
 
+
 @asynccontextmanager
 async def idle_connections(endpoint: str, count: int) -> AsyncIterator[list[socket.socket]]:
     """So many, which are replaced when they end."""

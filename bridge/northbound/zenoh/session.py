@@ -158,7 +158,7 @@ class ZenohServer:
         self._link.send(Message(self._keys.event_key(event), payload, keys.JSON))
 
     def _on_strangers(self, places: list[str]) -> None:
-        """They said nothing, or zenoh has refused them."""
+        """Silent, or not what zenoh lets in."""
         self._plant.count("zenoh_broken_connections", self._clock(), len(places))
         for host, count in Counter(place.rpartition(":")[0].strip("[]") for place in places).items():
             _log.warning("connections of %s came to no zenoh session: %d", host, count, extra=about(host))

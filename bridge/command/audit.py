@@ -195,14 +195,14 @@ class AuditTrail:
             telegrams = self._telegrams.pop(entry.target, None) if entry.ending.code == Code.OK else None
             if telegrams is not None:
                 # What follows a stop or a release is no repetition of what went before it.
-                self._tell_waiting(entry.target, telegrams)
+                self._tell_waiting(entry.target, telegrams, self._note_other)
             self._note_other(entry)
 
     def _note_telegram(self, entry: Entry) -> None:
         before = self._telegrams.get(entry.target)
         if before is None or not before.identity.is_same(entry.identity):
             if before is not None:
-                self._tell_waiting(entry.target, before)
+                self._tell_waiting(entry.target, before, self._note_other)
             self._note_other(entry)
             self._telegrams[entry.target] = _Telegrams(entry.identity, entry.new, entry.ending, entry.time)
             return
@@ -213,7 +213,7 @@ class AuditTrail:
             return
         before.new, before.ending = new, entry.ending
         if not goes_on and self._share(entry).allows(entry.time):
-            self._tell_waiting(entry.target, before)
+            self._tell_waiting(entry.target, before, self._tell)
             self._tell(entry)
             before.told_at = entry.time
             return
@@ -221,18 +221,18 @@ class AuditTrail:
             before.repeated += 1
         before.waiting = entry
         if entry.time - before.told_at >= SETPOINTS_S:
-            self._tell_waiting(entry.target, before)
+            self._tell_waiting(entry.target, before, self._tell)
 
-    def _tell_waiting(self, target: str, telegrams: _Telegrams) -> None:
+    def _tell_waiting(self, target: str, telegrams: _Telegrams, tell: Callable[[Entry], None]) -> None:
         """The newest setpoints, and how many telegrams went before them untold."""
         entry, telegrams.waiting = telegrams.waiting, None
         if entry is not None:
-            self._tell(entry)
+            tell(entry)
             telegrams.told_at = entry.time
         if telegrams.repeated:
             who, ending = telegrams.identity, telegrams.ending
             at = telegrams.told_at if entry is None else entry.time
-            self._tell(Entry(at, who, target, "telegrams", ending, count=telegrams.repeated))
+            tell(Entry(at, who, target, "telegrams", ending, count=telegrams.repeated))
             telegrams.repeated = 0
 
     def _note_other(self, entry: Entry) -> None:
@@ -268,7 +268,7 @@ class AuditTrail:
     def sum_up(self, now: float) -> None:
         """Tell what was only counted."""
         for target, telegrams in self._telegrams.items():
-            self._tell_waiting(target, telegrams)
+            self._tell_waiting(target, telegrams, self._tell)
         for key, share in list(self._shares.items()):
             if not share.is_used:
                 del self._shares[key]

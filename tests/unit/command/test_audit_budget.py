@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from bridge.command import Action, Code, Identity, Rejection, Request, Source
 from bridge.command.audit import AT_ONCE, DONE_EVERY_S, REFUSED_EVERY_S, SUMMARY_S, Entry, client_of
 from bridge.command.link import NodeState
+from bridge.image import Value
 from bridge.northbound.modbus.dispatch import Dispatcher
 from tests.support import sites
 from tests.support.rig import ENABLE, SHUT_DOWN
@@ -107,6 +108,14 @@ def write_and_release(hall: Hall, number: int) -> None:
     hall.plant.submit(request, hall.now, lambda outcome: None)
 
 
+def write_on_and_release(hall: Hall, number: int) -> None:
+    """The last setpoint waits to be told, the one before it is counted."""
+    for setpoint in (1, 2, 3):
+        values: dict[str, Value] = {"control_word": SHUT_DOWN, "setpoint_1": setpoint}
+        hall.plant.submit(Request(stranger(1), FU1, Action.WRITE, values), hall.now, lambda outcome: None)
+    hall.plant.submit(Request(stranger(1), FU1, Action.RELEASE_CONTROL), hall.now, lambda outcome: None)
+
+
 def take_turns(hall: Hall, number: int) -> None:
     hall.write((SHUT_DOWN, ENABLE)[number % 2], stranger(1))
 
@@ -119,8 +128,12 @@ def new_names(hall: Hall, number: int) -> None:
     hall.plant.submit(Request(who, FU1, Action.RELEASE_CONTROL), hall.now, lambda outcome: None)
 
 
-@pytest.mark.parametrize("act", [write_and_release, take_turns, new_names])
-def test_what_one_client_does_with_one_drive_has_a_budget(act: Callable[[Hall, int], None]) -> None:
+@pytest.mark.parametrize(
+    ("act", "requests"), [(write_and_release, 2), (write_on_and_release, 4), (take_turns, 1), (new_names, 2)]
+)
+def test_what_one_client_does_with_one_drive_has_a_budget(
+    act: Callable[[Hall, int], None], requests: int
+) -> None:
     """Accepted: else who may write washes the log of what was done."""
     hall = Hall()
     times, minutes, kinds = 6000, 3, 3
@@ -131,7 +144,7 @@ def test_what_one_client_does_with_one_drive_has_a_budget(act: Callable[[Hall, i
     assert lines <= kinds * (AT_ONCE + 60 * minutes / DONE_EVERY_S + 2 * (minutes + 1))
     hall.plant.audit.sum_up(hall.now)
     told = sum(entry.count for entry in hall.entries)
-    assert told == times * (1 if act is take_turns else 2), "none is forgotten"
+    assert told == times * requests, "none is forgotten"
 
 
 def test_another_clients_refusals_are_told_all_the_same() -> None:

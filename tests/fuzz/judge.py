@@ -93,8 +93,8 @@ class Figures:
             p50, p99 = (ordered[int((len(ordered) - 1) * part)] for part in (0.5, 0.99))
             told.append(
                 f"good client on {name}: {len(times)} exchanges, {self.busy.get(name, 0)} told to try again; "
-                f"{self.late.get(name, 0)} of {self.judged.get(name, 0)} while the machine was not busy were late; "
-                f"p50 {p50:.1f} ms, p99 {p99:.1f} ms, max {ordered[-1]:.1f} ms"
+                f"{self.late.get(name, 0)} of {self.judged.get(name, 0)} while the machine was not busy "
+                f"were late; p50 {p50:.1f} ms, p99 {p99:.1f} ms, max {ordered[-1]:.1f} ms"
             )
         for place, (pid, samples) in enumerate(self.memory_mb.items()):
             who = "bus process" if place == 0 else f"front {place}"

@@ -12,8 +12,11 @@ FLOOD = 5000
 
 
 async def until(came: list[str], count: int) -> None:
-    while len(came) < count:
+    for _ in range(count):
+        if len(came) >= count:
+            return
         await asyncio.sleep(0)
+    raise AssertionError(f"{len(came)} of {count} came")
 
 
 async def test_who_floods_takes_no_room_of_another_share() -> None:

@@ -11,7 +11,6 @@ from typing import Final, TypeVar
 from asyncua.server.address_space import AddressSpace, NodeData
 
 from bridge.northbound.opcua import ranges
-from bridge.northbound.opcua.admission import source_of
 from bridge.northbound.opcua.eventfilter import EventFilterFault, EventTypes, event_filter
 from bridge.northbound.opcua.filters import change_filter
 from bridge.northbound.opcua.items import EventItem, Item, ValueItem, event_settings, value_settings
@@ -29,6 +28,7 @@ from bridge.northbound.opcua.library import (
 from bridge.northbound.opcua.reading import checked_times, window
 from bridge.northbound.opcua.shares import MOST_ON_ONE, Share
 from bridge.northbound.opcua.subscription import Subscription
+from bridge.northbound.sources import source_of
 
 _BATCH: Final = 50
 _SUBSCRIBE_TO_EVENTS: Final = 1

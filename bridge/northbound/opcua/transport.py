@@ -30,7 +30,7 @@ from bridge import clock
 from bridge.command.freshness import NEVER
 from bridge.command.request import Identity
 from bridge.northbound.opcua import decoding
-from bridge.northbound.opcua.admission import Stage, source_of
+from bridge.northbound.opcua.admission import Stage
 from bridge.northbound.opcua.encoding import encode
 from bridge.northbound.opcua.library import (
     InvalidSignature,
@@ -52,6 +52,7 @@ from bridge.northbound.opcua.security import read_password
 from bridge.northbound.opcua.services import REFUSED
 from bridge.northbound.opcua.session import Server, Session
 from bridge.northbound.opcua.writes import received_at
+from bridge.northbound.sources import source_of
 
 _CREATE: Final = node_id(ObjectIds.CreateSessionRequest_Encoding_DefaultBinary)
 _ACTIVATE: Final = node_id(ObjectIds.ActivateSessionRequest_Encoding_DefaultBinary)

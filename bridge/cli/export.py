@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +14,7 @@ import typer
 from bridge import __version__
 from bridge.command import Plant, Source
 from bridge.command.rights import rights_of
-from bridge.dbc import describe
+from bridge.dbc import BusDescription, describe
 from bridge.errors import OperationFailed
 from bridge.image import Point
 from bridge.lint import family_dictionaries
@@ -90,8 +90,7 @@ def dbc(
     words: Annotated[bool, typer.Option("--words", help="raw words instead of values and bits")] = False,
 ) -> None:
     """A DBC file: PDOs with their signals, SYNC, NMT, heartbeats and emergency messages."""
-    from bridge.dbc.write import dbc_text
-
+    dbc_text = _dbc_writer()
     project = load_project(site)
     names = [table.name for table in project.site.bus]
     if bus is None and len(names) > 1:
@@ -104,6 +103,20 @@ def dbc(
         project.site.bus[place], ("bus", place), project.families, dictionaries, project.downloads
     )
     print(dbc_text(describe(view, words=words)), end="")
+
+
+def _dbc_writer() -> Callable[[BusDescription], str]:
+    """Raises OperationFailed where cantools is missing: it is an extra, because nothing else needs it."""
+    try:
+        from bridge.dbc.write import dbc_text
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.partition(".")[0] != "cantools":
+            raise
+        raise OperationFailed(
+            "writing a DBC file needs cantools, which is not installed: "
+            f"`{sys.executable} -m pip install cantools` (or install drivebridge as drivebridge[dbc])"
+        ) from None
+    return dbc_text
 
 
 def _point(point: Point, *, is_writable: bool) -> tuple[object, ...]:

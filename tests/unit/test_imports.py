@@ -10,7 +10,9 @@ import typer.main
 from typer.core import TyperGroup
 
 from bridge.cli.app import make_app
+from tests.support.process import REPOSITORY
 
+DEMO_SITE = REPOSITORY / "bridge" / "demo" / "site.toml"
 _OTHERS = (
     "bridge.service",
     "bridge.sim",
@@ -30,6 +32,18 @@ def test_a_command_does_not_import_the_others(word: str, imported: str) -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert [name for name in done.stdout.split() if name.startswith(_OTHERS)] == []
+
+
+def test_without_cantools_a_dbc_export_says_what_to_install() -> None:
+    script = (
+        "import sys; sys.modules['cantools'] = None; "
+        f"sys.argv = ['drivebridge', 'export', 'dbc', {str(DEMO_SITE)!r}]; "
+        "from bridge.cli.app import run_app; run_app()"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith("writing a DBC file needs cantools")
+    assert f"`{sys.executable} -m pip install cantools`" in done.stderr
 
 
 def commands(word: str = "") -> set[str]:

@@ -18,7 +18,7 @@ NO_NODE_ID: Final = 0xFF
 """A device that has none."""
 
 BIT_RATES: Final = (1_000_000, 800_000, 500_000, 250_000, 125_000, None, 50_000, 20_000, 10_000)
-"""By table index of table 0 (CiA 305 §7.4; 5 is reserved)."""
+"""By index in table 0 (CiA 305 §6.4.3; 5 is reserved)."""
 AUTOMATIC: Final = 9
 
 _SWITCH_GLOBAL: Final = 0x04
@@ -187,7 +187,7 @@ def answers_everything() -> Service[bool]:
 
 
 def fastscan(known: Identity | None = None) -> Service[Identity]:
-    """After ``is_anybody_there``: find one of the devices; it is in configuration state then (CiA 305 §6.10).
+    """After ``is_anybody_there``: find one of the devices; it is in configuration state then (CiA 305 §6.7).
 
     Each of 132 questions takes a whole reply time. ``known`` fills in fields that are the same for all
     (not 0). Raises LssError where nobody confirms what was found.

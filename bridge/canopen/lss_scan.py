@@ -1,4 +1,4 @@
-"""Every device without a node id: fastscan, one after the other (CiA 305 §6.10). Sans-IO.
+"""Every device without a node id: fastscan, one after the other (CiA 305 §6.7). Sans-IO.
 
 A device that was found is in configuration state and silent in a scan. Some are not: CANopenNode answers
 every question of a scan there, and hides all who have not been found. Where that shows, whoever keeps

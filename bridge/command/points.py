@@ -72,7 +72,7 @@ def _status_points(name: str, family: Family) -> list[Point]:
             name=f"{name}/status/state", data_type=DataType.UINT8, states=STATES, description="drive state"
         ),
         Point(name=f"{name}/status/fault_text", data_type=DataType.STRING, description="present fault"),
-        _word(f"{name}/status/emcy_code", "code of the last emergency message, DS-301 §7.2.7"),
+        _word(f"{name}/status/emcy_code", "code of the last emergency message, CiA 301 §7.2.7"),
     ]
 
 

@@ -130,7 +130,7 @@ class _XddReader:
 
     @staticmethod
     def _number(found: Text) -> Text:
-        """vendorID and productID are hexadecimal, with or without 0x (CiA 311 §5.2)."""
+        """vendorID and productID are hexadecimal, with or without 0x (CiA 311, DeviceIdentity)."""
         is_marked = found.text.lower().startswith("0x") or not found.text
         return found if is_marked else Text(f"0x{found.text}", found.line)
 

@@ -1,4 +1,4 @@
-"""Parameters of an XDD's application process (CiA 311 §5.4): what objects leave to them by uniqueIDRef."""
+"""Parameters of an XDD's application process (CiA 311 §6.4.5): what objects leave to them by uniqueIDRef."""
 
 from __future__ import annotations
 

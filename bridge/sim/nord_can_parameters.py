@@ -137,7 +137,7 @@ class CanParameters:
         return _word(lambda: self._tpdo(number).event_timer_ms, write, high=32767)
 
     def _mapping(self) -> list[Number]:
-        # P165 calls the PDO with the control word "Tx": the master's view. By DS-301 that is the drive's
+        # P165 calls the PDO with the control word "Tx": the master's view. By CiA 301 that is the drive's
         # RPDO (1600h). PDO 5 is labelled the other way round: §6.7.4 ties [-33] to 1A04h, [-34] to 1604h.
         entries = [
             self._mapping_entry(number, place, receives)

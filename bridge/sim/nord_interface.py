@@ -59,7 +59,7 @@ class InterfaceParts:
 def identity(device_name: str) -> Identity:
     """What a NORD node says of itself."""
     return Identity(
-        device_type=0x0001_0192,  # DS-402, frequency converter
+        device_type=0x0001_0192,  # CiA 402, frequency converter
         vendor_id=0,  # the manual prints none of the numbers of 1018h, and an invented one would be believed
         product_code=0,
         revision=0,

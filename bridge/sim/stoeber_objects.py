@@ -81,7 +81,7 @@ class CommunicationObjects:
         self.saves += 1
 
     def _add_ranges(self, dictionary: Dictionary) -> None:
-        """Where §11.1 says more than DS-301: SYNC 1…2047, 1015h as U32, 1006h."""
+        """Where §11.1 says more than CiA 301: SYNC 1…2047, 1015h as U32, 1006h."""
         current = self._communication
 
         def set_sync(value: int) -> None:
@@ -145,7 +145,7 @@ class CommunicationObjects:
         )
 
     def _add_sdo_server(self, dictionary: Dictionary, number: int) -> None:
-        """Bit 31 closes a channel, as in DS-301. The example of §7.3.2 opens one with bit 31 set: that is
+        """Bit 31 closes a channel, as in CiA 301. The example of §7.3.2 opens one with bit 31 set: that is
         ``bit_31_opens``."""
 
         def channel() -> SdoSettings:

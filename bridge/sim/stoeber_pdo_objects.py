@@ -22,7 +22,7 @@ def resolved(cob_id: int, function_codes: tuple[int, ...], node_id: int) -> int:
 
 
 class StoeberPdoObjects(PdoObjects):
-    """Where CAN 5000 differs from the rules of DS-301."""
+    """Where CAN 5000 differs from the rules of CiA 301."""
 
     def __init__(
         self,

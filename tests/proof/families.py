@@ -112,7 +112,7 @@ CIA402: Final = Family(
     speed=1000,
     enabling=(0x000F, 0x000F),
     enabled=(0x006F, 0x0027),
-    # CiA 402-2, the commands of 6040h; the ramp is "disable operation".
+    # CiA 402, the commands of 6040h; the ramp is "disable operation".
     stops={"disable_voltage": (0x0002, 0), "quick_stop": (0x0006, 0x0002), "stop": (0x000E, 0x0006)},
     configure=(
         f'{{ object = "1016:01", type = "uint32", value = {_HEARTBEAT_CONSUMER:#x} }}',

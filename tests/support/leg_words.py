@@ -128,7 +128,7 @@ STOEBER: Final = LegWords(
 
 
 def _cia402(mapping: str, enable: int, **more: object) -> LegWords:
-    """CiA 402-2 §8.2.1 (6040h), §8.2.2 (6041h). A stop is "disable operation" (0111b), which 605Ch makes a
+    """CiA 402, 6040h and 6041h. A stop is "disable operation" (0111b), which 605Ch makes a
     ramp at factory."""
     return LegWords(
         mapping,

@@ -1,4 +1,4 @@
-"""Download of a node's configuration in order, compared first and read back (CiA 302-2, 302-3).
+"""Download of a node's configuration in order, compared first and read back (CiA 302-2, CiA 302-3).
 
 A node that keeps a configuration date and time (1020h) is asked for it first: where it has ours, nothing
 is downloaded. The date the bridge writes is made from the configuration itself, so that a changed site

@@ -332,7 +332,7 @@ class Processor(UaProcessor):
             raise ServiceError(StatusCodes.BadSecurityPolicyRejected)
         session = self.session
         if isinstance(session, Session) and session.holder is not self:
-            # Activated on another connection; this one has lost it (Part 4 §5.6.3).
+            # Activated on another connection; this one has lost it (Part 4 §5.7.3).
             session = self.session = None
         if session is None or session.state is SessionState.Closed:
             if typeid == _CLOSE:

@@ -1,4 +1,4 @@
-"""Engineering units: from the unit of a point to what OPC UA calls it (Part 8 §5.6.3)."""
+"""Engineering units: from the unit of a point to what OPC UA calls it (Part 8 §5.6.4.3)."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def heard(decoder: Decoder, *frames: tuple[int, str]) -> Meaning:
         ([(0x605, "4066200100000000"), (0x585, "4B66200167000000")], "2066h:01 = 103 (0067h)"),
         # STÖBER CAN 5000 §8.2.2: C01 := 2500
         ([(0x601, "23012400C4090000")], "write 2401h:00 := 2500 (000009C4h)"),
-        # BU 2500 §8.3.2, DS-301: aborts in words
+        # BU 2500 §8.3.2, CiA 301: aborts in words
         (
             [(0x585, "8018100500000206")],
             "1018h:05: the node aborts: object does not exist in the object dictionary (06020000h)",

@@ -1,5 +1,5 @@
-"""Every point there is, made from the site file and the mappings: the one place where a user's view
-is defined. Names: ``docs/reference/points.md``."""
+"""Every point, made from the site file and the mappings: the one place where the user's view is defined.
+What each means: ``docs/reference/points.md``."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ NMT_STATES: Final = (
     (255, "unknown"),
 )
 CONNECTION_COUNTS: Final = {
-    "modbus_refused_connections": "Modbus connections that were not let in",
+    "modbus_refused_connections": "Modbus connections that were refused",
     "modbus_broken_connections": "Modbus connections that the bridge ended",
-    "opcua_refused_connections": "OPC UA connections, channels and logins that were not let in",
+    "opcua_refused_connections": "OPC UA connections, channels and logins that were refused",
     "opcua_broken_connections": "OPC UA connections that the bridge ended",
-    "zenoh_broken_connections": "zenoh connections that have ended, by whatever end",
+    "zenoh_broken_connections": "zenoh connections that have ended, whoever ended them",
 }
 CONTROLLER_STATES: Final = ((0, "ok"), (1, "warning"), (2, "passive"), (3, "bus_off"), (4, "down"))
 
@@ -37,9 +37,9 @@ def _word(name: str, description: str, bits: tuple[str, ...] = (), *, writable: 
 def drive_points(
     name: str, family: Family, slot: Slot, scales: dict[str, LinearScale], *, timeout_writable: bool
 ) -> list[Point]:
-    """The points of the drive called ``<node>/<drive>``; of words that its PDOs do not carry there are none.
+    """The points of the drive called ``<node>/<drive>``, without those of words that its PDOs do not carry.
 
-    ``scales`` holds the scales that are known already, by the value's leaf, for the ranges.
+    ``scales``: those already known, by the value's leaf; they give the ranges.
     ``timeout_writable``: the owner may change ``fieldbus_timeout_ms``.
     """
     return [
@@ -66,7 +66,7 @@ def _command_points(name: str, family: Family, slot: Slot, scales: dict[str, Lin
 def _status_points(name: str, family: Family) -> list[Point]:
     bits = tuple(family.status_word.bits)
     return [
-        _word(f"{name}/status/status_word", "status word; shows fault while the watchdog has tripped", bits),
+        _word(f"{name}/status/status_word", "status word; shows fault while the watchdog is tripped", bits),
         _word(f"{name}/status/drive_status_word", "status word as the drive sent it", bits),
         Point(
             name=f"{name}/status/state", data_type=DataType.UINT8, states=STATES, description="drive state"
@@ -112,7 +112,7 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
             name=f"{top}/watchdog_state",
             data_type=DataType.UINT8,
             states=watchdog.STATES,
-            description="controller leg of the watchdog",
+            description="state of the watchdog on the controller",
         ),
         Point(name=f"{top}/watchdog_left_ms", data_type=u32, unit=ms, description="time until the trip"),
         Point(
@@ -120,22 +120,22 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
             data_type=u32,
             unit=ms,
             writable=timeout_writable,
-            description="twin of P151; 0 is off",
+            description="how long the controller may be silent; 0: off (as NORD's P151)",
         ),
         Point(
             name=f"{top}/telegram_downtime_s",
             data_type=DataType.FLOAT,
             unit="s",
-            description="twin of P513; 0 is off, -0.1 ignores all communication errors",
+            description="how long the drive may be silent; 0: off, -0.1: errors are ignored (as P513)",
         ),
         Point(name=f"{top}/last_fault", data_type=DataType.FLOAT, description="such as 10.3 for E010/10.3"),
-        Point(name=f"{top}/current_fault", data_type=DataType.FLOAT, description="0 where there is none"),
+        Point(name=f"{top}/current_fault", data_type=DataType.FLOAT, description="present fault; 0: none"),
         Point(name=f"{top}/trips", data_type=u32, description="watchdog trips since start"),
         Point(
             name=f"{top}/worst_case_stop_ms",
             data_type=u32,
             unit=ms,
-            description="longest time from the controller's last telegram to the reaction on the bus",
+            description="longest time from the controller's last telegram to the stop on the bus",
         ),
         Point(name=f"{top}/pdo_age_ms", data_type=u32, unit=ms, description="age of the last TPDO"),
         _word(f"{top}/sent_control_word", "control word that the bridge sends to the drive"),
@@ -149,18 +149,18 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
             name=f"{top}/worst_case_bridge_ms",
             data_type=u32,
             unit=ms,
-            description="longest time from a hang of the bridge to the drive's own reaction",
+            description="longest time from the moment the bridge hangs to the drive's own reaction",
         ),
         Point(
             name=f"{top}/follows",
             data_type=DataType.BOOL,
-            description="false while the drive says that it is enabled, beyond the bound of its last stop",
+            description="false while the drive still reports enabled after the bound of its last stop",
         ),
         Point(
             name=f"{top}/last_stop",
             data_type=DataType.UINT8,
             states=follow.STATES,
-            description="how the last stop has ended",
+            description="how the last stop ended",
         ),
         _word(f"{top}/telegrams", "number of the owner's last valid telegram, modulo 65536"),
     ]
@@ -169,11 +169,11 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
 def _identity_points(name: str) -> list[Point]:
     top = f"{name}/identity"
     return [
-        Point(name=f"{top}/vendor", data_type=DataType.UINT32, description="1018h:1"),
-        Point(name=f"{top}/product", data_type=DataType.UINT32, description="1018h:2"),
-        Point(name=f"{top}/revision", data_type=DataType.UINT32, description="1018h:3"),
-        Point(name=f"{top}/serial", data_type=DataType.UINT32, description="1018h:4"),
-        Point(name=f"{top}/device_name", data_type=DataType.STRING, description="1008h"),
+        Point(name=f"{top}/vendor", data_type=DataType.UINT32, description="vendor id, 1018h:1"),
+        Point(name=f"{top}/product", data_type=DataType.UINT32, description="product code, 1018h:2"),
+        Point(name=f"{top}/revision", data_type=DataType.UINT32, description="revision number, 1018h:3"),
+        Point(name=f"{top}/serial", data_type=DataType.UINT32, description="serial number, 1018h:4"),
+        Point(name=f"{top}/device_name", data_type=DataType.STRING, description="device name, 1008h"),
     ]
 
 
@@ -189,16 +189,18 @@ def node_points(node: NodeTable, polls: list[Poll]) -> list[Point]:
         Point(
             name=f"{top}/supervision_state", data_type=DataType.STRING, description="heartbeat or guarding"
         ),
-        Point(name=f"{top}/software_version", data_type=DataType.STRING, description="100Ah"),
+        Point(name=f"{top}/software_version", data_type=DataType.STRING, description="version, 100Ah"),
         Point(name=f"{top}/boot_status", data_type=DataType.STRING, description="boot-up step or result"),
         Point(
             name=f"{top}/current_fault",
             data_type=DataType.FLOAT,
-            description="fault of the bridge's leg to the controller, as P170[-01]",
+            description="102.0 while a controller of its drives is silent (as NORD's P170[-01])",
         ),
-        Point(name=f"{top}/last_fault", data_type=DataType.FLOAT, description="as P170[-02]"),
+        Point(name=f"{top}/last_fault", data_type=DataType.FLOAT, description="the one before, P170[-02]"),
         Point(
-            name=f"{top}/rejected_frames", data_type=DataType.UINT32, description="frames that fit nothing"
+            name=f"{top}/rejected_frames",
+            data_type=DataType.UINT32,
+            description="received frames that did not match the expected layout",
         ),
         Point(
             name=f"{top}/emcy_history",
@@ -208,7 +210,7 @@ def node_points(node: NodeTable, polls: list[Poll]) -> list[Point]:
         Point(
             name=f"{top}/emcy_suppressed",
             data_type=DataType.UINT32,
-            description="emergency messages beyond the rate at which they are reported",
+            description="emergency messages not reported because too many came",
         ),
         *(
             Point(
@@ -222,7 +224,7 @@ def node_points(node: NodeTable, polls: list[Poll]) -> list[Point]:
         Point(
             name=f"{top}/device_errors",
             data_type=DataType.STRING,
-            description="errors that the node told at its last boot-up, 1001h and 1003h",
+            description="errors that the node reported at its last boot-up, 1001h and 1003h",
         ),
     ]
 
@@ -235,7 +237,7 @@ def bus_points(bus: BusTable) -> list[Point]:
             name=f"{top}/state",
             data_type=DataType.UINT8,
             states=CONTROLLER_STATES,
-            description="CAN controller",
+            description="state of the CAN controller",
         ),
         Point(
             name=f"{top}/load", data_type=DataType.FLOAT, unit="%", low=0, high=100, description="bus load"
@@ -244,36 +246,32 @@ def bus_points(bus: BusTable) -> list[Point]:
             name=f"{top}/nmt_state",
             data_type=DataType.UINT8,
             states=NMT_STATES,
-            description="the bridge's own NMT state on this bus, as its heartbeat says it",
+            description="the bridge's own NMT state on this bus, as in its heartbeat",
         ),
         Point(
             name=f"{top}/held_by",
             data_type=DataType.STRING,
-            description="nodes without which the others are not started",
+            description="missing nodes for which the others wait",
         ),
         Point(
             name=f"{top}/second_master",
             data_type=DataType.BOOL,
-            description="an NMT command that is not ours came within the last minute",
+            description="another master sent an NMT command within the last minute",
         ),
         Point(
             name=f"{top}/unexpected_nodes",
             data_type=DataType.STRING,
-            description="nodes of the last minute that are not in the site file",
+            description="nodes heard within the last minute that are not in the site file",
         ),
         Point(
             name=f"{top}/duplicate_ids",
             data_type=DataType.STRING,
-            description="node ids of the last minute that seem to be used twice",
+            description="node ids that seemed to be used twice within the last minute",
         ),
         Point(name=f"{top}/tx_errors", data_type=u32, description="transmit error counter"),
         Point(name=f"{top}/rx_errors", data_type=u32, description="receive error counter"),
-        Point(
-            name=f"{top}/frames_lost", data_type=u32, description="frames the kernel or the buffer dropped"
-        ),
-        Point(
-            name=f"{top}/frames_expired", data_type=u32, description="frames not sent within their deadline"
-        ),
+        Point(name=f"{top}/frames_lost", data_type=u32, description="received frames lost: buffer full"),
+        Point(name=f"{top}/frames_expired", data_type=u32, description="frames not sent in time and dropped"),
         Point(name=f"{top}/error_frames", data_type=u32, description="error frames of the controller"),
         Point(name=f"{top}/last_error", data_type=DataType.STRING, description="the latest trouble in words"),
         Point(
@@ -284,13 +282,13 @@ def bus_points(bus: BusTable) -> list[Point]:
         Point(
             name=f"{top}/intruders",
             data_type=u32,
-            description="frames of others on identifiers that are the bridge's alone",
+            description="frames of others on identifiers that belong to the bridge alone",
         ),
         Point(name=f"{top}/last_intruder", data_type=DataType.STRING, description="the latest one in words"),
         Point(
             name=f"{top}/passive",
             data_type=DataType.BOOL,
-            description="another bridge is in charge of the bus: this one only listens",
+            description="another bridge is in charge of the bus; this one only listens",
         ),
     ]
 
@@ -302,23 +300,23 @@ def bridge_points() -> list[Point]:
         Point(name="bridge/drives_configured", data_type=u32, description="drives in the site file"),
         Point(name="bridge/drives_good", data_type=u32, description="drives with good data"),
         Point(name="bridge/refused_writes", data_type=u32, description="refused requests since start"),
-        Point(name="bridge/audit_lost", data_type=u32, description="lines that are missing in the audit log"),
+        Point(name="bridge/audit_lost", data_type=u32, description="lines missing from the audit log"),
         Point(
             name="bridge/fronts_failing",
             data_type=DataType.STRING,
-            description="servers and fronts that do not serve at present, each with the reason",
+            description="servers and fronts that are not serving, each with the reason",
         ),
         Point(
             name="bridge/worst_trip_lateness_ms",
             data_type=DataType.FLOAT,
             unit="ms",
-            description="longest time since start from a deadline until the stop was handed to the bus",
+            description="longest time from a deadline to the stop's hand-over to the bus, since start",
         ),
         Point(
             name="bridge/worst_round_lateness_ms",
             data_type=DataType.FLOAT,
             unit="ms",
-            description="longest time since start that a round of the bus process came late",
+            description="longest delay of a round of the bus process, since start",
         ),
         *(
             Point(name=f"bridge/{leaf}", data_type=u32, description=f"{what}, since start")

@@ -255,7 +255,7 @@ def _holding_rows(drive: Drive, allows: Allows) -> list[Row]:
     stop = _row_maker(Table.HOLDING_REGISTER, _access(allows.may_stop))
     may_set = allows.may_command and drive.channel.settings.fieldbus_timeout_writable
     timeout = _row_maker(Table.HOLDING_REGISTER, _access(may_set))
-    name, text = "supervision/fieldbus_timeout_ms", "watchdog time, twin of P151; 0 is off"
+    name, text = "supervision/fieldbus_timeout_ms", "how long the controller may be silent; 0: off (as P151)"
     return [
         row(0, "command/control_word", "uint16", "", "control word"),
         *(row(i, f"command/{leaf}", "uint16", "", "setpoint, raw") for i, leaf in setpoint_words(drive)),

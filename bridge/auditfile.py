@@ -92,7 +92,7 @@ class AuditFile:
             file = self._opened()
         written = os.write(file, line)
         if written < len(line):
-            # No half lines: whoever reads the file reads JSON.
+            # No half lines: readers expect JSON.
             os.ftruncate(file, self._size)
             raise OSError(0, "the disk is full")
         self._size += written

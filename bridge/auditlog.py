@@ -19,7 +19,7 @@ from bridge.image import Value
 
 _PERIOD_S: Final = 0.5
 _LONGEST_TEXT: Final = 300
-"""Callers on the network may send anything; their words are cut."""
+"""Callers on the network may send anything: long texts are cut."""
 _encode = msgspec.json.Encoder().encode
 
 
@@ -41,7 +41,7 @@ class _Line(msgspec.Struct, omit_defaults=True):
 
 
 def as_line(entry: Entry, epoch_ns: int) -> bytes:
-    """One line with its end, ASCII but for what clients call themselves."""
+    """One line with its line break, ASCII except for names that clients give themselves."""
     who, ending = entry.identity, entry.ending
     seconds, ns = divmod(epoch_ns, 1_000_000_000)
     at = datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%dT%H:%M:%S")
@@ -75,10 +75,11 @@ def _shown(value: Value) -> Value:
 
 
 class AuditLog:
-    """Writes what ``plant`` is asked. ``clock`` is monotonic, ``epoch`` turns such a time into ns since
-    1970 UTC. What is lost is counted in ``bridge/audit_lost``.
+    """Writes all requests to ``plant``. ``clock`` is monotonic, ``epoch`` turns such a time into ns since
+    1970 UTC. Lost lines are counted in ``bridge/audit_lost``.
 
-    ``refused`` takes what was refused: whoever is refused again and again pushes nothing out of ``file``.
+    ``refused`` takes what was refused, so that a client that is refused again and again pushes nothing out of
+    ``file``.
     """
 
     def __init__(
@@ -139,6 +140,6 @@ class AuditLog:
 
     def _on_entry(self, entry: Entry) -> None:
         file = self.refused if entry.is_refused else self.file
-        # Whoever asked waits for the outcome, whatever becomes of the line.
+        # The caller gets its outcome, whatever becomes of the line.
         with self._guard:
             file.put(as_line(entry, self._epoch(entry.time)))

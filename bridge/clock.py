@@ -1,4 +1,4 @@
-"""The clocks of the service. Everything is timed by the monotonic one; only what leaves is dated."""
+"""The clocks of the service. All timing is monotonic; only what leaves the service gets a date."""
 
 from __future__ import annotations
 

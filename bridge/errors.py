@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 
 class BridgeError(Exception):
-    """Base of all errors that are told to the user in one sentence."""
+    """Base of all errors that the user gets as one sentence."""
 
     exit_code: int = 1
 

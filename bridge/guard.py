@@ -1,4 +1,4 @@
-"""Keeps one bad item from ending whoever works through all of them."""
+"""Keeps one bad item from ending the task that works through all of them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _LONGEST: Final = 300
 
 
 class Guard:
-    """``with guard:`` around the work on one item: what it raises is counted and told, and goes no further.
+    """``with guard:`` around the work on one item: what it raises is counted and logged, and goes no further.
 
-    ``work`` stands in the message. The first fault is logged with its traceback, then the 10th, the 100th
-    and so on with their number. Cancellation passes.
+    ``work`` is part of the message. The first fault is logged with its traceback, then the 10th, the 100th
+    and so on with their number. Cancellation passes through.
     """
 
     def __init__(self, work: str) -> None:
@@ -35,7 +35,7 @@ class Guard:
         return True
 
     def note(self, error: Exception) -> None:
-        """Count and tell ``error``, which was caught elsewhere."""
+        """Count and log ``error``, which was caught elsewhere."""
         self.faults += 1
         if self.faults < self._next:
             return

@@ -1,4 +1,4 @@
-"""Memory that stays where it is: a page that has to come from a disk holds up every drive.
+"""Locks the process into memory: a page that has to be read from a disk would delay every drive.
 
 Only for the bus process: a child that executes another program, such as a front, inherits no lock
 (mlockall(2)).
@@ -23,10 +23,10 @@ MlockAll = Callable[[int], int]
 
 
 def lock_memory(mlockall: MlockAll | None = None, is_limited: Callable[[], bool] | None = None) -> str:
-    """Keep all that the process has, and will have, in memory; gives why that is refused, or nothing.
+    """Lock all present and future memory of the process; returns why that was refused, or nothing.
 
-    What comes later is locked when it is first touched: the stacks of threads that need little of them would
-    take gigabytes else. With a limit nothing is locked, because beyond it an allocation fails.
+    Future pages are locked when first touched: otherwise the stacks of threads, which are hardly used, would
+    take gigabytes. With a limit nothing is locked, because an allocation beyond it would fail.
     """
     if (is_limited or _is_limited)():
         return "the limit for locked memory is not infinity (LimitMEMLOCK= of the unit, ulimit -l)"

@@ -1,4 +1,4 @@
-"""Tells systemd how we are (sd_notify(3)): ready, status, watchdog, stopping. Elsewhere it does nothing."""
+"""Tells systemd our state (sd_notify(3)): ready, status, watchdog, stopping. Without systemd, nothing."""
 
 from __future__ import annotations
 

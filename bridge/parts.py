@@ -1,6 +1,6 @@
-"""The parts of the service beside its buses: servers and fronts. One that fails is told, and started again.
+"""The parts of the service beside its buses: servers and fronts. One that fails is reported and restarted.
 
-Nothing of it ends the service: whoever is served by another part goes on moving drives.
+No failure of a part ends the service: clients of the other parts go on moving drives.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _log = logging.getLogger(__name__)
 _FIRST_PAUSE_S: Final = 0.2
 _LAST_PAUSE_S: Final = 10.0
 _STABLE_S: Final = 30.0
-"""Who has served for so long begins with the first pause again."""
+"""A part that has served for this long starts again with the first pause."""
 _TELL_S: Final = 60.0
 _LONGEST_REASON: Final = 300
 _FAILING: Final = "bridge/fronts_failing"
@@ -64,9 +64,9 @@ class ServerPart:
 
 
 class Parts:
-    """Keeps the parts going, and says which fail: point, events, and systemd's status line.
+    """Keeps the parts going, and reports which fail: point, events, and systemd's status line.
 
-    ``clock`` is the plant's; ``status`` is what the status line says besides.
+    ``clock`` is the plant's; ``status`` is the rest of the status line.
     """
 
     def __init__(self, plant: Plant, notifier: Notifier, clock: Callable[[], float], status: str) -> None:
@@ -100,7 +100,7 @@ class Parts:
         await self._all_known.wait()
 
     async def keep(self, part: Part) -> None:
-        """Keep ``part`` going until cancelled: after each end again, with longer and longer pauses."""
+        """Keep ``part`` going until cancelled; restart it after each end, with growing pauses."""
         pause_s = _FIRST_PAUSE_S
         while True:
             began = time.monotonic()

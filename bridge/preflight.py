@@ -1,4 +1,4 @@
-"""What is looked at before a bus is opened: a drive must not be moved by a bridge that cannot go on."""
+"""What is checked before a bus is opened: a bridge that cannot go on must not move a drive."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def check_files(site: Site, path: Path, *, opcua: bool) -> None:
 
 
 def _check_state_folder(folder: Path) -> None:
-    """Raises ``Unavailable`` where nothing can be written. A full disk is told and no more: it costs lines of
-    the audit log and counts of the EEPROM guard, and stops no plant."""
+    """Raises ``Unavailable`` if nothing can be written. A full disk is only reported: it costs lines of the
+    audit log and counts of the EEPROM guard, and must not stop a plant."""
     try:
         folder.mkdir(mode=0o750, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as probe:

@@ -51,7 +51,7 @@ def _refuse_vain_silence(project: Project) -> None:
 
 
 def _vain_silences(project: Project) -> Iterator[tuple[Key, str, str]]:
-    """Keys of the site file that ask for one, why it is in vain, and what would not be."""
+    """Keys of the site file that ask for silence, why it would not stop the drive, and what would."""
     for b, bus in enumerate(project.site.bus):
         for n, node in enumerate(bus.node):
             family = project.families[node.mapping]

@@ -1,7 +1,7 @@
-"""Lines of the log that others can bring about: the first of each kind and source, then how many. Of what is
-told of the plant the first few, so that a node that is lost and comes back twice is there twice.
+"""Log lines that others can cause at will: the first of each kind and source, then how many. Of events of the
+plant the first few, so that a node that is lost and comes back twice is logged twice.
 
-All of them go through one handler, so that a line that nobody has thought of fills no disk either.
+All lines go through one handler, so that a kind that nobody has thought of cannot fill a disk either.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ def about(source: str, kind: Hashable = None, *, first: int = 1) -> dict[str, Ha
 
 
 class QuietHandler(logging.StreamHandler[Any]):
-    """Writes to ``stream``, standard error where there is none. ``clock`` is monotonic.
+    """Writes to ``stream``, or standard error. ``clock`` is monotonic.
 
-    Counts that are due are written before the next line, and by ``sum_up``, which somebody should call now
-    and then: no thread does, since starting one takes its time where the machine is slow.
+    Due counts are written before the next line, and by ``sum_up``, which has to be called now and then: there
+    is no thread for it, because starting one takes long on a slow machine.
     """
 
     def __init__(self, stream: Any = None, *, clock: Callable[[], float] = time.monotonic) -> None:

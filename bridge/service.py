@@ -1,4 +1,4 @@
-"""Composition root of the bus process: the only place where everything meets."""
+"""Composition root of the bus process: the only place that knows all parts."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ class Service:
         self.master.halt(clock.now())
 
     async def _serve(self) -> None:
-        """Until cancelled, or until a task ends: each goes on for ever, or tells that its part has failed."""
+        """Until cancelled, or until a task ends: each runs for ever, or raises when its part has failed."""
         parts = [*self._servers(), *self.fronts]
         self.parts.expect(parts)
         works = {
@@ -180,8 +180,8 @@ class Service:
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     def _say_what_is_doubtful(self) -> None:
-        """A site that cannot work well is run all the same: stopping a plant over a prediction is worse. What
-        is predicted of each bus becomes part of its drives' published times."""
+        """A site with a doubtful prediction is run all the same: stopping a plant over it would be worse. The
+        prediction for each bus becomes part of its drives' published times."""
         verdict = lint(self.project.site, self.project.families, self.project.path, self.project.downloads)
         for finding in verdict.findings:
             level = logging.ERROR if finding.severity is Severity.ERROR else logging.WARNING

@@ -37,8 +37,8 @@ _HIDDEN: Final = ("demo-controller",)
 
 
 def make_app(word: str = "") -> typer.Typer:
-    """The command line. Where ``word`` is a command there is nothing else in it: the libraries of all of them
-    take longer to import than most commands run."""
+    """The command line. If ``word`` is a command, only that one: importing the libraries of all commands
+    takes longer than most of them run."""
     app = typer.Typer(
         name="drivebridge",
         help="CANopen master for industrial drives, served as OPC UA, Modbus TCP and zenoh.",
@@ -68,7 +68,7 @@ def run_app() -> None:
     try:
         make_app(*sys.argv[1:2])()
     except BridgeError as error:
-        # Empty where a child has told it already.
+        # Empty if a child process has already said it.
         if sentence := str(error):
             print(printable_lines(sentence), file=sys.stderr)
         raise SystemExit(error.exit_code) from None

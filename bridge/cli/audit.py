@@ -127,7 +127,7 @@ def _ask(line: Line, nodes: Sequence[Node], unavailable: list[str]) -> _Answers:
 
 
 def _rows(one: Audited) -> Iterator[tuple[str, ...]]:
-    """A row for each thing that the drive watches; the first says what comes of them."""
+    """A row for each thing that the drive supervises; the first has the verdict."""
     controller = "not known" if one.case.stop.unknown else str(one.case.stop)
     bridge = f"{one.own.bridge_ms} ms" if one.own.bridge_ms else "never"
     ends = (controller, bridge, one.verdict)
@@ -149,7 +149,7 @@ def _rows(one: Audited) -> Iterator[tuple[str, ...]]:
 
 
 def _explain(found: list[Audited], site: Path) -> None:
-    """The sums, why drives are errors, and what would be right; or why they are accepted."""
+    """The sums, then for each drive why it is an error and what would be right, or why it is accepted."""
     for one in found:
         for terms in one.case.terms:
             print(terms)
@@ -197,7 +197,7 @@ def _remedy(drives: list[Audited]) -> Iterator[str]:
 
 
 def _runs_on_by(one: Audited, want: OwnWant) -> bool:
-    """Whether this reaction is one with which the drive runs on, or not known."""
+    """Whether the drive runs on with this reaction, or the reaction is not known."""
     nothing = {want.place.shown(value) for value in want.only_if}
     shown = [watch.reaction for watch in one.own.watches if watch.reaction.startswith(want.place.name)]
     return any(text in nothing or text.endswith("not known") for text in shown)

@@ -1,4 +1,4 @@
-"""What the commands that work on a bus share: which bus, and how an errand is run on it."""
+"""What the commands on a bus share: the choice of the bus, and running an errand on it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _SEND_WITHIN_S = 0.1
 class Line:
     """The bus that a command works on. Without a site ``families`` is empty and ``is_of_site`` false.
 
-    A bit rate that nobody has stated is assumed, and not compared with that of the interface.
+    A bit rate that was not given is assumed, and not compared with the interface's.
     """
 
     table: BusTable
@@ -71,7 +71,7 @@ class Line:
 
     @property
     def own_id(self) -> int | None:
-        """The address of the site's bridge on this bus, where it makes itself heard."""
+        """The node id of the site's bridge on this bus, if it can be heard."""
         return self.table.master_node_id if self.is_of_site and self.table.heartbeat_ms else None
 
     def node_id(self, text: str) -> int:
@@ -93,7 +93,7 @@ class Line:
 def choose_line(
     site: Path | None, bus: str | None, interface: str | None, channel: str | None, bitrate: int | None
 ) -> Line:
-    """The bus that the options mean. Raises ``BadParameter`` where they mean none or two."""
+    """The bus that the options name. Raises ``BadParameter`` if they name none or two."""
     if site is None:
         if bus is not None:
             raise typer.BadParameter("--bus names a bus of SITE, and there is no SITE")
@@ -120,7 +120,7 @@ def _not_virtual(table: BusTable) -> BusTable:
 
 
 def split_site(words: list[str], count: int, usage: str) -> tuple[Path | None, list[str]]:
-    """SITE, where it is there, and the ``count`` words after it."""
+    """SITE, if given, and the ``count`` words after it."""
     if len(words) == count:
         return None, words
     if len(words) == count + 1:
@@ -194,12 +194,12 @@ def carry_out(
 
 
 def tell(text: str) -> None:
-    """A sentence beside the results."""
+    """A sentence on standard error, apart from the results."""
     print(printable(text), file=sys.stderr)
 
 
 def print_table(rows: Sequence[Sequence[str]]) -> None:
-    """Rows of cells, the first the heading, in columns as wide as they need."""
+    """Rows of cells in aligned columns; the first row is the heading."""
     shown = [[printable(cell) for cell in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*shown, strict=True)]
     for row in shown:

@@ -84,7 +84,7 @@ def _find(project: Project, name: str) -> tuple[BusTable, NodeTable]:
 
 
 def _consent(node: NodeTable, *, at_the_machine: bool) -> str:
-    """How the operator agreed. Raises ``BadParameter`` or ``OperationFailed`` where nobody did."""
+    """How the operator agreed. Raises ``BadParameter`` or ``OperationFailed`` if nobody did."""
     if at_the_machine:
         return "agreed by --yes-i-am-at-the-machine"
     if not sys.stdin.isatty():
@@ -101,7 +101,7 @@ def _consent(node: NodeTable, *, at_the_machine: bool) -> str:
 
 
 def _refuse_company(project: Project, bus: BusTable, node: NodeTable) -> None:
-    """Raises ``OperationFailed`` where somebody commands this bus already."""
+    """Raises ``OperationFailed`` if another master commands this bus."""
     family = project.families[node.mapping]
     commands = frozenset(pdo.cob_id + node.id for slot in family.slot for pdo in slot.rpdo)
     listen_s = max(_LISTEN_S, 3 * bus.heartbeat_ms / 1000)
@@ -112,7 +112,7 @@ def _refuse_company(project: Project, bus: BusTable, node: NodeTable) -> None:
 
 
 def alone(site: Site, bus: BusTable, node: NodeTable) -> Site:
-    """The site with this node alone, which no protocol commands."""
+    """The site reduced to this node, commanded by no protocol."""
     drives = [drive.model_copy(update={"control": "none"}) for drive in node.drive]
     table = node.model_copy(update={"drive": drives, "on_loss": "restart"})
     changes = {"node": [table], "mandatory_missing": "go_on", "reset_at_start": "none"}

@@ -27,7 +27,7 @@ def eds(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="machine-readable")] = False,
 ) -> None:
-    """Read FILE, whatever is odd about it, and say what it describes and what was odd."""
+    """Read FILE even if it has faults; print what it describes and what was wrong with it."""
     description = read_device_file(file)
     node_id = node_id or description.commissioning.node_id
     report = Report()
@@ -139,7 +139,7 @@ def _entry_json(entry: Entry, node_id: int | None) -> dict[str, Any]:
 
 
 def _value(value: Value | None, node_id: int | None) -> int | float | str | None:
-    """The value on this node; as the file has it where it needs a node id and none is known."""
+    """The value on this node; as written in the file if it needs a node id and none is known."""
     if value is None:
         return None
     plain = value.at(node_id)

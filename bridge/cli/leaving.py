@@ -28,8 +28,8 @@ def leave_after(work: Callable[[], None]) -> NoReturn:
 
 
 def _leave(code: str | int | None) -> NoReturn:
-    """Where a thread is left inside a library that does not come back, the interpreter must not end around
-    it: the library finds that out in a place from which it can only abort."""
+    """Ends without finalising the interpreter if a thread is stuck inside a library: when that thread wakes
+    up in a finalised interpreter, the library can only abort the process."""
     if isinstance(code, str):
         print(code, file=sys.stderr)
         code = _FAILED

@@ -23,7 +23,7 @@ _PRIORITY: Final = {
 
 
 class _Formatter(logging.Formatter):
-    """What devices and clients call themselves is in the log, too: it makes no line of its own there."""
+    """Names that devices and clients give themselves are logged, and must not start lines of their own."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:
         return printable(super().formatMessage(record))
@@ -50,13 +50,13 @@ def set_up(*, verbose: bool) -> None:
     root = logging.getLogger()
     root.handlers[:] = [handler]
     root.setLevel(logging.DEBUG if verbose else logging.INFO)
-    # Libraries tell their own users; ours need only what goes wrong.
+    # What libraries log below this is for their own users.
     for name in ("asyncua", "asyncio", "pymodbus", "can"):
         logging.getLogger(name).setLevel(logging.ERROR)
 
 
 def write_counts(loop: asyncio.AbstractEventLoop) -> None:
-    """Now and then, as long as ``loop`` runs: how many lines were left out."""
+    """Log now and then, while ``loop`` runs, how many lines were left out."""
     for handler in logging.getLogger().handlers:
         if isinstance(handler, QuietHandler):
             handler.sum_up()
@@ -64,8 +64,8 @@ def write_counts(loop: asyncio.AbstractEventLoop) -> None:
 
 
 class LoopFaults:
-    """An event loop's exception handler: what nobody awaited or caught. Of each place the first is logged
-    with its traceback."""
+    """An event loop's exception handler, for what nobody awaited or caught. The first from each place is
+    logged with its traceback."""
 
     def __call__(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         error: BaseException | None = context.get("exception")

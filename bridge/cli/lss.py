@@ -33,7 +33,7 @@ app = typer.Typer(help="Give devices node ids and bit rates (CiA 305).", no_args
 
 _T = TypeVar("_T")
 _QUESTIONS = 134
-"""Of a fastscan that finds something."""
+"""How many questions a fastscan takes that finds a device."""
 _NUMBER = re.compile(r"(?:0x)?([0-9a-f]{1,8})h?", re.IGNORECASE)
 
 Site = Annotated[Path | None, typer.Argument(metavar="[SITE]")]
@@ -169,7 +169,7 @@ def store(
     timeout_ms: Timeout = 2000,
     as_json: AsJson = False,
 ) -> None:
-    """Have a device store its node id and bit rate."""
+    """Make a device store its node id and bit rate."""
     line = choose_line(site, bus, interface, channel, bitrate)
     _run(line, lss_errand.keep_settings(_which(identity, only)), timeout_ms)
     _report({"ok": True, "stored": True}, "node id and bit rate", True, as_json)
@@ -193,7 +193,7 @@ def _row(identity: Identity) -> tuple[str, ...]:
 
 
 def _which(identity: str | None, only: bool) -> Identity | None:
-    """None is the only device there is. Raises BadParameter unless exactly one of the two is given."""
+    """None: the only device on the bus. Raises BadParameter unless exactly one of the two is given."""
     if only == (identity is not None):
         raise typer.BadParameter("which device? Give --identity, or --only where there is no other")
     return parse_identity(identity) if identity else None

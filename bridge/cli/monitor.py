@@ -1,4 +1,4 @@
-"""``monitor``: what is said on a bus, in words. It listens and sends nothing."""
+"""``monitor``: the traffic on a bus, in words. It listens and sends nothing."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def monitor(
     log: Annotated[Path | None, typer.Option(help="write the frames to a file as candump -L does")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Decode what is said on a bus until Ctrl-C, --count or --seconds."""
+    """Decode the frames on a bus until Ctrl-C, --count or --seconds."""
     line = choose_line(site, bus, interface, channel, bitrate)
     ids = {line.node_id(text) for text in node or []}
     kinds = set(kind or [])

@@ -1,4 +1,4 @@
-"""``nmt``: a network management command, and what the nodes make of it."""
+"""``nmt``: a network management command, and what the nodes do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the commands on parameters share: which drive, and how a procedure is run on its bus."""
+"""What the commands on parameters share: the choice of the drive, and running a procedure on its bus."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One drive of a site, and who counts what is written to it."""
+    """One drive of a site, with the ledger that counts the writes to it."""
 
     line: Line
     node: NodeTable
@@ -63,8 +63,8 @@ class Target:
             )
 
     def alone(self, *, force: bool = False) -> Standstill:
-        """Listen, and say what is known of the drive's state. Raises ``OperationFailed`` where somebody
-        commands this bus already."""
+        """Listen, and return what is known of the drive's state. Raises ``OperationFailed`` if another master
+        commands this bus."""
         table = self._real()
         listen_s = max(_LISTEN_S, 3 * table.heartbeat_ms / 1000)
         heard = carry_out(
@@ -83,7 +83,7 @@ class Target:
         return self.line.table
 
     def run(self, make: Callable[[float], Procedure[T]], *, writes: bool = False) -> T:
-        """Carry a procedure out on the bus. Raises ``OperationFailed`` with the sentence that says why.
+        """Run a procedure on the bus. Raises ``OperationFailed`` with the reason.
 
         Where it ``writes``, nothing is begun unless writes can be counted.
         """

@@ -25,7 +25,7 @@ _NameArgument = Annotated[
 
 @app.command("list")
 def list_(site: SiteArgument, drive: DriveArgument, as_json: AsJson = False) -> None:
-    """What the mapping file knows of the drive's parameters; asks nothing of the drive."""
+    """List the drive's parameters by its mapping file; the drive is not asked."""
     target = find(site, drive)
     definitions = target.access.names.definitions
     rows = [
@@ -101,7 +101,7 @@ def write(
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write a parameter and read it back; nothing is written where the drive holds the value already."""
+    """Write a parameter and read it back; a value that the drive already holds is not written."""
     target = find(site, drive)
     entry = _resolve(target.access, name)
     if not force:

@@ -159,8 +159,8 @@ def write(
 
 
 def why_forced(line: Line, node_id: int, address: Address) -> str:
-    """Why an object of one of the site's nodes is written with ``--force`` only. Without a site there is no
-    bridge that would supervise it."""
+    """Why this object of a node is written with ``--force`` only. Without a site there is no bridge that
+    supervises the node."""
     node = next((node for node in line.table.node if node.id == node_id), None)
     if node is None:
         return ""
@@ -177,7 +177,7 @@ def parse_object(text: str) -> tuple[int, int]:
 
 
 def encode(kind: ValueType, text: str) -> bytes:
-    """The bytes of a value. Raises ValueError with the sentence that says what is wrong."""
+    """The bytes of a value. Raises ValueError with a sentence for the user."""
     try:
         match kind:
             case ValueType.STRING:
@@ -207,13 +207,13 @@ def decode(kind: ValueType, data: bytes) -> int | float | str | bool:
 
 
 def for_people(value: int | float | str | bool | None, data: bytes) -> str:
-    """A value on the terminal; one without a type as what its bytes may be."""
+    """A value on the terminal; without a type, everything its bytes may mean."""
     return printable(shown(data) if value is None else str(value))
 
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """To which server of which node, and how patiently."""
+    """Which SDO server of which node, with which time-out."""
 
     node_id: int
     server: SdoServer | None
@@ -231,7 +231,7 @@ def _way(line: Line, node_id: int, sdo_channel: int, timeout_ms: int | None, ret
 
 
 def _transfer(line: Line, way: _Way, index: int, sub: int, data: bytes | None, *, as_json: bool) -> bytes:
-    """Do it. Raises ``OperationFailed`` with the abort text where the node refuses or is silent."""
+    """Run the transfer. Raises ``OperationFailed`` with the abort text if the node refuses or is silent."""
     node_id = way.node_id
 
     def make(now: float) -> SdoErrand:

@@ -20,7 +20,7 @@ from bridge.config import BusTable, ZenohTable, load_site
 from bridge.errors import BridgeError, OperationFailed
 from bridge.fronts import Front, become_front, give_reason
 
-# The service is not imported for a front: where one has ended, its clients wait for the next.
+# The service is not imported for a front: after one has ended, its clients wait for the next.
 if TYPE_CHECKING:
     from bridge.can import Bus
     from bridge.project import Project
@@ -80,7 +80,7 @@ def demo(verbose: Verbose = False) -> None:
 
 
 def simulate(site: SiteArgument, verbose: Verbose = False) -> None:
-    """Play every node of SITE on its buses, for a bridge that runs as another process."""
+    """Simulate every node of SITE on its buses, for a bridge that runs as another process."""
     from bridge.can import open_all
     from bridge.cli.simulation import simulation
     from bridge.project import load_project
@@ -115,7 +115,7 @@ def demo_controller(endpoint: str, moves: list[str], parent: int = 0) -> None:
 
 
 def _become_front(parent: int) -> None:
-    """A front that is still starting holds nothing that would have to be put in order."""
+    """A front that is still starting has nothing to clean up."""
     ending_signals.let_kill()
     become_front(parent)
 

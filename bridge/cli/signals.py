@@ -12,8 +12,8 @@ ENDING: Final = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal
 
 
 class EndingSignals:
-    """Caught from ``hold`` on. The first that comes is told to whoever asks, now or later; what comes after
-    it changes nothing: whoever is stopping must not be kept from it."""
+    """Caught from ``hold`` on. The first one is passed on to whoever asks, now or later; later ones change
+    nothing, so that they cannot interrupt the stopping."""
 
     def __init__(self) -> None:
         self.has_come = False

@@ -1,4 +1,4 @@
-"""Run something until it ends, or until somebody wants it to."""
+"""Run something until it ends, or until a signal ends it."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ async def _supervised(work: Coroutine[Any, Any, None], ending: Ending) -> None:
 
 
 def _first(error: BaseException) -> BaseException:
-    """The first error of nested groups: what a user is told."""
+    """The first error of nested groups: the one shown to the user."""
     while isinstance(error, BaseExceptionGroup):
         error = cast("BaseExceptionGroup[BaseException]", error).exceptions[0]
     return error

@@ -1,4 +1,4 @@
-"""What goes to a terminal: text without control characters of others, and how far a long task is."""
+"""Output for a terminal: text without foreign control characters, and the progress of a long task."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
 Show = Callable[[int, int | None, str], None]
-"""Called with what is done, of how much (None: not known), and that in words."""
+"""Called with how much is done, of how much (None: not known), and the same in words."""
 
 
 def printable(text: str) -> str:
     """``text`` with everything escaped that a terminal would obey instead of showing: names and strings
-    come from devices and from files of others."""
+    come from devices and from other people's files."""
     if text.isprintable():
         return text
     return "".join(one if one.isprintable() else _escaped(one) for one in text)
@@ -23,7 +23,7 @@ def _escaped(character: str) -> str:
 
 
 def printable_lines(text: str) -> str:
-    """As ``printable``, for text of several lines that are our own."""
+    """As ``printable``, but our own line breaks stay."""
     return "\n".join(map(printable, text.split("\n")))
 
 

@@ -1,4 +1,4 @@
-"""``witness``: watches the dead-man chain from outside, records every stop and tells what is late."""
+"""``witness``: watches the dead-man chain from outside, records every stop and reports late ones."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def _numbers(site: Site, given: str | None, buses: list[WatchedBus]) -> Numbers 
 
 
 def _promises(buses: list[WatchedBus], has_numbers: bool) -> list[str]:
-    """What each drive is held to."""
+    """The bounds for each drive."""
     lines: list[str] = []
     for bus in buses:
         for drive in bus.drives:

@@ -17,13 +17,13 @@ _PROTOCOLS: Final = ("modbus", "opcua", "zenoh")
 _LOCAL: Final = re.compile(r"(unixsock-stream|unixpipe)/.*|[a-z]+/(127\.[0-9.]+|localhost|\[::1\])(:.*)?")
 _MUTUAL_TLS: Final = re.compile(r"(tls|quic)/.*[#;]enable_mtls=(true|1)\b.*")
 _WITHOUT_CONNECTIONS: Final = ("opcua", "zenoh")
-"""Whose clients' connections are not known where drives are commanded."""
+"""Protocols of which the command side does not know whether a client is still connected."""
 _BUS: Final = BusTable.model_construct()
-"""The defaults."""
+"""Defaults of the site file."""
 
 
 def check(file: TomlFile) -> None:
-    """Note in ``file`` what does not go together."""
+    """Note every contradiction in ``file``."""
     nodes, units, channels, names = _Unique(file), _Unique(file), _Unique(file), _Unique(file)
     for bus in file.root.tables("bus"):
         names.add(bus, "name", "bus name")
@@ -41,13 +41,13 @@ def check(file: TomlFile) -> None:
 
 @dataclass(slots=True)
 class _Unique:
-    """Values that may stand in the file once."""
+    """Values that may occur only once in the file."""
 
     file: TomlFile
     seen: dict[str | int, Key] = field(default_factory=dict[str | int, Key])
 
     def add(self, table: RawTable, name: str, what: str) -> bool:
-        """Whether the value of ``name`` is there for the first time."""
+        """Whether this value of ``name`` occurs for the first time."""
         value = table.text(name) if table.text(name) is not None else table.whole(name)
         return value is None or self.add_value(value, (*table.key, name), f"{what} {value!r}")
 
@@ -135,7 +135,7 @@ def _check_control(drive: RawTable, file: TomlFile) -> None:
 
 
 def _check_dead_owner(drive: RawTable, file: TomlFile) -> None:
-    """Without a time-out only the end of its connection tells that an owner is dead."""
+    """Without a time-out only the end of its connection shows that an owner is dead."""
     content = drive.content
     given = content.get("fieldbus_timeout_range_ms")
     low = next(iter(cast("list[object]", given)), None) if isinstance(given, list) else None
@@ -163,7 +163,7 @@ def _check_ports(file: TomlFile) -> None:
 
 
 def _check_zenoh(file: TomlFile) -> None:
-    """Whoever may connect may command: that needs a user or a certificate."""
+    """Who may connect may command, so connecting has to take a user or a certificate."""
     zenoh = file.root.table("zenoh")
     given = zenoh.content.get("listen")
     listen = cast("list[object]", given) if isinstance(given, list) else []

@@ -23,7 +23,7 @@ INTEGERS: Final = {
     "uint32": (4, False),
     "uint64": (8, False),
 }
-"""Bytes and sign of CiA 301's integers."""
+"""Size in bytes and sign of CiA 301's integers."""
 REALS: Final = {"real32": "<f", "real64": "<d"}
 """Formats of CiA 301's floating point numbers."""
 
@@ -43,7 +43,7 @@ class Download:
 
     @property
     def is_command(self) -> bool:
-        """Store or restore: what is read there is never what was written (CiA 301 §7.5.2.13–14)."""
+        """Store or restore: these never read back what was written (CiA 301 §7.5.2.13–14)."""
         return self.index in COMMANDS
 
     @property
@@ -115,7 +115,7 @@ def parse_concise_dcf(content: bytes) -> tuple[Download, ...]:
 
 
 def to_concise_dcf(downloads: tuple[Download, ...]) -> bytes:
-    """The same the other way round."""
+    """``downloads`` as a concise DCF, 1F22h."""
     parts = [_COUNT.pack(len(downloads))]
     for one in downloads:
         parts += [_HEAD.pack(one.index, one.sub, len(one.data)), one.data]

@@ -19,7 +19,7 @@ def load_site(path: Path) -> Site:
 
 
 def read_site(path: Path) -> tuple[TomlFile, Site | None]:
-    """The file with its faults noted, for who has more to check, and the site if its form is right.
+    """The file with its faults noted, for callers that check more, and the site if its form is right.
 
     Raises ``FileFaults`` where the file is not TOML.
     """

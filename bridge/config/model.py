@@ -1,4 +1,4 @@
-"""What stands in a site file. Times are in ms unless the name says otherwise."""
+"""The keys of a site file. Times are in ms unless the name says otherwise."""
 
 from __future__ import annotations
 
@@ -197,7 +197,7 @@ class PdoTable(Table):
 
 
 def _listed(value: object) -> object:
-    """One table stands for a list of one."""
+    """A single table counts as a list of one."""
     return [cast("object", value)] if isinstance(value, dict | PdoTable) else value
 
 
@@ -243,7 +243,7 @@ class DriveTable(Table):
 
     @property
     def reacts_to_ignored_stop(self) -> OnIgnoredStop:
-        """A drive that nobody here commands may well be run by somebody else: its node is stopped only where
+        """A drive that is not commanded here may well be run by somebody else: its node is stopped only if
         the site file says so."""
         is_given = "on_ignored_stop" in self.model_fields_set
         return self.on_ignored_stop if is_given or self.control != "none" else "report"
@@ -255,7 +255,7 @@ class DriveTable(Table):
 
     @property
     def timeout_range_ms(self) -> tuple[int, int]:
-        """What the owner may set. Where the file does not say: never off, and up to ten times its own."""
+        """What the owner may set. By default never off, and up to ten times the site's own time."""
         if self.fieldbus_timeout_range_ms is not None:
             low, high = self.fieldbus_timeout_range_ms
             return low, high

@@ -1,8 +1,8 @@
 """A bus of the site file as the linter sees it: each node with its family, each PDO with what is known of it.
 
-What the site file sets counts, then the configuration that is downloaded, then what the family's own
-dictionary (an EDS beside the mapping file) says of the factory, then the mapping file. A node may be set
-otherwise; boot-up reads that back.
+The site file comes first, then the configuration that is downloaded, then the factory settings in the
+family's own dictionary (an EDS beside the mapping file), then the mapping file. The node itself may differ;
+the boot-up reads that.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class PdoView:
     rtr_poll_ms: int = 0
     number: int = 0
     words: int = 0
-    """How many words of its drive the mapping file has in it."""
+    """How many words of the drive it carries by the mapping file."""
     is_optional: bool = False
     cob_id_key: Key | None = None
     type_key: Key | None = None
@@ -67,7 +67,7 @@ class PdoView:
         return self.transmission_type in REMOTE_TYPES and bool(self.rtr_poll_ms)
 
     def period_s(self, sync_s: float) -> float | None:
-        """How often a TPDO comes at least, or None where nothing makes it regular."""
+        """The longest time between two TPDOs, or None where nothing makes it regular."""
         kind = self.transmission_type
         if 1 <= kind <= LAST_SYNCHRONOUS and sync_s:
             return kind * sync_s
@@ -78,7 +78,7 @@ class PdoView:
         return None
 
     def shortest_s(self, sync_s: float) -> float | None:
-        """How often a TPDO may come at most, or None where nothing limits it."""
+        """The shortest time between two TPDOs, or None where nothing limits it."""
         if self.is_synchronous:
             return max(1, self.transmission_type) * sync_s or None
         if self.is_polled:
@@ -104,7 +104,7 @@ class NodeView:
     key: Key
     drives: tuple[DriveView, ...]
     pdos: tuple[PdoView, ...]
-    """All that the node has, those of drives the site file does not name included."""
+    """All that the node has, including those of drives that the site file does not name."""
     settings: Settings
     emcy_id: int | None = None
     """On which identifier its emergency messages come (1014h), None where they are off."""
@@ -164,7 +164,7 @@ def _node(
         if drive:
             name = f"{table.name}/{family.leaf_of(drive)}"
             drives.append(DriveView(drive, drive_key, name, tuple(views[True]), tuple(views[False])))
-    # What the bridge does not use may collide all the same.
+    # PDOs that the bridge does not use may still collide.
     others = {place: _other_pdo(one, key) for place, one in known.items() if place not in used}
     for place in settings.pdos():
         if place not in used:
@@ -286,6 +286,6 @@ def _other_pdo(summary: PdoSummary, key: Key) -> PdoView:
 
 
 def _unknown_pdo(receives: bool, number: int, key: Key) -> PdoView:
-    """One of which only the configuration says that it is there."""
+    """A PDO that only the configuration mentions."""
     name = f"{'RPDO' if receives else 'TPDO'}{number}"
     return PdoView(name, key, receives, False, 0, 0, _FACTORY_TYPE, 0.0, 0, sent=False)

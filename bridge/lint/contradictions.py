@@ -1,6 +1,5 @@
-"""Downloads that the bridge's own settings undo: the node is written twice in each boot-up, and holds what
-the configuration does not say. And a node told to watch a heartbeat, or to wait for a SYNC, that does not
-come."""
+"""Downloads that the bridge's own settings undo: the node is written twice in each boot-up and ends up with
+another value than the configuration's. And nodes that wait for a heartbeat or a SYNC that never comes."""
 
 from __future__ import annotations
 
@@ -46,7 +45,7 @@ def _is_cob_id(index: int, sub: int) -> bool:
 
 
 def _own_settings(node: NodeView) -> Iterator[tuple[tuple[int, int], int, str]]:
-    """What the boot-up sets after the configuration: object, value, and the key that asks for it."""
+    """What the boot-up sets after the configuration: object, value, and the key that causes it."""
     for index, value in _error_control(node.table).items():
         yield (index, 0), value, "supervision"
     slots = {slot.name: slot for slot in node.family.slot}
@@ -86,7 +85,7 @@ def _pdo_settings(own: PdoTable) -> Iterator[tuple[int, int]]:
 
 def _check_consumer(bus: BusView, node: NodeView, report: LintReport) -> None:
     """1016h: node id in bits 16…22, consumer time in ms below (CiA 301, object 1016h). Other nodes'
-    heartbeats are the site's own affair; that they are there at all is checked."""
+    heartbeats are the site's own business; only that such a node exists is checked."""
     heartbeats = {
         other.table.id: heartbeat_period_ms(other.table.supervision_ms)
         for other in bus.nodes
@@ -112,8 +111,8 @@ def _check_consumer(bus: BusView, node: NodeView, report: LintReport) -> None:
 
 
 def _check_sync(node: NodeView, report: LintReport) -> None:
-    """A synchronous PDO waits for the SYNC with the identifier in 1005h: on another one it takes no stop
-    over."""
+    """A synchronous PDO waits for the SYNC whose identifier is in 1005h: with any other a stop would never
+    become effective."""
     waiting = [pdo.name for pdo in node.pdos if pdo.enabled and pdo.is_synchronous]
     if not waiting:
         return

@@ -1,4 +1,4 @@
-"""What is allowed, decided by whoever wrote the file, and still worth repeating."""
+"""Decisions of the site file that are allowed and still worth repeating."""
 
 from __future__ import annotations
 

@@ -31,8 +31,8 @@ class _Use:
 
 
 def check_identifiers(bus: BusView, report: LintReport) -> None:
-    """Error where two uses collide, warning where one of them is off at present. One finding for each
-    pair of nodes: where one identifier collides, many do."""
+    """An error if two uses collide, a warning if one of them is off at present. One finding for each pair
+    of nodes: where one identifier collides, many do."""
     first: dict[int, list[_Use]] = {}
     collisions: dict[tuple[str, str], list[tuple[_Use, _Use]]] = {}
     for use in _uses(bus):

@@ -1,4 +1,4 @@
-"""How full a bus will be, from the frames that the site file makes regular and their longest form."""
+"""How full a bus will be: all regular frames of the site file, each at its longest."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _FULL: Final = 100.0
 
 
 def longest_bits(length: int) -> int:
-    """Bits of a frame with an 11-bit identifier and ``length`` bytes: with the most stuff bits that there
-    can be, and the pause behind it (ISO 11898-1: after the first five bits one for every four)."""
+    """Bits of a frame with an 11-bit identifier and ``length`` bytes, with the most stuff bits possible and
+    the pause after it (ISO 11898-1: after the first five bits one for every four)."""
     stuffable = STUFFED_BITS + 8 * length
     return stuffable + (stuffable - 1) // 4 + UNSTUFFED_BITS
 
@@ -47,7 +47,7 @@ class Stream:
 @dataclass(frozen=True, slots=True)
 class BusLoad:
     """The prediction for one bus. ``most_percent`` is with every event-driven TPDO at its inhibit time;
-    ``cycle_ms`` is what SYNC and all that belongs to one cycle takes on the wire."""
+    ``cycle_ms`` is how long SYNC and all frames of one cycle take on the wire."""
 
     bus: str
     bitrate: int
@@ -81,7 +81,7 @@ def predict(bus: BusView) -> BusLoad:
 
 
 def _in_cycle(stream: Stream, sync_s: float) -> int:
-    """How many of its frames fall into one SYNC cycle at most."""
+    """The most of its frames that can fall into one SYNC cycle."""
     if not sync_s or not stream.period_s:
         return 1
     return max(1, math.ceil(sync_s / stream.period_s - 1e-9))
@@ -151,7 +151,7 @@ def check_load(bus: BusView, report: LintReport) -> BusLoad:
 
 
 def _check_window(bus: BusView, load: BusLoad, report: LintReport) -> None:
-    """All synchronous TPDOs must be through within the window (1007h), and one frame may be in their way."""
+    """All synchronous TPDOs must be sent within the window (1007h), and one other frame may delay them."""
     window_us = bus.table.sync_window_us
     synchronous = any(
         not pdo.receives and pdo.enabled and pdo.is_synchronous for node in bus.nodes for pdo in node.pdos

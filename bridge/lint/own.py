@@ -1,4 +1,4 @@
-"""What drives do by themselves when the bridge falls silent, as far as the site file and the factory tell."""
+"""What drives do by themselves when the bridge falls silent, judged by site file and factory settings."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def worst_cases(bus: BusView) -> Iterator[WorstCase]:
 
 
 def longest_ms(table: DriveTable) -> int:
-    """The longest time-out that the owner may set, or has; 0, off, is longer than any."""
+    """The longest time-out that the owner has or may set; 0 (off) counts as the longest."""
     low, high = table.timeout_range_ms
     own_ms = table.fieldbus_timeout_ms or 0
     return max(high, own_ms) if low and own_ms else 0
@@ -97,7 +97,7 @@ def check_own_supervision(bus: BusView, report: LintReport) -> None:
 
 
 def _check_times(bus: BusView, node: NodeView, report: LintReport) -> None:
-    """Those that the site sets: not shorter than what a living bridge may be silent for."""
+    """Configured time-outs must exceed the longest silence of a healthy bridge."""
     entry = settable(node.family)
     if entry is None:
         return
@@ -123,8 +123,8 @@ def _check_times(bus: BusView, node: NodeView, report: LintReport) -> None:
     elif own_ms < bus.table.deadman_ms:
         report.warning(
             key,
-            f"{name} is shorter than deadman_ms = {bus.table.deadman_ms}: it stops its drives over a pause "
-            "that the bridge gets over",
+            f"{name} is shorter than deadman_ms = {bus.table.deadman_ms}: a pause that the bridge survives "
+            "would stop its drives",
             f"at least {bus.table.deadman_ms} ms, or a shorter deadman_ms",
         )
 
@@ -143,7 +143,7 @@ def _given(bus: BusView, node: NodeView, entry: OwnSupervision) -> tuple[Key, fl
 
 
 def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> bool:
-    """A node that may do nothing when its time-out has run out, and does so at factory. True if told."""
+    """A node whose reaction to its time-out is by factory setting none. True if it was reported."""
     entry = settable(node.family)
     reaction = entry.reaction if entry else None
     if entry is None or reaction is None or reaction.factory not in reaction.nothing:
@@ -156,7 +156,7 @@ def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> bool:
         return False
     key, own_ms = _given(bus, node, entry)
     if own_ms:
-        is_set = f"{setting.value}" if setting is not None else "not set, and at factory nothing"
+        is_set = f"{setting.value}" if setting is not None else "not set, and none by factory setting"
         message = f"the node's own time-out, {time.ref}, has no effect: its reaction {place.ref} is {is_set}"
         report.warning(key, message, f"write {place.ref} too")
         return True
@@ -164,7 +164,7 @@ def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> bool:
         report.warning(
             node.key,
             f"{node.family.family.name} does nothing by itself when the bridge falls silent, unless "
-            f"{place.ref} has been set in it: at factory its drives run on",
+            f"{place.ref} has been set: with factory settings its drives run on",
             f"own_timeout_ms and enforce = true, or a [[bus.node.configure]] for {place.ref}, and for "
             f"{time.ref}, its time",
         )
@@ -173,8 +173,8 @@ def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> bool:
 
 
 def _check_runs_on(bus: BusView, node: NodeView, report: LintReport) -> None:
-    """Drives of which nobody knows that they stop when the bridge falls silent, one warning for those of a
-    node that have the same reason."""
+    """Drives not known to stop when the bridge falls silent; drives of a node with the same reason share one
+    warning."""
     drives: dict[tuple[OwnVerdict, str], list[str]] = {}
     for drive in node.drives:
         own = judged(bus, node, drive)

@@ -15,7 +15,7 @@ class Severity(StrEnum):
     ERROR = "error"
     """Cannot work."""
     WARNING = "warning"
-    """Can work, and is still worth a thought."""
+    """Can work, but deserves a second look."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class LintReport:
         self._findings: list[LintFinding] = []
         try:
             self._file = TomlFile(path)
-        except FileFaults:  # it has gone since it was loaded: what is in it still holds
+        except FileFaults:  # the file has gone since it was loaded: its content still counts
             self._file = None
 
     def error(self, key: Key, message: str, hint: str = "") -> None:

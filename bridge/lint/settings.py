@@ -24,8 +24,8 @@ TPDO: Final = (0x1800, 0x1A00)
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One object as it will be when all is downloaded. ``name`` is that of the parameter that is written in
-    its place, with its object, or empty."""
+    """One object as it will be after all downloads. ``name``: the parameter that is written in its place,
+    with its object, or empty."""
 
     value: int
     key: Key
@@ -33,8 +33,8 @@ class Setting:
 
 
 class Settings:
-    """All downloads of one node. Of an object that is written more than once the last value counts, under
-    whatever name of the family's it is written."""
+    """All downloads of one node. If an object is written more than once, under whatever name, the last value
+    counts."""
 
     def __init__(self, node: NodeTable, family: Family, key: Key, from_file: Sequence[Download]) -> None:
         """``from_file`` are the objects of the node's configuration file."""
@@ -43,7 +43,7 @@ class Settings:
         known = {(one.ref.index, one.ref.sub): one for one in aliases(family)}
         found: dict[tuple[int, int], Setting] = {}
         self.related: dict[tuple[int, int], Setting] = {}
-        """Objects that a download decides in another form: the value is the download's."""
+        """Objects whose value a download decides in another form; the value is that of the download."""
         for one, where in listed:
             value = int.from_bytes(one.data, "little")
             found[one.index, one.sub] = Setting(value, where)
@@ -54,7 +54,7 @@ class Settings:
         self._found: Mapping[tuple[int, int], Setting] = found
 
     def __getitem__(self, place: tuple[int, int]) -> Setting | None:
-        """What ``index, sub`` will hold, None where nothing is said of it."""
+        """The value that ``index, sub`` will have; None if nothing sets it."""
         return self._found.get(place)
 
     def number(self, index: int, sub: int, default: int) -> int:

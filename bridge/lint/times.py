@@ -11,7 +11,7 @@ from bridge.lint.report import LintReport
 from bridge.node.process.held import held_s, least_deadman_ms
 
 _SLOW_ANSWER_MS: Final = 50
-"""What an SDO answer may take: 30 + 20 ms in an 8400 motec (EDS84DMOTCAN 3.0 §9), 50 ms and more behind
+"""How long an SDO answer may take: 30 + 20 ms in an 8400 motec (EDS84DMOTCAN 3.0 §9), 50 ms and more behind
 NORD's system bus."""
 _SDO_LIVES: Final = 10
 _LONGEST_DEADMAN_MS: Final = 10_000
@@ -71,7 +71,7 @@ def _check_sdo(node: NodeView, report: LintReport) -> None:
     elif life and timeout_ms > _SDO_LIVES * life:
         report.warning(
             key,
-            f"{timeout_ms} ms: the node is given up after {life} ms, long before an answer is",
+            f"{timeout_ms} ms: the node counts as lost after {life} ms, long before this time-out ends",
             f"at most {_SDO_LIVES * life}, or a longer supervision_ms",
         )
 
@@ -91,14 +91,14 @@ def _check_controller(bus: BusView, drive: DriveView, report: LintReport) -> Non
     elif bus.table.deadman_ms > timeout_ms:
         report.warning(
             key,
-            f"{timeout_ms} ms is shorter than deadman_ms = {bus.table.deadman_ms}: a hung bridge keeps the "
-            "drive going for longer than a silent controller may",
+            f"{timeout_ms} ms is shorter than deadman_ms = {bus.table.deadman_ms}: a drive would run on for "
+            "longer after a hang of the bridge than after its controller fell silent",
             f"at least {bus.table.deadman_ms}, or a shorter deadman_ms",
         )
 
 
 def _check_range(drive: DriveView, report: LintReport) -> None:
-    """What the owner may make of its time-out."""
+    """The range within which the owner may set its time-out."""
     table, key = drive.table, (*drive.key, "fieldbus_timeout_range_ms")
     if table.fieldbus_timeout_range_ms is None or table.control == "none":
         return
@@ -112,12 +112,12 @@ def _check_range(drive: DriveView, report: LintReport) -> None:
         report.warning(key, message, "at least 1, better two RPDO periods and more")
     own_ms = table.fieldbus_timeout_ms
     if own_ms and not low <= own_ms <= high:
-        message = f"{low}…{high} ms does not have the site's own fieldbus_timeout_ms = {own_ms} in it"
-        report.warning(key, message, "a range with it: an owner that has changed it cannot set it again")
+        message = f"{low}…{high} ms does not include the site's own fieldbus_timeout_ms = {own_ms}"
+        report.warning(key, message, "a range that does: an owner that changed it cannot set it back")
 
 
 def _check_held(bus: BusView, drive: DriveView, report: LintReport) -> None:
-    """A stop that no SYNC takes over any more when the controller and the bridge fail together."""
+    """Whether a SYNC still makes the stop effective when controller and bridge fail together."""
     table, rpdo = drive.table, drive.rpdos[0]
     kind, sync_ms, timeout_ms = rpdo.transmission_type, bus.table.sync_period_ms, table.fieldbus_timeout_ms
     if not timeout_ms or table.control == "none" or table.telegram_downtime_s == IGNORE_ALL_S:
@@ -131,14 +131,14 @@ def _check_held(bus: BusView, drive: DriveView, report: LintReport) -> None:
     report.warning(
         rpdo.type_key or drive.key,
         f"{rpdo.name} of type {kind} waits for SYNC for up to {max(1, kind) * sync_ms} ms: with deadman_ms = "
-        f"{bus.table.deadman_ms} none comes that takes a stop over when the bridge fails together with the "
-        "controller; the drive's own time-out is what stops it then",
+        f"{bus.table.deadman_ms} no SYNC makes the stop effective if bridge and controller fail together; "
+        "then only the drive's own time-out stops it",
         f"type 254 or 255, a shorter sync_period_ms{longer}",
     )
 
 
 def _check_downtime(bus: BusView, node: NodeView, drive: DriveView, report: LintReport) -> None:
-    """The twin of P513 watches the drive's TPDO: that must come more often (``command.link``)."""
+    """``telegram_downtime_s`` must exceed the time after which the TPDO is late (``command.link``)."""
     downtime_s = drive.table.telegram_downtime_s
     key = (*drive.key, "telegram_downtime_s")
     tpdo = drive.tpdos[0]
@@ -158,12 +158,12 @@ def _check_downtime(bus: BusView, node: NodeView, drive: DriveView, report: Lint
             message = "has no effect: tpdo_deadline_ms = 0 says that the TPDO is never late"
             report.warning(key, message, "leave one of the two out")
         elif node.dictionary or drive.table.tpdo:
-            message = f"has no effect: {tpdo.name} comes only when a value changes"
+            message = f"has no effect: {tpdo.name} is sent only when a value changes"
             report.warning(key, message, "an event_ms, or a synchronous transmission type")
     elif downtime_s < deadline_s:
         report.warning(
             key,
-            f"{downtime_s:g} s is shorter than the pauses of {tpdo.name}: it is judged after "
+            f"{downtime_s:g} s is shorter than the pauses of {tpdo.name}, which is late only after "
             f"{deadline_s:.3g} s",
             f"at least {deadline_s:.3g}, or a shorter event_ms or transmission type",
         )

@@ -1,4 +1,4 @@
-"""What may be on the bus before a frame of ours, at the predicted load."""
+"""What may be sent on the bus before a frame of ours, at the predicted load."""
 
 from __future__ import annotations
 
@@ -24,12 +24,11 @@ def wire_of(bus: BusView, drive: DriveView, busy_bits: int | None) -> Wire:
 
 
 def busy_bits(bus: BusView) -> int | None:
-    """How many bits may follow each other without a pause; None where the bus never comes to rest.
+    """The most bits that can follow each other without a pause; None where the bus never comes to rest.
 
-    The queue of a CAN interface is served in its order: a frame of ours with a low identifier may wait
-    behind one that loses against everybody (an SDO request, say). So all that is regular on the bus may go
-    first, and one frame that is under way already, the longest: the fixed point of what is asked for while
-    all that lasts.
+    The queue of a CAN interface is first in, first out: a frame of ours with a low identifier may wait
+    behind one that loses every arbitration (an SDO request, say). So all regular traffic may go first, and
+    the longest frame, already under way. Frames that become due meanwhile count, too: hence a fixed point.
     """
     under_way = longest_bits(_LONGEST_BYTES)
     rate = bus.table.bitrate

@@ -23,7 +23,7 @@ _SYNTAX_PLACE: Final = re.compile(r" \(at (?:line (\d+), column \d+|end of docum
 
 @dataclass(frozen=True, slots=True)
 class RawTable:
-    """A table as it stands in the file, not checked: what does not fit is as if it were not there."""
+    """A table as it is in the file, not checked: what does not fit counts as missing."""
 
     key: Key
     content: dict[str, Any]
@@ -93,7 +93,7 @@ class TomlFile:
         return RawTable((), self.data)
 
     def line(self, key: Sequence[int | str]) -> int:
-        """The line of ``key``, or of the nearest table around it; 0 where nothing of it is written."""
+        """The line of ``key``, or of the nearest table around it; 0 if the file has neither."""
         for length in range(len(key), 0, -1):
             line = self._lines.get(tuple(key[:length]))
             if line:
@@ -128,7 +128,7 @@ def dotted(key: Sequence[int | str]) -> str:
 
 
 def real_key(data: Any, location: Sequence[int | str]) -> Key:
-    """``location`` without the tags pydantic adds for unions: only what stands in the file."""
+    """``location`` without the tags that pydantic adds for unions: only what is in the file."""
     key: list[int | str] = []
     here = data
     for position, part in enumerate(location):

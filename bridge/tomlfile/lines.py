@@ -1,6 +1,6 @@
-"""On which line each key of a TOML file stands; tomllib does not tell.
+"""The line of each key of a TOML file, which tomllib does not give.
 
-Reads text that tomllib has accepted, so it need not judge, only find its way (TOML v1.0.0).
+Reads text that tomllib has accepted, so it only has to find keys, not to validate (TOML v1.0.0).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What pydantic found, in the words of somebody who edits a file."""
+"""What pydantic found, in words for people who edit the file."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _plain(value: object) -> object:
 
 
 def _shown(value: object) -> str:
-    """``, not …`` as it stands in the file; nothing for tables and lists."""
+    """``, not …`` with the value as it is in the file; nothing for tables and lists."""
     if isinstance(value, bool | str):
         text = json.dumps(value, ensure_ascii=False)
     elif isinstance(value, float) or (isinstance(value, int) and abs(value) < 1 << 64):

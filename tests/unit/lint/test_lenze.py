@@ -49,7 +49,7 @@ def test_a_site_that_sets_nothing_is_told_that_the_drive_runs_on(tmp_path):
 
 def test_a_time_without_a_reaction_has_no_effect(tmp_path):
     (warning,) = warnings(tmp_path, TIME.format(300))
-    assert "5E9A:01, has no effect: its reaction 5DAE:01 is not set, and at factory nothing" in warning
+    assert "5E9A:01, has no effect: its reaction 5DAE:01 is not set, and none by factory setting" in warning
 
 
 def test_a_reaction_that_is_none_is_said_too(tmp_path):

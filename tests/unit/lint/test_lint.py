@@ -227,14 +227,14 @@ def test_the_dead_man_time_should_be_the_shorter_one(tmp_path: Path) -> None:
 
 def test_a_downtime_shorter_than_the_pauses_of_the_tpdo(tmp_path: Path) -> None:
     verdict = judge(tmp_path, drive=f"{TIMEOUT}\ntelegram_downtime_s = 0.2")
-    assert "it is judged after 0.395 s" in only(verdict, Severity.WARNING)
+    assert "which is late only after 0.395 s" in only(verdict, Severity.WARNING)
     faster = f"{TIMEOUT}\ntelegram_downtime_s = 0.2\ntpdo = {{ event_ms = 100 }}"
     assert judge(tmp_path, drive=faster).findings == ()
 
 
 def test_a_downtime_without_a_regular_tpdo(tmp_path: Path) -> None:
     verdict = judge(tmp_path, drive=f"{TIMEOUT}\ntpdo = {{ event_ms = 0 }}")
-    assert "has no effect: TPDO1 comes only when a value changes" in only(verdict, Severity.WARNING)
+    assert "has no effect: TPDO1 is sent only when a value changes" in only(verdict, Severity.WARNING)
 
 
 def test_a_downloaded_event_timer_counts(tmp_path: Path) -> None:
@@ -245,7 +245,7 @@ def test_a_downloaded_event_timer_counts(tmp_path: Path) -> None:
 
 def test_a_deadline_that_the_site_file_gives_counts(tmp_path: Path) -> None:
     drive = f"{TIMEOUT}\ntelegram_downtime_s = 0.5\ntpdo_deadline_ms = {{}}"
-    assert "judged after 0.6 s" in only(judge(tmp_path, drive=drive.format(600)), Severity.WARNING)
+    assert "late only after 0.6 s" in only(judge(tmp_path, drive=drive.format(600)), Severity.WARNING)
     assert "is never late" in only(judge(tmp_path, drive=drive.format(0)), Severity.WARNING)
 
 
@@ -299,7 +299,7 @@ def test_supervision_needs_more_than_a_cycle(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("timeout_ms", "text"), [(20, "shorter than drives take"), (5000, "given up after 200")]
+    ("timeout_ms", "text"), [(20, "shorter than drives take"), (5000, "counts as lost after 200")]
 )
 def test_sdo_time_outs_that_make_no_sense(tmp_path: Path, timeout_ms: int, text: str) -> None:
     assert text in only(judge(tmp_path, node=f"sdo_timeout_ms = {timeout_ms}"), Severity.WARNING)

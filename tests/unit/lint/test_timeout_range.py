@@ -42,11 +42,20 @@ def told(verdict: Verdict) -> list[str]:
         (f"{WRITABLE}\nfieldbus_timeout_range_ms = [100, 2000]", []),
         (f"{WRITABLE}\nfieldbus_timeout_range_ms = [200, 200]", []),
         (f"{WRITABLE}\nfieldbus_timeout_range_ms = [0, 2000]", ["the owner may switch off the time-out"]),
-        (f"{WRITABLE}\nfieldbus_timeout_range_ms = [201, 2000]", ["fieldbus_timeout_ms = 200 in it"]),
-        (f"{WRITABLE}\nfieldbus_timeout_range_ms = [100, 199]", ["fieldbus_timeout_ms = 200 in it"]),
+        (
+            f"{WRITABLE}\nfieldbus_timeout_range_ms = [201, 2000]",
+            ["does not include the site's own fieldbus_timeout_ms = 200"],
+        ),
+        (
+            f"{WRITABLE}\nfieldbus_timeout_range_ms = [100, 199]",
+            ["does not include the site's own fieldbus_timeout_ms = 200"],
+        ),
         (
             f"{WRITABLE}\nfieldbus_timeout_range_ms = [0, 199]",
-            ["the owner may switch off the time-out", "fieldbus_timeout_ms = 200 in it"],
+            [
+                "the owner may switch off the time-out",
+                "does not include the site's own fieldbus_timeout_ms = 200",
+            ],
         ),
         ("fieldbus_timeout_range_ms = [100, 2000]", ["has no effect: the owner may not set"]),
         ("fieldbus_timeout_range_ms = [0, 100]", ["has no effect: the owner may not set"]),

@@ -29,7 +29,7 @@ _STORE: Final = 0x17
 _SELECT: Final = (0x40, 0x41, 0x42, 0x43)
 _SELECTED: Final = 0x44
 IDENTIFIED: Final = 0x4F
-"""What every device says that a question of a fastscan fits."""
+"""Reply of every device that matches a fastscan query."""
 _FASTSCAN: Final = 0x51
 _INQUIRE: Final = (0x5A, 0x5B, 0x5C, 0x5D)
 _INQUIRE_NODE_ID: Final = 0x5E

@@ -1,1 +1,1 @@
-"""The CANopen master: the buses of a site, and when what is done on them."""
+"""The CANopen master: the buses of a site, and the timing of everything done on them."""

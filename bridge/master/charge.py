@@ -1,4 +1,4 @@
-"""Who is in charge of a bus, this bridge or another one, and what is said of it. Sans-IO."""
+"""Who is in charge of a bus, this bridge or another one, and how that is reported. Sans-IO."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Charge:
         return take
 
     def heard(self, sign: str, now: float) -> None:
-        """``sign`` shows another bridge. If this one gives way it sends nothing any more, no stops either."""
+        """``sign`` reveals another bridge. If this one gives way it sends nothing more, not even stops."""
         if not self._listening.heard(now):
             return
         self._forget(now, f"another bridge is in charge of {self._bus.name}")
@@ -67,7 +67,7 @@ class Charge:
         self._say_passive(now)
 
     def on_time(self, now: float) -> None:
-        """Begin to act when it is time for it: like at any start, with everything stopped."""
+        """Begin to act when it is time: as at any start, with everything stopped."""
         was_left = self.is_left
         if not self._listening.on_time(now) or not was_left:
             return

@@ -1,4 +1,4 @@
-"""The end of the service: have all drives followed their stop? What is done about the others, and said."""
+"""The end of the service: which drives did not follow their stop, what is done about them, and the report."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from bridge.image import Quality
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """Drives by their names. ``ignoring`` have been heard and do not follow their stop; of ``unheard`` it is
-    not known."""
+    """Names of drives. ``ignoring`` were heard and do not follow their stop; ``unheard`` were not heard."""
 
     drives: int = 0
     ignoring: tuple[str, ...] = ()
@@ -45,8 +44,8 @@ def waits_for(plant: Plant) -> bool:
 
 
 def end(plant: Plant, now: float, *, can_send: bool = True) -> Ending:
-    """NMT stop for the nodes of drives that have not followed, where the site does not say to leave them. Of
-    a master that has failed (not ``can_send``) nothing goes out, and it hears nobody."""
+    """NMT stop for the nodes of drives that have not followed, unless the site file exempts them. A master
+    that has failed (not ``can_send``) sends nothing and hears nobody."""
     ignoring = [drive for drive in plant.drives.values() if can_send and _ignores(drive)]
     unheard = [
         drive.name

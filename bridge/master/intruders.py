@@ -1,7 +1,7 @@
-"""Frames of others on identifiers that are the bridge's alone: counted, told in words, answered. Sans-IO.
+"""Frames of others on identifiers that belong to the bridge alone: counted, reported, answered. Sans-IO.
 
-What the site file has the bridge send is its own: RPDOs, SYNC, TIME, its heartbeat, requests to the SDO
-servers of its nodes. A site where it sends no SYNC or TIME may have another producer of them.
+What the bridge sends by its site file is its own: RPDOs, SYNC, TIME, its heartbeat, requests to the SDO
+servers of its nodes. Where it sends no SYNC or TIME, somebody else may produce them.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from bridge.node.process.process_data import DrivePdos
 from bridge.node.wire import Handler
 
 _AGAIN_S: Final = 10.0
-"""One who goes on is told so often, with the number of frames since the last time."""
+"""How often an intruder that goes on is reported, with the number of frames since the last time."""
 _STOP_AGAIN_S: Final = 1.0
-"""So often a node gets its NMT stop as long as the frames go on."""
+"""How often a node gets its NMT stop as long as the frames go on."""
 _SEVERE: Final = 900
 _HARMLESS: Final = 500
 
@@ -68,8 +68,8 @@ class Intruders:
     # whose identifiers
 
     def watched(self, taken: Mapping[int, Handler]) -> frozenset[int]:
-        """What we repeat, and nobody else may send, as the nodes are now; without what is ``taken``: a node
-        of the site says something on it."""
+        """Identifiers that we repeat and nobody else may use, by the nodes' present state; without those
+        ``taken`` by a node of the site for something of its own."""
         self._commands = {
             can_id: (node, command)
             for node in self._nodes
@@ -92,8 +92,7 @@ class Intruders:
         return known[1]
 
     def routes(self, others: Mapping[int, Handler]) -> dict[int, Handler]:
-        """What only single frames of ours are sent on, which do not come back: TIME, and SDO requests. What
-        others do with these goes on being done."""
+        """Identifiers on which we send single frames, which do not come back to us: TIME and SDO requests."""
         routes: dict[int, Handler] = {}
         if self._bus.time_period_s:
             routes[cobid.TIME] = self._on_time
@@ -108,8 +107,8 @@ class Intruders:
         return routes
 
     def is_sign(self, frame: Frame, *, acts: bool) -> bool:
-        """Whether this frame says that another bridge is in charge. Of one that acts itself RPDOs alone do
-        not: whoever sends them is an intruder and no bridge."""
+        """Whether this frame shows that another bridge is in charge. To a bridge that acts itself, RPDOs
+        alone do not: their sender is an intruder."""
         return frame.can_id == self._heartbeat_id or (not acts and frame.can_id in self._commands)
 
     def name(self, frame: Frame) -> str:
@@ -139,7 +138,7 @@ class Intruders:
         self._meet(frame, [], lambda: f"TIME ({frame.can_id:03X}h)")
 
     def _on_sdo(self, node: NodeCore, then: Handler | None, frame: Frame) -> None:
-        """Somebody asks or sets an object of a node. To read stops nobody: a tool may look."""
+        """Somebody reads or writes an object of a node. Reading has no consequences: a tool may look."""
         if then:
             then(frame)
         said = self._sdo.setdefault(frame.can_id, SdoListener()).request(frame.data)
@@ -158,8 +157,8 @@ class Intruders:
         said: Callable[[], str],
         is_worse: bool = False,
     ) -> None:
-        """Count it, answer it, and tell it, not with every frame. ``affected``: None for what changes
-        nothing. ``is_worse``: it is told even where another one on its identifier has been told just now."""
+        """Count it, answer it, and report it, though not every frame. ``affected``: None if it changes
+        nothing. ``is_worse``: report it even if another one on this identifier has just been reported."""
         if not self._acts():
             return
         self.count += 1

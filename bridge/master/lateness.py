@@ -1,4 +1,4 @@
-"""How late the bridge itself was at worst: an event where it was later than what is published allows."""
+"""The bridge's own worst delays: an event where one exceeds what the published times allow for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the bridge may act on a bus, or listens because another one may be in charge of it. Sans-IO."""
+"""Whether the bridge may act on a bus, or listens because another bridge may be in charge. Sans-IO."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _SHORTEST_S: Final = 0.2
 _LONGEST_S: Final = 1.0
 _PERIODS: Final = 2
 _SILENCE: Final = 3
-"""A bridge in charge that has been silent for so many times the listening is gone."""
+"""A bridge in charge that has been silent for this many listening times is gone."""
 
 
 class Part(Enum):
@@ -31,11 +31,12 @@ def listen_s(bus: BusTable) -> float:
 
 
 class Listening:
-    """Who acts for less than the time it listens gives way to another that acts: it may have begun in the
-    same moment, or was away while the other took over. Who has acted for longer stays.
+    """A bridge that has been acting for less than its listening time gives way to another that acts: both may
+    have begun at the same moment, or this one was away while the other took over. One that has acted for
+    longer stays.
 
-    ``spread`` gives a number from 0 to 1: so different are the times after which two that have given way to
-    each other begin again.
+    ``spread`` gives a random number from 0 to 1, so that two that have given way to each other begin again
+    at different times.
     """
 
     def __init__(self, listen_s: float, spread: Callable[[], float] = random.random) -> None:
@@ -54,8 +55,8 @@ class Listening:
         return self.part is Part.ACTING
 
     def heard(self, now: float) -> bool:
-        """Another one is in charge of the bus; True where that is new and it is left to it. Of one that acts
-        it is told only what gives the other away as a bridge."""
+        """Another bridge is in charge of the bus; True if that is new and this one gives way. While this one
+        acts, call it only for signs that certainly come from a bridge."""
         is_new = not self.is_passive
         if self.acts and now >= self._acts_since + self.listen_s:
             return False
@@ -70,7 +71,7 @@ class Listening:
         return self.part is Part.PASSIVE
 
     def on_time(self, now: float) -> bool:
-        """True at the moment it begins to act."""
+        """True once, when it begins to act."""
         if self.acts or self._is_gone:
             return False
         if self._until is None:
@@ -89,11 +90,11 @@ class Listening:
         self._acts_since = now
 
     def bus_is_gone(self) -> None:
-        """What is not heard now says nothing."""
+        """The bus cannot be heard now, so silence proves nothing."""
         self._is_gone = True
         self._until = None
 
     def bus_is_back(self, now: float) -> None:
-        """Who acts goes on at once, with stopped words: to listen first would keep them back."""
+        """A bridge that acts goes on at once, with stopped words: listening first would delay them."""
         self._is_gone = False
         self.returns(now)

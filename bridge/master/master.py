@@ -63,7 +63,7 @@ class _Line:
     beats: Beats | None = None
     renew_at: float = 0.0
     hold_at: float = inf
-    """When some bursts have to be renewed so that they go on for as long as a drive needs them."""
+    """When bursts have to be renewed so that they last as long as a drive needs them."""
     was_up: bool = True
     shown: ControllerState = ControllerState.OK
     shown_refusal: str = ""
@@ -72,13 +72,13 @@ class _Line:
 
     @property
     def burst_s(self) -> float:
-        """How long a burst goes on that nobody renews."""
+        """How long a burst goes on without being renewed."""
         return self.network.bus.deadman_ms / 1000
 
     @property
     def renew_s(self) -> float:
-        """How often bursts are renewed. Those that have to end in a stop reach no further ahead than the
-        longest sequence that the kernel takes."""
+        """How often bursts are renewed. One that has to end in a stop is no longer than the longest sequence
+        that the kernel takes."""
         return min(self.burst_s, MOST_FRAMES * self.network.bus.rpdo_period_s) / _RENEWALS
 
     def ended(self, beats: Beats, frames: list[Frame]) -> set[int]:
@@ -86,10 +86,10 @@ class _Line:
         return self.beating.keys() - (beats.keys() - {frame.can_id for frame in frames})
 
     def due(self, beats: Beats, now: float, *, renew: bool) -> list[tuple[Beat, bool]]:
-        """What the bus has to be told, and whether that is new: setpoints before the word that enables.
+        """What to hand to the bus, and whether it is new: setpoints before the enabling word.
 
-        What is not goes the other way round: told later, it has no more frames until the deadline than what
-        was told before it. So setpoints end before the stop comes.
+        Mere renewals go in reverse order: what is handed over later has no more frames left until the
+        deadline than what went before it, so setpoints end before the stop comes.
         """
         new, kept = list[tuple[Beat, bool]](), list[tuple[Beat, bool]]()
         for can_id, beat in beats.items():
@@ -101,9 +101,9 @@ class _Line:
         return [*new, *reversed(kept)]
 
     def beat(self, beat: Beat, now: float, *, at_once: bool) -> None:
-        """Have the bus repeat this for the dead-man time, and what follows if its own time is up before."""
+        """Make the bus repeat this for the dead-man time, then what follows if its own time ends earlier."""
         ending = None
-        # A deadline that lies further ahead is none of this burst, however long that is on its way.
+        # A deadline further ahead does not concern this burst, however long the hand-over takes.
         if beat.until is not None and beat.until < now + 2 * self.burst_s + beat.period_s:
             ending = BurstEnd(beat.until, beat.then())
         count = burst_length(beat.period_s, self.network.bus.deadman_ms)
@@ -115,8 +115,8 @@ class _Line:
 class Master:
     """Runs any number of networks on their buses in one event loop.
 
-    ``clock`` gives monotonic seconds; ``alive`` is called at the end of every complete round; ``alarm`` tells
-    of a standstill while frames are handed to the bus; ``suspended`` bounds the time for which the
+    ``clock`` gives monotonic seconds; ``alive`` is called at the end of every complete round; ``alarm``
+    notices a standstill while frames are handed to the bus; ``suspended`` gives bounds for how long the
     machine has been suspended.
     """
 
@@ -162,7 +162,7 @@ class Master:
     def attach(self, set_timer: Callable[[float], None]) -> None:
         """Run by whoever calls ``pump`` at the times given to ``set_timer``."""
         self._set_timer = set_timer
-        # A changed output goes out at once, and like everything else in a complete round.
+        # A changed output goes out at once, but like everything else in a complete round.
         self._plant.outputs_changed = self._wake
         self._running = True
 
@@ -173,7 +173,7 @@ class Master:
 
     async def stop_drives(self, now: float) -> Ending:
         """Take no more commands and send stopped words until every drive follows, unless the master has
-        failed: for a moment at least, and not for ever. Whoever does not follow gets NMT stop."""
+        failed: for a moment at least, and not for ever. Nodes of drives that do not follow get NMT stop."""
         self.halt(now)
         if self._running:
             await asyncio.sleep(_STOP_DRIVES_S)
@@ -204,9 +204,9 @@ class Master:
             line.bus.close()
 
     def _wake(self) -> None:
-        """A round, if we run. A fault of our own ends the running: no drive is left to a master that
-        does half of its work. Each gets a last, stopped word where that can still be done; the bursts end
-        within the dead-man time, and ``failed`` says why."""
+        """One round, while running. A fault of our own ends it: no drive is left to a master that does half
+        of its work. Each drive gets a last, stopped word if possible; the bursts end within the dead-man
+        time, and ``failed`` says why."""
         if not self._running:
             return
         if self._in_round:
@@ -271,7 +271,7 @@ class Master:
             self._lateness.refresh(now)
             for line in self._lines:
                 line.network.refresh(line.bus.status, now)
-        # A process that was stopped since the round began must not send what was right then.
+        # A process that was stopped since the round began must not send what was right before.
         self._last_round = now
         now = self._clock()
         self._check_gap(now)
@@ -288,13 +288,13 @@ class Master:
         self._arm(now)
 
     def _stood_still(self, line: _Line, since: float) -> bool:
-        """The process was stopped after ``since``, for so long that nothing of then may be sent any more. The
-        next round finds the gap."""
+        """The process was stopped after ``since`` for longer than deadman_ms, so words computed before are
+        stale. The next round finds the gap."""
         return (self._clock() - since) * 1000 > line.network.bus.deadman_ms
 
     def _check_gap(self, now: float) -> None:
-        """The process was not there for longer than the dead-man time: its bursts have ended meanwhile,
-        and nothing that was moving goes on by itself. Nor does it where the whole machine was suspended."""
+        """After a pause longer than the dead-man time, or a suspended machine, all bursts have ended: nothing
+        that was moving may go on by itself."""
         slept_s = self._suspend.take()
         if self._last_round is None:
             return
@@ -322,7 +322,7 @@ class Master:
         if status.outages != line.outages:
             line.outages = status.outages
             if is_up and line.was_up:
-                # It came and went between two rounds: its bursts are gone all the same.
+                # An outage came and went between two rounds: the bursts are gone anyway.
                 line.beating.clear()
                 line.renew_at = now
                 line.network.bus_is_gone(now)
@@ -387,7 +387,7 @@ class Master:
         line.beats = beats
         self._alarm.set(line.burst_s)
         for beat, changed in line.due(beats, now, renew=renew):
-            # In this order: the process may be stopped at the end of the look at the clock.
+            # In this order: the process may be stopped right after it has read the clock.
             if self._stood_still(line, now) or self._alarm.rang:
                 line.beats = None
                 return

@@ -1,6 +1,6 @@
 """One CANopen network: its nodes, its SYNC and TIME, our own heartbeat. Sans-IO.
 
-Says which frames are to be sent once and which are to be repeated; whoever holds the bus does it.
+Says which frames are to be sent once and which are to be repeated; the holder of the bus sends them.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from bridge.ratelimit import RateLimit
 
 _LOAD_PERIOD_S: Final = 1.0
 _ERRORS_EVERY_S: Final = 10.0
-"""A broken wire gives thousands of error frames a second: one line tells of all of them."""
+"""A broken wire gives thousands of error frames a second: one line reports all of them."""
 
 NOTHING: Final[Mapping[str, Sequence[Download]]] = MappingProxyType({})
 
@@ -117,7 +117,7 @@ class Network:
         self._pump(now)
 
     def _pump(self, now: float) -> None:
-        """Let every boot-up go on to which something has happened, and start who may start."""
+        """Continue every boot-up that something has happened to, and start nodes that may start."""
         while touched := self._schedule.take_touched():
             for node in touched:
                 node.booting.pump(now)
@@ -164,13 +164,13 @@ class Network:
 
     @staticmethod
     def _takes_over(nodes: Sequence[NodeCore]) -> bool:
-        """Whether one has to take over stopped words before its NMT stop: each gets its own in its time."""
+        """Whether a node needs a SYNC for its stopped words before its NMT stop: each waits for its own."""
         return any(node.leaving.takeover_s for node in nodes)
 
     # NMT
 
     def _boot_up(self, now: float) -> None:
-        """The bus is there: say that we have started (CiA 301 §7.2.8.3.3), and reset who is to be reset."""
+        """The bus is there: send our boot-up message (CiA 301 §7.2.8.3.3), and reset nodes that need it."""
         self._has_booted = True
         if self.bus.heartbeat_ms:
             self._frames.append(Frame(cobid.ERROR_CONTROL + self.bus.master_node_id, b"\0"))
@@ -228,7 +228,7 @@ class Network:
 
     @property
     def waiting(self) -> int:
-        """Plans and frames that it holds: bounded, whatever comes."""
+        """Plans and frames that it holds: bounded, whatever is received."""
         return len(self._schedule) + len(self._frames)
 
     def take_frames(self) -> list[Frame]:
@@ -305,13 +305,13 @@ class Network:
                             beats[beat.frames[0].can_id] = beat
                             if pdos.needs_sync:
                                 hold_at += beat.hold_at
-        # SYNC last: what goes out together with it is taken over by it (CiA 301 §7.2.2.2).
+        # SYNC last: it makes effective what is sent together with it (CiA 301 §7.2.2.2).
         if self.bus.sync_period_ms:
             beats[cobid.SYNC] = Beat(self._sync, self.bus.sync_period_ms / 1000, hold_at=tuple(hold_at))
         return beats
 
     def on_handed_over(self, now: float) -> None:
-        """What ``beats`` has said is on the bus: the bounds of stops begin (``command/follow.py``)."""
+        """What ``beats`` returned is on the bus: the bounds of stops begin (``command/follow.py``)."""
         unsent = self._plant.unsent
         for node in self.nodes:
             for drive in node.node.drives:
@@ -334,7 +334,7 @@ class Network:
             self._schedule.touch(node)
 
     def bus_is_back(self, now: float) -> None:
-        """What was written while the bus was gone does not go out first."""
+        """What was written while the bus was down must not be sent first."""
         self.charge.bus_is_back(now)
         for node in self.nodes:
             node.bus_is_back(now)

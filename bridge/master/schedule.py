@@ -1,4 +1,4 @@
-"""Which nodes of a bus have something to do now: 127 nodes cost as much as those that are due."""
+"""Which nodes of a bus have something to do now: only those that are due cost anything, even of 127."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ N = TypeVar("N", bound=Neighbour)
 
 
 class Schedule(Generic[N]):
-    """Deadlines of nodes. A deadline that was put off, as each heartbeat does, is noticed when it comes;
-    one that was brought forward has to be told by ``plan``, or by ``touch`` and the round that follows."""
+    """Deadlines of nodes. A deadline that was put off (each heartbeat does that) is noticed when the old one
+    comes; one that was brought forward has to be reported by ``plan``, or by ``touch`` and the next round."""
 
     def __init__(self, nodes: Iterable[N]) -> None:
         self._nodes = tuple(nodes)
@@ -44,7 +44,7 @@ class Schedule(Generic[N]):
         heap = self._heap
         while heap and heap[0][0] <= now:
             at, place = heapq.heappop(heap)
-            # An entry that was overtaken by an earlier one is stale.
+            # An entry is stale if the node has got an earlier one since.
             if self._planned[place] == at:
                 self._planned[place] = None
                 due.append(self._nodes[place])

@@ -1,8 +1,8 @@
-"""Whether the process was stopped for long, told without asking anybody.
+"""Whether the process was stopped for long, found out without a system call.
 
-A process can be stopped for any time between a look at the clock and what follows it: most likely at the end
-of the look itself, where that is a system call (the clock of many virtual machines is). A signal that has
-become due meanwhile is delivered before anything else of the process is executed.
+A process can be stopped for any time between reading the clock and what follows: most likely at the end of
+the reading itself, where that is a system call (as on many virtual machines). A signal that has become due
+meanwhile is delivered before the process executes anything else.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import signal
 
 
 class Alarm:
-    """``rang`` after the time it was last set to. This one never rings: for a master that is not alone in its
-    process."""
+    """``rang``: the time it was last set to has passed. This one never rings: it is for a master that shares
+    its process."""
 
     rang = False
 

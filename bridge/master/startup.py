@@ -36,7 +36,7 @@ class StartGate:
         self._order = min((node.table.start_order for node in coming), default=0)
 
     def may_start(self, node: Neighbour) -> bool:
-        """Whether nothing is missing and no node with a lower start order is still on its way."""
+        """Whether no mandatory node is missing and no node with a lower start order is still booting."""
         return not self.missing and node.table.start_order <= self._order
 
     @property

@@ -9,8 +9,8 @@ _NOTICEABLE_S: Final = 0.01
 
 
 class SuspendWatch:
-    """``look`` gives two numbers of seconds between which the time lies that the machine has been suspended
-    since it was booted: two clocks cannot be read at once, and the process may be held up between them."""
+    """``look`` gives a lower and an upper bound, in seconds, of how long the machine has been suspended since
+    it was booted: two clocks cannot be read at once, and the process may be delayed between them."""
 
     __slots__ = ("_at_most", "_look")
 
@@ -19,7 +19,7 @@ class SuspendWatch:
         self._at_most = look()[1]
 
     def take(self) -> float:
-        """How many seconds it was suspended since the last time this was asked; 0 where it was not."""
+        """How many seconds it was suspended since the last call; 0 if it was not."""
         at_least, at_most = self._look()
         slept_s = at_least - self._at_most
         if slept_s > _NOTICEABLE_S:

@@ -38,18 +38,18 @@ from bridge.node.boot.status import BootError
 
 _GOES_OPERATIONAL_S: Final = 2.0
 _SYNCS: Final = 2
-"""Of so many SYNC periods one has a SYNC in it, however late that is."""
+"""At least one of this many SYNC periods contains a SYNC, however late that is."""
 
 
 def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | None = None) -> Boot:
-    """Boot ``node``; returns what is to be known of it.
+    """Boot ``node``; returns what it has learned.
 
-    Raises BootError where it is another device, cannot be configured or does not go operational,
-    SdoError where it does not answer. ``downloads`` go before what the tables of the site file say.
-    ``memory`` is what the node's boot-ups before this one have left.
+    Raises BootError if the node is another device, cannot be configured or does not go operational, SdoError
+    if it does not answer. ``downloads`` come before what the tables of the site file say. ``memory`` is what
+    the node's earlier boot-ups have left.
     """
     result = BootResult(memory=memory or BootMemory())
-    # Outside Operational it takes no RPDO: what stops its drives goes first, and what may fail afterwards.
+    # Outside Operational it takes no RPDO: so first stop its drives, then do what may fail.
     yield SendStopped()
     device_type = yield from look_for()
     yield Found()
@@ -82,8 +82,8 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
 
 
 def _start(table: NodeTable, result: BootResult) -> Do:
-    """Error control first, then NMT start; both are seen from the node's own messages. Raises BootError where
-    they do not come."""
+    """Error control first, then NMT start; the node's own messages confirm both. Raises BootError if they do
+    not come."""
     not_heard = "F" if table.supervision == "guarding" else "K"
     yield Step(f"waiting for {table.supervision}", not_heard)
     yield StartSupervision()

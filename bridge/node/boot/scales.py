@@ -54,8 +54,8 @@ def read_scales(
 
 
 def number_from(data_type: str, data: bytes) -> int:
-    """The number in ``data``, little-endian, signed where its type is. Bytes beyond the type's are left
-    out: some servers answer every read with four."""
+    """The number in ``data``, little-endian. Bytes beyond its type are ignored: some servers answer every
+    read with four."""
     size, is_signed = INTEGERS[data_type]
     return int.from_bytes(data[:size], "little", signed=is_signed)
 

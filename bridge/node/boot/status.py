@@ -39,7 +39,7 @@ HINTS: Final = {
 }
 
 SILENT: Final = "did the node restart or lose its connection just now, or is the bus disturbed?"
-"""What helps where a node that was there says nothing any more, whatever it was asked."""
+"""What helps if a node that was there does not answer any more, whatever the step."""
 
 ABSENT: Final = frozenset("BEFK")
 """With these the node is not there; with the others it is there and cannot be used."""

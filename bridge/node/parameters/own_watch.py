@@ -1,4 +1,4 @@
-"""What clients may not make of the drives' own watch over the bridge, and what is not true of it any more
+"""What clients may not do to the drives' own supervision of the bridge, and what is no longer known of it
 once they have written it. Sans-IO."""
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Which parameter point is read next: in turn, within a budget, behind everything else. Sans-IO.
+"""Which parameter point is read next: in turn, within a budget, after everything else. Sans-IO.
 
-Every point is read once when its node has been booted, and those with ``every_ms`` again and again. One
-is asked at a time; where more are due than the budget allows, all of them come less often.
+Every point is read once after its node has booted, and those with ``every_ms`` again and again. One at a time
+is read; if more are due than the budget allows, all are read less often.
 """
 
 from __future__ import annotations

@@ -22,11 +22,10 @@ def run(
     *,
     priority: Priority = Priority.COMMAND,
 ) -> None:
-    """Carry ``procedure`` out; ``done`` is called once with what it returns or why it failed, possibly
+    """Run ``procedure``; ``done`` is called once with its result or the reason of its failure, possibly
     before this returns.
 
-    ``clock`` gives the latest time that is known, in monotonic seconds. What was read counts as of the
-    time at which it was asked for.
+    ``clock`` gives the latest known time in monotonic seconds. A value is as old as the request that read it.
     """
 
     refused: list[str] = []
@@ -56,7 +55,7 @@ def run(
                 refused[:] = filter(None, [transfer.why_not()])
             return not refused
 
-        # Not repeated where no answer comes: an EEPROM is written once, and read to see whether it was.
+        # Not repeated without an answer: an EEPROM is written once, and read to see whether it was.
         channel.write(
             index,
             sub,

@@ -1,8 +1,8 @@
 """The parameters of one node's drives: requests, and the points that show them. Sans-IO.
 
-Each drive's parameters go over the SDO channel that reaches it. Requests of clients come before polls;
-several who read the same parameter at once share one answer, and one parameter is written by one client
-at a time.
+Each drive's parameters use the SDO channel that reaches it. Requests of clients come before polls; clients
+that read the same parameter at the same time share one answer, and only one client at a time writes a
+parameter.
 """
 
 from __future__ import annotations

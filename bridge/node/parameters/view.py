@@ -12,7 +12,7 @@ from bridge.image import Image, Quality
 from bridge.parameter import Address, Entry, Names, ParameterError, Reading, Why
 
 _FINAL_ABORTS: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0602_0000, 0x0609_0011))
-"""Abort codes of what a drive does not have: asking again brings the same answer."""
+"""Abort codes for what a drive does not have: asking again gives the same answer."""
 
 
 NO_CHANNEL: Final = "no SDO channel reaches it: name its channel in sdo_channels of the site file"
@@ -32,7 +32,7 @@ class ParameterView:
         self._dead_at: float | None = None
 
     def on_node(self, state: NodeState, now: float) -> None:
-        """The node is in another state: what was read from it may not be so any more."""
+        """The node is in another state: what was read from it may have changed."""
         self._dead_at = None
         match state:
             case NodeState.OPERATIONAL | NodeState.CONFIG_ERROR | NodeState.ABSENT:
@@ -79,7 +79,7 @@ class ParameterView:
         return error.abort_code in _FINAL_ABORTS or error.why in (Why.NOT_CONFIGURED, Why.WRITE_ONLY)
 
     def failed(self, drive: str, entry: Entry, error: ParameterError, now: float) -> None:
-        """It could not be read: the last value is kept and is not a present one."""
+        """It could not be read: the last value stays, but is not current."""
         index = self._indices.get((drive, entry.address))
         if index is None:
             return

@@ -1,4 +1,4 @@
-"""How long before its owner's deadline the bridge may be gone, and the kernel stops the drive. Pure."""
+"""How long before its owner's deadline the bridge may fail and the kernel still stops the drive. Pure."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _ROUNDING: Final = 1e-9
 
 
 def held_s(bus: BusTable, transmission_type: int) -> float:
-    """How long before its owner's time is up the bridge may be gone at most, so that its drive is stopped in
-    time all the same; 0 where it is not. ``transmission_type`` is that of the RPDO with the control word.
+    """How long before its owner's deadline the bridge may fail so that the drive still stops in time; 0 if it
+    never does. ``transmission_type`` is that of the RPDO with the control word.
 
-    No burst outlasts the dead-man time, SYNC's neither: a drive may watch SYNC, too. From its deadline on the
-    stop takes up to two RPDO periods (``burstend.sequence``), then a synchronous RPDO waits for its SYNC, and
-    one SYNC is in hand for what the timers of the two bursts differ by.
+    No burst outlasts the dead-man time, SYNC's neither: a drive may supervise SYNC, too. From the deadline on
+    the stop takes up to two RPDO periods (``burstend.sequence``), then a synchronous RPDO waits for its SYNC;
+    one more SYNC allows for the different timers of the two bursts.
     """
     stop_s = _reach_s(bus.rpdo_period_s, bus.deadman_ms, MOST_FRAMES)
     if transmission_type > LAST_SYNCHRONOUS or not bus.sync_period_ms:
@@ -29,7 +29,8 @@ def held_s(bus: BusTable, transmission_type: int) -> float:
 
 
 def least_deadman_ms(bus: BusTable, transmission_type: int) -> int:
-    """The shortest dead-man time with which a synchronous RPDO has its stop taken over without the bridge."""
+    """The shortest dead-man time with which the stop of a synchronous RPDO becomes effective without the
+    bridge."""
     period_ms = 1000 * bus.rpdo_period_s
     stop_in_syncs = math.floor(2 * period_ms / bus.sync_period_ms + _ROUNDING) + 2
     syncs = max(SHORTEST, stop_in_syncs + _syncs(transmission_type))
@@ -41,7 +42,7 @@ def _syncs(transmission_type: int) -> int:
 
 
 def _reach_s(period_s: float, deadman_ms: int, most: int | None = None) -> float:
-    """How far the last frame of a burst is away at least; 0 where the kernel does not have it."""
+    """The least time to the last frame of a burst; 0 if the kernel does not send it."""
     count = burst_length(period_s, deadman_ms)
     if count < SHORTEST:
         return 0.0

@@ -1,5 +1,5 @@
-"""What has to be asked for again and again: objects, behind everything else that wants the SDO channel,
-and TPDOs that come on a remote frame only."""
+"""What has to be polled: objects, after everything else that wants the SDO channel, and TPDOs that come only
+on a remote frame."""
 
 from __future__ import annotations
 

@@ -23,11 +23,11 @@ Reject = Callable[[Frame, str], None]
 
 
 class Beat(NamedTuple):
-    """One identifier: the frames that are to be repeated in turn, and how often. With ``until`` they may be
-    on the bus no longer than that, and ``then`` gives the frame that takes their place; None for silence.
+    """One identifier: the frames to be repeated in turn, and how often. They may be on the bus no longer than
+    ``until``; ``then`` gives the frame that follows, None for silence.
 
-    A burst that is handed over at one of ``hold_at`` or later goes on for as long as a drive needs it in
-    order to stop without us (``held.py``)."""
+    A burst that is handed over at one of ``hold_at`` or later lasts as long as a drive needs to stop without
+    us (``held.py``)."""
 
     frames: tuple[Frame, ...]
     period_s: float

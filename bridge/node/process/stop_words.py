@@ -1,7 +1,7 @@
-"""Stop words for the drives of a node, by every identifier under which it may listen.
+"""Stop words for the drives of a node, on every identifier on which it may listen.
 
-A bridge that was started anew does not know what the node holds: the factory's identifiers, the site
-file's, and those that the node has named in a boot-up get a frame each, packed by the best that is known.
+A restarted bridge does not know what the node holds. So the factory's identifiers, the site file's, and those
+that the node has named in a boot-up get a frame each, packed by the best mapping known.
 """
 
 from __future__ import annotations

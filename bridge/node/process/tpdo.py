@@ -1,4 +1,4 @@
-"""TPDOs that belong to a node and to none of its drives: they bring what is polled otherwise."""
+"""TPDOs of a node that belong to none of its drives: they carry what would be polled otherwise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Between the entries of a PDO and the 16-bit words of a drive."""
+"""From the entries of a PDO to the 16-bit words of a drive and back."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _WORD_MASK: Final = 0xFFFF
 
 
 class Place(NamedTuple):
-    """Where a mapped object stands among the words of its drive.
+    """The place of a mapped object among the words of its drive.
 
     It fills ``span`` words from ``word`` on, the low one first; or, with ``bits``, so many bits of one
     word from ``shift`` on.

@@ -1,4 +1,4 @@
-"""When a controller acknowledges: edges of its own telegrams, whatever else was sent in between
+"""When a controller acknowledges: edges in its own telegrams, whatever the bridge sent in between
 (``docs/explanation/dead-man-chain.md``). Pure."""
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ class AcknowledgeEdges:
     def __init__(self) -> None:
         self.is_set: bool | None = None
         self._pressed_by: Identity | None = None
-        """Whose last telegram had 1 in the acknowledge register; it outlasts control of the drive."""
+        """Whose last telegram had 1 in the acknowledge register; kept after the owner has gone."""
 
     def on_bit(self, *, is_set: bool) -> bool:
         """A control word of the owner; True for an edge."""

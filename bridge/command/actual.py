@@ -1,4 +1,4 @@
-"""What a drive tells in its TPDOs, in the image: words, values made of them, and how good they are."""
+"""What a drive reports in its TPDOs, in the image: words, values made of them, and their quality."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _STATUS: Final = ("status_word", "drive_status_word", "state", "emcy_code")
 
 @dataclass(slots=True)
 class FurtherTpdo:
-    """A TPDO beside the one with the status word: what is in it has an age of its own.
+    """A TPDO other than the one with the status word: its values have an age of their own.
 
     ``places`` are those of its words in ``process.tpdo``; ``deadline_s`` is the longest regular pause
-    between two of them, None where it comes with changes only.
+    between two of them, None if it is sent on change only.
     """
 
     name: str
@@ -30,7 +30,7 @@ class FurtherTpdo:
     quality: Quality = Quality.WAITING
 
     def on_data(self, now: float) -> bool:
-        """It has come; True where its values were not good before."""
+        """It has arrived; True if its values were not good before."""
         self.last = now
         was_good = self.quality is Quality.GOOD
         self.quality = Quality.GOOD
@@ -44,12 +44,12 @@ class FurtherTpdo:
         return True
 
     def quality_at(self, now: float) -> Quality:
-        """Judged now: ``quality`` learns of a passed deadline only when its timer has run."""
+        """Judged now, while ``quality`` follows a passed deadline only when its timer runs."""
         is_late = self.quality is Quality.GOOD and not self.is_fresh(now)
         return Quality.STALE if is_late else self.quality
 
     def is_fresh(self, now: float) -> bool:
-        """It has come since the boot-up, and is not late."""
+        """It has arrived since the boot-up, and is not late."""
         if self.quality is not Quality.GOOD or self.last is None:
             return False
         return self.deadline_s is None or now < self.last + self.deadline_s
@@ -87,7 +87,7 @@ class ActualData:
         """The words of the last TPDOs, the status word first."""
         self.quality = Quality.WAITING
         self.is_even = True
-        """All words are as good as the status word: they come with it."""
+        """All words have the quality of the status word, because they come with it."""
         self._carried = family.carried(slot)[1][1:]
         self._places = [self._process.index(word) for word in self._carried]
         self._has_all = len(self._carried) == len(self._process) - 1
@@ -158,14 +158,14 @@ class ActualData:
         return f"no {late[0]} from the drive" if late else ""
 
     def on_heard_again(self) -> None:
-        """The drive could not be heard for a while: what its further TPDOs said before may have changed."""
+        """The drive could not be heard for a while: the values of its further TPDOs may have changed."""
         for pdo in self._further:
             if pdo.quality is Quality.GOOD:
                 pdo.quality = Quality.STALE
         self._shown = None
 
     def on_further(self, pdo: FurtherTpdo, now: float) -> None:
-        """One of them has brought words."""
+        """One of the further TPDOs has brought words."""
         if pdo.on_data(now):
             self._shown = None
         self.refresh(now)

@@ -1,7 +1,7 @@
 """What was asked of the plant, by whom, and how it ended: every write, accepted or refused.
 
-Sans-IO: requests and outcomes in, entries out. A controller that writes a hundred times a second fills no
-disk: its telegrams are told where they change something, and else counted.
+Sans-IO: requests and outcomes in, entries out. A controller that writes a hundred times a second must not
+fill a disk: its telegrams get an entry if they change something, and are counted otherwise.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from bridge.ratelimit import RateLimit
 Values = dict[str, Value]
 
 IGNORED: Final = "ignored"
-"""How a stop ends that the drive did not follow."""
+"""The outcome of a stop that the drive did not follow."""
 SUMMARY_S: Final = 60.0
-"""How often it is told what was only counted."""
+"""How often there is an entry for what was only counted."""
 SETPOINTS_S: Final = 1.0
-"""Where setpoints alone change, one telegram of each drive is told in this time, at last the newest."""
+"""While only setpoints change, one telegram of each drive gets an entry in this time, and the last one."""
 AT_ONCE: Final = 20
-"""Entries of one share, then one every so many seconds: of what one client is refused, whatever it asks for
-and whatever it calls itself; of what it has done with one drive or node in one way."""
+"""How many entries at once, then one every so many seconds: for what one client is refused, whatever it asks
+for and whatever it calls itself; for what it has done with one drive or node in one way."""
 REFUSED_EVERY_S: Final = 3.0
 DONE_EVERY_S: Final = 1.0
 _MOST_SHARES: Final = 1000
 _CARRIED_OUT: Final = (Code.OK, Code.TIMED_OUT, Code.CANCELLED, Code.REFUSED_BY_DRIVE, IGNORED)
-"""How requests end of which a drive or node has been told; the others were refused before that."""
+"""Outcomes of requests that reached a drive or node; the others were refused before."""
 _BRIDGE: Final = Identity(Source.NONE, "drivebridge", Role.ENGINEER)
 _ACTIONS: Final = frozenset(Action) | {"call"}
 _READS: Final = "read_"
@@ -40,7 +40,7 @@ _READS: Final = "read_"
 class Rejection:
     """A write or command that a protocol has refused by itself, so that it never became a request.
 
-    ``code`` is one of the outcomes' where one says it, ``target`` what was addressed, as far as it is known.
+    ``code`` is that of an outcome if one fits, ``target`` what was addressed, as far as known.
     """
 
     identity: Identity
@@ -75,13 +75,13 @@ class Entry:
 
     @property
     def is_refused(self) -> bool:
-        """Nobody but who asked has heard of it: anybody can bring about any number of these."""
+        """Refused before it reached anything: anybody can cause any number of these."""
         return self.ending.code not in _CARRIED_OUT
 
 
 @dataclass(slots=True)
 class _Telegrams:
-    """What one drive's owner has written lately."""
+    """What one drive's owner has written recently."""
 
     identity: Identity
     new: Values
@@ -93,7 +93,7 @@ class _Telegrams:
 
 @dataclass(slots=True)
 class _Share:
-    """Entries that count together: how many may be told, and those since the last summary that were more."""
+    """Entries with a common limit: how many may be written, and those beyond it since the last summary."""
 
     limit: RateLimit
     is_new: bool = True
@@ -102,13 +102,13 @@ class _Share:
     last: Entry | None = None
 
     def allows(self, now: float) -> bool:
-        """Whether one more is told at once."""
+        """Whether one more is written at once."""
         self.is_new, self.is_used = False, True
         return self.limit.allows(now)
 
     def takes(self, entry: Entry) -> bool:
-        """Whether it is told now; else it is counted."""
-        # The first of its kind is told whatever else the client was refused.
+        """Whether it is written now; otherwise it is counted."""
+        # The first of its kind is written whatever else the client was refused.
         is_new = self.is_new
         if self.allows(entry.time) or is_new:
             return True
@@ -117,7 +117,7 @@ class _Share:
         return False
 
     def sum_up(self, now: float) -> Entry | None:
-        """The last of those that were left out, for all of them."""
+        """The last of those that were left out, standing for all of them."""
         last, left_out = self.last, self.left_out
         self.is_used, self.left_out, self.last = False, 0, None
         return replace(last, time=now, old={}, new={}, count=left_out) if last else None
@@ -136,11 +136,11 @@ class AuditTrail:
         self._telegrams: dict[str, _Telegrams] = {}
         self._shares: dict[tuple[str, ...], _Share] = {}
         self._limits: dict[tuple[str, ...], RateLimit] = {}
-        """Of what each client may be refused."""
+        """What each client was refused."""
         self._summary_at = float("-inf")
 
     def follow(self, request: Request, now: float, reply: Reply) -> Reply:
-        """A reply to give in place of ``reply``: it notes the outcome first."""
+        """To be used in place of ``reply``: it notes the outcome first."""
         if self.tell is None or request.action.startswith(_READS):
             return reply
         old = self._held(request)
@@ -240,7 +240,8 @@ class AuditTrail:
             self._tell(entry)
 
     def _share(self, entry: Entry) -> _Share:
-        """What is refused is counted by how, and limited by client: targets and names can be made up."""
+        """Refused requests are counted by action and code and limited by client: targets and names can be
+        made up."""
         client = (entry.identity.source.label, client_of(entry.identity))
         kind = (entry.action if entry.action in _ACTIONS else "", str(entry.ending.code))
         key = (*client, *kind) if entry.is_refused else (*client, *kind, entry.target)
@@ -255,7 +256,7 @@ class AuditTrail:
         return share
 
     def on_time(self, now: float) -> None:
-        """Tell what has waited long enough; call it about once a second."""
+        """Write what has waited long enough; call it about once a second."""
         for telegrams in self._telegrams.values():
             if telegrams.waiting is not None and now - telegrams.told_at >= SETPOINTS_S:
                 entry, telegrams.waiting = telegrams.waiting, None
@@ -266,7 +267,7 @@ class AuditTrail:
             self.sum_up(now)
 
     def sum_up(self, now: float) -> None:
-        """Tell what was only counted."""
+        """Write what was only counted."""
         for target, telegrams in self._telegrams.items():
             self._tell_waiting(target, telegrams, self._tell)
         for key, share in list(self._shares.items()):
@@ -295,7 +296,7 @@ def client_of(identity: Identity) -> str:
 
 
 def _goes_on(before: _Telegrams, entry: Entry) -> bool:
-    """Whether this telegram brings nothing but setpoints, from the same controller and to the same end."""
+    """Whether this telegram brings only new setpoints, from the same controller and with the same outcome."""
     word = entry.new.get("control_word", before.new.get("control_word"))
     return (
         before.identity.is_same(entry.identity)

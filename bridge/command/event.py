@@ -1,4 +1,4 @@
-"""Things that happened and that people want to know: trips, lost nodes, refused writes."""
+"""Events that people want to know of: trips, lost nodes, refused writes."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ class Event:
 
 
 REPEATING: Final = frozenset((Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION, Kind.INTRUDER))
-"""Kinds of which somebody can cause as many as he likes."""
+"""Kinds that somebody can cause at will."""
 _MOST_A_SECOND: Final = 10
 
 
 class EventGate:
-    """Keeps whoever can cause events at will, such as a client that is refused or a babbling node, from
-    flooding those who follow them. What is left out is still counted where it happens."""
+    """Keeps a client that is refused again and again, or a babbling node, from flooding the listeners. What
+    is left out is still counted where it happens."""
 
     __slots__ = ("_told",)
 
@@ -47,7 +47,7 @@ class EventGate:
         self._told: dict[tuple[str, Kind], tuple[float, int]] = {}
 
     def admits(self, event: Event) -> bool:
-        """Whether this event is told: of a kind that repeats, at most ten a second of each source."""
+        """Whether this event is passed on: of kinds that repeat, at most ten a second of each source."""
         if event.kind not in REPEATING:
             return True
         key = (event.source, event.kind)

@@ -7,19 +7,20 @@ enabled although nothing that enables was sent: a deaf RPDO, another master and 
 What follows an ignored stop may halt a plant, so nothing is called ignored that may be something else:
 
 - The bound begins when the stop has been handed to the bus, not when it was decided.
-- What counts is when the drive's telegram was received. A drive is called ignoring by a telegram from after
-  the bound, never by the time that has passed: a late process does not look like a bad drive. Only a drive
-  that sends changes alone is judged by the time, once the bus has been drained.
+- What counts is when the drive's telegram was received. A drive ignores its stop by a telegram received after
+  the bound, never by mere time: a late process must not make a drive look bad. Only a drive that sends on
+  change alone is judged by the time, once the bus has been drained.
 - A drive that was not heard for longer than its TPDO's deadline may not have heard us either: its bound
-  begins anew with the first telegram after the pause, or with the node's operation.
-- A word that takes the voltage has a short bound; any other stop may be a ramp, which has a long one. The
-  bound of the weaker word holds as long as it may be the one that the drive has.
-- A drive that says it is not enabled has ended its ramp. Enabled again, it has until the short bound after
-  the stop: the word that enabled it may still have been on its way.
+  restarts with the first telegram after the pause, or when its node is in operation.
+- A word that takes the voltage has a short bound; any other stop may be a ramp, with a long one. The bound of
+  the weaker word holds as long as the drive may still have that word.
+- A drive that reports that it is not enabled has ended its ramp. If it reports enabled again, it has until
+  the short bound after the stop: the word that enabled it may still have been on its way.
 - Where the word leaves the voltage on, a drive may hold the motor, and may be enabled for a moment on its
   way there: it gets a bound for that, too.
-- A drive that the bridge itself silences, by an NMT stop of its node, is judged by what it said last: one
-  that said *enabled* and is not known to stop in that state is called ignoring when the bound has passed.
+- A drive that the bridge itself silences, by an NMT stop of its node, is judged by its last report: if that
+  was *enabled* and the drive is not known to stop in that state, it ignores its stop when the bound has
+  passed.
 - The ramp of a fault may come at any time, and has its bound from then.
 - A status word that fits no state of the family says nothing.
 """
@@ -32,7 +33,7 @@ from math import inf
 from typing import Final
 
 _LOOK_AGAIN_S: Final = 1.0
-"""How often it is looked after a drive that is no longer heard."""
+"""How often a drive that is no longer heard is looked at."""
 _SOON_S: Final = 0.001
 
 
@@ -231,7 +232,7 @@ class Follow:
 
     @property
     def _may_be_enabled(self) -> bool:
-        """It was enabled, and has not said anything since it was told to stop."""
+        """It was enabled, and has not reported anything since it was told to stop."""
         return self._was_enabled and self.state is LastStop.FORWARDED
 
     def on_node_stopped(self, now: float) -> None:

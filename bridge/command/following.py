@@ -11,11 +11,11 @@ from bridge.drive import MOVING, DriveState, OwnJudgement, OwnVerdict, StatusWor
 
 _DEADLINES: Final = 3
 _ON_CHANGE_S: Final = 0.5
-"""In place of the deadline where the drive sends its TPDO on changes alone."""
+"""Replaces the deadline if the drive sends its TPDO on change only."""
 
 
 class Following:
-    """Told of every change of the channel's output, of the drive's status word and of its node."""
+    """To be called on every change of the channel's output, of the drive's status word and of its node."""
 
     def __init__(self, channel: DriveChannel) -> None:
         self._channel = channel
@@ -38,7 +38,7 @@ class Following:
         return self._follow.is_judged
 
     def told_for_s(self, now: float) -> float:
-        """For how long the stop has been on the bus; 0 where there is none, or nobody says."""
+        """For how long the stop has been on the bus; 0 if there is none, or that is not known."""
         return self._follow.told_for_s(now)
 
     @property
@@ -95,7 +95,7 @@ class Following:
             ramp_s = off_s + stopping.ramp_ms / 1000
         if own is None or own.verdict is not OwnVerdict.STOPS:
             return Bounds(off_s, ramp_s)
-        # Our heartbeat goes on while the RPDOs are silent: a watch over it says nothing then.
+        # Our heartbeat goes on while the RPDOs are silent: a drive that supervises it would not stop.
         own_ms = own.process_data_ms or own.bridge_ms
         return Bounds(off_s, ramp_s, own_ms / 1000 + ramp_s)
 

@@ -1,15 +1,16 @@
-"""How old a telegram can be: fresh means recent, not read just now.
+"""How old a telegram can be: fresh means recent, not just read.
 
-What a controller has sent may wait in the network's buffers, its own and ours, and is read long after
-it has hung. So each telegram carries the time at which it can have come at the earliest. Its drive's timer
-runs from then on, and one that can have waited for longer than ``BOUND_MS`` does not count at all.
+What a controller has sent may wait in the network's buffers, its own and ours, and be read long after the
+controller has hung. So each telegram carries the earliest time at which it can have arrived. Its drive's
+timer runs from that time, and a telegram that can have waited for longer than ``BOUND_MS`` does not count at
+all.
 
 The rule for one connection:
 
-- What is read has come since the connection was last seen empty.
-- Who has more under way than somebody who waits for answers would have may have filled the buffers on
-  the way, also those that we cannot see. From then on nothing of it counts until it has been calm: too
-  few arrivals, for long enough, for what drains at full speed.
+- What is read has arrived since the connection was last seen empty.
+- A client that has more under way than one that waits for answers may have filled the buffers on the way,
+  also those that we cannot see. From then on nothing of it counts until it has been calm: too few arrivals,
+  for long enough, to be a backlog that drains at full speed.
 
 Pure: times are monotonic seconds, given from outside.
 """
@@ -21,48 +22,48 @@ from typing import Final, NamedTuple
 from bridge.command.request import Request
 
 GRAIN_MS: Final = 25
-"""A wait that is shorter is not told from none. A telegram can be so much older than it is taken for: this is
-its way through the bridge's front in ``worst_case_stop_ms``."""
+"""A shorter wait cannot be told from none. A telegram can be this much older than assumed: it is the way
+through the bridge's buffers in ``worst_case_stop_ms``."""
 
 NOW_S: Final = 0.001
-"""What is handled so soon after it was read needs no time of its own; a part of the grain."""
+"""What is handled this soon after it was read counts as handled at once; part of the grain."""
 
 BOUND_MS: Final = 500
-"""What can have waited for longer counts for nothing. A busy machine holds a request up for a while, and an
-OPC UA server may be half a second with a large subscription; the time for which it waited is none that the
-owner gains: its drive's timer runs from when it can have come."""
+"""What can have waited for longer does not count. A busy machine delays a request, and an OPC UA server may
+take half a second over a large subscription. The owner gains no time by the wait: its drive's timer runs from
+when the request can have arrived."""
 
 _GRAIN_S: Final = GRAIN_MS / 1000 - NOW_S
 
 CALM_S: Final = 0.1
 _CALM_MOST: Final = 32
-"""So few arrivals in ``CALM_S`` are no backlog: one drains at more than a thousand telegrams a second."""
+"""This few arrivals in ``CALM_S`` are no backlog: that would drain at more than a thousand a second."""
 
 
 HANG_MS: Final = 100
-"""An event loop without a turn for so long has hung. Where the connections cannot be seen, a shorter wait in
-them is not noticed."""
+"""An event loop without a turn for this long has hung. Where the connections cannot be seen, a shorter hang
+is not noticed."""
 _SEEN: Final = frozenset(("opcua", "modbus"))
 """Protocols whose connections are seen; with a lease it may be any."""
 
 
 def way_ms(control: str) -> int:
-    """How much older than it is taken for a telegram of who controls a drive can be, at most."""
+    """How much older than assumed a telegram of the drive's controller can be at most."""
     if control == "none":
         return 0
     return GRAIN_MS if control in _SEEN else GRAIN_MS + HANG_MS
 
 
 NEVER: Final = float("-inf")
-"""The time of a telegram of which nobody knows how long it has waited."""
+"""The time of a telegram that may have waited for any time."""
 
 
 _AFTER_HANG_S: Final = 1.0
-"""So long after a hang, who asks for the first time may have asked before it."""
+"""For this long after a hang, a first request may have been sent before it."""
 
 
 def arrival_of(request: Request, now: float) -> float:
-    """When ``request`` can have come at the earliest; one that was made in this process comes now."""
+    """When ``request`` can have arrived at the earliest; one that was made in this process arrives now."""
     return now if request.received_at is None else min(request.received_at, now)
 
 
@@ -80,9 +81,8 @@ def is_stale(request: Request, now: float, timeout_ms: int) -> bool:
 class Look(NamedTuple):
     """What the event loop knows of itself (``bridge.northbound.pulse`` keeps it).
 
-    ``at``: it has looked at everything that is open after this time, and what it found has been read but
-    for what it is about to read. ``steady_since``: when it last went on after it had hung, or its process
-    was stopped.
+    ``at``: it has looked at every open connection since, and has read what it found, except what it is about
+    to read. ``steady_since``: when it last went on after a hang or a stop of its process.
     """
 
     at: float
@@ -90,10 +90,10 @@ class Look(NamedTuple):
 
 
 class Inflow:
-    """What is known of the age of what comes through one connection.
+    """The age of what arrives through one connection.
 
-    ``is_hidden``: the connections cannot be seen, and this is all that comes from one asker. What
-    comes after a hang may have waited somewhere then, and cannot be told from what has not.
+    ``is_hidden``: the connections cannot be seen, and this is everything from one asker. What arrives after a
+    hang may have waited somewhere, and cannot be told from what has not.
     """
 
     __slots__ = (
@@ -126,7 +126,7 @@ class Inflow:
         return self._is_open
 
     def shut(self, now: float) -> None:
-        """Nothing more is read for now, so the buffers on the way may fill."""
+        """Nothing more is read for now, so buffers on the way may fill."""
         if self._is_open:
             self._is_open = False
             self._crowd(now)
@@ -143,7 +143,7 @@ class Inflow:
         self._came = 0
 
     def arrive(self, now: float, look: Look, *, crowded: bool = False) -> float:
-        """Something was read ``now``: when it can have come at the earliest, or ``NEVER``.
+        """Something was read ``now``: when it can have arrived at the earliest, or ``NEVER``.
 
         ``crowded``: more may be left, or more is under way than there should be.
         """

@@ -22,7 +22,7 @@ _WORDS: Final = {Action.STOP_NODE: "NMT stop", Action.RESET: "NMT reset node"}
 def conclude(
     node: Node, drive: Drive, verdict: Verdict, now: float, tell: Callable[[Event], None], audit: AuditTrail
 ) -> None:
-    """Tell how the drive's last stop has ended, and stop the node of a drive that ignores it."""
+    """Report how the drive's last stop ended, and stop the node of a drive that ignores it."""
     took_s = verdict.at - verdict.since
     if verdict.outcome is not LastStop.IGNORED:
         audit.stop_ended(drive.name, verdict.outcome.label, f"after {took_s:.3f} s", now)

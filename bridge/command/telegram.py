@@ -96,7 +96,7 @@ class TelegramDecoder:
         return Telegram(control_word, setpoints.over(before))
 
     def _check_set(self, values: Mapping[str, Value], control_word: int) -> None:
-        """Nobody knows what a scaled value would be in another parameter set; raw words are as they are."""
+        """Scaled values are not known in another parameter set; raw words need no scale."""
         if not control_word & self._set.mask:
             return
         for leaf in values:
@@ -139,7 +139,7 @@ def _as_number(leaf: str, value: object) -> float:
 
 
 def _as_word(leaf: str, value: object) -> int:
-    """``value`` as a 16-bit word. A negative number is none: FFFFh, as which it would go out, acknowledges
+    """``value`` as a 16-bit word. Negative numbers are refused: -1 would be sent as FFFFh, which acknowledges
     and enables. Signed numbers belong to the scaled values."""
     number = _as_number(leaf, value)
     if not 0 <= number <= _WORD_MASK:

@@ -26,7 +26,7 @@ _ROUNDING: Final = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """One summand: its name, and what takes this long."""
+    """One summand of the stop time, by its name."""
 
     name: str
     ms: float
@@ -61,7 +61,7 @@ class StopTime:
 
 @dataclass(frozen=True, slots=True)
 class Wire:
-    """What a drive's RPDOs take on their bus, and what may be before them there. ``before_ms`` is None where
+    """How long a drive's RPDOs take on their bus, and what may be sent before them. ``before_ms`` is None if
     nothing bounds it."""
 
     frames_ms: float = 0.0
@@ -78,8 +78,8 @@ def stop_time(
 ) -> StopTime:
     """From the owner's last telegram to the last frame that enables the drive, and to the first that does
     not. ``transmission_type`` is that of the RPDO with the control word. With silence the reaction is the
-    drive's own, ``own_ms`` after its last RPDO. Where it has none, 0, it gets disable voltage instead; None
-    where nobody has asked it yet."""
+    drive's own, ``own_ms`` after its last RPDO. If it has none (0), it gets disable voltage instead; None:
+    the drive has not been asked yet."""
     if not timeout_ms or table.telegram_downtime_s == IGNORE_ALL_S or table.on_expiry == "hold":
         return StopTime()
     if table.on_expiry == "silence" and own_ms is None:
@@ -107,7 +107,7 @@ def stop_time(
 
 
 def sync_wait_ms(bus: BusTable, transmission_type: int) -> int:
-    """How long an RPDO of this type waits for the SYNC with which it is taken over (CiA 301 §7.5.2.35)."""
+    """How long an RPDO of this type waits for the SYNC that makes it effective (CiA 301 §7.5.2.35)."""
     return max(1, transmission_type) * bus.sync_period_ms if transmission_type <= _LAST_SYNCHRONOUS else 0
 
 

@@ -1,4 +1,4 @@
-"""What an emergency message says in a family's words."""
+"""The meaning of an emergency message in a drive family."""
 
 from __future__ import annotations
 

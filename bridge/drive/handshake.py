@@ -1,8 +1,8 @@
 """The new set-point handshake of a positioning drive (CiA 402 profile position: bit 4, status bit 12).
 
-The bridge does it for who writes the position as a value: the bit rises with the new words, stays until the
-drive says that it has taken them, falls, and may rise again when the drive has seen that. A drive that
-does not say so within a second has not taken them.
+The bridge does it for clients that write the position as a value: the bit rises with the new words, stays
+until the drive reports that it has taken them, falls, and may rise again when the drive has seen that. A
+drive that does not report within a second has not taken them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Final
 from bridge.mapping.model import Handshake as HandshakeModel
 
 _LIMIT_S: Final = 1.0
-"""How long the drive may take to say that it has a position; the profile names no time."""
+"""How long the drive may take to report that it has a position; the profile names no time."""
 _LOW_S: Final = 0.1
 """How long the bit stays down after that: longer than any cycle we send with, so that an edge is seen."""
 
@@ -21,9 +21,9 @@ _LOW_S: Final = 0.1
 class Handshake:
     """One drive's. ``places`` are those of the value's words among the setpoints.
 
-    An order with the words that the drive has taken already is none: a controller that writes cyclically
-    moves nothing twice. What the drive has taken counts as long as it is enabled. Times are monotonic
-    seconds.
+    An order with words that the drive has already taken does nothing: a controller that writes cyclically
+    must not start a movement twice. What the drive has taken counts as long as it is enabled. Times are
+    monotonic seconds.
     """
 
     __slots__ = (
@@ -51,7 +51,7 @@ class Handshake:
         self._untaken = False
         self._taken: tuple[int, ...] | None = None
         self._deadline: float | None = None
-        """While the bit is up: when the drive has not taken the position."""
+        """While the bit is up: when it is given up that the drive takes the position."""
         self._rises_at: float | None = None
         """After that: when the bit may rise again."""
 
@@ -66,7 +66,7 @@ class Handshake:
         self._ordered = self._words(setpoints) != self._taken
 
     def reset(self) -> None:
-        """The drive is stopped: what was ordered does not count any more."""
+        """The drive is stopped: pending orders are dropped."""
         self._ordered = self._raised = False
         self._taken = self._deadline = None
 

@@ -22,7 +22,7 @@ class OwnVerdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Watch:
-    """One thing that the drive watches. ``verdict`` is None where it says nothing of the bridge."""
+    """One thing that the drive supervises. ``verdict`` is None if that is not the bridge."""
 
     name: str
     watches: str
@@ -34,7 +34,7 @@ class Watch:
     why: str = ""
     """Why the drive would not stop by it."""
     silent_ms: int = 0
-    """How long after the bridge hung the last sign of it may come."""
+    """How long after a hang of the bridge its last frame may come."""
 
     @property
     def bridge_ms(self) -> float | None:
@@ -120,7 +120,7 @@ def judge(family: Family, raw: Raw, bus: BusTable, node: NodeTable, accepted: st
 
 
 def why_silence_does_not_stop(family: Family, own: OwnJudgement, node: NodeTable) -> str:
-    """Why a drive of this node goes on when nothing but its RPDOs end, or an empty text.
+    """Why a drive of this node would run on if only its RPDOs ended, or an empty text.
 
     Heartbeat, guarding and SYNC go on then, and so do the RPDOs of the node's other drives.
     """

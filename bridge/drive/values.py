@@ -42,7 +42,7 @@ class ValueCodec:
 
     @property
     def is_unknown(self) -> bool:
-        """It is scaled by a parameter that nobody has told."""
+        """It is scaled by a parameter that is not known."""
         return self.scale is None and self.model.scale is not None
 
     @property

@@ -90,7 +90,7 @@ class ControlWords:
         return word & self._enable_mask == self._enable_value
 
     def takes_voltage(self, word: int) -> bool:
-        """Whether the drive is off at once with this word: any other stop may be a ramp."""
+        """Whether this word switches the drive off at once: any other stop may be a ramp."""
         return any(word & mask == value for mask, value in self._takes_voltage)
 
     def is_valid(self, word: int) -> bool:
@@ -106,13 +106,13 @@ class ControlWords:
         return self._changed(word, self._disable_voltage)
 
     def withhold(self, word: int) -> int:
-        """A stop for a drive that is not enabled: ``word`` without what it enables. Where a family's stop
-        holds the motor (Lenze's quick stop), it would bring the motor under current."""
+        """A stop for a drive that is not enabled: ``word`` without its enabling bits. A family's stop that
+        holds the motor (Lenze's quick stop) would energise it."""
         return self._changed(word, self._withhold)
 
     def _changed(self, word: int, bits: tuple[int, int]) -> int:
-        """``word`` with these bits. What is not about moving stays (parameter set, functions), but the
-        acknowledge bit falls: a stop must not acknowledge anything."""
+        """``word`` with these bits. Bits that do not concern movement stay (parameter set, functions), but
+        the acknowledge bit is cleared: a stop must not acknowledge anything."""
         mask, value = bits
         return (word & ~mask | value) & ~self.acknowledge_mask & 0xFFFF | self._valid_mask
 
@@ -150,7 +150,7 @@ class StatusWords:
         return DriveState.UNKNOWN
 
     def holds(self, word: int) -> bool:
-        """Whether a drive that says *operation enabled* stands still and may be holding its motor."""
+        """Whether a drive that reports *operation enabled* is at standstill and may be holding its motor."""
         return self._holding is not None and word & self._holding[0] == self._holding[1]
 
     def as_fault(self, word: int) -> int:

@@ -107,8 +107,8 @@ class Image:
             feed.mark(index)
 
     def renew(self, index: int, value: Value, now: float) -> None:
-        """Store a good value with its source time, also where it is what is there already: it was asked
-        for anew, and its age is what its reader wants to know."""
+        """Store a good value with its source time, even if the value is the same: it has been read again, and
+        readers want to know its age."""
         self._times[index] = now
         self.set(index, value, now)
         for feed in self._feeds:

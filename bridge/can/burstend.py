@@ -1,4 +1,4 @@
-"""A burst that turns into a stop by itself: the controller's deadline, kept by whoever sends the burst."""
+"""A burst that turns into a stop by itself: its sender keeps the controller's deadline."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bridge.canopen.frame import Frame
 MOST_FRAMES: Final = 256
 """The longest sequence that the kernel's broadcast manager takes (MAX_NFRAMES of net/can/bcm.c)."""
 SHORTEST: Final = 4
-"""A burst of fewer frames is none for the kernel: it counts the first, and would end before it is renewed."""
+"""Shorter bursts are not for the kernel: it counts the first frame, so they would end before a renewal."""
 _ROUNDING: Final = 1e-9
 
 
@@ -35,10 +35,10 @@ def sequence(
 ) -> Sequence:
     """A burst of ``count`` times ``frame`` that is handed over ``now`` and keeps to ``ending``.
 
-    Of a burst that runs the next frame comes at any time within a period. So the frames until the deadline
-    are rounded up: the stop comes never before it, and at most two periods after it. ``extra`` is the number
-    of frames that are sent at once, out of turn. The sequence has the same length always, because the
-    manager lets none grow; one that is too long for it is cut at the deadline.
+    In a running burst the next frame may come at any time within a period. So the number of frames until the
+    deadline is rounded up: the stop never comes before it, and at most two periods after it. ``extra`` is the
+    number of frames that are sent at once, out of turn. The length of the sequence stays the same, because
+    the manager lets none grow; one that is too long for it is cut at the deadline.
     """
     length = min(count, MOST_FRAMES)
     if ending is None:

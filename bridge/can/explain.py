@@ -1,4 +1,4 @@
-"""Why an interface cannot be used, in the sentence that helps."""
+"""Why an interface cannot be used, in a sentence that says what helps."""
 
 from __future__ import annotations
 

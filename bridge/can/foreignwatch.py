@@ -1,6 +1,6 @@
 """What others send on identifiers that are ours alone, on a socket of its own.
 
-All that we send comes back there, so nobody is woken for it: it is looked at a hundred times a second.
+All our own frames come back there, so it wakes nobody: it is looked at a hundred times a second.
 """
 
 from __future__ import annotations

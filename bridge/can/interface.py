@@ -100,9 +100,9 @@ class Bus(Protocol):
         the identifier is accepted, they come back by ``drain`` with the time at which they were sent.
 
         Calling it again for the same identifier replaces the data and refills the count without moving
-        the phase; ``at_once`` sends the frame immediately as well. A burst that nobody renews ends by
-        itself: that is the dead-man's handle (``docs/explanation/dead-man-chain.md``). A burst of one frame
-        may have an ``ending``: from then on its frame is sent in place of this one, still ``count`` in all.
+        the phase; ``at_once`` sends the frame immediately as well. A burst ends unless it is renewed: that is
+        the dead-man's handle (``docs/explanation/dead-man-chain.md``). A burst of one frame may have an
+        ``ending``: from then on that one's frame is sent instead, still ``count`` in all.
         """
         ...
 

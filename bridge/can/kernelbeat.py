@@ -1,5 +1,5 @@
-"""Bursts in the kernel's broadcast manager, and what is done where it does not take them. Sans-I/O but for
-the message to the manager."""
+"""Bursts in the kernel's broadcast manager, and what to do when it refuses them. Sans-IO except for the
+message to the manager."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bridge.canopen.frame import Frame
 _RETRY_S: Final = 0.001
 _PATIENCE_S: Final = 0.01
 _ON_ITS_WAY_S: Final = 0.001
-"""A message that took longer to the kernel than this carries too many frames before the deadline."""
+"""A message that took longer than this to reach the kernel has too many frames before the deadline."""
 _ENDED: Final = float("-inf")
 _LINK_IS_GONE: Final = (errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.ENOTCONN)
 
@@ -69,9 +69,9 @@ class _Sent(NamedTuple):
 class KernelBeat:
     """Finite bursts by COB-ID. Times are monotonic seconds; ``clock`` tells how late a message went out.
 
-    A message that the manager refuses (no memory, no room) leaves the old data on the bus, so it is sent
-    again every millisecond. After ten the bursts are given up: the manager is closed, which ends all of
-    them for certain, and a timer of ours goes on with them until ``open`` gives another manager.
+    A message that the manager refuses (no memory, no room) leaves the old data on the bus, so it is repeated
+    every millisecond. After ten attempts the bursts are given up: closing the manager ends all of them for
+    certain, and a timer of ours continues them until ``open`` gives another manager.
 
     ``beat``, ``silence``, ``silence_all`` and ``on_time`` raise OSError where the interface is gone or down.
     """
@@ -119,7 +119,7 @@ class KernelBeat:
         at_once: bool,
         ending: BurstEnd | None = None,
     ) -> Frame | None:
-        """Start or renew a burst; gives the frame that whoever calls has to send now, if any."""
+        """Start or renew a burst; returns the frame that the caller has to send now, if any."""
         can_id = frames[0].can_id
         # The kernel counts the first frame of a burst, so one of a frame or two ends before it can be
         # renewed. What is that slow needs no kernel: a round sends it.
@@ -185,10 +185,10 @@ class KernelBeat:
     def _hand_over(self, can_id: int, wish: _Wish, now: float) -> int:
         """Give the kernel a burst, or end it; how many frames it has got.
 
-        What it counts are frames, what it has to keep to is a time: where the message was long on its way, it
-        gets a second one with fewer. Refilling keeps the phase of a burst that runs and cannot wake one that
-        has ended, and we may stand still at any line of this: where it may have ended it is started anew, or
-        no renewal would ever wake it.
+        The kernel counts frames but has to keep a time: after a slow hand-over it gets a second message with
+        fewer frames. Refilling keeps the phase of a running burst but cannot wake one that has ended, and
+        this process may be stopped at any line: a burst that may have ended is started anew, or no renewal
+        would ever wake it.
         """
         job = self._jobs.get(can_id)
         runs = job is not None and job.wish.period_s == wish.period_s and now < job.until
@@ -201,7 +201,7 @@ class KernelBeat:
                 return count
             after = self._clock()
             if after >= stale_at:
-                # Nothing that was right then may go on. The next round renews it.
+                # After deadman_ms the old data must not be restarted. The next round renews it.
                 return self._end(can_id)
             if after >= until and not is_fresh:
                 asked = wish
@@ -236,7 +236,7 @@ class KernelBeat:
         return _Sent(count, until, is_fresh=start)
 
     def _end(self, can_id: int) -> int:
-        """What is not there the kernel refuses to delete."""
+        """The kernel refuses to delete a burst that it does not have."""
         assert self._manager is not None
         if can_id in self._held:
             self._manager.send(bcm.delete(can_id))

@@ -13,7 +13,7 @@ _REOPEN_S: Final = (0.2, 5.0)
 
 
 class LinkWatch:
-    """Asks the kernel in a thread: it answers when nobody is changing any network interface of the machine
+    """Asks the kernel in a thread: the answer waits while anybody changes a network interface of the machine
     (rtnl_lock), and no bus may wait for that. Times are monotonic seconds."""
 
     def __init__(self, look: Callable[[], Link]) -> None:
@@ -36,7 +36,7 @@ class LinkWatch:
         self._due = now + _LOOK_S
 
     def lost(self, now: float) -> None:
-        """The interface is gone. What is being asked now is about how it was."""
+        """The interface is gone. The answer to a pending question would be about its former state."""
         self._looking = None
         self._is_gone = True
         self._plan(now)

@@ -1,4 +1,4 @@
-"""Frames that found no room in the kernel: sent in order as room comes, never after their deadlines."""
+"""Frames for which the kernel had no room: sent in order when it has, never after their deadlines."""
 
 from __future__ import annotations
 

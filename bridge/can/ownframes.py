@@ -1,10 +1,11 @@
 """Our own frames that come back through the kernel, told from those of other processes of this host. Sans-IO.
 
-A frame from the wire carries no mark of a local sender and is somebody else's for certain. One with the
-mark may be ours: a socket gets what every other socket of the host sends, our broadcast manager's included.
-It is ours where we have told the kernel to send just that, now or a moment ago, and where it comes no more
-often than we can have sent it. No frame of ours is ever taken for another's: what a stranger repeats of
-ours is found late, and more seldom than we send it not at all; then it says nothing that we do not say.
+A frame from the wire carries no mark of a local sender and is certainly somebody else's. One with the mark
+may be ours: a socket receives what every other socket of the host sends, our broadcast manager's included. It
+is ours if we have told the kernel to send exactly that, now or a moment ago, and if it does not come more
+often than we can have sent it. No frame of ours is ever taken for another's. So a stranger that repeats our
+own frames is found late, or never if it does so less often than we do; but then it says nothing that we do
+not say.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from typing import Final
 from bridge.canopen.frame import Frame
 
 LINGER_S: Final = 1.0
-"""So long after it was replaced a frame may still come out of the queues below us."""
+"""For this long after it was replaced a frame may still come out of the queues below us."""
 _SPARE: Final = 64
 """Frames that may come in a bunch: what waited in those queues, and what was sent beside the rhythm."""
 _FASTER: Final = 1.1
-"""What is left grows by so much faster than we use it up, so that it is there again after an intruder."""
+"""By this much the allowance grows faster than we use it up, so that it recovers after an intruder."""
 _MOST_PAST: Final = 256
 
 
@@ -68,7 +69,7 @@ class _Count:
             self._at = at
 
     def take(self, at: float) -> bool:
-        """One has come; False where that is one too many."""
+        """One has arrived; False if it is one too many."""
         self._advance(at)
         if self.left < 1.0:
             return False
@@ -134,8 +135,8 @@ class OwnFrames:
             self.silenced(can_id, now)
 
     def stalled(self, now: float, *, is_stalled: bool) -> None:
-        """Frames are stuck below us as long as nobody acknowledges them: none is too old then, and those of
-        a moment ago may come out together when somebody does."""
+        """Frames are stuck below us as long as nobody acknowledges them: then none is too old, and recent
+        ones may come out together when somebody does."""
         if is_stalled == self._is_stalled:
             return
         self._is_stalled = is_stalled

@@ -1,7 +1,7 @@
 """The image and the events of the bus process in other processes, and their requests back to it.
 
-Runs over a zenoh session of its own on a Unix socket in the runtime folder. The folder is the key: who
-may open the socket is believed what it says of its clients' identities.
+Runs over a zenoh session of its own on a Unix socket in the runtime folder. The folder's mode is the
+protection: whoever may open the socket is trusted with the identities of its clients.
 """
 
 from bridge.mirror.client import MirrorClient, PointsChanged

@@ -23,7 +23,7 @@ from bridge.zenohlink import Message, ZenohLink, zenoh_config
 _log = logging.getLogger(__name__)
 
 SILENCE_S: Final = 1.0
-"""Not in step for so long, the bus process counts as gone."""
+"""After this long out of step the bus process counts as gone."""
 _LOOK_EVERY_S: Final = 0.1
 _SNAPSHOT_TIMEOUT_S: Final = 2.0
 _MOST_PENDING: Final = 2000
@@ -32,7 +32,7 @@ UNREACHABLE: Final = "bus process not reachable"
 
 
 class PointsChanged(OperationFailed):
-    """The bus process runs another site now: this front has to start anew."""
+    """The bus process runs another site now: this front has to restart."""
 
 
 class MirrorClient:
@@ -83,9 +83,9 @@ class MirrorClient:
         self._listeners.append(listener)
 
     async def request(self, request: Request, timeout_s: float = 5.0) -> Outcome:
-        """Have ``request`` carried out by the bus process; any number may be under way at once.
+        """Send ``request`` to the bus process; any number may be under way at once.
 
-        One without a time has come now: what it waits from here on, it is older there.
+        A request without a time has arrived now; its wait from here on counts.
         """
         if request.received_at is None:
             request = replace(request, received_at=self._clock())
@@ -229,7 +229,7 @@ class MirrorClient:
             image.set(changed.index, changed.value, changed.time_ns / 1e9, changed.quality, changed.reason)
 
     def _mark_dead(self) -> None:
-        """The bus process is gone: no value may look like a present one."""
+        """The bus process is gone: no value may look current."""
         if self._is_dead:
             return
         self._is_dead = True

@@ -29,7 +29,7 @@ _Model = TypeVar("_Model")
 
 
 class Malformed(ValueError):
-    """A message that is not what its key says."""
+    """A message that does not fit its key."""
 
 
 class Changed(msgspec.Struct, array_like=True, frozen=True):
@@ -83,7 +83,7 @@ class Told(msgspec.Struct, array_like=True, frozen=True):
 
 
 class Asked(msgspec.Struct, array_like=True, frozen=True):
-    """A request that is worth something until ``deadline_s`` of the monotonic clock."""
+    """A request that is valid until ``deadline_s`` of the monotonic clock."""
 
     deadline_s: float
     request: Request
@@ -115,8 +115,8 @@ _counted = msgspec.msgpack.Decoder(Counted)
 
 
 def encode(message: Snapshot | Delta | Told | Rejected | Counted | Outcome) -> bytes:
-    """Raises nothing: where a text is no Unicode or a number too long for MessagePack, that alone is changed,
-    because one word of somebody must not cost the rest."""
+    """Raises nothing: a text that is not Unicode, or a number too long for MessagePack, is changed, because
+    one bad value of a client must not cost the whole message."""
     try:
         return _encoder.encode(message)
     except (UnicodeError, OverflowError):

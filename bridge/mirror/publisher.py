@@ -175,7 +175,7 @@ class MirrorPublisher:
             asked.fail(str(error).encode(), "text/plain")
             return
         request, now = message.request, self._clock()
-        # While this process hung, the request waited and its asker was told that it failed. Nothing
+        # While this process hung, the request waited and its client was told that it failed. Nothing
         # may start moving after that; stopping is right at any time.
         if now > message.deadline_s and request.action not in STOP_ACTIONS:
             reply(Outcome(Code.TIMED_OUT, "the request came too late to be carried out", forwarded=False))

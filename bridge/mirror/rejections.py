@@ -1,4 +1,5 @@
-"""What a front has refused by itself: however fast a client is refused, the bus process hears little of it.
+"""What a front has refused by itself, condensed: a client that is refused fast must not flood the bus
+process.
 
 Sans-IO."""
 

@@ -1,4 +1,4 @@
-"""Listening sockets: opened with a sentence that helps where that cannot be, and looked at later."""
+"""Listening sockets: opened, with a helpful sentence if that fails, and watched later."""
 
 from __future__ import annotations
 

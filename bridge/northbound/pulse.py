@@ -1,4 +1,4 @@
-"""Since when the event loop has certainly looked at its sockets, and since when it has not hung."""
+"""When the event loop has certainly looked at its sockets, and when it last recovered from a hang."""
 
 from __future__ import annotations
 

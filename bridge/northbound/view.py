@@ -22,7 +22,7 @@ class View(Protocol):
     async def request(self, request: Request) -> Outcome: ...
 
     def rejected(self, rejection: Rejection) -> None:
-        """Say that the server has refused something by itself; it is answered already."""
+        """Report that the server has refused something by itself; the client has its answer."""
         ...
 
     def count(self, leaf: str) -> None:

@@ -32,7 +32,7 @@ class ParameterError(Exception):
 
 
 class TransferFailed(Exception):
-    """A transfer ended without success; thrown into a procedure by whoever carries out its transfers.
+    """A transfer failed; thrown into a procedure by the code that carries out its transfers.
 
     ``by_drive``: the drive has said so itself, and has not done what was asked.
     """

@@ -1,10 +1,10 @@
-"""The EEPROM guard: how often each parameter was written, and who writes too often.
+"""The EEPROM guard: how often each parameter was written, and which writes are too many.
 
-An EEPROM wears out by being written: NORD's stands 100,000 times (BU 2500 §6.6). Each write is counted
-by drive and object, kept across restarts (``ledger_file``), and told of at every tenth of what the
-family stands. Who writes one parameter more than ``MOST_WRITES`` times within ``WINDOW_S``, or more than
-``MOST_A_DAY`` times within a day, writes in a cycle, which no EEPROM is made for, and is refused; so is
-every write beyond what the EEPROM stands.
+Writing wears an EEPROM out: NORD's stands 100,000 writes (BU 2500 §6.6). Each write is counted by drive and
+object and kept across restarts (``ledger_file``); a warning comes at every tenth of what the family stands.
+More than ``MOST_WRITES`` writes of a parameter within ``WINDOW_S``, or more than ``MOST_A_DAY`` within a day,
+are cyclic writing, which no EEPROM is made for, and are refused; so is every write beyond what the EEPROM
+stands.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What may not be written as a parameter, by whatever name: judged on the objects that a write touches.
+"""What may not be written as a parameter, under whatever name: judged by the objects that a write touches.
 
-A parameter of the maker may be another name of a communication object, or decide one in another form; the
-mapping file's ``[aliases]`` say which.
+A maker's parameter may be another name of a communication object, or determine one in another form: see
+``[aliases]`` of the mapping file.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Whole parameter sets: read for a backup, compared with a drive, written back. Procedures without a bus.
 
-A set holds what can be set: parameters of the mapping file that are read and written, each element in
-each parameter set. It is restored in the order of the mapping file, and only where the drive differs.
+A set holds every parameter of the mapping file that can be read and written, each element in each parameter
+set. It is restored in the order of the mapping file, and only where the drive differs.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Which connections there may be, and for how long without a session. Sans-IO.
 
-Sockets that say nothing must not keep anybody out: who has no session yet has little time, makes room for
-who comes after it, and takes no more than the share of one address.
+Silent sockets must not keep anybody out: a connection without a session has little time, makes room for later
+ones, and each address has a limited share.
 """
 
 from __future__ import annotations

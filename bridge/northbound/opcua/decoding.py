@@ -1,8 +1,8 @@
-"""asyncua's decoder, made strict: what cannot be is refused where it is decoded.
+"""asyncua's decoder, made strict: what is malformed is refused where it is decoded.
 
-asyncua lets strings pass that are not UTF-8, which break whatever writes them down later; it goes backwards
-for a negative length; and it makes arrays as long as a client says, of elements that take no bytes: a
-message of thirty bytes fills the memory.
+asyncua accepts strings that are not UTF-8, which break whatever serialises them later; it goes backwards for
+a negative length; and it makes arrays as long as a client says, even of elements that take no bytes: a
+message of thirty bytes can fill the memory.
 """
 
 # asyncua's decoder has no types:

@@ -1,4 +1,4 @@
-"""Which changes of a value a client wants to be told: DataChangeFilter (OPC 10000-4 §7.22.2)."""
+"""Which changes of a value a client wants reported: DataChangeFilter (OPC 10000-4 §7.22.2)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The queue of passwords that wait to be checked.
 
-Each check takes 64 MiB and tens of ms, so that there is one at a time: guessing must not take all cores. It
-must not take anybody's turn either.
+Each check takes 64 MiB and tens of ms, so there is one at a time: guessing must not use all cores, nor may it
+delay others.
 """
 
 from __future__ import annotations

@@ -151,7 +151,7 @@ class Processor(UaProcessor):
             raise ServiceError(StatusCodes.BadRequestTooLarge)
 
     async def process(self, header: Any, body: Buffer) -> bool:
-        """False closes the connection; the client is told why first."""
+        """False closes the connection, after telling the client why."""
         # For what is carried out from here on, the tasks that are made for it included.
         received_at.set(self.arrivals.popleft() if self.arrivals else NEVER)
         self._begin()

@@ -27,7 +27,7 @@ from bridge.quietlog import about
 _log = logging.getLogger(__name__)
 
 ANSWER_LIMIT_S: Final = 10.0
-"""No request takes longer (a start takes 3 s); after this the way to the bus is taken for broken."""
+"""No request takes longer (a start takes 3 s); after this the link to the bus counts as broken."""
 
 
 received_at: ContextVar[float | None] = ContextVar("received_at", default=None)
@@ -118,7 +118,7 @@ class Writer:
             if group in _ALONE:
                 telegram = _ALONE[group](target)
                 telegrams.append(telegram)
-            # The same point twice is two telegrams: the edge from one value to the other may count.
+            # The same point twice is two telegrams: the edge between the two values may matter.
             elif telegram is None or leaf in telegram.values:
                 telegram = latest[target] = _Telegram(target)
                 telegrams.append(telegram)
@@ -140,7 +140,7 @@ class Writer:
     ) -> None:
         """The telegrams of one drive, one after the other."""
         for telegram in telegrams:
-            # One value that does not fit takes the others with it: half a telegram is none.
+            # One bad value refuses the others, too: there is no half a telegram.
             code = status(telegram.fault)
             if code.is_good():
                 code = outcome_status(await ask(self._view, telegram.request(identity)))

@@ -1,4 +1,4 @@
-"""What has to be known of a drive before something is written to it without its bridge. Sans-IO."""
+"""What must be known of a drive before it is written to without its bridge. Sans-IO."""
 
 from __future__ import annotations
 

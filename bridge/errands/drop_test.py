@@ -25,14 +25,15 @@ from bridge.master.network import Network
 
 BOOT_WITHIN_S: Final = 30.0
 ARM_S: Final = 1.0
-"""How long all is sent before nothing is: the first RPDO, heartbeat or guard request starts the watch."""
+"""How long everything is sent before the silence: the first RPDO, heartbeat or guard request starts the
+drive's supervision."""
 MARGIN_S: Final = 1.0
 UNKNOWN_S: Final = 5.0
-"""How long a drive is waited for whose own time-out is not known, or off."""
+"""How long to wait for a drive whose own time-out is not known, or off."""
 RETURN_S: Final = 1.0
 RETURN_WITHIN_S: Final = 20.0
 MESSAGE_MS: Final = 50
-"""What the emergency message or TPDO that tells of the reaction may be on its way."""
+"""How long the emergency message or TPDO that shows the reaction may be on its way."""
 
 
 class Phase(StrEnum):

@@ -1,4 +1,4 @@
-"""Finds the nodes of a bus: by what they say of themselves, by SDO and by node guarding. Sans-IO.
+"""Finds the nodes of a bus: by their own messages, by SDO and by node guarding. Sans-IO.
 
 All 127 ids are asked side by side. An SDO answer alone proves no node: a device with a second SDO
 server answers there for an id that nobody has (Lenze node n on 5C0h + n, which is the first channel of

@@ -1,4 +1,4 @@
-"""Other names of communication objects: parameters that are, or decide, what 1000h … 1FFFh hold."""
+"""Other names of communication objects: parameters that hold, or determine, what 1000h … 1FFFh hold."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The owners' telegrams, asked of the bridge by Modbus TCP: a client that has no other use.
+"""The owners' telegrams, asked of the bridge by Modbus TCP: a client for this alone.
 
 MODBUS Messaging on TCP/IP V1.0b §3.1.3, functions 3 and 4 of MODBUS Application Protocol V1.1b3 §6.3, §6.4.
 Input register 24 of a drive's unit is the number of the last telegram, holding register 12 the time-out in

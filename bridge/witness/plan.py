@@ -1,4 +1,4 @@
-"""What the witness looks at: the drives of a site, their frames, and when they have to stand."""
+"""What the witness looks at: the drives of a site, their frames, and when they have to be stopped."""
 
 from __future__ import annotations
 

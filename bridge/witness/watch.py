@@ -4,9 +4,9 @@ A stop is recorded with its time and what is promised of it; an alarm is raised 
 broken, whether or not the drive stops in the end. Times are seconds of one monotonic clock, those of frames
 their reception.
 
-The owner's telegrams are known by their number alone, which is read now and then, with the time-out in force:
-a telegram is taken for as young as it can be, so a stop may have been later by one reading than it seems, and
-is never earlier. Without readings nothing is known of the owner, and that is told.
+The owner's telegrams are known only by their number, which is read now and then, with the time-out in force.
+A telegram is assumed to be as young as possible, so a stop may have come up to one reading later than it
+seems, and never earlier. Without readings nothing is known of the owner, which is reported.
 """
 
 from __future__ import annotations

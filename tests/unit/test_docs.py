@@ -40,6 +40,13 @@ def test_every_link_leads_somewhere(page: Page) -> None:
             assert anchor in Page(target).anchors, f"{page}: {link} has no such heading"
 
 
+@pytest.mark.parametrize("page", LINKED, ids=repr)
+def test_every_picture_is_there_and_is_described(page: Page) -> None:
+    for description, picture in re.findall(r"!\[([^\]]*)\]\(([^()\s]+)\)", "\n".join(page.prose)):
+        assert (page.path.parent / picture).is_file(), f"{page}: there is no {picture}"
+        assert description, f"{page}: {picture} says nothing to those who cannot see it"
+
+
 def test_every_page_can_be_found_from_the_index() -> None:
     indices = [page("index.md"), page("reference/families/index.md")]
     linked = {(one.path.parent / link.partition("#")[0]).resolve() for one in indices for link in one.links}

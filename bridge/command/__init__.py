@@ -4,11 +4,31 @@ from bridge.command.audit import Rejection
 from bridge.command.drive import Drive, Identification
 from bridge.command.event import Event, Kind
 from bridge.command.plant import Node, Plant
-from bridge.command.request import Action, Code, Identity, Outcome, Reply, Request, Role, Source
+from bridge.command.request import (
+    Action,
+    Code,
+    Command,
+    Do,
+    Identity,
+    Outcome,
+    ReadParameter,
+    Reply,
+    Request,
+    Role,
+    SetTimeout,
+    Source,
+    Start,
+    TakeControl,
+    Write,
+    WriteParameter,
+    command_of,
+)
 
 __all__ = [
     "Action",
     "Code",
+    "Command",
+    "Do",
     "Drive",
     "Event",
     "Identification",
@@ -17,9 +37,16 @@ __all__ = [
     "Node",
     "Outcome",
     "Plant",
+    "ReadParameter",
     "Rejection",
     "Reply",
     "Request",
     "Role",
+    "SetTimeout",
     "Source",
+    "Start",
+    "TakeControl",
+    "Write",
+    "WriteParameter",
+    "command_of",
 ]

@@ -10,7 +10,22 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
-from bridge.command.request import Action, Code, Identity, Outcome, Reply, Request, Role, Source
+from bridge.command.request import (
+    Action,
+    Code,
+    Do,
+    Identity,
+    Outcome,
+    Reply,
+    Request,
+    Role,
+    SetTimeout,
+    Source,
+    Start,
+    TakeControl,
+    Write,
+    WriteParameter,
+)
 from bridge.image import Image, Value
 from bridge.ratelimit import RateLimit
 
@@ -169,15 +184,15 @@ class AuditTrail:
     def _held(self, request: Request) -> Values:
         """What the points hold that ``request`` is about to change."""
         top = f"{request.target}/command/"
-        match request.action:
-            case Action.WRITE:
-                names = {leaf: f"{top}{leaf}" for leaf in request.values}
-            case Action.SET_TIMEOUT:
+        match request.command:
+            case Write(values=values):
+                names = {leaf: f"{top}{leaf}" for leaf in values}
+            case SetTimeout():
                 names = {"fieldbus_timeout_ms": f"{request.target}/supervision/fieldbus_timeout_ms"}
-            case Action.TAKE_CONTROL | Action.RELEASE_CONTROL:
+            case TakeControl() | Do(action=Action.RELEASE_CONTROL):
                 names = {"owner": f"{request.target}/supervision/owner"}
-            case Action.WRITE_PARAMETER:  # what was read of it last
-                names = {request.parameter: f"{request.target}/parameter/{request.parameter}"}
+            case WriteParameter(parameter=parameter):  # what was read of it last
+                names = {parameter: f"{request.target}/parameter/{parameter}"}
             case _:
                 return {}
         index = self._image.index
@@ -307,18 +322,18 @@ def _goes_on(before: _Telegrams, entry: Entry) -> bool:
 
 
 def _asked(request: Request) -> Values:
-    match request.action:
-        case Action.WRITE:
-            return dict(request.values)
-        case Action.SET_TIMEOUT:
-            return {"fieldbus_timeout_ms": request.timeout_ms}
-        case Action.TAKE_CONTROL:
-            return {"owner": str(request.identity), "ttl_ms": request.ttl_ms}
-        case Action.RELEASE_CONTROL:
+    match request.command:
+        case Write(values=values):
+            return dict(values)
+        case SetTimeout(timeout_ms=timeout_ms):
+            return {"fieldbus_timeout_ms": timeout_ms}
+        case TakeControl(ttl_ms=ttl_ms):
+            return {"owner": str(request.identity), "ttl_ms": ttl_ms}
+        case Do(action=Action.RELEASE_CONTROL):
             return {"owner": ""}
-        case Action.START:
-            return {"direction": request.direction}
-        case Action.WRITE_PARAMETER:
-            return {} if request.value is None else {request.parameter: request.value}
+        case Start(direction=direction):
+            return {"direction": direction}
+        case WriteParameter(parameter=parameter, value=value):
+            return {parameter: value}
         case _:
             return {}

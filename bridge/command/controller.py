@@ -6,7 +6,7 @@ Brings authority, watchdog, gate and start together. Requests and time in, outco
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from bridge.command.acknowledge import AcknowledgeEdges
@@ -15,7 +15,22 @@ from bridge.command.event import Kind
 from bridge.command.freshness import arrival_of, is_stale, limit_ms_of
 from bridge.command.link import Link
 from bridge.command.output import Gate, Output
-from bridge.command.request import DONE, STOP_ACTIONS, Action, Code, Identity, Outcome, Reply, Request, Role
+from bridge.command.request import (
+    DONE,
+    STOP_ACTIONS,
+    Action,
+    Code,
+    Do,
+    Identity,
+    Outcome,
+    Reply,
+    Request,
+    Role,
+    SetTimeout,
+    Start,
+    TakeControl,
+    Write,
+)
 from bridge.command.setpoints import followers_of, handshake_of
 from bridge.command.start import StartSequence
 from bridge.command.status import DriveStatus
@@ -23,7 +38,7 @@ from bridge.command.telegram import Refusal, TelegramDecoder
 from bridge.command.watchdog import Effect, Stimulus, Watchdog, WatchdogState
 from bridge.config import DriveTable
 from bridge.drive import FAULTED, ControlWords, LinearScale
-from bridge.image import Quality
+from bridge.image import Quality, Value
 from bridge.mapping.model import Family
 
 _LEASE_MS: Final = (100, 600_000)
@@ -153,8 +168,8 @@ class ControllerLeg:
             self._check_authority(request, now)
             if request.action not in _TAKEN_STALE and self._is_stale(request, now):
                 raise self._stale(request)
-            if request.action is Action.START:
-                self._begin_start(request, now, reply)
+            if isinstance(request.command, Start):
+                self._begin_start(request, request.command.direction, now, reply)
             else:
                 self.outcomes.append((reply, self._carry_out(request, now)))
         except Refusal as refusal:
@@ -196,30 +211,30 @@ class ControllerLeg:
 
     def _carry_out(self, request: Request, now: float) -> Outcome:
         """What is done at once. Raises ``Refusal`` before anything has changed."""
-        match request.action:
-            case Action.WRITE:
-                return self._write(request, now)
-            case Action.KEEP_ALIVE:
+        match request.command:
+            case Write(values=values):
+                return self._write(request, values, now)
+            case Do(action=Action.KEEP_ALIVE):
                 self._hear(request, now)
-            case Action.RESET_FAULT:
+            case Do(action=Action.RESET_FAULT):
                 return self._reset_fault(request, now)
-            case Action.STOP | Action.QUICK_STOP | Action.DISABLE_VOLTAGE:
+            case Do(action=Action.STOP | Action.QUICK_STOP | Action.DISABLE_VOLTAGE):
                 self._stop(request, now)
-            case Action.TAKE_CONTROL:
-                self._take_control(request, now)
-            case Action.RELEASE_CONTROL:
+            case TakeControl(ttl_ms=ttl_ms):
+                self._take_control(request, ttl_ms, now)
+            case Do(action=Action.RELEASE_CONTROL):
                 return self._release(request, now)
-            case Action.SET_TIMEOUT:
-                self._set_timeout(request, now)
+            case SetTimeout(timeout_ms=timeout_ms):
+                self._set_timeout(request, timeout_ms, now)
             case _:
                 raise Refusal(Code.UNKNOWN_POINT, f"a drive knows no {request.action}")
         return DONE
 
-    def _write(self, request: Request, now: float) -> Outcome:
+    def _write(self, request: Request, values: Mapping[str, Value], now: float) -> Outcome:
         is_owner = request.identity.is_same(self.owner)
         # A new owner inherits no setpoints.
         kept = self.gate.setpoints if is_owner else self.gate.rest
-        telegram = self._decoder.decode(request.values, kept, self.control_word)
+        telegram = self._decoder.decode(values, kept, self.control_word)
         word = telegram.control_word
         if word is not None and not self.words.is_valid(word):
             self.watchdog.apply(Stimulus.INVALID, now)
@@ -241,7 +256,7 @@ class ControllerLeg:
             if not is_edge and not self.gate.control_word & mask:
                 word &= ~mask  # what was sent meanwhile would make an edge of a bit that never fell
         self.watchdog.apply(Stimulus.TELEGRAM, arrival_of(request, now))
-        position = self._handshake is not None and self._handshake.value in request.values
+        position = self._handshake is not None and self._handshake.value in values
         may_enable = self.may_enable(now)
         if self.gate.take(word, telegram.setpoints, may_enable=may_enable, position=position):
             return DONE
@@ -321,14 +336,14 @@ class ControllerLeg:
         if was_tripped:
             self._tell(now, Kind.WATCHDOG, 200, f"acknowledged by {self.owner}; the drive stays stopped")
 
-    def _take_control(self, request: Request, now: float) -> None:
+    def _take_control(self, request: Request, ttl_ms: int, now: float) -> None:
         low, high = _LEASE_MS
-        if self.authority.control == "lease" and not low <= request.ttl_ms <= high:
+        if self.authority.control == "lease" and not low <= ttl_ms <= high:
             raise Refusal(Code.OUT_OF_RANGE, f"ttl_ms takes {low}…{high}")
         owner, is_free = self.owner, self._owner_is_silent(now)
         if owner is not None and not is_free and not request.identity.is_same(owner):
             self._tell(now, Kind.OWNER, 500, f"{request.identity} takes control away from {owner}")
-        self._hand_over(request.identity, now, request.ttl_ms / 1000)
+        self._hand_over(request.identity, now, ttl_ms / 1000)
 
     def _release(self, request: Request, now: float) -> Outcome:
         if not request.identity.is_same(self.owner):
@@ -346,17 +361,17 @@ class ControllerLeg:
         self._edges.on_leave()
         self.start.end(Outcome(Code.CANCELLED, "control of the drive has changed"))
 
-    def _set_timeout(self, request: Request, now: float) -> None:
+    def _set_timeout(self, request: Request, timeout_ms: int, now: float) -> None:
         """Another time for as long as the owner owns the drive."""
         if not self._settings.fieldbus_timeout_writable:
             raise Refusal(Code.NOT_ALLOWED, "the site file does not allow to change fieldbus_timeout_ms")
         if not request.identity.is_same(self.owner):
             raise Refusal(Code.NOT_ALLOWED, "only who controls the drive may change fieldbus_timeout_ms")
         low, high = self._settings.timeout_range_ms
-        if not low <= request.timeout_ms <= high:
+        if not low <= timeout_ms <= high:
             raise Refusal(Code.OUT_OF_RANGE, f"fieldbus_timeout_ms takes {low}…{high} here")
-        self.watchdog.set_timeout(request.timeout_ms)
-        message = f"fieldbus_timeout_ms = {request.timeout_ms}, by {request.identity}"
+        self.watchdog.set_timeout(timeout_ms)
+        message = f"fieldbus_timeout_ms = {timeout_ms}, by {request.identity}"
         self._tell(now, Kind.CONFIGURATION, 400, message)
 
     def _restore_timeout(self, now: float) -> None:
@@ -383,11 +398,11 @@ class ControllerLeg:
         self.gate.stop_as_asked(change(self.gate.sent.words[0]))
         self.start.end(Outcome(Code.CANCELLED, f"{request.action} by {request.identity}"))
 
-    def _begin_start(self, request: Request, now: float, reply: Reply) -> None:
-        bits = {0: 0, 1: self.words.forward, -1: self.words.reverse}.get(request.direction)
+    def _begin_start(self, request: Request, direction: int, now: float, reply: Reply) -> None:
+        bits = {0: 0, 1: self.words.forward, -1: self.words.reverse}.get(direction)
         if bits is None:
-            raise Refusal(Code.OUT_OF_RANGE, f"direction takes 1, -1 or 0, not {request.direction}")
-        if request.direction < 0 and not bits:
+            raise Refusal(Code.OUT_OF_RANGE, f"direction takes 1, -1 or 0, not {direction}")
+        if direction < 0 and not bits:
             # Forward is what such a drive does with a positive setpoint: that needs no bit.
             raise Refusal(Code.OUT_OF_RANGE, "direction -1: here the sign of the setpoint is the direction")
         if self.is_tripped or self._status.state in FAULTED:

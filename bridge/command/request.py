@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
+from typing import Any, ClassVar, Final
 
 from bridge.image import Value
 
@@ -145,32 +146,95 @@ DONE = Outcome(Code.OK)
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
-    """One command.
+class Write:
+    """One telegram. ``values`` maps names of the command group to values:
+    ``{"control_word": 0x047F, "setpoint_1": 0x2000}``."""
 
-    ``target`` is ``<node>/<drive>``, ``<node>`` or, for NMT, ``bus/<bus>``. ``values`` (WRITE) maps names
-    of the command group to values: ``{"control_word": 0x047F, "setpoint_1": 0x2000}`` is one telegram.
-    ``ttl_ms`` (TAKE_CONTROL) is the lease's length, ``direction`` (START) is 1 forward, -1 reverse, 0 as
-    the drive's own setting, ``timeout_ms`` goes with SET_TIMEOUT. ``parameter`` is a vendor's name, an
-    object or the name of a point, ``value`` what is to be written, ``max_age_ms`` how old a value read
-    earlier may be. ``received_at`` is when it can have come at the earliest, in monotonic seconds of the bus
-    process's machine; None for one that was made in this process just now. ``pressed`` is what the telegram
-    says of an acknowledge register, None where its protocol has none or another request of the same telegram
-    says it.
+    action: ClassVar[Action] = Action.WRITE
+    values: Mapping[str, Value] = field(default_factory=dict[str, Value])
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """``direction`` is 1 forward, -1 reverse, 0 as the drive's own setting."""
+
+    action: ClassVar[Action] = Action.START
+    direction: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class TakeControl:
+    """``ttl_ms`` is the lease's length."""
+
+    action: ClassVar[Action] = Action.TAKE_CONTROL
+    ttl_ms: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class SetTimeout:
+    action: ClassVar[Action] = Action.SET_TIMEOUT
+    timeout_ms: int
+
+
+@dataclass(frozen=True, slots=True)
+class ReadParameter:
+    """``parameter`` is a vendor's name, an object or the name of a point; ``max_age_ms`` is how old a value
+    read earlier may be."""
+
+    action: ClassVar[Action] = Action.READ_PARAMETER
+    parameter: str
+    max_age_ms: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class WriteParameter:
+    """``parameter`` as in ``ReadParameter``."""
+
+    action: ClassVar[Action] = Action.WRITE_PARAMETER
+    parameter: str
+    value: Value
+
+
+@dataclass(frozen=True, slots=True)
+class Do:
+    """An action that needs no more words."""
+
+    action: Action
+
+
+Command = Write | Start | TakeControl | SetTimeout | ReadParameter | WriteParameter | Do
+
+COMMANDS: Final = {
+    kind.action: kind for kind in (Write, Start, TakeControl, SetTimeout, ReadParameter, WriteParameter)
+}
+"""The commands that have fields, by their action."""
+
+
+def command_of(action: Action, **fields: Any) -> Command:
+    """The command for ``action``, which has these fields."""
+    kind = COMMANDS.get(action)
+    return Do(action) if kind is None else kind(**fields)
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One command and who gives it.
+
+    ``target`` is ``<node>/<drive>``, ``<node>`` or, for NMT, ``bus/<bus>``. ``received_at`` is when it can
+    have come at the earliest, in monotonic seconds of the bus process's machine; None for one that was made
+    in this process just now. ``pressed`` is what the telegram says of an acknowledge register, None where its
+    protocol has none or another request of the same telegram says it.
     """
 
     identity: Identity
     target: str
-    action: Action
-    values: Mapping[str, Value] = field(default_factory=dict[str, Value])
-    ttl_ms: int = 0
-    direction: int = 0
-    timeout_ms: int = 0
-    parameter: str = ""
-    value: Value | None = None
-    max_age_ms: int = 0
+    command: Command
     received_at: float | None = None
     pressed: bool | None = None
+
+    @property
+    def action(self) -> Action:
+        return self.command.action
 
 
 Reply = Callable[[Outcome], None]

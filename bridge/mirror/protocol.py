@@ -7,12 +7,13 @@ the monotonic clock: both ends run on one machine, and a stepped wall clock must
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, TypeVar, cast
+from typing import Final, NamedTuple, TypeVar, cast
 
 import msgspec
 
-from bridge.command import Event, Kind, Outcome, Rejection, Request
+from bridge.command import Action, Do, Event, Identity, Kind, Outcome, Rejection, Request
 from bridge.command.points import CONNECTION_COUNTS
+from bridge.command.request import COMMANDS
 from bridge.image import Point, Quality, Reading, Value
 
 SNAPSHOT: Final = "mirror/snapshot"
@@ -82,11 +83,23 @@ class Told(msgspec.Struct, array_like=True, frozen=True):
         return Event(self.time_ns / 1e9, self.kind, self.source, self.severity, self.message)
 
 
-class Asked(msgspec.Struct, array_like=True, frozen=True):
+class Asked(NamedTuple):
     """A request that is valid until ``deadline_s`` of the monotonic clock."""
 
     deadline_s: float
     request: Request
+
+
+class _Asked(msgspec.Struct, array_like=True, frozen=True):
+    """The same as it goes over the link: what a command's fields are is told by its action."""
+
+    deadline_s: float
+    identity: Identity
+    target: str
+    action: Action
+    command: msgspec.Raw
+    received_at: float | None
+    pressed: bool | None
 
 
 class Rejected(msgspec.Struct, array_like=True, frozen=True):
@@ -108,7 +121,8 @@ _encoder = msgspec.msgpack.Encoder()
 _snapshot = msgspec.msgpack.Decoder(Snapshot)
 _delta = msgspec.msgpack.Decoder(Delta)
 _told = msgspec.msgpack.Decoder(Told)
-_asked = msgspec.msgpack.Decoder(Asked)
+_asked = msgspec.msgpack.Decoder(_Asked)
+_commands = {action: msgspec.msgpack.Decoder(kind) for action, kind in COMMANDS.items()}
 _outcome = msgspec.msgpack.Decoder(Outcome)
 _rejected = msgspec.msgpack.Decoder(Rejected)
 _counted = msgspec.msgpack.Decoder(Counted)
@@ -125,8 +139,11 @@ def encode(message: Snapshot | Delta | Told | Rejected | Counted | Outcome) -> b
 
 def encode_request(asked: Asked) -> bytes:
     """A request is never changed. Raises Malformed for one that cannot be encoded."""
+    request = asked.request
     try:
-        return _encoder.encode(asked)
+        command = msgspec.Raw(_encoder.encode(request.command))
+        who, came = (request.identity, request.target), (request.received_at, request.pressed)
+        return _encoder.encode(_Asked(asked.deadline_s, *who, request.action, command, *came))
     except (UnicodeError, OverflowError) as error:
         raise Malformed(f"cannot be passed on: {error}") from None
 
@@ -165,7 +182,11 @@ def decode_event(data: bytes) -> Event:
 
 
 def decode_request(data: bytes) -> Asked:
-    return _decode(_asked, data)
+    asked = _decode(_asked, data)
+    decoder = _commands.get(asked.action)
+    command = Do(asked.action) if decoder is None else _decode(decoder, bytes(asked.command))
+    request = Request(asked.identity, asked.target, command, asked.received_at, asked.pressed)
+    return Asked(asked.deadline_s, request)
 
 
 def decode_rejected(data: bytes) -> Rejected:

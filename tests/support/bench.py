@@ -13,7 +13,7 @@ from bridge.can.burstend import BurstEnd
 from bridge.can.interface import BusStatus, ControllerState
 from bridge.can.softbeat import SoftBeat
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Source
+from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Source, command_of
 from bridge.config import Site, load_site
 from bridge.mapping import Family, load_family
 from bridge.master.listening import Listening, listen_s
@@ -212,7 +212,7 @@ class Bench:
         self, action: Action, target: str = "conveyor/fu1", identity: Identity = PLC, **more: Any
     ) -> Outcome:
         outcomes: list[Outcome] = []
-        request = Request(identity, target, action, **more)
+        request = Request(identity, target, command_of(action, **more))
         self.plant.submit(request, self.now, outcomes.append)
         assert len(outcomes) == 1, "one request, one outcome"
         return outcomes[0]

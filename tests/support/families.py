@@ -12,7 +12,7 @@ from typing import Final, TypeVar
 from bridge.can import Bus
 from bridge.can.virtual import VirtualWire
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Identity, Outcome, Request
+from bridge.command import Action, Identity, Outcome, Request, command_of
 from bridge.config import BusTable
 from bridge.drive import DriveState
 from bridge.mapping import Family, load_family
@@ -142,7 +142,7 @@ class FamilyBridge:
     def ask(self, action: Action, drive: str, identity: Identity, **more: object) -> Outcome:
         """A request as a protocol makes it, with its outcome."""
         outcomes: list[Outcome] = []
-        request = Request(identity, drive, action, **more)  # pyright: ignore[reportArgumentType]
+        request = Request(identity, drive, command_of(action, **more))
         assert self._loop
         now = self._loop.time
         self.call(lambda: self.service.plant.submit(request, now(), outcomes.append))

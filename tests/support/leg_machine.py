@@ -5,7 +5,19 @@ from __future__ import annotations
 from collections.abc import Collection, Hashable, Mapping
 from typing import Any, Final
 
-from bridge.command import Action, Code, Identity, Outcome, Request, Role
+from bridge.command import (
+    Action,
+    Code,
+    Command,
+    Do,
+    Identity,
+    Outcome,
+    Request,
+    Role,
+    Start,
+    TakeControl,
+    Write,
+)
 from bridge.command.channel import DriveChannel
 from bridge.command.link import NodeState
 from bridge.command.request import STOP_ACTIONS
@@ -47,6 +59,16 @@ _STATES: Final = {
 }
 
 
+def _command(action: Action, ttl_ms: int) -> Command:
+    match action:
+        case Action.TAKE_CONTROL:
+            return TakeControl(ttl_ms)
+        case Action.START:
+            return Start(direction=1)
+        case _:
+            return Do(action)
+
+
 class LegMachine:
     """``words``: of which family. ``starts``: explore starts, else pulses of the acknowledge bit.
     ``answers``: explore what the drive says, as starts need it. ``stops``: every kind of stop. ``without``:
@@ -81,14 +103,8 @@ class LegMachine:
         self._outcomes: list[Outcome] = []
         self._before: tuple[State, State] = ((), ())
         self._requests = {
-            **{
-                name: Request(who, "", Action.WRITE, values)
-                for name, (who, values) in writes_of(words).items()
-            },
-            **{
-                name: Request(who, "", action, ttl_ms=ttl_ms, direction=1)
-                for name, (who, action) in ACTIONS.items()
-            },
+            **{name: Request(who, "", Write(values)) for name, (who, values) in writes_of(words).items()},
+            **{name: Request(who, "", _command(action, ttl_ms)) for name, (who, action) in ACTIONS.items()},
         }
         names = (*self._requests, *TIMES, *REST, *((TAKEN,) if words.taken else ()))
         left_out = (
@@ -218,20 +234,20 @@ class LegMachine:
             return True
         if not model.may(who, take=action is Action.TAKE_CONTROL):
             return False
-        match action:
-            case Action.WRITE:
-                return self._expect_write(who, request.values)
-            case Action.KEEP_ALIVE:
+        match request.command:
+            case Write(values=values):
+                return self._expect_write(who, values)
+            case Do(action=Action.KEEP_ALIVE):
                 model.telegram(who)
-            case Action.RESET_FAULT:
+            case Do(action=Action.RESET_FAULT):
                 model.acknowledge(who, fault=model.says is Says.FAULT)
-            case Action.START:
+            case Start():
                 if model.tripped or model.says is Says.FAULT or not model.is_there:
                     return False
                 model.start(who)
-            case Action.TAKE_CONTROL:
-                model.take(who, request.ttl_ms / 1000)
-            case Action.RELEASE_CONTROL:
+            case TakeControl(ttl_ms=ttl_ms):
+                model.take(who, ttl_ms / 1000)
+            case Do(action=Action.RELEASE_CONTROL):
                 if who.is_same(model.owner):
                     model.leave()
             case unknown:

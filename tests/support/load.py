@@ -12,7 +12,7 @@ from pathlib import Path
 
 from bridge.can.virtual import VirtualBus, VirtualWire
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Identity, Kind, Request, Source
+from bridge.command import Identity, Kind, Request, Source, Write
 from bridge.project import load_project
 from bridge.service import Service
 from bridge.sim.nord_tu4 import NordTu4
@@ -69,7 +69,7 @@ class Load:
         """Let fu1's controller fall silent, again and again."""
         for _ in range(times):
             for word in (0x047E, 0x04FE, 0x047E, 0x047F):
-                request = Request(_PLC, "conveyor/fu1", Action.WRITE, {"control_word": word})
+                request = Request(_PLC, "conveyor/fu1", Write({"control_word": word}))
                 last = time.monotonic()
                 self.service.plant.submit(request, last, lambda outcome: None)
             self._last_telegram = last

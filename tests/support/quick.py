@@ -10,7 +10,7 @@ from pathlib import Path
 from bridge.can.interface import BusStatus
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.nmt import NmtState
-from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Role, Source
+from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Role, Source, command_of
 from bridge.config import Site, load_site
 from bridge.mapping import load_family
 from bridge.master.listening import Listening
@@ -202,7 +202,7 @@ class Quick:
 
     def ask(self, action: Action, target: str, identity: Identity = ENGINEER) -> Outcome:
         outcomes: list[Outcome] = []
-        self.plant.submit(Request(identity, target, action), self.now, outcomes.append)
+        self.plant.submit(Request(identity, target, command_of(action)), self.now, outcomes.append)
         assert len(outcomes) == 1, "one request, one outcome"
         return outcomes[0]
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Request, Role, Source
+from typing import Any
+
+from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Request, Role, Source, command_of
 from bridge.command.channel import DriveChannel
 from bridge.command.link import NodeState
 from bridge.config import DriveTable
@@ -77,12 +79,12 @@ class Rig:
         action: Action,
         identity: Identity = PLC,
         *,
-        values: dict[str, Value] | None = None,
-        **more: int,
+        pressed: bool | None = None,
+        **fields: Any,
     ) -> list[Outcome]:
         """The outcomes so far, which grow when a later one comes."""
         outcomes: list[Outcome] = []
-        request = Request(identity, "conveyor/fu1", action, values or {}, **more)
+        request = Request(identity, "conveyor/fu1", command_of(action, **fields), pressed=pressed)
         self.channel.handle(request, self.now, outcomes.append)
         return outcomes
 

@@ -12,7 +12,7 @@ import pytest
 
 from bridge.auditfile import AuditFile
 from bridge.auditlog import AuditLog, as_line
-from bridge.command import Action, Event, Identity, Plant, Request, Source
+from bridge.command import Action, Do, Event, Identity, Plant, Request, Source, Write
 from bridge.command.audit import Ending, Entry
 from bridge.config import Site
 from tests.support import sites
@@ -177,9 +177,7 @@ def logged(folder: Path, more: str = "") -> tuple[Plant, AuditLog, list[Event]]:
 
 
 def write(plant: Plant, word: int) -> None:
-    plant.submit(
-        Request(PLC, "conveyor/fu1", Action.WRITE, {"control_word": word}), 100.0, lambda outcome: None
-    )
+    plant.submit(Request(PLC, "conveyor/fu1", Write({"control_word": word})), 100.0, lambda outcome: None)
 
 
 def test_what_the_plant_is_asked_is_in_the_state_folder(tmp_path: Path) -> None:
@@ -221,7 +219,7 @@ def test_a_line_that_cannot_be_written_costs_the_line_alone(tmp_path: Path) -> N
     log = AuditLog(plant, plant.site, lambda: 100.0, lambda at: no_date)
     log.start()
     outcomes: list[object] = []
-    request = Request(PLC, "conveyor/fu1", Action.WRITE, {"control_word": SHUT_DOWN})
+    request = Request(PLC, "conveyor/fu1", Write({"control_word": SHUT_DOWN}))
     plant.submit(request, 100.0, outcomes.append)
     assert len(outcomes) == 1
     log.look(200.0)
@@ -250,7 +248,7 @@ def test_what_is_refused_pushes_nothing_out_that_was_done(tmp_path: Path) -> Non
     log.start()
     write(plant, SHUT_DOWN)
     for number in range(3000):
-        request = Request(Identity(Source.MODBUS, "10.0.0.66"), f"attic/fu{number}", Action.STOP)
+        request = Request(Identity(Source.MODBUS, "10.0.0.66"), f"attic/fu{number}", Do(Action.STOP))
         plant.submit(request, 100.0, lambda outcome: None)
     write(plant, ENABLE)
     log.close()
@@ -272,7 +270,7 @@ def test_a_flood_of_refusals_leaves_room_for_what_is_done(tmp_path: Path) -> Non
     plant, log, _ = logged(tmp_path, "[audit]\nevery_telegram = true\n")
     plant.audit.tell = log._on_entry
     for number in range(11_000):
-        request = Request(Identity(Source.MODBUS, "10.0.0.66"), f"attic/fu{number}", Action.STOP)
+        request = Request(Identity(Source.MODBUS, "10.0.0.66"), f"attic/fu{number}", Do(Action.STOP))
         plant.submit(request, 100.0, lambda outcome: None)
     write(plant, SHUT_DOWN)
     assert log.refused.all_lost == 1000

@@ -14,7 +14,7 @@ import pytest
 
 from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Identity, Plant, Rejection, Request, Source
+from bridge.command import Action, Identity, Plant, Rejection, Request, Source, command_of
 from bridge.command.link import NodeState
 from bridge.config import ModbusTable, ZenohTable
 from bridge.eventlog import EventLog
@@ -68,7 +68,7 @@ class Hall:
         self.plant.on_time(self.now)
 
     def ask(self, action: Action, who: Identity = PLC, target: str = FU1, **more: object) -> None:
-        request = Request(who, target, action, **more)  # pyright: ignore[reportArgumentType]
+        request = Request(who, target, command_of(action, **more))
         self.plant.submit(request, self.now, lambda outcome: None)
 
 

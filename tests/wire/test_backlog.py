@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command import Action, Code, Identity, Outcome, Plant, Reply, Request, Source
+from bridge.command import Action, Code, Do, Identity, Outcome, Plant, Reply, Request, Source
 from bridge.command.link import NodeState
 from bridge.config import ModbusTable, ZenohTable
 from bridge.mirror import MirrorClient, MirrorPublisher, socket_endpoint
@@ -167,16 +167,16 @@ async def test_what_has_waited_on_the_link_between_our_processes_does_not_count(
     try:
         await front.open()
         who = Identity(Source.OPCUA, "plc")
-        fresh = Request(who, "conveyor/fu1", Action.KEEP_ALIVE)
+        fresh = Request(who, "conveyor/fu1", Do(Action.KEEP_ALIVE))
         assert (await front.request(fresh)).code is Code.OK
         for received_at, code in (
             (time.monotonic() - 1.0, Code.STALE),
             (time.monotonic() + 60.0, Code.STALE),
             (time.monotonic() - 0.2, Code.OK),
         ):
-            request = Request(who, "conveyor/fu1", Action.KEEP_ALIVE, received_at=received_at)
+            request = Request(who, "conveyor/fu1", Do(Action.KEEP_ALIVE), received_at=received_at)
             assert (await front.request(request)).code is code
-        stop = Request(who, "conveyor/fu1", Action.STOP, received_at=time.monotonic() - 60.0)
+        stop = Request(who, "conveyor/fu1", Do(Action.STOP), received_at=time.monotonic() - 60.0)
         assert (await front.request(stop)).code is Code.OK
     finally:
         await front.close()

@@ -16,7 +16,22 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Plant, Request, Role, Source
+from bridge.command import (
+    Action,
+    Code,
+    Do,
+    Event,
+    Identity,
+    Kind,
+    Outcome,
+    Plant,
+    Request,
+    Role,
+    Source,
+    Start,
+    TakeControl,
+    Write,
+)
 from bridge.command.link import NodeState
 from bridge.errors import Unavailable
 from bridge.image import Image, Quality, Value
@@ -135,16 +150,16 @@ async def test_a_request_carries_its_identity_and_brings_one_outcome(endpoint: s
     node_is(plant, NodeState.OPERATIONAL)
     drive_says(plant.drives["conveyor/fu4"], READY)
     async with publishing(endpoint, plant), front(endpoint) as client:
-        take = Request(SCADA, "conveyor/fu4", Action.TAKE_CONTROL, ttl_ms=5000)
+        take = Request(SCADA, "conveyor/fu4", TakeControl(ttl_ms=5000))
         assert await client.request(take) == Outcome(Code.OK)
         assert plant.drives["conveyor/fu4"].channel.owner == SCADA
-        write = Request(SCADA, "conveyor/fu4", Action.WRITE, {"control_word": 0x047E, "setpoint_1": 0x1000})
+        write = Request(SCADA, "conveyor/fu4", Write({"control_word": 0x047E, "setpoint_1": 0x1000}))
         assert (await client.request(write)).ok
         assert plant.drives["conveyor/fu4"].channel.output.words == (0x047E, 0x1000, 0, 0, 0)
-        refused = await client.request(Request(SCADA, "conveyor/fu1", Action.WRITE, {"control_word": 0x047E}))
+        refused = await client.request(Request(SCADA, "conveyor/fu1", Write({"control_word": 0x047E})))
         assert refused == Outcome(Code.NOT_ALLOWED, "the drive is controlled by modbus", forwarded=False)
         engineer = Identity(Source.OPCUA, "eve", Role.ENGINEER)
-        assert (await client.request(Request(engineer, "conveyor/fu4", Action.TAKE_CONTROL, ttl_ms=500))).ok
+        assert (await client.request(Request(engineer, "conveyor/fu4", TakeControl(ttl_ms=500)))).ok
 
 
 async def test_a_start_that_takes_its_time_holds_up_no_other_request(endpoint: str) -> None:
@@ -153,9 +168,9 @@ async def test_a_start_that_takes_its_time_holds_up_no_other_request(endpoint: s
     fu4 = plant.drives["conveyor/fu4"]
     drive_says(fu4, READY)
     async with publishing(endpoint, plant), front(endpoint) as client:
-        assert (await client.request(Request(SCADA, "conveyor/fu4", Action.TAKE_CONTROL, ttl_ms=9000))).ok
-        start = asyncio.create_task(client.request(Request(SCADA, "conveyor/fu4", Action.START)))
-        keep = Request(SCADA, "conveyor/fu4", Action.KEEP_ALIVE)
+        assert (await client.request(Request(SCADA, "conveyor/fu4", TakeControl(ttl_ms=9000)))).ok
+        start = asyncio.create_task(client.request(Request(SCADA, "conveyor/fu4", Start())))
+        keep = Request(SCADA, "conveyor/fu4", Do(Action.KEEP_ALIVE))
         begin = time.monotonic()
         outcomes = await asyncio.gather(*(client.request(keep) for _ in range(300)))
         assert all(outcome.ok for outcome in outcomes), outcomes
@@ -173,9 +188,9 @@ async def test_a_request_that_waited_too_long_moves_nothing_but_may_stop(endpoin
     async with publishing(endpoint, plant):
         late = MirrorClient(endpoint, clock=lambda: time.monotonic() - 60)
         await late.open()
-        outcome = await late.request(Request(SCADA, "conveyor/fu4", Action.TAKE_CONTROL, ttl_ms=5000))
+        outcome = await late.request(Request(SCADA, "conveyor/fu4", TakeControl(ttl_ms=5000)))
         assert outcome.code is Code.TIMED_OUT and fu4.channel.owner is None
-        assert (await late.request(Request(SCADA, "conveyor/fu4", Action.STOP))).ok
+        assert (await late.request(Request(SCADA, "conveyor/fu4", Do(Action.STOP)))).ok
         await late.close()
 
 
@@ -256,14 +271,14 @@ async def test_a_killed_bus_process_leaves_every_point_dead_until_it_is_back(end
         )
         assert time.monotonic() - begin < 2
         assert not client.is_connected
-        outcome = await client.request(Request(SCADA, "conveyor/fu1", Action.STOP), timeout_s=0.5)
+        outcome = await client.request(Request(SCADA, "conveyor/fu1", Do(Action.STOP)), timeout_s=0.5)
         assert outcome == Outcome(Code.TIMED_OUT, "the bus process did not answer", forwarded=False)
         await first.wait()
         # its socket is still there; the next one takes the place
         async with bus_process(endpoint):
             await until(lambda: client.image.read(frequency).quality is Quality.GOOD, "values again", 5)
             assert client.is_connected
-            stop = Request(SCADA, "conveyor/fu1", Action.STOP)
+            stop = Request(SCADA, "conveyor/fu1", Do(Action.STOP))
             assert (await client.request(stop)).ok
 
 

@@ -13,7 +13,7 @@ from pymodbus.client import AsyncModbusTcpClient
 
 from bridge.can.virtual import VirtualWire
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Event, Identity, Kind, Request, Source
+from bridge.command import Event, Identity, Kind, Request, Source, Write
 from bridge.project import load_project
 from bridge.service import Service
 from bridge.sim.nord_tu4 import NordTu4
@@ -97,7 +97,7 @@ async def moving(folder: Path) -> AsyncIterator[Moving]:
     try:
         await asyncio.wait_for(booted.wait(), 15)
         for word in (0x047E, 0x047F):
-            request = Request(PLC, "conveyor/fu1", Action.WRITE, {"control_word": word})
+            request = Request(PLC, "conveyor/fu1", Write({"control_word": word}))
             service.plant.submit(request, asyncio.get_running_loop().time(), lambda outcome: None)
         await asyncio.wait_for(enabled.wait(), 15)
         move.happened.clear()

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from bridge.command import Action, Identity, Plant, Request, Source
+from bridge.command import Action, Do, Identity, Plant, Request, SetTimeout, Source
 from bridge.command.link import NodeState
 from bridge.config import ModbusTable
 from bridge.northbound.modbus.server import ModbusServer
@@ -46,8 +46,8 @@ async def test_a_reading_has_the_number_and_the_time_out_in_force() -> None:
     now = time.monotonic()
     plant.on_node(plant.nodes["conveyor"], NodeState.OPERATIONAL, now)
     plant.drives[FU3].on_process_data([READY, 0, 0, 0], now)
-    plant.submit(Request(PLC, FU3, Action.KEEP_ALIVE), now, lambda outcome: None)
-    plant.submit(Request(PLC, FU3, Action.SET_TIMEOUT, timeout_ms=1500), now, lambda outcome: None)
+    plant.submit(Request(PLC, FU3, Do(Action.KEEP_ALIVE)), now, lambda outcome: None)
+    plant.submit(Request(PLC, FU3, SetTimeout(timeout_ms=1500)), now, lambda outcome: None)
     server = await served(plant)
     numbers = Numbers(HOST, server.port, [1, 2, 9])
     try:

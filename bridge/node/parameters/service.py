@@ -12,7 +12,21 @@ from functools import partial
 from typing import Final
 
 from bridge.canopen.sdo import Priority, SdoChannel
-from bridge.command import Action, Code, Drive, Event, Identity, Kind, Outcome, Plant, Reply, Request, Role
+from bridge.command import (
+    Action,
+    Code,
+    Drive,
+    Event,
+    Identity,
+    Kind,
+    Outcome,
+    Plant,
+    ReadParameter,
+    Reply,
+    Request,
+    Role,
+    WriteParameter,
+)
 from bridge.command.link import NodeState
 from bridge.command.plant import Node
 from bridge.drive import MOVING
@@ -139,13 +153,15 @@ class NodeParameters:
         """Raises ``ParameterError`` where the request itself is wrong."""
         access = self._drives[drive.name]
         conclude = partial(self._conclude, request, drive, reply)
-        if request.action is Action.SAVE_PARAMETERS:
+        command = request.command
+        if isinstance(command, ReadParameter):
+            entry = access.names.resolve(command.parameter)
+            self._read(drive, entry, command.max_age_ms / 1000, partial(self._on_read, conclude))
+            return
+        if not isinstance(command, WriteParameter):
             self._run(access.save(now), drive, partial(self._on_saved, conclude))
             return
-        entry = access.names.resolve(request.parameter)
-        if request.action is Action.READ_PARAMETER:
-            self._read(drive, entry, request.max_age_ms / 1000, partial(self._on_read, conclude))
-            return
+        entry = access.names.resolve(command.parameter)
         access.check_writable(entry)
         level = access.names.protection.level(entry.address)
         refusal = _why_protected(level, entry, request.identity, drive)
@@ -153,9 +169,7 @@ class NodeParameters:
             conclude(_no(Code.NOT_ALLOWED, refusal))
             return
         key = (drive.name, entry.address)
-        if request.value is None:
-            conclude(_no(Code.OUT_OF_RANGE, f"{entry.name}: there is no value to write"))
-        elif why := self._own_watch.why_kept(drive, entry, request.value):
+        if why := self._own_watch.why_kept(drive, entry, command.value):
             conclude(_no(Code.NOT_ALLOWED, why))
         elif key in self._writing:
             conclude(_no(Code.BUSY, f"{entry.name} of {drive.name} is being written"))
@@ -164,7 +178,7 @@ class NodeParameters:
             # Who asks may enable the drive while this waits for its turn.
             steps = access.write(
                 entry,
-                request.value,
+                command.value,
                 now,
                 why_not=lambda: _why_protected(level, entry, request.identity, drive),
             )

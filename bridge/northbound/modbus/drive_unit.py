@@ -23,7 +23,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from bridge.command import Action, Drive, Identity, Request
+from bridge.command import Action, Do, Drive, Identity, Request, SetTimeout, Write, WriteParameter
 from bridge.image import Image, Quality, Value
 from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, Refused
 from bridge.northbound.modbus.registers import (
@@ -301,10 +301,10 @@ class DriveUnit:
         target = self._drive.name
         is_pressed = bool(block.get(ACKNOWLEDGE))
         if is_pressed:
-            requests.append(Request(caller, target, Action.RESET_FAULT, pressed=True))
+            requests.append(Request(caller, target, Do(Action.RESET_FAULT), pressed=True))
         if TIMEOUT in block:
             timeout_ms = block[TIMEOUT]
-            request = Request(caller, target, Action.SET_TIMEOUT, timeout_ms=timeout_ms)
+            request = Request(caller, target, SetTimeout(timeout_ms))
             settings = self._drive.channel.settings
             low, high = settings.timeout_range_ms
             if not settings.fieldbus_timeout_writable or not low <= timeout_ms <= high:
@@ -312,16 +312,16 @@ class DriveUnit:
             requests.append(request)
         if KEEP_ALIVE in block:
             action = Action.KEEP_ALIVE if block[KEEP_ALIVE] else Action.RELEASE_CONTROL
-            requests.append(Request(caller, target, action))
+            requests.append(Request(caller, target, Do(action)))
         # A 0 written to the acknowledge register alone: nothing to do, and still a telegram.
-        requests = requests or [Request(caller, target, Action.KEEP_ALIVE)]
+        requests = requests or [Request(caller, target, Do(Action.KEEP_ALIVE))]
         return requests if is_pressed else _unpressed(requests)
 
     def _stop(self, code: int, caller: Identity) -> Request:
         action = _STOPS.get(code)
         if action is None:
             raise Refused(ExceptionCode.ILLEGAL_VALUE)
-        return Request(caller, self._drive.name, action)
+        return Request(caller, self._drive.name, Do(action))
 
     def _check_writable(self, start: int, end: int) -> None:
         only_reserved = start == _RESERVED and end == KEEP_ALIVE
@@ -363,11 +363,10 @@ class DriveUnit:
         row = self._map.parameters[(start - PARAMETERS) // 2]
         value = self._value(row, words)
         name = row.name.removeprefix("parameter/")
-        target = self._drive.name
-        return Request(caller, target, Action.WRITE_PARAMETER, parameter=name, value=value)
+        return Request(caller, self._drive.name, WriteParameter(name, value))
 
     def _write(self, values: Mapping[str, Value], caller: Identity) -> Request:
-        return Request(caller, self._drive.name, Action.WRITE, values)
+        return Request(caller, self._drive.name, Write(values))
 
     # identification
 

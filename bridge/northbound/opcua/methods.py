@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.command.request import PARAMETER_ACTIONS, Action, Code, Identity, Request
+from bridge.command.request import (
+    PARAMETER_ACTIONS,
+    Action,
+    Code,
+    Command,
+    Do,
+    Identity,
+    ReadParameter,
+    Request,
+    Start,
+    TakeControl,
+    WriteParameter,
+)
 from bridge.image import Value
 from bridge.northbound.opcua.library import AttributeIds, StatusCodes, get, make, status, ua
 from bridge.northbound.opcua.nodes import Argument, ArgumentType, MethodNode
@@ -123,18 +135,19 @@ def _argument(method: MethodNode, argument: Argument, given: ua.Variant) -> Valu
 
 
 def _request(identity: Identity, method: MethodNode, values: Sequence[Value]) -> Request:
-    request = Request(identity, method.target, method.action)
+    command: Command
     match method.action:
         case Action.START:
-            return replace(request, direction=int(values[0]))
+            command = Start(int(values[0]))
         case Action.TAKE_CONTROL:
-            return replace(request, ttl_ms=int(values[0]))
+            command = TakeControl(int(values[0]))
         case Action.READ_PARAMETER:
-            return replace(request, parameter=str(values[0]))
+            command = ReadParameter(str(values[0]))
         case Action.WRITE_PARAMETER:
-            return replace(request, parameter=str(values[0]), value=values[1])
-        case _:
-            return request
+            command = WriteParameter(str(values[0]), values[1])
+        case action:
+            command = Do(action)
+    return Request(identity, method.target, command)
 
 
 def _result(

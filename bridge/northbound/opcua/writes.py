@@ -16,7 +16,16 @@ from typing import ClassVar, Final
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.command.request import Action, Code, Identity, Outcome, Request
+from bridge.command.request import (
+    Action,
+    Code,
+    Identity,
+    Outcome,
+    Request,
+    SetTimeout,
+    Write,
+    WriteParameter,
+)
 from bridge.image import Value
 from bridge.northbound.opcua.library import GOOD, AttributeIds, StatusCodes, get, status, ua
 from bridge.northbound.opcua.nodes import VariableNode
@@ -47,7 +56,7 @@ class _Telegram:
     """What was written that is the fault, as far as it is a value at all."""
 
     def request(self, identity: Identity) -> Request:
-        return Request(identity, self.target, Action.WRITE, self.values)
+        return Request(identity, self.target, Write(self.values))
 
 
 @dataclass(slots=True)
@@ -58,7 +67,7 @@ class _Parameter(_Telegram):
 
     def request(self, identity: Identity) -> Request:
         ((name, value),) = self.values.items()
-        return Request(identity, self.target, Action.WRITE_PARAMETER, parameter=name, value=value)
+        return Request(identity, self.target, WriteParameter(name, value))
 
 
 @dataclass(slots=True)
@@ -69,7 +78,7 @@ class _Timeout(_Telegram):
 
     def request(self, identity: Identity) -> Request:
         (value,) = self.values.values()
-        return Request(identity, self.target, Action.SET_TIMEOUT, timeout_ms=int(value))
+        return Request(identity, self.target, SetTimeout(int(value)))
 
 
 _ALONE: Final[Mapping[str, type[_Telegram]]] = {"parameter": _Parameter, "supervision": _Timeout}

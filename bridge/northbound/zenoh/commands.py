@@ -9,7 +9,18 @@ from urllib.parse import unquote
 
 import msgspec
 
-from bridge.command import Action, Code, Identity, Request, Source
+from bridge.command import (
+    Action,
+    Code,
+    Identity,
+    ReadParameter,
+    Request,
+    SetTimeout,
+    Source,
+    Write,
+    WriteParameter,
+    command_of,
+)
 from bridge.command.request import NMT_ACTIONS
 from bridge.image import Point, Value
 from bridge.northbound.zenoh.users import ANONYMOUS, NAME, WANTED_NAME
@@ -125,12 +136,11 @@ class Commands:
             raise BadCommand(MALFORMED, f"a command has at most {_LONGEST} bytes")
         drive, name = self.parameter(tail)
         if name:
-            value = _decode_parameter(name, payload)
-            return Request(identity, drive, Action.WRITE_PARAMETER, parameter=name, value=value)
+            return Request(identity, drive, WriteParameter(name, _decode_parameter(name, payload)))
         owner, _, leaf = tail.rpartition("/")
         target, _, group = owner.rpartition("/")
         if leaf == "command" and owner in self._drives:
-            return Request(identity, owner, Action.WRITE, _decode_telegram(owner, payload))
+            return Request(identity, owner, Write(_decode_telegram(owner, payload)))
         if self.is_method(tail):
             return _call(identity, owner if owner in self._buses else target, Action(leaf), payload)
         point = self._points.get(tail)
@@ -139,8 +149,8 @@ class Commands:
         if not point.writable:
             raise BadCommand(Code.READ_ONLY, f"{tail} is read-only; {self._how(target)}")
         if group == "supervision":
-            return Request(identity, target, Action.SET_TIMEOUT, timeout_ms=_decode_whole(point, payload))
-        return Request(identity, target, Action.WRITE, {leaf: _decode_value(point, payload)})
+            return Request(identity, target, SetTimeout(_decode_whole(point, payload)))
+        return Request(identity, target, Write({leaf: _decode_value(point, payload)}))
 
     def parameter(self, tail: str) -> tuple[str, str]:
         """The drive and the parameter's name where ``tail`` is ``<node>/<drive>/parameter/<name>``, or
@@ -167,7 +177,7 @@ class Commands:
     def reading(self, drive: str, name: str, identity: Identity, *, cached: bool) -> Request:
         """The request for the value of a parameter, from the drive or as it was last read."""
         age_ms = _CACHED_MS if cached else 0
-        return Request(identity, drive, Action.READ_PARAMETER, parameter=name, max_age_ms=age_ms)
+        return Request(identity, drive, ReadParameter(name, age_ms))
 
     def _unknown(self, tail: str, target: str, group: str) -> BadCommand:
         if group == "command" and target in self._drives:
@@ -270,10 +280,6 @@ def _call(identity: Identity, target: str, action: Action, payload: bytes) -> Re
         raise BadCommand(MALFORMED, f"{action} takes no direction")
     if direction not in (msgspec.UNSET, -1, 0, 1):
         raise BadCommand(Code.OUT_OF_RANGE, "direction takes 1 (forward), -1 (reverse) or 0")
-    return Request(
-        identity,
-        target,
-        action,
-        ttl_ms=0 if ttl_ms is msgspec.UNSET else ttl_ms,
-        direction=0 if direction is msgspec.UNSET else direction,
-    )
+    options_given = {"ttl_ms": ttl_ms, "direction": direction}
+    given = {name: value for name, value in options_given.items() if value is not msgspec.UNSET}
+    return Request(identity, target, command_of(action, **given))

@@ -4,7 +4,20 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Rejection, Request, Source
+from bridge.command import (
+    Action,
+    Code,
+    Event,
+    Identity,
+    Kind,
+    Outcome,
+    Rejection,
+    Request,
+    Source,
+    Start,
+    Write,
+    command_of,
+)
 from bridge.command.audit import SUMMARY_S, Entry
 from bridge.command.link import NodeState
 from bridge.image import Value
@@ -39,12 +52,12 @@ class Hall:
 
     def ask(self, action: Action, identity: Identity = PLC, target: str = FU1, **more: int) -> Outcome:
         outcomes: list[Outcome] = []
-        self.plant.submit(Request(identity, target, action, **more), self.now, outcomes.append)
+        self.plant.submit(Request(identity, target, command_of(action, **more)), self.now, outcomes.append)
         (outcome,) = outcomes
         return outcome
 
     def write(self, identity: Identity = PLC, **values: Value) -> None:
-        request = Request(identity, FU1, Action.WRITE, values)
+        request = Request(identity, FU1, Write(values))
         self.plant.submit(request, self.now, lambda outcome: None)
 
     def cycle(self, seconds: float, period_s: float = 0.01, **values: Value) -> None:
@@ -122,7 +135,7 @@ def test_another_time_out_is_told(hall: Hall) -> None:
 
 
 def test_a_start_is_told_when_it_has_ended(hall: Hall) -> None:
-    request = Request(PLC, FU1, Action.START, direction=1)
+    request = Request(PLC, FU1, Start(direction=1))
     hall.plant.submit(request, hall.now, lambda outcome: None)
     assert not hall.entries
     assert hall.ask(Action.DISABLE_VOLTAGE).ok

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.command import Action, Code, Identity, Rejection, Request, Source
+from bridge.command import Action, Code, Do, Identity, Rejection, Request, Source, Write
 from bridge.command.audit import AT_ONCE, DONE_EVERY_S, REFUSED_EVERY_S, SUMMARY_S, Entry, client_of
 from bridge.command.link import NodeState
 from bridge.image import Value
@@ -44,7 +44,7 @@ class Hall:
         self.plant.audit.on_time(self.now)
 
     def write(self, word: int, who: Identity = PLC) -> None:
-        request = Request(who, FU1, Action.WRITE, {"control_word": word})
+        request = Request(who, FU1, Write({"control_word": word}))
         self.plant.submit(request, self.now, lambda outcome: None)
 
     def refused(self, who: Identity) -> list[Entry]:
@@ -73,7 +73,7 @@ def made_up_registers(hall: Hall, number: int) -> None:
 
 
 def made_up_targets(hall: Hall, number: int) -> None:
-    request = Request(stranger(number), f"attic/fu{number}", Action.STOP)
+    request = Request(stranger(number), f"attic/fu{number}", Do(Action.STOP))
     hall.plant.submit(request, hall.now, lambda outcome: None)
 
 
@@ -104,7 +104,7 @@ def test_who_makes_things_up_has_one_budget(refuse: Callable[[Hall, int], None])
 
 def write_and_release(hall: Hall, number: int) -> None:
     hall.write(SHUT_DOWN, stranger(number))
-    request = Request(stranger(number), FU1, Action.RELEASE_CONTROL)
+    request = Request(stranger(number), FU1, Do(Action.RELEASE_CONTROL))
     hall.plant.submit(request, hall.now, lambda outcome: None)
 
 
@@ -112,8 +112,8 @@ def write_on_and_release(hall: Hall, number: int) -> None:
     """The last setpoint waits to be told, the one before it is counted."""
     for setpoint in (1, 2, 3):
         values: dict[str, Value] = {"control_word": SHUT_DOWN, "setpoint_1": setpoint}
-        hall.plant.submit(Request(stranger(1), FU1, Action.WRITE, values), hall.now, lambda outcome: None)
-    hall.plant.submit(Request(stranger(1), FU1, Action.RELEASE_CONTROL), hall.now, lambda outcome: None)
+        hall.plant.submit(Request(stranger(1), FU1, Write(values)), hall.now, lambda outcome: None)
+    hall.plant.submit(Request(stranger(1), FU1, Do(Action.RELEASE_CONTROL)), hall.now, lambda outcome: None)
 
 
 def take_turns(hall: Hall, number: int) -> None:
@@ -122,10 +122,8 @@ def take_turns(hall: Hall, number: int) -> None:
 
 def new_names(hall: Hall, number: int) -> None:
     who = Identity(Source.ZENOH, f"c{number}")
-    hall.plant.submit(
-        Request(who, FU1, Action.WRITE, {"control_word": SHUT_DOWN}), hall.now, lambda outcome: None
-    )
-    hall.plant.submit(Request(who, FU1, Action.RELEASE_CONTROL), hall.now, lambda outcome: None)
+    hall.plant.submit(Request(who, FU1, Write({"control_word": SHUT_DOWN})), hall.now, lambda outcome: None)
+    hall.plant.submit(Request(who, FU1, Do(Action.RELEASE_CONTROL)), hall.now, lambda outcome: None)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command import Action, Code, Outcome, Request
+from bridge.command import Action, Code, Outcome, Request, command_of
 from bridge.command.actual import FurtherTpdo
 from bridge.command.link import NodeState
 from bridge.image import Value
@@ -47,7 +47,8 @@ class Axis:
 
     def submit(self, action: Action, **values: Value) -> Outcome:
         outcomes: list[Outcome] = []
-        self.plant.submit(Request(PLC, "axis/drive", action, values), self.now, outcomes.append)
+        command = command_of(action, **({"values": values} if values else {}))
+        self.plant.submit(Request(PLC, "axis/drive", command), self.now, outcomes.append)
         return outcomes[0] if outcomes else Outcome(Code.OK, "not told yet")
 
     def write(self, word: int) -> Outcome:

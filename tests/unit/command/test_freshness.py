@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.command import Action, Code, Identity, Request, Source
+from bridge.command import Action, Code, Do, Identity, Request, Source, TakeControl, command_of
 from bridge.command.freshness import BOUND_MS, GRAIN_MS, NEVER, Inflow, Look, is_stale
 from tests.support.rig import ACKNOWLEDGE, ENABLE, HALF_SPEED, OTHER_PLC, PLC, SHUT_DOWN, Rig
 
@@ -72,7 +72,7 @@ class Server:
             self.waiting += [(sent, received_at) for sent in some]
         for _ in range(min(TURN, len(self.waiting))):
             sent, received_at = self.waiting.popleft()
-            request = Request(PLC, "", Action.KEEP_ALIVE, received_at=received_at)
+            request = Request(PLC, "", Do(Action.KEEP_ALIVE), received_at=received_at)
             if is_stale(request, now, 0):
                 self.refused += 1
             else:
@@ -189,7 +189,8 @@ def test_who_asks_for_the_first_time_after_a_hang_may_have_asked_before_it():
 
 def ask(rig: Rig, action: Action, age_s: float, identity: Identity = PLC, **values: int) -> Code:
     codes: list[Code] = []
-    request = Request(identity, "conveyor/fu1", action, dict(values), received_at=rig.now - age_s)
+    command = command_of(action, **({"values": values} if values else {}))
+    request = Request(identity, "conveyor/fu1", command, received_at=rig.now - age_s)
     rig.channel.handle(request, rig.now, lambda outcome: codes.append(outcome.code))
     return codes[0]
 
@@ -201,7 +202,7 @@ def test_what_is_older_than_the_bound_is_refused_and_restarts_nothing(source: So
     rig = Rig(fieldbus_timeout_ms=2000, control=control)
     bound_s = BOUND_MS / 1000
     if control == "lease":
-        request = Request(who, "conveyor/fu1", Action.TAKE_CONTROL, ttl_ms=60_000)
+        request = Request(who, "conveyor/fu1", TakeControl(ttl_ms=60_000))
         rig.channel.handle(request, rig.now, lambda _: None)
     assert ask(rig, Action.KEEP_ALIVE, bound_s - 0.001, who) is Code.OK
     left = rig.channel.watchdog.left_ms(rig.now)

@@ -4,7 +4,20 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command import Action, Code, Drive, Event, Identification, Kind, Outcome, Request
+from bridge.command import (
+    Action,
+    Code,
+    Do,
+    Drive,
+    Event,
+    Identification,
+    Kind,
+    Outcome,
+    Request,
+    Start,
+    Write,
+    command_of,
+)
 from bridge.command.link import NodeState
 from bridge.command.worst_case import Wire
 from bridge.image import Quality, Reading, Value
@@ -53,7 +66,7 @@ class Hall:
 
     def submit(self, action: Action, target: str = "conveyor/fu1", identity=PLC, **more) -> Outcome:
         outcomes: list[Outcome] = []
-        self.plant.submit(Request(identity, target, action, **more), self.now, outcomes.append)
+        self.plant.submit(Request(identity, target, command_of(action, **more)), self.now, outcomes.append)
         (outcome,) = outcomes
         return outcome
 
@@ -327,7 +340,7 @@ class TestRequests:
         def on_outcome(outcome: Outcome) -> None:
             seen.append(running.value("command/frequency"))
 
-        request = Request(PLC, "conveyor/fu1", Action.WRITE, {"frequency": 5.0})
+        request = Request(PLC, "conveyor/fu1", Write({"frequency": 5.0}))
         running.plant.submit(request, running.now, on_outcome)
         assert seen == [pytest.approx(5.0, abs=0.01)]
 
@@ -337,7 +350,7 @@ class TestRequests:
         def on_outcome(outcome: Outcome) -> None:
             raise ConnectionResetError
 
-        request = Request(OPERATOR, "conveyor/fu1", Action.STOP)
+        request = Request(OPERATOR, "conveyor/fu1", Do(Action.STOP))
         with pytest.raises(ConnectionResetError):
             running.plant.submit(request, running.now, on_outcome)
         assert running.flushed == [(SHUT_DOWN, 0, 0, 0, 0)]
@@ -362,7 +375,7 @@ class TestRequests:
         hall.plant.on_node(hall.node, NodeState.OPERATIONAL, hall.now)
         hall.pdo(INHIBITED)
         seen: list[Value] = []
-        request = Request(PLC, "conveyor/fu1", Action.START)
+        request = Request(PLC, "conveyor/fu1", Start())
         hall.plant.submit(request, hall.now, lambda outcome: seen.append(hall.value("status/state")))
         hall.pdo(READY)
         hall.pdo(ENABLED)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command import Action, Code, Outcome, Request
+from bridge.command import Action, Code, Outcome, Request, Start
 from bridge.command.link import NodeState
 from bridge.drive import DriveState
 from tests.support.rig import (
@@ -370,7 +370,7 @@ def test_who_asks_on_on_the_outcome_finds_everything_settled(rig: Rig):
     def on_outcome(outcome: Outcome) -> None:
         seen.append((rig.sent, len(rig.submit(Action.KEEP_ALIVE))))
 
-    rig.channel.handle(Request(PLC, "conveyor/fu1", Action.START), rig.now, on_outcome)
+    rig.channel.handle(Request(PLC, "conveyor/fu1", Start()), rig.now, on_outcome)
     rig.drive_says(READY)
     rig.ask(Action.DISABLE_VOLTAGE, OPERATOR)
     assert seen == [(0x0474, 1)]

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Outcome, Request
+from bridge.command import Action, Outcome, Request, Write
 from bridge.command.link import NodeState
 from bridge.config import load_site
 from tests.support import sites
@@ -43,7 +43,7 @@ def test_a_changed_word_is_in_it_at_once(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path))
     bench.run(3.0)
     before = bench.network.beats()[RPDO1 + 5]
-    request = Request(PLC, "conveyor/fu1", Action.WRITE, {"control_word": 0x047E})
+    request = Request(PLC, "conveyor/fu1", Write({"control_word": 0x047E}))
     outcomes: list[Outcome] = []
     bench.plant.submit(request, bench.now, outcomes.append)
     assert outcomes[0].forwarded

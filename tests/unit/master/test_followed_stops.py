@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command import Action, Outcome, Request
+from bridge.command import Action, Outcome, Request, Start
 from bridge.command.follow import LastStop
 from bridge.config import load_site
 from bridge.drive import ControlWords, DriveState
@@ -48,7 +48,7 @@ def test_every_family_follows_every_stop(tmp_path: Path, mapping: str) -> None:
     (drive,) = bench.plant.drives.values()
     for stop in STOPS:
         outcomes: list[Outcome] = []
-        request = Request(PLC, drive.name, Action.START, direction=0)
+        request = Request(PLC, drive.name, Start(direction=0))
         bench.plant.submit(request, bench.now, outcomes.append)
         bench.run(3.1 if mapping.startswith("lenze/") else 0.7)
         assert [outcome.ok for outcome in outcomes] == [True], (stop, outcomes)

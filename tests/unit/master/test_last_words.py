@@ -10,7 +10,7 @@ from typing import Final
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Event, Identity, Outcome, Request, Role, Source
+from bridge.command import Action, Event, Identity, Outcome, Request, Role, Source, Start
 from bridge.command.follow import LastStop
 from bridge.config import load_site
 from bridge.mapping import load_family
@@ -106,7 +106,7 @@ def moving(folder: Path, mapping: str, kind: int, *, node: str = "", bus: str = 
     bench.run(2.5)
     (name, *_) = bench.plant.drives
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, name, Action.START, direction=0), bench.now, outcomes.append)
+    bench.plant.submit(Request(PLC, name, Start(direction=0)), bench.now, outcomes.append)
     bench.run(3.1)
     assert [outcome.ok for outcome in outcomes] == [True], outcomes
     bench.write(name, setpoint_1=400 if mapping.startswith("cia402/") else 0x1000)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Code, Event, Identity, Outcome, Request, Role, Source
+from bridge.command import Code, Event, Identity, Outcome, Request, Role, Source, WriteParameter
 from bridge.command.worst_case import stop_time
 from bridge.config import load_site
 from bridge.drive import DriveState
@@ -67,7 +67,7 @@ class Silent(Bench):
 
     def set(self, parameter: str, value: float, identity: Identity = ENGINEER) -> Outcome:
         outcomes: list[Outcome] = []
-        request = Request(identity, self.name, Action.WRITE_PARAMETER, parameter=parameter, value=value)
+        request = Request(identity, self.name, WriteParameter(parameter=parameter, value=value))
         self.plant.submit(request, self.now, outcomes.append)
         self.run(0.5)
         (outcome,) = outcomes

@@ -11,8 +11,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Rejection, Request, Role, Source
+from bridge.command import (
+    Action,
+    Code,
+    Do,
+    Event,
+    Identity,
+    Kind,
+    Outcome,
+    ReadParameter,
+    Rejection,
+    Request,
+    Role,
+    SetTimeout,
+    Source,
+    Start,
+    TakeControl,
+    Write,
+    WriteParameter,
+)
 from bridge.command.points import CONNECTION_COUNTS
+from bridge.command.request import COMMANDS
 from bridge.errors import Unavailable
 from bridge.image import DataType, Point, Quality
 from bridge.mirror import protocol, socket_endpoint
@@ -26,16 +45,17 @@ changes = st.builds(Changed, st.integers(0, 9), values, st.sampled_from(Quality)
 identities = st.builds(
     Identity, st.sampled_from(Source), st.text(max_size=10), st.sampled_from(Role), st.text()
 )
-requests = st.builds(
-    Request,
-    identities,
-    st.text(max_size=20),
-    st.sampled_from(Action),
-    st.dictionaries(st.text(max_size=10), values, max_size=4),
-    st.integers(0, 10**6),
-    st.sampled_from((-1, 0, 1)),
-    st.integers(0, 32767),
+commands = st.one_of(
+    st.builds(Write, st.dictionaries(st.text(max_size=10), values, max_size=4)),
+    st.builds(Start, st.sampled_from((-1, 0, 1))),
+    st.builds(TakeControl, st.integers(0, 10**6)),
+    st.builds(SetTimeout, st.integers(0, 32767)),
+    st.builds(ReadParameter, st.text(max_size=10), st.integers(0, 32767)),
+    st.builds(WriteParameter, st.text(max_size=10), values),
+    st.builds(Do, st.sampled_from([action for action in Action if action not in COMMANDS])),
 )
+came = st.none() | st.floats(allow_nan=False)
+requests = st.builds(Request, identities, st.text(max_size=20), commands, came, st.none() | st.booleans())
 
 
 @given(st.lists(changes, max_size=20))
@@ -95,9 +115,16 @@ def test_whatever_happens_can_be_told(source: str, message: str, value: str | in
 def test_a_request_is_passed_on_as_it_is_or_not_at_all(
     who: Identity, target: str, values: dict[str, str | int | float]
 ) -> None:
-    asked = Asked(1.0, Request(who, target, Action.WRITE, values))
+    asked = Asked(1.0, Request(who, target, Write(values)))
     with contextlib.suppress(Malformed):
         assert repr(protocol.decode_request(protocol.encode_request(asked))) == repr(asked)
+
+
+def test_a_command_with_other_fields_is_malformed() -> None:
+    asked = Asked(1.0, Request(Identity(Source.MODBUS, "plc"), "conveyor/fu1", SetTimeout(200)))
+    told = protocol.encode_request(asked).replace(b"timeout_ms", b"another_ms")
+    with pytest.raises(Malformed):
+        protocol.decode_request(told)
 
 
 def test_a_snapshot_brings_the_nature_of_every_point() -> None:

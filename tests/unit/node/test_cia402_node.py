@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Code, Outcome, Request
+from bridge.command import Action, Code, Outcome, Request, Start
 from bridge.config import load_site
 from bridge.drive import DriveState
 from bridge.image import Quality
@@ -76,7 +76,7 @@ def word(frame: Frame) -> int:
 
 def start(bench: Bench) -> None:
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, DRIVE, Action.START), bench.now, outcomes.append)
+    bench.plant.submit(Request(PLC, DRIVE, Start()), bench.now, outcomes.append)
     bench.run(0.2)
     assert [outcome.code for outcome in outcomes] == [Code.OK]
     assert state(bench) is DriveState.OPERATION_ENABLED
@@ -438,7 +438,7 @@ def test_a_start_after_a_quick_stop_enables_again(booted, option: int) -> None:
     bench.ask(Action.QUICK_STOP, DRIVE)
     keep_alive(bench, 2.0)
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, DRIVE, Action.START), bench.now, outcomes.append)
+    bench.plant.submit(Request(PLC, DRIVE, Start()), bench.now, outcomes.append)
     keep_alive(bench, 2.0)
     assert [outcome.code for outcome in outcomes] == [Code.OK]
     assert state(bench) is DriveState.OPERATION_ENABLED

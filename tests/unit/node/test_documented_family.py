@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command import Action, Code, Outcome, Request
+from bridge.command import Action, Code, Outcome, Request, command_of
 from bridge.drive import DriveState
 from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
@@ -72,7 +72,7 @@ def bench(tmp_path: Path, spin: Spin) -> Bench:
 def ask(bench: Bench, action: Action) -> Code:
     """The code of the outcome, and a moment for the drive to do it."""
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, DRIVE, action), bench.now, outcomes.append)
+    bench.plant.submit(Request(PLC, DRIVE, command_of(action)), bench.now, outcomes.append)
     bench.run(0.2)
     (outcome,) = outcomes
     return outcome.code

@@ -10,7 +10,7 @@ from typing import Any, Final
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Outcome, Request
+from bridge.command import Outcome, Request, Start
 from bridge.command.link import NodeState
 from bridge.config import load_site
 from bridge.mapping import load_family
@@ -99,7 +99,7 @@ def start(bench: Bench) -> None:
     bench.run(2.5)
     outcomes: list[Outcome] = []
     (name, *_) = bench.plant.drives
-    bench.plant.submit(Request(PLC, name, Action.START), bench.now, outcomes.append)
+    bench.plant.submit(Request(PLC, name, Start()), bench.now, outcomes.append)
     bench.run(1.0)
     assert [outcome.ok for outcome in outcomes] == [True], outcomes
     assert is_running(bench.node)

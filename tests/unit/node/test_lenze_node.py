@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command import Action, Code, Outcome, Request
+from bridge.command import Code, Outcome, Request, Start
 from bridge.config import load_site
 from bridge.drive import DriveState
 from bridge.image import Quality
@@ -104,7 +104,7 @@ def test_it_follows_the_setpoint_and_stops(booted) -> None:
 def test_start_leads_to_operation_enabled(booted) -> None:
     bench = booted()
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, DRIVE, Action.START), bench.now, outcomes.append)
+    bench.plant.submit(Request(PLC, DRIVE, Start()), bench.now, outcomes.append)
     bench.run(0.2)
     assert [outcome.code for outcome in outcomes] == [Code.OK]
     assert bench.node.drive.state is DeviceState.OPERATION_ENABLED

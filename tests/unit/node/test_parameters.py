@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Code, Identity, Kind, Outcome, Request, Role, Source
+from bridge.command import Action, Code, Identity, Kind, Outcome, Request, Role, Source, command_of
 from bridge.drive import DriveState, OwnJudgement
 from bridge.image import Quality
 from bridge.parameter.ledger import MOST_WRITES, Saved
@@ -37,7 +37,9 @@ class Parameters:
     def begin(self, action: Action, identity: Identity = ENGINEER, **more: Any) -> list[Outcome]:
         outcomes: list[Outcome] = []
         target = more.pop("target", "conveyor/fu1")
-        self.bench.plant.submit(Request(identity, target, action, **more), self.bench.now, outcomes.append)
+        self.bench.plant.submit(
+            Request(identity, target, command_of(action, **more)), self.bench.now, outcomes.append
+        )
         return outcomes
 
     def ask(self, action: Action, identity: Identity = ENGINEER, **more: Any) -> Outcome:

@@ -7,7 +7,22 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command import Action, Code, Identity, Kind, Outcome, Rejection, Request, Role, Source
+from bridge.command import (
+    Action,
+    Code,
+    Do,
+    Identity,
+    Kind,
+    Outcome,
+    ReadParameter,
+    Rejection,
+    Request,
+    Role,
+    SetTimeout,
+    Source,
+    Write,
+    WriteParameter,
+)
 from tests.support.bench import PLC, Bench, write_site
 
 FU1 = "conveyor/fu1"
@@ -25,19 +40,19 @@ def bench(tmp_path: Path) -> Bench:
 
 
 def parameter(name: str, who: Identity = SETTER, value: float = 1.0, drive: str = FU1) -> Request:
-    return Request(who, drive, Action.WRITE_PARAMETER, parameter=name, value=value)
+    return Request(who, drive, WriteParameter(parameter=name, value=value))
 
 
 REFUSED = {
-    "another controller": Request(OTHER, FU1, Action.WRITE, {"control_word": 0x047E}),
-    "a value that does not fit": Request(PLC, FU1, Action.WRITE, {"control_word": 70_000}),
-    "a point that is not there": Request(PLC, FU1, Action.WRITE, {"no_such": 1}),
-    "an observer": Request(GUEST, FU1, Action.STOP),
-    "a time-out": Request(PLC, FU1, Action.SET_TIMEOUT, timeout_ms=100),
-    "no drive": Request(PLC, "attic/fu9", Action.STOP),
-    "no node": Request(PLC, "attic", Action.RESET),
-    "no right on the node": Request(GUEST, "conveyor", Action.RESET),
-    "no right on the bus": Request(GUEST, "bus/can0", Action.STOP_NODE),
+    "another controller": Request(OTHER, FU1, Write({"control_word": 0x047E})),
+    "a value that does not fit": Request(PLC, FU1, Write({"control_word": 70_000})),
+    "a point that is not there": Request(PLC, FU1, Write({"no_such": 1})),
+    "an observer": Request(GUEST, FU1, Do(Action.STOP)),
+    "a time-out": Request(PLC, FU1, SetTimeout(timeout_ms=100)),
+    "no drive": Request(PLC, "attic/fu9", Do(Action.STOP)),
+    "no node": Request(PLC, "attic", Do(Action.RESET)),
+    "no right on the node": Request(GUEST, "conveyor", Do(Action.RESET)),
+    "no right on the bus": Request(GUEST, "bus/can0", Do(Action.STOP_NODE)),
     "no right to set parameters": parameter("P102", PLC),
     "another's parameters": parameter("P102", OTHER),
     "a protected parameter": parameter("P509"),
@@ -48,7 +63,7 @@ REFUSED = {
     "a drive that no channel reaches": parameter(
         "P102", replace(SETTER, source=Source.ZENOH), drive="conveyor/fu2"
     ),
-    "saving": Request(PLC, FU1, Action.SAVE_PARAMETERS),
+    "saving": Request(PLC, FU1, Do(Action.SAVE_PARAMETERS)),
 }
 
 
@@ -78,7 +93,7 @@ def test_so_does_what_a_protocol_refuses_by_itself(bench: Bench) -> None:
 def test_reading_counts_for_nothing(bench: Bench) -> None:
     before = bench.number("bridge/refused_writes")
     for drive, name in ((FU1, "P9999"), ("attic/fu9", "P102"), ("conveyor/fu2", "P102")):
-        request = Request(PLC, drive, Action.READ_PARAMETER, parameter=name)
+        request = Request(PLC, drive, ReadParameter(parameter=name))
         bench.plant.submit(request, bench.now, lambda outcome: None)
     bench.run(1.0)
     assert bench.number("bridge/refused_writes") == before

@@ -10,7 +10,7 @@ from bridge.canopen import abort
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand
 from bridge.canopen.sdo import Result, SdoError
-from bridge.command import Action, Identity, Request, Source
+from bridge.command import Identity, ReadParameter, Request, Source
 from bridge.errors import FileFaults
 from bridge.mapping import Family, load_family
 from bridge.mapping.model import SdoServer
@@ -73,9 +73,7 @@ def test_a_drive_that_is_away_leaves_the_others_in_service(tmp_path: Path) -> No
     drives = bench.plant.drives
     codes = [drive.sdo_abort_code for drive in drives.values()]
     assert codes == [0, 0], "what the bridge itself was refused is nothing that a client asked for"
-    reader = Request(
-        Identity(Source.MODBUS, "10.0.0.1"), "conveyor/fu2", Action.READ_PARAMETER, parameter="P102"
-    )
+    reader = Request(Identity(Source.MODBUS, "10.0.0.1"), "conveyor/fu2", ReadParameter("P102"))
     bench.plant.submit(reader, bench.now, lambda outcome: None)
     bench.run(1.0)
     assert [drive.sdo_abort_code for drive in drives.values()] == [0, 0x0606_0000]

@@ -12,7 +12,20 @@ from typing import Final
 
 import pytest
 
-from bridge.command import Action, Code, Identity, Outcome, Plant, Request, Role, Source
+from bridge.command import (
+    Action,
+    Code,
+    Identity,
+    Outcome,
+    Plant,
+    Request,
+    Role,
+    SetTimeout,
+    Source,
+    TakeControl,
+    Write,
+    WriteParameter,
+)
 from bridge.command.rights import rights_of
 from bridge.config import load_site
 from bridge.image import Point
@@ -141,7 +154,7 @@ class Asker:
         self._who = Identity(source, "somebody", role, sets_parameters=sets)
         if source is not Source.MODBUS:
             for drive in bench.plant.drives:
-                self.ask(Request(self._who, drive, Action.TAKE_CONTROL, ttl_ms=600_000))
+                self.ask(Request(self._who, drive, TakeControl(ttl_ms=600_000)))
 
     def ask(self, request: Request) -> Outcome:
         outcomes: list[Outcome] = []
@@ -155,11 +168,11 @@ class Asker:
         drive, _, group = owner.rpartition("/")
         value = self._bench.plant.image.read(point.name).value
         if group == "parameter":
-            request = Request(self._who, drive, Action.WRITE_PARAMETER, parameter=leaf, value=value)
+            request = Request(self._who, drive, WriteParameter(parameter=leaf, value=value))
         elif group == "supervision":
-            request = Request(self._who, drive, Action.SET_TIMEOUT, timeout_ms=int(value))
+            request = Request(self._who, drive, SetTimeout(timeout_ms=int(value)))
         else:
-            request = Request(self._who, drive, Action.WRITE, {leaf: value})
+            request = Request(self._who, drive, Write({leaf: value}))
         return self.ask(request)
 
 

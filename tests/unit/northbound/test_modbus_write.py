@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.command import Code, Event, Identity, Kind, Outcome, Plant, Reply, Request
+from bridge.command import Code, Event, Identity, Kind, Outcome, Plant, Reply, Request, Write
 from tests.support.modbus_site import (
     ENABLED,
     OTHER_PLC,
@@ -60,8 +60,8 @@ def test_the_example_of_bu_2500_6_8(rig: Rig):
 def test_a_block_is_one_telegram(rig: Rig):
     seen = requests_of(rig)
     assert rig.write(0, 0x047E, 1, 2, 3) == OK
-    assert [(r.action, dict(r.values)) for r in seen] == [
-        ("write", {"control_word": 0x047E, "setpoint_1": 1, "setpoint_2": 2, "setpoint_3": 3})
+    assert [r.command for r in seen] == [
+        Write({"control_word": 0x047E, "setpoint_1": 1, "setpoint_2": 2, "setpoint_3": 3})
     ]
 
 

@@ -11,7 +11,7 @@ from asyncua import ua
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.command import Action, Code, Identity, Outcome, Plant, Request, Source
+from bridge.command import Code, Identity, Outcome, Plant, Request, Source, Write
 from bridge.command.link import NodeState
 from bridge.image import Value
 from bridge.northbound.modbus.dispatch import Dispatcher
@@ -74,7 +74,7 @@ def is_word(value: object) -> bool:
 
 def write(plant: Plant, drive: str, who: Identity, leaf: str, value: Value) -> Outcome:
     outcomes: list[Outcome] = []
-    plant.submit(Request(who, drive, Action.WRITE, {leaf: value}), 1.0, outcomes.append)
+    plant.submit(Request(who, drive, Write({leaf: value})), 1.0, outcomes.append)
     return outcomes[0]
 
 

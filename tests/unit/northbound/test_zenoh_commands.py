@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.command import Action, Code, Identity, Request, Source
+from bridge.command import Action, Code, Do, Identity, Request, SetTimeout, Source, Start, TakeControl, Write
 from bridge.northbound.zenoh.commands import MALFORMED, BadCommand, Commands, identity_of
 from tests.support import sites
 from tests.support.zenoh_site import make_plant
@@ -34,20 +34,18 @@ def refusal(tail: str, payload: str | bytes = b"") -> BadCommand:
 @pytest.mark.parametrize("payload", ['{"v": 1151}', "1151", " 1151\n", "0x047F", "0x47f", "1151.0"])
 def test_a_point_of_the_command_group_is_written(payload: str) -> None:
     made = request("conveyor/fu3/command/control_word", payload)
-    assert made == Request(PLC, "conveyor/fu3", Action.WRITE, {"control_word": 0x047F})
+    assert made == Request(PLC, "conveyor/fu3", Write({"control_word": 0x047F}))
 
 
 def test_an_object_is_one_telegram() -> None:
     made = request("conveyor/fu3/command", '{"control_word": 1151, "setpoint_1": 8192}')
-    assert made.values == {"control_word": 0x047F, "setpoint_1": 0x2000}
+    assert made.command == Write({"control_word": 0x047F, "setpoint_1": 0x2000})
 
 
 def test_the_owners_time_out_is_set_where_the_site_file_allows_it() -> None:
     key = "conveyor/fu3/supervision/fieldbus_timeout_ms"
     writable = Commands(sites.plant_of(sites.site(sites.bus(sites.node(_WRITABLE)))).image.points)
-    assert writable.request(key, b"300", PLC) == Request(
-        PLC, "conveyor/fu3", Action.SET_TIMEOUT, timeout_ms=300
-    )
+    assert writable.request(key, b"300", PLC) == Request(PLC, "conveyor/fu3", SetTimeout(300))
     for payload in (b"1.5", b"true", b'"300"', b"1e999", b"", b"{}"):
         with pytest.raises(BadCommand):
             writable.request(key, payload, PLC)
@@ -58,13 +56,15 @@ def test_the_owners_time_out_is_set_where_the_site_file_allows_it() -> None:
 
 def test_every_method_has_its_key() -> None:
     for action in ("stop", "quick_stop", "disable_voltage", "release_control"):
-        assert request(f"conveyor/fu3/command/{action}") == Request(PLC, "conveyor/fu3", Action(action))
+        assert request(f"conveyor/fu3/command/{action}") == Request(PLC, "conveyor/fu3", Do(Action(action)))
     for action in ("stop", "quick_stop", "disable_voltage", "reset_fault", "release_control", "keep_alive"):
-        assert request(f"conveyor/fu3/command/{action}", "{}") == Request(PLC, "conveyor/fu3", Action(action))
-    assert request("conveyor/fu3/command/start", '{"direction": -1}').direction == -1
-    assert request("conveyor/fu3/command/take_control", '{"ttl_ms": 500}').ttl_ms == 500
+        assert request(f"conveyor/fu3/command/{action}", "{}") == Request(
+            PLC, "conveyor/fu3", Do(Action(action))
+        )
+    assert request("conveyor/fu3/command/start", '{"direction": -1}').command == Start(-1)
+    assert request("conveyor/fu3/command/take_control", '{"ttl_ms": 500}').command == TakeControl(500)
     for action in ("reset", "reset_communication", "enable", "disable"):
-        assert request(f"conveyor/node/{action}", "{}") == Request(PLC, "conveyor", Action(action))
+        assert request(f"conveyor/node/{action}", "{}") == Request(PLC, "conveyor", Do(Action(action)))
 
 
 @pytest.mark.parametrize("payload", ["", " \n"])

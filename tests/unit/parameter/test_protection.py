@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Code, Identity, Outcome, Request, Role, Source
+from bridge.command import Action, Code, Identity, Outcome, Request, Role, Source, Start, WriteParameter
 from bridge.config import load_site
 from bridge.drive import DriveState
 from bridge.mapping import load_family
@@ -261,7 +261,7 @@ def running(folder: Path, mapping: str) -> tuple[Bench, str]:
     bench.run(2.5)
     (name,) = bench.plant.drives
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, name, Action.START), bench.now, outcomes.append)
+    bench.plant.submit(Request(PLC, name, Start()), bench.now, outcomes.append)
     bench.run(1.0)
     assert bench.value(f"{name}/status/state") == DriveState.OPERATION_ENABLED
     return bench, name
@@ -278,7 +278,7 @@ def test_a_drive_is_not_made_deaf_by_another_name(tmp_path: Path, mapping: str, 
     bench, name = running(tmp_path, mapping)
     for parameter, value, *_ in DEAF[mapping]:
         outcomes: list[Outcome] = []
-        request = Request(who, name, Action.WRITE_PARAMETER, parameter=parameter, value=value)
+        request = Request(who, name, WriteParameter(parameter=parameter, value=value))
         bench.plant.submit(request, bench.now, outcomes.append)
         bench.run(0.5)
         (outcome,) = outcomes

@@ -8,7 +8,7 @@ import time
 import pytest
 from asyncua import Client, ua
 
-from bridge.command import Action
+from bridge.command import Action, TakeControl
 from tests.support.opcua_client import call, node
 from tests.support.opcua_site import LocalView, namespace
 
@@ -43,7 +43,7 @@ class TestMethods:
     async def test_a_lease_is_taken_for_a_time(self, client: Client, view: LocalView) -> None:
         drive, space = await node(client, "conveyor/fu3"), await namespace(client)
         await drive.call_method(f"{space}:TakeControl", ua.Variant(500, ua.VariantType.UInt32))
-        assert view.requests[-1].ttl_ms == 500
+        assert view.requests[-1].command == TakeControl(500)
         assert await (await node(client, "conveyor/fu3/supervision/owner")).read_value() == "opcua:anonymous"
         with pytest.raises(ua.uaerrors.BadOutOfRange):
             await drive.call_method(f"{space}:TakeControl", ua.Variant(1, ua.VariantType.UInt32))

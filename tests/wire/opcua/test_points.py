@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from asyncua import Client, ua
 
-from bridge.command import Action
+from bridge.command import Write
 from bridge.errors import Unavailable
 from bridge.image import Quality
 from bridge.northbound.opcua.server import OpcUaServer
@@ -127,8 +127,8 @@ class TestWrites:
     ) -> None:
         assert await write(client, control_word=word(0x047E), setpoint_1=word(0x2000)) == [0, 0]
         (request,) = view.requests
-        assert (request.target, request.action) == ("conveyor/fu1", Action.WRITE)
-        assert dict(request.values) == {"control_word": 0x047E, "setpoint_1": 0x2000}
+        assert request.target == "conveyor/fu1"
+        assert request.command == Write({"control_word": 0x047E, "setpoint_1": 0x2000})
         assert str(request.identity) == "opcua:anonymous"
 
     async def test_writes_to_two_drives_are_two_telegrams(self, client: Client, view: LocalView) -> None:
@@ -143,9 +143,9 @@ class TestWrites:
         where = (await node(client, "conveyor/fu1/command/control_word")).nodeid
         wanted = [write_value(where, word(value)) for value in (0x04FE, 0x047E)]
         assert await write_all(client, wanted) == [0, 0]
-        assert [dict(request.values) for request in view.requests] == [
-            {"control_word": 0x04FE},
-            {"control_word": 0x047E},
+        assert [request.command for request in view.requests] == [
+            Write({"control_word": 0x04FE}),
+            Write({"control_word": 0x047E}),
         ]
 
     async def test_the_manuals_example_moves_the_drive(self, client: Client) -> None:

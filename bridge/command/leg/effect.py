@@ -1,0 +1,57 @@
+"""What a step of the leg brings about beside the words that are sent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bridge.command.event import Kind
+from bridge.command.request import Identity, Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The outcome of the request that was the event."""
+
+    outcome: Outcome
+    is_refused: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class StartBegun:
+    """The request was a start: its outcome comes with ``StartEnded``."""
+
+
+@dataclass(frozen=True, slots=True)
+class StartEnded:
+    outcome: Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A valid telegram of the owner."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tripped:
+    """The watchdog has tripped; it was due at this time. ``who`` was silent for ``timeout_ms``."""
+
+    due: float
+    who: Identity | None
+    timeout_ms: int
+
+
+@dataclass(frozen=True, slots=True)
+class Ignored:
+    """The controller is silent, and the site file has that ignored."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tell:
+    """An event for people."""
+
+    kind: Kind
+    severity: int
+    message: str
+
+
+Effect = Answer | StartBegun | StartEnded | Heard | Tripped | Ignored | Tell

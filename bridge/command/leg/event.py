@@ -1,0 +1,68 @@
+"""What happens to the leg: a request, something that the drive says, something about the way to it, time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bridge.command.leg.state import Way
+from bridge.command.request import Identity, Request
+from bridge.drive import DriveState
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """The drive's status word says this. ``is_taken``: with the bit "set-point acknowledge"; ``fault_text``
+    is needed with a fault only."""
+
+    state: DriveState
+    is_taken: bool = False
+    fault_text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ActualWords:
+    """The drive's actual words, the status word first."""
+
+    words: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Time:
+    """The bus has been drained: let everything happen that is due. ``way`` is how it is then."""
+
+    way: Way | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class NodeBack:
+    """The node is operational anew. It may have been switched off and on: what it was told before does not
+    count."""
+
+
+@dataclass(frozen=True, slots=True)
+class StartAnew:
+    """The bus was gone, or the node was stopped or has restarted: whatever the drive was told does not count
+    any more, not even where communication errors are ignored."""
+
+
+@dataclass(frozen=True, slots=True)
+class BridgeGap:
+    """The bridge itself was not there for longer than the dead-man time."""
+
+
+@dataclass(frozen=True, slots=True)
+class OwnWatch:
+    """Whether the drive stops by itself when it gets no RPDO any more."""
+
+    stops: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """``identity`` has its first connection, or none any more."""
+
+    identity: Identity
+    is_there: bool
+
+
+Event = Request | Time | Report | ActualWords | Way | NodeBack | StartAnew | BridgeGap | OwnWatch | Connection

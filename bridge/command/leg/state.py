@@ -1,0 +1,215 @@
+"""The state of one drive's leg: frozen, hashable, complete. Times are monotonic seconds."""
+
+from __future__ import annotations
+
+from enum import IntEnum, StrEnum
+from typing import Final, NamedTuple
+
+from bridge.command.request import Identity
+from bridge.drive import DriveState
+
+
+class WatchdogState(IntEnum):
+    """The watchdog as others see it, numbered as Modbus serves it (input register 14)."""
+
+    OFF = 0
+    IDLE = 1
+    RUNNING = 2
+    TRIPPED = 3
+
+    @property
+    def label(self) -> str:
+        return self.name.lower()
+
+
+STATES: Final = tuple((state.value, state.label) for state in WatchdogState)
+
+
+class Stage(StrEnum):
+    """Where the way to the drive stands."""
+
+    CLOSED = "closed"
+    INTERLOCKED = "interlocked"
+    READY = "ready"
+    ENABLED = "enabled"
+    SETTLING = "settling"
+    ASKING = "asking"
+    PREPARED = "prepared"
+    BLIND = "blind"
+    BRAKING = "braking"
+    LEAVING = "leaving"
+    LEADING = "leading"
+    RAMPING = "ramping"
+    TRIPPED = "tripped"
+    SILENCED = "silent"
+    HELD = "held"
+    LET_GO = "let go"
+
+    @property
+    def is_tripped(self) -> bool:
+        return self in TRIPPED
+
+
+MEANING: Final[dict[Stage, str]] = {
+    Stage.CLOSED: "the node is not there or not heard, or the drive's position is needed and not known",
+    Stage.INTERLOCKED: "a stop is in force until the owner sends a word that does not enable",
+    Stage.READY: "the owner's word does not enable; one that does goes to the drive",
+    Stage.ENABLED: "the owner's enabling word is on the bus",
+    Stage.SETTLING: "a stop is on its way, and what the drive says may be from before it",
+    Stage.ASKING: "the drive has not reported since its node is operational: a report is waited for",
+    Stage.PREPARED: "it still has not, and gets READY",
+    Stage.BLIND: "nor since, and it gets the enabling word",
+    Stage.BRAKING: "the drive is in its quick stop, which may take a while",
+    Stage.LEAVING: "disable voltage is sent to leave a quick stop that does not end",
+    Stage.LEADING: "each report of the drive is answered with the next word",
+    Stage.RAMPING: "quick stop is sent until the drive is at rest",
+    Stage.TRIPPED: "the reaction is sent",
+    Stage.SILENCED: "nothing is sent",
+    Stage.HELD: "what was sent before goes on being sent",
+    Stage.LET_GO: "what was held has been stopped since",
+}
+WAY: Final = (Stage.CLOSED, Stage.INTERLOCKED, Stage.READY, Stage.ENABLED)
+"""Neither tripped nor in a start."""
+
+STARTING: Final = frozenset(
+    (
+        Stage.SETTLING,
+        Stage.ASKING,
+        Stage.PREPARED,
+        Stage.BLIND,
+        Stage.BRAKING,
+        Stage.LEAVING,
+        Stage.LEADING,
+    )
+)
+UNHEARD: Final = frozenset((Stage.ASKING, Stage.PREPARED, Stage.BLIND))
+AWAITS_REPORT: Final = UNHEARD | {Stage.SETTLING}
+"""What the drive says next counts, also where it says nothing new."""
+REACTING: Final = frozenset((Stage.RAMPING, Stage.TRIPPED, Stage.SILENCED))
+TRIPPED: Final = REACTING | {Stage.HELD, Stage.LET_GO}
+BLOCKED: Final = frozenset((Stage.CLOSED, Stage.INTERLOCKED, Stage.LET_GO))
+"""A word of the owner's that enables is replaced by the stop that is in force."""
+
+
+class Motion(StrEnum):
+    """What the drive's reports say since the last word that enabled it."""
+
+    EXPECTED = "the drive has reported no motion since"
+    SEEN = "the drive has reported motion since"
+    ENDED = "the drive has reported motion and then that it is not enabled"
+    FAULTED = "the drive has reported no motion since, but a fault"
+
+
+RESTS: Final = frozenset((Motion.ENDED, Motion.FAULTED))
+"""The drive stands: a stop that would hold the motor is not needed."""
+MAY_FOLLOW_LATE: Final = frozenset((Motion.EXPECTED, Motion.FAULTED))
+
+
+class Output(NamedTuple):
+    """Words of the RPDO, the control word first; ``silent``: send nothing at all."""
+
+    words: tuple[int, ...]
+    silent: bool = False
+
+
+class Timer(NamedTuple):
+    """The watchdog's: ``timeout_ms`` 0 is off. ``is_silent``: the time-out has passed since the owner's last
+    telegram."""
+
+    timeout_ms: int
+    heard_at: float | None = None
+    deadline: float | None = None
+    is_silent: bool = False
+
+
+class Owner(NamedTuple):
+    """``absent_until``: it has no connection any more; ``stopped_until``: somebody else has stopped its drive
+    and it has sent nothing since. From then on it is gone, where no watchdog says so."""
+
+    identity: Identity | None = None
+    lease_s: float = 0.0
+    lease_until: float | None = None
+    absent_until: float | None = None
+    stopped_until: float | None = None
+
+
+class Edges(NamedTuple):
+    """The acknowledge bit of the owner's last control word, None where it has written none since it owns the
+    drive; and whose last telegram had 1 in the acknowledge register, which outlasts control of the drive."""
+
+    bit: bool | None = None
+    pressed_by: Identity | None = None
+
+
+class Start(NamedTuple):
+    """``word`` is the one that enables. Until ``settles_at`` a report may describe the time before a stop;
+    at ``believed_at`` the last report is accepted although no new one came; at ``leaves_at`` a quick stop is
+    left; at ``until`` the start is given up."""
+
+    word: int
+    until: float
+    settles_at: float | None = None
+    believed_at: float | None = None
+    leaves_at: float | None = None
+    is_late: bool = False
+    """The drive may still follow the last enabling word, after the stop that came since."""
+
+
+class Trip(NamedTuple):
+    """When a quick stop becomes disable voltage at the latest, and when nothing is sent any more."""
+
+    ramps_until: float | None = None
+    silent_from: float | None = None
+
+
+class Order(NamedTuple):
+    """A position to be handed over with a handshake (``bridge.command.leg.order``)."""
+
+    is_waiting: bool = False
+    is_raised: bool = False
+    was_commanded: bool = False
+    taken: tuple[int, ...] | None = None
+    """The words that the drive has, or gets now."""
+    deadline: float | None = None
+    rises_at: float | None = None
+
+
+class Way(NamedTuple):
+    """What is known of the way to the drive. ``is_open``: enabling words may go to it as far as its link is
+    concerned, ``why`` else not. ``why_unplaced``: why the drive's own position is not known, empty where it
+    is. ``is_heard``: it has reported since its node is operational."""
+
+    is_open: bool
+    why: str
+    why_unplaced: str = ""
+    is_heard: bool = False
+
+
+class LegState(NamedTuple):
+    stage: Stage
+    owner: Owner
+    timer: Timer
+    edges: Edges
+    word: int
+    """The owner's control word, as it would like it, or what was led or stopped with since."""
+    is_ours: bool
+    """``word`` is a stop by the bridge, not the owner's."""
+    is_asked: bool
+    """The stop in force is one that somebody has asked for: it stays as it is."""
+    setpoints: tuple[int, ...]
+    rest: tuple[int, ...]
+    """The setpoints of a drive that nobody commands."""
+    sent: Output
+    drive: DriveState
+    is_taken: bool
+    """The drive's status word has the bit "set-point acknowledge"."""
+    motion: Motion
+    start: Start | None
+    trip: Trip
+    order: Order
+    pulse_until: float | None
+    """Until when an acknowledge bit of the bridge's own is sent."""
+    way: Way
+    silence_stops: bool
+    """The drive stops by itself without its RPDOs. Where it does not, or nobody knows, it gets disable
+    voltage in place of silence."""

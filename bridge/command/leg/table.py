@@ -1,0 +1,189 @@
+"""The leg as a table: what each event makes of each stage, and what is done about it.
+
+The code asks this table and nothing else for the next stage; ``docs/explanation/dead-man-chain.md`` has it
+printed. What an event is, and what has to hold for it, is decided where it comes in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from enum import StrEnum
+from typing import Final
+
+from bridge.command.leg.state import AWAITS_REPORT, STARTING, TRIPPED, Stage
+
+_S = Stage
+
+
+class Stimulus(StrEnum):
+    # the owner
+    STOP_WORD = "owner's control word that does not enable"
+    ENABLING_WORD = "owner's control word that enables"
+    SETPOINTS = "owner's telegram without a control word"
+    INVALID = "telegram that is not valid"
+    LATE_STOP = "owner's stop that has waited too long for a telegram"
+    ACKNOWLEDGE = "acknowledge"
+    ACKNOWLEDGE_FAULT = "acknowledge of a fault of the drive"
+    LEFT = "owner releases, loses its lease or is replaced; the bridge hung"
+    # anybody
+    STOP = "stop by a command"
+    # a start
+    START = "start of a drive that stands"
+    START_STOPPING = "start while a stop is on its way"
+    START_UNHEARD = "start of a drive that has not reported yet"
+    START_BRAKING = "start of a drive in its quick stop"
+    # time
+    EXPIRED_DISABLE = "timer expires (on_expiry = disable_voltage, stop)"
+    EXPIRED_QUICK_STOP = "timer expires (on_expiry = quick_stop)"
+    EXPIRED_SILENCE = "timer expires (on_expiry = silence)"
+    EXPIRED_HOLD = "timer expires (on_expiry = hold)"
+    REPORT_OVERDUE = "1 s without a report"
+    BRAKING_OVERDUE = "1 s in the quick stop"
+    START_OVERDUE = "3 s since the start began"
+    RAMP_OVERDUE = "10 s since the trip"
+    SILENCE_DUE = "then_silence_ms since the trip"
+    # the drive
+    SAYS_ENABLED = "drive says: operation enabled"
+    SAYS_BRAKING = "drive says: quick stop active"
+    SAYS_AT_REST = "drive says: not enabled"
+    SAYS_FAULT = "drive says: fault"
+    # the way to it
+    WAY_CLOSED = "node gone, drive not heard, position needed and not known"
+    WAY_OPEN = "way to the drive open"
+    NODE_BACK = "node operational anew"
+    ANEW = "bus back, or node told to stop"
+
+
+class Deed(StrEnum):
+    NOTHING = "–"
+    FORWARD = "forward"
+    TAKE = "take, do not forward"
+    REFUSE = "refuse"
+    STOP = "stop"
+    CLEAR = "clear the fault"
+    CLEAR_STOP = "clear the fault, stop"
+    REACT = "reaction, fault"
+    SILENCE = "send nothing"
+    WAIT = "hold the stop, wait"
+    READY = "send READY"
+    GO_ON = "answer with the next word"
+    ENABLE = "send the enabling word"
+    LEAVE = "send disable voltage"
+    DONE = "the start is done"
+    GIVE_UP = "stop, the start has failed"
+
+
+Cell = tuple[Stage, Deed]
+_Row = Mapping[Iterable[Stage], tuple[Stage | None, Deed]]
+
+_OPEN: Final = (_S.READY, _S.ENABLED)
+_SHUT: Final = (_S.CLOSED,)
+_LOCKED: Final = (_S.INTERLOCKED,)
+_REACTING: Final = (_S.RAMPING, _S.TRIPPED, _S.SILENCED)
+_HOLDING: Final = (_S.HELD, _S.LET_GO)
+_FREE: Final = (*_LOCKED, *_OPEN, *STARTING)
+"""Neither closed nor tripped."""
+_NOT_TRIPPED: Final = (*_SHUT, *_FREE)
+
+
+def _stops(deed: Deed = Deed.STOP) -> _Row:
+    return {
+        (*_SHUT, *_REACTING): (None, deed),
+        _FREE: (_S.INTERLOCKED, deed),
+        _HOLDING: (_S.LET_GO, deed),
+    }
+
+
+def _starts(after: Stage, deed: Deed, kept: Iterable[Stage] = ()) -> _Row:
+    """``kept``: stages of a start that the next one goes on with."""
+    return {
+        _SHUT: (None, Deed.REFUSE),
+        _FREE: (after, deed),
+        tuple(kept): (None, deed),
+        tuple(TRIPPED): (None, Deed.REFUSE),
+    }
+
+
+def _expires(after: Stage) -> _Row:
+    return {_NOT_TRIPPED: (after, Deed.REACT)}
+
+
+_ROWS: Final[dict[Stimulus, _Row]] = {
+    Stimulus.STOP_WORD: {
+        _SHUT: (None, Deed.FORWARD),
+        _FREE: (_S.READY, Deed.FORWARD),
+        _REACTING: (None, Deed.TAKE),
+        _HOLDING: (_S.LET_GO, Deed.FORWARD),
+    },
+    Stimulus.ENABLING_WORD: {
+        (*_SHUT, *_LOCKED, *TRIPPED): (None, Deed.TAKE),
+        (*_OPEN, *STARTING): (_S.ENABLED, Deed.FORWARD),
+    },
+    Stimulus.SETPOINTS: {
+        (*_SHUT, *_LOCKED, *TRIPPED): (None, Deed.TAKE),
+        (*_OPEN, *STARTING): (None, Deed.FORWARD),
+    },
+    Stimulus.INVALID: {tuple(Stage): (None, Deed.REFUSE)},
+    Stimulus.LATE_STOP: _stops(),
+    Stimulus.ACKNOWLEDGE: {
+        _NOT_TRIPPED: (None, Deed.CLEAR),
+        tuple(TRIPPED): (_S.INTERLOCKED, Deed.CLEAR_STOP),
+    },
+    Stimulus.ACKNOWLEDGE_FAULT: {
+        _SHUT: (None, Deed.CLEAR_STOP),
+        (*_FREE, *TRIPPED): (_S.INTERLOCKED, Deed.CLEAR_STOP),
+    },
+    Stimulus.LEFT: _stops(),
+    Stimulus.STOP: _stops(),
+    Stimulus.START: _starts(_S.LEADING, Deed.GO_ON),
+    Stimulus.START_STOPPING: _starts(_S.SETTLING, Deed.WAIT),
+    Stimulus.START_UNHEARD: {
+        **_starts(_S.ASKING, Deed.WAIT, kept=(_S.ASKING, _S.PREPARED)),
+        (_S.BLIND,): (_S.PREPARED, Deed.WAIT),
+    },
+    Stimulus.START_BRAKING: _starts(_S.BRAKING, Deed.WAIT),
+    Stimulus.EXPIRED_DISABLE: _expires(_S.TRIPPED),
+    Stimulus.EXPIRED_QUICK_STOP: _expires(_S.RAMPING),
+    Stimulus.EXPIRED_SILENCE: _expires(_S.SILENCED),
+    Stimulus.EXPIRED_HOLD: _expires(_S.HELD),
+    Stimulus.REPORT_OVERDUE: {
+        (_S.ASKING,): (_S.PREPARED, Deed.READY),
+        (_S.PREPARED,): (_S.BLIND, Deed.ENABLE),
+    },
+    Stimulus.BRAKING_OVERDUE: {
+        (_S.BRAKING,): (_S.LEAVING, Deed.LEAVE),
+        (_S.SETTLING,): (None, Deed.LEAVE),
+    },
+    Stimulus.START_OVERDUE: {tuple(STARTING): (_S.INTERLOCKED, Deed.GIVE_UP)},
+    Stimulus.RAMP_OVERDUE: {(_S.RAMPING,): (_S.TRIPPED, Deed.REACT)},
+    Stimulus.SILENCE_DUE: {(_S.RAMPING, _S.TRIPPED): (_S.SILENCED, Deed.SILENCE)},
+    Stimulus.SAYS_ENABLED: {tuple(STARTING): (_S.ENABLED, Deed.DONE)},
+    Stimulus.SAYS_BRAKING: {tuple(AWAITS_REPORT): (_S.BRAKING, Deed.WAIT)},
+    Stimulus.SAYS_AT_REST: {
+        tuple(STARTING): (_S.LEADING, Deed.GO_ON),
+        (_S.RAMPING,): (_S.TRIPPED, Deed.REACT),
+    },
+    Stimulus.SAYS_FAULT: {
+        tuple(STARTING): (_S.INTERLOCKED, Deed.GIVE_UP),
+        (_S.RAMPING,): (_S.TRIPPED, Deed.REACT),
+    },
+    Stimulus.WAY_CLOSED: {
+        _FREE: (_S.CLOSED, Deed.STOP),
+        _HOLDING: (_S.LET_GO, Deed.STOP),
+    },
+    Stimulus.WAY_OPEN: {_SHUT: (_S.INTERLOCKED, Deed.NOTHING)},
+    Stimulus.NODE_BACK: {_FREE: (_S.INTERLOCKED, Deed.STOP)},
+    Stimulus.ANEW: _stops(),
+}
+
+
+def _table() -> dict[tuple[Stage, Stimulus], Cell]:
+    table = {(stage, stimulus): (stage, Deed.NOTHING) for stage in Stage for stimulus in Stimulus}
+    for stimulus, row in _ROWS.items():
+        for stages, (after, deed) in row.items():
+            for stage in stages:
+                table[stage, stimulus] = (after or stage, deed)
+    return table
+
+
+TABLE: Final = _table()

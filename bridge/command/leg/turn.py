@@ -1,0 +1,310 @@
+"""One step of the leg while it is being made: the state, taken apart, and what has come of it so far."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.command.event import Kind
+from bridge.command.leg import order, words
+from bridge.command.leg.effect import Effect, Heard, Ignored, StartEnded, Tell, Tripped
+from bridge.command.leg.settings import LegSettings
+from bridge.command.leg.state import (
+    STARTING,
+    LegState,
+    Motion,
+    Output,
+    Owner,
+    Stage,
+    Timer,
+    Trip,
+)
+from bridge.command.leg.table import TABLE, Deed, Stimulus
+from bridge.command.request import Code, Outcome
+from bridge.config import Reaction
+from bridge.drive import FAULTED, MOVING, DriveState
+
+_ACKNOWLEDGE_PULSE_S: Final = 0.1
+"""How long a generated acknowledge edge stays on the bus: longer than any cycle we send with."""
+_RAMP_LIMIT_S: Final = 10.0
+"""After that a quick stop by the watchdog is followed by disable voltage in any case: Lenze's holds the motor
+for ever, and so does CiA 402's with 605Ah = 5 … 8."""
+_EXPIRED: Final[dict[Reaction, Stimulus]] = {
+    "disable_voltage": Stimulus.EXPIRED_DISABLE,
+    "stop": Stimulus.EXPIRED_DISABLE,
+    "quick_stop": Stimulus.EXPIRED_QUICK_STOP,
+    "silence": Stimulus.EXPIRED_SILENCE,
+    "hold": Stimulus.EXPIRED_HOLD,
+}
+
+
+class Turn:
+    """Made from a state, changed, and made a state again. The attributes are those of ``LegState``."""
+
+    __slots__ = ("effects", "now", "settings", *LegState._fields)
+
+    def __init__(self, settings: LegSettings, state: LegState, now: float) -> None:
+        self.settings = settings
+        self.now = now
+        self.effects: list[Effect] = []
+        (
+            self.stage,
+            self.owner,
+            self.timer,
+            self.edges,
+            self.word,
+            self.is_ours,
+            self.is_asked,
+            self.setpoints,
+            self.rest,
+            self.sent,
+            self.drive,
+            self.is_taken,
+            self.motion,
+            self.start,
+            self.trip,
+            self.order,
+            self.pulse_until,
+            self.way,
+            self.silence_stops,
+        ) = state
+
+    def end(self) -> LegState:
+        return LegState(
+            self.stage,
+            self.owner,
+            self.timer,
+            self.edges,
+            self.word,
+            self.is_ours,
+            self.is_asked,
+            self.setpoints,
+            self.rest,
+            self.sent,
+            self.drive,
+            self.is_taken,
+            self.motion,
+            self.start,
+            self.trip,
+            self.order,
+            self.pulse_until,
+            self.way,
+            self.silence_stops,
+        )
+
+    # the table
+
+    def happens(self, stimulus: Stimulus, of_start: Outcome | None = None) -> Deed:
+        """Go on as the table says. ``of_start``: how a start ends that is going on, where it ends by this."""
+        before = self.stage
+        self.stage, deed = TABLE[before, stimulus]
+        if before in STARTING and self.stage not in STARTING:
+            self.start = None
+            self.effects.append(StartEnded(of_start or Outcome(Code.CANCELLED)))
+        return deed
+
+    # what is known
+
+    @property
+    def is_tripped(self) -> bool:
+        return self.stage.is_tripped
+
+    @property
+    def is_enabling(self) -> bool:
+        """What is sent enables the drive."""
+        return self.settings.words.enables(self.sent.words[0])
+
+    @property
+    def is_commanded(self) -> bool:
+        """The drive is enabled, and what it gets does not stop it."""
+        return self.drive is DriveState.OPERATION_ENABLED and self.is_enabling
+
+    @property
+    def may_enable(self) -> bool:
+        """Whether enabling words may go to the drive, or go on. A target that is to follow the drive until it
+        is enabled must know where that is: without the actual value it would be 0 or an old one, and the
+        drive would go there. A drive that is enabled already needs nothing to follow."""
+        return self.way.is_open and (not self.way.why_unplaced or self.is_commanded)
+
+    @property
+    def why_blocked(self) -> str:
+        if self.is_tripped:
+            return "tripped: acknowledge first"
+        if self.way.why:
+            return self.way.why
+        if self.way.why_unplaced and not self.is_commanded:
+            return self.way.why_unplaced
+        return "restart interlock: send a control word that does not enable first"
+
+    @property
+    def word_at_rest(self) -> int:
+        """What is sent if it is a stop of some kind: an acknowledge turns no ramp into coasting."""
+        return words.at_rest(self.settings.words, self.sent.words[0])
+
+    @property
+    def control_word(self) -> int:
+        """``word`` with the acknowledge bit as the owner wrote it, so that whoever changes a bit beside it
+        makes no edge of it."""
+        return self.word | (self.settings.words.acknowledge_mask if self.edges.bit else 0)
+
+    # what is done
+
+    def tell(self, kind: Kind, severity: int, message: str) -> None:
+        self.effects.append(Tell(kind, severity, message))
+
+    def keep_at_rest(self) -> None:
+        """What was written for a drive that is not enabled yet must not make it jump when it is."""
+        follows = self.settings.follows
+        if follows and not self.is_commanded:
+            setpoints = list(self.setpoints)
+            for place, _ in follows:
+                setpoints[place] = self.rest[place]
+            self.setpoints = tuple(setpoints)
+
+    def lead(self, word: int) -> None:
+        """The next word of a start; what the owner has ordered stays."""
+        self.word = word
+        self.is_ours = False
+        self.keep_at_rest()
+
+    def stop(self, word: int, *, is_asked: bool = False) -> None:
+        """Stop with this word in place of the owner's. ``is_asked``: by a command, and not because the bridge
+        has to."""
+        self.word = word
+        self.is_ours = True
+        self.is_asked = is_asked
+        self.drop_setpoints()
+
+    def stop_as_asked(self, word: int) -> None:
+        """A stop by a command, made from the word that is sent. A reaction of the watchdog goes on from it,
+        too: after a ramp was begun, somebody may still disable the voltage."""
+        self.stop(word, is_asked=True)
+        self.sent = Output((word, *self.rest), self.sent.silent)
+
+    def drop_setpoints(self) -> None:
+        self.setpoints = self.rest
+        self.order = order.dropped(self.order)
+
+    def hear(self, at: float) -> None:
+        """A valid telegram. ``at`` is when it came, which may be a while ago: its time is up that much
+        earlier. It takes none from a newer one."""
+        timeout_ms, heard_at, _, _ = self.timer
+        heard_at = at if heard_at is None else max(at, heard_at)
+        deadline = heard_at + timeout_ms / 1000 if timeout_ms else None
+        self.timer = Timer(timeout_ms, heard_at, deadline)
+        self.effects.append(Heard())
+
+    def leave(self, of_start: str = "control of the drive has changed") -> None:
+        """The owner goes; the drive is stopped first."""
+        site_ms = self.settings.timeout_ms
+        if self.timer.timeout_ms != site_ms:
+            message = f"fieldbus_timeout_ms = {site_ms} again, as in the site file"
+            self.tell(Kind.CONFIGURATION, 400, message)
+        self.timer = Timer(site_ms)
+        self.stop(self.settings.words.stop(self.sent.words[0]))
+        self.owner = Owner(lease_s=self.owner.lease_s)
+        self.edges = self.edges._replace(bit=None)
+        self.happens(Stimulus.LEFT, Outcome(Code.CANCELLED, of_start))
+
+    # time
+
+    def judge(self) -> None:
+        """Is the controller still there?"""
+        timer = self.timer
+        if timer.deadline is not None and self.now >= timer.deadline:
+            self.timer = timer._replace(deadline=None, is_silent=True)
+            if self.settings.ignores_errors:
+                self.effects.append(Ignored())
+            elif not self.is_tripped:
+                self._trip(timer.deadline)
+        lease_until = self.owner.lease_until
+        if lease_until is not None and self.now >= lease_until:
+            self.tell(Kind.OWNER, 300, f"the lease of {self.owner.identity} ran out")
+            self.leave()
+
+    def _trip(self, due: float) -> None:
+        reaction, then_silence_s = self.settings.reaction, self.settings.then_silence_s
+        self.happens(_EXPIRED[reaction], Outcome(Code.CANCELLED, "the watchdog tripped"))
+        if reaction != "hold":
+            self.drop_setpoints()
+            self.trip = Trip(
+                self.now + _RAMP_LIMIT_S if reaction == "quick_stop" else None,
+                self.now + then_silence_s if then_silence_s and reaction != "silence" else None,
+            )
+        self.effects.append(Tripped(due, self.owner.identity, self.timer.timeout_ms))
+
+    def clear(self, *, pulse: bool) -> None:
+        """Acknowledge: leave the trip, and stop what would go on after a fault of the drive itself. With
+        ``pulse`` an acknowledge edge is sent to the drive."""
+        is_reset = pulse and self.drive in FAULTED
+        word = self.word_at_rest
+        deed = self.happens(Stimulus.ACKNOWLEDGE_FAULT if is_reset else Stimulus.ACKNOWLEDGE)
+        self.trip = Trip()
+        if deed is Deed.CLEAR_STOP:
+            self.stop(word)
+        if pulse:
+            self.pulse_until = self.now + _ACKNOWLEDGE_PULSE_S
+
+    # the drive
+
+    def reported(self, state: DriveState) -> None:
+        """The drive says that it is in this state."""
+        was_enabled = self.drive is DriveState.OPERATION_ENABLED
+        self.drive = state
+        if state in FAULTED or (was_enabled and state is not DriveState.OPERATION_ENABLED):
+            self.order = order.dropped(self.order)
+        motion = self.motion
+        if state in MOVING:
+            # Ignore a late "moving" report when the word being sent does not enable.
+            if motion is Motion.EXPECTED or self.is_enabling:
+                self.motion = Motion.SEEN
+            elif motion is Motion.FAULTED:
+                self.motion = Motion.ENDED
+        elif state is not DriveState.UNKNOWN:
+            if self.stage is Stage.RAMPING:
+                self.happens(Stimulus.SAYS_AT_REST)
+            self.trip = self.trip._replace(ramps_until=None) if self.trip.ramps_until else self.trip
+            if motion is Motion.SEEN:
+                self.motion = Motion.ENDED
+            elif motion is Motion.EXPECTED and state is DriveState.FAULT:
+                self.motion = Motion.FAULTED
+
+    # the end of each step
+
+    def settle(self) -> None:
+        """Bring the way to the drive and what is sent up to date."""
+        now, may_enable = self.now, self.may_enable
+        if may_enable:
+            self.happens(Stimulus.WAY_OPEN)
+        elif self.stage is not Stage.HELD or self.is_enabling:
+            self.happens(Stimulus.WAY_CLOSED, Outcome(Code.NOT_READY, self.why_blocked))
+        if not may_enable:
+            self.order = order.dropped(self.order)
+        ramps_until, silent_from = self.trip
+        if ramps_until is not None and now >= ramps_until:
+            self.happens(Stimulus.RAMP_OVERDUE)
+            self.trip = self.trip._replace(ramps_until=None)
+        if silent_from is not None and now >= silent_from:
+            self.happens(Stimulus.SILENCE_DUE)
+            self.trip = self.trip._replace(silent_from=None)
+        if self.pulse_until is not None and now >= self.pulse_until:
+            self.pulse_until = None
+        was_enabling = self.is_enabling
+        words.send(self)
+        handshake = self.settings.handshake
+        if handshake is not None:
+            self.order, is_untaken = order.went_on(
+                self.order,
+                tuple(self.setpoints[place] for place in handshake.places),
+                now,
+                is_taken=self.is_taken,
+                commanded=self.is_commanded,
+            )
+            words.send(self)
+            if is_untaken:
+                why = "the drive has not taken the position that was written: no answer within 1 s"
+                self.tell(Kind.REFUSED, 500, why)
+        if self.is_enabling:
+            if not was_enabling:
+                is_enabled = self.drive is DriveState.OPERATION_ENABLED
+                self.motion = Motion.SEEN if is_enabled else Motion.EXPECTED
+            self.is_asked = False

@@ -17,7 +17,7 @@ BUSY: Final = 0x060A_0023
 GENERAL: Final = 0x0800_0000
 
 TRANSIENT: Final = frozenset((TOGGLE, TIMED_OUT, BLOCK_SIZE, SEQUENCE, CRC, LENGTH_TOO_HIGH, LENGTH_TOO_LOW))
-"""What a lost or a foreign frame can cause: the same transfer may succeed when it is tried again."""
+"""What a lost or a foreign frame can cause: the same transfer may succeed when it is repeated."""
 
 TEXTS: Final = {
     0x0503_0000: "toggle bit not alternated",

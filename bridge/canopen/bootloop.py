@@ -1,4 +1,4 @@
-"""A node that starts again and again is asked less and less often, and told of once a minute."""
+"""A node that keeps restarting is booted less and less often, and reported once a minute."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class BootLoop:
         self.count = 0
 
     def on_boot_up(self, now: float) -> float:
-        """A boot-up message; returns the seconds to wait before the node is booted, 0 where all is well."""
+        """A boot-up message; returns the seconds to wait before the node is booted, 0 if all is well."""
         if self._times and now - self._times[-1] > max(_WITHIN_S, 2 * self._pause_s):
             self._pause_s = 0.0
             self._times.clear()
@@ -44,7 +44,7 @@ class BootLoop:
         return self._pause_s > 0
 
     def report(self, now: float) -> str | None:
-        """What to tell, once a minute while it goes on."""
+        """What to report, once a minute while it goes on."""
         if not self.is_looping or now - self._told_at < _TELL_S:
             return None
         self._told_at = now

@@ -1,4 +1,4 @@
-"""Signs that two devices share one node id. Pure: told of what the node sends, by its time stamps."""
+"""Signs that two devices share one node id. Sans-IO: gets what the node sends, with time stamps."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import Final
 _WINDOW: Final = 20
 """Heartbeats that are counted together."""
 _TOO_SOON: Final = 0.7
-"""A window that takes less than this part of its time had more than one producer."""
+"""A window that takes less than this share of the expected time had more than one producer."""
 _TURNS: Final = 8
-"""Changes of state within one window that no single device makes."""
+"""No single device changes its state this often within one window."""
 _EXTRA_REPLIES: Final = 3
 _FORGET_S: Final = 60.0
 _TOGETHER_S: Final = 0.05
-"""Two devices answer one request within this time; what comes later is a late answer."""
+"""Two devices answer one request within this time; anything later is a late answer."""
 _FOREIGN_S: Final = 2.0
-"""So long after another client's request an answer may be its own."""
+"""For this long after another client's request, an answer may belong to that client."""
 
 
 class DuplicateCheck:
@@ -36,7 +36,7 @@ class DuplicateCheck:
 
     def __init__(self) -> None:
         self.period_s: float | None = None
-        """The node's heartbeat period as the boot-up left it; None where it has none."""
+        """The node's heartbeat period as the boot-up left it; None if it sends none."""
         self._last_reply = b""
         self._last_reply_at = float("-inf")
         self._foreign_at = float("-inf")
@@ -45,7 +45,7 @@ class DuplicateCheck:
         self.restart()
 
     def restart(self) -> None:
-        """Count anew: the node has started, or its period is another one now."""
+        """Start counting again: the node has restarted, or its period has changed."""
         self._begin: float | None = None
         self._count = 0
         self._changes = 0
@@ -77,8 +77,8 @@ class DuplicateCheck:
         self._foreign_at = time
 
     def on_reply(self, data: bytes, time: float, *, matched: bool) -> str | None:
-        """An SDO answer; ``matched`` where it belonged to a request of ours. Late answers to requests of
-        ours are left out by the caller."""
+        """An SDO answer; ``matched`` if it belongs to a request of ours. The caller leaves out late answers
+        to our requests."""
         if matched:
             self._last_reply, self._last_reply_at = data[1:4], time
             return None

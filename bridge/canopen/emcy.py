@@ -11,7 +11,7 @@ _HEAD: Final = struct.Struct("<HB")
 
 @dataclass(frozen=True, slots=True)
 class Emergency:
-    """``vendor`` is the manufacturer's five bytes (fewer where the node sent a short message)."""
+    """``vendor`` is the manufacturer's five bytes (fewer if the node sent a short message)."""
 
     code: int
     register: int
@@ -19,7 +19,7 @@ class Emergency:
 
 
 def decode(data: bytes) -> Emergency | None:
-    """The emergency in ``data``, or None where it is too short to hold a code and a register."""
+    """The emergency in ``data``, or None if it is too short for a code and a register."""
     if len(data) < _HEAD.size:
         return None
     code, register = _HEAD.unpack_from(data)

@@ -14,9 +14,9 @@ STANDARD_MASK: Final = 0x7FF
 class Frame(NamedTuple):
     """One classic CAN frame.
 
-    ``can_id`` is the identifier with SocketCAN's flag bits (``EXTENDED``, ``REMOTE``, ``ERROR``), so a
-    plain data frame with an 11-bit identifier compares equal to its COB-ID. ``time`` is the moment of
-    reception in seconds of the monotonic clock; it is 0.0 in frames that have not been sent yet.
+    ``can_id`` is the identifier with SocketCAN's flag bits (``EXTENDED``, ``REMOTE``, ``ERROR``), so a plain
+    data frame with an 11-bit identifier compares equal to its COB-ID. ``time`` is the moment of reception in
+    seconds of the monotonic clock, 0.0 in frames that have not been sent yet.
     """
 
     can_id: int

@@ -1,4 +1,4 @@
-"""Error control (CiA 301 §7.2.8.3): is the node there? By heartbeat or by node guarding, never both.
+"""Error control (CiA 301 §7.2.8.3): is the node alive? By heartbeat or node guarding, never both.
 
 Both judge by the time stamps of the received frames, so a late event loop does not look like a dead
 node: ``on_time`` is called only after the bus has been drained.
@@ -11,7 +11,7 @@ from bridge.canopen.frame import REMOTE, Frame
 
 
 class HeartbeatConsumer:
-    """Watches one producer. Supervision begins with its first sign (CiA 301 §7.2.8.3.2.2)."""
+    """Watches one producer. Supervision begins with its first heartbeat (CiA 301 §7.2.8.3.2.2)."""
 
     __slots__ = ("_last", "timeout_s")
 
@@ -20,7 +20,7 @@ class HeartbeatConsumer:
         self._last: float | None = None
 
     def on_frame(self, frame: Frame) -> bool:
-        """Every heartbeat counts."""
+        """Any heartbeat is a sign of life."""
         self._last = frame.time
         return True
 
@@ -49,8 +49,8 @@ class HeartbeatConsumer:
 class NodeGuard:
     """Asks one node by remote frame every ``guard_time_s`` and checks its toggle bit.
 
-    The node counts as lost after ``life_time_factor`` guard times without a right answer; its own
-    life guarding watches us by the same frames (CiA 301 §7.2.8.3.2.1).
+    The node counts as lost after ``life_time_factor`` guard times without a correct answer; its own life
+    guarding watches us by the same frames (CiA 301 §7.2.8.3.2.1).
     """
 
     __slots__ = ("_due", "_frames", "_id", "_last", "_toggle", "guard_time_s", "life_time_s", "toggle_errors")
@@ -66,8 +66,8 @@ class NodeGuard:
         self._frames: list[Frame] = []
 
     def on_frame(self, frame: Frame) -> bool:
-        """Whether the answer counts. A repeated one proves nothing, neither that the node is there nor which
-        state it has; the next right one does."""
+        """Whether the answer counts. A repeated one (same toggle bit) proves neither that the node is alive
+        nor its state; the next correct one does."""
         if self._due is None:
             return True  # not asked by us
         if len(frame.data) != 1:
@@ -82,7 +82,7 @@ class NodeGuard:
         return True
 
     def expect(self, now: float) -> None:
-        """Begin guarding now. The first toggle bit is taken as it comes: the node may be guarded already."""
+        """Begin guarding now. Any first toggle bit is accepted: the node may have been guarded before."""
         self._due = now
         self._last = now
         self._toggle = None
@@ -103,9 +103,9 @@ class NodeGuard:
             self.reset()
             return True
         if now >= self._due:
-            # The length of what is asked for: the two must not differ on the wire (ISO 11898-1).
+            # As long as the answer: a remote frame has the DLC of the data frame (ISO 11898-1).
             self._frames.append(Frame(self._id | REMOTE, b"\0"))
-            # A late loop asks once and goes on from now: a burst of remote frames would help nobody.
+            # If we are late, ask once and go on from now: a burst of remote frames would help nobody.
             on_time = self._due + self.guard_time_s
             self._due = on_time if on_time > now else now + self.guard_time_s
         return False

@@ -1,8 +1,8 @@
 """SDO client (CiA 301 §7.2.4): one channel to one server, its queue and its time-outs.
 
-The transfers themselves are generators (``sdo_transfer``, ``sdo_block``). Everything the server says that
-is no answer to what was asked last — late, doubled, about another object — is counted and passed over,
-never taken for an answer.
+The transfers themselves are generators (``sdo_transfer``, ``sdo_block``). A frame from the server that does
+not answer the last request (late, repeated, about another object) is counted and dropped, never taken for an
+answer.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from bridge.canopen.sdo_transfer import (
 __all__ = ["Priority", "Result", "SdoChannel", "SdoError", "SdoJob"]
 
 SEGMENTS_AT_ONCE: Final = 8
-"""So many frames of a block go out together: a block is up to 127, more than a driver's queue holds."""
+"""This many frames of a block are sent at once: a block has up to 127, more than a driver's queue holds."""
 _COMMANDS: Final = frozenset((0x1010, 0x1011))
-"""Writing them does something each time (store and restore, CiA 301 §7.5.2.13–14): never repeated."""
+"""Writing them is a command (store and restore, CiA 301 §7.5.2.13–14): never repeated."""
 _COMMAND_S: Final = 10.0
-"""So long a node may take for one: it writes all its parameters to its memory before it answers."""
+"""A node may take this long for one: it saves all its parameters before it answers."""
 _MOST_OWED: Final = 8
-"""So many late answers are expected; a node that is silent for long owes no more."""
+"""No more late answers than this are expected, however long a node is silent."""
 
 T = TypeVar("T")
 
 
 @dataclass(slots=True)
 class _Owed:
-    """Answers that may still come, after we have given up waiting for them or have asked again."""
+    """Answers that may still come after we have given up waiting for them or have asked again."""
 
     index: int
     sub: int
@@ -55,7 +55,7 @@ class _Owed:
 
 
 class SdoChannel:
-    """One client channel. One transfer at a time; the others wait, by priority and then in order.
+    """One client channel. One transfer runs at a time; others wait, by priority and then in order.
 
     ``on_frame`` and ``on_time`` take monotonic seconds; ``take_frames`` gives what is to be sent. A
     transfer that fails by time-out or by a damaged answer is repeated ``retries`` times. ``done`` of each
@@ -73,7 +73,7 @@ class SdoChannel:
         self.unmatched = 0
         """Frames on the reply COB-ID that were no answer."""
         self.late = 0
-        """Those of them that answered a request of ours which we had given up."""
+        """Those of them that answered a request which we had given up."""
         self._segment_s = segment_s
         self._queue = SdoQueue()
         self._block = BlockUse()
@@ -122,9 +122,9 @@ class SdoChannel:
         repeatable: bool = True,
         may_begin: Callable[[], bool] | None = None,
     ) -> SdoJob:
-        """Write an object. ``repeatable`` is false where writing the same twice does more than once.
-        ``may_begin`` is asked when its turn has come: where it may not, nothing is sent, and the result is
-        an error."""
+        """Write an object. ``repeatable`` is false if a second write would have a second effect.
+        ``may_begin`` is asked when the transfer's turn has come: if it returns false, nothing is sent, and
+        the result is an error."""
 
         def start(block: BlockUse) -> Transfer:
             return write_object(index, sub, data, block)
@@ -135,7 +135,7 @@ class SdoChannel:
         return self._submit(SdoJob(index, sub, start, done, priority, retries, timeout_s, may_begin), now)
 
     def cancel(self, job: SdoJob, now: float) -> bool:
-        """End this transfer without calling its ``done``; False where it has ended already."""
+        """End this transfer without calling its ``done``; False if it has ended already."""
         if job is not self._job:
             return self._queue.remove(job)
         self._tell_abort(job, abort.GENERAL)
@@ -145,7 +145,7 @@ class SdoChannel:
         return True
 
     def flush(self, now: float) -> None:
-        """End everything that waits: the node or the bus is gone. Nothing more is sent."""
+        """End all transfers, because the node or the bus is gone. Nothing more is sent."""
         jobs = [self._job] if self._job else []
         jobs += self._queue
         self._queue.clear()
@@ -213,8 +213,8 @@ class SdoChannel:
     # the transfer that runs
 
     def _next(self, now: float) -> None:
-        """Begin the next transfer. One about an object that still owes us an answer has to wait: that
-        answer could be taken for its own."""
+        """Begin the next transfer. One about an object with an answer outstanding has to wait: it could take
+        that answer for its own."""
         self._hold_until = None
         owed = self._owed if self._owed and now < self._owed.until else None
         for job in self._queue:
@@ -234,7 +234,7 @@ class SdoChannel:
         self._resume(next, transfer, now)
 
     def _resume(self, step: Callable[[T], Exchange], argument: T, now: float) -> None:
-        """Let the transfer go on and send what it wants to be sent."""
+        """Resume the transfer and send its frames."""
         transfer = self._transfer
         if transfer is None:
             return
@@ -255,7 +255,7 @@ class SdoChannel:
             self._send_some(now)
 
     def _send_some(self, now: float) -> None:
-        """Send the next frames of the exchange; the time for the answer begins with the last one."""
+        """Send the next frames of the exchange; the time-out begins with the last one."""
         most = SEGMENTS_AT_ONCE if self._segment_s else len(self._unsent)
         for _ in range(min(most, len(self._unsent))):
             self._frames.append(Frame(self.request_id, self._unsent.popleft()))
@@ -264,7 +264,7 @@ class SdoChannel:
             self._deadline = now + self._job.timeout_s
 
     def _fail(self, error: SdoError, now: float) -> None:
-        """The transfer has failed: try it again, or tell the one who asked."""
+        """The transfer has failed: repeat it, or report the failure to the caller."""
         job = self._job
         if job is None:
             return
@@ -295,7 +295,7 @@ class SdoChannel:
         job = self._job
         self._clear()
         if not isinstance(result, SdoError) and job and self._owed and self._owed.is_about(job):
-            # It may have been the answer to the first attempt: the second's is still to come.
+            # It may have answered the first attempt: then the second's answer is still to come.
             self._owed.until = now + job.timeout_s
         if job is not None:
             job.done(result)

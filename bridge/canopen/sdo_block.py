@@ -29,11 +29,11 @@ from bridge.canopen.sdo_transfer import (
 )
 
 BLOCK_FROM_BYTES: Final = 112
-"""Sixteen segments: below, the frames that open and close a block transfer cost more than they save."""
+"""Sixteen segments: for fewer, opening and closing a block transfer costs more frames than it saves."""
 MOST_SEGMENTS: Final = 127
 _LEAST_SEGMENTS: Final = 4
 _MOST_REPEATS: Final = 3
-"""How many blocks in a row may bring nothing new before the transfer is given up."""
+"""The transfer is given up when this many blocks in a row bring nothing new."""
 
 _DOWNLOAD: Final = 0xC6  # with our CRC and the length
 _DOWNLOAD_END: Final = 0xC1
@@ -52,14 +52,14 @@ def crc16(data: bytes | bytearray) -> int:
 
 @dataclass(slots=True)
 class BlockUse:
-    """What a channel has learned of its server: whether it does block transfer at all, and how many
-    segments in a row arrive whole."""
+    """What a channel has learned about its server: whether it supports block transfer, and how many segments
+    in a row arrive without loss."""
 
     offered: bool = True
     segments: int = MOST_SEGMENTS
 
     def on_block(self, whole: bool) -> None:
-        """Half as many after a loss, twice as many after a block without one."""
+        """Halve the block after a loss, double it after a block without one."""
         if whole:
             self.segments = min(MOST_SEGMENTS, self.segments * 2)
         else:
@@ -67,7 +67,7 @@ class BlockUse:
 
 
 def read_object(index: int, sub: int, block: BlockUse) -> Transfer:
-    """Read an object: by blocks where it is announced as long and the server does that."""
+    """Read an object: by blocks if it is announced as long and the server supports that."""
     value, announced = yield from initiate_upload(index, sub)
     if value is not None:
         return value
@@ -82,7 +82,7 @@ def read_object(index: int, sub: int, block: BlockUse) -> Transfer:
 
 
 def write_object(index: int, sub: int, data: bytes, block: BlockUse) -> Transfer:
-    """Write an object: by blocks where it is long and the server does that."""
+    """Write an object: by blocks if it is long and the server supports that."""
     if block.offered and len(data) >= BLOCK_FROM_BYTES:
         done = yield from block_download(index, sub, data, block)
         if done:
@@ -93,8 +93,8 @@ def write_object(index: int, sub: int, data: bytes, block: BlockUse) -> Transfer
 def _initiate(
     requests: tuple[bytes, ...], reply: Reply | BlockStart, block: BlockUse
 ) -> Generator[Exchange, bytes, bytes | None]:
-    """The server's answer, or None where it knows no block transfer. A server that keeps silent may know
-    none either: the next attempt goes without."""
+    """The server's answer, or None if it does not support block transfer. A server that does not answer may
+    not support it either: the next attempt does without."""
     try:
         return (yield Exchange(requests, reply))
     except SdoError as error:
@@ -106,8 +106,8 @@ def _initiate(
 
 
 def block_upload(index: int, sub: int, block: BlockUse) -> Generator[Exchange, bytes, bytes | None]:
-    """Read by blocks; None where the server knows no block transfer. The segmented upload that has been
-    initiated is given up first."""
+    """Read by blocks; None if the server does not support that. The segmented upload that was initiated is
+    aborted first."""
     mux = MUX.pack(index, sub)
     give_up = abort_request(index, sub, abort.GENERAL)
     request = bytes((_UPLOAD,)) + mux + bytes((block.segments, 0, 0, 0))
@@ -115,7 +115,7 @@ def block_upload(index: int, sub: int, block: BlockUse) -> Generator[Exchange, b
     if reply is None:
         return None
     if reply[0] & 0xE1 != 0xC0:
-        # An ordinary upload, which was not allowed to it; or the answer to ours, doubled. Begin anew.
+        # An ordinary upload, which our request ruled out (pst = 0), or a repeated answer. Begin again.
         block.offered = False
         yield Exchange((give_up,), None)
         return None
@@ -136,8 +136,8 @@ def block_upload(index: int, sub: int, block: BlockUse) -> Generator[Exchange, b
 def _upload_blocks(
     index: int, sub: int, announced: int | None, block: BlockUse
 ) -> Generator[Exchange, bytes, tuple[bytearray, bytes]]:
-    """All data of an upload, filled up to whole segments, and the frame of the last segment, which has
-    not been acknowledged yet."""
+    """All data of an upload, padded to whole segments, and the frame of the last segment, which has not been
+    acknowledged yet."""
     most = (MOST_BYTES if announced is None else announced) + SEGMENT
     data = bytearray()
     request, repeats = _UPLOAD_START, 0
@@ -153,15 +153,15 @@ def _upload_blocks(
         if repeats > _MOST_REPEATS:
             raise SdoError(index, sub, abort.SEQUENCE, by_server=False)
         block.on_block(whole=len(frames) == size)
-        # The server goes on behind the last segment that came in sequence.
+        # The server goes on after the last segment that came in sequence.
         request = bytes((_UPLOAD_ACK, len(frames), block.segments)) + bytes(5)
 
 
 def _upload_block(request: bytes, size: int) -> Generator[Exchange, bytes, list[bytes]]:
-    """The segments of one block up to the first that is missing.
+    """The segments of one block up to the first missing one.
 
-    In silence, what has come is acknowledged. Where nothing has come, ``request`` may have been lost and is
-    repeated once, unless it was the start, which a server takes only once.
+    After a time-out the segments that came are acknowledged. If none came, ``request`` may have been lost and
+    is repeated once, unless it was the start, which a server accepts only once.
     """
     frames: list[bytes] = []
     requests, repeated = (request,), request == _UPLOAD_START
@@ -185,7 +185,7 @@ def _upload_block(request: bytes, size: int) -> Generator[Exchange, bytes, list[
 
 
 def block_download(index: int, sub: int, data: bytes, block: BlockUse) -> Generator[Exchange, bytes, bool]:
-    """Write by blocks; False where the server knows no block transfer."""
+    """Write by blocks; False if the server does not support that."""
     mux = MUX.pack(index, sub)
     request = bytes((_DOWNLOAD,)) + mux + U32.pack(len(data))
     reply = yield from _initiate((request,), Reply(0xE3, 0xA0, mux), block)
@@ -214,8 +214,8 @@ def block_download(index: int, sub: int, data: bytes, block: BlockUse) -> Genera
 def _download_block(part: list[bytes], is_last: bool, with_crc: bool) -> Transfer:
     """Send one block; returns the server's acknowledge.
 
-    In silence the last segment is repeated once: without it the server goes on waiting. If it was the
-    acknowledge that was lost, the block comes twice, which only a CRC tells.
+    After a time-out the last segment is repeated once: without it the server would go on waiting. If the
+    acknowledge was lost instead, the block arrives twice, which only the CRC shows.
     """
     frames = [bytes((number,)) + segment.ljust(SEGMENT, b"\0") for number, segment in enumerate(part, 1)]
     if is_last:

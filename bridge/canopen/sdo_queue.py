@@ -1,4 +1,4 @@
-"""What waits for an SDO channel: bounded, by priority and then in order."""
+"""Transfers that wait for an SDO channel: bounded, by priority and then in order."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST_WAITING: Final = 64
 
 
 class Priority(IntEnum):
-    """Who is served first where several wait for one channel."""
+    """Which transfer comes first if several wait for one channel."""
 
     COMMAND = 0
     BOOT = 1
@@ -51,8 +51,8 @@ class SdoQueue:
             yield from lane
 
     def add(self, job: SdoJob) -> SdoJob | None:
-        """Take ``job``. Where there is no room, the one that has to go: the last of the least important,
-        or ``job`` itself where none is less important."""
+        """Add ``job``. If there is no room, return the job that is dropped: the last of the least important,
+        or ``job`` itself if none is less important."""
         victim = None
         if len(self) >= MOST_WAITING:
             lane = next((lane for lane in reversed(self._lanes.values()) if lane), None)
@@ -63,7 +63,7 @@ class SdoQueue:
         return victim
 
     def remove(self, job: SdoJob) -> bool:
-        """False where it does not wait here."""
+        """False if it does not wait here."""
         lane = self._lanes[job.priority]
         if job not in lane:
             return False

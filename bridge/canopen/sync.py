@@ -8,7 +8,7 @@ from bridge.canopen import cobid
 from bridge.canopen.frame import Frame
 
 LAST_SYNCHRONOUS: Final = 240
-"""Transmission types up to this one go by SYNC (CiA 301 §7.5.2.37)."""
+"""Transmission types up to this one are synchronous (CiA 301 §7.5.2.37)."""
 REMOTE_SYNCHRONOUS: Final = 252
 """Sampled with SYNC, sent on a remote frame."""
 REMOTE_TYPES: Final = (REMOTE_SYNCHRONOUS, 253)
@@ -27,7 +27,7 @@ def sync_frames(counter: int) -> tuple[Frame, ...]:
 class SyncWindow:
     """Judges whether synchronous TPDOs come within the window after SYNC (1007h, CiA 301 §7.5.2.7).
 
-    Times are those of the frames: SYNC's own is known because the bus gives our bursts back.
+    Times are those of the frames, SYNC's included: the bus returns the frames of our bursts to us.
     """
 
     __slots__ = ("_sync_at", "misses", "window_s")
@@ -45,17 +45,16 @@ class SyncWindow:
             self.misses += 1
 
     def reset(self) -> None:
-        """The bus is gone: what comes next belongs to no SYNC that is known."""
+        """The bus is gone: the next TPDO belongs to no SYNC that we know."""
         self._sync_at = None
 
 
 def tpdo_deadline_s(
     transmission_type: int, event_timer_ms: int, sync_period_ms: int, rtr_poll_ms: int = 0
 ) -> float | None:
-    """After how long without this TPDO its values are stale, or None where it need not come.
+    """The values of this TPDO are stale after this time without it; None if it is not sent regularly.
 
-    That is half a period and a little more than when it was due: later than any jitter, sooner than
-    the next one.
+    That is half a period and a little after it was due: later than any jitter, sooner than the next one.
     """
     if 1 <= transmission_type <= LAST_SYNCHRONOUS and sync_period_ms:
         period_s = transmission_type * sync_period_ms / 1000
@@ -69,5 +68,6 @@ def tpdo_deadline_s(
 
 
 def burst_length(period_s: float, deadman_ms: int) -> int:
-    """How many frames of this period may be left to run without us: never longer than the dead-man time."""
+    """How many frames with this period the kernel may send without us: never for longer than the dead-man
+    time."""
     return max(1, int(deadman_ms / 1000 / period_s + 1e-9))

@@ -21,7 +21,7 @@ _MOST_DAYS: Final = 0xFFFF
 
 
 def encode(epoch_ns: int) -> bytes:
-    """Nanoseconds since 1970 as TIME_OF_DAY; what is before 1984 or after 2163 becomes the nearest end."""
+    """Nanoseconds since 1970 as TIME_OF_DAY, clipped to the years 1984 to 2163."""
     days, ms = divmod(epoch_ns // 1_000_000, _DAY_MS)
     days -= _EPOCH_DAYS
     if days < 0:
@@ -32,7 +32,7 @@ def encode(epoch_ns: int) -> bytes:
 
 
 def decode(data: bytes) -> int | None:
-    """Milliseconds since 1970 in a TIME message, or None where it is none."""
+    """Milliseconds since 1970 in a TIME message, or None if it is none."""
     if len(data) != _FORMAT.size:
         return None
     ms, days = _FORMAT.unpack(data)
@@ -51,7 +51,7 @@ class TimeProducer:
         return self._due
 
     def on_time(self, now: float) -> Frame | None:
-        """The frame that is due. After a pause the next is sent at once, and the missed ones are missed."""
+        """The frame that is due. After a pause one frame is sent at once, and missed ones are skipped."""
         if self._due is not None and now < self._due:
             return None
         late = self._due is None or now - self._due > self._period_s

@@ -1,7 +1,7 @@
 """Device descriptions: EDS and DCF (CiA 306), XDD and XDC (CiA 311), concise DCF (CiA 302-3, 1F22h).
 
-The readers take what is in the field, not only what the standards say, and report every oddity with its
-line. They raise ``FileFaults`` and nothing else.
+The readers accept files as they are found in the field, not only as the standards want them, and report every
+oddity with its line. They raise ``FileFaults`` and nothing else.
 """
 
 from bridge.eds.configuration import configuration

@@ -1,4 +1,4 @@
-"""What a DCF or XDC configures, as a list of SDO downloads."""
+"""The configuration in a DCF or XDC as a list of SDO downloads."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def configuration(
     description: Description, node_id: int | None = None, report: Report | None = None
 ) -> tuple[Download, ...]:
     """What has to be written to a node with factory settings, in this order: application objects, then
-    communication objects; of a mapping sub 0 last. Only what can be written, has a ParameterValue and
-    differs from its default. Switching PDOs off and on around it is the boot-up's (CiA 301 §7.5.2.36).
+    communication objects; sub 0 of a mapping last. Only entries that can be written, have a ParameterValue
+    and differ from their default. The boot-up switches PDOs off before and on after it (CiA 301 §7.5.2.36).
 
-    ``node_id`` stands for $NODEID; left out, that of the file. What cannot be encoded is reported.
+    ``node_id`` replaces $NODEID; by default it is that of the file. What cannot be encoded is reported.
     """
     if node_id is None:
         node_id = description.commissioning.node_id

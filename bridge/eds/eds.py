@@ -16,15 +16,15 @@ _INDEX: Final = re.compile(r"(?:0x)?([0-9a-f]{1,4})")
 _SUB: Final = re.compile(r"(?:0x)?([0-9a-f]{1,4})sub(?:0x)?([0-9a-f]{1,2})")
 _TABLE: Final = re.compile(r"(?:0x)?([0-9a-f]{1,4})(name|value)")
 _FIRST_OBJECT: Final = 0x1000
-"""Below it stand data types, which are no objects of the device."""
+"""Lower indices are data types, not objects of the device."""
 _LISTS: Final = ("MandatoryObjects", "OptionalObjects", "ManufacturerObjects")
 _KBIT_S: Final = (10, 20, 50, 100, 125, 250, 500, 800, 1000)
 _COMMISSIONING: Final = ("devicecomissioning", "devicecommissioning")
-"""CiA 306 spells it with one m; tools spell it right."""
+"""CiA 306 spells it with one m, tools with two."""
 
 
 def read_eds(text: str, report: Report) -> Description:
-    """Everything that can be read of ``text``. What cannot is in the report."""
+    """Everything that can be read from ``text``; the report has what cannot."""
     sections = read_sections(lines(text), report)
     reader = _EdsReader(sections, report)
     objects = reader.objects()
@@ -57,7 +57,7 @@ class _EdsReader:
                 self._tables[int(match[1], 16), match[2]] = section
 
     def _once(self, place: dict[int, Section], number: int, section: Section) -> None:
-        """[1018sub1] and [1018sub01] are one."""
+        """[1018sub1] and [1018sub01] are the same entry."""
         first = place.setdefault(number, section)
         if first is not section:
             self._report.error(
@@ -109,7 +109,7 @@ class _EdsReader:
         return found
 
     def _check_lists(self, found: dict[int, Object]) -> None:
-        """The lists of objects against the objects themselves; the objects count."""
+        """Compare the lists of objects with the objects described; the descriptions count."""
         listed: dict[int, int] = {}
         for name in _LISTS:
             section = self._sections.get(name.lower())

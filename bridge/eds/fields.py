@@ -1,4 +1,4 @@
-"""Reads single fields of a section: a wrong one is reported and left out, never raised."""
+"""Reads single fields of a section; a bad one is reported and left out, and raises nothing."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _ACCESS: Final = {
     "rwrw": Access.RW,
     "constant": Access.CONST,
 }
-"""Words that are not in the standard and yet in files."""
+"""Words that files use although the standard does not have them."""
 
 
 class Fields:
@@ -28,7 +28,7 @@ class Fields:
         self._report = report
 
     def number(self, section: Section, name: str, low: int = 0, high: int = 0xFFFF_FFFF) -> int | None:
-        """A whole number from ``low`` to ``high``, or None where there is none."""
+        """A whole number from ``low`` to ``high``, or None if there is none."""
         found = section.get(name)
         if found is None:
             return None
@@ -49,7 +49,7 @@ class Fields:
         return number
 
     def flag(self, section: Section, name: str) -> bool:
-        """0 or 1; anything else that is not 0 is taken as 1."""
+        """0 or 1; any other number that is not 0 is taken as 1."""
         found = section.get(name)
         if found is None:
             return False
@@ -76,7 +76,7 @@ class Fields:
         return one
 
     def access(self, found: Text | None, default: Access, line: int, whose: str) -> Access:
-        """The access; ``default`` where there is none or an unknown one, and that is reported."""
+        """The access; if it is missing or unknown, that is reported and ``default`` is taken."""
         if found is None:
             self._report.warning(line, f"{whose} has no AccessType: taken as {default}")
             return default

@@ -24,7 +24,7 @@ _SPELLING: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A value as it stands in the file."""
+    """A value as written in the file."""
 
     text: str
     line: int
@@ -32,14 +32,14 @@ class Text:
 
 @dataclass(slots=True)
 class Section:
-    """``name`` as it is written; ``keys`` in lower case, in the order of the file."""
+    """``name`` as written; ``keys`` in lower case, in the order of the file."""
 
     name: str
     line: int
     keys: dict[str, Text] = field(default_factory=dict[str, Text])
 
     def get(self, name: str) -> Text | None:
-        """The value of ``name``, or None where it is not there or empty."""
+        """The value of ``name``, or None if it is missing or empty."""
         found = self.keys.get(name.lower())
         return found if found and found.text else None
 
@@ -121,13 +121,13 @@ class _Reader:
             if value in (first.text, ""):
                 self._report.warning(number, f"{where}, and says the same")
             else:
-                # As Windows reads such files, on which these tools grew up.
+                # As Windows reads such files, for which these tools were made.
                 self._report.error(number, f"{where}: {shown(first.text)} counts, not {shown(value)}")
             return
         section.keys[name] = Text(value, number)
 
 
 def shown(text: str) -> str:
-    """``text`` in a message: short, and without characters that disturb a terminal."""
+    """``text`` for a message: short, and without characters that disturb a terminal."""
     clean = "".join(char if char.isprintable() else "�" for char in text[:60])
     return clean + ("…" if len(text) > 60 else "")

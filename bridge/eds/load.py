@@ -22,13 +22,13 @@ _XML_STARTS: Final = (b"<", b"\xef\xbb\xbf<", b"\xff\xfe<", b"\xfe\xff\0<")
 def read_device_file(path: Path) -> Description:
     """The description in ``path``, with its oddities in ``findings``.
 
-    Raises ``FileFaults`` where it cannot be opened or is no device description.
+    Raises ``FileFaults`` if it cannot be opened or is no device description.
     """
     return read_device(contents(path), str(path))
 
 
 def read_device(content: bytes, name: str) -> Description:
-    """As ``read_device_file``, of a file's content; ``name`` is for messages."""
+    """As ``read_device_file``, from a file's content; ``name`` is for messages."""
     report = Report()
     is_xml = content.lstrip(b" \t\r\n").startswith(_XML_STARTS)
     description = read_xdd(content, report) if is_xml else read_eds(decode(content, report), report)
@@ -57,8 +57,7 @@ def contents(path: Path) -> bytes:
 def read_configuration(path: Path, node_id: int | None = None) -> tuple[Download, ...]:
     """The downloads of a DCF, XDC or concise DCF for the node ``node_id``.
 
-    Raises ``FileFaults`` where the file cannot be read, and where a part of it cannot: half a
-    configuration is none.
+    Raises ``FileFaults`` if the file, or any part of it, cannot be read: half a configuration is none.
     """
     content = contents(path)
     if path.suffix.lower() in CONCISE_SUFFIXES:

@@ -12,7 +12,7 @@ _MOST_SUBS: Final = 254
 _REFUSES_DOWNLOAD: Final = 1
 _LONGEST_TYPE: Final = 0x1B
 _MOST_COMPACT: Final = 100_000
-"""Entries that CompactSubObj may make of one file: few lines can ask for millions."""
+"""Entries that CompactSubObj may create per file: a few lines can ask for millions."""
 
 
 class ObjectReader:
@@ -66,7 +66,7 @@ class ObjectReader:
         return Object(index, name, kind, tuple(entries[sub] for sub in sorted(entries)))
 
     def _object_type(self, index: int, root: Section, has_subs: bool) -> ObjectType:
-        """VAR where it is missing (CiA 306 §4.6.3.2), unless there are sub-indices."""
+        """VAR if it is missing (CiA 306 §4.6.3.2), unless there are sub-indices."""
         likely = ObjectType.RECORD if has_subs else ObjectType.VAR
         code = self._fields.number(root, "ObjectType")
         if code is None:
@@ -87,7 +87,7 @@ class ObjectReader:
         return kind
 
     def _element_type(self, root: Section, subs: dict[int, Section]) -> Text | None:
-        """What the elements of an array are, for those that do not say."""
+        """The type of an array's elements, for those that do not say."""
         return root.get("DataType") or (subs[1].get("DataType") if 1 in subs else None)
 
     def _sub(self, index: int, sub: int, section: Section, fallback: Text | None) -> Entry:
@@ -153,7 +153,8 @@ class ObjectReader:
         return None
 
     def _named_type(self, code: int | None) -> int | None:
-        """A type that the file itself describes, as CANFestival writes limited ones: [A0] with [A0sub1]."""
+        """A type that the file itself defines, as CANFestival does for types with limits: [A0] with
+        [A0sub1]."""
         if code is None or code <= _LONGEST_TYPE or code not in self._subs:
             return code
         base = self._subs[code].get(1)

@@ -1,4 +1,4 @@
-"""PDO objects: those that CompactPDO leaves out of an EDS (CiA 306 §4.5.2), and a summary of all."""
+"""PDO objects: those that an EDS leaves out with CompactPDO (CiA 306 §4.5.2), and a summary of all."""
 
 from __future__ import annotations
 
@@ -91,8 +91,8 @@ class MappedObject:
 
 @dataclass(frozen=True, slots=True)
 class PdoSummary:
-    """A PDO as the file configures it. ``cob_id`` is without its flags and None where it needs a node id
-    that is not known or is not given at all."""
+    """A PDO as the file configures it. ``cob_id`` is without its flags, and None if it is missing or depends
+    on an unknown node id."""
 
     receives: bool
     number: int

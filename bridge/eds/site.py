@@ -12,8 +12,8 @@ from bridge.tomlfile import TomlFile, dotted
 
 
 def read_configurations(site: Site, path: Path) -> dict[str, tuple[Download, ...]]:
-    """What the files named by ``configuration`` ask of their nodes, by the node's name; their names are
-    relative to the site file at ``path``. Raises ``FileFaults`` with all faults of all files."""
+    """The downloads in the files named by ``configuration``, by node name; file names are relative to the
+    site file at ``path``. Raises ``FileFaults`` with all faults of all files."""
     found: dict[str, tuple[Download, ...]] = {}
     faults: list[Fault] = []
     for b, bus in enumerate(site.bus):
@@ -25,7 +25,7 @@ def read_configurations(site: Site, path: Path) -> dict[str, tuple[Download, ...
             except FileFaults as error:
                 key = ("bus", b, "node", n, "configuration")
                 line = TomlFile(path).line(key)
-                # What has no line of its own is told where the file is named.
+                # A finding without a line of its own is reported where the file is named.
                 faults += [
                     one
                     if one.line

@@ -1,4 +1,4 @@
-"""Bytes of a text file as lines, whatever they were saved as."""
+"""Bytes of a text file as lines, whatever its encoding."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _LINE_END: Final = re.compile(r"\r\n|\n|\r")
 
 
 def decode(content: bytes, report: Report) -> str:
-    """UTF-8, with or without a byte order mark, or UTF-16 with one, or else Windows-1252."""
+    """UTF-8 with or without a byte order mark, UTF-16 with one, otherwise Windows-1252."""
     for mark, encoding in ((codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be")):
         if content.startswith(mark):
             report.warning(1, "is UTF-16: read as such")

@@ -27,7 +27,7 @@ _KEYS: Final = {
 
 
 def read_xdd(content: bytes, report: Report) -> Description:
-    """Everything that can be read of ``content``. What cannot is in the report."""
+    """Everything that can be read from ``content``; the report has what cannot."""
     return _XddReader(parse(content, report), report).read()
 
 
@@ -72,7 +72,7 @@ class _XddReader:
         return {index: reader.read(index) for index in roots}
 
     def _hexadecimal(self, element: Element, name: str, most: int) -> int | None:
-        """An index or sub-index, in hexadecimal without a mark."""
+        """An index or sub-index: hexadecimal without a prefix."""
         text = element.attributes.get(name, "")
         digits = text.lower().removeprefix("0x")
         if digits and len(digits) <= 4 and set(digits) <= set("0123456789abcdef") and int(digits, 16) <= most:

@@ -1,4 +1,4 @@
-"""Parameters of an XDD's application process (CiA 311 §6.4.5): what objects leave to them by uniqueIDRef."""
+"""Parameters of an XDD's application process (CiA 311 §6.4.5), to which objects refer by uniqueIDRef."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _ACCESS: Final = {
     "readwriteoutput": "rww",
     "noaccess": "ro",
 }
-"""By the attribute in lower case. What may not be accessed at all is not written either."""
+"""By the attribute in lower case. noAccess counts as read-only: it is not written."""
 DEFAULT_ACCESS: Final = "ro"
-"""Of a parameter that does not say, and of an object that has none (the schema's default is ``read``)."""
+"""For parameters and objects without an access (the schema's default is ``read``)."""
 
 BIT_STRING: Final = "BITSTRING"
 TYPES: Final = {
@@ -44,12 +44,12 @@ TYPES: Final = {
     "STRING": DataType.VISIBLE_STRING,
     "WSTRING": DataType.UNICODE_STRING,
 }
-"""Every element that names a simple type (IEC 61131-3). Types of other lengths, 24 bits say, and domains have
-none: tools write BITSTRING for them."""
+"""Every element that names a simple type (IEC 61131-3). Types of other lengths, such as 24 bits, and domains
+have none: tools write BITSTRING for them."""
 _VALUES: Final = {"defaultValue": "defaultvalue", "actualValue": "parametervalue"}
 _LIMITS: Final = {"minValue": "lowlimit", "maxValue": "highlimit"}
 _DEEPEST: Final = 8
-"""Types derived from each other."""
+"""Depth of types derived from each other."""
 
 
 class Parameters:
@@ -62,7 +62,7 @@ class Parameters:
         self._types = _by_id(one for tag in ("derived", "enum") for one in root.all(tag))
 
     def fill(self, section: Section, element: Element) -> None:
-        """What ``element``, an object or sub-object, does not say itself."""
+        """Fill in what ``element``, an object or sub-object, does not say itself."""
         reference = element.attributes.get("uniqueidref")
         parameter = self._parameters.get(reference or "")
         if parameter is None:
@@ -95,7 +95,7 @@ class Parameters:
         return known or DEFAULT_ACCESS
 
     def _type_of(self, parameter: Element) -> str | None:
-        """The element that names the type, also through types that the file derives from it."""
+        """The element that names the type, found through derived types if need be."""
         element = parameter
         for _ in range(_DEEPEST):
             named = next((child for child in element.children if child.tag in TYPES), None)
@@ -110,7 +110,7 @@ class Parameters:
 
 
 def _give(section: Section, key: str, text: str, line: int) -> None:
-    """Set a key that the section does not have, or has empty."""
+    """Set a key that is missing from the section or empty."""
     if text and not section.text(key):
         section.keys[key] = Text(text, line)
 
@@ -131,7 +131,7 @@ def _is_domain(section: Section) -> bool:
 
 
 def _fill_limits(section: Section, allowed: Element) -> None:
-    """Of one range: several are no limits."""
+    """Take the limits of a single range; several ranges are no limits."""
     ranges = [child for child in allowed.children if child.tag == "range"]
     if len(ranges) != 1:
         return

@@ -15,7 +15,7 @@ _MOST_ELEMENTS: Final = 500_000
 
 
 class _Refused(Exception):
-    """The text is XML that we do not read on."""
+    """The text is XML that we refuse to read further."""
 
 
 @dataclass(slots=True)
@@ -37,7 +37,7 @@ class Element:
             waiting.extend(reversed(element.children))
 
     def all(self, tag: str) -> Iterator[Element]:
-        """The elements of this name at or below this one."""
+        """The elements with this name: this one and those below it."""
         return (element for element in self.walk() if element.tag == tag)
 
     def first(self, tag: str) -> Element | None:
@@ -45,9 +45,9 @@ class Element:
 
 
 def parse(content: bytes, report: Report) -> Element:
-    """The tree of ``content``; where it is broken off, what stands before, and that is reported."""
+    """The tree of ``content``; if that breaks off, the part before, and a report of it."""
     builder = _Builder()
-    # Expat's own text encoding rules hold; an unknown encoding is an error like any other.
+    # Expat decides on the encoding; an unknown one is an error like any other.
     parser = expat.ParserCreate()
     parser.buffer_text = True
     builder.attach(parser)
@@ -57,7 +57,7 @@ def parse(content: bytes, report: Report) -> Element:
         report.error(error.lineno, f"is not XML from here on: {expat.ErrorString(error.code)}")
     except _Refused as error:
         report.error(parser.CurrentLineNumber, str(error))
-    except (ValueError, LookupError) as error:  # a declared encoding that Python does not have
+    except (ValueError, LookupError) as error:  # it declares an encoding that Python does not have
         report.error(1, f"cannot be decoded: {error}")
     return builder.root
 

@@ -1,4 +1,4 @@
-"""Listening sockets: opened, with a helpful sentence if that fails, and watched later."""
+"""Listening sockets: opening them, with advice if that fails, and watching them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _advice(error: OSError, host: str, port: str) -> str:
 
 
 def is_listening(bound: socket.socket) -> bool:
-    """False for one that was closed, or ended from outside (``ss --kill``)."""
+    """False if it was closed, or ended from outside (``ss --kill``)."""
     try:
         return bool(bound.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN))
     except OSError:
@@ -55,14 +55,14 @@ def is_listening(bound: socket.socket) -> bool:
 
 
 async def until_deaf(bound: socket.socket, key: str) -> None:
-    """Wait for ever, or raise ``OperationFailed`` when the socket listens no more."""
-    while is_listening(bound):  # noqa: ASYNC110 - the kernel tells nobody
+    """Wait until the socket no longer listens, then raise ``OperationFailed``."""
+    while is_listening(bound):  # noqa: ASYNC110 - the kernel notifies nobody
         await asyncio.sleep(_LOOK_EVERY_S)
     raise OperationFailed(f"{key}: its socket listens no more")
 
 
 class Port:
-    """A port that is held for a server in another process, also while that is away."""
+    """A port that is held for a server in another process, also while that is not running."""
 
     def __init__(self, endpoint: str, key: str) -> None:
         self._endpoint = endpoint
@@ -70,7 +70,7 @@ class Port:
         self._socket: socket.socket | None = None
 
     def socket(self) -> socket.socket:
-        """The listening socket, a new one where it has ended. Raises ``Unavailable``."""
+        """The listening socket, a new one if the old one has ended. Raises ``Unavailable``."""
         if self._socket is None or not is_listening(self._socket):
             self.close()
             self._socket = listen(self._endpoint, self._key)

@@ -1,4 +1,4 @@
-"""When the event loop has certainly looked at its sockets, and when it last recovered from a hang."""
+"""The last time at which the event loop has certainly looked at its sockets, and its last hang."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class Pulse:
             self._timer = None
 
     def _beat(self) -> None:
-        """Between two beats the loop looks at its sockets, after the first and before what it calls on the
-        second; what it finds is read before the second beat."""
+        """The loop polls its sockets between two beats, and reads what it finds before the second: what is
+        read later arrived after the first."""
         before, self._beat_at = self._beat_at, self._clock()
         has_hung = (self._beat_at - before) * 1000 > HANG_MS
         self.look = Look(before, self._beat_at if has_hung else self.look.steady_since)

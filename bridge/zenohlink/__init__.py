@@ -1,11 +1,10 @@
 """A zenoh session that never blocks the event loop.
 
-A zenoh call may wait for seconds (a peer that does not read, a session that closes), so every call is
-made by one worker thread and handed to it by a queue. What zenoh brings comes on threads of its own and
-is handed to the loop in small portions. Whatever zenoh raises ends here: it is counted and logged.
+A zenoh call may block for seconds (a peer that does not read, a session that closes), so one worker thread
+makes all calls and gets them through a queue. zenoh delivers on threads of its own; what arrives is passed to
+the loop in small portions. Every error of zenoh ends here: it is counted and logged.
 
-Bound to no layout of keys: the zenoh protocol for everybody and the link between our processes both use
-it.
+It knows no key layout: both the zenoh server and the link between our processes use it.
 """
 
 from bridge.zenohlink.link import Asked, ZenohLink

@@ -14,17 +14,17 @@ Arguments = TypeVarTuple("Arguments")
 _log = logging.getLogger(__name__)
 
 _LIMIT: Final = 1000
-"""Most queries and samples of one share that wait for the loop; what comes on top is refused."""
+"""Queries and samples of one share that may wait for the loop; further ones are refused."""
 _MOST_SHARES: Final = 64
-"""Further ones count as the first."""
+"""Shares beyond this number count as the first one."""
 _AT_ONCE: Final = 32
-"""Calls between two looks of the loop at its other business."""
+"""Calls made before the loop gets its turn for other work."""
 
 
 class Inbox:
-    """Calls that other threads want to be made in the loop. Belongs to the loop it is created in.
+    """Calls that other threads hand over to be made in the loop. Belongs to the loop it is created in.
 
-    Those of one share keep their order; shares have their turns, so that who fills his holds up no other.
+    Calls of one share keep their order; shares take turns, so that a full one delays no other.
     """
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class Inbox:
         self._drain_is_due = False
 
     def take_in(self, call: Callable[[], None], share: str = "") -> bool:
-        """From any thread. False: there is no room. One wake-up of the loop serves all that waits."""
+        """From any thread. False: there is no room. One wake-up of the loop serves all waiting calls."""
         if share not in self._shares and len(self._shares) >= _MOST_SHARES:
             share = ""
         waiting = self._shares.setdefault(share, deque())
@@ -50,14 +50,14 @@ class Inbox:
         return True
 
     def tell(self, call: Callable[[*Arguments], object], *arguments: *Arguments) -> None:
-        """From any thread, without a limit: for the ends of what the loop itself has begun."""
+        """From any thread, without a limit: for the completion of what the loop itself has begun."""
         try:
             self._loop.call_soon_threadsafe(call, *arguments)
         except RuntimeError:
             _log.debug("the event loop has ended; nobody is left to be told")
 
     def _drain(self) -> None:
-        # Cleared before the queues are looked at: whoever appends after that wakes the loop again.
+        # Cleared before the queues are read: an append after that wakes the loop again.
         self._drain_is_due = False
         try:
             for call in islice(self._in_turn(), _AT_ONCE):
@@ -68,7 +68,7 @@ class Inbox:
                 self._loop.call_soon(self._drain)
 
     def _in_turn(self) -> Iterator[Callable[[], None]]:
-        """A call of each share after the other, going on where it was left."""
+        """One call of each share in turn, continuing where it stopped."""
         while any(shares := tuple(self._shares.values())):
             for place in (*range(self._next, len(shares)), *range(self._next)):
                 if shares[place]:

@@ -1,4 +1,5 @@
-"""A thread that makes calls of one session, one after the other: what waits in one lane holds up no other."""
+"""A thread that makes calls of one session, one after the other; a call that blocks delays only its own
+lane."""
 
 # pyright: reportUnknownMemberType=false
 # zenoh's stubs leave out the return types of what returns nothing.
@@ -13,14 +14,14 @@ from typing import Final
 import zenoh
 
 LIMIT: Final = 10_000
-"""Most jobs that wait in one lane; what comes on top is refused."""
+"""Jobs that may wait in one lane; further ones are refused."""
 
 Job = Callable[[zenoh.Session], None]
 
 
 class Lane:
-    """``complain`` is told, on the lane's thread, what a job has raised. The thread is a daemon: where zenoh
-    does not come back, the process can end without it."""
+    """``complain`` is called, on the lane's thread, with what a job has raised. The thread is a daemon: if
+    zenoh never returns, the process can still end."""
 
     def __init__(self, name: str, session: zenoh.Session, complain: Callable[[Exception], None]) -> None:
         self.session = session
@@ -35,18 +36,18 @@ class Lane:
         return self._thread.is_alive()
 
     def do(self, job: Job) -> bool:
-        """From any thread. False: there is no room, or nobody to do it."""
+        """From any thread. False: there is no room, or the lane has ended."""
         if self._is_stopping or self._jobs.qsize() >= LIMIT:
             return False
         self._jobs.put(job)
         return True
 
     def end(self) -> None:
-        """When everything that was given so far is done."""
+        """End when all jobs given so far are done."""
         self._jobs.put(None)
 
     def stop(self) -> None:
-        """Skip what waits."""
+        """End without the jobs that still wait."""
         self._is_stopping = True
         self._jobs.put(None)
 
@@ -59,5 +60,5 @@ class Lane:
                 job(self.session)
             except Exception as error:  # noqa: BLE001 - one bad job must not end all others
                 self._complain(error)
-            # What the job holds, a query perhaps, ends here and not when the next one comes.
+            # Release what the job holds, such as a query, now and not with the next job.
             del job

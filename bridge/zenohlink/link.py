@@ -37,10 +37,10 @@ Result = TypeVar("Result")
 _log = logging.getLogger(__name__)
 
 _PUTS_AT_ONCE: Final = 100
-"""Puts between two other jobs of the worker: with a stalled subscriber each takes up to 1 ms."""
+"""Puts made before another job gets its turn: with a stalled subscriber each takes up to 1 ms."""
 
 Share = Callable[[str, bytes | None], str]
-"""Whose turn a query or a sample takes on its way to the loop, by key and payload (``Inbox``)."""
+"""The share of the ``Inbox`` in which a query or sample waits, by key and payload."""
 
 
 def _one_for_all(key: str, payload: bytes | None) -> str:
@@ -51,28 +51,28 @@ def _one_for_all(key: str, payload: bytes | None) -> str:
 class Asked:
     """A query, to be answered from the loop: any number of ``send``, then ``finish`` or ``fail``.
 
-    One that is not finished keeps its asker waiting until the asker's time is up.
+    If it is not finished, the client waits until its own time-out.
     """
 
     key: str
     payload: bytes | None
     attachment: bytes | None
     parameters: str
-    """What stands behind the ? of the selector."""
+    """The selector's part after the ``?``."""
     received_at: float
-    """When zenoh has handed it over, in monotonic seconds; it may have waited for the loop since."""
+    """When zenoh handed it over, in monotonic seconds; it may have waited for the loop since."""
     _query: zenoh.Query
     _link: ZenohLink
     _lane: Lane
     _is_apart: bool = False
 
     def apart(self) -> Asked:
-        """The same, answered on a thread of its own, which ``finish`` ends. For what may be long: replies
-        wait for an asker that does not read."""
+        """The same, answered on a thread of its own, which ``finish`` ends. For long answers: replies wait
+        for a client that does not read."""
         return replace(self, _lane=self._link.own_lane(self._lane), _is_apart=True)
 
     def send(self, messages: Sequence[Message]) -> None:
-        """With the time of now: what is published later is newer, whenever this goes out."""
+        """With the present time stamp: what is published later counts as newer, whenever this is sent."""
         try:
             stamp = self._lane.session.new_timestamp()
         except ZENOH_ERRORS:
@@ -81,11 +81,11 @@ class Asked:
         self._do(lambda _: reply(self._query, messages, stamp))
 
     async def settle(self) -> None:
-        """Wait until what was sent so far has gone, or has been given up."""
+        """Wait until the replies so far have been sent or given up."""
         await self._link.settle(self._lane)
 
     def finish(self) -> None:
-        """There are no more replies."""
+        """End the query: there are no more replies."""
         self._do(lambda _: self._query.drop())
         if self._is_apart:
             self._lane.end()
@@ -104,11 +104,11 @@ class Asked:
 class ZenohLink:
     """A zenoh session on a worker thread. All methods are called from the event loop.
 
-    ``name`` stands in messages to the user. Handlers are called in the loop. Declarations and messages
-    keep their order, except that of several ``put`` on one key only the newest may be sent.
+    ``name`` is used in messages to the user. Handlers are called in the loop. Declarations and messages keep
+    their order, except that of several ``put`` on one key only the newest may be sent.
 
-    Queries are answered in two lanes beside that: those of which ``is_prompt`` is true of the key, where no
-    reply may wait (``prompt`` of the session's settings), and all others. It is given where strangers
+    Queries are answered in two further lanes: one for keys with ``is_prompt``, whose replies never wait
+    (``prompt`` of the session's settings), and one for all others. ``is_prompt`` is given if strangers
     connect.
     """
 
@@ -131,16 +131,16 @@ class ZenohLink:
 
     @property
     def dropped(self) -> int:
-        """Messages, queries and samples that found no room."""
+        """Messages, queries and samples for which there was no room."""
         return self._dropped + self._inbox.refused
 
     # life
 
     async def open(self, patience_s: float = 2.0) -> bool:
-        """Open the session. False: nobody has answered yet (client mode); it goes on trying, and what
-        is declared and sent meanwhile waits.
+        """Open the session. False: nobody has answered yet (client mode); it keeps trying, and meanwhile
+        declarations and messages wait.
 
-        Raises Unavailable where zenoh refuses, with the reason.
+        Raises Unavailable with the reason if zenoh refuses.
         """
         self._loop = asyncio.get_running_loop()
         self._inbox = Inbox()
@@ -156,7 +156,7 @@ class ZenohLink:
         return True
 
     async def close(self, timeout_s: float = 2.0) -> bool:
-        """Close the session. False: zenoh did not come to an end in time and was left behind."""
+        """Close the session. False: zenoh did not end in time and was abandoned."""
         if self._worker.is_stopping or not self._worker.is_alive:
             return True
         self._latest.clear()
@@ -168,8 +168,8 @@ class ZenohLink:
         return self._closed.done()
 
     async def failed(self) -> None:
-        """Wait until the link is closed. Raises ``OperationFailed`` where nobody has closed it: nothing
-        is sent or heard any more."""
+        """Wait until the link is closed. Raises ``OperationFailed`` if it ended without being closed: nothing
+        is sent or received any more."""
         await asyncio.shield(self._closed)
         if not self._worker.is_stopping:
             raise OperationFailed(f"{self.name}: the zenoh session has ended by itself")
@@ -183,7 +183,7 @@ class ZenohLink:
     # sending
 
     def put(self, message: Message) -> None:
-        """Publish; where the worker is behind, a newer value takes the place of an older one."""
+        """Publish. If the worker is behind, a newer value replaces an older one."""
         if self._worker.is_stopping or not self._worker.is_alive:
             return
         if len(self._latest) >= LIMIT and message.key not in self._latest:
@@ -199,7 +199,7 @@ class ZenohLink:
         return self.submit(lambda session: publish(session, message))
 
     def submit(self, job: Job) -> bool:
-        """Let the worker do ``job``. False: there was no room, or nobody to do it."""
+        """Let the worker do ``job``. False: there was no room, or the worker has ended."""
         if self._worker.is_stopping or not self._worker.is_alive or self._worker.waiting >= LIMIT:
             self._dropped += 1
             return False
@@ -207,7 +207,7 @@ class ZenohLink:
         return True
 
     async def settle(self, lane: Lane | None = None) -> None:
-        """Wait until the worker, or ``lane``, has done what it was given so far."""
+        """Wait until the worker, or ``lane``, has done all jobs given so far."""
         done: asyncio.Future[None] = self._loop.create_future()
         if (lane.do if lane else self.submit)(lambda _: self._inbox.tell(_resolve, done, None)):
             await asyncio.wait((done, self._closed), return_when=asyncio.FIRST_COMPLETED)
@@ -228,7 +228,7 @@ class ZenohLink:
         for message in batch:
             try:
                 publish(session, message)
-            except Exception as error:  # noqa: BLE001 - nor may one value hold up the others
+            except Exception as error:  # noqa: BLE001 - one bad value must not stop the others
                 self._worker.complain(error)
         self._inbox.tell(self._hand_over)
 
@@ -242,7 +242,7 @@ class ZenohLink:
         timeout_s: float = 2.0,
         attachment: bytes | None = None,
     ) -> list[Answer]:
-        """The replies to a query; none where nobody answers within ``timeout_s``."""
+        """The replies to a query; none if nobody answers within ``timeout_s``."""
         answers: list[Answer] = []
         done: asyncio.Future[None] = self._loop.create_future()
 
@@ -269,7 +269,7 @@ class ZenohLink:
                 raise
 
         if self.submit(ask):
-            # zenoh keeps the time; this bound is for a worker that does not get to it.
+            # zenoh applies the time-out; this one is for a worker that is too busy to ask.
             waiting = (done, self._closed)
             await asyncio.wait(waiting, timeout=timeout_s + 0.1, return_when=asyncio.FIRST_COMPLETED)
         return list(answers)
@@ -279,7 +279,7 @@ class ZenohLink:
     def declare_queryable(
         self, key: str, handler: Callable[[Asked], None], share: Share = _one_for_all
     ) -> None:
-        """Answer queries on ``key``. A flood of them ends before it reaches the loop."""
+        """Answer queries on ``key``. A flood of them is cut off before it reaches the loop."""
 
         def declare(session: zenoh.Session) -> None:
             prompt, other = self._worker.answers(session)
@@ -291,10 +291,10 @@ class ZenohLink:
                 lane = prompt if self._is_prompt(key) else other
                 asked = Asked(key, payload, attachment, parameters, now, query, self, lane)
                 if not self._inbox.take_in(partial(handler, asked), share(key, payload)):
-                    # Not here: the end of a query may wait for the asker, and this thread reads for others.
+                    # Not here: ending a query may wait for its client, and this thread reads for all others.
                     lane.do(lambda _: query.drop())
 
-            # Complete: whoever stores these keys must not be asked in our place.
+            # Complete, so that a storage of these keys is not asked in our place.
             callback = zenoh.handlers.Callback(on_query, indirect=False)
             self._worker.declared.append(session.declare_queryable(key, callback, complete=True))
 
@@ -308,7 +308,7 @@ class ZenohLink:
         *,
         from_others: bool = False,
     ) -> None:
-        """Follow ``key``; ``from_others`` leaves out what this session itself publishes."""
+        """Subscribe to ``key``; ``from_others`` leaves out what this session itself publishes."""
         origin = zenoh.Locality.REMOTE if from_others else zenoh.Locality.ANY
 
         def on_sample(sample: zenoh.Sample) -> None:
@@ -323,7 +323,7 @@ class ZenohLink:
         self.submit(declare)
 
     def follow_liveliness(self, key: str, handler: Callable[[str, bool], None]) -> None:
-        """``handler(key, is_alive)`` for each token there is and each that comes or goes."""
+        """Call ``handler(key, is_alive)`` for each existing token, and whenever one appears or disappears."""
 
         def on_sample(sample: zenoh.Sample) -> None:
             self._inbox.take_in(partial(handler, str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
@@ -335,7 +335,7 @@ class ZenohLink:
         self.submit(declare)
 
     def follow_endings(self, handler: Callable[[], None]) -> None:
-        """``handler`` is called for each connection to a peer that has ended."""
+        """Call ``handler`` for each connection to a peer that has ended."""
 
         def on_event(event: zenoh.TransportEvent) -> None:
             if event.kind == zenoh.SampleKind.DELETE:
@@ -348,7 +348,7 @@ class ZenohLink:
         self.submit(declare)
 
     def follow_strangers(self, handler: Callable[[list[str]], None]) -> None:
-        """``handler`` is given the addresses of connections that came to no session."""
+        """Call ``handler`` with the addresses of connections that did not become a session."""
         self._worker.on_strangers = lambda places: self._inbox.take_in(partial(handler, places))
 
     def declare_token(self, key: str) -> None:

@@ -1,4 +1,4 @@
-"""What goes through a link, in our own types."""
+"""What is sent and received through a link, in our own types."""
 
 # pyright: reportUnknownMemberType=false
 # zenoh's stubs leave out the return types of what returns nothing.
@@ -18,8 +18,8 @@ _SOURCE_PLACE: Final = re.compile(r"\s+at /\S+?\.rs:\d+\.?")
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A payload under its key, as it is sent or was received. ``encoding`` is zenoh's name of it;
-    ``received_at`` is in monotonic seconds."""
+    """A payload with its key, sent or received. ``encoding`` is zenoh's name for it; ``received_at`` is in
+    monotonic seconds."""
 
     key: str
     payload: bytes
@@ -30,14 +30,14 @@ class Message:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """One reply to a ``get``; where ``ok`` is False the payload says why."""
+    """One reply to a ``get``; if ``ok`` is False, the payload says why."""
 
     ok: bool
     message: Message
 
 
 def publish(session: zenoh.Session, message: Message) -> None:
-    """Never waits for a peer that does not read; that peer loses the message."""
+    """Never waits for a peer that does not read: that peer loses the message."""
     session.put(
         message.key,
         message.payload,
@@ -48,8 +48,8 @@ def publish(session: zenoh.Session, message: Message) -> None:
 
 
 def reply(query: zenoh.Query, messages: Sequence[Message], stamp: zenoh.Timestamp) -> None:
-    """``stamp``: where a storage has an older sample of the key, the asker's zenoh takes the newer one, and
-    takes one without a time for older than any."""
+    """``stamp``: if a storage has another sample of the key, the client's zenoh takes the newer one, and one
+    without a time counts as the oldest."""
     for message in messages:
         query.reply(
             message.key,
@@ -86,5 +86,5 @@ def to_bytes(data: zenoh.ZBytes | None) -> bytes | None:
 
 
 def sentence(error: Exception) -> str:
-    """zenoh's message without the places in its own source."""
+    """zenoh's message without file names and lines of its source."""
     return _SOURCE_PLACE.sub("", str(error)).strip()

@@ -15,20 +15,21 @@ from bridge.errors import Unavailable
 from bridge.zenohlink.message import sentence
 
 _LEASE_MS: Final = 1000
-"""A peer that falls silent is noticed within this time, and one that does not come to a session in it is
-closed; zenoh's default is 10 s for both."""
+"""A peer that falls silent is noticed within this time, and a connection that does not become a session in it
+is closed; zenoh's default is 10 s for both."""
 _MOST_PENDING: Final = 500
-"""Connections without a session. zenoh closes what comes on top: with the 100 of its default a hundred that
-say nothing lock everybody out. Each is a file of the bus process, which often has no more than 1024."""
+"""Connections that are not a session yet; zenoh closes further ones. With its default of 100, a hundred
+silent connections lock everybody out. Each uses a file descriptor of the bus process, which often has no more
+than 1024."""
 _STALLED_US: Final = 500_000
-"""How long a query or a reply waits for a peer that does not read before the connection is closed."""
+"""How long a query or reply waits for a peer that does not read; then the connection is closed."""
 _STALLED_AMONG_OTHERS_US: Final = 100_000
-"""The same where others must not notice: inside zenoh they do, now and then."""
+"""The same where others must not be delayed: inside zenoh they sometimes are."""
 
 _WAIT: Final = "transport/link/tx/queue/congestion_control/block/wait_before_close"
 _MOST_BATCHES: Final = 16
-"""Of 64 KiB, made when they are needed. With the two of zenoh's default an answer would be dropped when the
-machine is busy for a moment."""
+"""Buffers of 64 KiB, allocated when needed. With zenoh's default of two, an answer would be dropped whenever
+the machine is busy for a moment."""
 
 
 def zenoh_config(
@@ -41,22 +42,21 @@ def zenoh_config(
     prompt: Sequence[str] = (),
     waiting: Sequence[str] = (),
 ) -> zenoh.Config:
-    """Settings of a session that finds nobody by itself and notices a silent peer within a second.
+    """Settings of a session without discovery that notices a silent peer within a second.
 
-    ``users`` is our own user, its password, and the path of a file with a line ``user:password`` for
-    each who may connect. ``access`` is zenoh's ``access_control``.
+    ``users`` is our own user, its password, and the path of a file with a line ``user:password`` for each
+    user. ``access`` is zenoh's ``access_control``.
 
-    With ``prompt``, answers are dropped where the asker does not read. On the keys of ``prompt`` they go
-    ahead of published values. On those of ``waiting`` that are not among ``prompt``, they wait for the asker
-    instead.
+    With ``prompt``, answers are dropped if the client does not read. On the keys of ``prompt`` they go ahead
+    of published values. On keys of ``waiting`` that are not in ``prompt``, they wait for the client instead.
 
-    Raises Unavailable where an endpoint is not one.
+    Raises Unavailable if an endpoint is not valid.
     """
     settings: dict[str, object] = {
         "mode": mode,
         "listen/endpoints": list(listen),
         "connect/endpoints": list(connect),
-        # A peer goes on trying by itself; this makes a client do so too.
+        # A peer keeps trying by itself; this makes a client do so, too.
         "connect/timeout_ms": -1,
         "connect/exit_on_failure": False,
         "connect/retry": {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2},
@@ -91,10 +91,10 @@ def zenoh_config(
 
 
 def _replies(prompt: Sequence[str], waiting: Sequence[str]) -> list[dict[str, object]]:
-    """Replies, and the end of them, have what their query has: so it is changed as it comes in, by each of
-    these after the other. Each kind has a queue, and with it a lock, of its own: what may be dropped would
-    else wait for what waits. zenoh ends a query that is for nobody on a thread that reads for all
-    connections."""
+    """Replies and their end inherit priority and congestion control from their query, so the query is changed
+    as it comes in, by each of these in turn. Each kind has a queue, and thus a lock, of its own: otherwise
+    droppable replies would wait behind those that wait. zenoh ends a query that nobody answers on a thread
+    that reads for all connections."""
     rules: tuple[tuple[Sequence[str], str, str], ...] = (
         (("**", "*/**/@/**"), "drop", "background"),
         (waiting, "block", "data_low"),

@@ -1,4 +1,4 @@
-"""Connections to our port that come to no session. Sans-IO."""
+"""Connections to our port that do not become a session. Sans-IO."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Iterable
 from typing import Final
 
 PATIENCE_S: Final = 2.0
-"""More than a connection is given to come to a session (``settings.py``)."""
+"""Longer than a connection may take to become a session (``settings.py``)."""
 _MORE: Final = re.compile(r"%[^\]]*|[?#].*")
 
 
 class Strangers:
-    """Places are the other ends of connections, ``10.0.0.1:40000`` or ``[fe80::1]:40000``. ``came`` may be
+    """Places are the remote ends of connections, ``10.0.0.1:40000`` or ``[fe80::1]:40000``. ``came`` may be
     called from another thread."""
 
     def __init__(self) -> None:
@@ -33,7 +33,7 @@ class Strangers:
         self._waiting |= dict.fromkeys({_bare(place) for place in places} - self._links, now)
 
     def take(self, now: float) -> list[str]:
-        """Those that have had their time, each once."""
+        """Those whose time is up, each once."""
         gone = [place for place, since in tuple(self._waiting.items()) if now - since >= PATIENCE_S]
         for place in gone:
             self._waiting.pop(place, None)
@@ -41,6 +41,6 @@ class Strangers:
 
 
 def _bare(place: str) -> str:
-    """Without what zenoh says of a link, and the interface of an IPv6 address, which has a name here and a
-    number there."""
+    """Without zenoh's link type and the interface of an IPv6 address, which is a name in one place and a
+    number in the other."""
     return _MORE.sub("", place)

@@ -1,7 +1,7 @@
-"""What each zenoh link may do, as zenoh's ``access_control``. Pure.
+"""What each zenoh link may do, as zenoh's ``access_control``. Sans-IO.
 
-The bridge alone publishes, answers and holds tokens below ``<prefix>/<site>/``, and passes nothing on from
-one of its links to another: neither can anybody speak in its place, nor wait in it for somebody else.
+Only the bridge publishes, answers and holds tokens below ``<prefix>/<site>/``, and it forwards nothing
+between its links. So nobody can pose as the bridge, or block it by waiting for another client.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from bridge.northbound.zenoh.keys import KeySpace
 from bridge.northbound.zenoh.users import Users
 
 _EVERYTHING = ("**", "*/**/@/**")
-"""``**`` does not find what is behind an ``@``; what begins with one is zenoh's own."""
+"""``**`` does not match chunks that begin with ``@``; keys that begin with one are zenoh's own."""
 
 
 def access_control(keys: KeySpace, users: Users, *, accept_put: bool) -> dict[str, object]:
-    """Where no rule allows it, nothing comes in and nothing goes out."""
+    """Without a rule that allows it, nothing passes in either direction."""
     told = ("declare_subscriber", "declare_liveliness_subscriber", "liveliness_query")
     rules: list[dict[str, object]] = [
         _rule("ask", "ingress", ("query",), ("**",)),

@@ -1,7 +1,7 @@
-"""Who a zenoh client is. With users, it is who its link has proved to be.
+"""Who a zenoh client is: with users, the user that its link has authenticated as.
 
-zenoh does not tell by which link a query came. It does let a link through to some keys and not to others:
-each user has command keys of its own, ``…/@/controller/<user>/…``, and by them the bridge knows who asks.
+zenoh does not tell which link a query came by, but it can restrict the keys that a link may use. So each user
+has command keys of its own, ``…/@/controller/<user>/…``, which tell the bridge who asks.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _OWN_KEYS: Final = "@/controller/"
 
 @dataclass(frozen=True, slots=True)
 class Login:
-    """Our own user, and the file with the lines ``user:password`` of all."""
+    """Our own user, and the file with a line ``user:password`` for each user."""
 
     user: str
     password: str
@@ -33,9 +33,8 @@ class Login:
 
 @dataclass(frozen=True, slots=True)
 class Users:
-    """Where links prove who their users are, ``controllers`` have command keys of their own. Else whoever
-    asks is who it says it is. ``sole`` is the one user that there is beside the bridge's, where there can
-    be nobody else."""
+    """If links authenticate, ``controllers`` have command keys of their own; otherwise clients are who they
+    say they are. ``sole`` is the only user beside the bridge's own, if there can be no other."""
 
     login: Login | None = None
     are_proved: bool = False
@@ -43,8 +42,8 @@ class Users:
     sole: str = ""
 
     def owner(self, tail: str) -> tuple[str, str]:
-        """Whose command key ``tail`` is, a key without prefix and site, and which of the plain keys it stands
-        for. A plain key is nobody's, ``""``, or that of the sole user."""
+        """Whose command key ``tail`` (without prefix and site) is, and which plain key it stands for. A plain
+        key belongs to nobody, ``""``, or to the sole user."""
         if not self.are_proved or not tail.startswith(_OWN_KEYS):
             return self.sole, tail
         name, _, rest = tail.removeprefix(_OWN_KEYS).partition("/")
@@ -57,10 +56,10 @@ def own_keys(name: str) -> str:
 
 
 def read_users(settings: ZenohTable) -> Users:
-    """Raises Unavailable where the password file cannot be used."""
+    """Raises Unavailable if the password file cannot be used."""
     login = _read_login(settings)
     if settings.mode != "peer" or not settings.listen:
-        # Who is behind the router that we have chosen is the router's to know.
+        # Without a port of our own, the router that we connect to authenticates its clients.
         return Users(login)
     if settings.controllers is not None:
         return Users(login, True, tuple(settings.controllers))

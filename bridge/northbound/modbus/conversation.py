@@ -1,7 +1,7 @@
 """One connection without its socket: bytes in, answers out, in the order of the requests.
 
-Framing is MODBUS Messaging on TCP/IP V1.0b §3.1.3: transaction id, protocol id 0, length, unit id; the
-length field alone says where a PDU ends, however TCP has cut the stream.
+Framing is MODBUS Messaging on TCP/IP V1.0b §3.1.3: transaction id, protocol id 0, length, unit id; the length
+field alone says where a PDU ends, wherever TCP has cut the stream.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ _LENGTHS: Final = range(2, 255)  # unit id and a PDU of 1 … 253 bytes
 _MOST_UNANSWERED: Final = 64  # requests whose outcome is still to come, per connection
 
 Handle = Callable[[int, bytes, Callable[[bytes], None], float], None]
-"""(unit id, PDU, answer, received at): ``answer`` is to be called exactly once with the answer's PDU, the
-time is that with which the end of the request was received."""
+"""(unit id, PDU, answer, received at): ``answer`` is to be called exactly once with the answer's PDU; the
+time is when the end of the request was received."""
 
 
 class _Exchange:
-    """One request and its answer, as soon as there is one."""
+    """One request, and its answer once there is one."""
 
     __slots__ = ("answer", "transaction", "unit_id")
 
@@ -34,13 +34,13 @@ class _Exchange:
 
 
 class Conversation:
-    """``handle`` gets the requests in order. ``on_late_answer`` is called when an answer comes after its
-    request's turn, so that another ``advance`` is worth while.
+    """``handle`` gets the requests in order. ``on_late_answer`` is called when an answer comes after
+    ``handle`` has returned, so that ``advance`` should be called again.
 
-    A request keeps the time of the bytes that end it, however long it waits here.
+    A request has the time of its last byte, however long it waits here.
 
-    ``backlog``: there is more to handle at once. ``is_full``: no more is handled until an answer comes.
-    ``fault``: why the stream cannot be followed any more, or empty.
+    ``backlog``: more requests can be handled now. ``is_full``: none is handled until an answer comes.
+    ``fault``: why the stream cannot be understood any more, or empty.
     """
 
     __slots__ = (
@@ -64,7 +64,7 @@ class Conversation:
         self._offset = 0
         self._dropped = 0  # bytes of the stream before the buffer
         self._received_at = 0.0
-        # Where chunks before the last end in the stream, as far as they are not handled, with their times.
+        # Where the chunks before the last one end in the stream, with their times, as far as not handled.
         self._earlier: deque[tuple[int, float]] = deque()
         self._exchanges: deque[_Exchange] = deque()
         self._working = False
@@ -77,7 +77,7 @@ class Conversation:
 
     @property
     def waiting(self) -> int:
-        """Bytes that are not handled yet."""
+        """Bytes that have not been handled yet."""
         return len(self._buffer)
 
     def receive(self, data: bytes | bytearray | memoryview, received_at: float = 0.0) -> None:
@@ -87,7 +87,8 @@ class Conversation:
         self._received_at = received_at
 
     def advance(self, most: int) -> bytes:
-        """Handle up to ``most`` requests; the answers that may be sent now, none before an earlier one."""
+        """Handle up to ``most`` requests and return the answers that may be sent now, in the order of the
+        requests."""
         self._working = True
         try:
             more = True
@@ -113,7 +114,7 @@ class Conversation:
         return b"".join(ready)
 
     def _handle_next(self) -> bool:
-        """Handle the next frame; False where there is none, or none that can be understood."""
+        """Handle the next frame; False if there is none, or none that can be understood."""
         begin = self._offset
         if self.fault or len(self._buffer) - begin < _HEADER.size:
             return False
@@ -133,7 +134,8 @@ class Conversation:
         return True
 
     def _arrival(self, place: int) -> float:
-        """When what ends at this place in the stream was received. Places are asked for in their order."""
+        """When the frame that ends at this place in the stream was received. To be called in order of
+        place."""
         earlier = self._earlier
         while earlier and earlier[0][0] < place:
             earlier.popleft()

@@ -1,9 +1,8 @@
 """Modbus PDUs: bytes to requests and answers to bytes (MODBUS Application Protocol V1.1b3, §6).
 
-Plain ``struct`` code rather than pymodbus's PDU classes: ``DecodePDU`` answers a wrong count with None,
-so that the function code for the exception is lost, passes FC16 with a byte count that does not fit,
-and formats a log line for each PDU. pymodbus checks this codec from the other side, as the client of
-the wire tests.
+Plain ``struct`` code rather than pymodbus's PDU classes: ``DecodePDU`` returns None for a wrong count, which
+loses the function code for the exception, accepts FC16 with a wrong byte count, and formats a log line for
+each PDU. As the client of the wire tests, pymodbus checks this codec from the other side.
 """
 
 from __future__ import annotations
@@ -71,7 +70,7 @@ class ReadWords:
 
 @dataclass(frozen=True, slots=True)
 class WriteBits:
-    """FC5 and FC15. ``echo`` is the answer to a write that was done, here and below."""
+    """FC5 and FC15. ``echo``, here and below, is the answer to a successful write."""
 
     start: int
     bits: tuple[bool, ...]
@@ -136,8 +135,8 @@ _IDENTIFY_EVERYTHING: Final = 0x83  # conformity level: extended, as streams and
 def parse(pdu: bytes) -> PduRequest:
     """The request in ``pdu``, which has at least one byte.
 
-    Raises ``Refused``: ILLEGAL_FUNCTION for a function that is not served, ILLEGAL_VALUE for a count,
-    length or value that the function does not have. Nothing else is raised, whatever the bytes are.
+    Raises ``Refused``: ILLEGAL_FUNCTION for a function that is not served, ILLEGAL_VALUE for a count, length
+    or value that the function does not allow. Nothing else is raised, whatever the bytes are.
     """
     parser = _PARSERS.get(pdu[0])
     if parser is None:
@@ -251,8 +250,8 @@ def bits_answer(function: Function, bits: Sequence[bool]) -> bytes:
 def identification_answer(request: Identify, objects: Mapping[int, bytes]) -> bytes:
     """The answer to FC43/14 from ``objects`` by object id, in rising order.
 
-    A stream begins at ``object_id`` and, where it is too long, says at which object to go on. Raises
-    ``Refused`` (ILLEGAL_ADDRESS) where one object is asked for that there is not.
+    A stream begins at ``object_id`` and, if it is too long, names the object to continue with. Raises
+    ``Refused`` (ILLEGAL_ADDRESS) if a single object is asked for that does not exist.
     """
     if request.code == 4:
         value = objects.get(request.object_id)
@@ -262,7 +261,7 @@ def identification_answer(request: Identify, objects: Mapping[int, bytes]) -> by
     else:
         last = {1: 0x02, 2: 0x7F, 3: 0xFF}[request.code]
         category = [(number, value) for number, value in objects.items() if number <= last]
-        # An object id that is not there means the beginning, §6.21.
+        # A stream from an unknown object id starts at the beginning, §6.21.
         known = any(number == request.object_id for number, _ in category)
         chosen = [pair for pair in category if not known or pair[0] >= request.object_id]
     body = bytearray()

@@ -1,4 +1,5 @@
-"""Simulated drives that speak real frames: the independent witness against which the master is tested.
+"""Simulated drives that exchange real frames: an independent implementation against which the master is
+tested.
 
-Nothing here is shared with the master but the frame and the bus interface.
+They share only the frame type and the bus interface with the master.
 """

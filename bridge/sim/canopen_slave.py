@@ -20,18 +20,18 @@ from bridge.sim.store import Store
 
 _ERROR_CONTROL: Final = 0x700
 _OUTBOX_MAX: Final = 256
-"""A real controller's queue is shorter; a shell that never fetches must not cost memory."""
+"""A real controller's queue is shorter; this bounds the memory if nobody fetches the frames."""
 
 
 class Application(Protocol):
-    """What the device makes of its communication."""
+    """How the device reacts to its communication."""
 
     def nmt_changed(self, state: NmtState) -> None:
-        """The NMT state is another one."""
+        """The NMT state has changed."""
         ...
 
     def restarted(self, command: NmtCommand) -> None:
-        """Reset node or reset communication, before the boot-up message; settings are those of power-on."""
+        """Reset node or reset communication, before the boot-up message; settings are as at power-on."""
         ...
 
     def accepts_rpdo(self, number: int, length: int) -> bool:
@@ -47,12 +47,12 @@ class Application(Protocol):
         ...
 
     def master_back(self) -> None:
-        """The first guard request after that."""
+        """The first guard request after that has come."""
         ...
 
 
 class CanopenSlave:
-    """Frames and time in, frames out. The owner calls ``poll`` after it has changed anything."""
+    """Frames and time in, frames out. The owner calls ``poll`` after every change."""
 
     def __init__(
         self,
@@ -99,7 +99,7 @@ class CanopenSlave:
         self._outbox.clear()
 
     def on_frame(self, frame: Frame, now: float) -> None:
-        """Take one frame from the bus; a frame for somebody else is ignored."""
+        """Take one frame from the bus; frames for other nodes are ignored."""
         if self.state is NmtState.INITIALISING or frame.can_id & (EXTENDED | ERROR):
             return
         cob_id = frame.can_id & STANDARD_MASK
@@ -113,7 +113,7 @@ class CanopenSlave:
             self._on_object(cob_id, frame.data, now)
 
     def poll(self, now: float) -> None:
-        """Do what has become due: life guarding, heartbeat, EMCY, event-driven TPDOs."""
+        """Do what is due: life guarding, heartbeat, EMCY, event-driven TPDOs."""
         if self.state is NmtState.INITIALISING:
             return
         if self._error_control.life_time_expired(now):
@@ -142,7 +142,7 @@ class CanopenSlave:
         return min((deadline for deadline in deadlines if deadline is not None), default=None)
 
     def hears(self) -> frozenset[int]:
-        """The identifiers that can concern this node as it is set up now."""
+        """The identifiers that concern this node with its present settings."""
         settings = self._store.current
         own = {0, _ERROR_CONTROL + self.node_id, settings.sync_cob_id}
         own.update(channel.receive_cob_id for channel in settings.sdo)
@@ -201,7 +201,7 @@ class CanopenSlave:
             self._apply(number, pdo, effective)
 
     def _on_sync(self, now: float) -> None:
-        # TPDOs are sampled before RPDOs act: both mean the moment of the SYNC (CiA 301 §7.2.2.2).
+        # TPDOs are sampled before RPDOs act, because both refer to the moment of the SYNC (CiA 301 §7.2.2.2).
         for tpdo, settings in self._active_tpdos():
             payload = self._payload(settings)
             if tpdo.on_sync(settings, payload):

@@ -1,4 +1,4 @@
-"""Which drive families can be simulated, and how a site file's node becomes one."""
+"""The drive families that can be simulated, and how a node of a site file becomes one."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Factory = Callable[[int, Mapping[str, float]], SimulatedNode]
 def simulate_node(mapping: str, node_id: int, parameters: dict[str, float]) -> SimulatedNode:
     """A simulated node of the family ``mapping``, with parameters in engineering units.
 
-    NORD: ``P105`` sets all drives of a node, ``fu2/P105`` one, ``P151`` (ms) the interface, and where there
-    is none with parameters of its own ``P513`` (s) the drive's watch. STÖBER: ``C01`` (1/min) and the ramps
-    ``accelerate_s``, ``decelerate_s``, ``quick_stop_s``, ``axis2/C01`` of one. CiA 402: objects, ``6083``,
-    ``6046:02``, in the drive's units. Lenze: codes, ``C00011`` (1/min), ``C00593/1``. Raises
+    NORD: ``P105`` sets all drives of a node, ``fu2/P105`` one, ``P151`` (ms) the interface, and without an
+    interface that has parameters ``P513`` (s) the drive's own supervision. STÖBER: ``C01`` (1/min) and the
+    ramps ``accelerate_s``, ``decelerate_s``, ``quick_stop_s``, ``axis2/C01`` of one. CiA 402: objects,
+    ``6083``, ``6046:02``, in the drive's units. Lenze: codes, ``C00011`` (1/min), ``C00593/1``. Raises
     ``OperationFailed`` for a family or a parameter that the simulation does not have.
     """
     factory = _FAMILIES.get(mapping)
@@ -40,4 +40,4 @@ _FAMILIES: Final[dict[str, Factory]] = {
 }
 
 SIMULATED: Final = tuple(sorted(_FAMILIES))
-"""The mappings whose nodes can be played."""
+"""The mappings whose nodes can be simulated."""

@@ -30,7 +30,7 @@ _MOST_STEPS: Final = 2000
 _VOLTAGE: Final = 0x0010
 _REMOTE: Final = 0x0200
 _ABORT: Final = {2: ENABLE_VOLTAGE, 3: QUICK_STOP}
-"""6007h: the bit of the control word that it takes away."""
+"""6007h: the bit of the control word that it clears."""
 
 
 class Cia402Axis:
@@ -69,7 +69,7 @@ class Cia402Axis:
 
     @property
     def demand_velocity(self) -> int:
-        """Where the speed is to be, in increments per second."""
+        """The demanded speed in increments per second."""
         follows = self.state is State.ENABLED and self.automaton.ramp is None
         return round(self._mode.demand) if follows else 0
 
@@ -86,7 +86,7 @@ class Cia402Axis:
         word = self.state | _VOLTAGE | _REMOTE
         if self.state is State.ENABLED:
             word |= self._mode.bits
-            if self.automaton.ramp is not None:  # halted or being stopped: bit 10 says that it stands still
+            if self.automaton.ramp is not None:  # halted or being stopped: bit 10 means standstill
                 word = word & ~0x0400 | (0x0400 if self.motor.stands_still else 0)
         elif self._mode is self.homing:
             word |= self.homing.bits & 0x3000
@@ -117,11 +117,11 @@ class Cia402Axis:
         return self.automaton.control_word if self._commanded is None else self._commanded
 
     def command(self, word: int) -> None:
-        """6040h was written; it waits for the set-points behind it in the same PDO."""
+        """6040h was written; it takes effect after the set-points that follow in the same PDO."""
         self._commanded = word
 
     def obey(self) -> None:
-        """The PDO or the SDO request is done."""
+        """The PDO or the SDO request has been processed."""
         word, self._commanded = self._commanded, None
         if word is not None:
             self._on_control_word(word)
@@ -146,13 +146,13 @@ class Cia402Axis:
         self._settle()
 
     def abort_connection(self, code: int) -> bool:
-        """6007h: the master is gone. True where that is a fault, which is reported."""
+        """6007h: the master is gone. True if that is a fault to be reported."""
         option = self._settings().abort_connection
         if option == 1:
             self.fail(code)
             return True
         if option in _ABORT:
-            # As if the control word had said it, so that the next one is obeyed again.
+            # As if the control word had asked for it, so that the next one is obeyed again.
             self._on_control_word(self.automaton.control_word & ~_ABORT[option])
         return False
 
@@ -173,7 +173,7 @@ class Cia402Axis:
 
     @property
     def _is_busy(self) -> bool:
-        """Something changes with time."""
+        """Whether anything changes with time."""
         if not self.motor.stands_still or self.automaton.leaving:
             return True
         if self.state in (State.FAULT_REACTION, State.QUICK_STOP_ACTIVE):
@@ -204,7 +204,7 @@ class Cia402Axis:
         self._note_state()
 
     def _note_state(self) -> None:
-        """What a mode was doing ends with "operation enabled"."""
+        """A mode's action ends when the drive leaves "operation enabled"."""
         is_enabled = self.state is State.ENABLED
         if self._was_enabled and not is_enabled:
             self._mode.leave()

@@ -21,12 +21,12 @@ MAPPINGS: Final = (
 )
 _NAME: Final = re.compile(r"(?:drive/)?(6[0-9A-Fa-f]{3})(?::([0-9A-Fa-f]{2}))?")
 _COMMANDS: Final = (0x6040, 0x6042, 0x607A, 0x60FF)
-"""What a master commands is no parameter."""
+"""What the master commands is not a parameter."""
 
 
 def cia402(node_id: int, parameters: Mapping[str, float]) -> Cia402Drive:
-    """``6083``, ``6046:02`` and every other parameter of the profile, in the drive's units. Raises
-    ``OperationFailed`` for one that it does not have or a value out of range."""
+    """``6083``, ``6046:02`` and any other parameter of the profile, in the drive's units. Raises
+    ``OperationFailed`` for an unknown one or a value out of range."""
     node = Cia402Drive(node_id)
     for name, value in parameters.items():
         match = _NAME.fullmatch(name)

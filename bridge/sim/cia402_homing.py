@@ -14,7 +14,7 @@ from bridge.sim.cia402_settings import INCREMENTS, Cia402Settings
 
 METHODS: Final = (17, 18, 33, 34, 35, 37)
 SWITCH_AT: Final = 100_000
-"""Where the limit switches are, from the place at which the drive was switched on."""
+"""Position of the limit switches, relative to where the drive was switched on."""
 _GIVES_UP_AFTER: Final = 4 * SWITCH_AT
 
 
@@ -26,7 +26,7 @@ class _Phase(Enum):
 
 
 class Homing:
-    """hm: begins with bit 4, ends when it falls. ``switches`` False: nobody finds them."""
+    """hm: begins with bit 4 and ends when that falls. ``switches`` False: they are never found."""
 
     def __init__(self, motor: Motor, settings: Callable[[], Cia402Settings], targets: Targets) -> None:
         del targets
@@ -34,7 +34,7 @@ class Homing:
         self._motor = motor
         self._settings = settings
         self._shift = 0.0
-        """The place of the machine is the drive's position and this."""
+        """The machine's position is the drive's position plus this."""
         self._phase = _Phase.IDLE
         self._goal = 0.0
         self._speed = 0.0

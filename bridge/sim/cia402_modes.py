@@ -1,7 +1,7 @@
-"""What each mode of operation makes of set-points and the mode's bits in the control word (CiA 402).
+"""How each mode of operation uses set-points and its bits in the control word (CiA 402).
 
-A mode gets the time that passes while the drive is enabled and not being stopped, and says bits 10 … 13 of
-the status word. ``leave`` ends what it was doing.
+A mode runs while the drive is enabled and not being stopped, and gives bits 10 … 13 of the status word.
+``leave`` ends its action.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ class OperationMode(Protocol):
 
     @property
     def demand(self) -> float:
-        """The speed that it goes to, in increments per second."""
+        """The speed to go to, in increments per second."""
         ...
 
 
 class _Parts:
-    """What every mode works with."""
+    """What all modes share."""
 
     def __init__(self, motor: Motor, settings: Callable[[], Cia402Settings], targets: Targets) -> None:
         self.motor = motor
@@ -123,7 +123,8 @@ class ProfileVelocity(_Parts):
 
 
 class ProfilePosition(_Parts):
-    """pp: new set-points by bit 4, one of them may wait; bit 5 at once, bit 6 relative."""
+    """pp: a new set-point with each edge of bit 4, of which one may wait; bit 5: take it at once; bit 6:
+    relative."""
 
     def __init__(self, motor: Motor, settings: Callable[[], Cia402Settings], targets: Targets) -> None:
         super().__init__(motor, settings, targets)
@@ -141,7 +142,7 @@ class ProfilePosition(_Parts):
 
     def _new_setpoint(self, word: int) -> None:
         if self._waiting is not None and not word & BIT_5:
-            return  # no place: bit 12 is 1 all the time
+            return  # no room for another: bit 12 stays 1
         base = self.motor.position if self.goal is None else self.goal
         goal = self._within(self.targets.position + (base if word & BIT_6 else 0))
         if word & BIT_5 or self.goal is None or self._reached:
@@ -151,7 +152,7 @@ class ProfilePosition(_Parts):
         self._acknowledged = True
 
     def _answer(self) -> None:
-        """Bit 12 falls with bit 4, but not before a set-point that waits has begun."""
+        """Bit 12 falls with bit 4, but not before a waiting set-point has begun."""
         if not self._word & BIT_4 and self._waiting is None:
             self._acknowledged = False
 
@@ -190,7 +191,7 @@ class ProfilePosition(_Parts):
 
 
 class CyclicPosition(_Parts):
-    """csp: 607Ah anew with every SYNC; in between at the speed that reaches it in the time of 60C2h."""
+    """csp: a new 607Ah with each SYNC; in between, the speed that reaches it within the time in 60C2h."""
 
     def __init__(self, motor: Motor, settings: Callable[[], Cia402Settings], targets: Targets) -> None:
         super().__init__(motor, settings, targets)
@@ -199,7 +200,7 @@ class CyclicPosition(_Parts):
 
     @property
     def following_error(self) -> bool:
-        """The target was out of 6065h for longer than 6066h."""
+        """Whether the target was outside 6065h for longer than 6066h."""
         return self._late_s * 1000 > self.settings.following_ms
 
     @property
@@ -231,7 +232,7 @@ class CyclicPosition(_Parts):
 
 
 class CyclicVelocity(_Parts):
-    """csv: 60FFh anew with every SYNC, without ramps."""
+    """csv: a new 60FFh with each SYNC, without ramps."""
 
     @property
     def demand(self) -> float:

@@ -10,12 +10,12 @@ from bridge.sim.nord_ramp import step
 COAST_S: Final = 1.0
 """Run-down from full speed without voltage."""
 _STILL: Final = 1.0
-"""Slower than this many increments per second is standstill."""
+"""Fewer increments per second than this count as standstill."""
 _WRAP: Final = 1 << 32
 
 
 class Motor:
-    """``position`` runs over at the ends of an INTEGER32, as 6064h does."""
+    """``position`` wraps at the ends of an INTEGER32, as 6064h does."""
 
     def __init__(self, max_speed: float) -> None:
         self.max_speed = max_speed
@@ -30,7 +30,7 @@ class Motor:
         self.ramp_to(0.0, 0.0, self.max_speed / COAST_S, dt_s)
 
     def ramp_to(self, velocity: float, acceleration: float, deceleration: float, dt_s: float) -> None:
-        """Toward this speed; a ramp of 0 is a jump."""
+        """Go to this speed; a ramp of 0 is a jump."""
         before = self.velocity
         self._accelerate(velocity, acceleration, deceleration, dt_s)
         if velocity == 0 and self.stands_still:
@@ -38,13 +38,13 @@ class Motor:
         self.move((before + self.velocity) / 2 * dt_s)
 
     def go_to(self, goal: float, speed: float, acceleration: float, deceleration: float, dt_s: float) -> bool:
-        """Toward this position, to stand still there. True where it does."""
+        """Go to this position and stop there. True once it has."""
         distance = goal - self.position
         braking = max(deceleration, 1.0)
         if abs(distance) < 1.0 and abs(self.velocity) <= braking * dt_s + _STILL:
             self.position, self.velocity = goal, 0.0
             return True
-        # As fast as it may be to stop at the goal, one step earlier than late.
+        # As fast as still allows a stop at the target, rather one step early than late.
         fastest = math.sqrt(2 * braking * abs(distance)) - braking * dt_s / 2
         wanted = math.copysign(max(1.0, min(speed, fastest)), distance)
         before = self.velocity

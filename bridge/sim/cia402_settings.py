@@ -33,8 +33,8 @@ SUPPORTED_MODES: Final = sum(1 << mode - 1 for mode in Mode if mode)
 
 @dataclass(slots=True)
 class Cia402Settings:
-    """What 1010h saves of the profile; positions in increments, speeds in increments per second, ramps in
-    increments per second squared, but the vl mode's in 1/min and s."""
+    """The profile's parameters that 1010h saves. Positions are in increments, speeds in increments per
+    second, ramps in increments per second squared; those of the vl mode are in 1/min and s."""
 
     abort_connection: int = 1
     """6007h."""

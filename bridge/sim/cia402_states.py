@@ -1,7 +1,7 @@
 """The finite state automaton of a drive with CiA 402 (IEC 61800-7-201): states, commands, transitions.
 
-Transitions are numbered as the standard does. Where an option code lets the drive stop first, the
-transition is taken when it stands still: ``Automaton.leaving`` says that it waits for that.
+Transitions are numbered as the standard does. If an option code lets the drive stop first, the transition is
+taken at standstill; ``Automaton.leaving`` is true until then.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FAULT_OPTION: Final = 0x605E
 
 
 class State(IntEnum):
-    """The value is what bits 0 … 3, 5 and 6 of the status word show."""
+    """The value is that of bits 0 … 3, 5 and 6 of the status word."""
 
     NOT_READY = 0x00
     SWITCH_ON_DISABLED = 0x40
@@ -88,8 +88,8 @@ def command_of(control_word: int) -> Command:
 
 
 def ramp_of(option: int) -> Ramp:
-    """What an option code of 605Ah … 605Eh says. 3 and 4 (at the current or voltage limit) brake as the
-    quick stop does."""
+    """The ramp for an option code of 605Ah … 605Eh. 3 and 4 (at the current or voltage limit) brake like the
+    quick stop."""
     if option == 0:
         return Ramp.COAST
     return Ramp.SLOW_DOWN if option in (1, 5) else Ramp.QUICK
@@ -141,7 +141,7 @@ class Automaton:
             self._go(1, State.SWITCH_ON_DISABLED)
 
     def on_control_word(self, word: int, *, standstill: bool) -> bool:
-        """A control word came. True where its edge resets a fault (transition 15)."""
+        """A control word came. True if its edge resets a fault (transition 15)."""
         rising = word & ~self.control_word
         self.control_word = word
         is_reset = bool(rising & FAULT_RESET) and self.state is State.FAULT and not self._lasting

@@ -22,7 +22,7 @@ class HeartbeatConsumer:
 
     @property
     def node(self) -> int:
-        """The watched node, 0 where none is."""
+        """The watched node, 0 for none."""
         entry = self._entry()
         return entry >> 16 & _NODE_MAX if entry & 0xFFFF else 0
 
@@ -30,7 +30,7 @@ class HeartbeatConsumer:
         self._heard_at, self.is_lost = None, False
 
     def on_heartbeat(self, data: bytes, now: float) -> bool:
-        """True where the producer is back."""
+        """True if the producer is back."""
         if len(data) != 1:
             return False
         was_lost, self.is_lost, self._heard_at = self.is_lost, False, now

@@ -1,7 +1,7 @@
 """The demo's controller: an ordinary zenoh client that takes leases on drives and moves them.
 
-It knows nothing of the bridge but its keys. What it does is what any controller has to do: take
-control, keep saying so, acknowledge when it was too late.
+It knows only the bridge's keys. It does what any controller has to do: take control, keep writing, and
+acknowledge if it was too late.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _log = logging.getLogger(__name__)
 
 _TTL_MS: Final = 3000
 _ANSWER_S: Final = 5.0
-"""A start may take three."""
+"""A start may take three seconds."""
 _WAVE_S: Final = 40.0
 _IDENTITY: Final = json.dumps({"controller": "demo"})
 
@@ -40,7 +40,7 @@ class Times:
 @dataclass(frozen=True, slots=True)
 class Move:
     """What to move: ``drive_key`` is ``<prefix>/<site>/<drive>``, ``value`` its setpoint (``frequency``),
-    ``most`` how far, in the setpoint's unit."""
+    ``most`` the highest value, in the setpoint's unit."""
 
     drive_key: str
     value: str
@@ -69,7 +69,7 @@ class Controller:
         self._key = move.drive_key
 
     def ask(self, leaf: str, **payload: object) -> dict[str, object]:
-        """One command; its outcome, or an error of our own where nobody answered."""
+        """Send one command; returns its outcome, or an error of our own if nobody answered."""
         replies = self._session.get(
             f"{self._key}/command/{leaf}",
             payload=json.dumps(payload),
@@ -78,7 +78,7 @@ class Controller:
         )
         for reply in replies:
             answer = reply.ok.payload if reply.ok is not None else reply.err.payload if reply.err else None
-            # zenoh itself answers a query that nobody has answered, in plain text.
+            # A query that nobody answers is answered by zenoh itself, in plain text.
             with suppress(json.JSONDecodeError):
                 if answer is not None:
                     return json.loads(answer.to_string())
@@ -90,7 +90,7 @@ class Controller:
             self.run_once()
 
     def run_once(self) -> bool:
-        """Take control, run, pause. False: something failed, and it is time for the next try."""
+        """Take control, run, pause. False: something failed, so try again."""
         if not self.ask("take_control", ttl_ms=_TTL_MS).get("ok"):
             time.sleep(self._times.retry_s)
             return False
@@ -113,7 +113,7 @@ class Controller:
         return self._hold(self._times.pause_s)
 
     def _hold(self, duration_s: float) -> bool:
-        """Let time go by as the drive's owner: one that falls silent trips its watchdog."""
+        """Wait as the drive's owner, which must keep writing lest the watchdog trip."""
         end = time.monotonic() + duration_s
         while time.monotonic() < end:
             if not self.ask("keep_alive").get("ok"):
@@ -126,7 +126,7 @@ class Controller:
 def run_controller(endpoint: str, moves: Sequence[Move]) -> None:
     """Connect to the bridge at ``endpoint`` (``tcp/127.0.0.1:7447``) and move the drives until killed.
 
-    Each has a thread of its own: a drive that is slow to start must not keep the others' telegrams.
+    Each drive has a thread of its own: one that is slow to start must not delay the others' telegrams.
     """
     session = _connect(endpoint)
     threads = [threading.Thread(target=_keep_moving, args=(session, move), daemon=True) for move in moves]

@@ -1,7 +1,7 @@
 """The object dictionary of a simulated node.
 
-An entry owns no value: it reads and writes through functions, so that one value may appear under
-several indices (as NORD's P161 and 1400h:1 do) and cannot disagree with itself.
+An entry does not store its value: it reads and writes through functions, so that one value under several
+indices (such as NORD's P161 and 1400h:1) is always the same.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Cell:
 class Number:
     """An integer object. No ``read`` makes it write-only, no ``write`` read-only.
 
-    ``write`` raises ``SdoAbort`` to refuse a value; nothing may have changed then.
+    ``write`` raises ``SdoAbort`` to refuse a value, and must have changed nothing then.
     """
 
     data_type: DataType
@@ -77,7 +77,7 @@ class Number:
 
     @property
     def limits(self) -> tuple[int, int]:
-        """The least and the greatest value, of its own or of its type."""
+        """The least and the greatest value: its own limits, or those of its type."""
         bits = 8 * self.data_type.size
         low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if self.data_type.signed else (0, (1 << bits) - 1)
         return (low if self.low is None else self.low, high if self.high is None else self.high)
@@ -141,7 +141,7 @@ class Domain:
         return self.read()
 
     def check_writable(self) -> None:
-        """It always is."""
+        """It is always writable."""
 
     def download(self, data: bytes) -> None:
         if len(data) > self.max_size:
@@ -170,7 +170,7 @@ class Dictionary:
         self._objects.setdefault(index, {})[sub] = entry
 
     def add_array(self, index: int, entries: Iterable[Entry]) -> None:
-        """Sub 0 says how many; the entries follow from sub 1."""
+        """Sub 0 is their number; the entries begin at sub 1."""
         count = 0
         for sub, entry in enumerate(entries, start=1):
             self.add(index, sub, entry)
@@ -181,7 +181,7 @@ class Dictionary:
         return index in self._objects
 
     def find(self, index: int, sub: int) -> Entry:
-        """The entry, or ``SdoAbort`` saying whether the object or only the sub-index is missing."""
+        """The entry. Raises ``SdoAbort``, which says whether the object or only the sub-index is missing."""
         subs = self._objects.get(index)
         if subs is None:
             raise SdoAbort(AbortCode.OBJECT_MISSING)

@@ -40,7 +40,7 @@ class EmcyProducer:
         self._sent_at = None
 
     def report(self, code: int, register: int, specific: bytes = b"") -> None:
-        """An error has come, or with code 0000h has gone. ``specific`` is bytes 3…7."""
+        """Report an error, or with code 0000h that it is gone. ``specific`` is bytes 3…7."""
         self.error_register = register
         if code:
             self._history.appendleft(code | (specific[0] if specific else 0) << 16)

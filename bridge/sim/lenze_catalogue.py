@@ -19,8 +19,8 @@ _DEVICE_COMMANDS: Final = 2
 
 
 def lenze_8400_motec(node_id: int, parameters: Mapping[str, float]) -> LenzeMotec:
-    """``C00011`` (1/min), ``C00012`` and ``C00013`` (s), ``C00593/1`` and every other code that can be
-    written. Raises ``OperationFailed`` for one that it does not have or a value out of range."""
+    """``C00011`` (1/min), ``C00012`` and ``C00013`` (s), ``C00593/1`` and any other code that can be written.
+    Raises ``OperationFailed`` for an unknown one or a value out of range."""
     if not 1 <= node_id <= 63:
         raise OperationFailed(f"an 8400 motec has addresses 1…63, not {node_id}")
     node = LenzeMotec(node_id)

@@ -12,7 +12,7 @@ Values = Callable[[], list[int]]
 
 
 class CodeTable:
-    """Adds codes; ``number`` is the code's, and sub-code 0 means that it has none."""
+    """Adds codes; ``number`` is that of the code; sub-code 0 means that it has none."""
 
     def __init__(self, dictionary: Dictionary) -> None:
         self._dictionary = dictionary
@@ -67,7 +67,8 @@ class CodeTable:
         limits: tuple[int, int],
         write: Callable[[int, int], None] | None = None,
     ) -> None:
-        """Sub-codes from 1 on; ``write`` gets the place from 0 and the value, left out: it is just kept."""
+        """Sub-codes from 1 on; ``write`` gets the place (from 0) and the value; without it the value is just
+        stored."""
 
         def keep(place: int, value: int) -> None:
             values()[place] = value

@@ -59,7 +59,7 @@ class BusDisplay:
 
 @dataclass(frozen=True, slots=True)
 class CodeParts:
-    """What the codes show and change."""
+    """What the codes display and change."""
 
     codes: Store[LenzeCodes]
     stack: Store[CommunicationSettings]

@@ -67,7 +67,7 @@ class LenzeDrive:
 
     @property
     def errors(self) -> list[int]:
-        """Error numbers that have not been acknowledged or gone, the one of C00168 first."""
+        """Numbers of present and unacknowledged errors, that of C00168 first."""
         return sorted(self._errors, key=lambda number: _PRIORITY.index(self._errors[number]))
 
     @property
@@ -101,7 +101,7 @@ class LenzeDrive:
         self.state, self._time, self._ready_at = DeviceState.INIT, now, now + INIT_S
 
     def on_words(self, words: Sequence[int]) -> None:
-        """CAN1_IN: control word and speed setpoint; the other words are connected to nothing."""
+        """CAN1_IN: control word and speed setpoint; the other words are not connected."""
         rising = words[0] & ~self.control_word
         self.control_word, self.setpoint = words[0], words[1]
         if rising & RESET_FAULT:
@@ -109,8 +109,8 @@ class LenzeDrive:
         self._settle()
 
     def error(self, number: int, reaction: Reaction, *, lasting: bool = True) -> None:
-        """An error has come. A ``lasting`` cause, as that of a trouble always is, blocks the acknowledge
-        until ``cause_gone``."""
+        """An error occurs. A ``lasting`` cause (that of a trouble always is) blocks the acknowledge until
+        ``cause_gone``."""
         if reaction is Reaction.NONE or number in self._causes:
             return
         if lasting or reaction is Reaction.TROUBLE:
@@ -119,7 +119,7 @@ class LenzeDrive:
         self._settle()
 
     def cause_gone(self, number: int) -> None:
-        """A trouble goes with its cause; a fault and a locked warning wait for the acknowledge."""
+        """A trouble ends with its cause; a fault and a locked warning wait for the acknowledge."""
         self._causes.discard(number)
         if self._errors.get(number) is Reaction.TROUBLE:
             del self._errors[number]
@@ -137,7 +137,7 @@ class LenzeDrive:
         return None if self.speed_rpm == self._target_rpm() else next_tick(self._time)
 
     def _settle(self) -> None:
-        """Take every change of state that errors and control word ask for."""
+        """Make all transitions that errors and control word ask for."""
         reactions = self._errors.values()
         if self.state is DeviceState.INIT and self._time < self._ready_at:
             return
@@ -153,7 +153,7 @@ class LenzeDrive:
             self.state = DeviceState.SWITCHED_ON
 
     def _target_rpm(self) -> float:
-        """Where the shaft is to end: the setpoint, clipped to C00011, or standstill."""
+        """The demanded speed: the setpoint, clipped to C00011, or standstill."""
         if self.inhibited or self.control_word & QUICK_STOP:
             return 0.0
         share = ((self.setpoint & 0xFFFF ^ 0x8000) - 0x8000) / HUNDRED_PERCENT

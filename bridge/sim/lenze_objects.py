@@ -1,7 +1,7 @@
 """Objects 1000h…1A01h of an 8400 motec (EDS84DMOTCAN 3.0, §13).
 
-What they set is a code too, and stays over an NMT reset: every write goes to the running CAN stack and
-into the codes that it is initialised from.
+Each of them is also a code and survives an NMT reset: a write changes both the running CAN stack and the
+codes from which that is initialised.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
 
 
 class LenzeObjects:
-    """Changes the CAN stack by the rules of §13, for the objects and for the codes that mean the same."""
+    """Changes the CAN stack by the rules of §13, for the objects and the equivalent codes."""
 
     def __init__(self, codes: Store[LenzeCodes], stack: Store[CommunicationSettings]) -> None:
         self._codes = codes
         self._stack = stack
-        # The manual asks for no NMT state: an object may be changed whenever its PDO or SDO is off.
+        # The manual requires no NMT state: an object may be changed whenever its PDO or SDO is off.
         self._rules = PdoObjects(Dictionary(), stack, RULES, lambda: True)
 
     def add_to(self, dictionary: Dictionary, emcy: EmcyProducer) -> None:
@@ -214,7 +214,8 @@ class LenzeObjects:
 
     @staticmethod
     def _add_mapping(dictionary: Dictionary, index: int) -> None:
-        """The mapping is static: no entries are shown. The manual names no object that could be mapped."""
+        """The mapping is static and has no visible entries: the manual names no object that could be
+        mapped."""
 
         def refuse(value: int) -> None:
             if value:

@@ -1,7 +1,7 @@
 """Codes of an 8400 motec with its CANopen unit, and what the CAN stack makes of them
 (EDS84DMOTCAN 3.0, §8.3, §12.2).
 
-The codes are the one memory. NMT reset and C00002/26 initialise the CAN stack from them anew.
+Only the codes are stored. NMT reset and C00002/26 initialise the CAN stack from them again.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ class LenzeCodes:
         self.emcy_cob_id = self.emcy_cob_id or 0x80 + self.node_id
 
     def move_to(self, node_id: int) -> None:
-        """C00350 is another one: the identifiers that depend on it follow with the next reset (§8.3)."""
+        """C00350 has changed: identifiers that depend on it follow at the next reset (§8.3)."""
         if node_id != self.node_id:
             self.node_id = node_id
             self.cob_ids = [base + node_id for base in _BASES[CAN_BASE]]

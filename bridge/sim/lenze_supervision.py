@@ -1,4 +1,4 @@
-"""What an 8400 motec watches on the bus and reports (EDS84DMOTCAN 3.0, §10)."""
+"""What an 8400 motec supervises on the bus and reports (EDS84DMOTCAN 3.0, §10)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NO_RESPONSE: Final = 255
 
 
 class Watched(IntEnum):
-    """What the CAN unit raises an error about, as numbers of C00168.
+    """Errors of the CAN unit, as numbers of C00168.
 
     The manual prints one number only, 01.0127.00002 (§6.5), and not how its parts lie in the 32 bits:
     module 127 in the high word and these errors are the simulation's own.
@@ -77,7 +77,7 @@ class HeartbeatConsumer:
 
     @property
     def node(self) -> int:
-        """The watched node, 0 where none is."""
+        """The watched node, 0 for none."""
         return self._node() if heartbeat_step(self._time_ms()) else 0
 
     def reset(self) -> None:
@@ -102,7 +102,7 @@ class HeartbeatConsumer:
 
 
 class ErrorReporter:
-    """EMCY once for everything that comes, and once for everything that goes (§10.4)."""
+    """One EMCY for each error that comes, and one when it goes (§10.4)."""
 
     def __init__(self, emcy: EmcyProducer) -> None:
         self._emcy = emcy
@@ -126,7 +126,7 @@ class ErrorReporter:
             self._emcy.report(0, self._register())
 
     def device_errors(self, numbers: Sequence[int]) -> bool:
-        """The drive's errors as they are now: F000h with the Lenze number in bytes 4…7. True for news."""
+        """The drive's present errors: F000h with the Lenze number in bytes 4…7. True if anything is new."""
         come = [number for number in numbers if number not in self._device]
         gone = self._device.difference(numbers)
         self._device = set(numbers)

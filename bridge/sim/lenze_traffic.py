@@ -1,4 +1,4 @@
-"""What an 8400 motec sends of its own accord, and what it counts (EDS84DMOTCAN 3.0, §7.2.3, §8.5, C00360)."""
+"""What an 8400 motec sends by itself, and what it counts (EDS84DMOTCAN 3.0, §7.2.3, §8.5, C00360)."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class SyncProducer:
         self._period_ms = 0
 
     def due(self, now: float) -> bool:
-        """Whether a SYNC is to be sent now. A late caller gets one, not those that were missed."""
+        """Whether a SYNC is to be sent now. After a pause there is one; missed ones are skipped."""
         codes = self._codes()
         period_ms = codes.sync_ms if codes.sync_producer else 0
         if period_ms != self._period_ms:  # just written: the new period begins now
@@ -61,7 +61,7 @@ class SyncProducer:
 
 
 def counters_of(cob_id: int, settings: CommunicationSettings, *, sent: bool) -> tuple[int, ...]:
-    """The sub-codes of C00360 that this frame counts in: all of its direction, and its own channel."""
+    """The sub-codes of C00360 that count this frame: its direction's and its channel's."""
     if sent:
         channels = [pdo.cob_id for pdo in settings.tpdo] + [0] + [sdo.send_cob_id for sdo in settings.sdo]
     else:

@@ -1,4 +1,4 @@
-"""Everything that an 8400 motec watches on the bus, with its reactions (EDS84DMOTCAN 3.0, §10, §12.2)."""
+"""Everything that an 8400 motec supervises on the bus, with its reactions (EDS84DMOTCAN 3.0, §10, §12.2)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ BUS_OFF: Final = 3
 
 
 class BusWatch:
-    """Tells the drive what has come and gone, and the bus by EMCY."""
+    """Reports errors and their end to the drive, and to the bus by EMCY."""
 
     def __init__(self, codes: Callable[[], LenzeCodes], drive: LenzeDrive, emcy: EmcyProducer) -> None:
         self._codes = codes
@@ -60,7 +60,7 @@ class BusWatch:
                 monitor.start(now)
             else:
                 monitor.stop()
-        # The manual does not say whose stop is meant; here it is the node's own (§12.2, C00592/4).
+        # The manual does not say which node's stop is meant; here it is this node's (§12.2, C00592/4).
         stopped = state is NmtState.STOPPED
         self._watch(Watched.COMMUNICATION_STOPPED, stopped, self._codes().bus_reactions[3])
 
@@ -81,7 +81,7 @@ class BusWatch:
         change(PDO_TOO_LONG)
 
     def bus_error(self, state: int) -> None:
-        """C00345 is this now."""
+        """C00345 has changed."""
         reactions = self._codes().bus_reactions
         self._watch(Watched.CAN_WARNING, state in (1, 2), reactions[2], CAN_WARNING)
         self._watch(Watched.BUS_OFF, state == BUS_OFF, reactions[1])
@@ -91,7 +91,7 @@ class BusWatch:
         change(SUPPLY_FAILED)
 
     def expire(self, now: float) -> bool:
-        """Let happen what is late by ``now``. True where the heartbeat is: the node leaves Operational."""
+        """Apply the time-outs up to ``now``. True if the heartbeat is late: the node leaves Operational."""
         codes = self._codes()
         for number, monitor in enumerate(self._monitors):
             if monitor.expired(now):
@@ -102,7 +102,7 @@ class BusWatch:
         return True
 
     def report(self, stack: CommunicationSettings) -> None:
-        """Identifiers that are received and sent (§10.4), and the drive's own errors."""
+        """Report identifiers received and sent (§10.4), and the drive's own errors."""
         received = {pdo.cob_id for pdo in stack.rpdo if pdo.enabled}
         sent = {pdo.cob_id for pdo in stack.tpdo if pdo.enabled}
         change = self._reporter.begin if received & sent else self._reporter.end
@@ -117,7 +117,7 @@ class BusWatch:
         return RpdoMonitor(lambda: self._codes().rpdo_time_ms[number])
 
     def _watch(self, number: Watched, present: bool, reaction: int, code: int = 0) -> None:
-        """Something that is watched is there or not: ``reaction`` of C00592, and EMCY ``code``."""
+        """Something supervised has come or gone: ``reaction`` of C00592, and EMCY ``code``."""
         if present:
             self._drive.error(number, Reaction(reaction))
             if code:

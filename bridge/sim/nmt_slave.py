@@ -9,7 +9,7 @@ from bridge.sim.store import Store
 
 
 class NmtState(IntEnum):
-    """State of a node as its heartbeat says it."""
+    """State of a node as in its heartbeat."""
 
     INITIALISING = 0
     STOPPED = 4
@@ -35,7 +35,7 @@ COMMANDED_STATE = {
 
 
 def nmt_command_for(node_id: int, data: bytes) -> NmtCommand | None:
-    """The command in an NMT frame if it means this node (its address or 0 = all) and is known."""
+    """The command in an NMT frame if it is known and for this node (its address, or 0 for all)."""
     if len(data) != 2 or data[1] not in (0, node_id):
         return None
     try:
@@ -86,7 +86,7 @@ class ErrorControl:
         return True
 
     def heartbeat_due(self, now: float) -> bool:
-        """Whether a heartbeat is to be sent now. A late caller gets one, not those that were missed."""
+        """Whether a heartbeat is to be sent now. After a pause there is one; missed ones are skipped."""
         heartbeat_ms = self._store.current.heartbeat_ms
         if heartbeat_ms != self._heartbeat_ms:  # just written: the new period begins now
             self._heartbeat_ms = heartbeat_ms

@@ -1,4 +1,4 @@
-"""What every simulated node offers to the shell."""
+"""The interface of simulated nodes to the shell."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class SimulatedNode(Protocol):
 
     @property
     def heard(self) -> frozenset[int]:
-        """The identifiers that ``on_frame`` does something with, as they are now."""
+        """The identifiers that ``on_frame`` evaluates at present."""
         ...
 
     def start(self, now: float) -> None:

@@ -1,4 +1,4 @@
-"""P160…P167: the communication objects once more, as NORD parameters (BU 2500 §7.1.2)."""
+"""P160…P167: the communication objects as NORD parameters (BU 2500 §7.1.2)."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ class CanParameters:
 
     def _mapping_entry(self, number: int, place: int, receives: bool) -> Number:
         def write(word: int) -> None:
-            # P165 has no count to set to 0 first: the entry changes alone, if it may.
+            # P165 has no count to be set to 0 first: only the entry changes, if that is allowed.
             self._pdos.require_pre_operational()
             self._pdos.check_mappable(word, receives=receives)
             pdo = self._pdos.pdo(number, receives=receives)

@@ -19,7 +19,8 @@ _P151_MOST_MS: Final = 32767
 _POSITION: Final = MappingProxyType(
     {"P543": 10.0, "P544": 15.0, "P545": 1.0, "P546": 23.0, "P547": 24.0, "P548": 1.0}
 )
-"""What the mapping sk-tu3-cao-pdo3 asks of its drive (BU 2500 §5.4): a position in two words, a frequency."""
+"""What the mapping sk-tu3-cao-pdo3 requires of its drive (BU 2500 §5.4): a position in two words, a
+frequency."""
 _SLOTS: Final = ("fu1", "fu2", "fu3", "fu4")
 
 
@@ -41,7 +42,7 @@ def _interface(kind: Kind) -> Callable[[int, Mapping[str, float]], SimulatedNode
 def _single(
     variant: Variant, preset: Mapping[str, float] = MappingProxyType({})
 ) -> Callable[[int, Mapping[str, float]], SimulatedNode]:
-    """``P105`` or ``drive/P105``; ``P513`` (s) is the drive's watch over its master."""
+    """``P105`` or ``drive/P105``; ``P513`` (s) is the drive's supervision of its master."""
 
     def make(node_id: int, parameters: Mapping[str, float]) -> SimulatedNode:
         node = NordSingle(node_id, variant)
@@ -52,7 +53,7 @@ def _single(
 
 
 def _commission(name: str, drives: Mapping[str, NordDrive], parameters: Mapping[str, float]) -> None:
-    # What is meant for one drive comes after what is meant for all.
+    # Settings for one drive come after those for all.
     for key in sorted(parameters, key=lambda key: "/" in key):
         slot, _, parameter = key.rpartition("/")
         if (slot and slot not in drives) or not parameter.removeprefix("P").isdigit():
@@ -84,4 +85,4 @@ NORD: Final = {
     **dict.fromkeys(_names("nord/sk-5xxe-rj45", ["encoder"]), _single(RJ45_5XX)),
     **dict.fromkeys(_names("nord/sk-54xe-rj45", ["encoder"]), _single(RJ45_54X)),
 }
-"""By mapping. Of what a mapping makes of the same device, such as the profile, the boot-up sees to it."""
+"""By mapping. Where mappings differ for the same device, as by the profile, the boot-up sets it."""

@@ -56,7 +56,7 @@ class NordDrive:
         self.demand: Demand | None = None
         self.output_hz = 0.0
         self.position_increments = 0.0
-        """Of the motor's shaft; an absolute encoder may set it."""
+        """Position of the motor's shaft; an absolute encoder may set it."""
         self.fault_tenths = 0
         self.warning_tenths = 0
         self.last_faults: deque[int] = deque([0] * 5, maxlen=5)
@@ -80,7 +80,7 @@ class NordDrive:
         if self.state is State.NOT_READY:
             return 0  # §6.8, first line
         word = STATE_BITS[self.state] | self.control_word & 0xC000
-        # Bits 4 and 5 say that "disable voltage" and "quick stop" are not commanded. While it stops, the
+        # Bits 4 and 5 mean that "disable voltage" and "quick stop" are not commanded. While it stops, the
         # drive has taken the command even if the master has lifted it meanwhile.
         word |= (self.control_word & 0x02) << 3 | (self.control_word & 0x04) << 3
         if self.state is State.QUICK_STOP:
@@ -134,12 +134,12 @@ class NordDrive:
         self.state, self._until, self._time = State.NOT_READY, now + CHARGING_S, now
 
     def on_telegram(self, control_word: int, setpoints: Sequence[int]) -> bool:
-        """Process data from the interface. Returns False for a telegram that §6.5.1 bit 10 makes void."""
+        """Process data from the interface. Returns False for a telegram that is void by bit 10 (§6.5.1)."""
         if not control_word & VALID:
             self.telegrams_ignored += 1
             return False
         if not self._bus_controls:
-            return True  # local control: the telegram is in order and somebody else commands
+            return True  # local control: the telegram is valid, but somebody else commands
         acknowledge = bool(control_word & ~self.control_word & ACKNOWLEDGE)
         self.control_word = control_word
         if self.parameters.raw(510) in (0, *_BUS_SOURCES):
@@ -160,7 +160,8 @@ class NordDrive:
         self.state, self._until = State.FAULT_REACTION, self._time + FAULT_REACTION_S
 
     def communication_lost(self, fault_tenths: int) -> None:
-        """Field bus or system bus is gone: a fault, unless P513 (or for 10.9 also P120) says to carry on."""
+        """Field bus or system bus is lost: a fault, unless P513 (or for 10.9 also P120) lets the drive go
+        on."""
         if self.parameters.raw(513) == _IGNORE:
             return  # §8.1: ignores every communication error and keeps its state
         if fault_tenths == INTERFACE_MISSING and self.parameters.raw(120) == 0:
@@ -205,8 +206,8 @@ class NordDrive:
         return self.parameters.raw(509) in _BUS_SOURCES
 
     def _commanded_hz(self) -> float:
-        """Setpoint frequency, signed: positive turns right. Bit 12 turns it round, bit 11 changes nothing
-        (§6.5.1 note 3: bit 12 = 0 means right); clipped to P105."""
+        """Setpoint frequency, signed: positive turns right. Bit 12 inverts it, bit 11 changes nothing (§6.5.1
+        note 3: bit 12 = 0 means right); clipped to P105."""
         if self.demand:
             return max(-self._max_hz, min(self._max_hz, self.demand.target_hz))
         share = 0.0
@@ -217,7 +218,7 @@ class NordDrive:
         return self._max_hz * (-share if self.control_word & LEFT else share)
 
     def _goal_hz(self) -> float:
-        """Where the output is to end with the present control word."""
+        """The frequency demanded by the present control word."""
         runs = self.state is State.ENABLED and self.control_word & 0x7F == 0x7F
         return self._commanded_hz() if runs else 0.0
 
@@ -252,7 +253,7 @@ class NordDrive:
         return up_s, down_s
 
     def _settle(self) -> None:
-        """Take every transition that the control word asks for; the drive goes on without a new telegram."""
+        """Make all transitions that the control word asks for; this goes on without a new telegram."""
         while True:
             if self.state is State.QUICK_STOP and self.output_hz == 0:
                 self._enter(State.SWITCH_ON_INHIBITED)  # §6.5.1 bit 2: ends there at 0 Hz

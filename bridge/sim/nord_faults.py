@@ -5,23 +5,24 @@ from __future__ import annotations
 from typing import Final
 
 UNKNOWN_CODE: Final = 0x1000
-"""The interface does not know the drive's fault number; P700 says it."""
+"""The interface does not know the drive's fault number; it is in P700."""
 
 TELEGRAM_DOWNTIME: Final = 102
-"""10.2: the NMT master's life time has run out, or P513 (the older BU 0260 tells it from 10.3 so)."""
+"""10.2: the NMT master's life time or P513 has expired (the older BU 0260 distinguishes it from 10.3 in this
+way)."""
 BUS_TIMEOUT: Final = 103
 """10.3, P151."""
 LINK_BROKEN: Final = 108
-"""10.8, the SK TU3-CAO and its drive have lost each other."""
+"""10.8: the connection between the SK TU3-CAO and its drive is lost."""
 INTERFACE_MISSING: Final = 109
-"""10.9, the drive does not reach the bus interface on the system bus."""
+"""10.9: the drive does not reach the bus interface on the system bus."""
 
 INTERFACE_BUS_TIMEOUT: Final = 1020
-"""102.0 in P170: P151 has run out."""
+"""102.0 in P170: P151 has expired."""
 INTERFACE_CANOPEN_TIMEOUT: Final = 5120
-"""512.0 in P170: node guarding has run out."""
+"""512.0 in P170: node guarding has expired."""
 
-# Fault number × 10 → code. 3.2 and 3.3 stand twice in the table (2211h/2311h, 2212h/2312h); the first wins.
+# Fault number × 10 → code. 3.2 and 3.3 are in the table twice (2211h/2311h, 2212h/2312h); the first counts.
 _CODES: Final = {
     40: 0x2200,
     41: 0x2200,
@@ -85,5 +86,5 @@ def emcy_code(fault_tenths: int) -> int:
 
 
 def register_bits(code: int) -> int:
-    """What this error sets in 1001h: always the generic bit, and the bit of its group."""
+    """The bits that this error sets in 1001h: the generic one and that of its group."""
     return 0x01 | _REGISTER_BITS.get(code >> 12, 0)

@@ -22,7 +22,7 @@ from bridge.sim.nord_settings import (
 class ProcessImage:
     """Objects 3000h…3005h. Drives are counted from 0.
 
-    ``touched`` collects the drives whose words have been written since it was last taken.
+    ``touched`` collects the drives whose words have been written since it was last fetched.
     """
 
     def __init__(self, drives: Sequence[NordDrive], online: Callable[[int], bool], layout: Layout) -> None:
@@ -47,14 +47,14 @@ class ProcessImage:
         return touched
 
     def touch(self, drive: int) -> None:
-        """A word for this drive has been written somewhere else."""
+        """A word for this drive has been written elsewhere."""
         self._touched.add(drive)
 
     def setpoints_of(self, drive: int) -> list[int]:
         return self.setpoints[drive * self._per_drive : (drive + 1) * self._per_drive]
 
     def status(self, drive: int) -> int:
-        """Of a drive that is not there the interface has nothing: 0, which reads as "not ready"."""
+        """For a missing drive the interface has 0, which means "not ready"."""
         return self._drives[drive].status_word if self._online(drive) else 0
 
     def actual(self, drive: int, value: int) -> int:
@@ -108,7 +108,7 @@ class ProcessImage:
             self.setpoints[place] = value
             self._touched.add(place // self._per_drive)
 
-        # §6.5.8 maps a control word and a setpoint into 1A00h: what is RW goes either way.
+        # §6.5.8 maps a control word and a setpoint into 1A00h: an RW object can be mapped both ways.
         return Number(DataType.UNSIGNED16, lambda: self.setpoints[place], write, in_rpdo=True, in_tpdo=True)
 
     def _actual_entry(self, place: int) -> Number:

@@ -99,14 +99,14 @@ class DriveParameters:
         return self.raw(number, 1, parameter_set) * self._by_number[number].unit
 
     def meaning(self, number: int, value: int, parameter_set: int) -> int:
-        """What actual value (P543) or setpoint (P546) ``value`` from 1 means: an element of that parameter,
-        or in an SK 500E…535E one of the three from that number on. 0 is nothing."""
+        """The meaning of actual value (P543) or setpoint (P546) number ``value``, from 1: an element of that
+        parameter, or in an SK 500E…535E one of the three parameters from that number on. 0 is none."""
         by_elements = len(self._by_number[number].defaults) > 1
         key = (number, value, parameter_set) if by_elements else (number + value - 1, 1, parameter_set)
         return self._ram.get(key, 0) if by_elements or value <= _PLAIN_VALUES else 0
 
     def commission(self, number: int, value: float) -> None:
-        """Set all sets and elements, as a technician did before the drive came onto the bus.
+        """Set all sets and elements, as at commissioning, before the drive was connected to the bus.
 
         Raises ``KeyError`` for a parameter the simulation does not have and ``ValueError`` out of range.
         """

@@ -15,7 +15,7 @@ from bridge.sim.nord_settings import DRIVES, InterfaceSettings
 from bridge.sim.store import Store
 
 PROFILE_STEP: Final = 0x800
-"""From one drive's objects to the next one's: §6.7.1 has eight profiles in 6000h…9FFFh."""
+"""Distance between the objects of two drives: §6.7.1 has eight profiles in 6000h…9FFFh."""
 _PROFILE: Final = range(0x6000, 0xA000)
 _REPLACED: Final = range(0x3000, 0x3006)
 _RPM_PER_HZ: Final = 60 / POLE_PAIRS
@@ -26,7 +26,7 @@ _IO_SHIFT: Final = 16
 
 
 class ProfileDictionary(Dictionary):
-    """Objects of which either those of the profile or 3000h…3005h are there."""
+    """A dictionary that has either the objects of the profile or 3000h…3005h."""
 
     def __init__(self, hides: Callable[[int], bool]) -> None:
         super().__init__()
@@ -36,7 +36,7 @@ class ProfileDictionary(Dictionary):
         return not self._hides(index) and super().has_object(index)
 
     def find(self, index: int, sub: int) -> Entry:
-        """As in a dictionary that has only what is there now."""
+        """The entry, if the object exists at present."""
         return super().find(index if self.has_object(index) else -1, sub)
 
 
@@ -61,14 +61,15 @@ class VelocityMode:
         return self._store.current.profile[0] != 0
 
     def hides(self, index: int) -> bool:
-        """Whether this object is not there: one of the profile without it, or one that it replaces."""
+        """Whether this object does not exist at present: one of the profile while that is off, or one that it
+        replaces."""
         return index in (_REPLACED if self.is_on else _PROFILE)
 
     def clear(self) -> None:
         self._targets_rpm = [0] * DRIVES
 
     def demand(self, place: int) -> Demand:
-        """What the drive is to do, by 6042h within 6046h and with the ramps of 6048h and 6049h."""
+        """The drive's demand: 6042h within 6046h, with the ramps in 6048h and 6049h."""
         settings = self._store.current
         target = self._targets_rpm[place]
         if target:
@@ -128,7 +129,7 @@ class VelocityMode:
             dictionary.add_array(base + index, [speeds, times])
 
     def _ramp_s(self, place: int, first: int) -> float | None:
-        """The time between 0 and P105 by P168; None where it says no change of speed."""
+        """The time between 0 and P105 by P168; None if it defines no change of speed."""
         at = 1 + _PER_DRIVE * place + first
         delta_rpm, delta_s = self._store.current.profile[at : at + 2]
         if not delta_rpm:

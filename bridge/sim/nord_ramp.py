@@ -1,4 +1,4 @@
-"""Ramp generator of a NORD inverter (P102, P103, P426), and where the shaft gets to (BU 2500 §6.5.4)."""
+"""Ramp generator of a NORD inverter (P102, P103, P426), and its shaft's position (BU 2500 §6.5.4)."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from dataclasses import dataclass
 from typing import Final
 
 SNAP_HZ: Final = 1e-9
-"""Closer than this to the target is there: sums of floats never end exactly."""
+"""Closer than this, the target counts as reached: sums of floats are never exact."""
 POLE_PAIRS: Final = 2
 """A motor of four poles, as in §5.4."""
 INCREMENTS: Final = 1000
-"""Of a position, to a revolution (§6.5.4)."""
+"""Increments of a position per revolution (§6.5.4)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """What an interface asks for in the drive profile (§6.7.3), instead of setpoints and ramps of the
-    drive. The times are those between 0 and P105; None is P102 or P103."""
+    """What an interface demands in the drive profile (§6.7.3), in place of the drive's setpoints and ramps.
+    The times are those between 0 and P105; None is P102 or P103."""
 
     target_hz: float
     accelerate_s: float | None
@@ -49,7 +49,7 @@ def _toward(value_hz: float, target_hz: float, time_s: float, max_hz: float, dt_
 
 
 def turned(increments: float, from_hz: float, to_hz: float, dt_s: float) -> float:
-    """The position ``dt_s`` later, in increments, between two frequencies of the field. One that runs over
-    its 32 bits goes on at the other end."""
+    """The position in increments ``dt_s`` later, between two frequencies of the field. It wraps at 32
+    bits."""
     increments += (from_hz + to_hz) / 2 / POLE_PAIRS * dt_s * INCREMENTS
     return (increments + 0x8000_0000) % 0x1_0000_0000 - 0x8000_0000

@@ -1,4 +1,4 @@
-"""One NORD inverter SK 5xxE to a node: with an SK TU3-CAO, or by its own RJ45 sockets (BU 2500)."""
+"""A node with one NORD inverter SK 5xxE: with an SK TU3-CAO, or through its own RJ45 sockets (BU 2500)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _INTERFACE_ID: Final = 0x0C00
 
 
 class NordSingle(NordNode):
-    """``p513_s`` is the drive's watch over its master, the only one there is (§8.1): 0 off, -0.1 ignore."""
+    """``p513_s`` is the only supervision of the master (§8.1): 0 off, -0.1 ignore."""
 
     def __init__(
         self,
@@ -70,17 +70,18 @@ class NordSingle(NordNode):
     # What a test or a demonstration does to the drive.
 
     def fail_drive(self, fault_tenths: int) -> None:
-        """The drive trips by itself; 30 is E003/3.0. The cause is gone at once, the acknowledge works."""
+        """The drive trips by itself; 30 is E003/3.0. The cause does not last: an acknowledge works."""
         self._injected.append(lambda: self.drive.trip(fault_tenths))
 
     def drop_drive(self) -> None:
-        """Interface and drive lose each other: 10.8 in the drive (§8.4). By RJ45 there is no interface."""
+        """Cut the connection between interface and drive: 10.8 in the drive (§8.4). With RJ45 there is no
+        interface."""
         if not self.variant.has_interface:
             raise ValueError(f"{self.variant.device_name} has no interface that it could lose")
         self._injected.append(self._unlink)
 
     def restore_drive(self) -> None:
-        """Interface and drive have each other again. The fault stays until the acknowledge."""
+        """Restore that connection. The fault stays until the acknowledge."""
         self._injected.append(self._link)
 
     # The application of the CANopen slave.
@@ -89,8 +90,8 @@ class NordSingle(NordNode):
         if command is NmtCommand.RESET_COMMUNICATION:
             return  # the application, and with it P513, is not touched (CiA 301 §7.3.2.2.1)
         self._power_on()
-        # Interface or CANopen are gone for a moment. The manual does not say what a drive makes of it; here
-        # one that is running reports it, one at rest lets it pass.
+        # Interface or CANopen are gone for a moment. The manual does not say how a drive reacts; here
+        # a running one reports it, one at rest ignores it.
         if self.drive.state in (State.ENABLED, State.QUICK_STOP):
             self.drive.communication_lost(LINK_BROKEN if self.variant.has_interface else TELEGRAM_DOWNTIME)
             self.drive.cause_gone()
@@ -100,7 +101,7 @@ class NordSingle(NordNode):
         return True
 
     def rpdo_applied(self, number: int) -> None:
-        del number  # what was written says it
+        del number  # the objects written tell which
         if 0 in self._written and self._control & VALID and self.linked:
             self._watch.on_telegram(self._now)
             self._causes_gone(TELEGRAM_DOWNTIME)
@@ -158,7 +159,7 @@ class NordSingle(NordNode):
             dictionary.add(ENCODER, 0, self._encoder())
 
     def _encoder(self) -> Number:
-        """The position that an absolute encoder, or who plays it, tells the drive."""
+        """The position from an absolute encoder, or from a test that plays one."""
 
         def write(value: int) -> None:
             self.drive.position_increments = value
@@ -185,7 +186,7 @@ class NordSingle(NordNode):
 
     def _words_by_sdo(self) -> None:
         if self.slave.state is NmtState.OPERATIONAL:
-            # They act on the drive, but P513 waits for a process data telegram.
+            # They act on the drive, but only a process data telegram restarts P513.
             self._forward()
 
     def _watch_expired(self) -> None:
@@ -206,7 +207,7 @@ class NordSingle(NordNode):
             return
         setpoints = list(self._setpoints)
         if self.variant.has_interface and 0 in written:
-            # §6.5.7: the RPDO that is sent says whether one or up to three setpoints are evaluated.
+            # §6.5.7: which RPDO is sent decides whether one or up to three setpoints are evaluated.
             setpoints = [word if n in written else 0 for n, word in enumerate(setpoints, start=1)]
         self.drive.on_telegram(self._control, setpoints)
 

@@ -1,4 +1,4 @@
-"""Nodes with one SK 5xxE: what their factory settings are (BU 2500 §6.5.7)."""
+"""Factory settings of nodes with one SK 5xxE (BU 2500 §6.5.7)."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """``values`` are setpoints, and as many actual values. ``has_interface``: an SK TU3-CAO stands between
-    drive and bus; then the RPDO that came last says which setpoints count."""
+    """``values`` are setpoints, and as many actual values. ``has_interface``: with an SK TU3-CAO between
+    drive and bus; then the latest RPDO decides which setpoints count."""
 
     device_name: str
     values: int

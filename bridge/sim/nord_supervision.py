@@ -1,4 +1,4 @@
-"""What a NORD node watches and reports: P151 or P513, P170, P173 (BU 2500 §7.1.1, §7.1.3, §8.1, §8.2)."""
+"""What a NORD node supervises and reports: P151 or P513, P170, P173 (BU 2500 §7.1.1, §7.1.3, §8.1, §8.2)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ class Presence(IntEnum):
 
 
 def module_state(nmt: NmtState, master_lost: bool, p151_tripped: bool, drives: Sequence[Presence]) -> int:
-    """P173: NMT state, time-outs, two bits per drive. The bus bits 4…7 stay 0: a simulated bus is well."""
+    """P173: NMT state, time-outs, two bits per drive. The bus bits 4…7 stay 0: a simulated bus has no
+    errors."""
     state = 1 if nmt is NmtState.PRE_OPERATIONAL else 0
     state |= 2 if nmt is NmtState.OPERATIONAL else 0
     state |= 4 if master_lost else 0
@@ -31,8 +32,8 @@ def module_state(nmt: NmtState, master_lost: bool, p151_tripped: bool, drives: S
 
 
 class TelegramWatch:
-    """P151, or P513 where there is no interface with parameters of its own (§8.1): from the first valid
-    telegram on, the next must come within this time. 0 ms is off."""
+    """P151, or P513 without an interface that has parameters (§8.1): from the first valid telegram on, the
+    next must come within this time. 0 ms is off."""
 
     def __init__(self, time_ms: Callable[[], int]) -> None:
         self._time_ms = time_ms
@@ -78,7 +79,7 @@ class FaultDisplay:
             self._present.append(fault_tenths)
 
     def clear(self, fault_tenths: int) -> None:
-        """The cause has gone: the fault clears by itself and is kept as the last one."""
+        """The cause is gone: the fault clears by itself and is kept as the last one."""
         if fault_tenths in self._present:
             self._present.remove(fault_tenths)
             self.last = fault_tenths

@@ -72,18 +72,18 @@ class NordTu4(NordNode):
         if profile:
             self._set_profile(True)
             self._communication.save()
-        self._interface.save()  # commissioned before it came onto this bus
+        self._interface.save()  # commissioned before it was connected to this bus
         self._build()
 
     # What a test or a demonstration does to its drives.
 
     def fail_drive(self, slot: str | int, fault_tenths: int) -> None:
-        """The drive trips by itself; 30 is E003/3.0. The cause is gone at once, the acknowledge works."""
+        """The drive trips by itself; 30 is E003/3.0. The cause does not last: an acknowledge works."""
         drive = self.drives[place_of(slot)]
         self._injected.append(lambda: drive.trip(fault_tenths))
 
     def drop_drive(self, slot: str | int) -> None:
-        """The drive loses the system bus: lost for the interface, 10.9 in the drive."""
+        """The drive loses the system bus: missing for the interface, 10.9 in the drive."""
         place = place_of(slot)
         self._injected.append(lambda: self._join(place, Presence.LOST))
 
@@ -100,15 +100,15 @@ class NordTu4(NordNode):
             return  # the application, and with it P151, is not touched (CiA 301 §7.3.2.2.1)
         self._power_on()
         for drive in self.drives:
-            # The restarting interface is gone from the system bus for a moment. The manual does not say what
-            # a drive makes of it; here one that is running reports it as missing, one at rest lets it pass.
+            # The restarting interface leaves the system bus for a moment. The manual does not say how
+            # a drive reacts; here a running one reports it as missing, one at rest ignores it.
             if drive.state in (State.ENABLED, State.QUICK_STOP):
                 drive.communication_lost(INTERFACE_MISSING)
                 drive.cause_gone()
 
     def accepts_rpdo(self, number: int, length: int) -> bool:
         """§6.4: a drive's PDO is evaluated only with all four words, mapped and received. In the drive
-        profile it has the words that §6.7.3 tells to map."""
+        profile it has the words that are mapped by §6.7.3."""
         if number >= DRIVES:
             return True
         mapped_bits = self._communication.current.rpdo[number].mapped_bits
@@ -117,7 +117,7 @@ class NordTu4(NordNode):
         return mapped_bits == 16 * PDO_WORDS and length == 2 * PDO_WORDS
 
     def rpdo_applied(self, number: int) -> None:
-        del number  # the words written say which drives are meant, however the PDO is mapped
+        del number  # the words written tell which drives are meant, however the PDO is mapped
         written = self.image.take_touched()
         if any(self.image.control[drive] & VALID for drive in written):
             self._watch.on_telegram(self._now)
@@ -182,8 +182,8 @@ class NordTu4(NordNode):
         self._fit_mappings()
 
     def _fit_mappings(self) -> None:
-        """What is mapped of objects that are not there is gone. §6.7.3 leaves it to the master to map those
-        of the profile; without the profile the mapping is that of the factory."""
+        """Remove mappings of objects that do not exist now. §6.7.3 leaves it to the master to map those of
+        the profile; without the profile the factory mapping applies."""
         now, factory = self._communication.current, factory_communication(self.node_id, self._layout)
         for pdo, delivered in zip((*now.rpdo, *now.tpdo), (*factory.rpdo, *factory.tpdo), strict=True):
             if not any(pdo.entries) or any(self.profile.hides(entry >> 16) for entry in pdo.entries):
@@ -201,7 +201,7 @@ class NordTu4(NordNode):
     def _words_by_sdo(self) -> None:
         written = self.image.take_touched()
         if written and self.slave.state is NmtState.OPERATIONAL:
-            # Process words written by SDO act on the drive, but P151 waits for a process data telegram.
+            # Process words written by SDO act on the drive, but only a process data telegram restarts P151.
             self._forward(written)
 
     def _watch_expired(self) -> None:
@@ -210,7 +210,7 @@ class NordTu4(NordNode):
 
     def _tell_drives(self, fault_tenths: int) -> None:
         for place, drive in enumerate(self.drives):
-            if self._online(place):  # one that is off the system bus does not hear of it
+            if self._online(place):  # a drive that is off the system bus does not get it
                 drive.communication_lost(fault_tenths)
 
     def _forward(self, places: Sequence[int]) -> None:

@@ -22,7 +22,7 @@ class Tpdo:
         self._waiting = False
 
     def start(self) -> None:
-        """The node has become operational: what the PDO carries counts as changed."""
+        """The node has become operational: the PDO's data count as changed."""
         self._last = None
         self._sent_at = None
         self._syncs = 0
@@ -99,7 +99,7 @@ class Rpdo:
 
 
 def pack(dictionary: Dictionary, settings: PdoSettings) -> bytes:
-    """What a TPDO carries at this moment."""
+    """The data of a TPDO at this moment."""
     parts: list[bytes] = []
     for word in settings.mapping:
         entry = dictionary.find(word >> 16, word >> 8 & 0xFF)

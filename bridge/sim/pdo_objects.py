@@ -37,7 +37,7 @@ def check_cob_id(cob_id: int, enabled: bool) -> None:
 
 
 class PdoObjects:
-    """Changes PDO settings by the rules, for 14xxh…1Axxh and for any parameter that means the same."""
+    """Changes PDO settings by the rules, for 14xxh…1Axxh and any equivalent parameter."""
 
     def __init__(
         self,
@@ -81,7 +81,7 @@ class PdoObjects:
         self._set_cob_id(pdo, cob_id, enabled)
 
     def set_cob_id(self, pdo: PdoSettings, cob_id: int) -> None:
-        """Another COB-ID, whether the PDO is on or off."""
+        """Set another COB-ID, also while the PDO is on."""
         self.require_pre_operational()
         self._set_cob_id(pdo, cob_id, pdo.enabled)
 
@@ -96,7 +96,7 @@ class PdoObjects:
         pdo.transmission_type = value
 
     def set_count(self, pdo: PdoSettings, count: int) -> None:
-        """Sub 0 of a mapping object: 0 takes the mapping out of use, n puts the first n entries into it."""
+        """Sub 0 of a mapping object: 0 disables the mapping, n enables its first n entries."""
         self._require_mapping_open(pdo)
         if count > len(pdo.entries):
             raise SdoAbort(AbortCode.VALUE_RANGE)
@@ -115,7 +115,8 @@ class PdoObjects:
         pdo.entries[place] = word
 
     def check_mappable(self, word: int, *, receives: bool) -> None:
-        """Abort unless the object exists, has this length and may go this way. 0 means an empty place."""
+        """Abort unless the object exists, has this length and can be mapped in this direction. 0 means an
+        empty place."""
         index, sub, bits = word >> 16, word >> 8 & 0xFF, word & 0xFF
         if word == 0 or (receives and sub == 0 and DUMMY_BITS.get(index) == bits):
             return

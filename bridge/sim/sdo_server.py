@@ -36,7 +36,7 @@ class _Download:
 
 
 class SdoServer:
-    """Answers each request with the frames that CiA 301 wants, often one, in a block none or many.
+    """Answers each request with the frames that CiA 301 asks for: usually one, in a block none or many.
 
     With ``block_segments`` 0 block transfer is not offered; its commands are answered as unknown.
     """
@@ -52,7 +52,7 @@ class SdoServer:
     def on_request(self, data: bytes) -> list[bytes]:
         """The answers to ``data``; a transfer under way is given up by a new one."""
         if len(data) != _REQUEST_SIZE:
-            return []  # not an SDO (CiA 301: always eight bytes); a real server does not see it
+            return []  # not an SDO (CiA 301: always eight bytes); a real server ignores it
         transfer = self._transfer
         receives = isinstance(transfer, BlockDownload) and transfer.in_blocks
         command = data[0] >> 5
@@ -61,7 +61,7 @@ class SdoServer:
             return []
         index, sub = int.from_bytes(data[1:3], "little"), data[3]
         continues = command in (0, 3) or (command in (5, 6) and data[0] & 0x03 in _CONTINUES[command])
-        if receives or continues:  # these carry no index: the abort names that of the transfer
+        if receives or continues:  # these have no index: the abort names that of the transfer
             index, sub = (transfer.index, transfer.sub) if transfer else (0, 0)
         try:
             if isinstance(transfer, BlockDownload) and transfer.in_blocks:

@@ -1,4 +1,4 @@
-"""Everything of a node that the communication objects set: what ``save`` keeps and ``load`` restores."""
+"""All settings made by communication objects: what ``save`` keeps and ``load`` restores."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ COB_ID_MASK: Final = 0x7FF
 
 @dataclass(frozen=True, slots=True)
 class SlaveRules:
-    """Where devices differ in what CiA 301 leaves open or they do their own way."""
+    """How devices differ where CiA 301 leaves a choice, or where they deviate from it."""
 
     wrong_state: AbortCode = AbortCode.WRONG_STATE
     """Answer to a write that is allowed in Pre-Operational only."""
@@ -30,7 +30,7 @@ class SlaveRules:
     """Errors that 1003h remembers."""
     map_entries: int = 8
     sdo_block_segments: int = 0
-    """Segments in a block that the SDO servers take; 0: they know no block transfer."""
+    """Segments in a block that the SDO servers accept; 0: no block transfer."""
 
 
 @dataclass(slots=True)

@@ -1,4 +1,4 @@
-"""Runs simulated nodes on a bus: drain, tell, send, one timer."""
+"""Runs simulated nodes on a bus: drain, hand over, send, one timer."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ class Simulation:
         self._work = asyncio.Event()
         self._is_open = False
         self._due: dict[SimulatedNode, float | None] = {}
-        """When each node wants to be looked at; one that is not in it, now. Asking all of them for every
-        frame of a busy bus would cost more than playing them."""
+        """When each node is due; one that is missing here is due now. Asking all of them for every frame of a
+        busy bus would cost more than simulating them."""
 
     def open(self) -> None:
-        """Open the bus. Raises ``Unavailable`` where that cannot be."""
+        """Open the bus. Raises ``Unavailable`` if that fails."""
         self._bus.open(self._work.set)
         self._is_open = True
 
     async def run(self) -> None:
-        """Power the nodes on and keep them going until cancelled. Opens the bus where nobody has."""
+        """Power the nodes on and run them until cancelled. Opens the bus if nobody has."""
         loop = asyncio.get_running_loop()
         if not self._is_open:
             self.open()
@@ -50,7 +50,7 @@ class Simulation:
                     timer.cancel()
 
     def poke(self) -> None:
-        """Something was done to a node from outside: look at it now instead of at the next deadline."""
+        """A node was changed from outside: serve it now instead of at its next deadline."""
         self._due.clear()
         self._work.set()
 

@@ -1,6 +1,6 @@
 """One axis of a STÖBER inverter: device control byte and speed setpoint in, state and speed out.
 
-The states are those of E48 (ID 441684.06 §11.1: 0…7); the manual of the bus has no more of the drive.
+The states are those of E48 (ID 441684.06 §11.1: 0…7); the fieldbus manual says no more about the drive.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from bridge.sim.ticks import next_tick
 
 SELF_TEST_S: Final = 0.2
 CLOSING_S: Final = 0.02
-"""From the enable to the speed control: state 3 lasts as long as this."""
+"""From the enable to speed control: the duration of state 3."""
 FAULT_REACTION_S: Final = 0.02
 COAST_S: Final = 1.0
 """Run-down from C01 to standstill without voltage."""
@@ -48,7 +48,7 @@ FAULTY: Final = (AxisState.FAULT, AxisState.FAULT_REACTION)
 
 @dataclass(slots=True)
 class AxisParameters:
-    """What an axis keeps in its memory. Times are those between standstill and C01."""
+    """The saved parameters of an axis. Times are those between standstill and C01."""
 
     c01_rpm: int = 3000
     c230_percent: int = 200
@@ -87,7 +87,7 @@ class StoeberAxis:
 
     @property
     def _is_stopping(self) -> bool:
-        """On the ramp of the quick stop, which a fault may take too."""
+        """On the ramp of the quick stop, which a fault may use, too."""
         reacts = self.state is AxisState.FAULT_REACTION and self._brakes
         return self.state is AxisState.QUICK_STOP or reacts
 
@@ -113,7 +113,7 @@ class StoeberAxis:
         self.state, self._until = AxisState.FAULT_REACTION, self._time + FAULT_REACTION_S
 
     def acknowledge(self) -> bool:
-        """Leave the fault; False where the reaction to it still goes on."""
+        """Leave the fault; False while the reaction to it goes on."""
         if self.state is not AxisState.FAULT:
             return False
         self.state = AxisState.INHIBITED
@@ -145,7 +145,7 @@ class StoeberAxis:
             case AxisState.SELF_TEST if due:
                 return AxisState.INHIBITED
             case AxisState.INHIBITED if not enable and not stop and self._may_switch_on():
-                return AxisState.READY  # the enable has to come anew: nothing starts by itself
+                return AxisState.READY  # a new enable is needed: nothing starts by itself
             case AxisState.READY if stop or not self._may_switch_on():
                 return AxisState.INHIBITED
             case AxisState.READY if enable:

@@ -15,7 +15,7 @@ _PARAMETERS: Final = {
     "decelerate_s": ("decelerate_s", 0.0, 600.0),
     "quick_stop_s": ("quick_stop_s", 0.0, 600.0),
 }
-"""What the simulation calls it, and its limits."""
+"""Name in the simulation, and limits."""
 
 
 def stoeber_5000(node_id: int, parameters: Mapping[str, float]) -> Stoeber5000:
@@ -29,7 +29,7 @@ def stoeber_5000_four_axes(node_id: int, parameters: Mapping[str, float]) -> Sto
 
 def _commissioned(node: Stoeber5000, parameters: Mapping[str, float]) -> Stoeber5000:
     slots = [f"axis{axis.number}" for axis in node.axes]
-    # What is meant for one axis comes after what is meant for all.
+    # Settings for one axis come after those for all.
     for name in sorted(parameters, key=lambda name: "/" in name):
         slot, _, parameter = name.rpartition("/")
         if parameter not in _PARAMETERS or slot not in ("", *slots):

@@ -30,7 +30,7 @@ class StoeberDevice:
 
     @property
     def shown(self) -> StoeberAxis:
-        """The axis that the displays of the device mean: the one that is switched on."""
+        """The axis whose values the device displays: the one that is switched on."""
         return next((axis for axis in self.axes if axis.blocks_others), self.axes[0])
 
     @property
@@ -44,7 +44,7 @@ class StoeberDevice:
         return 0 if self.event == NO_EVENT else CODES[self.event][1]
 
     def parameters(self, axis: int = 0) -> AxisParameters:
-        """What an axis (from 0) is set to."""
+        """The parameters of an axis (from 0)."""
         return self._settings.current.axes[axis]
 
     def power_on(self, now: float) -> None:
@@ -53,7 +53,7 @@ class StoeberDevice:
             axis.power_on(now)
 
     def trip(self, event: int, cause: int = 0, *, lasting: bool = False) -> None:
-        """The inverter goes into fault, with all its axes; the first event is the one to be seen."""
+        """The inverter and all its axes go into fault; the first event is the one displayed."""
         if self.event != NO_EVENT:
             return
         self.event, self.cause, self.cause_lasts = event, cause, lasting
@@ -77,7 +77,7 @@ class StoeberDevice:
         self.settle()
 
     def settle(self) -> None:
-        """Take every change of state that is due; an axis that has come to rest sets the others free."""
+        """Make all transitions that are due; an axis that has come to rest frees the others."""
         for _ in range(2):
             for axis in self.axes:
                 axis.settle()

@@ -15,7 +15,7 @@ _BAUD_250: Final = 5
 
 
 def add_device(dictionary: Dictionary, device: StoeberDevice, settings: Store[StoeberSettings]) -> None:
-    """What there is once, and A180 and D230 where one axis is all there is."""
+    """Parameters of the device, and A180 and D230 if there is only one axis."""
     u8, i16 = Type.UNSIGNED8, Type.INTEGER16
     for channel in range(CHANNELS + 1):
         dictionary.add(coordinate("A11"), channel, _edited_axis(settings, channel, len(device.axes)))
@@ -32,7 +32,7 @@ def add_device(dictionary: Dictionary, device: StoeberDevice, settings: Store[St
 
 
 def add_axis(dictionary: Dictionary, device: StoeberDevice, number: int) -> None:
-    """What axis ``number`` (from 0) has of its own."""
+    """The parameters of axis ``number`` (from 0)."""
     axis = device.axes[number]
     u8, i16 = Type.UNSIGNED8, Type.INTEGER16
 

@@ -50,7 +50,7 @@ class StoeberPdoObjects(PdoObjects):
         pdo.transmission_type = value
 
     def set_entry(self, pdo: PdoSettings, place: int, word: int, *, receives: bool) -> None:
-        """The length may be 0; the drive puts in the object's own (§8.1.1)."""
+        """The length may be 0; the drive then fills in that of the object (§8.1.1)."""
         self.require_pre_operational()
         if 0 < word >> 16 < _FIRST_OBJECT:  # no dummy entries: the manual has none
             raise SdoAbort(AbortCode.NOT_MAPPABLE)

@@ -11,7 +11,7 @@ from bridge.sim.stoeber_axis import AxisParameters
 CHANNELS: Final = 4
 MAP_ENTRIES: Final = 6
 ANSWERED: Final = 254
-"""Transmission type: an RPDO is taken at once and answered by a TPDO (§8.1.2)."""
+"""Transmission type: an RPDO takes effect at once and is answered by a TPDO (§8.1.2)."""
 
 RULES: Final = SlaveRules(
     remap_needs_disabled=False,  # §7.3.1 and §8.1.1 ask for Pre-Operational only
@@ -35,7 +35,7 @@ def _words(*names: tuple[str, int]) -> list[int]:
 
 RECEIVED: Final = _words(("A180", 8), ("D230", 16))
 SENT: Final = _words(("E48", 8), ("E200", 8), ("E08", 16), ("E00", 16))
-"""What mappings/stoeber/5000.toml takes for the application's words; the manual names none."""
+"""The application's words that mappings/stoeber/5000.toml assumes; the manual names none."""
 AXIS_RECEIVED: Final = _words(("Q00", 8), ("Q01", 16))
 AXIS_SENT: Final = _words(("Q02", 8), ("Q03", 8), ("Q04", 16), ("Q05", 16))
 """The same for an application with a channel to each axis, mappings/stoeber/5000-four-axes.toml."""
@@ -52,7 +52,7 @@ class StoeberPdo(PdoSettings):
 
 @dataclass(slots=True)
 class StoeberSettings:
-    """What "save values" keeps beside the communication objects."""
+    """What "save values" keeps in addition to the communication objects."""
 
     axes: list[AxisParameters]
     edited_axis: list[int]

@@ -1,4 +1,4 @@
-"""What the CANopen slave of CAN 5000 does its own way (ID 441684.06 §7 … §9)."""
+"""Where the CANopen slave of CAN 5000 deviates from CiA 301 (ID 441684.06 §7 … §9)."""
 
 from __future__ import annotations
 
@@ -84,8 +84,8 @@ class SyncWatch:
 class StoeberSlave(CanopenSlave):
     """``views`` are the objects as each PDO channel sees them: channel n maps parameters of axis n.
 
-    SDO channels that were changed count after reset communication, or after Stopped and Pre-Operational
-    (§7.3.1); reset communication keeps what was written, as it is that which makes it count.
+    Changed SDO channels take effect after reset communication, or after Stopped and Pre-Operational (§7.3.1).
+    So reset communication keeps what was written.
     """
 
     def __init__(
@@ -168,7 +168,7 @@ class StoeberSlave(CanopenSlave):
         super()._on_sync(now)
 
     def _apply(self, number: int, pdo: PdoSettings, data: bytes) -> None:
-        """§8.1.1: surplus bytes are left out, an object that is not covered whole stays as it is."""
+        """§8.1.1: surplus bytes are ignored, an object that is not completely covered stays unchanged."""
         covered: list[int] = []
         bits = 0
         for entry in pdo.mapping:

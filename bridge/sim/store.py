@@ -1,4 +1,4 @@
-"""Settings with a memory: what a node has after power-on, ``save`` and ``load``."""
+"""Settings and their non-volatile memory: power-on, ``save`` and ``load``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 
 class Store(Generic[T]):
-    """``current`` is what the node works with; ``saved`` is its EEPROM (BU 2500 §6.7.2, 1010h and 1011h)."""
+    """``current`` is what the node uses; ``saved`` is its EEPROM (BU 2500 §6.7.2, 1010h and 1011h)."""
 
     def __init__(self, factory: Callable[[], T]) -> None:
         self._factory = factory

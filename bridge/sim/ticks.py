@@ -1,4 +1,4 @@
-"""The one beat of everything that moves: simulated drives that tick together wake their process once."""
+"""A common tick for everything that moves: drives that tick together wake their process only once."""
 
 from __future__ import annotations
 

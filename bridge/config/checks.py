@@ -98,7 +98,7 @@ def _check_node(bus: RawTable, node: RawTable, file: TomlFile) -> None:
         file.fault((*node.key, "name"), f"{name!r} is reserved", "choose another name")
     master = _given(bus, "master_node_id", _BUS.master_node_id)
     if node.content.get("enforce") is True and "own_timeout_ms" not in node.content:
-        file.fault((*node.key, "enforce"), "says nothing without own_timeout_ms", "give the time, in ms")
+        file.fault((*node.key, "enforce"), "has no effect without own_timeout_ms", "give the time, in ms")
     if node_id == master and _given(bus, "heartbeat_ms", _BUS.heartbeat_ms):
         file.fault((*node.key, "id"), f"node id {node_id} is the bridge's own", "change it or master_node_id")
 
@@ -144,7 +144,7 @@ def _check_dead_owner(drive: RawTable, file: TomlFile) -> None:
         way = "fieldbus_timeout_range_ms from 1 ms on" if may_be_off else "a fieldbus_timeout_ms from 1 ms on"
         file.fault(
             (*drive.key, "stop_by_anyone"),
-            f"nobody would be told that an owner by {drive.text('control')} is dead: without a time-out it "
+            f"nobody would notice that an owner by {drive.text('control')} is dead: without a time-out it "
             "would block the drive for ever",
             f"{way}, or stop_by_anyone = true",
         )
@@ -177,13 +177,13 @@ def _check_zenoh(file: TomlFile) -> None:
     if "controllers" in zenoh.content and (open_to_all or not listen):
         file.fault(
             ("zenoh", "controllers"),
-            "names users, and nobody has to prove to be one",
+            "names users, but clients need not authenticate",
             "user and password_file, or listen on tls with enable_mtls=true",
         )
     for i in open_to_all:
         if not _LOCAL.fullmatch(cast("str", listen[i])) and zenoh.content.get("no_security") is not True:
             file.fault(
                 ("zenoh", "listen", i),
-                f"{listen[i]} is beyond loopback, and whoever reaches it could command the drives",
+                f"{listen[i]} is not on loopback: anybody who reaches it could command the drives",
                 "user and password_file, or tls with enable_mtls=true; no_security = true is a decision",
             )

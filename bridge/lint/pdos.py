@@ -40,7 +40,7 @@ def _check_type(family: Family, pdo: PdoView, report: LintReport) -> None:
     if LAST_SYNCHRONOUS < kind < REMOTE_TYPES[0]:
         why = "241…251 are reserved"
     elif pdo.receives and kind in REMOTE_TYPES:
-        why = "252 and 253 are TPDOs that are asked for"
+        why = "252 and 253 are for TPDOs sent on request"
     elif kind in forbidden:
         why = f"{family.family.name} does not have {', '.join(map(str, forbidden))}"
     else:

@@ -51,7 +51,7 @@ def _check_supervision(bus: BusView, node: NodeView, report: LintReport) -> None
     if table.supervision == "none":
         return
     if table.supervision == "guarding" and table.life_time_factor == 1:
-        message = "is 1: one lost frame, and the node is lost"
+        message = "is 1: a single lost frame counts as a lost node"
         report.warning((*node.key, "life_time_factor"), message, "at least 2")
     if table.supervision_ms < 2 * bus.table.sync_period_ms:
         report.warning(
@@ -150,7 +150,7 @@ def _check_downtime(bus: BusView, node: NodeView, drive: DriveView, report: Lint
         deadline_s = given_ms / 1000 or None
     if downtime_s <= 0:
         if downtime_s == 0 and node.table.supervision == "none":
-            message = "is 0, and the node is not supervised: nothing notices that the drive is gone"
+            message = "is 0, and the node is not supervised: nobody would notice a lost drive"
             report.warning(key, message)
         return
     if deadline_s is None:

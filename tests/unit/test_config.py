@@ -303,7 +303,7 @@ class TestWhatDoesNotGoTogether:
             load(tmp_path, text.format("false"))
             return
         (fault,) = faults(tmp_path, text.format("false"))
-        assert "stop_by_anyone: nobody would be told" in fault
+        assert "stop_by_anyone: nobody would notice that an owner" in fault
         assert "from 1 ms on, or stop_by_anyone = true" in fault
 
     def test_a_lease_needs_no_protocol_of_its_own(self, tmp_path: Path):

@@ -277,7 +277,7 @@ def test_the_nodes_own_time_out_outlives_rpdos_and_dead_man_time(
 
 def test_a_drive_that_nothing_watches(tmp_path: Path) -> None:
     verdict = judge(tmp_path, node='supervision = "none"', drive=f"{TIMEOUT}\ntelegram_downtime_s = 0")
-    assert "nothing notices that the drive is gone" in only(verdict, Severity.WARNING)
+    assert "nobody would notice a lost drive" in only(verdict, Severity.WARNING)
 
 
 @pytest.mark.parametrize(

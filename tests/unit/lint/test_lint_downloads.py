@@ -173,7 +173,7 @@ def test_reserved_transmission_types(tmp_path: Path, pdo: str, kind: int) -> Non
 def test_an_rpdo_is_not_asked_for(tmp_path: Path, kind: int) -> None:
     drive = f"{TIMEOUT}\nrpdo = {{ transmission_type = {kind} }}"
     found = only(judge(tmp_path, drive=drive), Severity.ERROR)
-    assert f"RPDO1 cannot have type {kind}: 252 and 253 are TPDOs that are asked for" in found
+    assert f"RPDO1 cannot have type {kind}: 252 and 253 are for TPDOs sent on request" in found
 
 
 def test_a_type_that_the_family_does_not_have(tmp_path: Path) -> None:
@@ -201,6 +201,6 @@ def test_what_the_factory_has_is_its_own_affair(tmp_path: Path) -> None:
 
 def test_one_lost_frame_must_not_lose_a_node(tmp_path: Path) -> None:
     found = only(judge(tmp_path, node='supervision = "guarding"\nlife_time_factor = 1'), Severity.WARNING)
-    assert "life_time_factor: is 1: one lost frame, and the node is lost" in found
+    assert "life_time_factor: is 1: a single lost frame counts as a lost node" in found
     assert judge(tmp_path, node='supervision = "guarding"\nlife_time_factor = 2').findings == ()
     assert findings(judge(tmp_path, node="life_time_factor = 1"), Severity.WARNING) == []

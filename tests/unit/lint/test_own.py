@@ -61,7 +61,7 @@ def test_check_tells_what_a_dead_bridge_leads_to(tmp_path, mapping: str, node: s
         ("nord/sk-tu3-cao", "own_timeout_ms = 250", "250 is no multiple of 100 ms"),
         ("nord/sk-tu4-cao", "own_timeout_ms = 40000", "takes 1…32767 ms"),
         ("lenze/8400-motec", "own_timeout_ms = 65400", "takes 1…65000 ms"),
-        ("nord/sk-tu4-cao", "enforce = true", "says nothing without own_timeout_ms"),
+        ("nord/sk-tu4-cao", "enforce = true", "has no effect without own_timeout_ms"),
         ("nord/sk-tu4-cao", "own_timeout_ms = 0", "must be at least 1"),
     ],
 )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from ipaddress import IPv6Address, ip_address
 
 
+@lru_cache(maxsize=1024)
 def source_of(host: str) -> str:
     """An IPv4 address, or an IPv6 network of 64 bits, because a single machine has all addresses of that."""
     try:

@@ -22,6 +22,7 @@ from bridge.mirror.client import MirrorClient
 from bridge.northbound.modbus.dispatch import Dispatcher
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.session import Session
+from bridge.northbound.sources import source_of
 from bridge.northbound.zenoh.session import ZenohServer
 from bridge.notify import Notifier
 from bridge.parts import Parts
@@ -294,19 +295,26 @@ class _Visitor:
     identity: Identity | None = None
     heard_at: float = 0.0
     address: str = "10.0.0.9:50000"
-    host: str = "10.0.0.9"
+    source: str = "10.0.0.9"
+    has_spoken: bool = True
 
     def close(self) -> None: ...
 
 
-async def test_connections_that_come_and_go(log: QuietLog) -> None:
+@pytest.mark.parametrize(
+    ("stranger", "guest"),
+    [("192.168.1.1", "10.0.0.9"), ("2001:db8::{:x}", "fd00::{:x}")],
+    ids=["of one address each", "of every address of a network"],
+)
+async def test_connections_that_come_and_go(log: QuietLog, stranger: str, guest: str) -> None:
     plant = sites.plant_of(SITE)
-    table = ModbusTable.model_validate({"allow": ["10.0.0.0/8"], "max_connections": 2})
+    table = ModbusTable.model_validate({"allow": ["10.0.0.0/8", "fd00::/8"], "max_connections": 2})
     server = ModbusServer(plant, table, lambda: log.now)
     for number in range(TIMES):
-        visitor = cast(Session, _Visitor())
-        server.admit(visitor, "192.168.1.1", number)
-        server.admit(visitor, "10.0.0.9", number)
+        host = guest.format(number)
+        visitor = cast(Session, _Visitor(source=source_of(host)))
+        server.admit(visitor, stranger.format(number), number)
+        server.admit(visitor, host, number)
         server.on_fault(visitor, f"protocol id {number}")
     assert len(log.lines) == 3
     assert len(log.pass_minute()) == 3

@@ -95,7 +95,7 @@ class ModbusServer:
             _log.warning(
                 "connection of %s refused: it is in none of the networks of modbus.allow",
                 address,
-                extra=about(str(address)),
+                extra=about(source_of(str(address))),
             )
             return None
         if len(self._sessions) >= self._settings.max_connections:
@@ -115,17 +115,17 @@ class ModbusServer:
 
     def on_fault(self, session: Session, fault: str) -> None:
         self._plant.count("modbus_broken_connections", self._clock())
-        _log.warning("connection of %s closed: %s", session.address, fault, extra=about(session.host))
+        _log.warning("connection of %s closed: %s", session.address, fault, extra=about(session.source))
 
     def _make_room(self, newcomer: str) -> None:
         """End the connection that is missed least: one of the address that has the most, so that a crowd
         pushes out itself; of them one that has said nothing yet, or the one that is idle the longest."""
         owners = [drive.channel.owner for drive in self._plant.drives.values()]
-        crowds = Counter(source_of(session.host) for session in self._sessions)
+        crowds = Counter(session.source for session in self._sessions)
         crowds[newcomer] += 1
 
         def is_missed(session: Session) -> tuple[bool, int, bool, float]:
-            identity, crowd = session.identity, crowds[source_of(session.host)]
+            identity, crowd = session.identity, crowds[session.source]
             # An owner's address has its share before all others, but no more than that.
             owns = identity is not None and any(map(identity.is_same, owners))
             has_share = crowd <= max(1, self._settings.max_connections // 2)
@@ -137,7 +137,7 @@ class ModbusServer:
             "connection of %s closed to make room: there are %d, and it is missed least",
             idlest.address,
             len(self._sessions),
-            extra=about(idlest.host),
+            extra=about(idlest.source),
         )
         self._sessions.discard(idlest)
         idlest.close()

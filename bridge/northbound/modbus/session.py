@@ -12,6 +12,7 @@ from bridge.command.freshness import Inflow
 from bridge.northbound.modbus.conversation import Conversation
 from bridge.northbound.modbus.dispatch import Answer, Dispatcher
 from bridge.northbound.pulse import Pulse
+from bridge.northbound.sources import source_of
 
 TURN: Final = 16
 """Requests of one connection that are handled before everything else gets its turn: about 0.3 ms."""
@@ -69,9 +70,9 @@ class Session(asyncio.BufferedProtocol):
         return self.identity.address if self.identity else ""
 
     @property
-    def host(self) -> str:
-        """The client's address without its port."""
-        return self.identity.user if self.identity else ""
+    def source(self) -> str:
+        """Whom limits count it for, and lines of the log."""
+        return source_of(self.identity.user) if self.identity else ""
 
     def close(self) -> None:
         """End the connection; answers that the client does not take are lost."""

@@ -17,7 +17,7 @@ import zenoh
 
 from bridge.zenohlink.lane import Job, Lane
 from bridge.zenohlink.message import sentence
-from bridge.zenohlink.sockets import close_without_waiting
+from bridge.zenohlink.sockets import Connections
 from bridge.zenohlink.strangers import Strangers
 
 _log = logging.getLogger(__name__)
@@ -64,6 +64,7 @@ class Worker:
         """Is told, on the worker's thread, whose connections came to no session."""
         self._config = config
         self._is_for_strangers = is_for_strangers
+        self._connections = Connections()
         self._strangers = Strangers()
         self._look_at = time.monotonic()
         self._opened = opened
@@ -163,7 +164,7 @@ class Worker:
     def _settle_sockets(self) -> None:
         now = time.monotonic()
         self._look_at = now + _LOOK_S
-        self._strangers.on_connections(close_without_waiting(), now)
+        self._strangers.on_connections(self._connections.settle(), now)
         strangers = self._strangers.take(now)
         if strangers:
             self.on_strangers(strangers)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import errno
+import os
 import socket
 import struct
 from pathlib import Path
 
 import pytest
 
-from bridge.zenohlink.sockets import close_without_waiting
+from bridge.zenohlink.sockets import Connections
 
 TEN_SECONDS = struct.pack("ii", 1, 10)
 
@@ -24,7 +25,8 @@ def files() -> set[str]:
 
 
 def test_every_tcp_connection_is_found_and_no_other_file_is_touched() -> None:
-    close_without_waiting()
+    connections = Connections()
+    connections.settle()
     local, remote = socket.socketpair()
     with (
         socket.create_server(("127.0.0.1", 0)) as server,
@@ -37,10 +39,10 @@ def test_every_tcp_connection_is_found_and_no_other_file_is_touched() -> None:
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, TEN_SECONDS)
         before = files()
         ends = {"{}:{}".format(*connection.getpeername()) for connection in (client, accepted)}
-        found = close_without_waiting()
+        found = connections.settle()
         assert len(found) == 2
         assert set(found) == ends, "where they lead"
-        assert close_without_waiting() == []
+        assert connections.settle() == []
         assert files() == before, "nothing is left open"
         assert not any(map(lingers, (client, accepted)))
         client.sendall(b"still there")
@@ -55,7 +57,31 @@ def test_an_ipv6_connection_is_named_as_zenoh_does() -> None:
         socket.create_connection(server.getsockname()[:2]) as client,
     ):
         client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, TEN_SECONDS)
-        assert close_without_waiting() == [f"[::1]:{server.getsockname()[1]}"]
+        assert Connections().settle() == [f"[::1]:{server.getsockname()[1]}"]
+
+
+def test_what_is_settled_is_not_looked_at_again_but_whoever_has_its_number_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Hundreds may be there, and the process that looks drives a bus."""
+    connections = Connections()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        first = socket.create_connection(server.getsockname())
+        first.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, TEN_SECONDS)
+        number = first.fileno()
+        assert len(connections.settle()) == 1
+        looked_at: list[int] = []
+        dup = os.dup
+        monkeypatch.setattr(os, "dup", lambda number: looked_at.append(number) or dup(number))
+        connections.settle()
+        assert looked_at
+        assert number not in looked_at
+        first.close()
+        with socket.create_connection(server.getsockname()) as second:
+            assert second.fileno() == number
+            second.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, TEN_SECONDS)
+            assert len(connections.settle()) == 1
+            assert not lingers(second)
 
 
 def test_no_copy_is_left_whatever_fails(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -66,8 +92,9 @@ def test_no_copy_is_left_whatever_fails(monkeypatch: pytest.MonkeyPatch) -> None
 
     with socket.socket(socket.AF_UNIX), socket.socket(socket.AF_INET):
         before = len(list(Path("/proc/self/fd").iterdir()))
-        close_without_waiting()
+        connections = Connections()
+        connections.settle()
         monkeypatch.setattr(socket, "socket", refuse)
         for _ in range(10):
-            close_without_waiting()
+            connections.settle()
         assert len(list(Path("/proc/self/fd").iterdir())) == before

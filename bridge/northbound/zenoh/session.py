@@ -23,6 +23,7 @@ from bridge.command.request import STOP_ACTIONS
 from bridge.config import ZenohTable
 from bridge.errors import Unavailable
 from bridge.northbound.pulse import Pulse
+from bridge.northbound.sources import source_of
 from bridge.northbound.zenoh import keys
 from bridge.northbound.zenoh.access import access_control
 from bridge.northbound.zenoh.askers import Askers
@@ -160,8 +161,9 @@ class ZenohServer:
     def _on_strangers(self, places: list[str]) -> None:
         """Silent, or not what zenoh lets in."""
         self._plant.count("zenoh_broken_connections", self._clock(), len(places))
-        for host, count in Counter(place.rpartition(":")[0].strip("[]") for place in places).items():
-            _log.warning("connections of %s came to no zenoh session: %d", host, count, extra=about(host))
+        sources = Counter(source_of(place.rpartition(":")[0].strip("[]")) for place in places)
+        for source, count in sources.items():
+            _log.warning("connections of %s came to no zenoh session: %d", source, count, extra=about(source))
 
     # in
 

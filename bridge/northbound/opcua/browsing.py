@@ -14,6 +14,7 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace
 
+from bridge.northbound.opcua.encoding import Results
 from bridge.northbound.opcua.hierarchy import subtypes
 from bridge.northbound.opcua.library import (
     AttributeIds,
@@ -70,11 +71,10 @@ class Browser:
         self._subtypes: dict[ua.NodeId, set[ua.NodeId]] = {}
         self._looked_at = 0
 
-    async def browse(self, params: ua.BrowseParameters) -> list[ua.BrowseResult]:
+    async def browse(self, params: ua.BrowseParameters, results: Results) -> None:
         if get(get(params, "View"), "ViewId") != _NULL:
             raise ServiceError(StatusCodes.BadViewIdUnknown)
         most: int = get(params, "RequestedMaxReferencesPerNode")
-        results: list[ua.BrowseResult] = []
         left = _MOST_REFERENCES
         for wanted in get(params, "NodesToBrowse"):
             await self._rest()
@@ -85,8 +85,7 @@ class Browser:
             left -= len(get(result, "References"))
             if left < 0:
                 raise ServiceError(StatusCodes.BadResponseTooLarge)
-            results.append(result)
-        return results
+            await results.add(result)
 
     async def _rest(self) -> None:
         if self._looked_at >= _BEFORE_YIELD:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import struct
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from asyncua.ua.ua_binary import struct_to_binary
 
@@ -23,25 +23,23 @@ _LEAST_BYTES: Final = 32
 """What is smaller takes as long."""
 _LENGTH: Final = struct.Struct("<i")
 
-_T = TypeVar("_T")
 
-
-class Results(list[_T]):
+class Results:
     """What a service has found so far, each encoded as it is added."""
 
     def __init__(self, most_bytes: int) -> None:
-        super().__init__()
+        self.count = 0
         self.encoded = bytearray()
         self._most_bytes = most_bytes
         self._since_turn = 0
 
-    async def add(self, result: _T) -> None:
+    async def add(self, result: object) -> None:
         """Raises ServiceError where all of them are more than the client takes."""
         piece = struct_to_binary(result)
         if len(self.encoded) + len(piece) > self._most_bytes:
             raise ServiceError(StatusCodes.BadResponseTooLarge)
         self.encoded += piece
-        self.append(result)
+        self.count += 1
         self._since_turn += max(len(piece), _LEAST_BYTES)
         if self._since_turn >= _TURN_BYTES:
             self._since_turn = 0
@@ -56,7 +54,7 @@ def encode(response: Any) -> bytes:
     response.Results = []
     empty = struct_to_binary(response)
     head, diagnostics = empty[: -2 * _LENGTH.size], empty[-_LENGTH.size :]
-    return b"".join((head, _LENGTH.pack(len(results)), results.encoded, diagnostics))
+    return b"".join((head, _LENGTH.pack(results.count), results.encoded, diagnostics))
 
 
 def weight(value: Any) -> int:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import math
 import secrets
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, cast
 
@@ -91,7 +91,7 @@ class Session(InternalSession):
         self.browser = Browser(aspace)
         self.holder: object | None = None
         """The processor of the connection that it is activated on."""
-        self.answer: Results[Any] | None = None
+        self.answer: Results | None = None
         """What is being encoded for it."""
         self.most_bytes = 0
         """Of an answer, as its client takes it on that connection."""
@@ -134,20 +134,16 @@ class Session(InternalSession):
 
     # services
 
-    async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
+    async def read(self, params: ua.ReadParameters) -> Any:
         wanted: list[ua.ReadValueId] = get(params, "NodesToRead")
         _limit(wanted, MOST_OPERATIONS)
         times = checked_times(params)
         # `not >=` refuses NaN, too.
         if not get(params, "MaxAge") >= 0:
             raise ServiceError(StatusCodes.BadMaxAgeInvalid)
-        return await self._encoded(self._read(one, times) for one in wanted)
-
-    async def _encoded(self, found: Iterable[Any]) -> list[Any]:
-        """The results of an answer, encoded in turns with others."""
-        results = self.answer = Results[Any](self.most_bytes)
-        for one in found:
-            await results.add(one)
+        results = self.answer = Results(self.most_bytes)
+        for one in wanted:
+            await results.add(self._read(one, times))
         return results
 
     def _read(self, wanted: ua.ReadValueId, times: ua.TimestampsToReturn) -> ua.DataValue:
@@ -191,9 +187,11 @@ class Session(InternalSession):
         _limit(params, MOST_CALLS)
         return await self._server.services.caller.call(self.identity, params)
 
-    async def browse(self, params: ua.BrowseParameters) -> list[ua.BrowseResult]:
+    async def browse(self, params: ua.BrowseParameters) -> Any:
         _limit(get(params, "NodesToBrowse"), MOST_OPERATIONS)
-        return await self._encoded(await self.browser.browse(params))
+        results = self.answer = Results(self.most_bytes)
+        await self.browser.browse(params, results)
+        return results
 
     async def browse_next(self, parameters: ua.BrowseNextParameters) -> list[ua.BrowseResult]:
         _limit(get(parameters, "ContinuationPoints"), MOST_OPERATIONS)

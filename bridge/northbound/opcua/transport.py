@@ -188,11 +188,11 @@ class Processor(UaProcessor):
     async def process_message(self, seqhdr: Any, body: Buffer) -> bool:
         """Requests that wait for a drive are answered when it has; the others go on meanwhile."""
         typeid = nodeid_from_binary(body)
-        handle = _request_handle(body.copy())
+        header = body.copy()
         try:
             requesthdr = struct_from_binary(ua.RequestHeader, body)
         except _MALFORMED as error:
-            self._refuse(handle, seqhdr, self._fault(error))
+            self._refuse(_request_handle(header), seqhdr, self._fault(error))
             return True
         if typeid not in _SLOW:
             try:

@@ -105,7 +105,7 @@ class EventSender:
         }
         for emitter in self._emitters(event.source):
             for subscription in list(self._subscriptions.subscriptions.values()):
-                if subscription.listening:
+                if subscription.is_listening:
                     # Each client brings its own filter.
                     with self._guard:
                         subscription.hear(Occurrence(emitter, fields))

@@ -197,7 +197,7 @@ def _overflown(value: ua.DataValue) -> ua.DataValue:
 class EventItem:
     """Listens to the events of one node."""
 
-    __slots__ = ("_loss", "filter", "mode", "node", "number", "queue", "settings", "weight")
+    __slots__ = ("_loss", "filter", "mode", "node", "number", "queue", "settings", "share")
 
     def __init__(
         self,
@@ -206,13 +206,15 @@ class EventItem:
         settings: Settings,
         filter_: EventFilter,
         mode: ua.MonitoringMode,
+        share: str = "",
     ) -> None:
         self.number = number
         self.node = node
         self.settings = settings
         self.filter = filter_
         self.mode = mode
-        self.weight = filter_.weight
+        self.share = share
+        """Whom it is counted for."""
         self.queue: deque[list[ua.Variant]] = deque()
         self._loss: list[ua.Variant] | None = None
         """The event that says that others were lost. It is kept in addition to the queue's size."""
@@ -246,7 +248,6 @@ class EventItem:
 
     def modify(self, settings: Settings, filter_: EventFilter) -> None:
         self.settings, self.filter = settings, filter_
-        self.weight = filter_.weight
         while len(self.queue) > settings.queue_size:
             if settings.discard_oldest:
                 self.queue.popleft()

@@ -26,7 +26,7 @@ from bridge.northbound.opcua.library import (
     ua,
 )
 from bridge.northbound.opcua.reading import checked_times, window
-from bridge.northbound.opcua.shares import MOST_ON_ONE, Share
+from bridge.northbound.opcua.shares import MOST_ON_ONE, Listening
 from bridge.northbound.opcua.subscription import Subscription
 from bridge.northbound.sources import source_of
 
@@ -43,33 +43,29 @@ class MonitoredItems:
         self._space = space
         self._numbers = count(1)
         self._watching: Counter[Hashable] = Counter()
+        self._listening = Listening()
         self.event_types = EventTypes(space)
 
     async def create(
         self,
         find: Callable[[], Subscription],
         params: ua.CreateMonitoredItemsParameters,
-        room: Callable[[], Share],
+        room: Callable[[], int],
     ) -> list[ua.MonitoredItemCreateResult]:
         """``room`` tells how much there is now, ``find`` the subscription; ServiceError where that has been
         deleted meanwhile."""
         times = checked_times(params)
         found, left = find(), room()
-        items_left = left.items
         results: list[ua.MonitoredItemCreateResult] = []
         for place, wanted in enumerate(get(params, "ItemsToCreate")):
             if place and place % _BATCH == 0:
                 await asyncio.sleep(0)
-                found = find()
-            is_event = get(get(wanted, "ItemToMonitor"), "AttributeId") == AttributeIds.EventNotifier
-            if is_event or place % _BATCH == 0:
-                left = room()
-                items_left = left.items
-            if items_left <= 0 or (is_event and left.listeners <= 0):
+                found, left = find(), room()
+            if left <= 0:
                 code = status(StatusCodes.BadTooManyMonitoredItems)
                 results.append(make(ua.MonitoredItemCreateResult, StatusCode=code))
             else:
-                items_left -= 1
+                left -= 1
                 results.append(self._create(found, wanted, times))
         return results
 
@@ -87,7 +83,7 @@ class MonitoredItems:
             if get(target, "AttributeId") not in node.attributes:
                 raise ServiceError(StatusCodes.BadAttributeIdInvalid)
             if get(target, "AttributeId") == AttributeIds.EventNotifier:
-                item = self._event_item(node, wanted)
+                item = self._event_item(node, wanted, subscription)
             else:
                 item = self._value_item(node, wanted, times, subscription)
         except ServiceError as error:
@@ -97,14 +93,18 @@ class MonitoredItems:
             self._watch(subscription, item)
         return change(_agreed(ua.MonitoredItemCreateResult(), item), MonitoredItemId=item.number)
 
-    def _event_item(self, node: NodeData, wanted: ua.MonitoredItemCreateRequest) -> EventItem:
+    def _event_item(
+        self, node: NodeData, wanted: ua.MonitoredItemCreateRequest, subscription: Subscription
+    ) -> EventItem:
         held = self._space.read_attribute_value(node.nodeid, AttributeIds.EventNotifier).Value
         if held is None or not held.Value & _SUBSCRIBE_TO_EVENTS:
             raise ServiceError(StatusCodes.BadNotSupported)
         asked: ua.MonitoringParameters = get(wanted, "RequestedParameters")
         filter_ = event_filter(get(asked, "Filter"), self.event_types)
         mode = get(wanted, "MonitoringMode")
-        return EventItem(next(self._numbers), node.nodeid, event_settings(asked), filter_, mode)
+        settings, share = event_settings(asked), source_of(subscription.owner.address)
+        self._listening.change(share, filter_.weight)
+        return EventItem(next(self._numbers), node.nodeid, settings, filter_, mode, share)
 
     def _value_item(
         self,
@@ -167,7 +167,10 @@ class MonitoredItems:
         try:
             item = _item(subscription, get(wanted, "MonitoredItemId"))
             if isinstance(item, EventItem):
-                item.modify(event_settings(asked), event_filter(get(asked, "Filter"), self.event_types))
+                settings = event_settings(asked)
+                filter_ = event_filter(get(asked, "Filter"), self.event_types)
+                self._listening.change(item.share, filter_.weight - item.filter.weight)
+                item.modify(settings, filter_)
             else:
                 node = self._space[get(item.target, "NodeId")]
                 filter_ = change_filter(
@@ -200,7 +203,9 @@ class MonitoredItems:
 
     def drop(self, subscription: Subscription, item: Item) -> None:
         subscription.drop(item)
-        if isinstance(item, ValueItem):
+        if isinstance(item, EventItem):
+            self._listening.change(item.share, -item.filter.weight)
+        else:
             self._space.delete_datachange_callback(item.handle)
             self._watching[item.share] -= 1
             if not self._watching[item.share]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Final, Protocol
 
 from asyncua.server.subscription_service import SubscriptionService
@@ -56,25 +56,25 @@ async def make_room(session: Holder, sessions: Sequence[Holder], subscriptions: 
     raise ServiceError(StatusCodes.BadTooManySubscriptions)
 
 
-@dataclass(frozen=True, slots=True)
-class Share:
-    """So many monitored items, those for events of that weight."""
-
-    items: int
-    listeners: int
-
-
-def room_for_items(address: str, subscriptions: Iterable[Subscription]) -> Share:
-    """What a session of this address may have in addition to what all ``subscriptions`` have."""
-    items = listeners = items_of_address = listeners_of_address = 0
-    source = source_of(address)
+def room_for_items(address: str, subscriptions: Iterable[Subscription]) -> int:
+    """How many monitored items a session of this address may have in addition to what all have."""
+    items: Counter[str] = Counter()
     for one in subscriptions:
-        items += len(one.items)
-        listeners += one.listening
-        if source_of(one.owner.address) == source:
-            items_of_address += len(one.items)
-            listeners_of_address += one.listening
-    return Share(
-        min(MOST_ITEMS - items, MOST_ITEMS_OF_ADDRESS - items_of_address),
-        min(MOST_LISTENERS - listeners, MOST_LISTENERS_OF_ADDRESS - listeners_of_address),
-    )
+        items[source_of(one.owner.address)] += len(one.items)
+    return min(MOST_ITEMS - items.total(), MOST_ITEMS_OF_ADDRESS - items[source_of(address)])
+
+
+class Listening:
+    """What the items for events weigh, by whom they are counted for."""
+
+    def __init__(self) -> None:
+        self._weights: Counter[str] = Counter()
+
+    def change(self, source: str, by: int) -> None:
+        """Raises ServiceError for more where there is no room. What comes last may go beyond it."""
+        full = self._weights.total() >= MOST_LISTENERS or self._weights[source] >= MOST_LISTENERS_OF_ADDRESS
+        if by > 0 and full:
+            raise ServiceError(StatusCodes.BadTooManyMonitoredItems)
+        self._weights[source] += by
+        if not self._weights[source]:
+            del self._weights[source]

@@ -107,9 +107,9 @@ class Subscription:
         return self.terms.priority
 
     @property
-    def listening(self) -> int:
-        """What its items for events weigh."""
-        return sum(item.weight for item in self._listeners.values())
+    def is_listening(self) -> bool:
+        """Whether it has items for events."""
+        return bool(self._listeners)
 
     # what there is to tell
 

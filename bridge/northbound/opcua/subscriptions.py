@@ -17,7 +17,7 @@ from bridge.northbound.opcua.library import ServiceError, StatusCodes, change, g
 from bridge.northbound.opcua.monitoring import MonitoredItems, code_of, loop_time
 from bridge.northbound.opcua.passwords import ANONYMOUS
 from bridge.northbound.opcua.publishing import PublishRequest
-from bridge.northbound.opcua.shares import MOST_SUBSCRIPTIONS, Share, room_for_items
+from bridge.northbound.opcua.shares import MOST_SUBSCRIPTIONS, room_for_items
 from bridge.northbound.opcua.subscription import Owner, Subscription, terms
 
 _T = TypeVar("_T")
@@ -139,7 +139,7 @@ class Subscriptions:
     async def create_items(
         self, owner: Owner, params: ua.CreateMonitoredItemsParameters
     ) -> list[ua.MonitoredItemCreateResult]:
-        def room() -> Share:
+        def room() -> int:
             return room_for_items(owner.address, self.subscriptions.values())
 
         return await self._items.create(lambda: self._of_items(owner, params), params, room)

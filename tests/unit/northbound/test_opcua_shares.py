@@ -11,19 +11,20 @@ from asyncua import ua
 from bridge.northbound.opcua import shares
 from bridge.northbound.opcua.eventfilter import EventFilter
 from bridge.northbound.opcua.items import EventItem, Settings
-from bridge.northbound.opcua.shares import Share, room_for_items
+from bridge.northbound.opcua.library import ServiceError
+from bridge.northbound.opcua.shares import Listening, room_for_items
 from bridge.northbound.opcua.subscription import Subscription, terms
 from bridge.northbound.opcua.where import Where
 
 HERE, NEIGHBOUR, ELSEWHERE = "2001:db8::1", "2001:db8::2", "10.0.0.1"
 
 
-def listening(address: str, items: int, filter_: EventFilter) -> Subscription:
+def subscription(address: str, items: int) -> Subscription:
     owner: Any = SimpleNamespace(address=address)
     made = Subscription(1, owner, terms(ua.CreateSubscriptionParameters()), enabled=True)
     for number in range(items):
         settings = Settings(number, 0, 5, True)
-        made.add(EventItem(number, ua.NodeId("conveyor", 2), settings, filter_, ua.MonitoringMode.Reporting))
+        made.add(EventItem(number, ua.NodeId("conveyor", 2), settings, simple(), ua.MonitoringMode.Reporting))
     return made
 
 
@@ -43,12 +44,29 @@ def limits(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(shares, name, limit)
 
 
-def test_one_address_takes_no_more_than_its_share() -> None:
-    there = [listening(HERE, 40, simple()), listening(NEIGHBOUR, 20, simple())]
-    assert room_for_items(HERE, there) == Share(440, 0), "one network of 64 bits is one address"
-    assert room_for_items(ELSEWHERE, there) == Share(500, 40)
-    there.append(listening(ELSEWHERE, 30, simple()))
-    assert room_for_items("10.0.0.2", there) == Share(500, 10)
+def test_one_address_takes_no_more_than_its_share_of_items() -> None:
+    there = [subscription(HERE, 300), subscription(NEIGHBOUR, 160)]
+    assert room_for_items(HERE, there) == 40, "one network of 64 bits is one address"
+    assert room_for_items(ELSEWHERE, there) == 500
+    there.append(subscription(ELSEWHERE, 400))
+    assert room_for_items("10.0.0.2", there) == 140
+
+
+def test_one_address_takes_no_more_than_its_share_of_items_for_events() -> None:
+    all_ = Listening()
+    for _ in range(6):
+        all_.change(HERE, 10)
+    with pytest.raises(ServiceError) as refused:
+        all_.change(HERE, 1)
+    assert refused.value.code == ua.StatusCodes.BadTooManyMonitoredItems
+    all_.change(ELSEWHERE, 40)
+    with pytest.raises(ServiceError):
+        all_.change("10.0.0.2", 1)
+    all_.change(HERE, 0)
+    all_.change(HERE, -10)
+    all_.change("10.0.0.2", 51)
+    with pytest.raises(ServiceError):
+        all_.change(HERE, 1)
 
 
 @pytest.mark.parametrize(
@@ -56,8 +74,4 @@ def test_one_address_takes_no_more_than_its_share() -> None:
     [(simple(1), 1), (simple(9), 1), (simple(10), 2), (simple(30), 4), (simple(5, 500), 51)],
 )
 def test_a_filter_that_takes_its_time_counts_as_several(filter_: EventFilter, weight: int) -> None:
-    one = listening(HERE, 1, simple())
-    (item,) = one.items.values()
-    assert isinstance(item, EventItem)
-    item.modify(item.settings, filter_)
-    assert room_for_items(HERE, [one]) == Share(499, 60 - weight)
+    assert filter_.weight == weight

@@ -222,11 +222,16 @@ class TestSubscriptions:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(shares, "MOST_LISTENERS_OF_ADDRESS", 5)
-        message = ua.SimpleAttributeOperand(
-            TypeDefinitionId=ua.NodeId(ua.ObjectIds.BaseEventType),
-            BrowsePath=[ua.QualifiedName("Message", 0)],
-            AttributeId=ua.AttributeIds.Value,
-        )
+
+        def watch(number: int, fields: int) -> ua.MonitoringParameters:
+            message = ua.SimpleAttributeOperand(
+                TypeDefinitionId=ua.NodeId(ua.ObjectIds.BaseEventType),
+                BrowsePath=[ua.QualifiedName("Message", 0)],
+                AttributeId=ua.AttributeIds.Value,
+            )
+            filter_ = ua.EventFilter(SelectClauses=[message] * fields)
+            return ua.MonitoringParameters(ClientHandle=number, QueueSize=10, Filter=filter_)
+
         server_events = ua.ReadValueId(
             NodeId=ua.NodeId(ua.ObjectIds.Server), AttributeId=ua.AttributeIds.EventNotifier
         )
@@ -234,15 +239,31 @@ class TestSubscriptions:
             ua.MonitoredItemCreateRequest(
                 ItemToMonitor=server_events,
                 MonitoringMode=ua.MonitoringMode.Reporting,
-                RequestedParameters=ua.MonitoringParameters(
-                    ClientHandle=number, QueueSize=10, Filter=ua.EventFilter(SelectClauses=[message])
-                ),
+                RequestedParameters=watch(number, 1),
             )
             for number in range(1000, 1007)
         ]
         async with serving(OPEN, tmp_path) as (server, _), connected(server) as client:
             subscription = await client.create_subscription(1000, None)
+
+            async def change(item: int, fields: int) -> int:
+                asked = ua.MonitoredItemModifyRequest(item, watch(1000, fields))
+                params = ua.ModifyMonitoredItemsParameters(
+                    SubscriptionId=subscription.subscription_id, ItemsToModify=[asked]
+                )
+                (result,) = await client.uaclient.modify_monitored_items(params)
+                return result.StatusCode.value
+
             made = await subscription.create_monitored_items(wanted)
             assert sum(isinstance(one, int) for one in made) == 5
             values = await subscription.subscribe_data_change([client.nodes.server_state] * 10)
             assert all(isinstance(one, int) for one in values), "but values may be watched"
+            # A filter that takes its time counts as several, also when it comes later.
+            assert await change(made[0], 100) == ua.StatusCodes.BadTooManyMonitoredItems
+            await subscription.unsubscribe(made[4])
+            assert await change(made[0], 100) == ua.StatusCodes.Good
+            (refused,) = await subscription.create_monitored_items(wanted[:1])
+            assert refused.value == ua.StatusCodes.BadTooManyMonitoredItems
+            assert await change(made[0], 1) == ua.StatusCodes.Good
+            (again,) = await subscription.create_monitored_items(wanted[:1])
+            assert isinstance(again, int)

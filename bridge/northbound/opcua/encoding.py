@@ -19,8 +19,8 @@ from bridge.northbound.opcua.library import ServiceError, StatusCodes, ua
 
 _TURN_BYTES: Final = 16 * 1024
 """That are encoded before others have their turn; a few milliseconds."""
-_LEAST_BYTES: Final = 32
-"""What is smaller takes as long."""
+_EACH_BYTES: Final = 32
+"""What one value or result counts besides its bytes: small ones take their time, too."""
 _LENGTH: Final = struct.Struct("<i")
 
 
@@ -31,18 +31,17 @@ class Results:
         self.count = 0
         self.encoded = bytearray()
         self._most_bytes = most_bytes
-        self._since_turn = 0
+        self._turn_at = _TURN_BYTES
 
     async def add(self, result: object) -> None:
         """Raises ServiceError where all of them are more than the client takes."""
-        piece = struct_to_binary(result)
-        if len(self.encoded) + len(piece) > self._most_bytes:
+        self.encoded += struct_to_binary(result)
+        if len(self.encoded) > self._most_bytes:
             raise ServiceError(StatusCodes.BadResponseTooLarge)
-        self.encoded += piece
         self.count += 1
-        self._since_turn += max(len(piece), _LEAST_BYTES)
-        if self._since_turn >= _TURN_BYTES:
-            self._since_turn = 0
+        done = len(self.encoded) + _EACH_BYTES * self.count
+        if done >= self._turn_at:
+            self._turn_at = done + _TURN_BYTES
             await asyncio.sleep(0)
 
 
@@ -64,7 +63,7 @@ def weight(value: Any) -> int:
     if isinstance(value, ua.LocalizedText):
         return weight(value.Text)
     if isinstance(value, str | bytes):
-        return _LEAST_BYTES + len(value)
+        return _EACH_BYTES + len(value)
     if isinstance(value, list | tuple):
-        return _LEAST_BYTES + sum(map(weight, value))
-    return _LEAST_BYTES
+        return _EACH_BYTES + sum(map(weight, value))
+    return _EACH_BYTES

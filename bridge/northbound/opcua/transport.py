@@ -164,21 +164,26 @@ class Processor(UaProcessor):
         except (ServiceError, UaStatusCodeError) as error:
             code = int(error.code)
             is_too_large = code == StatusCodes.BadRequestTooLarge
-            self._server.count("opcua_broken_connections" if is_too_large else "opcua_refused_connections")
+            self._count("opcua_broken_connections" if is_too_large else "opcua_refused_connections")
         except _MALFORMED as error:
-            self._server.count("opcua_broken_connections")
+            self._count("opcua_broken_connections")
             tell(_MALFORMED_KIND, self._source, f"connection closed: {error!r}")
             code = StatusCodes.BadSecurityChecksFailed
             if self._connection.is_open():
                 is_malformed = decoding.is_malformed(error)
                 code = StatusCodes.BadDecodingError if is_malformed else StatusCodes.BadTcpInternalError
         except Exception as error:  # noqa: BLE001 - nor may one message end the others' connections
-            self._server.count("opcua_broken_connections")
+            self._count("opcua_broken_connections")
             self._server.guard.note(error)
             code = StatusCodes.BadTcpInternalError
         message = make(ua.ErrorMessage, Error=status(code))
         self._transport.write(uatcp_to_binary(_ERROR, message))
         return False
+
+    def _count(self, leaf: str) -> None:
+        """A connection that ends, once: what came before it was closed is still looked at."""
+        if not self._transport.is_closing():
+            self._server.count(leaf)
 
     def _greeted(self) -> None:
         if min(self._limits.max_send_buffer, self._limits.max_message_size) < _LEAST_BUFFER:

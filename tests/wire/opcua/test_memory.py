@@ -85,7 +85,8 @@ async def test_messages_that_wait_before_a_session_are_few(tmp_path: Path) -> No
         chunks = b"".join(chunk(client) for _ in range(2 * MOST_BEFORE_SESSION // CHUNK))
         send(client, chunks)
         await until(lambda: is_closed(client), "the end of the connection")
-        assert ended(view) > before
+        await asyncio.sleep(0.1)
+        assert ended(view) == before + 1, "one connection, whatever is left of its messages"
 
 
 async def test_with_a_session_a_large_message_may_come(tmp_path: Path) -> None:

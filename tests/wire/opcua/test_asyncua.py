@@ -28,6 +28,7 @@ OVERRIDDEN = {
     "Listener": {"_make_protocol", "start", "stop"},
     "Processor": {
         "_process_message",
+        "_session_watchdog_loop",
         "_should_close_session_on_transport_loss",
         "close",
         "process",
@@ -42,6 +43,7 @@ OVERRIDDEN = {
         "call",
         "close_session",
         "create_monitored_items",
+        "create_session",
         "create_subscription",
         "delete_monitored_items",
         "delete_subscriptions",
@@ -58,7 +60,7 @@ OVERRIDDEN = {
         "write",
     },
     "_Outer": {"start"},
-    "_Protocol": {"connection_lost", "connection_made", "data_received"},
+    "_Protocol": {"_process_one_msg", "connection_lost", "connection_made", "data_received"},
 }
 """A name that asyncua no longer has would be no override any more, and nobody would call it."""
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import re
-import struct
 import sys
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
+from bridge.canopen import datatypes
+from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, Plain, TypeName
 from bridge.canopen.decode_sdo import shown
 from bridge.canopen.sdo import SdoError
 from bridge.cli.bus import (
@@ -38,44 +38,9 @@ _READ_USAGE = "drivebridge sdo read [SITE] NODE INDEX[:SUB]"
 _WRITE_USAGE = "drivebridge sdo write [SITE] NODE INDEX[:SUB] VALUE --type TYPE"
 
 
-class ValueType(StrEnum):
-    """Little-endian on the wire, all of them (CiA 301 §7.1.4). The types of the site file, and two names more
-    that points and other tools have for its real numbers."""
-
-    BOOL = "bool"
-    UINT8 = "uint8"
-    UINT16 = "uint16"
-    UINT32 = "uint32"
-    UINT64 = "uint64"
-    INT8 = "int8"
-    INT16 = "int16"
-    INT32 = "int32"
-    INT64 = "int64"
-    REAL32 = "real32"
-    REAL64 = "real64"
-    FLOAT = "float"
-    DOUBLE = "double"
-    STRING = "string"
-    BYTES = "bytes"
-
-
-_STRUCTS = {
-    ValueType.BOOL: "<?",
-    ValueType.UINT8: "<B",
-    ValueType.UINT16: "<H",
-    ValueType.UINT32: "<I",
-    ValueType.UINT64: "<Q",
-    ValueType.INT8: "<b",
-    ValueType.INT16: "<h",
-    ValueType.INT32: "<i",
-    ValueType.INT64: "<q",
-    ValueType.REAL32: "<f",
-    ValueType.REAL64: "<d",
-    ValueType.FLOAT: "<f",
-    ValueType.DOUBLE: "<d",
-}
-_REALS = (ValueType.REAL32, ValueType.REAL64, ValueType.FLOAT, ValueType.DOUBLE)
-
+ValueType = Literal[TypeName, "float", "double"]
+_ALSO = {"float": "real32", "double": "real64"}
+"""Names that points and other tools have for real numbers."""
 Timeout = Annotated[
     int | None, typer.Option(min=10, max=60_000, help="wait so long for each answer; 500, or the site's")
 ]
@@ -178,32 +143,28 @@ def parse_object(text: str) -> tuple[int, int]:
 
 def encode(kind: ValueType, text: str) -> bytes:
     """The bytes of a value. Raises ValueError with a sentence for the user."""
+    name = _ALSO.get(kind, kind)
     try:
-        match kind:
-            case ValueType.STRING:
-                return text.encode("latin-1")
-            case ValueType.BYTES:
-                return bytes.fromhex(text)
-            case ValueType.BOOL:
-                return struct.pack("<?", {"0": False, "1": True, "false": False, "true": True}[text.lower()])
-            case _ if kind in _REALS:
-                return struct.pack(_STRUCTS[kind], float(text))
-            case _:
-                return struct.pack(_STRUCTS[kind], int(text, 0))
-    except (ValueError, KeyError, OverflowError, struct.error):
+        return datatypes.encode(name, _typed(name, text))
+    except (ValueError, KeyError):
         raise ValueError(f"{text!r} is no {kind} value") from None
 
 
-def decode(kind: ValueType, data: bytes) -> int | float | str | bool:
+def _typed(name: str, text: str) -> Plain:
+    if name == "bool":
+        return {"0": False, "1": True, "false": False, "true": True}[text.lower()]
+    if name in REALS:
+        return float(text)
+    return int(text, 0) if name in INTEGERS else text
+
+
+def decode(kind: ValueType, data: bytes) -> Plain:
     """The value of these bytes. Raises ValueError where the node has sent another length."""
-    if kind is ValueType.STRING:
-        return data.split(b"\0", 1)[0].decode("latin-1")
-    if kind is ValueType.BYTES:
-        return data.hex(" ").upper()
-    form = struct.Struct(_STRUCTS[kind])
-    if len(data) != form.size:
-        raise ValueError(f"{kind} has {form.size} bytes, the node sent {len(data)}: {data.hex(' ').upper()}")
-    return form.unpack(data)[0]
+    name = _ALSO.get(kind, kind)
+    size = NUMBERS[name].size if name in NUMBERS else len(data)
+    if len(data) != size:
+        raise ValueError(f"{kind} has {size} bytes, the node sent {len(data)}: {data.hex(' ').upper()}")
+    return datatypes.decode(name, data)
 
 
 def for_people(value: int | float | str | bool | None, data: bytes) -> str:

@@ -16,12 +16,9 @@ from pydantic import (
     field_validator,
 )
 
-from bridge.config.download import Download, encode
+from bridge.canopen.datatypes import TypeName, encode
+from bridge.config.download import Download
 
-ObjectType = Literal[
-    "bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64",
-    "real32", "real64", "string", "bytes",
-]  # fmt: skip
 OnLoss = Literal["restart", "stop_node", "stop_all", "nothing"]
 OnFailedStart = Literal["reset_communication", "report"]
 MandatoryMissing = Literal["go_on", "hold_all", "stop_all"]
@@ -285,7 +282,7 @@ class ConfigureTable(Table):
     """One object that the node is to hold."""
 
     object: ObjectName = Field(description='an object as "2097:01", index and sub-index in hexadecimal')
-    type: ObjectType = Field(description="the object's data type, such as uint16")
+    type: TypeName = Field(description="the object's data type, such as uint16")
     value: Annotated[bool | int | float | str, BeforeValidator(_plain)]
     read_back: bool = Field(True, description="false writes it blindly, as a command")
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from bridge.canopen.datatypes import INTEGERS
 from bridge.dbc.fields import Field, Layout
 from bridge.dbc.model import Signal
 from bridge.drive import ValueCodec
-from bridge.image.point import INTEGER_RANGE
 from bridge.node.process.words import WORD_BITS
 
 Groups = dict[str, tuple[str, ...]]
@@ -79,7 +79,7 @@ class PdoSignals:
             field.start,
             field.length,
             # A shorter object fills its word with zeros, unless the mapping file says that it has a sign.
-            field.is_signed or (field.length % WORD_BITS == 0 and INTEGER_RANGE[model.raw_type][0] < 0),
+            field.is_signed or (field.length % WORD_BITS == 0 and INTEGERS[model.raw_type].signed),
             codec.scale.full / codec.scale.at if codec.scale else 1.0,
             codec.scale.offset if codec.scale else 0.0,
             low,

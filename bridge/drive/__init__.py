@@ -4,7 +4,7 @@ from bridge.drive.emergency import EmergencyReader, Told
 from bridge.drive.handshake import Handshake
 from bridge.drive.own_supervision import OwnJudgement, OwnVerdict
 from bridge.drive.parameter_set import ParameterSet
-from bridge.drive.scaling import LinearScale, scale_of, signed
+from bridge.drive.scaling import LinearScale, scale_of
 from bridge.drive.values import ValueCodec, Written
 from bridge.drive.words import FAULTED, MOVING, STATES, ControlWords, DriveState, StatusWords
 
@@ -25,5 +25,4 @@ __all__ = [
     "ValueCodec",
     "Written",
     "scale_of",
-    "signed",
 ]

@@ -7,18 +7,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
+from bridge.canopen.datatypes import INTEGERS
 from bridge.image import DataType
-from bridge.image.point import INTEGER_RANGE
 from bridge.mapping.model import ProcessValue
 
 _WORD_BITS: Final = 32
 _EXACT: Final = 1 << 53
 """Up to here every whole number is a float."""
-
-
-def signed(word: int) -> int:
-    """A 16-bit word as the signed number it stands for: C000h is -16384."""
-    return word - 0x1_0000 if word & 0x8000 else word
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +34,8 @@ class LinearScale:
 
     @property
     def _ends(self) -> tuple[float, float]:
-        one, other = (raw * self.full / self.at + self.offset for raw in INTEGER_RANGE[self.raw])
+        number = INTEGERS[self.raw]
+        one, other = (raw * self.full / self.at + self.offset for raw in (number.low, number.high))
         return min(one, other), max(one, other)
 
     @property
@@ -51,24 +47,14 @@ class LinearScale:
     def low(self) -> float:
         return max(-abs(self.full) * self.limit, self._ends[0], self.least)
 
-    @property
-    def _mask(self) -> int:
-        return 0xFFFF_FFFF if self.raw in (DataType.INT32, DataType.UINT32) else 0xFFFF
-
     def from_word(self, word: int) -> float:
-        return number_of(word, self.raw) * self.full / self.at + self.offset
+        return INTEGERS[self.raw].from_word(word) * self.full / self.at + self.offset
 
     def to_word(self, value: float) -> int:
         """The nearest word. Raises ValueError where ``value`` is out of range."""
         if not self.low <= value <= self.high:
             raise ValueError(f"takes {self.low:g}…{self.high:g}, not {value:g}")
-        return round((value - self.offset) * self.at / self.full) & self._mask
-
-
-def number_of(word: int, raw: DataType) -> int:
-    """An unsigned word of 16 or 32 bits as the number of type ``raw`` that it stands for."""
-    low, high = INTEGER_RANGE[raw]
-    return word - (high - low + 1) if word > high else word
+        return INTEGERS[self.raw].to_word(round((value - self.offset) * self.at / self.full))
 
 
 def _ratio(factor: float) -> tuple[float, float]:

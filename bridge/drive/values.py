@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.drive.scaling import LinearScale, number_of
+from bridge.canopen.datatypes import INTEGERS
+from bridge.drive.scaling import LinearScale
 from bridge.image import DataType
 from bridge.mapping.model import ProcessValue
 
@@ -27,13 +28,13 @@ class ValueCodec:
     """One value of one drive. ``places`` says where its words stand, the low one first; ``scale`` is None
     for what has none, and where it is not known."""
 
-    __slots__ = ("_bit", "_high", "_low", "_raw", "_states", "model", "places", "scale")
+    __slots__ = ("_bit", "_high", "_low", "_number", "_states", "model", "places", "scale")
 
     def __init__(self, model: ProcessValue, words: Sequence[str], scale: LinearScale | None = None) -> None:
         self.model = model
         self.places = tuple(words.index(word) for word in model.word_names)
         self.scale = scale
-        self._raw = model.raw_type
+        self._number = INTEGERS[model.raw_type]
         self._bit = model.bit
         self._states = model.states
         low, high = model.raw_range
@@ -54,7 +55,7 @@ class ValueCodec:
         """One signed word times a factor: what most values are."""
         return (
             len(self.places) == 1
-            and self._raw is DataType.INT16
+            and self.model.raw_type is DataType.INT16
             and self._bit is None
             and self.model.scale is not None
             and not self.model.scale.offset
@@ -78,7 +79,7 @@ class ValueCodec:
             return bool(word >> self._bit & 1)
         if self.scale is not None:
             return self.scale.from_word(word)
-        number = number_of(word, self._raw)
+        number = self._number.from_word(word)
         return float(number) if self.model.scale is not None else number
 
     def to_words(self, value: bool | int | float) -> tuple[Written, ...]:

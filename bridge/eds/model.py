@@ -37,33 +37,6 @@ class DataType(IntEnum):
     UNSIGNED56 = 0x1A
     UNSIGNED64 = 0x1B
 
-    @property
-    def size(self) -> int:
-        """Bytes; 0 where the length is not fixed."""
-        return _SIZE.get(self, 0)
-
-    @property
-    def signed(self) -> bool:
-        return self.name.startswith("INTEGER")
-
-    @property
-    def is_integer(self) -> bool:
-        return self.signed or self.name.startswith("UNSIGNED")
-
-
-_SIZE: Final = {
-    DataType.BOOLEAN: 1,
-    DataType.REAL32: 4,
-    DataType.REAL64: 8,
-    DataType.TIME_OF_DAY: 6,
-    DataType.TIME_DIFFERENCE: 6,
-    **{
-        one: int(one.name.removeprefix("INTEGER").removeprefix("UNSIGNED")) // 8
-        for one in DataType
-        if one.is_integer
-    },
-}
-
 
 class ObjectType(IntEnum):
     """CiA 301 §7.4.3, table 42."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-import struct
 from typing import Final
 
+from bridge.canopen.datatypes import REALS, Integer
 from bridge.eds.ini import shown
 from bridge.eds.model import DataType, Value
 
@@ -16,7 +16,18 @@ _INTEGER: Final = re.compile(
 _NODE_ID: Final = re.compile(r"\$?NODE_?ID", re.IGNORECASE)
 _TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)
 _BYTES: Final = (DataType.OCTET_STRING, DataType.DOMAIN)
-_REALS: Final = {DataType.REAL32: ("<f", "<I"), DataType.REAL64: ("<d", "<Q")}
+_REALS: Final = {DataType.REAL32: REALS["real32"], DataType.REAL64: REALS["real64"]}
+_INTEGERS: Final = {
+    DataType.BOOLEAN: Integer(1),
+    DataType.TIME_OF_DAY: Integer(6),
+    DataType.TIME_DIFFERENCE: Integer(6),
+    **{
+        one: Integer(int(one.name.removeprefix(kind)) // 8, signed=kind == "INTEGER")
+        for kind in ("INTEGER", "UNSIGNED")
+        for one in DataType
+        if one.name.startswith(kind)
+    },
+}
 
 
 class BadValue(ValueError):
@@ -98,14 +109,14 @@ def encode(plain: int | float | str | bytes, data_type: DataType) -> bytes:
         return plain
     if isinstance(plain, str):
         return plain.encode("utf-16-le" if data_type is DataType.UNICODE_STRING else "latin-1", "replace")
-    if data_type in _REALS:
-        return _packed(_REALS[data_type][0], float(plain))
-    if not isinstance(plain, int) or not data_type.size:
-        raise BadValue(f"{plain} is no {data_type.name}")
     try:
-        return plain.to_bytes(data_type.size, "little", signed=data_type.signed)
-    except OverflowError:
+        if data_type in _REALS:
+            return _REALS[data_type].encode(plain)
+        if data_type in _INTEGERS and isinstance(plain, int):
+            return _INTEGERS[data_type].encode(plain)
+    except ValueError:
         raise BadValue(f"{plain} is beyond {data_type.name}") from None
+    raise BadValue(f"{plain} is no {data_type.name}")
 
 
 def _octets(text: str) -> bytes:
@@ -128,24 +139,16 @@ def _real(text: str) -> float:
 
 def _real_from_bits(number: Value, data_type: DataType) -> float:
     """0x3F800000 for 1.0, as CiA 306 writes reals."""
-    real, bits = _REALS[data_type]
-    plain = number.plain
+    real, plain = _REALS[data_type], number.plain
     if not isinstance(plain, int) or number.plus_node_id:
         raise BadValue("a real number has no $NODEID")
     try:
-        (found,) = struct.unpack(real, struct.pack(bits, plain))
-    except struct.error:
+        found = real.decode(Integer(real.size).encode(plain))
+    except ValueError:
         raise BadValue(f"{plain:#x} is beyond {data_type.name}") from None
     if not math.isfinite(found):
         raise BadValue(f"{plain:#x} is not a finite number")
     return found
-
-
-def _packed(form: str, number: float) -> bytes:
-    try:
-        return struct.pack(form, number)
-    except (OverflowError, struct.error):
-        raise BadValue(f"{number:g} does not fit") from None
 
 
 def _fitted(number: Value, data_type: DataType | None, text: str) -> Value:
@@ -153,10 +156,9 @@ def _fitted(number: Value, data_type: DataType | None, text: str) -> Value:
     plain = number.plain
     if data_type is None or not isinstance(plain, int):
         return number
-    bits = 8 * data_type.size
-    if data_type.signed and re.match(r"\s*0x", text, re.IGNORECASE) and 1 << bits - 1 <= plain < 1 << bits:
-        return Value(plain - (1 << bits), number.plus_node_id)
-    lowest, highest = (-(1 << bits - 1), (1 << bits - 1) - 1) if data_type.signed else (0, (1 << bits) - 1)
-    if not number.plus_node_id and not lowest <= plain <= highest:
+    fits = _INTEGERS[data_type]
+    if fits.high < plain <= fits.high - fits.low and re.match(r"\s*0x", text, re.IGNORECASE):
+        return Value(fits.from_word(plain), number.plus_node_id)
+    if not number.plus_node_id and not fits.low <= plain <= fits.high:
         raise BadValue(f"{shown(text)} is beyond {data_type.name}")
     return number

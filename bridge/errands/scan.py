@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.canopen import cobid, nmt
+from bridge.canopen.datatypes import text
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.nmt import NmtState
 from bridge.canopen.sdo import Result, SdoChannel, SdoError
@@ -96,7 +97,7 @@ def _interview(node: FoundNode) -> Interview:
         setattr(node, name, _number(answer))
     answer = yield Ask(0x1008)
     if isinstance(answer, bytes):
-        node.name = answer.split(b"\0", 1)[0].decode("latin-1").strip()
+        node.name = text(answer).strip()
     node.first_channel = _number((yield Ask(0x1200, 1)))
     node.emcy_id = _number((yield Ask(0x1014)))
     for index in _OTHER_CHANNELS:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final
+
+from bridge.canopen.datatypes import INTEGERS
 
 Value = bool | int | float | str
 
@@ -21,7 +22,7 @@ class DataType(StrEnum):
 
     @property
     def is_integer(self) -> bool:
-        return self in INTEGER_RANGE
+        return self in INTEGERS and self is not DataType.BOOL
 
     @property
     def zero(self) -> Value:
@@ -31,15 +32,6 @@ class DataType(StrEnum):
         if self is DataType.BOOL:
             return False
         return 0.0 if self is DataType.FLOAT else 0
-
-
-INTEGER_RANGE: Final = {
-    DataType.UINT8: (0, 0xFF),
-    DataType.UINT16: (0, 0xFFFF),
-    DataType.UINT32: (0, 0xFFFF_FFFF),
-    DataType.INT16: (-0x8000, 0x7FFF),
-    DataType.INT32: (-0x8000_0000, 0x7FFF_FFFF),
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

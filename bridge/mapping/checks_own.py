@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bridge.config.download import INTEGERS
+from bridge.canopen.datatypes import INTEGERS
 from bridge.mapping.checks_process import twice
 from bridge.mapping.merge import Noted
 from bridge.mapping.model import Family, OwnObject

@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
-from bridge.config.model import Name, ObjectType
+from bridge.config.model import Name
 from bridge.image import DataType
 
 __all__ = [
@@ -21,7 +21,6 @@ __all__ = [
     "MappedObject",
     "Name",
     "ObjectRef",
-    "ObjectType",
     "Pattern",
     "Ref",
     "States",

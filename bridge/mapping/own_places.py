@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.canopen.datatypes import INTEGERS, Integer
 from bridge.config import BusTable, NodeTable
-from bridge.config.download import INTEGERS
 from bridge.mapping.model import Family, ObjectRef, OwnObject, OwnSupervision, Slot
 
 LIFE_TIME_FACTOR: Final = (0x100D, 0)
@@ -34,14 +34,10 @@ class OwnPlace:
     def key(self) -> tuple[int, int]:
         return self.ref.index, self.ref.sub
 
-    def encode(self, value: int) -> bytes:
-        size, signed = INTEGERS[self.data_type]
-        return value.to_bytes(size, "little", signed=signed)
-
-    def decode(self, data: bytes) -> int:
-        """Some servers answer every read with four bytes: those beyond the type's are left out."""
-        size, signed = INTEGERS[self.data_type]
-        return int.from_bytes(data[:size], "little", signed=signed)
+    @property
+    def number(self) -> Integer:
+        """How it is on the wire."""
+        return INTEGERS[self.data_type]
 
     def shown(self, value: int) -> str:
         """``C00593/1 is 0 (no reaction)``."""
@@ -53,10 +49,11 @@ def place_of(family: Family, one: OwnObject) -> OwnPlace:
     """Where a setting is. The mapping's checks have seen to it that there is one."""
     if one.parameter is None:
         ref = one.object or ObjectRef(index=0, sub=0)
-        low, high = _range(one.data_type)
-        return OwnPlace(str(ref), ref, one.data_type, one.per_drive, low, high, {})
+        number = INTEGERS[one.data_type]
+        return OwnPlace(str(ref), ref, one.data_type, one.per_drive, number.low, number.high, {})
     parameter = family.parameter_named(one.parameter)
-    low, high = _range(parameter.data_type)
+    number = INTEGERS[parameter.data_type]
+    low, high = number.low, number.high
     if parameter.low is not None:
         low = max(low, round(parameter.low / parameter.factor))
     if parameter.high is not None:
@@ -64,12 +61,6 @@ def place_of(family: Family, one: OwnObject) -> OwnPlace:
     ref = family.object_of(parameter)
     kind, states = parameter.data_type, parameter.states
     return OwnPlace(parameter.name, ref, kind, one.per_drive, low, high, states)
-
-
-def _range(data_type: str) -> tuple[int, int]:
-    size, signed = INTEGERS[data_type]
-    bits = 8 * size
-    return (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
 
 
 def places(family: Family, *, link: bool = False) -> list[OwnPlace]:
@@ -157,8 +148,7 @@ def offline(
             raw[place.key] = one.factory
         reaches = not place.per_drive or slot.parameters_by_sdo
         if place.key in settings and reaches:
-            data = settings[place.key] & (1 << 8 * INTEGERS[place.data_type][0]) - 1
-            raw[place.key] = place.decode(data.to_bytes(8, "little"))
+            raw[place.key] = place.number.from_word(place.number.to_word(settings[place.key]))
     guards = node.supervision == "guarding"
     for entry in family.own_supervision:
         if entry.watches == "guarding":

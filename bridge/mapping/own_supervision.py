@@ -6,7 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from bridge.mapping.fields import ObjectType, Ref, Table
+from bridge.canopen.datatypes import TypeName
+from bridge.mapping.fields import Ref, Table
 
 Watches = Literal["process_data", "heartbeat", "guarding", "link"]
 
@@ -16,7 +17,7 @@ class OwnObject(Table):
 
     parameter: str | None = Field(None, description="one of this file, which has object, type and texts")
     object: Ref | None = Field(None, description="instead of a parameter")
-    data_type: ObjectType = Field("uint16", description="of an object; a parameter has its own")
+    data_type: TypeName = Field("uint16", description="of an object; a parameter has its own")
     per_drive: bool = Field(False, description="true: each drive of the node has its own")
     factory: int | None = Field(None, description="what it holds as delivered, where that is known")
 

@@ -7,7 +7,8 @@ from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, Field
 
-from bridge.mapping.fields import ObjectRef, ObjectType, Ref, States, Table
+from bridge.canopen.datatypes import TypeName
+from bridge.mapping.fields import ObjectRef, Ref, States, Table
 
 GROUPS: Final = ("number", "letter", "element", "set")
 """What the pattern of parameter names may name."""
@@ -57,7 +58,7 @@ class Parameter(Table):
     name: str = Field(min_length=1)
     title: str
     object: Ref | None = Field(None, description="left out: by [parameter_names]")
-    data_type: ObjectType
+    data_type: TypeName
     factor: float = Field(1.0, allow_inf_nan=False)
     unit: str = ""
     low: float | None = Field(None, allow_inf_nan=False)

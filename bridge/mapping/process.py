@@ -6,10 +6,10 @@ from typing import Annotated, Final, Literal, cast
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
-from bridge.config.download import INTEGERS, Download, encode
+from bridge.canopen.datatypes import INTEGERS, TypeName, encode
+from bridge.config.download import Download
 from bridge.image import DataType
-from bridge.image.point import INTEGER_RANGE
-from bridge.mapping.fields import Bit, Mapped, Name, ObjectRef, ObjectType, Ref, States, Table
+from bridge.mapping.fields import Bit, Mapped, Name, ObjectRef, Ref, States, Table
 
 MOST_WORDS: Final = 9
 """Control or status word and eight values: what Modbus has registers for."""
@@ -80,7 +80,7 @@ class StartWrite(Table):
     """One object that the boot-up writes for a drive, such as its mode of operation."""
 
     object: Ref
-    type: ObjectType = Field(description="the object's data type, such as int8")
+    type: TypeName = Field(description="the object's data type, such as int8")
     value: Annotated[bool | int | float | str, BeforeValidator(_plain)] = Field(
         description='"sync_period_ms" with an integer type: what the bus has, in ms'
     )
@@ -207,7 +207,8 @@ class ProcessValue(Table):
 
     @property
     def raw_range(self) -> tuple[int, int]:
-        return INTEGER_RANGE[self.raw_type]
+        number = INTEGERS[self.raw_type]
+        return number.low, number.high
 
     @property
     def point_type(self) -> DataType:

@@ -7,15 +7,14 @@ text where it sends another length.
 from __future__ import annotations
 
 import math
-import struct
 from typing import Final
 
-from bridge.config.download import INTEGERS, encode
+from bridge.canopen import datatypes
+from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, Integer
 from bridge.image import Value
 from bridge.parameter.definition import Entry
 from bridge.parameter.error import ParameterError, Why
 
-_REALS: Final = {"real32": "<f", "real64": "<d"}
 _RAW_SIZES: Final = (1, 2, 4, 8)
 _SIGN: Final = 0x80
 _DIGITS: Final = 9
@@ -31,23 +30,18 @@ def decode(entry: Entry, data: bytes) -> Value:
     if definition is None:
         return _raw(data)
     kind = definition.data_type
-    if kind == "string":
-        return data.split(b"\0", 1)[0].decode("latin-1")
-    if kind == "bytes":
-        return data.hex(" ").upper()
-    size = _size(kind)
-    if len(data) < size:
+    if kind in NUMBERS and len(data) < NUMBERS[kind].size:
         found = f"the drive sent {len(data)}: {data.hex(' ').upper()}"
-        raise ParameterError(Why.NOT_CONFIGURED, f"{entry.name} is {kind} with {size} bytes, {found}")
-    if kind == "bool":
-        return bool(data[0])
-    if kind in _REALS:
-        number: float = struct.unpack(_REALS[kind], data[:size])[0]
-        if not math.isfinite(number):
-            raise ParameterError(Why.REFUSED, f"{entry.name}: the drive has no number, but {number}")
-        return number if definition.factor == 1.0 else number * definition.factor
-    raw = int.from_bytes(data[:size], "little", signed=INTEGERS[kind][1])
-    return raw if definition.factor == 1.0 else round(raw * definition.factor, _DIGITS)
+        what = f"{entry.name} is {kind} with {NUMBERS[kind].size} bytes"
+        raise ParameterError(Why.NOT_CONFIGURED, f"{what}, {found}")
+    value = datatypes.decode(kind, data)
+    if isinstance(value, str | bool) or (definition.factor == 1.0 and isinstance(value, int)):
+        return value
+    if isinstance(value, int):
+        return round(value * definition.factor, _DIGITS)
+    if not math.isfinite(value):
+        raise ParameterError(Why.REFUSED, f"{entry.name}: the drive has no number, but {value}")
+    return value * definition.factor
 
 
 def encode_value(entry: Entry, value: Value, held: bytes | None) -> bytes:
@@ -62,11 +56,11 @@ def encode_value(entry: Entry, value: Value, held: bytes | None) -> bytes:
     kind = definition.data_type
     try:
         if kind in ("string", "bytes", "bool"):
-            return encode(kind, value)
+            return datatypes.encode(kind, value)
         number = _number(entry, value)
-        if kind in _REALS:
+        if kind in REALS:
             _check_range(entry, number)
-            return encode(kind, number / definition.factor)
+            return datatypes.encode(kind, number / definition.factor)
         # A number of 64 bits has more digits than a division leaves it.
         raw = round(number if definition.factor == 1.0 else number / definition.factor)
         if definition.factor == 1.0 and raw != number:
@@ -74,7 +68,7 @@ def encode_value(entry: Entry, value: Value, held: bytes | None) -> bytes:
         _check_range(entry, raw if definition.factor == 1.0 else round(raw * definition.factor, _DIGITS))
         if definition.states and raw not in dict(definition.states):
             raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {_shown_states(entry)}")
-        return encode(kind, raw)
+        return datatypes.encode(kind, raw)
     except (ValueError, OverflowError) as error:
         raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} = {value!r}: {error}") from None
 
@@ -82,11 +76,11 @@ def encode_value(entry: Entry, value: Value, held: bytes | None) -> bytes:
 def matches(entry: Entry, held: bytes, wanted: bytes) -> bool:
     """Whether the drive holds what was to be written."""
     if entry.definition and entry.definition.data_type == "string":
-        return held.split(b"\0", 1)[0] == wanted.split(b"\0", 1)[0]
+        return datatypes.text(held) == datatypes.text(wanted)
     kind = entry.definition.data_type if entry.definition else ""
     beyond = held[len(wanted) :]
     # Some servers answer every read with four bytes, and a negative number with its sign.
-    is_negative = kind in INTEGERS and INTEGERS[kind][1] and bool(wanted) and wanted[-1] >= _SIGN
+    is_negative = kind in INTEGERS and INTEGERS[kind].signed and bool(wanted) and wanted[-1] >= _SIGN
     extended = not any(beyond) or (is_negative and set(beyond) == {0xFF})
     return held[: len(wanted)] == wanted and extended
 
@@ -123,30 +117,26 @@ def shown(entry: Entry, value: Value) -> str:
     return f"{text} ({state})" if state else f"{text} {definition.unit}".rstrip()
 
 
-def _size(kind: str) -> int:
-    return INTEGERS[kind][0] if kind in INTEGERS else struct.calcsize(_REALS[kind])
-
-
 def _raw(data: bytes) -> Value:
     if len(data) in _RAW_SIZES:
         return int.from_bytes(data, "little")
-    text = data.split(b"\0", 1)[0].decode("latin-1")
+    text = datatypes.text(data)
     return text if text.isprintable() else data.hex(" ").upper()
 
 
 def _encode_raw(entry: Entry, value: Value, held: bytes | None) -> bytes:
     if isinstance(value, str):
         try:
-            return encode("string", value)
+            return datatypes.encode("string", value)
         except ValueError as error:
             raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name}: {error}") from None
     whole = isinstance(value, bool | int) or value.is_integer()
     size = len(held) if held is not None else 0
-    number = int(value) if whole else 0
-    if not whole or size not in _RAW_SIZES or not -(1 << 8 * size - 1) <= number < 1 << 8 * size:
-        what = f"a whole number of {size} bytes" if size in _RAW_SIZES else "a text"
+    number = Integer(size, signed=value < 0) if size in _RAW_SIZES else None
+    if number is None or not whole or not number.low <= value <= number.high:
+        what = "a text" if number is None else f"a whole number of {size} bytes"
         raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {what}, not {value}")
-    return (number & (1 << 8 * size) - 1).to_bytes(size, "little")
+    return number.encode(int(value))
 
 
 def _number(entry: Entry, value: Value) -> int | float:

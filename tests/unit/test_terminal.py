@@ -58,7 +58,7 @@ def test_the_monitor_shows_them_escaped() -> None:
 
 
 def test_a_value_that_was_read_is_shown_escaped_and_is_itself_for_scripts() -> None:
-    value = sdo.decode(sdo.ValueType.STRING, CLEAR.encode())
+    value = sdo.decode("string", CLEAR.encode())
     assert value == CLEAR
     assert sdo.for_people(value, b"") == r"\x1b[2J"
 

@@ -27,7 +27,7 @@ from bridge.node.boot.listening import rpdo_plan
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.pdo_settings import MOST_ENTRIES
 from bridge.node.boot.procedure import boot
-from bridge.node.boot.scales import number_from, parameter_value
+from bridge.node.boot.scales import parameter_value
 from bridge.node.boot.status import BootError
 
 __all__ = [
@@ -58,7 +58,6 @@ __all__ = [
     "heartbeat_period_ms",
     "layouts",
     "match_words",
-    "number_from",
     "parameter_value",
     "rpdo_plan",
 ]

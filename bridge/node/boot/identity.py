@@ -6,6 +6,7 @@ import re
 from collections.abc import Generator
 from dataclasses import dataclass
 
+from bridge.canopen import datatypes
 from bridge.canopen.sdo import SdoError
 from bridge.command import Identification
 from bridge.command.plant import Node
@@ -96,7 +97,7 @@ def _text(letter: str, index: int, wanted: str | None) -> Generator[Action, byte
     """A text of the node, in which the regular expression ``wanted`` has to be found."""
     yield Step("reading name and version", letter)
     data = yield from optional(index)
-    text = (data or b"")[:_LONGEST_TEXT].split(b"\0", 1)[0].decode("latin-1").strip()
+    text = datatypes.text((data or b"")[:_LONGEST_TEXT]).strip()
     if wanted is not None and not re.search(wanted, text, re.IGNORECASE):
         found = f"the node has no {index:04X}h" if data is None else f"{index:04X}h is {text!r}"
         raise BootError(letter, f"{found}, expected {wanted!r} by the site file")

@@ -65,7 +65,7 @@ def read_places(
                 raise
             return raw  # the drive behind the channel may be away while the node itself is there
         if data is not None:
-            raw[place.key] = place.decode(data)
+            raw[place.key] = place.number.decode(data)
     return raw
 
 
@@ -81,7 +81,7 @@ def _bring(node: Node, want: OwnWant, raw: Raws, channel: int, owner: str, resul
         return
     if have is None:
         raise BootError("J", f"{owner}: {place.name} ({place.ref}) is to be {want.value}, and is not there")
-    memory, data = result.memory, place.encode(want.value)
+    memory, data = result.memory, place.number.encode(want.value)
     # Each drive has its own object of the same number.
     tried = place.ref.index | channel << 16
     if memory.was_not_kept(tried, place.ref.sub, data):
@@ -100,7 +100,7 @@ def _bring(node: Node, want: OwnWant, raw: Raws, channel: int, owner: str, resul
         memory.note_not_kept(tried, place.ref.sub, data)
         raise BootError("J", f"{owner}: {place.name} was to become {want.value}: {error}") from None
     read = yield from optional(place.ref.index, place.ref.sub, channel)
-    kept = None if read is None else place.decode(read)
+    kept = None if read is None else place.number.decode(read)
     if kept != want.value:
         memory.note_not_kept(tried, place.ref.sub, data)
         raise BootError("J", f"{owner}: {place.name} is {kept} after {want.value} was written; {NOT_AGAIN}")

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Generator
 
+from bridge.canopen.datatypes import NUMBERS
 from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
 from bridge.command.plant import Node
-from bridge.config.download import INTEGERS, REALS
 from bridge.mapping.model import Parameter
 from bridge.node.boot.actions import Action, BootResult, optional
 from bridge.node.sdo_channels import FIRST, channel_of
@@ -53,24 +52,12 @@ def read_scales(
     return scales
 
 
-def number_from(data_type: str, data: bytes) -> int:
-    """The number in ``data``, little-endian. Bytes beyond its type are ignored: some servers answer every
-    read with four."""
-    size, is_signed = INTEGERS[data_type]
-    return int.from_bytes(data[:size], "little", signed=is_signed)
-
-
 def parameter_value(parameter: Parameter, data: bytes) -> float:
     """The value of a parameter from its bytes, in its unit. Raises ValueError where it is no number."""
-    kind = parameter.data_type
-    if kind in REALS:
-        form = REALS[kind]
-        size = struct.calcsize(form)
-        if len(data) < size:
-            raise ValueError(f"{parameter.name}: {len(data)} bytes are no {kind}")
-        number: float = struct.unpack_from(form, data)[0]
-    elif kind in INTEGERS:
-        number = number_from(kind, data)
-    else:
-        raise ValueError(f"{parameter.name} is a {kind}, no number")
-    return round(number * parameter.factor, 9)
+    number = NUMBERS.get(parameter.data_type)
+    if number is None:
+        raise ValueError(f"{parameter.name} is a {parameter.data_type}, no number")
+    try:
+        return round(number.decode(data) * parameter.factor, 9)
+    except ValueError as error:
+        raise ValueError(f"{parameter.name} is a {parameter.data_type}: {error}") from None

@@ -53,6 +53,6 @@ class OwnWatch:
 def _raw(place: OwnPlace, entry: Entry, value: Value) -> int | None:
     """What the object would hold; None for a value that it does not take."""
     try:
-        return place.decode(encode_value(entry, value, None))
+        return place.number.decode(encode_value(entry, value, None))
     except ParameterError:
         return None

@@ -6,10 +6,10 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Iterable
 
+from bridge.canopen.datatypes import INTEGERS
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import Priority, Result, SdoChannel, SdoError
 from bridge.mapping.model import Poll
-from bridge.node.boot import number_from
 from bridge.node.process.process_data import DrivePdos
 from bridge.node.process.remote_polling import RemotePolling
 
@@ -67,7 +67,7 @@ class Polling:
 
         def done(result: Result) -> None:
             if not isinstance(result, SdoError):
-                self._show(poll.name, number_from(poll.data_type, result), self._now)
+                self._show(poll.name, INTEGERS[poll.data_type].decode(result), self._now)
             elif result.by_server:
                 # The node does not have it: asking again changes nothing.
                 self._due = [item for item in self._due if item[1] != number]

@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bridge.config import load_site
-from bridge.config.download import COMMANDS, INTEGERS, Download, encode, parse_concise_dcf, to_concise_dcf
+from bridge.config.download import COMMANDS, Download, parse_concise_dcf, to_concise_dcf
 from bridge.errors import FileFaults
 
 # Store and restore (1010h, 1011h) come back as commands, which are not read back.
@@ -44,22 +44,6 @@ def test_nonsense_is_refused_or_understood_never_more(content: bytes) -> None:
     except ValueError:
         return
     assert to_concise_dcf(found) == content
-
-
-@pytest.mark.parametrize("kind", [kind for kind in INTEGERS if kind != "bool"])
-def test_integers_are_little_endian_and_bounded(kind: str) -> None:
-    size, signed = INTEGERS[kind]
-    most = (1 << 8 * size - signed) - 1
-    assert encode(kind, most) == most.to_bytes(size, "little", signed=signed)
-    with pytest.raises(ValueError, match=kind):
-        encode(kind, most + 1)
-
-
-def test_other_types() -> None:
-    assert encode("bool", True) == b"\x01"
-    assert encode("real32", 1.5) == bytes.fromhex("0000C03F")
-    assert encode("string", "save") == b"save"
-    assert encode("bytes", "0A 1b") == b"\x0a\x1b"
 
 
 SITE = """\

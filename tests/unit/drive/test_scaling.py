@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.drive import LinearScale, scale_of, signed
+from bridge.drive import LinearScale, scale_of
 from bridge.mapping.model import ProcessValue
 
 HZ = LinearScale(50.0, 16384, 2.0)
@@ -62,11 +62,6 @@ def test_a_word_comes_back(word: int, full: float, at: int):
 def test_a_value_is_rounded_to_the_nearest_word(value: float):
     half_a_step = 50.0 / 16384 / 2
     assert abs(HZ.from_word(HZ.to_word(value)) - value) <= half_a_step * 1.0001
-
-
-@given(st.integers(-0x8000, 0x7FFF))
-def test_a_signed_word_is_its_twos_complement(number: int):
-    assert signed(number & 0xFFFF) == number
 
 
 @pytest.mark.parametrize(

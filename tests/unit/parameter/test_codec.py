@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.config.download import INTEGERS
+from bridge.canopen.datatypes import INTEGERS
 from bridge.image import Value
 from bridge.parameter import Address, Definition, Entry, ParameterError, Why
 from bridge.parameter.codec import decode, encode_value, matches, parse, shown
@@ -24,9 +24,7 @@ def entry(data_type: str, **more: object) -> Entry:
 
 
 def limits(kind: str) -> tuple[int, int]:
-    size, signed = INTEGERS[kind]
-    bits = 8 * size
-    return (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
+    return INTEGERS[kind].low, INTEGERS[kind].high
 
 
 def test_the_manuals_acceleration_time() -> None:
@@ -43,7 +41,7 @@ def test_a_whole_number_comes_back_as_it_was(data: st.DataObject) -> None:
     number = data.draw(st.integers(*limits(kind)))
     one = entry(kind)
     coded = encode_value(one, number, None)
-    assert len(coded) == INTEGERS[kind][0]
+    assert len(coded) == INTEGERS[kind].size
     assert decode(one, coded) == number
     assert decode(one, coded + b"\xff\xff") == number
 

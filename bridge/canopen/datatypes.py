@@ -1,0 +1,138 @@
+"""CANopen's data types on the wire (CiA 301 version 4.2, §7.1.4): numbers are little-endian.
+
+Site files, mappings and the command line name them as ``TypeName`` does.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+TypeName = Literal[
+    "bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64",
+    "real32", "real64", "string", "bytes",
+]  # fmt: skip
+Plain = bool | int | float | str
+
+
+@dataclass(frozen=True, slots=True)
+class Integer:
+    """INTEGERn or UNSIGNEDn: ``size`` bytes that hold ``low`` to ``high``."""
+
+    size: int
+    signed: bool = False
+    low: int = field(init=False)
+    high: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        bits = 8 * self.size
+        object.__setattr__(self, "low", -(1 << bits - 1) if self.signed else 0)
+        object.__setattr__(self, "high", (1 << bits - self.signed) - 1)
+
+    def encode(self, value: int) -> bytes:
+        """Raises ValueError where ``value`` does not fit."""
+        if not self.low <= value <= self.high:
+            raise ValueError(f"takes {self.low}…{self.high}")
+        return value.to_bytes(self.size, "little", signed=self.signed)
+
+    def decode(self, data: bytes) -> int:
+        """Bytes beyond its type are ignored: some servers answer every read with four."""
+        return int.from_bytes(data[: self.size], "little", signed=self.signed)
+
+    def from_word(self, word: int) -> int:
+        """What an unsigned word of the same length stands for: FFFFh of an INTEGER16 is -1."""
+        return word - (self.high - self.low + 1) if word > self.high else word
+
+    def to_word(self, value: int) -> int:
+        """The other way round."""
+        return value & self.high - self.low
+
+
+@dataclass(frozen=True, slots=True)
+class Real:
+    """REAL32 or REAL64 (IEEE 754)."""
+
+    size: int
+    layout: str
+
+    def encode(self, value: float) -> bytes:
+        """Raises ValueError where ``value`` is too large."""
+        try:
+            return struct.pack(self.layout, value)
+        except (OverflowError, struct.error):  # of a float, and of an integer
+            raise ValueError("too large") from None
+
+    def decode(self, data: bytes) -> float:
+        """May be infinite or no number. Raises ValueError where bytes are missing; those beyond the type's
+        are left out."""
+        if len(data) < self.size:
+            raise ValueError(f"{len(data)} bytes are too few")
+        return struct.unpack_from(self.layout, data)[0]
+
+
+INTEGERS: Final = {
+    "bool": Integer(1),
+    "int8": Integer(1, signed=True),
+    "int16": Integer(2, signed=True),
+    "int32": Integer(4, signed=True),
+    "int64": Integer(8, signed=True),
+    "uint8": Integer(1),
+    "uint16": Integer(2),
+    "uint32": Integer(4),
+    "uint64": Integer(8),
+}
+REALS: Final = {"real32": Real(4, "<f"), "real64": Real(8, "<d")}
+NUMBERS: Final[dict[str, Integer | Real]] = {**INTEGERS, **REALS}
+
+
+def encode(kind: str, value: Plain) -> bytes:
+    """``value`` as it goes over the wire. Raises ValueError where it does not fit ``kind``."""
+    if kind == "bool":
+        if value not in (0, 1) or isinstance(value, float | str):
+            raise ValueError("a bool is true or false")
+        return bytes((int(value),))
+    if kind in INTEGERS:
+        if isinstance(value, bool | float | str):
+            raise ValueError(f"a {kind} is a whole number")
+        number = INTEGERS[kind]
+        try:
+            return number.encode(value)
+        except ValueError:
+            raise ValueError(f"a {kind} is {number.low}…{number.high}") from None
+    if kind in REALS:
+        if isinstance(value, bool | str):
+            raise ValueError(f"a {kind} is a number")
+        try:
+            return REALS[kind].encode(value)
+        except ValueError:
+            raise ValueError(f"{value} is too large for a {kind}") from None
+    if not isinstance(value, str):
+        raise ValueError(f"a {kind} is a text in quotes")
+    if kind == "bytes":
+        return bytes.fromhex(value)
+    try:
+        return value.encode("latin-1")
+    except UnicodeEncodeError:
+        raise ValueError("a string has characters of ISO 8859-1 only") from None
+
+
+def decode(kind: str, data: bytes) -> Plain:
+    """The value of these bytes: a string up to its first zero byte, bytes in hexadecimal.
+
+    Raises ValueError where a number's bytes are missing; those beyond its type's are left out.
+    """
+    if kind == "string":
+        return text(data)
+    if kind == "bytes":
+        return data.hex(" ").upper()
+    number = NUMBERS[kind]
+    if len(data) < number.size:
+        raise ValueError(f"a {kind} has {number.size} bytes, not {len(data)}")
+    value = number.decode(data)
+    return bool(value) if kind == "bool" else value
+
+
+def text(data: bytes) -> str:
+    """A VISIBLE_STRING, up to its first zero byte. Devices send ISO 8859-1 in it."""
+    return data.split(b"\0", 1)[0].decode("latin-1")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final, Generic, TypeVar
 
 from bridge.canopen import lss
+from bridge.canopen.dialogue import Dialogue
 from bridge.canopen.frame import Frame
 from bridge.canopen.lss import Exchange, Identity, LssError, Service
 
@@ -33,7 +34,7 @@ class LssErrand(Generic[_R]):
         self.step = ""
         self.late = 0
         """Answers to a scan that came when nobody waited for one."""
-        self._service = service
+        self._dialogue = Dialogue(service, self._ask, self._done, (LssError,))
         self._timeout_s = timeout_s
         self._exchange: Exchange | None = None
         self._reply: bytes | None = None
@@ -43,7 +44,7 @@ class LssErrand(Generic[_R]):
         self._frames: list[Frame] = []
         self._result: list[_R] = []
         self._finished = False
-        self._advance(None, now)
+        self._dialogue.go_on(None, now)
 
     def is_finished(self, now: float) -> bool:
         return self._finished and not self._frames
@@ -86,22 +87,25 @@ class LssErrand(Generic[_R]):
 
     def _advance(self, reply: bytes | None, now: float) -> None:
         self._reply = None
-        try:
-            exchange = next(self._service) if self._exchange is None else self._service.send(reply)
-        except StopIteration as end:
-            self._result.append(end.value)
-            self._end(None)
-        except LssError as error:
-            self._end(error)
+        self._dialogue.go_on(reply, now)
+
+    def _ask(self, exchange: Exchange, now: float) -> bool:
+        self._exchange = exchange
+        self.step = exchange.step
+        self.steps += 1
+        if exchange.request:
+            self._frames.append(Frame(lss.REQUEST_ID, exchange.request))
+        self._deadline = now + self._wait_s(exchange)
+        if exchange.reply == lss.IDENTIFIED:
+            self._asked = now
+        return True
+
+    def _done(self, end: _R | LssError, now: float) -> None:
+        if isinstance(end, LssError):
+            self._end(end)
         else:
-            self._exchange = exchange
-            self.step = exchange.step
-            self.steps += 1
-            if exchange.request:
-                self._frames.append(Frame(lss.REQUEST_ID, exchange.request))
-            self._deadline = now + self._wait_s(exchange)
-            if exchange.reply == lss.IDENTIFIED:
-                self._asked = now
+            self._result.append(end)
+            self._end(None)
 
     def _wait_s(self, exchange: Exchange) -> float:
         if exchange.reply is None and not exchange.by_many:
@@ -114,7 +118,7 @@ class LssErrand(Generic[_R]):
         self.error = error
         if error:
             self._frames += [Frame(lss.REQUEST_ID, exchange.request) for exchange in lss.to_waiting()]
-        self._service.close()
+        self._dialogue.close()
         self._exchange = self._deadline = None
         self._finished = True
 

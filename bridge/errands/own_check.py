@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, field
 
+from bridge.canopen import dialogue
+from bridge.canopen.dialogue import Dialogue, Read
 from bridge.canopen.frame import Frame
-from bridge.canopen.sdo import Result, SdoError
+from bridge.canopen.sdo import SdoError
 from bridge.command.plant import Node
 from bridge.drive import OwnJudgement
 from bridge.drive.own_supervision import judge
-from bridge.node.boot import Action, BootError, Read
+from bridge.node.boot import BootError
 from bridge.node.boot.own_supervision import read_places
 from bridge.node.sdo_channels import SdoChannels
 
-Asking = Generator[Action, bytes | None, dict[str, OwnJudgement]]
+Judgements = dict[str, OwnJudgement]
 
 
-def ask(node: Node) -> Asking:
+def ask(node: Node) -> Generator[Read, bytes | None, Judgements]:
     """What each drive of the node would do, by the drive's name."""
     of_node = yield from read_places(node, None, link=True)
-    found: dict[str, OwnJudgement] = {}
+    found: Judgements = {}
     for drive in node.drives:
         of_drive = yield from read_places(node, drive, link=True)
         accepted = drive.table.accepts.runs_on or ""
@@ -28,68 +29,54 @@ def ask(node: Node) -> Asking:
     return found
 
 
-@dataclass(slots=True)
-class _Asked:
-    node: Node
-    sdo: SdoChannels
-    asking: Asking
-    answers: list[Result] = field(default_factory=list[Result])
-    is_done: bool = False
-
-
 class AuditErrand:
     """All nodes side by side. ``found`` has what was read, by drive; ``failed`` why a node could not be
     asked, by node."""
 
     def __init__(self, nodes: Sequence[Node], now: float) -> None:
-        self.found: dict[str, OwnJudgement] = {}
+        self.found: Judgements = {}
         self.failed: dict[str, str] = {}
         self._now = now
-        self._nodes = [_Asked(node, SdoChannels(node), ask(node)) for node in nodes]
-        self._channels = {channel.reply_id: channel for one in self._nodes for channel in one.sdo}
-        for one in self._nodes:
-            self._go_on(one, None)
-            self._pump(one)
+        self._left = len(nodes)
+        self._sdo = [SdoChannels(node) for node in nodes]
+        self._channels = {channel.reply_id: channel for sdo in self._sdo for channel in sdo}
+        for node, sdo in zip(nodes, self._sdo, strict=True):
+            self._begin(node, sdo)
 
-    def _pump(self, one: _Asked) -> None:
-        while one.answers:
-            self._go_on(one, one.answers.pop(0))
+    def _begin(self, node: Node, sdo: SdoChannels) -> None:
+        def do(step: Read, now: float) -> bool:
+            dialogue.ask(step, sdo[step.channel], now, lambda answer: asking.go_on(answer, self._now))
+            return True
 
-    def _go_on(self, one: _Asked, answer: Result | None) -> None:
-        try:
-            is_error = isinstance(answer, SdoError)
-            action = one.asking.throw(answer) if is_error else one.asking.send(answer)
-        except StopIteration as end:
-            self.found |= end.value
-            one.is_done = True
-        except (SdoError, BootError) as error:
-            self.failed[one.node.name] = str(error)
-            one.is_done = True
-        else:
-            if isinstance(action, Read):
-                channel = one.sdo[action.channel]
-                channel.read(action.index, action.sub, self._now, one.answers.append)
+        def done(end: Judgements | SdoError | BootError, now: float) -> None:
+            self._left -= 1
+            if isinstance(end, dict):
+                self.found |= end
+            else:
+                self.failed[node.name] = str(end)
+
+        asking = Dialogue[Read, bytes | None, Judgements, SdoError | BootError](
+            ask(node), do, done, (SdoError, BootError)
+        )
+        asking.go_on(None, self._now)
 
     def is_finished(self, now: float) -> bool:
-        return all(one.is_done for one in self._nodes)
+        return not self._left
 
     def on_frame(self, frame: Frame) -> None:
         self._now = max(self._now, frame.time)
         channel = self._channels.get(frame.can_id)
         if channel is not None:
             channel.on_frame(frame)
-            for one in self._nodes:
-                self._pump(one)
 
     def on_time(self, now: float) -> None:
         self._now = max(self._now, now)
-        for one in self._nodes:
-            one.sdo.on_time(now)
-            self._pump(one)
+        for sdo in self._sdo:
+            sdo.on_time(now)
 
     def next_deadline(self) -> float | None:
-        times = (one.sdo.next_deadline() for one in self._nodes if not one.is_done)
+        times = (sdo.next_deadline() for sdo in self._sdo)
         return min((time for time in times if time is not None), default=None)
 
     def take_frames(self) -> list[Frame]:
-        return [frame for one in self._nodes for frame in one.sdo.take_frames()]
+        return [frame for sdo in self._sdo for frame in sdo.take_frames()]

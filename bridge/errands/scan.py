@@ -8,12 +8,13 @@ once the answers say that they are its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.canopen import cobid, nmt
 from bridge.canopen.datatypes import text
+from bridge.canopen.dialogue import Dialogue, Read, ask, attempt
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.nmt import NmtState
 from bridge.canopen.sdo import Result, SdoChannel, SdoError
@@ -29,19 +30,11 @@ _LEAST_STEP_S: Final = 0.001
 
 
 @dataclass(frozen=True, slots=True)
-class Ask:
-    """Read this object."""
-
-    index: int
-    sub: int = 0
-
-
-@dataclass(frozen=True, slots=True)
 class Guard:
     """Ask for the NMT state by remote frame."""
 
 
-Interview = Generator[Ask | Guard, Result | None, None]
+Interview = Generator[Read | Guard, bytes | None, None]
 
 
 @dataclass(slots=True)
@@ -71,17 +64,17 @@ class FoundNode:
         return (self.device_type, self.vendor, self.product, self.revision, self.serial, self.name)
 
 
-def _is_silence(answer: Result | None) -> bool:
+def _is_silence(answer: Result) -> bool:
     return isinstance(answer, SdoError) and not answer.by_server
 
 
-def _number(answer: Result | None) -> int | None:
+def _number(answer: Result) -> int | None:
     return int.from_bytes(answer, "little") if isinstance(answer, bytes) and answer else None
 
 
 def _interview(node: FoundNode) -> Interview:
     """Ask one node for itself. Ends with its first silence."""
-    answer = yield Ask(0x1000)
+    answer = yield from attempt(0x1000)
     if _is_silence(answer):
         # A stopped node has no SDO and still answers to guarding.
         if not node.is_heard:
@@ -90,24 +83,24 @@ def _interview(node: FoundNode) -> Interview:
     node.answers += 1
     node.device_type = _number(answer)
     for sub, name in enumerate(("vendor", "product", "revision", "serial"), 1):
-        answer = yield Ask(0x1018, sub)
+        answer = yield from attempt(0x1018, sub)
         if _is_silence(answer):
             return
         node.answers += 1
         setattr(node, name, _number(answer))
-    answer = yield Ask(0x1008)
+    answer = yield from attempt(0x1008)
     if isinstance(answer, bytes):
         node.name = text(answer).strip()
-    node.first_channel = _number((yield Ask(0x1200, 1)))
-    node.emcy_id = _number((yield Ask(0x1014)))
+    node.first_channel = _number((yield from attempt(0x1200, 1)))
+    node.emcy_id = _number((yield from attempt(0x1014)))
     for index in _OTHER_CHANNELS:
-        cob_id = _number((yield Ask(index, 1)))
+        cob_id = _number((yield from attempt(index, 1)))
         if cob_id is None:
             break
         if not cob_id & cobid.PDO_DISABLED:
             node.other_channels.add(cob_id & cobid.COB_ID_MASK)
     # The first remote frame would start the node's life guarding, and we send no second one.
-    guarded = (_number((yield Ask(0x100C))) or 0) * (_number((yield Ask(0x100D))) or 0)
+    guarded = (_number((yield from attempt(0x100C))) or 0) * (_number((yield from attempt(0x100D))) or 0)
     if not node.is_heard and not guarded:
         yield Guard()
 
@@ -131,8 +124,8 @@ class Scanner:
         """``own_id`` is the bridge's own: a heartbeat with it is no node, an SDO answer is."""
         self._nodes = {node_id: FoundNode(node_id) for node_id in _IDS}
         self._channels: dict[int, SdoChannel] = {}
-        self._interviews: dict[int, Interview] = {}
-        self._answers: list[tuple[int, Result]] = []
+        self._interviews: dict[int, Dialogue[Read | Guard, bytes | None, None, SdoError]] = {}
+        self._now = now
         self._guarding: dict[int, float] = {}
         self._frames: list[Frame] = []
         self._timeout_s = timeout_s
@@ -152,10 +145,10 @@ class Scanner:
         return now >= self._until and not self._starts and not self._interviews
 
     def on_frame(self, frame: Frame) -> None:
+        self._now = max(self._now, frame.time)
         base, node_id = frame.can_id & ~0x7F, frame.can_id & 0x7F
         if base == cobid.SDO_REPLY and node_id in self._channels:
             self._channels[node_id].on_frame(frame)
-            self._pump(frame.time)
         elif base == cobid.ERROR_CONTROL and node_id in self._nodes and len(frame.data) == 1:
             self._on_error_control(self._nodes[node_id], frame)
 
@@ -165,17 +158,17 @@ class Scanner:
         node.nmt_state = NmtState.PRE_OPERATIONAL if state is NmtState.INITIALISING else state
         node.is_heard = True
         if self._guarding.pop(node.id, None) is not None:
-            self._go_on(node.id, None, frame.time)
+            self._interviews[node.id].go_on(None, frame.time)
 
     def on_time(self, now: float) -> None:
+        self._now = max(self._now, now)
         while self._starts and self._starts[-1][0] <= now:
             self._begin(self._starts.pop()[1], now)
         for channel in self._channels.values():
             channel.on_time(now)
         for node_id in [node_id for node_id, until in self._guarding.items() if now >= until]:
             del self._guarding[node_id]
-            self._go_on(node_id, None, now)
-        self._pump(now)
+            self._interviews[node_id].go_on(None, now)
 
     def next_deadline(self) -> float | None:
         times = list(self._guarding.values())
@@ -191,36 +184,25 @@ class Scanner:
         return frames
 
     def _begin(self, node_id: int, now: float) -> None:
-        self._channels[node_id] = SdoChannel(
+        channel = self._channels[node_id] = SdoChannel(
             cobid.SDO_REQUEST + node_id, cobid.SDO_REPLY + node_id, self._timeout_s
         )
-        self._interviews[node_id] = _interview(self._nodes[node_id])
-        self._go_on(node_id, None, now)
 
-    def _pump(self, now: float) -> None:
-        while self._answers:
-            node_id, answer = self._answers.pop(0)
-            self._go_on(node_id, answer, now)
-
-    def _go_on(self, node_id: int, answer: Result | None, now: float) -> None:
-        interview = self._interviews.get(node_id)
-        if interview is None:
-            return
-        try:
-            step = interview.send(answer)
-        except StopIteration:
-            del self._interviews[node_id]
-            return
-        match step:
-            case Ask(index, sub):
-                self._channels[node_id].read(index, sub, now, self._collect(node_id))
-            case Guard():
+        def do(step: Read | Guard, now: float) -> bool:
+            if isinstance(step, Read):
+                ask(step, channel, now, lambda answer: interview.go_on(answer, self._now))
+            else:
                 # DLC 1, as the answer has it.
                 self._frames.append(Frame((cobid.ERROR_CONTROL + node_id) | REMOTE, b"\0"))
                 self._guarding[node_id] = now + self._timeout_s
+            return True
 
-    def _collect(self, node_id: int) -> Callable[[Result], None]:
-        return lambda result: self._answers.append((node_id, result))
+        def done(end: SdoError | None, now: float) -> None:
+            del self._interviews[node_id]
+
+        interview = Dialogue(_interview(self._nodes[node_id]), do, done, (SdoError,))
+        self._interviews[node_id] = interview
+        interview.go_on(None, now)
 
     # what was found
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from bridge.canopen.dialogue import Dialogue, ask
 from bridge.canopen.nmt import NmtState
 from bridge.canopen.sdo import Priority, Result, SdoError
 from bridge.node import boot
@@ -30,6 +31,9 @@ class Host(Protocol):
     def boot_ended(self, result: boot.BootResult | boot.BootError, now: float) -> None: ...
 
 
+_Dialogue = Dialogue[boot.Action, bytes | None, boot.BootResult, SdoError | boot.BootError]
+
+
 @dataclass(frozen=True, slots=True)
 class _Awaited:
     state: NmtState | None
@@ -44,7 +48,7 @@ class Booting:
         self._host = host
         self._make = make
         self._sdo = sdo
-        self._boot: boot.Boot | None = None
+        self._dialogue: _Dialogue | None = None
         self._awaited: _Awaited | None = None
         self._goes_on_at: float | None = None
         self._answers: list[Result] = []
@@ -53,18 +57,18 @@ class Booting:
 
     @property
     def is_running(self) -> bool:
-        return self._boot is not None
+        return self._dialogue is not None
 
     def begin(self, now: float) -> None:
         self.cancel(now)
-        self._boot = self._make()
+        self._dialogue = Dialogue(self._make(), self._waits, self._end, (SdoError, boot.BootError))
         self._go_on(None, now)
 
     def cancel(self, now: float) -> None:
         """End the boot-up, if there is one, and everything that waits on the SDO channel."""
-        if self._boot:
-            self._boot.close()
-            self._boot = None
+        if self._dialogue:
+            self._dialogue.close()
+            self._dialogue = None
         self._awaited = self._goes_on_at = None
         self.is_held = False
         self._sdo.flush(now)
@@ -102,30 +106,14 @@ class Booting:
 
     def _go_on(self, answer: Result | boot.BootError | None, now: float) -> None:
         """Run until the boot-up waits for something, from an answer, or from what has become of waiting."""
-        while self._boot is not None:
-            try:
-                action = _resume(self._boot, answer)
-            except StopIteration as end:
-                self._end(end.value, now)
-                return
-            except SdoError as error:
-                self._end(_failure(error, self._step.letter), now)
-                return
-            except boot.BootError as error:
-                self._end(error, now)
-                return
-            answer = None
-            if self._waits(action, now):
-                return
+        if self._dialogue is not None:
+            self._dialogue.go_on(answer, now)
 
     def _waits(self, action: boot.Action, now: float) -> bool:
         """Do one step; True where its answer comes later."""
         match action:
-            case boot.Read(index, sub, channel):
-                self._sdo[channel].read(index, sub, now, self._answers.append, priority=Priority.BOOT)
-                return True
-            case boot.Write(index, sub, data, channel):
-                self._sdo[channel].write(index, sub, data, now, self._answers.append, priority=Priority.BOOT)
+            case boot.Read() | boot.Write():
+                ask(action, self._sdo[action.channel], now, self._answers.append, Priority.BOOT)
                 return True
             case boot.Await(state, timeout_s):
                 if not self._host.begin_await(state):
@@ -146,8 +134,10 @@ class Booting:
                 self._host.carry_out(action, now)
                 return False
 
-    def _end(self, result: boot.BootResult | boot.BootError, now: float) -> None:
-        self._boot = None
+    def _end(self, result: boot.BootResult | boot.BootError | SdoError, now: float) -> None:
+        self._dialogue = None
+        if isinstance(result, SdoError):
+            result = _failure(result, self._step.letter)
         self._host.boot_ended(result, now)
 
 
@@ -156,9 +146,3 @@ def _failure(error: SdoError, letter: str) -> boot.BootError:
     if error.by_server or letter == "B":
         return boot.BootError(letter, str(error), absent=not error.by_server)
     return boot.BootError(letter, f"the node does not answer: {error}", absent=True)
-
-
-def _resume(generator: boot.Boot, answer: Result | boot.BootError | None) -> boot.Action:
-    if isinstance(answer, SdoError | boot.BootError):
-        return generator.throw(answer)
-    return generator.send(answer)

@@ -6,8 +6,8 @@ from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Final
 
+from bridge.canopen.dialogue import Read, Write
 from bridge.canopen.nmt import NmtCommand, NmtState
-from bridge.canopen.sdo import SdoError
 from bridge.command import Identification
 from bridge.drive import OwnJudgement
 from bridge.node.boot.memory import BootMemory
@@ -21,23 +21,6 @@ class Step:
 
     text: str
     letter: str
-
-
-@dataclass(frozen=True, slots=True)
-class Read:
-    """Read an object over one of the node's SDO channels, by number."""
-
-    index: int
-    sub: int = 0
-    channel: int = 1
-
-
-@dataclass(frozen=True, slots=True)
-class Write:
-    index: int
-    sub: int
-    data: bytes
-    channel: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,21 +150,10 @@ class BootResult:
 
 
 Boot = Generator[Action, bytes | None, BootResult]
-Ask = Generator[Action, bytes | None, bytes | None]
 Do = Generator[Action, bytes | None, None]
 
 
 _LONGEST_NUMBER: Final = 8
-
-
-def optional(index: int, sub: int = 0, channel: int = 1) -> Ask:
-    """An object that the node need not have: None where it aborts. A time-out is still an error."""
-    try:
-        return (yield Read(index, sub, channel))
-    except SdoError as error:
-        if error.by_server:
-            return None
-        raise
 
 
 def number(data: bytes | None, default: int = 0) -> int:

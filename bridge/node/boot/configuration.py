@@ -11,19 +11,10 @@ import zlib
 from collections.abc import Generator, Sequence
 from typing import Final
 
+from bridge.canopen.dialogue import Read, Write, optional
 from bridge.canopen.sdo import SdoError
 from bridge.config.download import Download
-from bridge.node.boot.actions import (
-    Action,
-    BootResult,
-    Do,
-    Read,
-    Step,
-    Write,
-    number,
-    optional,
-    same,
-)
+from bridge.node.boot.actions import Action, BootResult, Do, Step, number, same
 from bridge.node.boot.memory import NOT_AGAIN, BootMemory
 from bridge.node.boot.pdo_downloads import download_pdo, is_pdo, pdo_parameter
 from bridge.node.boot.status import BootError

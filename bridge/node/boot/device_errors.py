@@ -9,17 +9,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from bridge.canopen.dialogue import optional
 from bridge.command.plant import Node
 from bridge.mapping import emcy_codes
-from bridge.node.boot.actions import (
-    BootResult,
-    DeviceErrors,
-    Do,
-    Pause,
-    ResetCommunication,
-    Step,
-    optional,
-)
+from bridge.node.boot.actions import BootResult, DeviceErrors, Do, Pause, ResetCommunication, Step
 from bridge.node.boot.status import BootError
 
 _REGISTER: Final = 0x1001

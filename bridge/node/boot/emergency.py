@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from bridge.canopen import cobid
-from bridge.node.boot.actions import BootResult, Do, Step, number, optional
+from bridge.canopen.dialogue import optional
+from bridge.node.boot.actions import BootResult, Do, Step, number
 
 
 def read_emcy_id(node_id: int, result: BootResult) -> Do:

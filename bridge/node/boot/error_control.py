@@ -5,9 +5,10 @@ from __future__ import annotations
 import struct
 from typing import Final
 
+from bridge.canopen.dialogue import Write, optional
 from bridge.canopen.sdo import SdoError
 from bridge.config import NodeTable
-from bridge.node.boot.actions import BootResult, Do, Step, Write, number, optional, same
+from bridge.node.boot.actions import BootResult, Do, Step, number, same
 from bridge.node.boot.memory import NOT_AGAIN
 from bridge.node.boot.status import BootError
 

@@ -7,10 +7,11 @@ from collections.abc import Generator
 from dataclasses import dataclass
 
 from bridge.canopen import datatypes
+from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Identification
 from bridge.command.plant import Node
-from bridge.node.boot.actions import Action, BootResult, Do, Read, Step, Wake, number, optional
+from bridge.node.boot.actions import Action, BootResult, Do, Step, Wake, number
 from bridge.node.boot.status import BootError
 
 _ALL = 0xFFFF_FFFF

@@ -7,11 +7,12 @@ from contextlib import suppress
 from typing import Final
 
 from bridge.canopen import cobid
+from bridge.canopen.dialogue import optional
 from bridge.canopen.pdo import Entry, MappingError, PdoCodec
 from bridge.command import Drive
 from bridge.command.plant import Node
 from bridge.mapping.model import Family, Pdo, Slot
-from bridge.node.boot.actions import Action, BootResult, Do, PdoPlan, Step, number, optional
+from bridge.node.boot.actions import Action, BootResult, Do, PdoPlan, Step, number
 from bridge.node.boot.layout import factory_entries, layouts, match_words
 from bridge.node.boot.pdos import RPDO, read_entries
 

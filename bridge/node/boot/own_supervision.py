@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 
+from bridge.canopen.dialogue import Read, Write, optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
 from bridge.command.plant import Node
@@ -11,7 +12,7 @@ from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_supervision import judge
 from bridge.mapping.model import Family
 from bridge.mapping.own_places import OwnPlace, OwnWant, places, wanted
-from bridge.node.boot.actions import Action, BootResult, Do, Step, Write, optional
+from bridge.node.boot.actions import BootResult, Do, Step
 from bridge.node.boot.memory import NOT_AGAIN
 from bridge.node.boot.status import BootError
 from bridge.node.sdo_channels import FIRST, channel_of
@@ -49,7 +50,7 @@ def set_own_supervision(node: Node, result: BootResult) -> Do:
 
 def read_places(
     node: Node, drive: Drive | None, *, link: bool = False
-) -> Generator[Action, bytes | None, Raws]:
+) -> Generator[Read, bytes | None, Raws]:
     """The node's own objects, or those that each drive has for itself. What cannot be read is left out."""
     raw: Raws = {}
     channel = FIRST if drive is None else channel_of(node, drive.slot)

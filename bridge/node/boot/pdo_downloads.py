@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from typing import Final
 
+from bridge.canopen.dialogue import optional
 from bridge.canopen.pdo import MappingError
 from bridge.config.download import Download
-from bridge.node.boot.actions import Action, number, optional, same
+from bridge.node.boot.actions import Action, number, same
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.pdo_settings import FIXED_BITS, Change, PdoObjects, write_pdo
 from bridge.node.boot.status import BootError

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.canopen import cobid
+from bridge.canopen.dialogue import Write, optional
 from bridge.canopen.pdo import Entry, MappingError
 from bridge.canopen.sdo import SdoError
 from bridge.config import PdoTable
 from bridge.config.model import MappedObject
 from bridge.mapping.model import Pdo
-from bridge.node.boot.actions import Action, BootResult, Do, Write, number, optional
+from bridge.node.boot.actions import Action, BootResult, Do, number
 from bridge.node.boot.memory import NOT_AGAIN, BootMemory
 
 FIXED_BITS: Final = 0x6000_0000

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.canopen import cobid
+from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.pdo import Entry, MappingError, PdoCodec
 from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
@@ -19,18 +20,7 @@ from bridge.command.plant import Node
 from bridge.config import PdoTable
 from bridge.image import DataType
 from bridge.mapping.model import Pdo
-from bridge.node.boot.actions import (
-    Action,
-    BootResult,
-    Do,
-    DrivePlan,
-    NodePdoPlan,
-    PdoPlan,
-    Read,
-    Step,
-    number,
-    optional,
-)
+from bridge.node.boot.actions import Action, BootResult, Do, DrivePlan, NodePdoPlan, PdoPlan, Step, number
 from bridge.node.boot.layout import Layouts, differences, factory_entries, layouts, match_words
 from bridge.node.boot.pdo_settings import MOST_ENTRIES, PdoObjects, set_pdo, table_for
 from bridge.node.boot.start import write_start

@@ -6,11 +6,12 @@ import math
 from collections.abc import Generator
 
 from bridge.canopen.datatypes import NUMBERS
+from bridge.canopen.dialogue import optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
 from bridge.command.plant import Node
 from bridge.mapping.model import Parameter
-from bridge.node.boot.actions import Action, BootResult, optional
+from bridge.node.boot.actions import Action, BootResult
 from bridge.node.sdo_channels import FIRST, channel_of
 
 

@@ -6,11 +6,12 @@ from collections.abc import Generator
 from typing import Final
 
 from bridge.canopen import cobid
+from bridge.canopen.dialogue import Read, Write, optional
 from bridge.canopen.nmt import NmtCommand
 from bridge.canopen.sdo import SdoError
 from bridge.command.plant import Node
 from bridge.mapping.model import SdoServer
-from bridge.node.boot.actions import Action, BootResult, Do, Nmt, Read, Step, Write, number, optional
+from bridge.node.boot.actions import Action, BootResult, Do, Nmt, Step, number
 from bridge.node.boot.status import BootError
 from bridge.node.sdo_channels import opened_servers
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator
 from functools import partial
 from typing import TypeVar
 
+from bridge.canopen.dialogue import Dialogue
 from bridge.canopen.sdo import Priority, Result, SdoChannel, SdoError
 from bridge.parameter import ParameterError, Transfer, TransferFailed, Why
 
@@ -27,28 +28,16 @@ def run(
 
     ``clock`` gives the latest known time in monotonic seconds. A value is as old as the request that read it.
     """
-
     refused: list[str] = []
     """Why the write that is under way was not begun."""
 
-    def advance(resume: Callable[[], Transfer]) -> None:
-        try:
-            transfer = resume()
-        except StopIteration as end:
-            done(end.value)
-        except ParameterError as error:
-            done(error)
-        else:
-            carry_out(transfer)
-
-    def carry_out(transfer: Transfer) -> None:
-        now = clock()
+    def carry_out(transfer: Transfer, now: float) -> bool:
         index, sub = transfer.address.index, transfer.address.sub
         concluded = partial(conclude, now)
         channel = channel_for(transfer)
         if transfer.data is None:
             channel.read(index, sub, now, concluded, priority=priority)
-            return
+            return True
 
         def may_begin() -> bool:
             if transfer.why_not is not None:
@@ -66,15 +55,16 @@ def run(
             repeatable=False,
             may_begin=may_begin,
         )
+        return True
 
     def conclude(asked: float, result: Result) -> None:
         if refused:
-            why = refused.pop()
-            advance(lambda: procedure.throw(ParameterError(Why.PROTECTED, why)))
+            dialogue.go_on(ParameterError(Why.PROTECTED, refused.pop()), clock())
         elif isinstance(result, SdoError):
             failure = TransferFailed(str(result), result.code, by_drive=result.by_server)
-            advance(lambda: procedure.throw(failure))
+            dialogue.go_on(failure, clock())
         else:
-            advance(lambda: procedure.send((result, asked)))
+            dialogue.go_on((result, asked), clock())
 
-    advance(lambda: next(procedure))
+    dialogue = Dialogue(procedure, carry_out, lambda end, now: done(end), (ParameterError,))
+    dialogue.go_on(None, clock())

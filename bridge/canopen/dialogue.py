@@ -1,0 +1,116 @@
+"""Dialogues with a node: generators that yield one step after the other and are sent what came of it.
+
+What a step is, who writes the generator says. ``Read`` and ``Write`` are those that an SDO channel carries
+out. An error is thrown into the generator, at the step that it belongs to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from bridge.canopen.sdo import Priority, Result, SdoChannel, SdoError
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """Read an object over one of the node's SDO channels, by number."""
+
+    index: int
+    sub: int = 0
+    channel: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    index: int
+    sub: int
+    data: bytes
+    channel: int = 1
+
+
+def ask(
+    step: Read | Write,
+    sdo: SdoChannel,
+    now: float,
+    answered: Callable[[Result], None],
+    priority: Priority = Priority.COMMAND,
+) -> None:
+    """Have ``sdo`` carry out ``step``; ``answered`` is called once, possibly before this returns."""
+    if isinstance(step, Read):
+        sdo.read(step.index, step.sub, now, answered, priority=priority)
+    else:
+        sdo.write(step.index, step.sub, step.data, now, answered, priority=priority)
+
+
+def attempt(index: int, sub: int = 0, channel: int = 1) -> Generator[Read, bytes | None, Result]:
+    """What became of reading an object, an error included."""
+    try:
+        return (yield Read(index, sub, channel)) or b""
+    except SdoError as error:
+        return error
+
+
+def optional(index: int, sub: int = 0, channel: int = 1) -> Generator[Read, bytes | None, bytes | None]:
+    """An object that the node need not have: None where it aborts. A time-out is still an error."""
+    try:
+        return (yield Read(index, sub, channel))
+    except SdoError as error:
+        if error.by_server:
+            return None
+        raise
+
+
+S = TypeVar("S")
+A = TypeVar("A")
+R = TypeVar("R")
+E = TypeVar("E", bound=Exception)
+
+
+class Dialogue(Generic[S, A, R, E]):
+    """Runs one generator. ``do`` carries out a step, and says whether its answer comes later, by ``go_on``.
+    ``done`` gets what the generator returns, or which of the errors ``fails`` has ended it."""
+
+    def __init__(
+        self,
+        steps: Generator[S, A, R],
+        do: Callable[[S, float], bool],
+        done: Callable[[R | E, float], None],
+        fails: tuple[type[E], ...],
+    ) -> None:
+        self._steps: Generator[S, A, R] | None = steps
+        self._do = do
+        self._done = done
+        self._fails = fails
+
+    def go_on(self, answer: A | Exception | None, now: float) -> None:
+        """Begin with None, or go on with an answer, until something has to be waited for. Nothing happens
+        after the end."""
+        while self._steps is not None:
+            try:
+                if answer is None:
+                    step = next(self._steps)
+                elif isinstance(answer, Exception):
+                    step = self._steps.throw(answer)
+                else:
+                    step = self._steps.send(answer)
+            except StopIteration as end:
+                self._end(end.value, now)
+                return
+            except self._fails as error:
+                self._end(error, now)
+                return
+            answer = None
+            if self._do(step, now):
+                return
+
+    def close(self) -> None:
+        """End it without a result."""
+        if self._steps is not None:
+            self._steps.close()
+            self._steps = None
+
+    def _end(self, result: R | E, now: float) -> None:
+        self._steps = None
+        self._done(result, now)

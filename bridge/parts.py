@@ -15,6 +15,7 @@ from bridge.command import Event, Kind, Plant
 from bridge.errors import BridgeError
 from bridge.notify import Notifier
 from bridge.quietlog import about
+from bridge.ratelimit import Pauses
 
 _log = logging.getLogger(__name__)
 
@@ -22,7 +23,6 @@ _FIRST_PAUSE_S: Final = 0.2
 _LAST_PAUSE_S: Final = 10.0
 _STABLE_S: Final = 30.0
 """A part that has served for this long starts again with the first pause."""
-_TELL_S: Final = 60.0
 _LONGEST_REASON: Final = 300
 _FAILING: Final = "bridge/fronts_failing"
 
@@ -75,7 +75,7 @@ class Parts:
         self._clock = clock
         self._status = status
         self._failing: dict[str, str] = {}
-        self._told_at: dict[str, float] = {}
+        self._pauses = Pauses()
         self._told: set[str] = set()
         self._unknown: set[str] = set()
         self._all_known = asyncio.Event()
@@ -125,8 +125,7 @@ class Parts:
         self._failing[part.name] = how
         now = self._clock()
         self._settled(part, now)
-        if now - self._told_at.get(part.name, float("-inf")) >= _TELL_S:
-            self._told_at[part.name] = now
+        if self._pauses.take(now, part.name) is not None:
             self._told.add(part.name)
             message = f"{part.title} {how}; it is started again in {pause_s:.1f} s"
             self._plant.report(Event(now, Kind.FRONT, "bridge", 700, message))

@@ -37,6 +37,42 @@ class RateLimit:
         return True
 
 
+class PerSecond:
+    """At most ``most`` within a second, which begins with the first of them."""
+
+    __slots__ = ("_begin", "_count", "_most")
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._begin = float("-inf")
+        self._count = 0
+
+    def allows(self, now: float) -> bool:
+        if now - self._begin >= 1.0:
+            self._begin, self._count = now, 0
+        self._count += 1
+        return self._count <= self._most
+
+
+class Pauses:
+    """One of each key, and no other of it for ``pause_s``."""
+
+    __slots__ = ("_pause_s", "_told")
+
+    def __init__(self, pause_s: float = PAUSE_S) -> None:
+        self._pause_s = pause_s
+        self._told: dict[Hashable, tuple[float, int]] = {}
+
+    def take(self, now: float, key: Hashable = None) -> int | None:
+        """None where this one is left out; else how many were since the last one."""
+        at, left_out = self._told.get(key, (float("-inf"), 0))
+        if now - at < self._pause_s:
+            self._told[key] = at, left_out + 1
+            return None
+        self._told[key] = now, 0
+        return left_out
+
+
 @dataclass(slots=True)
 class _Told(Generic[Item]):
     """What is kept of one kind and source since ``at``: ``lines`` were told, and ``last`` is the newest of

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+from bridge.ratelimit import PerSecond
+
 
 class Kind(StrEnum):
     WATCHDOG = "watchdog"
@@ -41,18 +43,14 @@ class EventGate:
     """Keeps a client that is refused again and again, or a babbling node, from flooding the listeners. What
     is left out is still counted where it happens."""
 
-    __slots__ = ("_told",)
+    __slots__ = ("_limits",)
 
     def __init__(self) -> None:
-        self._told: dict[tuple[str, Kind], tuple[float, int]] = {}
+        self._limits: dict[tuple[str, Kind], PerSecond] = {}
 
     def admits(self, event: Event) -> bool:
         """Whether this event is passed on: of kinds that repeat, at most ten a second of each source."""
         if event.kind not in REPEATING:
             return True
-        key = (event.source, event.kind)
-        begin, told = self._told.get(key, (event.time, 0))
-        if event.time - begin >= 1.0:
-            begin, told = event.time, 0
-        self._told[key] = (begin, told + 1)
-        return told < _MOST_A_SECOND
+        limit = self._limits.setdefault((event.source, event.kind), PerSecond(_MOST_A_SECOND))
+        return limit.allows(event.time)

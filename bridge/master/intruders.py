@@ -19,6 +19,7 @@ from bridge.node.node import NodeCore
 from bridge.node.process.command_frames import Command, commands_of
 from bridge.node.process.process_data import DrivePdos
 from bridge.node.wire import Handler
+from bridge.ratelimit import Pauses
 
 _AGAIN_S: Final = 10.0
 """How often an intruder that goes on is reported, with the number of frames since the last time."""
@@ -53,8 +54,7 @@ class Intruders:
         self._commands: dict[int, tuple[NodeCore, Command]] = {}
         self._heartbeat_id = cobid.ERROR_CONTROL + bus.master_node_id if bus.heartbeat_ms else None
         self._sdo: dict[int, SdoListener] = {}
-        self._told: dict[tuple[int, bool], tuple[float, int]] = {}
-        """When an identifier was told, and how many frames have come since."""
+        self._pauses = Pauses(_AGAIN_S)
         self._stopped: dict[int, float] = {}
         self._spoken = frozenset(
             tpdo.cob_id for node in nodes for drive in node.table.drive for tpdo in drive.tpdo
@@ -163,11 +163,8 @@ class Intruders:
             return
         self.count += 1
         stopped = self._to_be_stopped(affected)
-        told_at, since = self._told.get((frame.can_id, is_worse), (float("-inf"), 0))
-        if frame.time - told_at < _AGAIN_S:
-            self._told[frame.can_id, is_worse] = told_at, since + 1
-        else:
-            self._told[frame.can_id, is_worse] = frame.time, 0
+        since = self._pauses.take(frame.time, (frame.can_id, is_worse))
+        if since is not None:
             more = f" ({since + 1} frames since the last message)" if since else ""
             self.last = f"{said()}, from somebody else{more}{_answer(stopped, self._nodes)}"
             severity = _HARMLESS if affected is None else _SEVERE

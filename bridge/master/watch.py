@@ -8,6 +8,7 @@ from typing import Final
 from bridge.canopen import cobid, nmt
 from bridge.canopen.frame import Frame
 from bridge.command import Event, Kind, Plant
+from bridge.ratelimit import Pauses
 
 _NODES: Final = range(1, 128)
 _FORGET_S: Final = 60.0
@@ -35,7 +36,7 @@ class BusWatch:
         self._master_at = float("-inf")
         self._strangers: dict[int, float] = {}
         self._duplicates: dict[int, float] = {}
-        self._told: dict[str, float] = {}
+        self._pauses = Pauses()
 
     def routes(self) -> dict[int, Callable[[Frame], None]]:
         """NMT commands, and the error control messages of every node that is not configured."""
@@ -86,10 +87,8 @@ class BusWatch:
         )
 
     def _tell(self, key: str, message: str, now: float, severity: int) -> None:
-        if now - self._told.get(key, float("-inf")) < _FORGET_S:
-            return
-        self._told[key] = now
-        self._plant.report(Event(now, Kind.BUS, self._bus, severity, message))
+        if self._pauses.take(now, key) is not None:
+            self._plant.report(Event(now, Kind.BUS, self._bus, severity, message))
 
     def refresh(self, now: float) -> None:
         """Bring the points of the bus up to date."""

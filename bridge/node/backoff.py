@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from bridge.ratelimit import Pauses
+
 BETWEEN_BOOTS_S: Final = 0.2
 _FIRST_S: Final = 1.0
 _LAST_S: Final = 10.0
@@ -13,17 +15,16 @@ each attempt may cost it writes."""
 _STEADY_S: Final = 30.0
 """Who has been in operation for so long begins anew."""
 _MANY: Final = 3
-_TELL_S: Final = 60.0
 
 
 class BackOff:
     """Of one node. ``lost`` and ``failed`` give the seconds until it is booted again."""
 
-    __slots__ = ("_losses", "_pause_s", "_since", "_told_at", "pause_s", "steady_at")
+    __slots__ = ("_losses", "_pause_s", "_pauses", "_since", "pause_s", "steady_at")
 
     def __init__(self) -> None:
         self._since = float("-inf")
-        self._told_at = float("-inf")
+        self._pauses = Pauses()
         self.reset()
 
     def reset(self) -> None:
@@ -69,7 +70,6 @@ class BackOff:
 
     def report(self, now: float) -> str | None:
         """What to tell of a node that flaps, once a minute."""
-        if not self.is_flapping or now - self._told_at < _TELL_S:
+        if not self.is_flapping or self._pauses.take(now) is None:
             return None
-        self._told_at = now
         return f"the node is lost again and again: {self._losses} times, soon after each boot-up"

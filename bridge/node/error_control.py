@@ -9,13 +9,13 @@ from collections.abc import Callable
 from enum import Enum
 
 from bridge.canopen import nmt
-from bridge.canopen.bootloop import BootLoop
 from bridge.canopen.duplicate import DuplicateCheck
 from bridge.canopen.frame import Frame
 from bridge.canopen.heartbeat import HeartbeatConsumer, NodeGuard
 from bridge.canopen.nmt import NmtState
 from bridge.config import NodeTable
 from bridge.node.boot.status import HINTS
+from bridge.node.bootloop import BootLoop
 
 
 class Sign(Enum):

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
-from bridge.canopen.bootloop import BootLoop
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.command import Action, Plant
 from bridge.command.link import NodeState
@@ -16,6 +15,7 @@ from bridge.node import boot
 from bridge.node import nmt_commands as node_commands
 from bridge.node.backoff import BETWEEN_BOOTS_S, BackOff
 from bridge.node.booting import Booting
+from bridge.node.bootloop import BootLoop
 from bridge.node.error_control import Sign
 from bridge.node.leaving import Leaving
 from bridge.node.neighbours import Neighbours

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from bridge.canopen.bootloop import BootLoop
 from bridge.canopen.nmt import NmtState
 from bridge.command import Event, Kind, Plant
 from bridge.command.link import NodeState
 from bridge.command.plant import Node
 from bridge.node.backoff import BackOff
 from bridge.node.boot import BootError
+from bridge.node.bootloop import BootLoop
 
 
 class NodeView:

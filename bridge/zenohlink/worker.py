@@ -15,6 +15,7 @@ from typing import Final, Protocol
 
 import zenoh
 
+from bridge.ratelimit import Pauses
 from bridge.zenohlink.lane import Job, Lane
 from bridge.zenohlink.message import sentence
 from bridge.zenohlink.sockets import Connections
@@ -73,7 +74,7 @@ class Worker:
         self._lanes: set[Lane] = set()
         self._answers: tuple[Lane, Lane] | None = None
         self._lanes_lock = threading.Lock()
-        self._last_complaint = float("-inf")
+        self._pauses = Pauses()
         self._thread = threading.Thread(target=self._work, name=f"zenoh-{name}", daemon=True)
 
     def start(self) -> None:
@@ -115,8 +116,7 @@ class Worker:
         """Count an error and log it at most once a minute, with its place where it is none of zenoh's."""
         self.errors += 1
         now = time.monotonic()
-        if now - self._last_complaint >= 60:
-            self._last_complaint = now
+        if self._pauses.take(now) is not None:
             ours = None if isinstance(error, ZENOH_ERRORS) else error
             _log.warning("%s: %s (%d so far)", self.name, sentence(error), self.errors, exc_info=ours)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import uuid
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -17,40 +17,18 @@ from bridge.northbound.opcua.library import ObjectIds, node_id, text, ua, varian
 from bridge.northbound.opcua.nodes import pascal_case
 from bridge.northbound.opcua.subscriptions import Subscriptions
 from bridge.northbound.opcua.values import source_time
+from bridge.ratelimit import RateLimit
 
 BASE_TYPE: Final = "DriveEventType"
 _BURST: Final = 20
-_PER_SECOND: Final = 10.0
+_EVERY_S: Final = 0.1
+"""Of one kind so many go out at once and then one in so many seconds. Each kind has its own limit, so that
+somebody who has writes refused all day hides no watchdog trip."""
 _WAITING: Final = 200
 
 
 def type_name(kind: Kind) -> str:
     return f"{pascal_case(kind.value)}EventType"
-
-
-class Bound:
-    """How many events of one kind may go out: a burst, then so many a second.
-
-    Each kind has its own, so that somebody who has writes refused all day hides no watchdog trip.
-    """
-
-    __slots__ = ("_left", "_since", "held_back")
-
-    def __init__(self) -> None:
-        self._left = float(_BURST)
-        self._since: float | None = None
-        self.held_back = 0
-
-    def take(self, now: float) -> bool:
-        """Whether one more may go at ``now`` (monotonic seconds)."""
-        if self._since is not None:
-            self._left = min(float(_BURST), self._left + (now - self._since) * _PER_SECOND)
-        self._since = now
-        if self._left < 1:
-            self.held_back += 1
-            return False
-        self._left -= 1
-        return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +52,15 @@ class EventSender:
         self._objects = objects
         self._types = types
         self._guard = Guard("OPC UA events")
-        self._bounds: dict[Kind, Bound] = {}
+        self._limits: dict[Kind, RateLimit] = {}
+        self._held_back = Counter[Kind]()
         self._queue: deque[_Told] = deque(maxlen=_WAITING)
 
     def on_event(self, event: Event) -> None:
-        bound = self._bounds.setdefault(event.kind, Bound())
-        if bound.take(event.time):
-            self._queue.append(_Told(event, bound.held_back))
-            bound.held_back = 0
+        if self._limits.setdefault(event.kind, RateLimit(_BURST, _EVERY_S)).allows(event.time):
+            self._queue.append(_Told(event, self._held_back.pop(event.kind, 0)))
+        else:
+            self._held_back[event.kind] += 1
 
     async def send_waiting(self) -> None:
         while self._queue:

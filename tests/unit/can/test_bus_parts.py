@@ -18,7 +18,6 @@ from bridge.can.outbox import Outbox
 from bridge.can.softbeat import SoftBeat
 from bridge.can.wirebits import WireBits, exact_bits
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
-from bridge.ratelimit import RateLimit
 
 ERROR = 0x2000_0000
 
@@ -235,13 +234,3 @@ def test_the_wrong_bit_rate_is_told_with_what_helps() -> None:
     text = explain(WrongBitrate("can0", 500_000, 250_000), "can0")
     assert "can0 runs at 500000 bit/s, the site file says 250000" in text
     assert "ip link set can0 up type can bitrate 250000" in text
-
-
-# limits
-
-
-def test_a_limit_lets_through_a_burst_and_then_a_steady_rate() -> None:
-    limit = RateLimit(3, 0.5)
-    assert [limit.allows(0.0) for _ in range(5)] == [True, True, True, False, False]
-    told = sum(limit.allows(number / 100) for number in range(1, 1001))
-    assert told == 20

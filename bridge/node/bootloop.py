@@ -5,22 +5,23 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
+from bridge.ratelimit import Pauses
+
 _MANY: Final = 4
 _WITHIN_S: Final = 20.0
 _FIRST_PAUSE_S: Final = 2.0
 _LAST_PAUSE_S: Final = 60.0
-_TELL_S: Final = 60.0
 
 
 class BootLoop:
     """Counts the boot-up messages of one node."""
 
-    __slots__ = ("_pause_s", "_since_told", "_times", "_told_at", "count")
+    __slots__ = ("_pause_s", "_pauses", "_since_told", "_times", "count")
 
     def __init__(self) -> None:
         self._times: deque[float] = deque(maxlen=_MANY)
         self._pause_s = 0.0
-        self._told_at = float("-inf")
+        self._pauses = Pauses()
         self._since_told = 0
         self.count = 0
 
@@ -45,9 +46,8 @@ class BootLoop:
 
     def report(self, now: float) -> str | None:
         """What to report, once a minute while it goes on."""
-        if not self.is_looping or now - self._told_at < _TELL_S:
+        if not self.is_looping or self._pauses.take(now) is None:
             return None
-        self._told_at = now
         since, self._since_told = self._since_told, 0
         return (
             f"the node starts again and again: {since} boot-up messages; asked again in {self._pause_s:g} s"

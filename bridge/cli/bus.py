@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import inspect
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Annotated, Protocol, TypeVar
+from typing import Annotated, Any, Protocol, TypeVar
 
 import typer
 
@@ -24,15 +26,43 @@ from bridge.node.sdo_channels import FIRST
 from bridge.project import load_project
 
 BusName = Annotated[str | None, typer.Option("--bus", help="the bus of SITE; not needed where it has one")]
-Interface = Annotated[str | None, typer.Option(help="without SITE: socketcan, or one of python-can's")]
-Channel = Annotated[str | None, typer.Option(help="without SITE: such as can0")]
-Bitrate = Annotated[
-    int | None,
-    typer.Option(min=10_000, max=1_000_000, help="without SITE: bit/s, stated, not set on SocketCAN"),
-]
 AsJson = Annotated[bool, typer.Option("--json", help="machine-readable")]
 
 _SEND_WITHIN_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class BusChoice:
+    """What was said of the bus that a command works on."""
+
+    bus: BusName = None
+    interface: Annotated[str | None, typer.Option(help="without SITE: socketcan, or one of python-can's")] = (
+        None
+    )
+    channel: Annotated[str | None, typer.Option(help="without SITE: such as can0")] = None
+    bitrate: Annotated[
+        int | None,
+        typer.Option(min=10_000, max=1_000_000, help="without SITE: bit/s, stated, not set on SocketCAN"),
+    ] = None
+
+
+def takes_bus(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of ``BusChoice`` in the place of its parameter ``which``."""
+    signature = inspect.signature(command, eval_str=True)
+    options = inspect.signature(BusChoice, eval_str=True).parameters
+    parameters: list[inspect.Parameter] = []
+    for one in signature.parameters.values():
+        parameters += options.values() if one.name == "which" else [one]
+
+    @wraps(command)
+    def with_options(**values: Any) -> None:
+        said = {name: values.pop(name) for name in options}
+        command(which=BusChoice(**said), **values)
+
+    for_typer: Any = with_options
+    for_typer.__signature__ = signature.replace(parameters=parameters)
+    for_typer.__annotations__ = {one.name: one.annotation for one in parameters}
+    return with_options
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,19 +120,18 @@ class Line:
         return node_id
 
 
-def choose_line(
-    site: Path | None, bus: str | None, interface: str | None, channel: str | None, bitrate: int | None
-) -> Line:
+def choose_line(site: Path | None, which: BusChoice) -> Line:
     """The bus that the options name. Raises ``BadParameter`` if they name none or two."""
+    bus = which.bus
     if site is None:
         if bus is not None:
             raise typer.BadParameter("--bus names a bus of SITE, and there is no SITE")
-        if interface is None or channel is None:
+        if which.interface is None or which.channel is None:
             raise typer.BadParameter("which bus? Give SITE, or --interface and --channel")
-        content = {"name": "bus", "interface": interface, "channel": channel}
-        table = BusTable.model_validate(content | ({"bitrate": bitrate} if bitrate else {}))
-        return Line(_not_virtual(table), {}, is_of_site=False, states_bitrate=bitrate is not None)
-    if interface is not None or channel is not None or bitrate is not None:
+        content = {"name": "bus", "interface": which.interface, "channel": which.channel}
+        table = BusTable.model_validate(content | ({"bitrate": which.bitrate} if which.bitrate else {}))
+        return Line(_not_virtual(table), {}, is_of_site=False, states_bitrate=which.bitrate is not None)
+    if which != BusChoice(bus):
         raise typer.BadParameter("SITE says interface, channel and bit rate: leave the options out")
     project = load_project(site)
     tables = {table.name: table for table in project.site.bus}

@@ -12,18 +12,7 @@ import typer
 
 from bridge.canopen.lss import BIT_RATES, NO_NODE_ID, Identity, LssError, Service
 from bridge.canopen.lss_scan import Scanned, find_all
-from bridge.cli.bus import (
-    AsJson,
-    Bitrate,
-    BusName,
-    Channel,
-    Interface,
-    Line,
-    carry_out,
-    choose_line,
-    print_table,
-    tell,
-)
+from bridge.cli.bus import AsJson, BusChoice, Line, carry_out, choose_line, print_table, takes_bus, tell
 from bridge.cli.terminal import progress
 from bridge.errands import lss as lss_errand
 from bridge.errands.lss import LssErrand
@@ -47,22 +36,20 @@ Keep = Annotated[bool, typer.Option("--store", help="store it in the device, too
 
 
 @app.command()
+@takes_bus
 def scan(
+    which: BusChoice,
     site: Site = None,
     known: Annotated[
         str | None, typer.Option(help="as for --identity, 0 where unknown: these numbers are not searched")
     ] = None,
-    bus: BusName = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
     timeout_ms: Annotated[
         int, typer.Option(min=5, max=10_000, help="wait so long at least for each answer")
     ] = 100,
     as_json: AsJson = False,
 ) -> None:
     """Find every device that has no node id (fastscan). 14 seconds for each, longer for slow ones."""
-    line = choose_line(site, bus, interface, channel, bitrate)
+    line = choose_line(site, which)
     scanned = Scanned()
     try:
         _run(line, find_all(parse_identity(known) if known else None, scanned), timeout_ms)
@@ -86,19 +73,17 @@ def _print_scanned(scanned: Scanned, *, as_json: bool) -> None:
 
 
 @app.command()
+@takes_bus
 def inquire(
+    which: BusChoice,
     site: Site = None,
     identity: Which = None,
     only: Only = False,
-    bus: BusName = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
     timeout_ms: Timeout = 500,
     as_json: AsJson = False,
 ) -> None:
     """Ask a device for its identity and node id."""
-    line = choose_line(site, bus, interface, channel, bitrate)
+    line = choose_line(site, which)
     found, node_id = _run(line, lss_errand.inquire(_which(identity, only)), timeout_ms)
     if as_json:
         print(json.dumps({"node_id": None if node_id == NO_NODE_ID else node_id} | found._asdict()))
@@ -107,30 +92,30 @@ def inquire(
 
 
 @app.command("set-id")
+@takes_bus
 def set_id(
     node_id: Annotated[int, typer.Option("--id", min=1, max=255, help="1…127; 255 takes it away")],
+    which: BusChoice,
     site: Site = None,
     identity: Which = None,
     only: Only = False,
     keep: Keep = False,
-    bus: BusName = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
     timeout_ms: Timeout = 500,
     as_json: AsJson = False,
 ) -> None:
     """Give a device a node id. One that has another already takes it with its next reset."""
     if 127 < node_id < NO_NODE_ID:
         raise typer.BadParameter(f"{node_id} is no node id: 1…127, or 255 for none")
-    line = choose_line(site, bus, interface, channel, bitrate)
+    line = choose_line(site, which)
     _run(line, lss_errand.set_node_id(_which(identity, only), node_id, keep=keep), timeout_ms)
     _report({"ok": True, "node_id": node_id, "stored": keep}, f"node id {node_id}", keep, as_json)
 
 
 @app.command("set-bitrate")
+@takes_bus
 def set_bitrate(
     new: Annotated[str, typer.Option(help="bit/s, or auto")],
+    which: BusChoice,
     site: Site = None,
     identity: Which = None,
     only: Only = False,
@@ -138,10 +123,6 @@ def set_bitrate(
     activate_ms: Annotated[
         int | None, typer.Option(min=1, max=65_535, help="switch now, with this silence before and after")
     ] = None,
-    bus: BusName = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
     timeout_ms: Timeout = 500,
     as_json: AsJson = False,
 ) -> None:
@@ -150,7 +131,7 @@ def set_bitrate(
     rate = None if new == "auto" else int(new) if new.isdecimal() else 0
     if rate is not None and rate not in rates:
         raise typer.BadParameter(f"{new!r} is no bit rate of LSS: {', '.join(map(str, rates))} or auto")
-    line = choose_line(site, bus, interface, channel, bitrate)
+    line = choose_line(site, which)
     service = lss_errand.set_bit_rate(_which(identity, only), rate, keep=keep, activate_ms=activate_ms)
     _run(line, service, timeout_ms)
     facts = {"ok": True, "bitrate": rate, "stored": keep, "active": activate_ms is not None}
@@ -158,19 +139,17 @@ def set_bitrate(
 
 
 @app.command()
+@takes_bus
 def store(
+    which: BusChoice,
     site: Site = None,
     identity: Which = None,
     only: Only = False,
-    bus: BusName = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
     timeout_ms: Timeout = 2000,
     as_json: AsJson = False,
 ) -> None:
     """Make a device store its node id and bit rate."""
-    line = choose_line(site, bus, interface, channel, bitrate)
+    line = choose_line(site, which)
     _run(line, lss_errand.keep_settings(_which(identity, only)), timeout_ms)
     _report({"ok": True, "stored": True}, "node id and bit rate", True, as_json)
 

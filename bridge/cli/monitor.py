@@ -13,17 +13,7 @@ import typer
 
 from bridge import clock
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
-from bridge.cli.bus import (
-    AsJson,
-    Bitrate,
-    BusName,
-    Channel,
-    Interface,
-    carry_out,
-    choose_line,
-    print_table,
-    tell,
-)
+from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_line, print_table, takes_bus, tell
 from bridge.cli.terminal import printable
 from bridge.errands.decode import Decoder, Kind, Meaning
 from bridge.errands.statistics import Statistics
@@ -75,12 +65,10 @@ class _Listener:
         return []
 
 
+@takes_bus
 def monitor(
+    which: BusChoice,
     site: Annotated[Path | None, typer.Argument(metavar="[SITE]", help="the site file")] = None,
-    bus: BusName = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
     node: Annotated[list[str] | None, typer.Option(help="only this node; may be repeated")] = None,
     kind: Annotated[list[Kind] | None, typer.Option(help="only this kind; may be repeated")] = None,
     count: Annotated[int | None, typer.Option(min=1, help="end after so many frames")] = None,
@@ -90,7 +78,7 @@ def monitor(
     as_json: AsJson = False,
 ) -> None:
     """Decode the frames on a bus until Ctrl-C, --count or --seconds."""
-    line = choose_line(site, bus, interface, channel, bitrate)
+    line = choose_line(site, which)
     ids = {line.node_id(text) for text in node or []}
     kinds = set(kind or [])
     decoder = Decoder(line.table.node, line.families, line.own_id)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from bridge.canopen.nmt import NmtCommand
-from bridge.cli.bus import AsJson, Bitrate, BusName, Channel, Interface, carry_out, choose_line, split_site
+from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_line, split_site, takes_bus
 from bridge.cli.terminal import progress
 from bridge.errands.single import NmtErrand
 from bridge.errors import OperationFailed
@@ -34,12 +34,10 @@ _COMMANDS = {
 }
 
 
+@takes_bus
 def nmt(
     what: Annotated[list[str], typer.Argument(metavar="[SITE] COMMAND NODE|all")],
-    bus: BusName = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
+    which: BusChoice,
     seconds: Annotated[
         float, typer.Option(min=0.05, max=60, help="wait so long for the nodes' states")
     ] = 2.0,
@@ -54,7 +52,7 @@ def nmt(
         command = _COMMANDS[CommandName(name)]
     except ValueError:
         raise typer.BadParameter(f"{name!r} is none of {', '.join(CommandName)}") from None
-    line = choose_line(site, bus, interface, channel, bitrate)
+    line = choose_line(site, which)
     node_id = 0 if node == "all" else line.node_id(node)
     with progress(f"{name}: waiting up to {seconds:g} s") as show:
 

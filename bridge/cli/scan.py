@@ -10,18 +10,7 @@ from typing import Annotated
 
 import typer
 
-from bridge.cli.bus import (
-    AsJson,
-    Bitrate,
-    BusName,
-    Channel,
-    Interface,
-    Line,
-    carry_out,
-    choose_line,
-    print_table,
-    tell,
-)
+from bridge.cli.bus import AsJson, BusChoice, Line, carry_out, choose_line, print_table, takes_bus, tell
 from bridge.cli.terminal import progress
 from bridge.errands.scan import FoundNode, Scanner
 from bridge.mapping import Family, family_names, load_family
@@ -32,12 +21,10 @@ _ACTIVE_S = 0.5
 _COLUMNS = ("id", "name", "NMT state", "type", "vendor", "product", "revision", "serial", "mapping", "site")
 
 
+@takes_bus
 def scan(
+    which: BusChoice,
     site: Annotated[Path | None, typer.Argument(metavar="[SITE]", help="the site file")] = None,
-    bus: BusName = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
     passive: Annotated[bool, typer.Option("--passive", help="send nothing, only listen")] = False,
     seconds: Annotated[
         float | None, typer.Option(min=0.1, help="listen at least so long; 0.5, with --passive 3")
@@ -46,7 +33,7 @@ def scan(
     as_json: AsJson = False,
 ) -> None:
     """List the nodes of a bus: by heartbeat, guarding and SDO."""
-    line = choose_line(site, bus, interface, channel, bitrate)
+    line = choose_line(site, which)
     listen_s = seconds or (_PASSIVE_S if passive else _ACTIVE_S)
     scanner = _run(line, passive=passive, listen_s=listen_s, timeout_s=timeout_ms / 1000)
     families = {name: load_family(name) for name in family_names()}

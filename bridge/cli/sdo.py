@@ -14,17 +14,7 @@ from bridge.canopen import datatypes
 from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, Plain, TypeName
 from bridge.canopen.decode_sdo import shown
 from bridge.canopen.sdo import SdoError
-from bridge.cli.bus import (
-    AsJson,
-    Bitrate,
-    BusName,
-    Channel,
-    Interface,
-    Line,
-    carry_out,
-    choose_line,
-    split_site,
-)
+from bridge.cli.bus import AsJson, BusChoice, Line, carry_out, choose_line, split_site, takes_bus
 from bridge.cli.terminal import printable, progress
 from bridge.errands.single import SdoErrand
 from bridge.errors import OperationFailed
@@ -53,13 +43,11 @@ Server = Annotated[
 
 
 @app.command()
+@takes_bus
 def read(
     what: Annotated[list[str], typer.Argument(metavar="[SITE] NODE INDEX[:SUB]")],
+    which: BusChoice,
     kind: Annotated[ValueType | None, typer.Option("--type", help="how to take the bytes")] = None,
-    bus: BusName = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
     timeout_ms: Timeout = None,
     retries: Retries = None,
     sdo_channel: Server = 1,
@@ -67,7 +55,7 @@ def read(
 ) -> None:
     """Read an object. INDEX and SUB are hexadecimal; SUB is 0 where it is left out."""
     site, (node, name) = split_site(what, 2, _READ_USAGE)
-    line = choose_line(site, bus, interface, channel, bitrate)
+    line = choose_line(site, which)
     index, sub = parse_object(name)
     way = _way(line, line.node_id(node), sdo_channel, timeout_ms, retries)
     data = _transfer(line, way, index, sub, None, as_json=as_json)
@@ -83,17 +71,15 @@ def read(
 
 
 @app.command(context_settings={"ignore_unknown_options": True})
+@takes_bus
 def write(
     what: Annotated[list[str], typer.Argument(metavar="[SITE] NODE INDEX[:SUB] VALUE")],
     kind: Annotated[ValueType, typer.Option("--type", help="how to send the value")],
+    which: BusChoice,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="do not ask")] = False,
     force: Annotated[
         bool, typer.Option("--force", help="also what commands, supervises or addresses the drive")
     ] = False,
-    bus: BusName = None,
-    interface: Interface = None,
-    channel: Channel = None,
-    bitrate: Bitrate = None,
     timeout_ms: Timeout = None,
     retries: Retries = None,
     sdo_channel: Server = 1,
@@ -101,7 +87,7 @@ def write(
 ) -> None:
     """Write an object. On a terminal it asks first: a drive may move, and many keep it in EEPROM."""
     site, (node, name, text) = split_site(what, 3, _WRITE_USAGE)
-    line = choose_line(site, bus, interface, channel, bitrate)
+    line = choose_line(site, which)
     index, sub = parse_object(name)
     node_id = line.node_id(node)
     try:

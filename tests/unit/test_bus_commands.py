@@ -16,7 +16,7 @@ from bridge.canopen.datatypes import encode as as_site_file
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.cli.app import make_app
-from bridge.cli.bus import choose_line, split_site
+from bridge.cli.bus import BusChoice, choose_line, split_site
 from bridge.cli.sdo import ValueType, decode, encode, parse_object, why_forced
 from bridge.errands.single import NmtErrand, SdoErrand
 from bridge.image import DataType
@@ -50,7 +50,7 @@ def site(tmp_path: Path) -> Path:
 
 
 def test_a_bus_is_named_by_its_options() -> None:
-    line = choose_line(None, None, "socketcan", "can0", 500_000)
+    line = choose_line(None, BusChoice(None, "socketcan", "can0", 500_000))
     assert (line.table.channel, line.table.bitrate, line.is_of_site) == ("can0", 500_000, False)
 
 
@@ -65,8 +65,8 @@ def test_what_supervises_a_drive_takes_force_on_the_command_line(site: Path, nam
 
 def test_a_site_with_two_buses_needs_the_name_of_one(site: Path) -> None:
     with pytest.raises(typer.BadParameter, match="one of north, south"):
-        choose_line(site, None, None, None, None)
-    line = choose_line(site, "north", None, None, None)
+        choose_line(site, BusChoice())
+    line = choose_line(site, BusChoice("north"))
     assert line.node_id("conveyor") == 5
     assert line.node_id("0x11") == 17
     with pytest.raises(typer.BadParameter, match="conveyor"):
@@ -79,12 +79,12 @@ def test_a_site_with_two_buses_needs_the_name_of_one(site: Path) -> None:
 )
 def test_half_a_bus_is_bad_usage(bus: str | None, interface: str | None, channel: str | None) -> None:
     with pytest.raises(typer.BadParameter):
-        choose_line(None, bus, interface, channel, None)
+        choose_line(None, BusChoice(bus, interface, channel))
 
 
 def test_a_site_and_an_interface_are_two_buses(site: Path) -> None:
     with pytest.raises(typer.BadParameter, match="leave the options out"):
-        choose_line(site, "north", "socketcan", "can0", None)
+        choose_line(site, BusChoice("north", "socketcan", "can0"))
 
 
 def test_the_site_may_stand_first() -> None:
@@ -206,14 +206,14 @@ def test_a_silent_node_is_waited_for_and_then_not() -> None:
 def test_a_nodes_own_time_and_retries_are_taken_from_the_site(site: Path) -> None:
     text = site.read_text("utf-8").replace("id = 5", "id = 5\nsdo_timeout_ms = 700\nsdo_retries = 3")
     site.write_text(text, "utf-8")
-    line = choose_line(site, "north", None, None, None)
+    line = choose_line(site, BusChoice("north"))
     assert line.sdo_policy(5) == (0.7, 3)
     assert line.sdo_policy(6) == (0.5, 0), "a node that the site does not have"
 
 
 def test_a_further_sdo_channel_has_the_cob_ids_of_the_mapping(site: Path) -> None:
     """BU 2500 §6.4: SDO3 is 440h and 3C0h + node id."""
-    line = choose_line(site, "north", None, None, None)
+    line = choose_line(site, BusChoice("north"))
     assert line.sdo_server(5, 1) is None
     server = line.sdo_server(5, 3)
     assert server is not None
@@ -224,7 +224,7 @@ def test_a_further_sdo_channel_has_the_cob_ids_of_the_mapping(site: Path) -> Non
     with pytest.raises(typer.BadParameter, match="no SDO channel 9: 1, 2, 3, 4"):
         line.sdo_server(5, 9)
     with pytest.raises(typer.BadParameter, match="give SITE"):
-        choose_line(None, None, "socketcan", "can0", None).sdo_server(5, 2)
+        choose_line(None, BusChoice(None, "socketcan", "can0")).sdo_server(5, 2)
 
 
 def test_an_sdo_errand_asks_again_as_often_as_it_was_told() -> None:
@@ -269,6 +269,6 @@ def test_what_is_protected_is_written_with_force_only(site: Path, address: str, 
 
 
 def test_anything_else_is_written_without(site: Path) -> None:
-    line = choose_line(site, "north", None, None, None)
+    line = choose_line(site, BusChoice("north"))
     assert not why_forced(line, 5, Address(0x2066, 1))
     assert not why_forced(line, 6, Address(0x1017, 0)), "no node of the site"

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
-from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
+from bridge.canopen.frame import Frame
 from bridge.sim.canopen_slave import CanopenSlave
 from bridge.sim.cia402_axis import Cia402Axis
 from bridge.sim.cia402_objects import Cia402Objects
@@ -13,6 +12,7 @@ from bridge.sim.cia402_settings import RULES, Cia402Settings, factory_communicat
 from bridge.sim.cia402_states import State
 from bridge.sim.cia402_supervision import HeartbeatConsumer
 from bridge.sim.communication_objects import Memory
+from bridge.sim.device import SimulatedDevice
 from bridge.sim.dictionary import Dictionary
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.nmt_slave import NmtCommand, NmtState
@@ -26,18 +26,11 @@ _REGISTERS: Final = {0x2: 0x03, 0x3: 0x05, 0x4: 0x09, 0x8: 0x21}
 """1001h by the first digit of the error code; bit 4, communication, for 81xxh and 82xxh."""
 
 
-class Cia402Drive:
-    """The node as the CAN bus sees it. Times are seconds of the caller's monotonic clock.
-
-    What is injected (``fail`` and its like) happens at the next ``on_time`` or ``on_frame``;
-    ``next_deadline`` says at once that there is something to do.
-    """
+class Cia402Drive(SimulatedDevice):
+    """``fail`` and its like happen at the next ``on_time`` or ``on_frame``."""
 
     def __init__(self, node_id: int, settings: Cia402Settings | None = None) -> None:
-        self.node_id = node_id
-        self.powered = False
-        self._now = 0.0
-        self._injected: list[Callable[[], None]] = []
+        super().__init__(node_id)
         self._settings = Store(Cia402Settings)
         if settings is not None:
             self._settings.current = settings
@@ -65,53 +58,6 @@ class Cia402Drive:
         """Who commissions the drive saves its parameters."""
         self._settings.save()
 
-    # The core: frames and time in, frames out.
-
-    def start(self, now: float) -> None:
-        """Power on."""
-        self._now = now
-        self._communication.power_on()
-        self._restart()
-        self.powered = True
-        self.slave.boot()
-        self.heard = self._hears()
-
-    def on_frame(self, frame: Frame, now: float) -> None:
-        cob_id = frame.can_id & STANDARD_MASK
-        if not self.powered or cob_id not in self.heard or frame.can_id & (EXTENDED | ERROR):
-            return
-        self._advance(now)
-        if not self.powered:
-            return
-        if self._consumer.node and cob_id == _HEARTBEAT + self._consumer.node and not frame.can_id & REMOTE:
-            if self._consumer.on_heartbeat(frame.data, self._now):
-                self._master_is_back()
-        else:
-            self.slave.on_frame(frame, self._now)
-            self.axis.obey()  # a control word that came by SDO
-        self.slave.poll(self._now)
-        self.heard = self._hears()
-
-    def on_time(self, now: float) -> None:
-        self._advance(now)
-        if self.powered:
-            self.slave.poll(self._now)
-
-    def next_deadline(self) -> float | None:
-        if self._injected:
-            return self._now
-        if not self.powered:
-            return None
-        deadlines = (
-            self.slave.next_deadline(),
-            self.axis.next_deadline(),
-            self._consumer.next_deadline(),
-        )
-        return min((deadline for deadline in deadlines if deadline is not None), default=None)
-
-    def take_frames(self) -> list[Frame]:
-        return self.slave.take_frames()
-
     # What a test or a demonstration does to the node.
 
     def fail(self, code: int, *, lasting: bool = False) -> None:
@@ -123,25 +69,6 @@ class Cia402Drive:
     def mend(self) -> None:
         """The cause is gone."""
         self._injected.append(self.axis.automaton.cause_gone)
-
-    def silence(self) -> None:
-        """The node sends nothing more; it goes on receiving and working."""
-        self.slave.silent = True
-
-    def speak(self) -> None:
-        self.slave.silent = False
-
-    def power_off(self) -> None:
-        def off() -> None:
-            self.powered = False
-            self.slave.power_off()
-
-        self._injected.append(off)
-
-    def power_cycle(self) -> None:
-        """Off and on again: unsaved settings are lost, the boot-up message comes."""
-        self.power_off()
-        self._injected.append(lambda: self.start(self._now))
 
     # The application of the CANopen slave.
 
@@ -158,10 +85,6 @@ class Cia402Drive:
         if self.axis.state is State.ENABLED:
             self.axis.abort_connection(_MASTER_LOST)
 
-    def accepts_rpdo(self, number: int, length: int) -> bool:
-        del number, length  # of one that is too long the mapped bytes count
-        return True
-
     def rpdo_applied(self, number: int) -> None:
         del number
         self.axis.obey()
@@ -173,6 +96,26 @@ class Cia402Drive:
         self._master_is_back()
 
     # How it works inside.
+
+    def _switch_on(self) -> None:
+        self._communication.power_on()
+        self._restart()
+
+    def _pass_time(self) -> None:
+        self.axis.advance(self._now)
+        if self._consumer.expired(self._now):
+            self._abort_connection()
+
+    def _receive(self, frame: Frame) -> None:
+        is_heartbeat = self._consumer.node and frame.can_id == _HEARTBEAT + self._consumer.node
+        if not is_heartbeat:
+            self.slave.on_frame(frame, self._now)
+            self.axis.obey()  # a control word that came by SDO
+        elif self._consumer.on_heartbeat(frame.data, self._now):
+            self._master_is_back()
+
+    def _deadlines(self) -> tuple[float | None, ...]:
+        return self.axis.next_deadline(), self._consumer.next_deadline()
 
     def _hears(self) -> frozenset[int]:
         watched = {_HEARTBEAT + self._consumer.node} if self._consumer.node else set[int]()
@@ -208,16 +151,6 @@ class Cia402Drive:
         """Where it was no fault there is nothing to be reset: the error has gone."""
         if self.axis.state not in (State.FAULT, State.FAULT_REACTION):
             self._emcy.report(0, 0)
-
-    def _advance(self, now: float) -> None:
-        self._now = max(self._now, now)  # stamps of frames may lie before the last timer
-        if self.powered:
-            self.axis.advance(self._now)
-            if self._consumer.expired(self._now):
-                self._abort_connection()
-        injected, self._injected = self._injected, []
-        for action in injected:
-            action()
 
 
 def _register(code: int) -> int:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
-from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
+from bridge.canopen.frame import REMOTE, STANDARD_MASK, Frame
 from bridge.sim.canopen_slave import CanopenSlave
+from bridge.sim.device import SimulatedDevice
 from bridge.sim.dictionary import DataType, Dictionary, Number
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.lenze_codes import BusDisplay, CodeParts, add_codes
@@ -23,16 +23,14 @@ from bridge.sim.store import Store
 _HEARTBEAT: Final = 0x700
 
 
-class LenzeMotec:
-    """The node as the CAN bus sees it. Times are seconds of the caller's monotonic clock.
-
-    ``words`` are those of PDO1 and PDO2, one to four. What is injected (``fail`` and its like) happens at
-    the next ``on_time`` or ``on_frame``; ``next_deadline`` says at once that there is something to do.
-    """
+class LenzeMotec(SimulatedDevice):
+    """``words`` are those of PDO1 and PDO2, one to four. ``fail`` and its like happen at the next ``on_time``
+    or ``on_frame``."""
 
     def __init__(
         self, node_id: int, *, words: tuple[int, int] = (4, 4), codes: LenzeCodes | None = None
     ) -> None:
+        super().__init__(node_id)
         self._codes = Store(lambda: LenzeCodes(node_id))
         if codes is not None:
             self._codes.current = codes
@@ -40,10 +38,7 @@ class LenzeMotec:
         self._stack = Store(lambda: communication(self._codes.current, words))
         self.drive = LenzeDrive(lambda: self._codes.current)
         self.display = BusDisplay()
-        self.powered = False
         self._words = [0] * PDOS * PORT_WORDS
-        self._now = 0.0
-        self._injected: list[Callable[[], None]] = []
         self._own: list[Frame] = []
         emcy = EmcyProducer(self._stack, RULES)
         self._watch = BusWatch(lambda: self.codes, self.drive, emcy)
@@ -57,10 +52,6 @@ class LenzeMotec:
         self.heard = self._hears()
 
     @property
-    def node_id(self) -> int:
-        return self.slave.node_id
-
-    @property
     def codes(self) -> LenzeCodes:
         """The codes as they are now."""
         return self._codes.current
@@ -68,48 +59,6 @@ class LenzeMotec:
     def save(self) -> None:
         """What C00002/11 does, and who commissions it: the codes outlast the mains."""
         self._codes.save()
-
-    # The core: frames and time in, frames out.
-
-    def start(self, now: float) -> None:
-        """Power on."""
-        self._now = now
-        self._codes.power_on()
-        self._stack.power_on()
-        self.slave.node_id = self.codes.node_id
-        self.drive.power_on(now)
-        self.display.reset()
-        self._reset_communication()
-        self.powered = True
-        self.slave.boot()
-        self.heard = self._hears()
-
-    def on_frame(self, frame: Frame, now: float) -> None:
-        cob_id = frame.can_id & STANDARD_MASK
-        if not self.powered or cob_id not in self.heard or frame.can_id & (EXTENDED | ERROR):
-            return
-        self._advance(now)
-        if frame.can_id & REMOTE:
-            self._on_remote(cob_id)
-        else:
-            self._on_data(cob_id, frame)
-        if self.powered:
-            self._finish()
-        self.heard = self._hears()
-
-    def on_time(self, now: float) -> None:
-        self._advance(now)
-        if self.powered:
-            self._finish()
-
-    def next_deadline(self) -> float | None:
-        if self._injected:
-            return self._now
-        if not self.powered:
-            return None
-        deadlines = [self.slave.next_deadline(), self.drive.next_deadline(), self._watch.next_deadline()]
-        deadlines += [self._sync.next_deadline(), self._master.next_deadline()]
-        return min((deadline for deadline in deadlines if deadline is not None), default=None)
 
     def take_frames(self) -> list[Frame]:
         frames = self.slave.take_frames()
@@ -145,27 +94,6 @@ class LenzeMotec:
         """The supply from the drive unit: EMCY 3100h while it is not there (§10.4)."""
         self._injected.append(lambda: self._watch.supply(there=there))
 
-    def silence(self) -> None:
-        """The node sends nothing more; it goes on receiving and working."""
-        self.slave.silent = True
-
-    def speak(self) -> None:
-        self.slave.silent = False
-
-    def power_off(self) -> None:
-        """Mains off."""
-
-        def off() -> None:
-            self.powered = False
-            self.slave.power_off()
-
-        self._injected.append(off)
-
-    def power_cycle(self) -> None:
-        """Off and on again: what was not saved is lost, the boot-up message comes."""
-        self.power_off()
-        self._injected.append(lambda: self.start(self._now))
-
     # The application of the CANopen slave.
 
     def nmt_changed(self, state: NmtState) -> None:
@@ -175,14 +103,10 @@ class LenzeMotec:
         # Both resets initialise all that concerns CAN (§7.2.1); codes that were not saved stay until the
         # mains are switched off (§7.1.2). The words from the bus begin anew, so the drive is not enabled.
         del command
-        self.slave.node_id = self.codes.node_id
+        self.node_id = self.slave.node_id = self.codes.node_id
         self._words = [0] * len(self._words)
         self.drive.on_words(self._words)
         self._reset_communication()
-
-    def accepts_rpdo(self, number: int, length: int) -> bool:
-        del number, length  # too short ones do not come here; of a longer one the first bytes count
-        return True
 
     def rpdo_applied(self, number: int) -> None:
         self._watch.on_rpdo(number, self._now)
@@ -195,6 +119,23 @@ class LenzeMotec:
         """Never."""
 
     # How it works inside.
+
+    def _switch_on(self) -> None:
+        self._codes.power_on()
+        self._stack.power_on()
+        self.node_id = self.slave.node_id = self.codes.node_id
+        self.drive.power_on(self._now)
+        self.display.reset()
+        self._reset_communication()
+
+    def _pass_time(self) -> None:
+        self.drive.advance(self._now)
+        if self._watch.expire(self._now) and self.slave.state is NmtState.OPERATIONAL:
+            self._command_self(NmtCommand.ENTER_PRE_OPERATIONAL)
+
+    def _deadlines(self) -> tuple[float | None, ...]:
+        parts = (self.drive, self._watch, self._sync, self._master)
+        return tuple(part.next_deadline() for part in parts)
 
     def _ports(self) -> Dictionary:
         """CAN1_IN … CAN2_OUT: what the static mapping carries."""
@@ -239,6 +180,13 @@ class LenzeMotec:
         self._sync.reset()
         self._master.start(self._now)
 
+    def _receive(self, frame: Frame) -> None:
+        cob_id = frame.can_id & STANDARD_MASK
+        if frame.can_id & REMOTE:
+            self._on_remote(cob_id)
+        else:
+            self._on_data(cob_id, frame)
+
     def _on_remote(self, cob_id: int) -> None:
         """A TPDO may be asked for (§8.4). A guard request gets no answer."""
         for pdo in self._stack.current.tpdo:
@@ -255,16 +203,6 @@ class LenzeMotec:
                 if pdo.enabled and cob_id == pdo.cob_id:
                     self._watch.check_length(len(frame.data), pdo.mapped_bits // 8)
         self.slave.on_frame(frame, self._now)
-
-    def _advance(self, now: float) -> None:
-        self._now = max(self._now, now)  # stamps of frames may lie before the last timer
-        if self.powered:
-            self.drive.advance(self._now)
-            if self._watch.expire(self._now) and self.slave.state is NmtState.OPERATIONAL:
-                self._command_self(NmtCommand.ENTER_PRE_OPERATIONAL)
-        injected, self._injected = self._injected, []
-        for action in injected:
-            action()
 
     def _command_self(self, command: NmtCommand) -> None:
         self.slave.on_frame(Frame(0, bytes([command, self.slave.node_id])), self._now)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from bridge.canopen.frame import STANDARD_MASK, Frame
+from bridge.canopen.frame import Frame
+from bridge.sim.device import SimulatedDevice
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.nmt_slave import NmtCommand, NmtState
 from bridge.sim.sdo_server import SdoServer
@@ -22,12 +22,10 @@ from bridge.sim.stoeber_slave import StoeberSlave, SyncWatch
 from bridge.sim.store import Store
 
 
-class Stoeber5000:
-    """The node as the CAN bus sees it. Times are seconds of the caller's monotonic clock.
-
-    ``axes`` is 1, with A180 and D230 in PDO channel 1, or up to 4, with Q00 and Q01 of axis n in channel n.
-    ``mapped`` says that an application was downloaded; a drive as delivered maps nothing. What is injected
-    (``fail`` and its like) happens at the next ``on_time`` or ``on_frame``.
+class Stoeber5000(SimulatedDevice):
+    """``axes`` is 1, with A180 and D230 in PDO channel 1, or up to 4, with Q00 and Q01 of axis n in channel
+    n. ``mapped`` says that an application was downloaded; a drive as delivered maps nothing. ``fail`` and
+    its like happen at the next ``on_time`` or ``on_frame``.
     """
 
     def __init__(
@@ -42,10 +40,7 @@ class Stoeber5000:
     ) -> None:
         if not 1 <= axes <= CHANNELS:
             raise ValueError(f"axes = {axes}: a POSISwitch has 1 … {CHANNELS}")
-        self.node_id = node_id
-        self.powered = False
-        self._now = 0.0
-        self._injected: list[Callable[[], None]] = []
+        super().__init__(node_id)
         self._communication = Store(lambda: factory_communication(node_id, axes, mapped=mapped))
         self._settings = Store(lambda: factory_settings(axes))
         self._emcy = EmcyProducer(self._communication, RULES)
@@ -56,41 +51,6 @@ class Stoeber5000:
     @property
     def axes(self) -> tuple[StoeberAxis, ...]:
         return self.device.axes
-
-    # The core: frames and time in, frames out.
-
-    def start(self, now: float) -> None:
-        """Power on."""
-        self._now = now
-        self._communication.power_on()
-        self._restart()
-        self.powered = True
-        self.slave.boot()
-        self.heard = self.slave.hears()
-
-    def on_frame(self, frame: Frame, now: float) -> None:
-        if not self.powered or frame.can_id & STANDARD_MASK not in self.heard:
-            return
-        self._advance(now)
-        self.slave.on_frame(frame, self._now)
-        self.device.settle()
-        self._poll()
-        self.heard = self.slave.hears()
-
-    def on_time(self, now: float) -> None:
-        self._advance(now)
-        self._poll()
-
-    def next_deadline(self) -> float | None:
-        if self._injected:
-            return self._now
-        if not self.powered:
-            return None
-        deadlines = (self.slave.next_deadline(), self.device.next_deadline())
-        return min((deadline for deadline in deadlines if deadline is not None), default=None)
-
-    def take_frames(self) -> list[Frame]:
-        return self.slave.take_frames()
 
     # What a test or a demonstration does to the node.
 
@@ -111,25 +71,6 @@ class Stoeber5000:
     def cause_gone(self) -> None:
         self.device.cause_lasts = False
 
-    def silence(self) -> None:
-        """The node sends nothing more; it goes on receiving and working."""
-        self.slave.silent = True
-
-    def speak(self) -> None:
-        self.slave.silent = False
-
-    def power_off(self) -> None:
-        def off() -> None:
-            self.powered = False
-            self.slave.power_off()
-
-        self._injected.append(off)
-
-    def power_cycle(self) -> None:
-        """Off and on again: unsaved settings are lost, the boot-up message comes."""
-        self.power_off()
-        self._injected.append(lambda: self.start(self._now))
-
     # The application of the CANopen slave.
 
     def nmt_changed(self, state: NmtState) -> None:
@@ -140,13 +81,6 @@ class Stoeber5000:
         if command is NmtCommand.RESET_NODE:
             self._restart()
 
-    def accepts_rpdo(self, number: int, length: int) -> bool:
-        del number, length  # §8.1.1: any length is taken as far as it goes
-        return True
-
-    def rpdo_applied(self, number: int) -> None:
-        del number  # the objects have acted when they were written
-
     def master_lost(self) -> None:
         self.device.trip(COMMUNICATION, LIFE_GUARDING)
 
@@ -154,6 +88,20 @@ class Stoeber5000:
         """The event stays until it is acknowledged."""
 
     # How it works inside.
+
+    def _switch_on(self) -> None:
+        self._communication.power_on()
+        self._restart()
+
+    def _pass_time(self) -> None:
+        self.device.advance(self._now)
+
+    def _receive(self, frame: Frame) -> None:
+        self.slave.on_frame(frame, self._now)
+        self.device.settle()
+
+    def _deadlines(self) -> tuple[float | None, ...]:
+        return (self.device.next_deadline(),)
 
     def _build(self, rated_power_kw: float, name: str, bit_31_opens_sdo: bool) -> StoeberSlave:
         dictionary = WideDictionary()
@@ -197,15 +145,3 @@ class Stoeber5000:
         self._settings.power_on()
         self._emcy.error_register = 0
         self.device.power_on(self._now)
-
-    def _advance(self, now: float) -> None:
-        self._now = max(self._now, now)  # stamps of frames may lie before the last timer
-        if self.powered:
-            self.device.advance(self._now)
-        injected, self._injected = self._injected, []
-        for action in injected:
-            action()
-
-    def _poll(self) -> None:
-        if self.powered:
-            self.slave.poll(self._now)

@@ -1,0 +1,143 @@
+"""What every simulated drive does with frames, time and power, whatever it simulates."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+
+from bridge.canopen.frame import ERROR, EXTENDED, STANDARD_MASK, Frame
+from bridge.sim.canopen_slave import CanopenSlave
+from bridge.sim.nmt_slave import NmtCommand, NmtState
+
+
+class SimulatedDevice(ABC):
+    """The node as the CAN bus sees it, and the application of its CANopen slave. Times are seconds of the
+    caller's monotonic clock.
+
+    What is injected happens at the next ``on_time`` or ``on_frame``; ``next_deadline`` says at once that
+    there is something to do.
+    """
+
+    slave: CanopenSlave
+
+    def __init__(self, node_id: int) -> None:
+        self.node_id = node_id
+        self.powered = False
+        self.heard: frozenset[int] = frozenset()
+        self._now = 0.0
+        self._injected: list[Callable[[], None]] = []
+
+    # What a device is.
+
+    @abstractmethod
+    def _switch_on(self) -> None:
+        """Settings and process data are those of power-on."""
+
+    @abstractmethod
+    def _pass_time(self) -> None:
+        """Bring the drives to the present time."""
+
+    @abstractmethod
+    def _receive(self, frame: Frame) -> None:
+        """A frame that the node hears."""
+
+    @abstractmethod
+    def _deadlines(self) -> Iterable[float | None]:
+        """When something is due beside what the slave has to do."""
+
+    def _finish(self) -> None:
+        """Send what has become due."""
+        self.slave.poll(self._now)
+
+    def _hears(self) -> frozenset[int]:
+        return self.slave.hears()
+
+    # The application of the CANopen slave.
+
+    @abstractmethod
+    def nmt_changed(self, state: NmtState) -> None: ...
+
+    @abstractmethod
+    def restarted(self, command: NmtCommand) -> None: ...
+
+    def accepts_rpdo(self, number: int, length: int) -> bool:
+        """Too short ones do not come here; of a longer one the mapped bytes count."""
+        del number, length
+        return True
+
+    def rpdo_applied(self, number: int) -> None:
+        """Nothing to do: the objects have acted when they were written."""
+        del number
+
+    @abstractmethod
+    def master_lost(self) -> None: ...
+
+    @abstractmethod
+    def master_back(self) -> None: ...
+
+    # The core: frames and time in, frames out.
+
+    def start(self, now: float) -> None:
+        """Power on."""
+        self._now = now
+        self._switch_on()
+        self.powered = True
+        self.slave.boot()
+        self.heard = self._hears()
+
+    def on_frame(self, frame: Frame, now: float) -> None:
+        can_id = frame.can_id
+        if not self.powered or can_id & STANDARD_MASK not in self.heard or can_id & (EXTENDED | ERROR):
+            return
+        self._advance(now)
+        if self.powered:
+            self._receive(frame)
+            self._finish()
+        self.heard = self._hears()
+
+    def on_time(self, now: float) -> None:
+        self._advance(now)
+        if self.powered:
+            self._finish()
+
+    def next_deadline(self) -> float | None:
+        if self._injected:
+            return self._now
+        if not self.powered:
+            return None
+        deadlines = (self.slave.next_deadline(), *self._deadlines())
+        return min((deadline for deadline in deadlines if deadline is not None), default=None)
+
+    def take_frames(self) -> list[Frame]:
+        return self.slave.take_frames()
+
+    def _advance(self, now: float) -> None:
+        self._now = max(self._now, now)  # stamps of frames may lie before the last timer
+        if self.powered:
+            self._pass_time()
+        injected, self._injected = self._injected, []
+        for action in injected:
+            action()
+
+    # What a test or a demonstration does to any node.
+
+    def silence(self) -> None:
+        """The node sends nothing more; it goes on receiving and working."""
+        self.slave.silent = True
+
+    def speak(self) -> None:
+        self.slave.silent = False
+
+    def power_off(self) -> None:
+        """Mains and 24 V off for the node and its drives."""
+
+        def off() -> None:
+            self.powered = False
+            self.slave.power_off()
+
+        self._injected.append(off)
+
+    def power_cycle(self) -> None:
+        """Off and on again: unsaved settings are lost, the boot-up message comes."""
+        self.power_off()
+        self._injected.append(lambda: self.start(self._now))

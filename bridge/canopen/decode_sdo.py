@@ -5,15 +5,12 @@ A segment does not name its object: each channel remembers what its transfer is 
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.canopen import abort
+from bridge.canopen.sdo_transfer import ABORT, MUX, U32, expedited, segment
 
-_MUX: Final = struct.Struct("<HB")
-_SIZE: Final = struct.Struct("<I")
-_ABORT: Final = 0x80
 _MOST_COLLECTED: Final = 4096
 """Bytes of one value that are kept; a monitor runs for days beside any kind of client."""
 _PRINTABLE: Final = range(0x20, 0x7F)
@@ -50,7 +47,7 @@ class SdoListener:
         if len(data) != 8:
             return SdoSaid(f"SDO request of {len(data)} bytes")
         command = data[0]
-        if command == _ABORT:
+        if command == ABORT:
             return self._abort(data, "client")
         if self._block == "down":
             return self._block_segment(data)
@@ -79,7 +76,7 @@ class SdoListener:
         if len(data) != 8:
             return SdoSaid(f"SDO answer of {len(data)} bytes")
         command = data[0]
-        if command == _ABORT:
+        if command == ABORT:
             return self._abort(data, "node")
         if self._block == "up":
             return self._block_segment(data)
@@ -104,7 +101,7 @@ class SdoListener:
                 return SdoSaid(f"SDO answer with unknown command {command:02X}h")
 
     def _name(self, data: bytes) -> None:
-        self._index, self._sub = _MUX.unpack_from(data, 1)
+        self._index, self._sub = MUX.unpack_from(data, 1)
 
     def _begin(self, data: bytes) -> None:
         self._name(data)
@@ -118,14 +115,14 @@ class SdoListener:
     def _abort(self, data: bytes, who: str) -> SdoSaid:
         self._name(data)
         self._block = ""
-        code = _SIZE.unpack_from(data, 4)[0]
+        code = U32.unpack_from(data, 4)[0]
         text = f"{self._object}: the {who} aborts: {abort.text(code)} ({code:08X}h)"
         return self._about("abort", text, ("abort_code", f"{code:08X}"), ("abort_text", abort.text(code)))
 
     def _initiate_download(self, data: bytes) -> SdoSaid:
         self._begin(data)
         if data[0] & 2:
-            value = _expedited(data)
+            value = expedited(data)
             text = f"write {self._object} := {shown(value)}"
             return self._about("write", text, ("data", value.hex()))
         return self._about("write", f"write {self._object}: {_size(data, data[0] & 1)} in segments")
@@ -133,12 +130,12 @@ class SdoListener:
     def _initiate_upload(self, data: bytes) -> SdoSaid:
         self._begin(data)
         if data[0] & 2:
-            value = _expedited(data)
+            value = expedited(data)
             return self._about("read", f"{self._object} = {shown(value)}", ("data", value.hex()))
         return self._about("read", f"{self._object}: {_size(data, data[0] & 1)} in segments")
 
     def _segment(self, data: bytes, what: str) -> SdoSaid:
-        self._collect(data[1 : 8 - (data[0] >> 1 & 7)])
+        self._collect(segment(data))
         if not data[0] & 1:
             return self._about(what, f"{self._object}: segment")
         value = bytes(self._data)
@@ -188,12 +185,8 @@ class SdoListener:
                 return self._about("write", f"block write {self._object}: end confirmed")
 
 
-def _expedited(data: bytes) -> bytes:
-    return data[4 : 8 - (data[0] >> 2 & 3)] if data[0] & 1 else data[4:]
-
-
 def _size(data: bytes, is_given: int) -> str:
-    return f"{_SIZE.unpack_from(data, 4)[0]} bytes" if is_given else "bytes"
+    return f"{U32.unpack_from(data, 4)[0]} bytes" if is_given else "bytes"
 
 
 def shown(value: bytes) -> str:

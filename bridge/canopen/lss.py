@@ -21,27 +21,30 @@ BIT_RATES: Final = (1_000_000, 800_000, 500_000, 250_000, 125_000, None, 50_000,
 """By index in table 0 (CiA 305 §6.4.3; 5 is reserved)."""
 AUTOMATIC: Final = 9
 
-_SWITCH_GLOBAL: Final = 0x04
-_NODE_ID: Final = 0x11
-_BIT_TIMING: Final = 0x13
-_ACTIVATE: Final = 0x15
-_STORE: Final = 0x17
-_SELECT: Final = (0x40, 0x41, 0x42, 0x43)
-_SELECTED: Final = 0x44
+SWITCH_GLOBAL: Final = 0x04
+NODE_ID: Final = 0x11
+BIT_TIMING: Final = 0x13
+ACTIVATE: Final = 0x15
+STORE: Final = 0x17
+SELECT: Final = (0x40, 0x41, 0x42, 0x43)
+SELECTED: Final = 0x44
 IDENTIFIED: Final = 0x4F
 """Reply of every device that matches a fastscan query."""
-_FASTSCAN: Final = 0x51
-_INQUIRE: Final = (0x5A, 0x5B, 0x5C, 0x5D)
-_INQUIRE_NODE_ID: Final = 0x5E
-_CONFIRM: Final = 0x80
+FASTSCAN: Final = 0x51
+INQUIRE: Final = (0x5A, 0x5B, 0x5C, 0x5D)
+INQUIRE_NODE_ID: Final = 0x5E
+CONFIRM: Final = 0x80
 
 FIELDS: Final = ("vendor id", "product code", "revision number", "serial number")
 _SERIAL: Final = 3
-_U32: Final = struct.Struct("<I")
+U32: Final = struct.Struct("<I")
+U16: Final = struct.Struct("<H")
+QUESTION: Final = struct.Struct("<IBBB")
+"""Of a fastscan: number, lowest bit that is compared, field, next field (CiA 305 §6.10)."""
 _STANDARD_ERRORS: Final = {
-    _NODE_ID: {1: "a node id must be 1…127 or 255"},
-    _BIT_TIMING: {1: "this bit rate is not supported"},
-    _STORE: {1: "the device cannot store", 2: "access to its memory failed"},
+    NODE_ID: {1: "a node id must be 1…127 or 255"},
+    BIT_TIMING: {1: "this bit rate is not supported"},
+    STORE: {1: "the device cannot store", 2: "access to its memory failed"},
 }
 
 
@@ -93,7 +96,7 @@ def settle() -> Service[None]:
 def switch_global(*, configuration: bool) -> Service[None]:
     """All devices to configuration or to waiting state; nobody answers."""
     name = "configuration" if configuration else "waiting"
-    yield Exchange(_message(_SWITCH_GLOBAL, bytes((configuration,))), None, f"all devices to {name} state")
+    yield Exchange(_message(SWITCH_GLOBAL, bytes((configuration,))), None, f"all devices to {name} state")
 
 
 def to_waiting() -> Service[None]:
@@ -103,11 +106,11 @@ def to_waiting() -> Service[None]:
 
 def switch_selective(identity: Identity) -> Service[None]:
     """The one device with this identity to configuration state. Raises LssError where it is not there."""
-    for command, value, name in zip(_SELECT, identity, FIELDS, strict=True):
-        last = command == _SELECT[-1]
-        reply = _SELECTED if last else None
+    for command, value, name in zip(SELECT, identity, FIELDS, strict=True):
+        last = command == SELECT[-1]
+        reply = SELECTED if last else None
         answer = yield Exchange(
-            _message(command, _U32.pack(value)), reply, f"selecting by {name}", fails=False
+            _message(command, U32.pack(value)), reply, f"selecting by {name}", fails=False
         )
         if last and answer is None:
             raise LssError("no device has this identity, or it does not know LSS")
@@ -116,21 +119,21 @@ def switch_selective(identity: Identity) -> Service[None]:
 def inquire_identity() -> Service[Identity]:
     """What the device in configuration state is. Several of them would answer at once."""
     values: list[int] = []
-    for command, name in zip(_INQUIRE, FIELDS, strict=True):
+    for command, name in zip(INQUIRE, FIELDS, strict=True):
         answer = yield Exchange(_message(command), command, f"asking for its {name}")
-        values.append(_U32.unpack_from(answer or bytes(8), 1)[0])
+        values.append(U32.unpack_from(answer or bytes(8), 1)[0])
     return Identity(*values)
 
 
 def inquire_node_id() -> Service[int]:
     """Its present node id, ``NO_NODE_ID`` where it has none."""
-    answer = yield Exchange(_message(_INQUIRE_NODE_ID), _INQUIRE_NODE_ID, "asking for its node id")
+    answer = yield Exchange(_message(INQUIRE_NODE_ID), INQUIRE_NODE_ID, "asking for its node id")
     return answer[1] if answer else NO_NODE_ID
 
 
 def configure_node_id(node_id: int) -> Service[None]:
     """Its node id after the next reset of its communication, 1…127, or ``NO_NODE_ID``."""
-    answer = yield Exchange(_message(_NODE_ID, bytes((node_id,))), _NODE_ID, f"setting node id {node_id}")
+    answer = yield Exchange(_message(NODE_ID, bytes((node_id,))), NODE_ID, f"setting node id {node_id}")
     _check(answer)
 
 
@@ -138,20 +141,20 @@ def configure_bit_rate(bit_rate: int | None) -> Service[None]:
     """Its bit rate in bit/s after activation or its next start; None: it finds out by itself."""
     index = AUTOMATIC if bit_rate is None else BIT_RATES.index(bit_rate)
     step = "setting automatic bit rate" if bit_rate is None else f"setting {bit_rate} bit/s"
-    answer = yield Exchange(_message(_BIT_TIMING, bytes((0, index))), _BIT_TIMING, step)
+    answer = yield Exchange(_message(BIT_TIMING, bytes((0, index))), BIT_TIMING, step)
     _check(answer)
 
 
 def activate_bit_rate(delay_ms: int) -> Service[None]:
     """All devices in configuration state change their bit rate: silent for ``delay_ms``, then switched,
     then silent for as long again. Nobody answers."""
-    request = _message(_ACTIVATE, struct.pack("<H", delay_ms))
+    request = _message(ACTIVATE, U16.pack(delay_ms))
     yield Exchange(request, None, f"activating the bit rate within {delay_ms} ms")
 
 
 def store() -> Service[None]:
     """Node id and bit rate into the device's memory."""
-    answer = yield Exchange(_message(_STORE), _STORE, "storing")
+    answer = yield Exchange(_message(STORE), STORE, "storing")
     _check(answer)
 
 
@@ -171,7 +174,7 @@ def error_text(answer: bytes) -> str:
 
 def is_anybody_there(*, is_first: bool = False) -> Service[bool]:
     """Begin a scan: whether a device without a node id answers. Every device begins with the vendor id."""
-    request = struct.pack("<IBBB", 0, _CONFIRM, 0, 0)
+    request = QUESTION.pack(0, CONFIRM, 0, 0)
     return (yield _question(request, "is anybody there?", is_first=is_first)) is not None
 
 
@@ -180,7 +183,7 @@ def answers_everything() -> Service[bool]:
     value of a serial number's first bit. CANopenNode does, once it has been found and is in configuration
     state."""
     for value in (0, 1 << 31):
-        request = struct.pack("<IBBB", value, 31, _SERIAL, _SERIAL)
+        request = QUESTION.pack(value, 31, _SERIAL, _SERIAL)
         if (yield _question(request, "does somebody answer everything?")) is None:
             return False
     return True
@@ -206,19 +209,19 @@ def fastscan(known: Identity | None = None) -> Service[Identity]:
 def enter(sub: int, value: int) -> Service[bool]:
     """Devices whose field ``sub`` is ``value`` go on to the next one, after the last to configuration state.
     False: there is none."""
-    request = struct.pack("<IBBB", value, 0, sub, (sub + 1) % len(FIELDS))
+    request = QUESTION.pack(value, 0, sub, (sub + 1) % len(FIELDS))
     return (yield _question(request, f"{FIELDS[sub]} is {value:08X}h")) is not None
 
 
 def has(sub: int, value: int, bit: int = 0) -> Service[bool]:
     """Whether a device that has come to field ``sub`` has this ``value`` there, from ``bit`` on upwards. It
     stays where it is."""
-    request = struct.pack("<IBBB", value, bit, sub, sub)
+    request = QUESTION.pack(value, bit, sub, sub)
     return (yield _question(request, f"{FIELDS[sub]}, bit {bit}")) is not None
 
 
 def _question(request: bytes, step: str, *, is_first: bool = False) -> Exchange:
-    message = _message(_FASTSCAN, request)
+    message = _message(FASTSCAN, request)
     return Exchange(message, IDENTIFIED, step, fails=False, by_many=True, is_first=is_first)
 
 

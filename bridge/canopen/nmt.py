@@ -49,12 +49,15 @@ def state_of(octet: int) -> NmtState:
     return _BY_OCTET.get(octet & 0x7F, NmtState.UNKNOWN)
 
 
+def command_name(octet: int) -> str:
+    try:
+        return NmtCommand(octet).name.lower().replace("_", " ")
+    except ValueError:
+        return f"unknown command {octet:02X}h"
+
+
 def describe(data: bytes) -> str:
     """An NMT command on the wire, in words."""
     if len(data) != 2:
         return f"{data.hex().upper() or 'nothing'} (not an NMT command)"
-    try:
-        name = NmtCommand(data[0]).name.lower().replace("_", " ")
-    except ValueError:
-        name = f"command {data[0]:02X}h"
-    return f"{name} for {f'node {data[1]}' if data[1] else 'all nodes'}"
+    return f"{command_name(data[0])} for {f'node {data[1]}' if data[1] else 'all nodes'}"

@@ -130,14 +130,23 @@ def check_length(index: int, sub: int, length: int, announced: int | None) -> No
     raise SdoError(index, sub, code, by_server=False)
 
 
+def expedited(data: bytes) -> bytes:
+    """The value in an expedited initiation; without a length all four bytes count."""
+    return data[4 : 8 - (data[0] >> 2 & 3) if data[0] & 1 else 8]
+
+
+def segment(data: bytes) -> bytes:
+    """The part of a value in a segment."""
+    return data[1 : 8 - (data[0] >> 1 & 7)]
+
+
 def initiate_upload(index: int, sub: int) -> Generator[Exchange, bytes, tuple[bytes | None, int | None]]:
     """Ask for an object. Returns its value where the answer held it, and else the announced length."""
     mux = MUX.pack(index, sub)
     reply = yield Exchange((bytes((_UPLOAD,)) + mux + bytes(4),), Reply(0xE0, 0x40, mux))
-    command = reply[0]
-    if command & 2:  # expedited
-        return reply[4 : 8 - (command >> 2 & 3) if command & 1 else 8], None
-    return None, announced_bytes(index, sub, reply) if command & 1 else None
+    if reply[0] & 2:
+        return expedited(reply), None
+    return None, announced_bytes(index, sub, reply) if reply[0] & 1 else None
 
 
 def upload_segments(index: int, sub: int, announced: int | None) -> Transfer:
@@ -150,7 +159,7 @@ def upload_segments(index: int, sub: int, announced: int | None) -> Transfer:
         reply = yield Exchange((request,), Reply(0xE0, 0x00, before=reply))
         if reply[0] & _TOGGLE != toggle:
             raise SdoError(index, sub, abort.TOGGLE, by_server=False)
-        part = reply[1 : 8 - (reply[0] >> 1 & 7)]
+        part = segment(reply)
         data += part
         if len(data) > most:
             code = abort.OUT_OF_MEMORY if announced is None else abort.LENGTH_TOO_HIGH

@@ -7,26 +7,23 @@ another mapping is shown as if it had not.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from typing import Final
 
-from bridge.canopen import cobid, decode_lss, emcy, lss, nmt
+from bridge.canopen import cobid, decode_lss, emcy, lss, nmt, time_stamp
 from bridge.canopen.decode_sdo import SdoListener, Value
 from bridge.canopen.frame import EXTENDED, REMOTE, STANDARD_MASK, Frame
-from bridge.canopen.nmt import NmtCommand, NmtState
+from bridge.canopen.nmt import NmtState
 from bridge.config import NodeTable
 from bridge.drive import EmergencyReader
 from bridge.errands.decode_pdo import PdoView, views
 from bridge.mapping import emcy_codes
 from bridge.mapping.model import Family
 
-_TIME: Final = 0x100
-_TIME_OF_DAY: Final = struct.Struct("<IH")
-_EPOCH: Final = datetime(1984, 1, 1, tzinfo=UTC)
+_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 _LSS: Final = {lss.REPLY_ID: "LSS slave", lss.REQUEST_ID: "LSS master"}
 _PDOS: Final = {
     0x180: "TPDO1",
@@ -102,7 +99,7 @@ class Decoder:
             return self._nmt(frame.data)
         if cob_id == cobid.SYNC:
             return _sync(frame.data)
-        if cob_id == _TIME:
+        if cob_id == cobid.TIME:
             return _time(frame.data)
         if cob_id in _LSS:
             return _lss(cob_id, frame.data)
@@ -146,10 +143,7 @@ class Decoder:
         if len(data) != 2:
             return Meaning(Kind.NMT, 0, "NMT", f"{len(data)} bytes instead of 2")
         target = "all nodes" if data[1] == 0 else self.name(data[1])
-        try:
-            command = NmtCommand(data[0]).name.lower().replace("_", " ")
-        except ValueError:
-            command = f"unknown command {data[0]:02X}h"
+        command = nmt.command_name(data[0])
         return Meaning(Kind.NMT, data[1], "NMT", f"{command}: {target}", (("command", command),))
 
     def _emcy(self, node_id: int, data: bytes) -> Meaning:
@@ -217,11 +211,10 @@ def _sync(data: bytes) -> Meaning:
 
 
 def _time(data: bytes) -> Meaning:
-    """Milliseconds after midnight in 28 bits, days since 1984-01-01 (CiA 301 §7.1.6.5)."""
-    if len(data) != _TIME_OF_DAY.size:
+    epoch_ms = time_stamp.decode(data)
+    if epoch_ms is None:
         return Meaning(Kind.TIME, 0, "TIME", f"{len(data)} bytes instead of 6")
-    milliseconds, days = _TIME_OF_DAY.unpack(data)
-    moment = _EPOCH + timedelta(days=days, milliseconds=milliseconds & 0x0FFF_FFFF)
+    moment = _EPOCH + timedelta(milliseconds=epoch_ms)
     # Whose time zone it is, the message does not say.
     text = moment.replace(tzinfo=None).isoformat(" ", "milliseconds")
     return Meaning(Kind.TIME, 0, "TIME", text, (("time", text),))

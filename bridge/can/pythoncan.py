@@ -16,51 +16,31 @@ from typing import Any, Final
 
 import can
 
-from bridge.can.burstend import BurstEnd
-from bridge.can.interface import BusStatus, ControllerState
-from bridge.can.softbeat import SoftBeat
-from bridge.can.wirebits import WireBits
+from bridge.can.interface import ControllerState
+from bridge.can.softbus import SoftBus
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.errors import Unavailable
 
 _MOST_WAITING: Final = 1 << 14
 _MOST_TO_SEND: Final = 256
 _POLL_S: Final = 0.2
-_BEAT_WITHIN_S: Final = 0.05
 _REOPEN_S: Final = (0.2, 5.0)
 _ERROR_BYTES: Final = 8
 _FAILURES: Final = (can.CanError, OSError, ValueError, ImportError, TypeError, AttributeError)
 
 
-class PythonCanBus:
+class PythonCanBus(SoftBus):
     """A python-can bus behind two threads."""
 
     def __init__(self, name: str, interface: str, channel: str, bitrate: int) -> None:
-        self._name = name
+        super().__init__(name)
         self._interface, self._channel, self._bitrate = interface, channel, bitrate
-        self._status = BusStatus()
-        self._beats = SoftBeat()
         self._received: deque[Frame] = deque(maxlen=_MOST_WAITING)
         self._to_send: queue.Queue[tuple[Frame, float] | None] = queue.Queue(_MOST_TO_SEND)
-        self._accepted: frozenset[int] | None = None
-        self._ours: frozenset[int] = frozenset()
         self._foreign: deque[Frame] = deque(maxlen=_MOST_WAITING)
         self._bus: can.BusABC | None = None
-        self._bits = WireBits()
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._wake: Callable[[], None] = lambda: None
-        self._woken = False
         self._stopping = threading.Event()
         self._threads: list[threading.Thread] = []
-
-    @property
-    def name(self) -> str:
-        return self._name
-
-    @property
-    def status(self) -> BusStatus:
-        self._status.bits = int(self._bits.total)
-        return self._status
 
     def open(self, wake: Callable[[], None]) -> None:
         self._loop = asyncio.get_running_loop()
@@ -79,12 +59,6 @@ class PythonCanBus:
     def _make(self) -> can.BusABC:
         options: dict[str, Any] = {"bitrate": self._bitrate}
         return can.Bus(interface=self._interface, channel=self._channel, **options)
-
-    def accept(self, can_ids: list[int]) -> None:
-        self._accepted = frozenset(can_ids)
-
-    def watch(self, can_ids: frozenset[int]) -> None:
-        self._ours = can_ids
 
     def take_foreign(self, now: float) -> list[Frame]:
         frames: list[Frame] = []
@@ -123,9 +97,10 @@ class PythonCanBus:
             self._foreign.append(frame)
             self._rouse()
         if self._accepted is None or frame.can_id in self._accepted:
-            self._give(frame)
+            self._give(frame, frame.time)
 
-    def _give(self, frame: Frame) -> None:
+    def _give(self, frame: Frame, now: float) -> None:
+        del now
         if len(self._received) == _MOST_WAITING:
             self._status.frames_lost += 1
         self._received.append(frame)
@@ -181,10 +156,6 @@ class PythonCanBus:
             self._woken = True
             self._loop.call_soon_threadsafe(self._wake_up)
 
-    def _wake_up(self) -> None:
-        self._woken = False
-        self._wake()
-
     def drain(self, now: float) -> list[Frame]:
         frames: list[Frame] = []
         while self._received:
@@ -200,35 +171,6 @@ class PythonCanBus:
             self._to_send.put_nowait((frame, deadline))
         except queue.Full:
             self._status.frames_expired += 1
-
-    def beat(
-        self,
-        frames: tuple[Frame, ...],
-        now: float,
-        period_s: float,
-        count: int,
-        *,
-        at_once: bool = False,
-        ending: BurstEnd | None = None,
-    ) -> None:
-        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
-        if frame is not None:
-            self._send_beat(frame, now, period_s)
-
-    def _send_beat(self, frame: Frame, now: float, within_s: float) -> None:
-        self.send(frame, now, now + within_s)
-        if self._accepted is not None and frame.can_id in self._accepted:
-            self._give(frame._replace(time=now))
-
-    def silence(self, can_id: int) -> None:
-        self._beats.silence(can_id)
-
-    def next_deadline(self) -> float | None:
-        return self._beats.next_deadline()
-
-    def on_time(self, now: float) -> None:
-        for frame in self._beats.due(now):
-            self._send_beat(frame, now, _BEAT_WITHIN_S)
 
     def close(self) -> None:
         self._beats.clear()

@@ -7,10 +7,8 @@ import random
 from collections import deque
 from collections.abc import Callable
 
-from bridge.can.burstend import BurstEnd
-from bridge.can.interface import BusStatus, ControllerState
-from bridge.can.softbeat import SoftBeat
-from bridge.can.wirebits import WireBits
+from bridge.can.interface import ControllerState
+from bridge.can.softbus import SoftBus
 from bridge.canopen.frame import Frame
 
 _MOST_WAITING = 1 << 16
@@ -46,41 +44,18 @@ class VirtualWire:
                 end.deliver(frame, now)
 
 
-class VirtualBus:
+class VirtualBus(SoftBus):
     """One end. Everything runs in the event loop of the one who opened it."""
 
     def __init__(self, name: str, wire: VirtualWire) -> None:
-        self._name = name
+        super().__init__(name)
         self._wire = wire
-        self._status = BusStatus()
-        self._beats = SoftBeat()
-        self._bits = WireBits()
         self._waiting: deque[Frame] = deque()
-        self._accepted: frozenset[int] | None = None
-        self._ours: frozenset[int] = frozenset()
         self._foreign: list[Frame] = []
-        self._wake: Callable[[], None] | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._woken = False
-
-    @property
-    def name(self) -> str:
-        return self._name
-
-    @property
-    def status(self) -> BusStatus:
-        self._status.bits = int(self._bits.total)
-        return self._status
 
     def open(self, wake: Callable[[], None]) -> None:
         self._wake = wake
         self._loop = asyncio.get_running_loop()
-
-    def accept(self, can_ids: list[int]) -> None:
-        self._accepted = frozenset(can_ids)
-
-    def watch(self, can_ids: frozenset[int]) -> None:
-        self._ours = can_ids
 
     def take_foreign(self, now: float) -> list[Frame]:
         foreign, self._foreign = self._foreign, []
@@ -96,9 +71,11 @@ class VirtualBus:
 
     def deliver(self, frame: Frame, now: float) -> None:
         """The wire brings a frame."""
+        if self._accepted is None or frame.can_id in self._accepted:
+            self._give(frame, now)
+
+    def _give(self, frame: Frame, now: float) -> None:
         if self._wake is None or self._loop is None or self._status.state is ControllerState.DOWN:
-            return
-        if self._accepted is not None and frame.can_id not in self._accepted:
             return
         if len(self._waiting) >= _MOST_WAITING:
             self._status.frames_lost += 1
@@ -114,11 +91,6 @@ class VirtualBus:
             self._loop.call_later(delay_s, self._wake_up)
         else:
             self._loop.call_soon(self._wake_up)
-
-    def _wake_up(self) -> None:
-        self._woken = False
-        if self._wake:
-            self._wake()
 
     def drain(self, now: float) -> list[Frame]:
         waiting = self._waiting
@@ -137,35 +109,6 @@ class VirtualBus:
         self._status.frames_sent += 1
         self._bits.add(frame)
         self._wire.put(frame, self, now)
-
-    def beat(
-        self,
-        frames: tuple[Frame, ...],
-        now: float,
-        period_s: float,
-        count: int,
-        *,
-        at_once: bool = False,
-        ending: BurstEnd | None = None,
-    ) -> None:
-        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
-        if frame is not None:
-            self._send_beat(frame, now)
-
-    def _send_beat(self, frame: Frame, now: float) -> None:
-        self.send(frame, now, now)
-        if self._accepted is not None and frame.can_id in self._accepted:
-            self.deliver(frame._replace(time=now), now)
-
-    def silence(self, can_id: int) -> None:
-        self._beats.silence(can_id)
-
-    def next_deadline(self) -> float | None:
-        return self._beats.next_deadline()
-
-    def on_time(self, now: float) -> None:
-        for frame in self._beats.due(now):
-            self._send_beat(frame, now)
 
     def break_down(self) -> None:
         """The interface goes away, as by ``ip link set down``."""

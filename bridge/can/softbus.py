@@ -1,0 +1,88 @@
+"""What the buses without the kernel's broadcast manager share, such as bursts by a timer of ours."""
+
+from __future__ import annotations
+
+import asyncio
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Final
+
+from bridge.can.burstend import BurstEnd
+from bridge.can.interface import BusStatus
+from bridge.can.softbeat import SoftBeat
+from bridge.can.wirebits import WireBits
+from bridge.canopen.frame import Frame
+
+_WITHIN_S: Final = 0.05
+"""A frame of a burst that cannot be sent within this time is stale."""
+
+
+class SoftBus(ABC):
+    """One end of a bus, as ``interface.Bus`` has it."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._status = BusStatus()
+        self._beats = SoftBeat()
+        self._bits = WireBits()
+        self._accepted: frozenset[int] | None = None
+        self._ours: frozenset[int] = frozenset()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._wake: Callable[[], None] | None = None
+        self._woken = False
+
+    @property
+    def name(self) -> str:
+        return self._name
+
+    @property
+    def status(self) -> BusStatus:
+        self._status.bits = int(self._bits.total)
+        return self._status
+
+    def accept(self, can_ids: list[int]) -> None:
+        self._accepted = frozenset(can_ids)
+
+    def watch(self, can_ids: frozenset[int]) -> None:
+        self._ours = can_ids
+
+    @abstractmethod
+    def send(self, frame: Frame, now: float, deadline: float) -> None: ...
+
+    @abstractmethod
+    def _give(self, frame: Frame, now: float) -> None:
+        """A frame for ``drain``."""
+
+    def beat(
+        self,
+        frames: tuple[Frame, ...],
+        now: float,
+        period_s: float,
+        count: int,
+        *,
+        at_once: bool = False,
+        ending: BurstEnd | None = None,
+    ) -> None:
+        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
+        if frame is not None:
+            self._send_beat(frame, now, period_s)
+
+    def silence(self, can_id: int) -> None:
+        self._beats.silence(can_id)
+
+    def next_deadline(self) -> float | None:
+        return self._beats.next_deadline()
+
+    def on_time(self, now: float) -> None:
+        for frame in self._beats.due(now):
+            self._send_beat(frame, now, _WITHIN_S)
+
+    def _send_beat(self, frame: Frame, now: float, within_s: float) -> None:
+        self.send(frame, now, now + within_s)
+        if self._accepted is not None and frame.can_id in self._accepted:
+            self._give(frame._replace(time=now), now)
+
+    def _wake_up(self) -> None:
+        self._woken = False
+        if self._wake:
+            self._wake()

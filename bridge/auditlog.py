@@ -12,7 +12,7 @@ import msgspec
 
 from bridge.auditfile import AuditFile
 from bridge.command import Event, Kind, Plant
-from bridge.command.audit import Entry
+from bridge.command.audit import AuditEntry
 from bridge.config import Site
 from bridge.guard import Guard
 from bridge.image import Value
@@ -40,7 +40,7 @@ class _Line(msgspec.Struct, omit_defaults=True):
     count: int = 1
 
 
-def as_line(entry: Entry, epoch_ns: int) -> bytes:
+def as_line(entry: AuditEntry, epoch_ns: int) -> bytes:
     """One line with its line break, ASCII except for names that clients give themselves."""
     who, ending = entry.identity, entry.ending
     seconds, ns = divmod(epoch_ns, 1_000_000_000)
@@ -138,7 +138,7 @@ class AuditLog:
             message = f"the audit log is written again; {file.all_lost} lines are missing"
             self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", 300, message))
 
-    def _on_entry(self, entry: Entry) -> None:
+    def _on_entry(self, entry: AuditEntry) -> None:
         file = self.refused if entry.is_refused else self.file
         # The caller gets its outcome, whatever becomes of the line.
         with self._guard:

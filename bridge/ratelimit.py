@@ -74,7 +74,7 @@ class Pauses:
 
 
 @dataclass(slots=True)
-class _Told(Generic[Item]):
+class _Kept(Generic[Item]):
     """What is kept of one kind and source since ``at``: ``lines`` were told, and ``last`` is the newest of
     those that were not."""
 
@@ -90,7 +90,7 @@ class Repeats(Generic[Item]):
 
     def __init__(self, pause_s: float = PAUSE_S) -> None:
         self._pause_s = pause_s
-        self._told: dict[Hashable, dict[Hashable, _Told[Item]]] = {}
+        self._told: dict[Hashable, dict[Hashable, _Kept[Item]]] = {}
 
     def admits(self, kind: Hashable, source: Hashable, item: Item, now: float, first: int = 1) -> bool:
         """Whether ``item`` is told now, as one of the ``first``; else it is counted."""
@@ -102,7 +102,7 @@ class Repeats(Generic[Item]):
             source = None
         told = sources.get(source)
         if told is None or self._is_over(told, now):
-            sources[source] = _Told(now)
+            sources[source] = _Kept(now)
             return True
         if told.lines < first:
             told.lines += 1
@@ -119,10 +119,10 @@ class Repeats(Generic[Item]):
             for source, told in sources.items():
                 if told.last is not None and now - told.at >= self._pause_s:
                     found.append((told.last, told.left_out))
-                    sources[source] = _Told(now)
+                    sources[source] = _Kept(now)
         return found
 
-    def _is_over(self, told: _Told[Item], now: float) -> bool:
+    def _is_over(self, told: _Kept[Item], now: float) -> bool:
         return told.last is None and now - told.at >= self._pause_s
 
     def _forget(self, now: float) -> None:

@@ -17,7 +17,7 @@ from bridge.command import Plant
 from bridge.config import BusTable
 from bridge.errors import BridgeError, OperationFailed
 from bridge.eventlog import EventLog
-from bridge.fronts import Front
+from bridge.front_process import Front
 from bridge.lint import Severity, lint
 from bridge.master.ending import Ending
 from bridge.master.master import Master

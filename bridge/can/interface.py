@@ -84,7 +84,7 @@ class Bus(Protocol):
         """Send ``frame`` now, or as soon as there is room, but never after ``deadline``."""
         ...
 
-    def beat(
+    def burst(
         self,
         frames: tuple[Frame, ...],
         now: float,
@@ -106,7 +106,7 @@ class Bus(Protocol):
         """
         ...
 
-    def silence(self, can_id: int) -> None:
+    def end_burst(self, can_id: int) -> None:
         """End the burst of this identifier."""
         ...
 

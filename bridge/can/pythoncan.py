@@ -173,7 +173,7 @@ class PythonCanBus(SoftBus):
             self._status.frames_expired += 1
 
     def close(self) -> None:
-        self._beats.clear()
+        self._bursts.clear()
         self._stopping.set()
         try:
             self._to_send.put_nowait(None)

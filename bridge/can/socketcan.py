@@ -22,7 +22,7 @@ from bridge.can.errorframe import judge
 from bridge.can.explain import WrongBitrate, explain
 from bridge.can.foreignwatch import ForeignWatch
 from bridge.can.interface import BusStatus, ControllerState
-from bridge.can.kernelbeat import KernelBeat
+from bridge.can.kernelbursts import KernelBursts
 from bridge.can.linkwatch import LinkWatch
 from bridge.can.netlink import Link
 from bridge.can.outbox import Outbox
@@ -55,7 +55,7 @@ class SocketCanBus:
         self._sockets = sockets or CanSockets(channel)
         self._watch = LinkWatch(self._sockets.link)
         self._foreign = ForeignWatch(self._sockets)
-        self._beats = KernelBeat(time.monotonic)
+        self._bursts = KernelBursts(time.monotonic)
         self._outbox = Outbox()
         self._accepted: frozenset[int] = frozenset()
         self._own: list[Frame] = []
@@ -101,7 +101,7 @@ class SocketCanBus:
             self._loop.add_reader(raw.fileno(), self._wake)
 
     def _open_manager(self) -> None:
-        self._beats.open(self._sockets.manager())
+        self._bursts.open(self._sockets.manager())
         self._status.bursts_refused = ""
 
     def _check_link(self, link: Link) -> None:
@@ -123,7 +123,7 @@ class SocketCanBus:
         self._close_sockets()
 
     def _close_sockets(self) -> None:
-        self._beats.close()
+        self._bursts.close()
         self._own.clear()
         self._drop_waiting()
         self._foreign.own.silenced_all(self._last_drain)
@@ -205,7 +205,7 @@ class SocketCanBus:
             self._drop_waiting()
             self._foreign.own.silenced_all(now)
             try:
-                self._beats.silence_all(now)
+                self._bursts.end_all(now)
             except OSError as error:
                 self._break_down(error, now)
 
@@ -250,7 +250,7 @@ class SocketCanBus:
     def _drop_waiting(self) -> None:
         self._status.frames_expired += self._outbox.clear()
 
-    def beat(
+    def burst(
         self,
         frames: tuple[Frame, ...],
         now: float,
@@ -264,33 +264,33 @@ class SocketCanBus:
             last = (ending.frame,) if ending and ending.frame else ()
             self._foreign.own.told((*frames, *last), now, period_s, at_once=at_once)
         try:
-            first = self._beats.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
+            first = self._bursts.start(frames, now, period_s, count, at_once=at_once, ending=ending)
         except OSError as error:
             self._break_down(error, now)
             return
         if first is not None:
-            self._send_beat(first, now)
+            self._send_of_burst(first, now)
         self._wire.sample(frames[0])
 
-    def silence(self, can_id: int) -> None:
+    def end_burst(self, can_id: int) -> None:
         self._foreign.own.silenced(can_id, self._last_drain)
         try:
-            self._beats.silence(can_id, self._last_drain)
+            self._bursts.end(can_id, self._last_drain)
         except OSError as error:
             self._break_down(error, self._last_drain)
 
-    def _send_beats(self, now: float) -> None:
+    def _send_bursts(self, now: float) -> None:
         """What the kernel does not send for us, and again what it has refused."""
         try:
-            frames = self._beats.on_time(now)
+            frames = self._bursts.on_time(now)
         except OSError as error:
             self._break_down(error, now)
             return
-        self._status.bursts_refused = self._beats.refusal
+        self._status.bursts_refused = self._bursts.refusal
         for frame in frames:
-            self._send_beat(frame, now)
+            self._send_of_burst(frame, now)
 
-    def _send_beat(self, frame: Frame, now: float) -> None:
+    def _send_of_burst(self, frame: Frame, now: float) -> None:
         self.send(frame, now, now + _BEAT_LIMIT_S)
         if frame.can_id in self._accepted and self._can_send:
             self._own.append(frame._replace(time=now))
@@ -300,13 +300,13 @@ class SocketCanBus:
     def next_deadline(self) -> float | None:
         times = [self._watch.next_deadline()]
         if self._raw is not None:
-            times += [self._outbox.retry_at, self._beats.next_deadline(), self._foreign.next_deadline()]
+            times += [self._outbox.retry_at, self._bursts.next_deadline(), self._foreign.next_deadline()]
         return min((time for time in times if time is not None), default=None)
 
     def on_time(self, now: float) -> None:
         if self._outbox:
             self._send_waiting(now)
-        self._send_beats(now)
+        self._send_bursts(now)
         if (looking := self._watch.take()) is not None:
             self._take_look(looking, now)
         self._watch.on_time(now)
@@ -336,7 +336,7 @@ class SocketCanBus:
         status.bits = int(self._wire.total)
         if link.tx_errors is not None and link.rx_errors is not None:
             status.tx_errors, status.rx_errors = link.tx_errors, link.rx_errors
-        if self._beats.refusal:
+        if self._bursts.refusal:
             self._open_manager()
         # An error frame may be lost in a full socket buffer; the driver's own state is not.
         if link.state is not None and link.state <= ControllerState.BUS_OFF and link.state != status.state:

@@ -9,7 +9,7 @@ from typing import Final
 
 from bridge.can.burstend import BurstEnd
 from bridge.can.interface import BusStatus
-from bridge.can.softbeat import SoftBeat
+from bridge.can.softbursts import SoftBursts
 from bridge.can.wirebits import WireBits
 from bridge.canopen.frame import Frame
 
@@ -23,7 +23,7 @@ class SoftBus(ABC):
     def __init__(self, name: str) -> None:
         self._name = name
         self._status = BusStatus()
-        self._beats = SoftBeat()
+        self._bursts = SoftBursts()
         self._bits = WireBits()
         self._accepted: frozenset[int] | None = None
         self._ours: frozenset[int] = frozenset()
@@ -53,7 +53,7 @@ class SoftBus(ABC):
     def _give(self, frame: Frame, now: float) -> None:
         """A frame for ``drain``."""
 
-    def beat(
+    def burst(
         self,
         frames: tuple[Frame, ...],
         now: float,
@@ -63,21 +63,21 @@ class SoftBus(ABC):
         at_once: bool = False,
         ending: BurstEnd | None = None,
     ) -> None:
-        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
+        frame = self._bursts.start(frames, now, period_s, count, at_once=at_once, ending=ending)
         if frame is not None:
-            self._send_beat(frame, now, period_s)
+            self._send_of_burst(frame, now, period_s)
 
-    def silence(self, can_id: int) -> None:
-        self._beats.silence(can_id)
+    def end_burst(self, can_id: int) -> None:
+        self._bursts.end(can_id)
 
     def next_deadline(self) -> float | None:
-        return self._beats.next_deadline()
+        return self._bursts.next_deadline()
 
     def on_time(self, now: float) -> None:
-        for frame in self._beats.due(now):
-            self._send_beat(frame, now, _WITHIN_S)
+        for frame in self._bursts.due(now):
+            self._send_of_burst(frame, now, _WITHIN_S)
 
-    def _send_beat(self, frame: Frame, now: float, within_s: float) -> None:
+    def _send_of_burst(self, frame: Frame, now: float, within_s: float) -> None:
         self.send(frame, now, now + within_s)
         if self._accepted is not None and frame.can_id in self._accepted:
             self._give(frame._replace(time=now), now)

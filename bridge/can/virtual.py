@@ -114,7 +114,7 @@ class VirtualBus(SoftBus):
         """The interface goes away, as by ``ip link set down``."""
         self._status.state = ControllerState.DOWN
         self._status.note_error("the interface is down")
-        self._beats.clear()
+        self._bursts.clear()
         self._waiting.clear()
         self._foreign.clear()
         if self._loop and self._wake:
@@ -127,5 +127,5 @@ class VirtualBus(SoftBus):
 
     def close(self) -> None:
         self._wake = None
-        self._beats.clear()
+        self._bursts.clear()
         self._waiting.clear()

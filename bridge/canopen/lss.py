@@ -1,6 +1,6 @@
 """LSS master (CiA 305): node ids and bit rates of devices that are told apart by their identity.
 
-Each service is a generator. It yields ``Exchange``s and is sent the reply's eight bytes, or None where
+Each service is a generator. It yields ``LssExchange``s and is sent the reply's eight bytes, or None where
 none came in time; what it returns is the result. Services that need a device in configuration state say
 so: ``switch_selective``, ``switch_global`` or ``fastscan`` come first.
 """
@@ -40,7 +40,7 @@ _SERIAL: Final = 3
 U32: Final = struct.Struct("<I")
 U16: Final = struct.Struct("<H")
 QUESTION: Final = struct.Struct("<IBBB")
-"""Of a fastscan: number, lowest bit that is compared, field, next field (CiA 305 §6.10)."""
+"""Of a fastscan: number, lowest bit that is compared, field, next field (CiA 305 §6.7)."""
 _STANDARD_ERRORS: Final = {
     NODE_ID: {1: "a node id must be 1…127 or 255"},
     BIT_TIMING: {1: "this bit rate is not supported"},
@@ -52,7 +52,7 @@ class LssError(Exception):
     """A device refused, or did not answer."""
 
 
-class Identity(NamedTuple):
+class LssAddress(NamedTuple):
     """Object 1018h: the LSS address."""
 
     vendor: int
@@ -62,7 +62,7 @@ class Identity(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Exchange:
+class LssExchange:
     """One request, empty where nothing is sent; ``reply`` is the command specifier that is waited for, None
     where none comes.
 
@@ -81,7 +81,7 @@ class Exchange:
 
 
 _R = TypeVar("_R")
-Service = Generator[Exchange, bytes | None, _R]
+Service = Generator[LssExchange, bytes | None, _R]
 
 
 def _message(command: int, rest: bytes = b"") -> bytes:
@@ -90,13 +90,13 @@ def _message(command: int, rest: bytes = b"") -> bytes:
 
 def settle() -> Service[None]:
     """Ask nothing for a whole answer time: what comes then is late, and not taken for an answer."""
-    yield Exchange(b"", None, "waiting for late answers", fails=False, by_many=True)
+    yield LssExchange(b"", None, "waiting for late answers", fails=False, by_many=True)
 
 
 def switch_global(*, configuration: bool) -> Service[None]:
     """All devices to configuration or to waiting state; nobody answers."""
     name = "configuration" if configuration else "waiting"
-    yield Exchange(_message(SWITCH_GLOBAL, bytes((configuration,))), None, f"all devices to {name} state")
+    yield LssExchange(_message(SWITCH_GLOBAL, bytes((configuration,))), None, f"all devices to {name} state")
 
 
 def to_waiting() -> Service[None]:
@@ -104,36 +104,36 @@ def to_waiting() -> Service[None]:
     return switch_global(configuration=False)
 
 
-def switch_selective(identity: Identity) -> Service[None]:
+def switch_selective(identity: LssAddress) -> Service[None]:
     """The one device with this identity to configuration state. Raises LssError where it is not there."""
     for command, value, name in zip(SELECT, identity, FIELDS, strict=True):
         last = command == SELECT[-1]
         reply = SELECTED if last else None
-        answer = yield Exchange(
+        answer = yield LssExchange(
             _message(command, U32.pack(value)), reply, f"selecting by {name}", fails=False
         )
         if last and answer is None:
             raise LssError("no device has this identity, or it does not know LSS")
 
 
-def inquire_identity() -> Service[Identity]:
+def inquire_identity() -> Service[LssAddress]:
     """What the device in configuration state is. Several of them would answer at once."""
     values: list[int] = []
     for command, name in zip(INQUIRE, FIELDS, strict=True):
-        answer = yield Exchange(_message(command), command, f"asking for its {name}")
+        answer = yield LssExchange(_message(command), command, f"asking for its {name}")
         values.append(U32.unpack_from(answer or bytes(8), 1)[0])
-    return Identity(*values)
+    return LssAddress(*values)
 
 
 def inquire_node_id() -> Service[int]:
     """Its present node id, ``NO_NODE_ID`` where it has none."""
-    answer = yield Exchange(_message(INQUIRE_NODE_ID), INQUIRE_NODE_ID, "asking for its node id")
+    answer = yield LssExchange(_message(INQUIRE_NODE_ID), INQUIRE_NODE_ID, "asking for its node id")
     return answer[1] if answer else NO_NODE_ID
 
 
 def configure_node_id(node_id: int) -> Service[None]:
     """Its node id after the next reset of its communication, 1…127, or ``NO_NODE_ID``."""
-    answer = yield Exchange(_message(NODE_ID, bytes((node_id,))), NODE_ID, f"setting node id {node_id}")
+    answer = yield LssExchange(_message(NODE_ID, bytes((node_id,))), NODE_ID, f"setting node id {node_id}")
     _check(answer)
 
 
@@ -141,7 +141,7 @@ def configure_bit_rate(bit_rate: int | None) -> Service[None]:
     """Its bit rate in bit/s after activation or its next start; None: it finds out by itself."""
     index = AUTOMATIC if bit_rate is None else BIT_RATES.index(bit_rate)
     step = "setting automatic bit rate" if bit_rate is None else f"setting {bit_rate} bit/s"
-    answer = yield Exchange(_message(BIT_TIMING, bytes((0, index))), BIT_TIMING, step)
+    answer = yield LssExchange(_message(BIT_TIMING, bytes((0, index))), BIT_TIMING, step)
     _check(answer)
 
 
@@ -149,12 +149,12 @@ def activate_bit_rate(delay_ms: int) -> Service[None]:
     """All devices in configuration state change their bit rate: silent for ``delay_ms``, then switched,
     then silent for as long again. Nobody answers."""
     request = _message(ACTIVATE, U16.pack(delay_ms))
-    yield Exchange(request, None, f"activating the bit rate within {delay_ms} ms")
+    yield LssExchange(request, None, f"activating the bit rate within {delay_ms} ms")
 
 
 def store() -> Service[None]:
     """Node id and bit rate into the device's memory."""
-    answer = yield Exchange(_message(STORE), STORE, "storing")
+    answer = yield LssExchange(_message(STORE), STORE, "storing")
     _check(answer)
 
 
@@ -189,7 +189,7 @@ def answers_everything() -> Service[bool]:
     return True
 
 
-def fastscan(known: Identity | None = None) -> Service[Identity]:
+def fastscan(known: LssAddress | None = None) -> Service[LssAddress]:
     """After ``is_anybody_there``: find one of the devices; it is in configuration state then (CiA 305 §6.7).
 
     Each of 132 questions takes a whole reply time. ``known`` fills in fields that are the same for all
@@ -203,7 +203,7 @@ def fastscan(known: Identity | None = None) -> Service[Identity]:
         if not (yield from enter(sub, value)):
             raise LssError(f"a device answered and confirmed no {name} {value:08X}h: allow it more time")
         found.append(value)
-    return Identity(*found)
+    return LssAddress(*found)
 
 
 def enter(sub: int, value: int) -> Service[bool]:
@@ -220,9 +220,9 @@ def has(sub: int, value: int, bit: int = 0) -> Service[bool]:
     return (yield _question(request, f"{FIELDS[sub]}, bit {bit}")) is not None
 
 
-def _question(request: bytes, step: str, *, is_first: bool = False) -> Exchange:
+def _question(request: bytes, step: str, *, is_first: bool = False) -> LssExchange:
     message = _message(FASTSCAN, request)
-    return Exchange(message, IDENTIFIED, step, fails=False, by_many=True, is_first=is_first)
+    return LssExchange(message, IDENTIFIED, step, fails=False, by_many=True, is_first=is_first)
 
 
 def _find_number(sub: int) -> Service[int]:

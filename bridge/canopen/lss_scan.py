@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.canopen import lss
-from bridge.canopen.lss import Identity, LssError, Service
+from bridge.canopen.lss import LssAddress, LssError, Service
 
 _MOST_FOUND: Final = 127
 _MOST_SPOILT: Final = 3
@@ -26,12 +26,12 @@ class Scanned:
     """Filled while the scan goes on. ``keeps_answering``: who of those ``found`` answered further questions.
     ``problem``: why there may be more devices, empty where there are none."""
 
-    found: list[Identity] = field(default_factory=list[Identity])
-    keeps_answering: list[Identity] = field(default_factory=list[Identity])
+    found: list[LssAddress] = field(default_factory=list[LssAddress])
+    keeps_answering: list[LssAddress] = field(default_factory=list[LssAddress])
     problem: str = ""
 
 
-def find_all(known: Identity | None, scanned: Scanned | None = None) -> Service[Scanned]:
+def find_all(known: LssAddress | None, scanned: Scanned | None = None) -> Service[Scanned]:
     """Every device without a node id, in ``scanned``; all are left in waiting state.
 
     A late answer that was taken for one to another question spoils a scan: the device does not confirm,
@@ -81,7 +81,7 @@ def _keep_real(scanned: Scanned) -> Service[None]:
     yield from lss.to_waiting()
 
 
-def _is_there(identity: Identity) -> Service[bool]:
+def _is_there(identity: LssAddress) -> Service[bool]:
     try:
         yield from lss.switch_selective(identity)
     except LssError:
@@ -89,9 +89,9 @@ def _is_there(identity: Identity) -> Service[bool]:
     return True
 
 
-def _among_talkers(known: Identity | None, scanned: Scanned) -> Service[None]:
+def _among_talkers(known: LssAddress | None, scanned: Scanned) -> Service[None]:
     """Go on where somebody keeps answering."""
-    silent: list[Identity] = []
+    silent: list[LssAddress] = []
     for identity in tuple(scanned.found):
         yield from lss.to_waiting()
         if not (yield from _is_there(identity)):
@@ -112,7 +112,9 @@ def _among_talkers(known: Identity | None, scanned: Scanned) -> Service[None]:
     yield from _keep_real(scanned)
 
 
-def _tell_all_apart(known: Identity | None, present: Collection[Identity], scanned: Scanned) -> Service[None]:
+def _tell_all_apart(
+    known: LssAddress | None, present: Collection[LssAddress], scanned: Scanned
+) -> Service[None]:
     """Add who is in waiting state. Once more where an answer was missing."""
     for _ in range(_MOST_SPOILT):
         is_sure = yield from _tell_apart(known, present, scanned.found)
@@ -122,7 +124,7 @@ def _tell_all_apart(known: Identity | None, present: Collection[Identity], scann
 
 
 def _tell_apart(
-    known: Identity | None, present: Collection[Identity], found: list[Identity]
+    known: LssAddress | None, present: Collection[LssAddress], found: list[LssAddress]
 ) -> Service[bool]:
     """Add every device in waiting state to ``found``; nobody leaves that state. Of those ``present`` it is
     known that they answer, and nothing is asked. False: not all have confirmed what they answered.
@@ -141,7 +143,7 @@ def _tell_apart(
         if sub < _FIELDS - 1:
             branches += [(*branch, value) for value in values]
         else:
-            new = [Identity._make((*branch, value)) for value in values]
+            new = [LssAddress._make((*branch, value)) for value in values]
             found += [identity for identity in new if identity not in found]
     return is_sure
 

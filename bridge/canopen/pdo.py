@@ -18,7 +18,7 @@ MOST_BITS: Final = 8 * MOST_BYTES
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class PdoEntry:
     """One mapped object: index, sub-index, length in bits."""
 
     index: int
@@ -26,7 +26,7 @@ class Entry:
     bits: int
 
     @classmethod
-    def from_object(cls, value: int) -> Entry:
+    def from_object(cls, value: int) -> PdoEntry:
         """From the 32-bit value of 16xxh/1Axxh: ``IIIISSLL``."""
         return cls(value >> 16, value >> 8 & 0xFF, value & 0xFF)
 
@@ -52,7 +52,7 @@ class PdoCodec:
 
     __slots__ = ("_fields", "_masks", "_pack", "_unpack", "entries", "has_signed", "length")
 
-    def __init__(self, entries: tuple[Entry, ...], signed: Collection[tuple[int, int]] = ()) -> None:
+    def __init__(self, entries: tuple[PdoEntry, ...], signed: Collection[tuple[int, int]] = ()) -> None:
         """Raises MappingError where an entry has not 1…64 bits or the sum exceeds eight bytes."""
         for entry in entries:
             if not 1 <= entry.bits <= MOST_BITS:

@@ -18,7 +18,7 @@ _COMMANDS: Final = {
     "simulate": "serve.simulate",
     "demo-controller": "serve.demo_controller",
     "check": "project.check",
-    "audit": "audit.audit",
+    "audit": "own_check.audit",
     "drop-test": "drop_test.drop_test",
     "witness": "witness.witness",
     "eds": "eds.eds",

@@ -10,7 +10,7 @@ from typing import Annotated, TypeVar
 
 import typer
 
-from bridge.canopen.lss import BIT_RATES, NO_NODE_ID, Identity, LssError, Service
+from bridge.canopen.lss import BIT_RATES, NO_NODE_ID, LssAddress, LssError, Service
 from bridge.canopen.lss_scan import Scanned, find_all
 from bridge.cli.bus import AsJson, BusChoice, Line, carry_out, choose_line, print_table, takes_bus, tell
 from bridge.cli.terminal import progress
@@ -154,24 +154,24 @@ def store(
     _report({"ok": True, "stored": True}, "node id and bit rate", True, as_json)
 
 
-def parse_identity(text: str) -> Identity:
+def parse_identity(text: str) -> LssAddress:
     """The four numbers of object 1018h, in hexadecimal with colons between them."""
     matches = [_NUMBER.fullmatch(part) for part in text.split(":")]
     if len(matches) != 4 or not all(matches):
         raise typer.BadParameter(f"{text!r} is no identity: VENDOR:PRODUCT:REVISION:SERIAL in hexadecimal")
-    return Identity(*(int(match[1], 16) for match in matches if match))
+    return LssAddress(*(int(match[1], 16) for match in matches if match))
 
 
-def identity_text(identity: Identity) -> str:
+def identity_text(identity: LssAddress) -> str:
     """As ``--identity`` takes it."""
     return ":".join(f"{number:08X}" for number in identity)
 
 
-def _row(identity: Identity) -> tuple[str, ...]:
+def _row(identity: LssAddress) -> tuple[str, ...]:
     return (*(f"{number:08X}h" for number in identity), identity_text(identity))
 
 
-def _which(identity: str | None, only: bool) -> Identity | None:
+def _which(identity: str | None, only: bool) -> LssAddress | None:
     """None: the only device on the bus. Raises BadParameter unless exactly one of the two is given."""
     if only == (identity is not None):
         raise typer.BadParameter("which device? Give --identity, or --only where there is no other")

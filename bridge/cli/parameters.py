@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from bridge.cli import parameter_sets
+from bridge.cli import parameter_backup
 from bridge.cli.bus import AsJson, print_table, tell
 from bridge.cli.parameter_drive import DriveArgument, Force, SiteArgument, Yes, find
 from bridge.errors import OperationFailed
@@ -165,5 +165,5 @@ def _range(low: float | None, high: float | None, unit: str) -> str:
     return f"{'…'.join(ends)} {unit}".rstrip()
 
 
-for _command in (parameter_sets.backup, parameter_sets.compare, parameter_sets.restore):
+for _command in (parameter_backup.backup, parameter_backup.compare, parameter_backup.restore):
     app.command()(_command)

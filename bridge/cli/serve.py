@@ -18,7 +18,7 @@ from bridge.cli.signals import ending_signals
 from bridge.cli.stopping import Ending, until_stopped
 from bridge.config import BusTable, ZenohTable, load_site
 from bridge.errors import BridgeError, OperationFailed
-from bridge.fronts import Front, become_front, give_reason
+from bridge.front_process import Front, become_front, give_reason
 
 # The service is not imported for a front: after one has ended, its clients wait for the next.
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def run(
     """Run the bridge for SITE. Nodes of a virtual bus are simulated in the same process."""
     logs.set_up(verbose=verbose)
     if role == "opcua":
-        from bridge.front import run_opcua
+        from bridge.opcua_front import run_opcua
 
         _become_front(parent)
         try:

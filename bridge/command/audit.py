@@ -75,7 +75,7 @@ class Ending(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class AuditEntry:
     """One line. ``time`` is when the request came, in monotonic seconds; ``old`` and ``new`` have what it
     was about to change. ``count`` says how many requests like this one are told by it alone."""
 
@@ -103,7 +103,7 @@ class _Telegrams:
     ending: Ending
     told_at: float
     repeated: int = 0
-    waiting: Entry | None = None
+    waiting: AuditEntry | None = None
 
 
 @dataclass(slots=True)
@@ -114,14 +114,14 @@ class _Share:
     is_new: bool = True
     is_used: bool = True
     left_out: int = 0
-    last: Entry | None = None
+    last: AuditEntry | None = None
 
     def allows(self, now: float) -> bool:
         """Whether one more is written at once."""
         self.is_new, self.is_used = False, True
         return self.limit.allows(now)
 
-    def takes(self, entry: Entry) -> bool:
+    def takes(self, entry: AuditEntry) -> bool:
         """Whether it is written now; otherwise it is counted."""
         # The first of its kind is written whatever else the client was refused.
         is_new = self.is_new
@@ -131,7 +131,7 @@ class _Share:
         self.last = entry
         return False
 
-    def sum_up(self, now: float) -> Entry | None:
+    def sum_up(self, now: float) -> AuditEntry | None:
         """The last of those that were left out, standing for all of them."""
         last, left_out = self.last, self.left_out
         self.is_used, self.left_out, self.last = False, 0, None
@@ -145,7 +145,7 @@ class AuditTrail:
     """
 
     def __init__(self, image: Image) -> None:
-        self.tell: Callable[[Entry], None] | None = None
+        self.tell: Callable[[AuditEntry], None] | None = None
         self.every_telegram = False
         self._image = image
         self._telegrams: dict[str, _Telegrams] = {}
@@ -163,7 +163,7 @@ class AuditTrail:
         def conclude(outcome: Outcome) -> None:
             ending = Ending(outcome.code, outcome.message, outcome.ok and outcome.forwarded)
             who, new = request.identity, _asked(request)
-            self._note(Entry(now, who, request.target, request.action, ending, old, new))
+            self._note(AuditEntry(now, who, request.target, request.action, ending, old, new))
             reply(outcome)
 
         return conclude
@@ -173,13 +173,13 @@ class AuditTrail:
         if self.tell is not None:
             who, ending = rejection.identity, Ending(rejection.code, rejection.message)
             new = rejection.values
-            self._note(Entry(now, who, rejection.target, rejection.action, ending, new=new, count=count))
+            self._note(AuditEntry(now, who, rejection.target, rejection.action, ending, new=new, count=count))
 
     def stop_ended(self, target: str, outcome: str, message: str, now: float) -> None:
         """A stop that was forwarded has been followed or ignored."""
         if self.tell is not None:
             ending = Ending(Code.OK if outcome == "followed" else outcome, message, forwarded=True)
-            self._note_other(Entry(now, _BRIDGE, target, "stop_ended", ending))
+            self._note_other(AuditEntry(now, _BRIDGE, target, "stop_ended", ending))
 
     def _held(self, request: Request) -> Values:
         """What the points hold that ``request`` is about to change."""
@@ -201,7 +201,7 @@ class AuditTrail:
 
     # what is told, and what is counted
 
-    def _note(self, entry: Entry) -> None:
+    def _note(self, entry: AuditEntry) -> None:
         if self.every_telegram:
             self._tell(entry)
         elif entry.ending.code == Code.OK and entry.action in (Action.WRITE, Action.KEEP_ALIVE):
@@ -213,7 +213,7 @@ class AuditTrail:
                 self._tell_waiting(entry.target, telegrams, self._note_other)
             self._note_other(entry)
 
-    def _note_telegram(self, entry: Entry) -> None:
+    def _note_telegram(self, entry: AuditEntry) -> None:
         before = self._telegrams.get(entry.target)
         if before is None or not before.identity.is_same(entry.identity):
             if before is not None:
@@ -238,7 +238,7 @@ class AuditTrail:
         if entry.time - before.told_at >= SETPOINTS_S:
             self._tell_waiting(entry.target, before, self._tell)
 
-    def _tell_waiting(self, target: str, telegrams: _Telegrams, tell: Callable[[Entry], None]) -> None:
+    def _tell_waiting(self, target: str, telegrams: _Telegrams, tell: Callable[[AuditEntry], None]) -> None:
         """The newest setpoints, and how many telegrams went before them untold."""
         entry, telegrams.waiting = telegrams.waiting, None
         if entry is not None:
@@ -247,14 +247,14 @@ class AuditTrail:
         if telegrams.repeated:
             who, ending = telegrams.identity, telegrams.ending
             at = telegrams.told_at if entry is None else entry.time
-            tell(Entry(at, who, target, "telegrams", ending, count=telegrams.repeated))
+            tell(AuditEntry(at, who, target, "telegrams", ending, count=telegrams.repeated))
             telegrams.repeated = 0
 
-    def _note_other(self, entry: Entry) -> None:
+    def _note_other(self, entry: AuditEntry) -> None:
         if self._share(entry).takes(entry):
             self._tell(entry)
 
-    def _share(self, entry: Entry) -> _Share:
+    def _share(self, entry: AuditEntry) -> _Share:
         """Refused requests are counted by action and code and limited by client: targets and names can be
         made up."""
         client = (entry.identity.source.label, client_of(entry.identity))
@@ -296,7 +296,7 @@ class AuditTrail:
         for client in [client for client in self._limits if client not in used]:
             del self._limits[client]  # a minute has filled it
 
-    def _tell(self, entry: Entry) -> None:
+    def _tell(self, entry: AuditEntry) -> None:
         if self.tell is not None:
             self.tell(entry)
 
@@ -310,7 +310,7 @@ def client_of(identity: Identity) -> str:
     return address.partition(":")[0] if address.count(":") == 1 else address
 
 
-def _goes_on(before: _Telegrams, entry: Entry) -> bool:
+def _goes_on(before: _Telegrams, entry: AuditEntry) -> bool:
     """Whether this telegram brings only new setpoints, from the same controller and with the same outcome."""
     word = entry.new.get("control_word", before.new.get("control_word"))
     return (

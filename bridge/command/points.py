@@ -6,13 +6,11 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.command import follow, watchdog
-from bridge.command.request import Source
 from bridge.config import BusTable, NodeTable
 from bridge.drive import STATES, LinearScale, ValueCodec
 from bridge.image import DataType, Point
 from bridge.mapping.model import Family, Poll, ProcessValue, Slot
 
-OWNERS: Final = tuple((source.value, source.label) for source in Source)
 NMT_STATES: Final = (
     (0, "initialising"),
     (4, "stopped"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bridge.canopen.pdo import Entry
+from bridge.canopen.pdo import PdoEntry
 from bridge.node.process.words import WORD_BITS, Place
 
 
@@ -32,11 +32,11 @@ class Layout:
     word of the drive."""
 
     words: dict[int, list[Field]]
-    others: list[tuple[Entry, Field]]
+    others: list[tuple[PdoEntry, Field]]
 
 
 def lay_out(
-    entries: Sequence[Entry], places: Sequence[Place | None], signed: frozenset[tuple[int, int]]
+    entries: Sequence[PdoEntry], places: Sequence[Place | None], signed: frozenset[tuple[int, int]]
 ) -> Layout:
     """The bits of each word. Objects that share a word and follow each other become one field."""
     layout = Layout({}, [])

@@ -7,7 +7,7 @@ from typing import Final, Generic, TypeVar
 from bridge.canopen import lss
 from bridge.canopen.dialogue import Dialogue
 from bridge.canopen.frame import Frame
-from bridge.canopen.lss import Exchange, Identity, LssError, Service
+from bridge.canopen.lss import LssAddress, LssError, LssExchange, Service
 
 _PAUSE_S: Final = 0.02
 """After a request that nobody answers: the devices have to act on it."""
@@ -36,7 +36,7 @@ class LssErrand(Generic[_R]):
         """Answers to a scan that came when nobody waited for one."""
         self._dialogue = Dialogue(service, self._ask, self._done, (LssError,))
         self._timeout_s = timeout_s
-        self._exchange: Exchange | None = None
+        self._exchange: LssExchange | None = None
         self._reply: bytes | None = None
         self._deadline: float | None = None
         self._asked = now
@@ -89,7 +89,7 @@ class LssErrand(Generic[_R]):
         self._reply = None
         self._dialogue.go_on(reply, now)
 
-    def _ask(self, exchange: Exchange, now: float) -> bool:
+    def _ask(self, exchange: LssExchange, now: float) -> bool:
         self._exchange = exchange
         self.step = exchange.step
         self.steps += 1
@@ -107,7 +107,7 @@ class LssErrand(Generic[_R]):
             self._result.append(end)
             self._end(None)
 
-    def _wait_s(self, exchange: Exchange) -> float:
+    def _wait_s(self, exchange: LssExchange) -> float:
         if exchange.reply is None and not exchange.by_many:
             return _PAUSE_S
         least_s = self._timeout_s * (_FIRST_QUESTION if exchange.is_first else 1)
@@ -123,7 +123,7 @@ class LssErrand(Generic[_R]):
         self._finished = True
 
 
-def select(which: Identity | None) -> Service[None]:
+def select(which: LssAddress | None) -> Service[None]:
     """One device to configuration state: the one with this identity, or the only one on the bus."""
     if which is None:
         yield from lss.switch_global(configuration=True)
@@ -132,7 +132,7 @@ def select(which: Identity | None) -> Service[None]:
         yield from lss.switch_selective(which)
 
 
-def inquire(which: Identity | None) -> Service[tuple[Identity, int]]:
+def inquire(which: LssAddress | None) -> Service[tuple[LssAddress, int]]:
     """Identity and node id of a device."""
     yield from select(which)
     identity = yield from lss.inquire_identity()
@@ -141,7 +141,7 @@ def inquire(which: Identity | None) -> Service[tuple[Identity, int]]:
     return identity, node_id
 
 
-def set_node_id(which: Identity | None, node_id: int, *, keep: bool) -> Service[None]:
+def set_node_id(which: LssAddress | None, node_id: int, *, keep: bool) -> Service[None]:
     """A new node id; ``keep`` stores it. A device that had none takes it when it leaves configuration."""
     yield from select(which)
     yield from lss.configure_node_id(node_id)
@@ -151,7 +151,7 @@ def set_node_id(which: Identity | None, node_id: int, *, keep: bool) -> Service[
 
 
 def set_bit_rate(
-    which: Identity | None, bit_rate: int | None, *, keep: bool, activate_ms: int | None
+    which: LssAddress | None, bit_rate: int | None, *, keep: bool, activate_ms: int | None
 ) -> Service[None]:
     """A new bit rate, valid after the device's next start, or within twice ``activate_ms`` from now."""
     yield from select(which)
@@ -164,7 +164,7 @@ def set_bit_rate(
         yield from lss.activate_bit_rate(activate_ms)
 
 
-def keep_settings(which: Identity | None) -> Service[None]:
+def keep_settings(which: LssAddress | None) -> Service[None]:
     """Store node id and bit rate as they are set."""
     yield from select(which)
     yield from lss.store()

@@ -16,7 +16,7 @@ class MutableBus:
         self._bus = bus
         self._heard = heard
         self._accepted: list[int] = []
-        self._beating: set[int] = set()
+        self._bursting: set[int] = set()
         self._muted: frozenset[int] | None = None
         """The identifiers that are muted alone; None: all are."""
         self._sent_at: dict[int, float] = {}
@@ -35,7 +35,7 @@ class MutableBus:
 
     def accept(self, can_ids: list[int]) -> None:
         self._accepted = can_ids
-        self._bus.accept([*can_ids, *self._beating.difference(can_ids)])
+        self._bus.accept([*can_ids, *self._bursting.difference(can_ids)])
 
     def watch(self, can_ids: frozenset[int]) -> None:
         self._bus.watch(can_ids)
@@ -46,7 +46,7 @@ class MutableBus:
     def drain(self, now: float) -> list[Frame]:
         frames = self._bus.drain(now)
         for frame in frames:
-            if frame.can_id in self._beating:
+            if frame.can_id in self._bursting:
                 self._note(frame.can_id, frame.time)
             else:
                 self._heard(frame)
@@ -71,7 +71,7 @@ class MutableBus:
             default=float("-inf"),
         )
 
-    def beat(
+    def burst(
         self,
         frames: tuple[Frame, ...],
         now: float,
@@ -84,21 +84,21 @@ class MutableBus:
         can_id = frames[0].can_id
         if self._mutes(can_id):
             return
-        if can_id not in self._beating:
-            self._beating.add(can_id)
+        if can_id not in self._bursting:
+            self._bursting.add(can_id)
             self.accept(self._accepted)
-        self._bus.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
+        self._bus.burst(frames, now, period_s, count, at_once=at_once, ending=ending)
 
-    def silence(self, can_id: int) -> None:
-        self._bus.silence(can_id)
+    def end_burst(self, can_id: int) -> None:
+        self._bus.end_burst(can_id)
 
     def mute(self, only: frozenset[int] | None = None) -> None:
         """From now on nothing is sent: no SYNC, no RPDO, no heartbeat, no guarding, no SDO; or nothing on the
         identifiers in ``only``."""
         self.is_muted, self._muted = True, only
-        for can_id in self._beating:
+        for can_id in self._bursting:
             if self._mutes(can_id):
-                self._bus.silence(can_id)
+                self._bus.end_burst(can_id)
 
     def unmute(self) -> None:
         self.is_muted = False

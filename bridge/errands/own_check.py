@@ -29,7 +29,7 @@ def ask(node: Node) -> Generator[Read, bytes | None, Judgements]:
     return found
 
 
-class AuditErrand:
+class OwnCheck:
     """All nodes side by side. ``found`` has what was read, by drive; ``failed`` why a node could not be
     asked, by node."""
 

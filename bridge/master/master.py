@@ -107,7 +107,7 @@ class _Line:
         if beat.until is not None and beat.until < now + 2 * self.burst_s + beat.period_s:
             ending = BurstEnd(beat.until, beat.then())
         count = burst_length(beat.period_s, self.network.bus.deadman_ms)
-        self.bus.beat(beat.frames, now, beat.period_s, count, at_once=at_once, ending=ending)
+        self.bus.burst(beat.frames, now, beat.period_s, count, at_once=at_once, ending=ending)
         ends = now + self.burst_s + beat.period_s
         self.beating[beat.frames[0].can_id] = Told(beat.frames, beat.until, ends, now)
 
@@ -196,7 +196,7 @@ class Master:
             self._timer.close()
         for line in self._lines:
             for can_id in line.beating:
-                line.bus.silence(can_id)
+                line.bus.end_burst(can_id)
         self._close_buses()
 
     def _close_buses(self) -> None:
@@ -374,7 +374,7 @@ class Master:
         ended = set[int]() if is_same else line.ended(beats, frames)
         # First: the kernel must not repeat an enabling word once more after a stopped one.
         for can_id in ended:
-            bus.silence(can_id)
+            bus.end_burst(can_id)
             del line.beating[can_id]
         for frame in frames:
             bus.send(frame, now, now + _SEND_LIMIT_S)

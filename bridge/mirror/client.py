@@ -15,7 +15,7 @@ from bridge.errors import OperationFailed
 from bridge.guard import Guard
 from bridge.image import Image, Quality
 from bridge.mirror import protocol
-from bridge.mirror.protocol import Asked, Changed, Counted, Delta, Malformed, Snapshot
+from bridge.mirror.protocol import Changed, Counted, Delta, Malformed, RequestMessage, Snapshot
 from bridge.mirror.rejections import Rejections
 from bridge.quietlog import about
 from bridge.zenohlink import Message, ZenohLink, zenoh_config
@@ -90,7 +90,7 @@ class MirrorClient:
         if request.received_at is None:
             request = replace(request, received_at=self._clock())
         try:
-            payload = protocol.encode_request(Asked(self._clock() + timeout_s, request))
+            payload = protocol.encode_request(RequestMessage(self._clock() + timeout_s, request))
         except Malformed as error:
             return Outcome(Code.NOT_VALID, str(error), forwarded=False)
         answers = await self._link.get(protocol.REQUEST, payload, timeout_s=timeout_s)

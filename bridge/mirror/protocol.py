@@ -1,7 +1,8 @@
 """What goes over the link between the bus process and its fronts, in MessagePack. Pure.
 
-Times are ns since 1970 UTC, except those in ``Asked``, ``Request`` and ``Rejected``, which are in seconds of
-the monotonic clock: both ends run on one machine, and a stepped wall clock must not make a request old.
+Times are ns since 1970 UTC, except those in ``RequestMessage``, ``Request`` and ``Rejected``, which are in
+seconds of the monotonic clock: both ends run on one machine, and a stepped wall clock must not make a
+request old.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ class Delta(msgspec.Struct, array_like=True, frozen=True):
     readings: tuple[Changed, ...]
 
 
-class Told(msgspec.Struct, array_like=True, frozen=True):
+class EventMessage(msgspec.Struct, array_like=True, frozen=True):
     """An event."""
 
     time_ns: int
@@ -75,7 +76,7 @@ class Told(msgspec.Struct, array_like=True, frozen=True):
     message: str
 
     @classmethod
-    def of(cls, event: Event, time_ns: int) -> Told:
+    def of(cls, event: Event, time_ns: int) -> EventMessage:
         return cls(time_ns, event.kind, event.source, event.severity, event.message)
 
     def event(self) -> Event:
@@ -83,14 +84,14 @@ class Told(msgspec.Struct, array_like=True, frozen=True):
         return Event(self.time_ns / 1e9, self.kind, self.source, self.severity, self.message)
 
 
-class Asked(NamedTuple):
+class RequestMessage(NamedTuple):
     """A request that is valid until ``deadline_s`` of the monotonic clock."""
 
     deadline_s: float
     request: Request
 
 
-class _Asked(msgspec.Struct, array_like=True, frozen=True):
+class _RequestFields(msgspec.Struct, array_like=True, frozen=True):
     """The same as it goes over the link: what a command's fields are is told by its action."""
 
     deadline_s: float
@@ -120,15 +121,15 @@ class Counted(msgspec.Struct, array_like=True, frozen=True):
 _encoder = msgspec.msgpack.Encoder()
 _snapshot = msgspec.msgpack.Decoder(Snapshot)
 _delta = msgspec.msgpack.Decoder(Delta)
-_told = msgspec.msgpack.Decoder(Told)
-_asked = msgspec.msgpack.Decoder(_Asked)
+_told = msgspec.msgpack.Decoder(EventMessage)
+_asked = msgspec.msgpack.Decoder(_RequestFields)
 _commands = {action: msgspec.msgpack.Decoder(kind) for action, kind in COMMANDS.items()}
 _outcome = msgspec.msgpack.Decoder(Outcome)
 _rejected = msgspec.msgpack.Decoder(Rejected)
 _counted = msgspec.msgpack.Decoder(Counted)
 
 
-def encode(message: Snapshot | Delta | Told | Rejected | Counted | Outcome) -> bytes:
+def encode(message: Snapshot | Delta | EventMessage | Rejected | Counted | Outcome) -> bytes:
     """Raises nothing: a text that is not Unicode, or a number too long for MessagePack, is changed, because
     one bad value of a client must not cost the whole message."""
     try:
@@ -137,13 +138,13 @@ def encode(message: Snapshot | Delta | Told | Rejected | Counted | Outcome) -> b
         return _encoder.encode(_encodable(msgspec.to_builtins(message)))
 
 
-def encode_request(asked: Asked) -> bytes:
+def encode_request(asked: RequestMessage) -> bytes:
     """A request is never changed. Raises Malformed for one that cannot be encoded."""
     request = asked.request
     try:
         command = msgspec.Raw(_encoder.encode(request.command))
         who, came = (request.identity, request.target), (request.received_at, request.pressed)
-        return _encoder.encode(_Asked(asked.deadline_s, *who, request.action, command, *came))
+        return _encoder.encode(_RequestFields(asked.deadline_s, *who, request.action, command, *came))
     except (UnicodeError, OverflowError) as error:
         raise Malformed(f"cannot be passed on: {error}") from None
 
@@ -181,12 +182,12 @@ def decode_event(data: bytes) -> Event:
     return _decode(_told, data).event()
 
 
-def decode_request(data: bytes) -> Asked:
+def decode_request(data: bytes) -> RequestMessage:
     asked = _decode(_asked, data)
     decoder = _commands.get(asked.action)
     command = Do(asked.action) if decoder is None else _decode(decoder, bytes(asked.command))
     request = Request(asked.identity, asked.target, command, asked.received_at, asked.pressed)
-    return Asked(asked.deadline_s, request)
+    return RequestMessage(asked.deadline_s, request)
 
 
 def decode_rejected(data: bytes) -> Rejected:

@@ -15,7 +15,7 @@ from bridge.command.request import STOP_ACTIONS
 from bridge.errors import Unavailable
 from bridge.mirror import protocol
 from bridge.mirror.endpoint import close_to_others, prepare_folder
-from bridge.mirror.protocol import Changed, Delta, Malformed, Snapshot, Told
+from bridge.mirror.protocol import Changed, Delta, EventMessage, Malformed, Snapshot
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 
 _log = logging.getLogger(__name__)
@@ -118,9 +118,9 @@ class MirrorPublisher:
         return Changed.of(index, reading, at_zero_ns + round(reading.time * 1e9))
 
     def _on_event(self, event: Event) -> None:
-        self._send(protocol.EVENT, Told.of(event, self._epoch(event.time)))
+        self._send(protocol.EVENT, EventMessage.of(event, self._epoch(event.time)))
 
-    def _send(self, key: str, message: Delta | Told) -> None:
+    def _send(self, key: str, message: Delta | EventMessage) -> None:
         self._link.send(Message(key, protocol.encode(message)))
 
     # in

@@ -25,7 +25,7 @@ _AGAIN_S: Final = 1.0
 
 
 @dataclass(slots=True)
-class _Asked:
+class _Watched:
     drive: Drive
     sdo: SdoChannel
     due: float = math.inf
@@ -45,7 +45,7 @@ class FaultReading:
         # Some families have a number for "no fault" that is not 0.
         self._none = family.emcy.event.gone if family.emcy.event else None
         self._current, self._last = parameter(faults.current), parameter(faults.last)
-        self._drives: dict[str, _Asked] = {}
+        self._drives: dict[str, _Watched] = {}
         self._look_at: float | None = None
         self._now = 0.0
         if self._current is None and self._last is None:
@@ -53,7 +53,7 @@ class FaultReading:
         for drive in node.drives:
             number = channel_of(node, drive.slot)
             if number is not None:
-                self._drives[drive.name] = _Asked(drive, sdo[number])
+                self._drives[drive.name] = _Watched(drive, sdo[number])
 
     def start(self, now: float) -> None:
         """The node is in operation: each drive is asked once, for what it remembers."""
@@ -90,7 +90,7 @@ class FaultReading:
                 asked.due = now + _AGAIN_S if is_faulted else math.inf
                 self._ask(asked, now)
 
-    def _ask(self, asked: _Asked, now: float) -> None:
+    def _ask(self, asked: _Watched, now: float) -> None:
         channel = asked.drive.channel
 
         def tell_current(value: float) -> None:

@@ -1,5 +1,5 @@
 """Parameters of drives by the vendor's own names: what they are called, how they are coded, what writing
-them wears out, and whole sets of them. No bus in here."""
+them wears out, and backups of them. No bus in here."""
 
 from bridge.parameter.access import DriveParameters, Reading, Transfer, Written
 from bridge.parameter.definition import Address, Definition, Entry

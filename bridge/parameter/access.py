@@ -57,7 +57,6 @@ class Written:
     reading: Reading
     before: Value | None
     changed: bool
-    in_eeprom: bool = False
     warning: str = ""
 
 
@@ -178,7 +177,7 @@ class DriveParameters:
         # Also where the answer was lost: it may have been written.
         warning = self._count(key, entry.name, now) if wears else ""
         if blind:
-            return Written(Reading(entry, _held(entry, data, value), now), None, True, wears, warning)
+            return Written(Reading(entry, _held(entry, data, value), now), None, True, warning)
         try:
             held, now = yield from self._fetch(entry, now, 0.0)
         except ParameterError as error:
@@ -189,7 +188,7 @@ class DriveParameters:
             found = shown(entry, decode(entry, held))
             raise ParameterError(Why.NOT_TAKEN, f"{entry.name}: the drive took the value and holds {found}")
         was = None if before is None else decode(entry, before)
-        return Written(Reading(entry, _held(entry, held, value), now), was, True, wears, warning)
+        return Written(Reading(entry, _held(entry, held, value), now), was, True, warning)
 
     def check_writable(self, entry: Entry) -> None:
         """Raises ``ParameterError`` for what nobody writes by this way."""

@@ -11,7 +11,7 @@ from bridge.sim.cia402_homing import METHODS
 from bridge.sim.cia402_settings import INCREMENTS, SUPPORTED_MODES, Cia402Settings, Mode
 from bridge.sim.cia402_supervision import is_consumer_entry
 from bridge.sim.communication_objects import (
-    Identity,
+    DeviceIdentity,
     Memory,
     add_errors,
     add_identity,
@@ -26,7 +26,7 @@ from bridge.sim.pdo_objects import PdoObjects
 from bridge.sim.settings import CommunicationSettings
 from bridge.sim.store import Store
 
-IDENTITY: Final = Identity(
+IDENTITY: Final = DeviceIdentity(
     device_type=0x0002_0192,  # a servo drive with this profile
     vendor_id=0,
     product_code=0x402,

@@ -17,7 +17,7 @@ _LOAD: Final = int.from_bytes(b"load", "little")
 
 
 @dataclass(frozen=True, slots=True)
-class Identity:
+class DeviceIdentity:
     """What the node says it is."""
 
     device_type: int
@@ -38,7 +38,7 @@ class Memory:
     load: Callable[[], None]
 
 
-def add_identity(dictionary: Dictionary, identity: Identity, status: Callable[[], int]) -> None:
+def add_identity(dictionary: Dictionary, identity: DeviceIdentity, status: Callable[[], int]) -> None:
     """1000h, 1002h, 1008h…100Ah and 1018h."""
     dictionary.add(0x1000, 0, constant(DataType.UNSIGNED32, identity.device_type))
     dictionary.add(0x1002, 0, Number(DataType.UNSIGNED32, status))

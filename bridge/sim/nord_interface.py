@@ -9,7 +9,7 @@ from typing import Final, Literal
 
 from bridge.sim.abort import AbortCode, SdoAbort
 from bridge.sim.communication_objects import (
-    Identity,
+    DeviceIdentity,
     Memory,
     add_errors,
     add_identity,
@@ -56,9 +56,9 @@ class InterfaceParts:
     set_profile: Callable[[bool], None]
 
 
-def identity(device_name: str) -> Identity:
+def identity(device_name: str) -> DeviceIdentity:
     """What a NORD node says of itself."""
-    return Identity(
+    return DeviceIdentity(
         device_type=0x0001_0192,  # CiA 402, frequency converter
         vendor_id=0,  # the manual prints none of the numbers of 1018h, and an invented one would be believed
         product_code=0,

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from bridge.sim.abort import AbortCode, SdoAbort
-from bridge.sim.communication_objects import Identity, add_identity, add_protocols, add_sdo_servers
+from bridge.sim.communication_objects import DeviceIdentity, add_identity, add_protocols, add_sdo_servers
 from bridge.sim.dictionary import DataType as Type
 from bridge.sim.dictionary import Dictionary, Number, constant
 from bridge.sim.settings import COB_ID_MASK, DISABLED, CommunicationSettings, SdoSettings
@@ -19,9 +19,9 @@ _SYNC_MOST_US: Final = 32_000_000
 _SYNC_MOST: Final = 0x7FF
 
 
-def identity(rated_power_kw: float, name: str) -> Identity:
+def identity(rated_power_kw: float, name: str) -> DeviceIdentity:
     """§11.1: the product code is the rated power in 0.1 kW."""
-    return Identity(
+    return DeviceIdentity(
         device_type=0x0002_0192,
         vendor_id=0xB9,
         product_code=round(rated_power_kw * 10),
@@ -59,7 +59,11 @@ class CommunicationObjects:
         self.saves = 0
 
     def add_to(
-        self, dictionary: Dictionary, who: Identity, register: Callable[[], int], state: Callable[[], int]
+        self,
+        dictionary: Dictionary,
+        who: DeviceIdentity,
+        register: Callable[[], int],
+        state: Callable[[], int],
     ) -> None:
         """``register`` is 1001h, ``state`` 1002h."""
         add_identity(dictionary, who, state)

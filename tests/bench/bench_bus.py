@@ -10,7 +10,7 @@ import canopen
 from canopen.objectdictionary import UNSIGNED16
 
 from bridge.canopen.frame import Frame
-from bridge.canopen.pdo import Entry, PdoCodec
+from bridge.canopen.pdo import PdoCodec, PdoEntry
 from bridge.command.link import NodeState
 from bridge.node.boot import PdoPlan
 from bridge.node.process.process_data import DrivePdos
@@ -32,7 +32,7 @@ def test_a_pdo_from_frame_to_image(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path), present=False)
     drive = bench.plant.drives["conveyor/fu1"]
     bench.plant.on_node(bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, 1.0)
-    entries = tuple(Entry(0x3001 if n == 0 else 0x3003, max(n, 1), 16) for n in range(4))
+    entries = tuple(PdoEntry(0x3001 if n == 0 else 0x3003, max(n, 1), 16) for n in range(4))
     plan = PdoPlan(0x185, 255, 250, PdoCodec(entries), tuple(Place(n) for n in range(4)))
     (tpdo,) = DrivePdos(drive, [plan], [plan], lambda frame, why: None).tpdos
     changing, same = frames(COUNT), [Frame(0x185, bytes(8), 1.0)] * COUNT

@@ -68,7 +68,7 @@ class Loop:
         self.bus.send(frame, now, now + 0.1)
 
     def beat(self, *frames: Frame, period_s: float = 0.01, count: int = 10, at_once: bool = False) -> None:
-        self.bus.beat(frames, time.monotonic(), period_s, count, at_once=at_once)
+        self.bus.burst(frames, time.monotonic(), period_s, count, at_once=at_once)
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from typing import Any
 
 from bridge.can.burstend import BurstEnd
 from bridge.can.interface import BusStatus, ControllerState
-from bridge.can.softbeat import SoftBeat
+from bridge.can.softbursts import SoftBursts
 from bridge.canopen.frame import Frame
 from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Source, command_of
 from bridge.config import Site, load_site
@@ -55,7 +55,7 @@ class ClockBus:
         self.ours: frozenset[int] = frozenset()
         self.foreign: list[Frame] = []
         self._deliver = deliver
-        self._beats = SoftBeat()
+        self._bursts = SoftBursts()
 
     def open(self, wake: Callable[[], None]) -> None: ...
 
@@ -77,7 +77,7 @@ class ClockBus:
         if self.status.state is not ControllerState.DOWN:
             self._deliver(frame._replace(time=now))
 
-    def beat(
+    def burst(
         self,
         frames: tuple[Frame, ...],
         now: float,
@@ -87,27 +87,27 @@ class ClockBus:
         at_once: bool = False,
         ending: BurstEnd | None = None,
     ) -> None:
-        frame = self._beats.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
+        frame = self._bursts.start(frames, now, period_s, count, at_once=at_once, ending=ending)
         if frame is not None:
-            self._send_beat(frame, now)
+            self._send_of_burst(frame, now)
 
-    def _send_beat(self, frame: Frame, now: float) -> None:
+    def _send_of_burst(self, frame: Frame, now: float) -> None:
         self.send(frame, now, now)
         if frame.can_id in self.accepted:
             self.inbox.append(frame._replace(time=now))
 
-    def silence(self, can_id: int) -> None:
-        self._beats.silence(can_id)
+    def end_burst(self, can_id: int) -> None:
+        self._bursts.end(can_id)
 
     def next_deadline(self) -> float | None:
-        return self._beats.next_deadline()
+        return self._bursts.next_deadline()
 
     def on_time(self, now: float) -> None:
-        for frame in self._beats.due(now):
-            self._send_beat(frame, now)
+        for frame in self._bursts.due(now):
+            self._send_of_burst(frame, now)
 
     def clear(self) -> None:
-        self._beats.clear()
+        self._bursts.clear()
 
     def close(self) -> None:
         self.clear()

@@ -21,7 +21,7 @@ class _WiredBus(ClockBus):
     def send(self, frame: Frame, now: float, deadline: float) -> None:
         self._bench.waiting.append((frame, deadline, True))
 
-    def _send_beat(self, frame: Frame, now: float) -> None:
+    def _send_of_burst(self, frame: Frame, now: float) -> None:
         self._bench.replace(frame, from_master=True)
 
 

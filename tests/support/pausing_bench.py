@@ -10,7 +10,7 @@ from math import inf
 
 from bridge.can.burstend import BurstEnd
 from bridge.can.interface import ControllerState
-from bridge.can.kernelbeat import KernelBeat
+from bridge.can.kernelbursts import KernelBursts
 from bridge.canopen.frame import Frame
 from bridge.config import Site
 from bridge.mapping import load_family
@@ -46,10 +46,10 @@ class KernelBus(ClockBus):
     def __init__(self, bench: PausingBench) -> None:
         super().__init__(bench.from_master)
         self.kernel = BroadcastManager(lambda: bench.now, bench.from_kernel)
-        self.bursts = KernelBeat(bench.clock)
+        self.bursts = KernelBursts(bench.clock)
         self.bursts.open(self.kernel)
 
-    def beat(
+    def burst(
         self,
         frames: tuple[Frame, ...],
         now: float,
@@ -59,12 +59,12 @@ class KernelBus(ClockBus):
         at_once: bool = False,
         ending: BurstEnd | None = None,
     ) -> None:
-        frame = self.bursts.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
+        frame = self.bursts.start(frames, now, period_s, count, at_once=at_once, ending=ending)
         if frame is not None and self.status.state is not ControllerState.DOWN:
             self.send(frame, now, now)
 
-    def silence(self, can_id: int) -> None:
-        self.bursts.silence(can_id, 0.0)
+    def end_burst(self, can_id: int) -> None:
+        self.bursts.end(can_id, 0.0)
 
     def next_deadline(self) -> float | None:
         return self.bursts.next_deadline()

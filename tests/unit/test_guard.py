@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from bridge.command import Event, Kind
-from bridge.fronts import give_reason
+from bridge.front_process import give_reason
 from bridge.guard import Guard
 from bridge.notify import Notifier
 from tests.support import sites

@@ -25,7 +25,7 @@ _OTHERS = (
 )
 
 
-@pytest.mark.parametrize(("word", "imported"), [("version", ""), ("run", "import bridge.front; ")])
+@pytest.mark.parametrize(("word", "imported"), [("version", ""), ("run", "import bridge.opcua_front; ")])
 def test_a_command_does_not_import_the_others(word: str, imported: str) -> None:
     script = (
         f"import sys; from bridge.cli.app import make_app; make_app({word!r}); {imported}print(*sys.modules)"

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 from pymodbus.client import ModbusTcpClient
 
-from bridge import fronts, parts
+from bridge import front_process, parts
 from bridge.errors import OperationFailed
-from bridge.fronts import Front, give_signs
+from bridge.front_process import Front, give_signs
 from bridge.notify import Notifier
 from tests.support import sites
 from tests.support.process import REPOSITORY, Process, drivebridge, running, until
@@ -36,7 +36,7 @@ class Spawns:
         self.count = 0
         self._scripts = scripts
         self._spawn = asyncio.create_subprocess_exec
-        monkeypatch.setattr(fronts.asyncio, "create_subprocess_exec", self)
+        monkeypatch.setattr(front_process.asyncio, "create_subprocess_exec", self)
 
     async def __call__(self, *arguments: str, **options: object) -> asyncio.subprocess.Process:
         script = self._scripts[min(self.count, len(self._scripts) - 1)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from bridge.canopen.pdo import Entry
+from bridge.canopen.pdo import PdoEntry
 from bridge.mapping.model import MappedObject, Pdo
 from bridge.node.process.words import WORD_BITS, Place
 
@@ -22,25 +22,25 @@ def layouts(pdos: Sequence[Pdo], words: Sequence[Sequence[str]], process: Sequen
     }
 
 
-def factory_entries(pdo: Pdo) -> tuple[Entry, ...]:
+def factory_entries(pdo: Pdo) -> tuple[PdoEntry, ...]:
     """The mapping as the mapping file has it. An object that is named for several words in a row fills
     them all."""
-    entries: list[Entry] = []
+    entries: list[PdoEntry] = []
     before: MappedObject | None = None
     for refs in pdo.objects:
         first = refs[0]
         if before is not None and before.parts == first.parts and not first.is_composite:
             last = entries[-1]
             if not first.bits[0]:
-                entries[-1] = Entry(last.index, last.sub, last.bits + WORD_BITS)
+                entries[-1] = PdoEntry(last.index, last.sub, last.bits + WORD_BITS)
         else:
             for part, bits in zip(first.parts, first.lengths, strict=True):
-                entries.append(Entry(part.index, part.sub, bits))
+                entries.append(PdoEntry(part.index, part.sub, bits))
         before = first
     return tuple(entries)
 
 
-def match_words(entries: Sequence[Entry], known: Layouts) -> tuple[Place | None, ...]:
+def match_words(entries: Sequence[PdoEntry], known: Layouts) -> tuple[Place | None, ...]:
     """For each entry its place, by the layout of the mapping file that explains the most of them."""
     best: tuple[Place | None, ...] = (None,) * len(entries)
     for layout in range(max((len(refs) for refs in known.values()), default=0)):
@@ -72,7 +72,7 @@ def _places(known: Layouts, layout: int) -> dict[_Object, Place]:
 
 
 def differences(
-    entries: Sequence[Entry], expected: Sequence[Entry], places: Sequence[Place | None]
+    entries: Sequence[PdoEntry], expected: Sequence[PdoEntry], places: Sequence[Place | None]
 ) -> list[str]:
     """What the node has otherwise than the mapping file, entry by entry."""
     told: list[str] = []

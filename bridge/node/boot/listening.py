@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.canopen import cobid
 from bridge.canopen.dialogue import optional
-from bridge.canopen.pdo import Entry, MappingError, PdoCodec
+from bridge.canopen.pdo import MappingError, PdoCodec, PdoEntry
 from bridge.command import Drive
 from bridge.command.plant import Node
 from bridge.mapping.model import Family, Pdo, Slot
@@ -37,7 +37,7 @@ def _rpdo(drive: Drive, pdo: Pdo) -> Generator[Action, bytes | None, PdoPlan | N
     if cob_id & (cobid.PDO_DISABLED | cobid.PDO_EXTENDED) or not cobid.is_for_pdos(identifier):
         return None
     kind = number((yield from optional(parameter, 2)), _FACTORY_TYPE)
-    entries: tuple[Entry, ...] = ()
+    entries: tuple[PdoEntry, ...] = ()
     if not pdo.static:
         with suppress(MappingError):
             entries = yield from read_entries(mapping, number((yield from optional(mapping, 0))))
@@ -49,7 +49,7 @@ def rpdo_plan(
     slot: Slot,
     pdo: Pdo,
     cob_id: int,
-    entries: Sequence[Entry] = (),
+    entries: Sequence[PdoEntry] = (),
     kind: int = _FACTORY_TYPE,
 ) -> PdoPlan:
     """An RPDO of a drive with this mapping; with the mapping file's where there is none, or none that can be

@@ -12,7 +12,7 @@ from typing import Final
 
 from bridge.canopen import cobid
 from bridge.canopen.dialogue import Write, optional
-from bridge.canopen.pdo import Entry, MappingError
+from bridge.canopen.pdo import MappingError, PdoEntry
 from bridge.canopen.sdo import SdoError
 from bridge.config import PdoTable
 from bridge.config.model import MappedObject
@@ -49,7 +49,7 @@ class PdoObjects:
     default_cob_id: int
 
 
-def table_for(pdo: Pdo, factory: Sequence[Entry], asked: PdoTable | None) -> PdoTable | None:
+def table_for(pdo: Pdo, factory: Sequence[PdoEntry], asked: PdoTable | None) -> PdoTable | None:
     """What this PDO is to be brought to: what the site file asks, and beside that, where the mapping file
     says ``write``, what that has. None where nothing is to be written."""
     if not pdo.write:
@@ -78,7 +78,7 @@ def set_pdo(objects: PdoObjects, wanted: PdoTable, result: BootResult) -> Do:
     ):
         if value is not None and number((yield from optional(objects.parameter, sub)), -1) != value:
             changes.append(Change(objects.parameter, sub, size, value))
-    entries = [Entry(ref.index, ref.sub, ref.bits) for ref in wanted.mapping]
+    entries = [PdoEntry(ref.index, ref.sub, ref.bits) for ref in wanted.mapping]
     maps = False
     if entries:
         have = yield from _mapping(objects.mapping)

@@ -13,7 +13,7 @@ from typing import Final
 
 from bridge.canopen import cobid
 from bridge.canopen.dialogue import Read, optional
-from bridge.canopen.pdo import Entry, MappingError, PdoCodec
+from bridge.canopen.pdo import MappingError, PdoCodec, PdoEntry
 from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
 from bridge.command.plant import Node
@@ -223,11 +223,11 @@ def plan_node_tpdos(node: Node, result: BootResult) -> Generator[Action, bytes |
             result.node_tpdos.append(NodePdoPlan(plan, names))
 
 
-def read_entries(mapping: int, count: int) -> Generator[Action, bytes | None, tuple[Entry, ...]]:
+def read_entries(mapping: int, count: int) -> Generator[Action, bytes | None, tuple[PdoEntry, ...]]:
     """The mapping as the node has it. Raises MappingError where it cannot be one."""
     if count > MOST_ENTRIES:
         raise MappingError(f"{mapping:04X}h:00 is {count}, at most {MOST_ENTRIES} objects can be mapped")
-    entries: tuple[Entry, ...] = ()
+    entries: tuple[PdoEntry, ...] = ()
     for sub in range(1, count + 1):
         try:
             value = number((yield Read(mapping, sub)))
@@ -236,5 +236,5 @@ def read_entries(mapping: int, count: int) -> Generator[Action, bytes | None, tu
                 raise
             raise MappingError(str(error)) from None
         if value:  # some nodes have a fixed count, and 0 in the places that they do not use
-            entries = (*entries, Entry.from_object(value))
+            entries = (*entries, PdoEntry.from_object(value))
     return entries

@@ -11,7 +11,7 @@ from bridge.node.process.process_data import DrivePdos
 
 
 @dataclass(slots=True)
-class _Asked:
+class _Polled:
     request: Frame
     period_s: float
     due: float
@@ -21,13 +21,13 @@ class RemotePolling:
     """The TPDOs of one node that have to be asked for, each in its drive's ``rtr_poll_ms``."""
 
     def __init__(self) -> None:
-        self._asked: list[_Asked] = []
+        self._asked: list[_Polled] = []
         self._frames: list[Frame] = []
 
     def start(self, drives: Iterable[DrivePdos], now: float) -> None:
         self._asked = [
             # The length of what is asked for: the two must not differ on the wire (ISO 11898-1).
-            _Asked(Frame(tpdo.cob_id | REMOTE, bytes(tpdo.plan.codec.length)), tpdo.rtr_poll_s, now)
+            _Polled(Frame(tpdo.cob_id | REMOTE, bytes(tpdo.plan.codec.length)), tpdo.rtr_poll_s, now)
             for pdos in drives
             for tpdo in pdos.tpdos
             if tpdo.plan.transmission_type in REMOTE_TYPES and tpdo.plan.remote_allowed

@@ -11,7 +11,7 @@ from typing import Final
 
 from bridge.canopen import cobid
 from bridge.canopen.frame import Frame
-from bridge.canopen.pdo import Entry
+from bridge.canopen.pdo import PdoEntry
 from bridge.command import Drive
 from bridge.command.plant import Node
 from bridge.config import PdoTable
@@ -82,7 +82,7 @@ def _known(node: Node, drive: Drive, downloads: Sequence[Download]) -> Iterator[
             yield rpdo_plan(drive.family, drive.slot, pdo, *configured)
         asked = _asked(drive, pdo)
         if asked is not None and asked.enable:
-            entries = [Entry(ref.index, ref.sub, ref.bits) for ref in asked.mapping]
+            entries = [PdoEntry(ref.index, ref.sub, ref.bits) for ref in asked.mapping]
             yield rpdo_plan(drive.family, drive.slot, pdo, asked.cob_id or factory_id, entries)
 
 
@@ -92,7 +92,7 @@ def _asked(drive: Drive, pdo: Pdo) -> PdoTable | None:
     return next((table for table in drive.table.rpdo if (table.number or first) == pdo.number), None)
 
 
-def _configured(pdo: Pdo, downloads: Sequence[Download]) -> tuple[int, list[Entry]] | None:
+def _configured(pdo: Pdo, downloads: Sequence[Download]) -> tuple[int, list[PdoEntry]] | None:
     """COB-ID and mapping that are downloaded for this PDO; no entries where none are."""
     held = {(one.index, one.sub): int.from_bytes(one.data, "little") for one in downloads}
     cob_id = held.get((_RPDO + pdo.number - 1, 1), cobid.PDO_DISABLED)
@@ -101,7 +101,7 @@ def _configured(pdo: Pdo, downloads: Sequence[Download]) -> tuple[int, list[Entr
     mapping = _MAPPING + pdo.number - 1
     count = min(MOST_ENTRIES, held.get((mapping, 0), 0))
     words = [held.get((mapping, sub), 0) for sub in range(1, count + 1)]
-    return cob_id & cobid.COB_ID_MASK, [Entry.from_object(word) for word in words if word]
+    return cob_id & cobid.COB_ID_MASK, [PdoEntry.from_object(word) for word in words if word]
 
 
 def _given_ids(node: Node, downloads: Sequence[Download]) -> Iterator[int]:

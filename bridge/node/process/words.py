@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from bridge.canopen.pdo import Entry
+from bridge.canopen.pdo import PdoEntry
 
 WORD_BITS: Final = 16
 _WORD_MASK: Final = 0xFFFF
@@ -33,7 +33,7 @@ class WordMap:
 
     __slots__ = ("_count", "_parts", "_shared", "_whole", "is_in_order")
 
-    def __init__(self, entries: Sequence[Entry], places: Sequence[Place | None], words: int) -> None:
+    def __init__(self, entries: Sequence[PdoEntry], places: Sequence[Place | None], words: int) -> None:
         """``words`` is how many the drive has; what lies beyond them is left out."""
         self._count = len(entries)
         whole: list[tuple[int, int, int]] = []

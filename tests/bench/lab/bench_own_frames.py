@@ -34,7 +34,7 @@ async def cpu_us(*, watched: bool) -> float:
             if now >= renew_at:
                 renew_at = now + 0.033
                 for frame in RPDOS:
-                    bus.beat((frame,), now, PERIOD_S, 10)
+                    bus.burst((frame,), now, PERIOD_S, 10)
             assert bus.take_foreign(now) == []
             bus.on_time(now)
             await asyncio.sleep(0.01)

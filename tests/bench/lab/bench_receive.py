@@ -12,7 +12,7 @@ from pathlib import Path
 import canopen
 
 from bridge.can.socketcan import SocketCanBus
-from bridge.canopen.pdo import Entry, PdoCodec
+from bridge.canopen.pdo import PdoCodec, PdoEntry
 from bridge.command.link import NodeState
 from bridge.node.boot import PdoPlan
 from bridge.node.process.process_data import DrivePdos
@@ -43,7 +43,7 @@ async def measure_ours(folder: Path) -> float:
     bench = Bench(write_site(folder), present=False)
     drive = bench.plant.drives["conveyor/fu1"]
     bench.plant.on_node(bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, time.monotonic())
-    entries = tuple(Entry(0x3001 if n == 0 else 0x3003, max(n, 1), 16) for n in range(4))
+    entries = tuple(PdoEntry(0x3001 if n == 0 else 0x3003, max(n, 1), 16) for n in range(4))
     plan = PdoPlan(0x185, 255, 250, PdoCodec(entries), (0, 1, 2, 3))
     pdos = DrivePdos(drive, plan, plan, lambda frame, why: None)
     routes = {0x185: pdos.on_tpdo}

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.can.burstend import MOST_FRAMES, BurstEnd, sequence
-from bridge.can.kernelbeat import KernelBeat
-from bridge.can.softbeat import SoftBeat
+from bridge.can.kernelbursts import KernelBursts
+from bridge.can.softbursts import SoftBursts
 from bridge.canopen.frame import Frame
 from tests.support.broadcast_manager import BroadcastManager
 
@@ -29,7 +29,7 @@ class Bench:
         """How long the process stands still at its next looks at the clock and messages, before each."""
         self.seen: list[tuple[float, Frame]] = []
         self.kernel = BroadcastManager(lambda: self.now, lambda frame: self.seen.append((self.now, frame)))
-        self.beats = KernelBeat(self.clock)
+        self.beats = KernelBursts(self.clock)
         self.beats.open(self)
 
     def send(self, message: bytes, /) -> int:
@@ -54,7 +54,7 @@ class Bench:
     def beat(
         self, frame: Frame = RUN, *, ending: BurstEnd | None, at_once: bool = False, count: int = 10
     ) -> None:
-        self.beats.beat((frame,), self.now, PERIOD_S, count, at_once=at_once, ending=ending)
+        self.beats.start((frame,), self.now, PERIOD_S, count, at_once=at_once, ending=ending)
 
     def run(self, seconds: float) -> None:
         end = self.now + seconds
@@ -184,14 +184,14 @@ def test_who_renews_a_burst_has_it_on_the_bus_wherever_the_bridge_stood_still(
 
 
 def test_a_timer_of_ours_keeps_it_as_well() -> None:
-    soft = SoftBeat()
+    soft = SoftBursts()
     ending = BurstEnd(0.045, STOP)
-    sent = [soft.beat((RUN,), 0.0, PERIOD_S, 10, at_once=False, ending=ending)]
+    sent = [soft.start((RUN,), 0.0, PERIOD_S, 10, at_once=False, ending=ending)]
     for ms in range(1, 200):
         sent += soft.due(ms / 1000)
     assert sent == [RUN] * 5 + [STOP] * 5
-    silent = SoftBeat()
-    silent.beat((RUN,), 0.0, PERIOD_S, 10, at_once=False, ending=BurstEnd(0.045, None))
+    silent = SoftBursts()
+    silent.start((RUN,), 0.0, PERIOD_S, 10, at_once=False, ending=BurstEnd(0.045, None))
     assert len([frame for ms in range(1, 200) for frame in silent.due(ms / 1000)]) == math.floor(4.5)
     assert 0x205 not in silent
 

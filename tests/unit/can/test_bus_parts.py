@@ -15,7 +15,7 @@ from bridge.can import bcm, netlink
 from bridge.can.errorframe import ControllerState, describe, judge
 from bridge.can.explain import WrongBitrate, explain
 from bridge.can.outbox import Outbox
-from bridge.can.softbeat import SoftBeat
+from bridge.can.softbursts import SoftBursts
 from bridge.can.wirebits import WireBits, exact_bits
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 
@@ -161,14 +161,14 @@ def test_the_outbox_is_bounded_and_may_be_cleared_while_it_sends() -> None:
 
 
 def test_a_burst_of_several_frames_takes_turns_and_keeps_its_place_when_renewed() -> None:
-    beats = SoftBeat()
+    beats = SoftBursts()
     frames = tuple(Frame(0x80, bytes((number,))) for number in range(1, 5))
-    first = beats.beat(frames, 0.0, 0.01, 10, at_once=False)
+    first = beats.start(frames, 0.0, 0.01, 10, at_once=False)
     sent = [first.data[0]] if first else []
     for step in range(1, 25):
         now = step * 0.01 + 1e-6
         if step % 4 == 0:
-            assert beats.beat(frames, now - 0.005, 0.01, 10, at_once=False) is None
+            assert beats.start(frames, now - 0.005, 0.01, 10, at_once=False) is None
         sent += [frame.data[0] for frame in beats.due(now)]
     assert sent == [number % 4 + 1 for number in range(len(sent))]
     assert len(sent) == 25

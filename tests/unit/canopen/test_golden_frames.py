@@ -12,7 +12,7 @@ import pytest
 from bridge.canopen import emcy
 from bridge.canopen.emcy import Emergency
 from bridge.canopen.frame import Frame
-from bridge.canopen.pdo import Entry
+from bridge.canopen.pdo import PdoEntry
 from tests.support.sdo_client import Client
 
 Exchange = tuple[str, str]
@@ -166,11 +166,11 @@ def test_stoeber_reads_sixteen_bytes_in_segments() -> None:
 
 def test_stoeber_maps_e08() -> None:
     """§8.1.1: E08 (2808h:00, 16 bits) as the first object of RPDO1: length, sub-index, index."""
-    entry = Entry(0x2808, 0, 16)
+    entry = PdoEntry(0x2808, 0, 16)
     client = Client()
     client.write(0x1600, 1, struct.pack("<I", entry.to_object()))
     play(client, ("23 00 16 01 10 00 08 28", "60 00 16 01 00 00 00 00"))
-    assert Entry.from_object(struct.unpack("<I", bytes.fromhex("10 00 08 28"))[0]) == entry
+    assert PdoEntry.from_object(struct.unpack("<I", bytes.fromhex("10 00 08 28"))[0]) == entry
 
 
 @pytest.mark.parametrize(

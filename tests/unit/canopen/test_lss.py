@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 
 from bridge.canopen import lss
 from bridge.canopen.frame import Frame
-from bridge.canopen.lss import Identity, LssError, Service
+from bridge.canopen.lss import LssAddress, LssError, Service
 from bridge.canopen.lss_scan import find_all
 from bridge.errands import lss as lss_errand
 from bridge.errands.lss import LssErrand
 from tests.support.lss_slave import CONFIGURATION, WAITING, LssSlave
 
 T = TypeVar("T")
-NORD = Identity(0x0000_0038, 0x0001_0203, 0x0000_0007, 0x1234_5678)
-OTHER = Identity(0x0000_0038, 0x0001_0203, 0x0000_0007, 0x1234_5679)
+NORD = LssAddress(0x0000_0038, 0x0001_0203, 0x0000_0007, 0x1234_5678)
+OTHER = LssAddress(0x0000_0038, 0x0001_0203, 0x0000_0007, 0x1234_5679)
 TIMEOUT_S = 0.05
 
 numbers = st.integers(0, 0xFFFF_FFFF)
@@ -181,7 +181,7 @@ def test_a_scan_passes_over_devices_that_have_a_node_id() -> None:
 
 def test_what_is_known_is_not_searched() -> None:
     bus = LssBus(LssSlave(NORD))
-    errand = bus.run(find_all(Identity(NORD.vendor, NORD.product, NORD.revision, 0)))
+    errand = bus.run(find_all(LssAddress(NORD.vendor, NORD.product, NORD.revision, 0)))
     assert errand.result.found == [NORD]
     assert len(bus.requests) < 50
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bridge.canopen.lss import Identity
+from bridge.canopen.lss import LssAddress
 from bridge.canopen.lss_scan import Scanned, find_all
 from bridge.errands.lss import LssErrand
 from tests.support.lss_slave import WAITING, LssSlave
@@ -20,11 +20,11 @@ KINDS = {
 }
 kinds = st.sampled_from(list(KINDS))
 numbers = st.one_of(st.integers(0, 3), st.integers(0, 0xFFFF_FFFF))
-identities = st.builds(Identity, numbers, numbers, numbers, numbers)
-THIRD = Identity(NORD.vendor, 0x99, 1, 0)
+identities = st.builds(LssAddress, numbers, numbers, numbers, numbers)
+THIRD = LssAddress(NORD.vendor, 0x99, 1, 0)
 
 
-def slaves(present: dict[Identity, str]) -> list[LssSlave]:
+def slaves(present: dict[LssAddress, str]) -> list[LssSlave]:
     return [LssSlave(identity, **KINDS[kind]) for identity, kind in present.items()]
 
 
@@ -32,7 +32,7 @@ def slaves(present: dict[Identity, str]) -> list[LssSlave]:
 @example({NORD: TALKER, OTHER: TALKER})
 @example({NORD: TALKER, OTHER: STANDARD, THIRD: STANDARD})
 @settings(max_examples=25, deadline=None)
-def test_every_device_is_found_whatever_its_neighbours_do(present: dict[Identity, str]) -> None:
+def test_every_device_is_found_whatever_its_neighbours_do(present: dict[LssAddress, str]) -> None:
     devices = slaves(present)
     bus = LssBus(*devices)
     scanned = bus.run(find_all(None)).result
@@ -94,9 +94,9 @@ def test_what_an_interrupted_scan_has_found_is_there() -> None:
 
 
 @pytest.mark.parametrize(
-    "known", [Identity(NORD.vendor, NORD.product, NORD.revision, 0), Identity(NORD.vendor, 0, 0, 0)]
+    "known", [LssAddress(NORD.vendor, NORD.product, NORD.revision, 0), LssAddress(NORD.vendor, 0, 0, 0)]
 )
-def test_what_is_known_is_not_searched_among_talkers_either(known: Identity) -> None:
+def test_what_is_known_is_not_searched_among_talkers_either(known: LssAddress) -> None:
     devices = [LssSlave(identity, talks_when_found=True) for identity in (NORD, OTHER)]
     bus, whole = LssBus(*devices), LssBus(*(LssSlave(one, talks_when_found=True) for one in (NORD, OTHER)))
     assert sorted(bus.run(find_all(known)).result.found) == [NORD, OTHER]

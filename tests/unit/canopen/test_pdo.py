@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.canopen.frame import REMOTE, Frame
-from bridge.canopen.pdo import Entry, MappingError, PdoCodec
+from bridge.canopen.pdo import MappingError, PdoCodec, PdoEntry
 from bridge.canopen.sync import burst_length, tpdo_deadline_s
 from bridge.command.link import NodeState
 from bridge.image import Quality
@@ -26,13 +26,13 @@ NORD = load_family("nord/sk-tu4-cao")
 
 def test_a_mapping_entry_is_index_sub_length() -> None:
     """BU 2500 §6.5.8: 3002h sub 3 with 16 bits is 30020310h."""
-    entry = Entry.from_object(0x30020310)
+    entry = PdoEntry.from_object(0x30020310)
     assert (entry.index, entry.sub, entry.bits) == (0x3002, 3, 16)
     assert entry.to_object() == 0x30020310
 
 
 def test_four_words_little_endian() -> None:
-    codec = PdoCodec(tuple(Entry(0x3000 + n, 1, 16) for n in range(4)))
+    codec = PdoCodec(tuple(PdoEntry(0x3000 + n, 1, 16) for n in range(4)))
     assert codec.pack((0x047F, 0x2000, 0, 0)) == bytes.fromhex("7F04002000000000")
     assert codec.unpack(bytes.fromhex("370B002000000000")) == (0x0B37, 0x2000, 0, 0)
 
@@ -40,12 +40,12 @@ def test_four_words_little_endian() -> None:
 @pytest.mark.parametrize("bits", [0, 65, 128])
 def test_a_length_that_cannot_be_packed_is_named(bits: int) -> None:
     with pytest.raises(MappingError, match=f"3001:01/{bits}"):
-        PdoCodec((Entry(0x3001, 1, bits),))
+        PdoCodec((PdoEntry(0x3001, 1, bits),))
 
 
 def test_more_than_eight_bytes_cannot_be_mapped() -> None:
     with pytest.raises(MappingError, match="10 bytes"):
-        PdoCodec((Entry(0x6064, 0, 64), Entry(0x6041, 0, 16)))
+        PdoCodec((PdoEntry(0x6064, 0, 64), PdoEntry(0x6041, 0, 16)))
 
 
 def lengths(sizes: st.SearchStrategy[int]) -> st.SearchStrategy[list[int]]:
@@ -54,7 +54,7 @@ def lengths(sizes: st.SearchStrategy[int]) -> st.SearchStrategy[list[int]]:
 
 @given(lengths(st.sampled_from([8, 16, 32, 64])) | lengths(st.integers(1, 64)), st.data())
 def test_what_is_packed_is_unpacked(bits: list[int], data: st.DataObject) -> None:
-    entries = tuple(Entry(0x2000, n, length) for n, length in enumerate(bits))
+    entries = tuple(PdoEntry(0x2000, n, length) for n, length in enumerate(bits))
     signs = [data.draw(st.booleans()) for _ in bits]
     codec = PdoCodec(entries, {(0x2000, n) for n, sign in enumerate(signs) if sign})
     values = tuple(
@@ -69,7 +69,7 @@ def test_what_is_packed_is_unpacked(bits: list[int], data: st.DataObject) -> Non
 @given(lengths(st.integers(1, 64)), st.integers(0, 2**64 - 1))
 def test_bits_follow_each_other_from_the_lowest(bits: list[int], number: int) -> None:
     """CiA 301 §7.5.2.36: the first object begins at bit 0 of the first byte."""
-    codec = PdoCodec(tuple(Entry(0x2000, n, length) for n, length in enumerate(bits)))
+    codec = PdoCodec(tuple(PdoEntry(0x2000, n, length) for n, length in enumerate(bits)))
     number &= (1 << sum(bits)) - 1
     expected, rest = [], number
     for length in bits:
@@ -81,7 +81,7 @@ def test_bits_follow_each_other_from_the_lowest(bits: list[int], number: int) ->
 def test_a_bit_mapped_pdo() -> None:
     """Three bits, a bit, a nibble, a signed 12-bit value, a byte across the boundary of bytes."""
     codec = PdoCodec(
-        tuple(Entry(0x2000, n, bits) for n, bits in enumerate((3, 1, 4, 12, 8))), signed={(0x2000, 3)}
+        tuple(PdoEntry(0x2000, n, bits) for n, bits in enumerate((3, 1, 4, 12, 8))), signed={(0x2000, 3)}
     )
     assert codec.length == 4
     assert codec.unpack(bytes.fromhex("AD FF 5F 05")) == (5, 1, 10, -1, 0x55)
@@ -110,7 +110,7 @@ class Words:
 
 
 def plan(*bits: int, words: tuple[int | None, ...], kind: int = 255, signed: tuple[int, ...] = ()) -> PdoPlan:
-    entries = tuple(Entry(0x2000, n, length) for n, length in enumerate(bits))
+    entries = tuple(PdoEntry(0x2000, n, length) for n, length in enumerate(bits))
     places = tuple(
         None if word is None else Place(word, (length + 15) // 16)
         for word, length in zip(words, bits, strict=True)
@@ -118,7 +118,7 @@ def plan(*bits: int, words: tuple[int | None, ...], kind: int = 255, signed: tup
     return PdoPlan(0x185, kind, 0, PdoCodec(entries, {(0x2000, n) for n in signed}), places)
 
 
-def matched(entries: tuple[Entry, ...], pdo: Pdo) -> tuple[int | None, ...]:
+def matched(entries: tuple[PdoEntry, ...], pdo: Pdo) -> tuple[int | None, ...]:
     """The words that these entries are, by the layouts of this PDO; the first of those that are several."""
     names = [f"word_{n}" for n in range(len(pdo.objects))]
     places = match_words(entries, layouts([pdo], [names], names))
@@ -169,7 +169,7 @@ def test_an_object_named_for_two_words_is_32_bits_long_where_the_node_has_no_map
     objects = [["6041:00"], ["6064:00"], ["6064:00"]]
     pdo = Pdo.model_validate({"number": 1, "cob_id": 0x180, "objects": objects})
     entries = factory_entries(pdo)
-    assert entries == (Entry(0x6041, 0, 16), Entry(0x6064, 0, 32))
+    assert entries == (PdoEntry(0x6041, 0, 16), PdoEntry(0x6064, 0, 32))
     assert matched(entries, pdo) == (0, 1)
 
 
@@ -286,12 +286,12 @@ def test_both_setpoint_layouts_of_the_manual_are_recognised(slot: object, drives
     """BU 2500 §7.1.2 P165: three to a drive; §6.7.5: five to a drive."""
     number = slot.rpdo[0].number  # type: ignore[attr-defined]
     first = (number - 1) * drives_have
-    entries = (Entry(0x3000, number, 16), *(Entry(0x3002, first + n, 16) for n in (1, 2, 3)))
+    entries = (PdoEntry(0x3000, number, 16), *(PdoEntry(0x3002, first + n, 16) for n in (1, 2, 3)))
     assert matched(entries, slot.rpdo[0]) == (0, 1, 2, 3)  # type: ignore[attr-defined]
 
 
 def test_an_object_that_the_mapping_does_not_know_has_no_word() -> None:
-    entries = (Entry(0x3001, 1, 16), Entry(0x2222, 0, 16), Entry(0x3003, 2, 16))
+    entries = (PdoEntry(0x3001, 1, 16), PdoEntry(0x2222, 0, 16), PdoEntry(0x3003, 2, 16))
     assert matched(entries, NORD.slot[0].tpdo[0]) == (0, None, 2)
 
 

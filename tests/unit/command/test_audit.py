@@ -18,7 +18,7 @@ from bridge.command import (
     Write,
     command_of,
 )
-from bridge.command.audit import SUMMARY_S, Entry
+from bridge.command.audit import SUMMARY_S, AuditEntry
 from bridge.command.link import NodeState
 from bridge.image import Value
 from tests.support import sites
@@ -41,7 +41,7 @@ class Hall:
 
     def __init__(self, *, every_telegram: bool = False) -> None:
         self.plant = sites.plant_of(SITE)
-        self.entries: list[Entry] = []
+        self.entries: list[AuditEntry] = []
         self.events: list[Event] = []
         self.plant.on_event(self.events.append)
         self.plant.audit.tell = self.entries.append

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.command import Action, Code, Do, Identity, Rejection, Request, Source, Write
-from bridge.command.audit import AT_ONCE, DONE_EVERY_S, REFUSED_EVERY_S, SUMMARY_S, Entry, client_of
+from bridge.command.audit import AT_ONCE, DONE_EVERY_S, REFUSED_EVERY_S, SUMMARY_S, AuditEntry, client_of
 from bridge.command.link import NodeState
 from bridge.image import Value
 from bridge.northbound.modbus.dispatch import Dispatcher
@@ -32,7 +32,7 @@ def stranger(port: int) -> Identity:
 class Hall:
     def __init__(self) -> None:
         self.plant = sites.plant_of(SITE)
-        self.entries: list[Entry] = []
+        self.entries: list[AuditEntry] = []
         self.plant.audit.tell = self.entries.append
         self.now = 100.0
         self.plant.on_node(self.plant.nodes["conveyor"], NodeState.OPERATIONAL, self.now)
@@ -47,7 +47,7 @@ class Hall:
         request = Request(who, FU1, Write({"control_word": word}))
         self.plant.submit(request, self.now, lambda outcome: None)
 
-    def refused(self, who: Identity) -> list[Entry]:
+    def refused(self, who: Identity) -> list[AuditEntry]:
         return [
             entry
             for entry in self.entries

@@ -79,13 +79,13 @@ def test_a_setpoint_is_there_before_the_enable_and_renewed_after_the_control_wor
     bench = PausingBench(load_site(sites.write(tmp_path, sites.bus(node), sites.modbus(), name="bench")))
     bench.run(3.0)
     told: list[tuple[int, bool]] = []
-    beat = bench.bus.beat
+    burst = bench.bus.burst
 
     def note(frames: tuple[Frame, ...], now: float, period_s: float, count: int, **options: Any) -> None:
         told.append((frames[0].can_id, options["at_once"]))
-        beat(frames, now, period_s, count, **options)
+        burst(frames, now, period_s, count, **options)
 
-    bench.bus.beat = note
+    bench.bus.burst = note
     for word in (0x047E, 0x047F):
         assert bench.write(control_word=word, setpoint_1=0x2000, setpoint_4=word).ok
         bench.run(0.2)

@@ -224,7 +224,7 @@ def test_a_process_stopped_while_it_sends_sends_nothing_that_was_right_before(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     running(bench)
-    send = bench.bus.beat
+    send = bench.bus.burst
 
     def stand_still_after(frames: tuple[Frame, ...], now: float, period_s: float, count: int, **more: bool):
         send(frames, now, period_s, count, **more)
@@ -236,7 +236,7 @@ def test_a_process_stopped_while_it_sends_sends_nothing_that_was_right_before(
     del line.beating[HEARTBEAT]
     bench.log.clear()
     with monkeypatch.context() as patched:
-        patched.setattr(bench.bus, "beat", stand_still_after)
+        patched.setattr(bench.bus, "burst", stand_still_after)
         bench.write(control_word=0x047F, setpoint_1=0x2100)
     bench.run(0.5)
     assert bench.sent(RPDO1)

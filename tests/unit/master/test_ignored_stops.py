@@ -9,7 +9,7 @@ import pytest
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtState
 from bridge.command import Action, Event, Identity, Kind, Role, Source
-from bridge.command.audit import Entry
+from bridge.command.audit import AuditEntry
 from bridge.command.follow import LastStop
 from bridge.command.link import NodeState
 from bridge.image import Quality
@@ -96,7 +96,7 @@ def test_a_deaf_drive_is_named_and_its_node_stopped(bench: DeafBench) -> None:
 
 @pytest.mark.parametrize(("deaf", "code"), [(False, "ok"), (True, "ignored")])
 def test_the_audit_log_has_the_end_of_a_stop(bench: DeafBench, deaf: bool, code: str) -> None:
-    entries: list[Entry] = []
+    entries: list[AuditEntry] = []
     bench.plant.audit.tell = entries.append
     if deaf:
         bench.node_is_deaf_to = frozenset({RPDO1})

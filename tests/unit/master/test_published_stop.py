@@ -34,7 +34,7 @@ EXAMPLES = 80
 POINT = "conveyor/fu1/supervision/worst_case_stop_ms"
 DEADMEN_MS = [10, 40, 100, 101, 250, 400, 1000, 10_000]
 ON_ITS_WAY_S = 0.001
-"""A burst that took longer to the kernel is handed over a second time (``kernelbeat.py``)."""
+"""A burst that took longer to the kernel is handed over a second time (``kernelbursts.py``)."""
 
 
 @dataclass(frozen=True)

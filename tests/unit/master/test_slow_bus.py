@@ -37,12 +37,12 @@ class SlowBus(KernelBus):
         super().send(frame, now, deadline)
         self._wait()
 
-    def beat(self, *burst: Any, **options: Any) -> None:
-        super().beat(*burst, **options)
+    def burst(self, *burst: Any, **options: Any) -> None:
+        super().burst(*burst, **options)
         self._wait()
 
-    def silence(self, can_id: int) -> None:
-        super().silence(can_id)
+    def end_burst(self, can_id: int) -> None:
+        super().end_burst(can_id)
         self._wait()
 
 

@@ -36,7 +36,16 @@ from bridge.errors import Unavailable
 from bridge.image import DataType, Point, Quality
 from bridge.mirror import protocol, socket_endpoint
 from bridge.mirror.endpoint import prepare_folder
-from bridge.mirror.protocol import Asked, Changed, Counted, Delta, Malformed, Rejected, Snapshot, Told
+from bridge.mirror.protocol import (
+    Changed,
+    Counted,
+    Delta,
+    EventMessage,
+    Malformed,
+    Rejected,
+    RequestMessage,
+    Snapshot,
+)
 from tests.support.zenoh_site import make_plant
 
 values = st.booleans() | st.integers(-(2**31), 2**32 - 1) | st.floats(allow_nan=False) | st.text(max_size=20)
@@ -69,9 +78,9 @@ def test_deltas_read_back(readings: list[Changed]) -> None:
 
 @given(requests, st.floats(0, 1e9))
 def test_requests_read_back_with_their_identity(request: Request, deadline: float) -> None:
-    assert protocol.decode_request(protocol.encode_request(Asked(deadline, request))) == Asked(
-        deadline, request
-    )
+    assert protocol.decode_request(
+        protocol.encode_request(RequestMessage(deadline, request))
+    ) == RequestMessage(deadline, request)
 
 
 @given(identities, st.text(max_size=20), st.dictionaries(st.text(max_size=10), values, max_size=4))
@@ -104,7 +113,7 @@ def test_whatever_was_refused_can_be_told(
 
 @given(any_text, any_text, any_text | st.integers() | st.floats(allow_nan=False))
 def test_whatever_happens_can_be_told(source: str, message: str, value: str | int | float) -> None:
-    protocol.decode_event(protocol.encode(Told(1, Kind.REFUSED, source, 300, message)))
+    protocol.decode_event(protocol.encode(EventMessage(1, Kind.REFUSED, source, 300, message)))
     protocol.decode_outcome(protocol.encode(Outcome(Code.NOT_VALID, message)))
     delta = Delta(1, 1, (Changed(0, 5, Quality.GOOD, 0, ""), Changed(1, value, Quality.GOOD, 0, message)))
     back = protocol.decode_delta(protocol.encode(delta), 2)
@@ -115,13 +124,13 @@ def test_whatever_happens_can_be_told(source: str, message: str, value: str | in
 def test_a_request_is_passed_on_as_it_is_or_not_at_all(
     who: Identity, target: str, values: dict[str, str | int | float]
 ) -> None:
-    asked = Asked(1.0, Request(who, target, Write(values)))
+    asked = RequestMessage(1.0, Request(who, target, Write(values)))
     with contextlib.suppress(Malformed):
         assert repr(protocol.decode_request(protocol.encode_request(asked))) == repr(asked)
 
 
 def test_a_command_with_other_fields_is_malformed() -> None:
-    asked = Asked(1.0, Request(Identity(Source.MODBUS, "plc"), "conveyor/fu1", SetTimeout(200)))
+    asked = RequestMessage(1.0, Request(Identity(Source.MODBUS, "plc"), "conveyor/fu1", SetTimeout(200)))
     told = protocol.encode_request(asked).replace(b"timeout_ms", b"another_ms")
     with pytest.raises(Malformed):
         protocol.decode_request(told)
@@ -146,7 +155,7 @@ def test_a_snapshot_brings_the_nature_of_every_point() -> None:
 
 def test_an_event_arrives_with_wall_clock_time() -> None:
     event = Event(5.0, Kind.NODE_LOST, "conveyor", 800, "node lost")
-    back = protocol.decode_event(protocol.encode(Told.of(event, 1_500_000_000)))
+    back = protocol.decode_event(protocol.encode(EventMessage.of(event, 1_500_000_000)))
     assert back == Event(1.5, Kind.NODE_LOST, "conveyor", 800, "node lost")
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.can.softbeat import SoftBeat
+from bridge.can.softbursts import SoftBursts
 from bridge.canopen import emcy, nmt
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.heartbeat import HeartbeatConsumer, NodeGuard
@@ -101,8 +101,8 @@ RPDO = Frame(0x205, bytes(8))
 
 
 def test_a_burst_nobody_renews_ends_by_itself() -> None:
-    beats = SoftBeat()
-    assert beats.beat((RPDO,), 0.0, 0.01, 10, at_once=False) == RPDO, "the first frame goes out at once"
+    beats = SoftBursts()
+    assert beats.start((RPDO,), 0.0, 0.01, 10, at_once=False) == RPDO, "the first frame goes out at once"
     times = []
     now = 0.0
     while (due := beats.next_deadline()) is not None and now < 10:
@@ -113,9 +113,9 @@ def test_a_burst_nobody_renews_ends_by_itself() -> None:
 
 
 def test_a_renewed_burst_keeps_its_phase_and_takes_the_new_data() -> None:
-    beats = SoftBeat()
-    beats.beat((RPDO,), 0.0, 0.01, 10, at_once=False)
-    assert not beats.beat((RPDO._replace(data=b"x"),), 0.0149, 0.01, 10, at_once=False)
+    beats = SoftBursts()
+    beats.start((RPDO,), 0.0, 0.01, 10, at_once=False)
+    assert not beats.start((RPDO._replace(data=b"x"),), 0.0149, 0.01, 10, at_once=False)
     assert beats.next_deadline() == 0.01
     assert beats.due(0.015) == [RPDO._replace(data=b"x")]
     assert beats.next_deadline() == 0.02
@@ -123,8 +123,8 @@ def test_a_renewed_burst_keeps_its_phase_and_takes_the_new_data() -> None:
 
 @given(st.lists(st.floats(0.0, 0.5), min_size=1, max_size=50), st.integers(1, 20))
 def test_a_late_timer_sends_no_bunch_and_no_more_than_was_asked(pauses: list[float], count: int) -> None:
-    beats = SoftBeat()
-    now, sent = 0.0, int(beats.beat((RPDO,), 0.0, 0.01, count, at_once=False) is not None)
+    beats = SoftBursts()
+    now, sent = 0.0, int(beats.start((RPDO,), 0.0, 0.01, count, at_once=False) is not None)
     for pause in pauses:
         now += pause
         frames = beats.due(now)

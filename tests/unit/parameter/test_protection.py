@@ -18,7 +18,7 @@ from bridge.drive import DriveState
 from bridge.mapping import load_family
 from bridge.mapping.aliases import COMMUNICATION, aliases
 from bridge.mapping.loader import family_names
-from bridge.parameter import Address, DriveParameters, Entry, Ledger, Names, ParameterError, sets
+from bridge.parameter import Address, DriveParameters, Entry, Ledger, Names, ParameterError, backups
 from bridge.parameter.definition import leaf_of
 from bridge.parameter.error import Why
 from bridge.sim.catalogue import simulate_node
@@ -228,7 +228,7 @@ def test_a_write_that_is_let_through_touches_no_communication_object(mapping: st
 def test_a_parameter_set_with_one_is_refused_before_anything_is_written(mapping: str, name: str) -> None:
     access = access_to(mapping)
     harmless = "C00011" if mapping == LENZE else "C01" if mapping == STOEBER else "P102"
-    steps = sets.restore(access, {harmless: 100, name: 1}, sets.Restored(), 0.0)
+    steps = backups.restore(access, {harmless: 100, name: 1}, backups.Restored(), 0.0)
     with pytest.raises(ParameterError) as raised:
         next(steps)
     assert raised.value.why in (Why.PROTECTED, Why.READ_ONLY)
@@ -237,7 +237,7 @@ def test_a_parameter_set_with_one_is_refused_before_anything_is_written(mapping:
 @pytest.mark.parametrize("mapping", FAMILIES)
 def test_no_backup_has_what_cannot_be_restored(mapping: str) -> None:
     access = access_to(mapping)
-    for entry in sets.settings(access.names):
+    for entry in backups.settings(access.names):
         access.check_writable(entry)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.canopen.pdo import Entry, PdoCodec
+from bridge.canopen.pdo import PdoCodec, PdoEntry
 from bridge.canopen.sdo import SdoChannel, SdoError
 from bridge.mapping import load_family
 from bridge.node.boot import factory_entries
@@ -68,7 +68,7 @@ def tu4(bench_of):
 
 def test_6_5_8_another_mapping_and_identifier_for_tpdo1(tu4):
     client = Client(tu4)
-    control, setpoint_3 = Entry(0x3000, 1, 16), Entry(0x3002, 3, 16)
+    control, setpoint_3 = PdoEntry(0x3000, 1, 16), PdoEntry(0x3002, 3, 16)
     for index, sub, data, request, answer in (
         (0x1A00, 0, b"\0", "2F 00 1A 00 00 00 00 00", "60 00 1A 00"),
         (0x1A00, 1, control.to_object().to_bytes(4, "little"), "23 00 1A 01 10 01 00 30", "60 00 1A 01"),

@@ -58,12 +58,6 @@ class Wire:
             if frame.can_id == can_id:
                 seen.set()
 
-    def beat(
-        self, frame: Frame, now: float, period_s: float, count: int, *, at_once: bool = False
-    ) -> None: ...
-
-    def silence(self, can_id: int) -> None: ...
-
     def next_deadline(self) -> float | None:
         return None
 

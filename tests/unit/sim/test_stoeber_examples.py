@@ -6,7 +6,7 @@ import pytest
 
 from bridge.canopen import emcy
 from bridge.canopen.frame import Frame
-from bridge.canopen.pdo import Entry
+from bridge.canopen.pdo import PdoEntry
 from bridge.canopen.sdo import SdoChannel
 from bridge.mapping import load_family
 from bridge.sim.dictionary import Dictionary, Domain
@@ -98,7 +98,7 @@ def test_7_3_4_a_node_can_leave_the_sync_to_others(make_drive):
 
 def test_8_1_1_a_mapping_entry_on_the_wire(make_drive):
     """E08: 10 00 08 28. The length may be 0 when it is written; reading gives it."""
-    assert Entry(0x2808, 0, 16).to_object().to_bytes(4, "little").hex(" ") == "10 00 08 28"
+    assert PdoEntry(0x2808, 0, 16).to_object().to_bytes(4, "little").hex(" ") == "10 00 08 28"
     drive = make_drive(mapped=False)
     assert ask(drive, "23001A0100000828") == "60 00 1A 01 00 00 00 00"
     assert ask(drive, "40001A0100000000") == "43 00 1A 01 10 00 08 28"

@@ -8,7 +8,7 @@ import struct
 
 import pytest
 
-from bridge.can.kernelbeat import KernelBeat
+from bridge.can.kernelbursts import KernelBursts
 from bridge.canopen.frame import Frame
 
 RUN, STOP = Frame(0x205, bytes.fromhex("7F04")), Frame(0x205, bytes.fromhex("7E04"))
@@ -51,11 +51,11 @@ def kernel() -> Kernel:
 
 
 @pytest.fixture
-def beats(kernel: Kernel) -> KernelBeat:
-    beats = KernelBeat(lambda: kernel.now)
+def beats(kernel: Kernel) -> KernelBursts:
+    beats = KernelBursts(lambda: kernel.now)
     beats.open(kernel)
-    assert beats.beat((RUN,), 0.0, PERIOD_S, 10, at_once=True) is None
-    assert beats.beat((OTHER,), 0.0, PERIOD_S, 10, at_once=True) is None
+    assert beats.start((RUN,), 0.0, PERIOD_S, 10, at_once=True) is None
+    assert beats.start((OTHER,), 0.0, PERIOD_S, 10, at_once=True) is None
     return beats
 
 
@@ -65,10 +65,10 @@ def control_word(kernel: Kernel) -> bytes:
 
 @pytest.mark.parametrize("number", [errno.EAGAIN, errno.ENOBUFS, errno.ENOMEM])
 def test_a_stop_that_the_kernel_refuses_is_tried_again_a_millisecond_later(
-    kernel: Kernel, beats: KernelBeat, number: int
+    kernel: Kernel, beats: KernelBursts, number: int
 ) -> None:
     kernel.refuses = number
-    assert beats.beat((STOP,), 0.02, PERIOD_S, 10, at_once=True) is None
+    assert beats.start((STOP,), 0.02, PERIOD_S, 10, at_once=True) is None
     assert control_word(kernel) == RUN.data
     assert beats.next_deadline() == pytest.approx(0.021)
     kernel.refuses = None
@@ -78,10 +78,10 @@ def test_a_stop_that_the_kernel_refuses_is_tried_again_a_millisecond_later(
     assert beats.next_deadline() is None
 
 
-def test_the_newest_words_are_those_that_are_tried_again(kernel: Kernel, beats: KernelBeat) -> None:
+def test_the_newest_words_are_those_that_are_tried_again(kernel: Kernel, beats: KernelBursts) -> None:
     kernel.refuses = errno.ENOBUFS
-    beats.beat((RUN._replace(data=b"\xff\x04"),), 0.02, PERIOD_S, 10, at_once=True)
-    beats.beat((STOP,), 0.0205, PERIOD_S, 10, at_once=False)
+    beats.start((RUN._replace(data=b"\xff\x04"),), 0.02, PERIOD_S, 10, at_once=True)
+    beats.start((STOP,), 0.0205, PERIOD_S, 10, at_once=False)
     kernel.refuses = None
     beats.on_time(0.022)
     assert control_word(kernel) == STOP.data
@@ -89,41 +89,41 @@ def test_the_newest_words_are_those_that_are_tried_again(kernel: Kernel, beats: 
 
 
 def test_a_burst_that_the_kernel_never_took_is_started_not_refilled(kernel: Kernel) -> None:
-    beats = KernelBeat(lambda: kernel.now)
+    beats = KernelBursts(lambda: kernel.now)
     beats.open(kernel)
     kernel.refuses = errno.ENOMEM
-    beats.beat((RUN,), 0.0, PERIOD_S, 10, at_once=True)
+    beats.start((RUN,), 0.0, PERIOD_S, 10, at_once=True)
     kernel.refuses = None
     beats.on_time(0.001)
     assert control_word(kernel) == RUN.data
 
 
 def test_a_burst_that_may_have_ended_while_its_renewal_was_on_its_way_is_started_anew(
-    kernel: Kernel, beats: KernelBeat
+    kernel: Kernel, beats: KernelBursts
 ) -> None:
     kernel.now = 0.0799
-    beats.beat((STOP,), 0.079, PERIOD_S, 10, at_once=True)
+    beats.start((STOP,), 0.079, PERIOD_S, 10, at_once=True)
     assert kernel.said[-1] == (SETUP, 1 | 8, 0x205), "it runs: its phase is kept"
     kernel.now = 0.081
-    beats.beat((OTHER,), 0.079, PERIOD_S, 10, at_once=False)
+    beats.start((OTHER,), 0.079, PERIOD_S, 10, at_once=False)
     assert kernel.said[-3:] == [(SETUP, 1, 0x305), (DELETE, 0, 0x305), (SETUP, 1 | START, 0x305)]
 
 
 def test_a_renewal_that_was_on_its_way_for_longer_than_its_burst_wakes_none(
-    kernel: Kernel, beats: KernelBeat
+    kernel: Kernel, beats: KernelBursts
 ) -> None:
     kernel.now = 0.02 + 10 * PERIOD_S
-    beats.beat((RUN,), 0.02, PERIOD_S, 10, at_once=True)
+    beats.start((RUN,), 0.02, PERIOD_S, 10, at_once=True)
     assert kernel.said[-1] == (DELETE, 0, 0x205)
-    beats.beat((RUN,), kernel.now, PERIOD_S, 10, at_once=False)
+    beats.start((RUN,), kernel.now, PERIOD_S, 10, at_once=False)
     assert kernel.said[-1] == (SETUP, 1 | START, 0x205), "the next one does"
 
 
 def test_a_kernel_that_goes_on_refusing_loses_every_burst_and_we_send_them(
-    kernel: Kernel, beats: KernelBeat
+    kernel: Kernel, beats: KernelBursts
 ) -> None:
     kernel.refuses = errno.ENOMEM
-    beats.beat((STOP,), 0.02, PERIOD_S, 10, at_once=True)
+    beats.start((STOP,), 0.02, PERIOD_S, 10, at_once=True)
     now, sent = 0.02, list[Frame]()
     while not beats.refusal:
         deadline = beats.next_deadline()
@@ -136,21 +136,21 @@ def test_a_kernel_that_goes_on_refusing_loses_every_burst_and_we_send_them(
     assert sorted(frame.data for frame in sent) == sorted([STOP.data, OTHER.data]), "the new word, at once"
     assert beats.refusal == "Cannot allocate memory"
     assert sorted(f.can_id for f in beats.on_time(now + PERIOD_S)) == [0x205, 0x305]
-    assert beats.beat((RUN,), now + 0.012, PERIOD_S, 10, at_once=True) == RUN, "we send what changes"
+    assert beats.start((RUN,), now + 0.012, PERIOD_S, 10, at_once=True) == RUN, "we send what changes"
 
 
 def test_a_kernel_that_takes_bursts_again_gets_them_back_without_a_gap(
-    kernel: Kernel, beats: KernelBeat
+    kernel: Kernel, beats: KernelBursts
 ) -> None:
     kernel.refuses = errno.ENOMEM
-    beats.beat((STOP,), 0.02, PERIOD_S, 10, at_once=True)
+    beats.start((STOP,), 0.02, PERIOD_S, 10, at_once=True)
     for ms in range(21, 33):
         beats.on_time(ms / 1000)
     assert beats.refusal
     again = Kernel()
     beats.open(again)
     again.refuses = errno.ENOMEM
-    beats.beat((STOP,), 0.035, PERIOD_S, 10, at_once=False)
+    beats.start((STOP,), 0.035, PERIOD_S, 10, at_once=False)
     assert 0x205 in {frame.can_id for frame in beats.on_time(0.042)}, "until it takes it, we go on"
     again.refuses = None
     beats.on_time(0.0435)
@@ -159,39 +159,41 @@ def test_a_kernel_that_takes_bursts_again_gets_them_back_without_a_gap(
 
 
 def test_a_burst_that_is_silenced_while_its_renewal_waits_is_deleted(
-    kernel: Kernel, beats: KernelBeat
+    kernel: Kernel, beats: KernelBursts
 ) -> None:
     kernel.refuses = errno.ENOBUFS
-    beats.beat((STOP,), 0.02, PERIOD_S, 10, at_once=True)
-    beats.silence(0x205, 0.0205)
+    beats.start((STOP,), 0.02, PERIOD_S, 10, at_once=True)
+    beats.end(0x205, 0.0205)
     kernel.refuses = None
     beats.on_time(0.022)
     assert kernel.said[-1] == (DELETE, 0, 0x205)
     assert list(kernel.holds) == [0x305]
 
 
-def test_an_outage_ends_what_the_kernel_holds_even_after_a_refusal(kernel: Kernel, beats: KernelBeat) -> None:
+def test_an_outage_ends_what_the_kernel_holds_even_after_a_refusal(
+    kernel: Kernel, beats: KernelBursts
+) -> None:
     kernel.refuses = errno.EAGAIN
-    beats.beat((STOP,), 0.02, PERIOD_S, 10, at_once=True)
+    beats.start((STOP,), 0.02, PERIOD_S, 10, at_once=True)
     kernel.refuses = None
-    beats.silence_all(0.0205)
+    beats.end_all(0.0205)
     assert not kernel.holds
     assert beats.next_deadline() is None
 
 
 def test_a_deletion_that_is_refused_for_long_ends_the_bursts_by_closing(
-    kernel: Kernel, beats: KernelBeat
+    kernel: Kernel, beats: KernelBursts
 ) -> None:
     kernel.refuses = errno.ENOMEM
-    beats.silence(0x205, 0.02)
+    beats.end(0x205, 0.02)
     sent = [frame for ms in range(21, 33) for frame in beats.on_time(ms / 1000)]
     assert kernel.closed
     assert {frame.can_id for frame in sent} == {0x305}, "who was silenced stays so"
 
 
 @pytest.mark.parametrize("number", [errno.ENETDOWN, errno.ENODEV, errno.ENOTCONN])
-def test_an_interface_that_is_gone_is_told(kernel: Kernel, beats: KernelBeat, number: int) -> None:
+def test_an_interface_that_is_gone_is_told(kernel: Kernel, beats: KernelBursts, number: int) -> None:
     kernel.refuses = number
     with pytest.raises(OSError):
-        beats.beat((STOP,), 0.02, PERIOD_S, 10, at_once=True)
+        beats.start((STOP,), 0.02, PERIOD_S, 10, at_once=True)
     assert not beats.refusal

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple, Protocol
 
 from bridge.can import bcm
 from bridge.can.burstend import SHORTEST, BurstEnd, Sequence, sequence
-from bridge.can.softbeat import SoftBeat
+from bridge.can.softbursts import SoftBursts
 from bridge.canopen.frame import Frame
 
 _RETRY_S: Final = 0.001
@@ -66,14 +66,14 @@ class _Sent(NamedTuple):
     """It was started, and not refilled."""
 
 
-class KernelBeat:
+class KernelBursts:
     """Finite bursts by COB-ID. Times are monotonic seconds; ``clock`` tells how late a message went out.
 
     A message that the manager refuses (no memory, no room) leaves the old data on the bus, so it is repeated
     every millisecond. After ten attempts the bursts are given up: closing the manager ends all of them for
     certain, and a timer of ours continues them until ``open`` gives another manager.
 
-    ``beat``, ``silence``, ``silence_all`` and ``on_time`` raise OSError where the interface is gone or down.
+    ``start``, ``end``, ``end_all`` and ``on_time`` raise OSError where the interface is gone or down.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
@@ -86,7 +86,7 @@ class KernelBeat:
         """What the kernel has, whether it still runs or not."""
         self._wishes: dict[int, _Wish] = {}
         self._retry_at: float | None = None
-        self._soft = SoftBeat()
+        self._soft = SoftBursts()
         self._first: list[Frame] = []
 
     def open(self, manager: Manager) -> None:
@@ -109,7 +109,7 @@ class KernelBeat:
             self._manager.close()
             self._manager = None
 
-    def beat(
+    def start(
         self,
         frames: tuple[Frame, ...],
         now: float,
@@ -124,26 +124,26 @@ class KernelBeat:
         # The kernel counts the first frame of a burst, so one of a frame or two ends before it can be
         # renewed. What is that slow needs no kernel: a round sends it.
         if self._manager is None or count < SHORTEST:
-            return self._soft.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
+            return self._soft.start(frames, now, period_s, count, at_once=at_once, ending=ending)
         waiting = self._wishes.get(can_id)
         wish = _Wish(frames, period_s, count, at_once, now, ending)
         if waiting:
             wish.at_once, wish.since = at_once or waiting.at_once, waiting.since
         if not self._try(can_id, wish, now) and can_id in self._soft:
-            return self._soft.beat(frames, now, period_s, count, at_once=at_once, ending=ending)
+            return self._soft.start(frames, now, period_s, count, at_once=at_once, ending=ending)
         return None
 
-    def silence(self, can_id: int, now: float) -> None:
+    def end(self, can_id: int, now: float) -> None:
         """End the burst of this identifier."""
-        self._soft.silence(can_id)
+        self._soft.end(can_id)
         waiting = self._wishes.get(can_id)
         if can_id in self._jobs or waiting:
             self._try(can_id, _Wish((), 0.0, 0, False, waiting.since if waiting else now), now)
 
-    def silence_all(self, now: float) -> None:
+    def end_all(self, now: float) -> None:
         self._soft.clear()
         for can_id in {**self._jobs, **self._wishes}:
-            self.silence(can_id, now)
+            self.end(can_id, now)
 
     def next_deadline(self) -> float | None:
         times = (self._retry_at, self._soft.next_deadline())
@@ -174,7 +174,7 @@ class KernelBeat:
         self._wishes.pop(can_id, None)
         if not self._wishes:
             self._retry_at = None
-        self._soft.silence(can_id)
+        self._soft.end(can_id)
         if count:
             # The last frame of a burst comes up to a period before its count of periods is over.
             self._jobs[can_id] = _Job(wish, now + (count - 2) * wish.period_s)
@@ -249,7 +249,7 @@ class KernelBeat:
         self.refusal = error.strerror or str(error)
         for wish in going.values():
             if wish.frames:
-                first = self._soft.beat(
+                first = self._soft.start(
                     wish.frames, now, wish.period_s, wish.count, at_once=True, ending=wish.ending
                 )
                 self._first += [first] if first else []

@@ -1,4 +1,4 @@
-"""``parameters backup``, ``compare``, ``restore``: whole parameter sets of a drive."""
+"""``parameters backup``, ``compare``, ``restore``: all that can be set of a drive."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from bridge.cli.bus import AsJson, print_table, tell
 from bridge.cli.parameter_drive import DriveArgument, Force, SiteArgument, Target, Yes, find
 from bridge.errors import OperationFailed
 from bridge.image import Value
-from bridge.parameter import Definition, ParameterError, sets
+from bridge.parameter import Definition, ParameterError, backups
+from bridge.parameter.backup_file import BackupFile, read_backup
 from bridge.parameter.codec import shown
-from bridge.parameter.set_file import SetFile, read_set
 
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="a parameter set, TOML")]
 
@@ -32,12 +32,12 @@ def backup(
     target = find(site, drive)
     if file.exists() and not force:
         raise typer.BadParameter(f"{file} is there already: --force writes over it")
-    found = sets.Backup()
-    target.run(lambda now: sets.back_up(target.access, found, now))
+    found = backups.Backup()
+    target.run(lambda now: backups.back_up(target.access, found, now))
     saved = datetime.now(UTC).isoformat(timespec="seconds")
-    entries = {entry.name: entry for entry in sets.settings(target.access.names)}
+    entries = {entry.name: entry for entry in backups.settings(target.access.names)}
     comments = {name: _comment(entries[name].definition) for name in found.values}
-    content = SetFile(target.node.mapping, target.name, saved, found.values, comments, found.missing)
+    content = BackupFile(target.node.mapping, target.name, saved, found.values, comments, found.missing)
     try:
         file.write_text(content.text(), encoding="utf-8")
     except OSError as error:
@@ -83,9 +83,11 @@ def restore(
         raise OperationFailed("nothing written")
     check = target.alone(force=force).check
     target.run(lambda now: check(changed))
-    done = sets.Restored()
+    done = backups.Restored()
     try:
-        target.run(lambda now: sets.restore(target.access, values, done, now, before_it=check), writes=True)
+        target.run(
+            lambda now: backups.restore(target.access, values, done, now, before_it=check), writes=True
+        )
     except OperationFailed:
         _print_restored(target, done)
         raise
@@ -106,26 +108,26 @@ def restore(
 
 def _values(target: Target, file: Path) -> dict[str, Value]:
     """The values of a file that fit this drive. Raises ``BadParameter`` where they do not."""
-    content = read_set(file)
+    content = read_backup(file)
     if content.mapping != target.node.mapping:
         raise typer.BadParameter(
             f"{file} is of {content.mapping}, and {target.name} has {target.node.mapping}"
         )
     values = dict(content.values)
     try:
-        sets.in_order(target.access.names, values)
+        backups.in_order(target.access.names, values)
     except ParameterError as error:
         raise typer.BadParameter(f"{file}: {error}") from None
     return values
 
 
-def _compare(target: Target, values: dict[str, Value]) -> sets.Comparison:
-    found = sets.Comparison()
-    target.run(lambda now: sets.compare(target.access, values, found, now))
+def _compare(target: Target, values: dict[str, Value]) -> backups.Comparison:
+    found = backups.Comparison()
+    target.run(lambda now: backups.compare(target.access, values, found, now))
     return found
 
 
-def _print_comparison(target: Target, found: sets.Comparison, as_json: bool) -> None:
+def _print_comparison(target: Target, found: backups.Comparison, as_json: bool) -> None:
     if as_json:
         differences = [
             {"name": one.entry.name, "in_drive": one.in_drive, "in_file": one.in_set, "unit": one.entry.unit}
@@ -146,7 +148,7 @@ def _print_comparison(target: Target, found: sets.Comparison, as_json: bool) -> 
     print(f"{target.name}: {len(found.differences)} differ, {len(found.same)} are the same")
 
 
-def _print_restored(target: Target, done: sets.Restored) -> None:
+def _print_restored(target: Target, done: backups.Restored) -> None:
     for one in done.written:
         was = "" if one.before is None else f", was {shown(one.reading.entry, one.before)}"
         print(f"{one.reading}{was}")
@@ -155,7 +157,7 @@ def _print_restored(target: Target, done: sets.Restored) -> None:
     print(f"{target.name}: {len(done.written)} written, {len(done.same)} were the same")
 
 
-def _as_json(done: sets.Restored) -> dict[str, object]:
+def _as_json(done: backups.Restored) -> dict[str, object]:
     return {
         "ok": done.error is None,
         "written": [

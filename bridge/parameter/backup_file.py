@@ -1,4 +1,4 @@
-"""A parameter set as a file: TOML, one line a value, to be read, compared and kept by people."""
+"""A backup as a file: TOML, one line a value, to be read, compared and kept by people."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FORMAT: Final = 1
 
 
 @dataclass(frozen=True, slots=True)
-class SetFile:
+class BackupFile:
     """What a file holds. ``mapping`` is the family, such as nord/sk-tu4-cao; ``drive`` where the values
     come from, ``saved`` when, both for people."""
 
@@ -46,7 +46,7 @@ class SetFile:
         return "\n".join(lines) + "\n"
 
 
-def read_set(path: Path) -> SetFile:
+def read_backup(path: Path) -> BackupFile:
     """Raises ``FileFaults`` with everything that is wrong."""
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -80,7 +80,7 @@ def read_set(path: Path) -> SetFile:
                 values[name] = value
     if faults:
         raise FileFaults(faults)
-    return SetFile(texts["mapping"], texts["drive"], texts["saved"], values, {})
+    return BackupFile(texts["mapping"], texts["drive"], texts["saved"], values, {})
 
 
 def _quoted(text: str) -> str:

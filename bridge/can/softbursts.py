@@ -29,13 +29,13 @@ class _Job:
         return frame
 
 
-class SoftBeat:
+class SoftBursts:
     """Finite bursts by COB-ID. Times are monotonic seconds; ``due`` gives the frames to be sent."""
 
     def __init__(self) -> None:
         self._jobs: dict[int, _Job] = {}
 
-    def beat(
+    def start(
         self,
         frames: tuple[Frame, ...],
         now: float,
@@ -60,7 +60,7 @@ class SoftBeat:
     def __contains__(self, can_id: int) -> bool:
         return can_id in self._jobs
 
-    def silence(self, can_id: int) -> None:
+    def end(self, can_id: int) -> None:
         self._jobs.pop(can_id, None)
 
     def clear(self) -> None:

@@ -1,7 +1,7 @@
-"""Whole parameter sets: read for a backup, compared with a drive, written back. Procedures without a bus.
+"""Backups of a drive's parameters: made, compared with a drive, written back. Procedures without a bus.
 
-A set holds every parameter of the mapping file that can be read and written, each element in each parameter
-set. It is restored in the order of the mapping file, and only where the drive differs.
+A backup holds every parameter of the mapping file that can be read and written, each element in each
+parameter set. It is restored in the order of the mapping file, and only where the drive differs.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from bridge.parameter.definition import Address, Entry
 from bridge.parameter.error import ParameterError, Why
 from bridge.parameter.names import Names
 
-Told = Callable[[str], None]
+Progress = Callable[[str], None]
 """Is told what is being done."""
 
 
@@ -100,7 +100,7 @@ def in_order(names: Names, values: Mapping[str, Value]) -> list[tuple[Entry, Val
     return sorted(found, key=lambda pair: places.get(pair[0].address, len(places)))
 
 
-def back_up(access: DriveParameters, into: Backup, now: float, tell: Told = lambda _: None) -> Steps:
+def back_up(access: DriveParameters, into: Backup, now: float, tell: Progress = lambda _: None) -> Steps:
     """Read every setting into ``into``. Raises ``ParameterError`` where one cannot be read."""
     for entry in settings(access.names, on_first=access.on_first):
         tell(entry.name)
@@ -120,7 +120,7 @@ def compare(
     values: Mapping[str, Value],
     into: Comparison,
     now: float,
-    tell: Told = lambda _: None,
+    tell: Progress = lambda _: None,
 ) -> Steps:
     """Compare a set with the drive. Raises ``ParameterError``."""
     for entry, value in in_order(access.names, values):
@@ -144,7 +144,7 @@ def restore(
     values: Mapping[str, Value],
     into: Restored,
     now: float,
-    tell: Told = lambda _: None,
+    tell: Progress = lambda _: None,
     before_it: Asks | None = None,
 ) -> Steps:
     """Write a set where the drive differs; every write is read back, and the first refusal ends it.

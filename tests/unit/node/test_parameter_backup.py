@@ -1,4 +1,4 @@
-"""Whole parameter sets: what was backed up can be restored, and whatever ends it is told.
+"""Backups of parameters: what was backed up can be restored, and whatever ends it is told.
 
 The command line's errand with the simulated NORD interface, on a virtual clock.
 """
@@ -16,9 +16,9 @@ from bridge.errors import FileFaults
 from bridge.image import Value
 from bridge.mapping import load_family
 from bridge.node.parameters.run import Procedure
-from bridge.parameter import DriveParameters, Ledger, Names, ParameterError, sets
+from bridge.parameter import DriveParameters, Ledger, Names, ParameterError, backups
+from bridge.parameter.backup_file import BackupFile, read_backup
 from bridge.parameter.ledger import Saved
-from bridge.parameter.set_file import SetFile, read_set
 from bridge.sim.nord_supervision import Presence
 from bridge.sim.nord_tu4 import NordTu4
 
@@ -60,21 +60,21 @@ class Workshop:
             self.now += 0.001
         raise AssertionError("the errand does not end")
 
-    def back_up(self) -> sets.Backup:
-        found = sets.Backup()
-        assert self.run(lambda now: sets.back_up(self.access, found, now)) is None
+    def back_up(self) -> backups.Backup:
+        found = backups.Backup()
+        assert self.run(lambda now: backups.back_up(self.access, found, now)) is None
         return found
 
-    def restore(self, values: dict[str, Value]) -> sets.Restored:
+    def restore(self, values: dict[str, Value]) -> backups.Restored:
         self.access.forget()
-        done = sets.Restored()
-        assert self.run(lambda now: sets.restore(self.access, values, done, now)) is None
+        done = backups.Restored()
+        assert self.run(lambda now: backups.restore(self.access, values, done, now)) is None
         return done
 
-    def compare(self, values: dict[str, Value]) -> sets.Comparison:
+    def compare(self, values: dict[str, Value]) -> backups.Comparison:
         self.access.forget()
-        found = sets.Comparison()
-        assert self.run(lambda now: sets.compare(self.access, values, found, now)) is None
+        found = backups.Comparison()
+        assert self.run(lambda now: backups.compare(self.access, values, found, now)) is None
         return found
 
     @property
@@ -148,19 +148,19 @@ def test_what_this_drive_does_not_have_is_named_and_passed_over(workshop: Worksh
 
 
 def test_a_name_that_there_is_not_stops_it_before_anything_is_written(workshop: Workshop) -> None:
-    done = sets.Restored()
+    done = backups.Restored()
     values: dict[str, Value] = {"P102.1": 1.0, "P1O5": 1.0}
-    error = workshop.run(lambda now: sets.restore(workshop.access, values, done, now))
+    error = workshop.run(lambda now: backups.restore(workshop.access, values, done, now))
     assert isinstance(error, ParameterError)
     assert workshop.eeprom_writes == 0
 
 
 def test_a_file_is_read_as_it_was_written(tmp_path: Path, workshop: Workshop) -> None:
     values = {**workshop.back_up().values, 'a "name"\\': "über\n\t\x7f", "yes": True, "tiny": 1e-300}
-    written = SetFile("nord/sk-tu4-cao", "conveyor/fu1", "2026-11-21", values, {"P102.1": "s"}, ("P999",))
+    written = BackupFile("nord/sk-tu4-cao", "conveyor/fu1", "2026-11-21", values, {"P102.1": "s"}, ("P999",))
     path = tmp_path / "fu1.toml"
     path.write_text(written.text(), "utf-8")
-    read = read_set(path)
+    read = read_backup(path)
     assert read.values == values
     assert (read.mapping, read.drive, read.saved) == ("nord/sk-tu4-cao", "conveyor/fu1", "2026-11-21")
 
@@ -179,13 +179,13 @@ def test_a_file_that_is_none_says_what_is_wrong(tmp_path: Path, text: str, messa
     path = tmp_path / "set.toml"
     path.write_text(text, "utf-8")
     with pytest.raises(FileFaults) as told:
-        read_set(path)
+        read_backup(path)
     assert message in str(told.value)
 
 
 def _refusal(workshop: Workshop, values: dict[str, Value]) -> str:
-    done = sets.Restored()
-    error = workshop.run(lambda now: sets.restore(workshop.access, values, done, now))
+    done = backups.Restored()
+    error = workshop.run(lambda now: backups.restore(workshop.access, values, done, now))
     assert isinstance(error, ParameterError)
     assert workshop.eeprom_writes == 0
     return str(error)
@@ -215,9 +215,9 @@ def test_the_switch_of_the_eeprom_is_written_first_where_what_follows_is_to_be_k
     workshop: Workshop,
 ) -> None:
     workshop.restore({"P560": 0})
-    done = workshop.restore({"P102.1": 1.0, "P560": 1})
+    done, access = workshop.restore({"P102.1": 1.0, "P560": 1}), workshop.access
     assert [one.reading.entry.name for one in done.written] == ["P560", "P102.1"]
-    assert (done.written[1].in_eeprom, done.warning) == (True, "")
+    assert (access.writes(access.names.resolve("P102.1")), done.warning) == (1, "")
 
 
 def test_a_restore_into_the_ram_alone_says_so(workshop: Workshop) -> None:
@@ -227,8 +227,8 @@ def test_a_restore_into_the_ram_alone_says_so(workshop: Workshop) -> None:
 
 def test_the_nodes_own_parameters_are_in_the_set_of_its_first_drive_only() -> None:
     names = Names(NORD)
-    first = {entry.name for entry in sets.settings(names)}
-    second = {entry.name for entry in sets.settings(names, on_first=False)}
+    first = {entry.name for entry in backups.settings(names)}
+    second = {entry.name for entry in backups.settings(names, on_first=False)}
     assert first - second >= {"P151", "P150"}
     assert not any(name.startswith("P15") for name in second)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from bridge import clock
 from bridge.config import Site
 from bridge.errors import OperationFailed
-from bridge.fronts import give_signs
+from bridge.front_process import give_signs
 from bridge.mirror.client import MirrorClient
 from bridge.mirror.endpoint import socket_endpoint
 from bridge.northbound.opcua.server import OpcUaServer

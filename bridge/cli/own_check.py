@@ -16,7 +16,7 @@ from bridge.cli.terminal import progress
 from bridge.command import Plant
 from bridge.command.plant import Node
 from bridge.drive import OwnJudgement, OwnVerdict
-from bridge.errands.own_check import AuditErrand
+from bridge.errands.own_check import OwnCheck
 from bridge.errors import Unavailable
 from bridge.lint import WorstCase, lint
 from bridge.mapping.own_places import OwnWant, channels_needed, suggested, suggested_ms
@@ -119,7 +119,7 @@ def _audit(project: Project, only: str | None, unavailable: list[str], *, offlin
 def _ask(line: Line, nodes: Sequence[Node], unavailable: list[str]) -> _Answers:
     try:
         with progress(f"bus {line.table.name}"):
-            errand = carry_out(line, lambda now: AuditErrand(nodes, now))
+            errand = carry_out(line, lambda now: OwnCheck(nodes, now))
     except Unavailable as error:
         unavailable.append(str(error))
         return {}, {node.name: "its bus cannot be opened" for node in nodes}

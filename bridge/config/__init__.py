@@ -3,23 +3,20 @@
 Reference for users: ``docs/reference/site-file.md``.
 """
 
+from bridge.config.fields import IGNORE_ALL_S, Control, Reaction, WordOrder
 from bridge.config.load import load_site, read_site
 from bridge.config.model import (
-    IGNORE_ALL_S,
     BusTable,
     ConfigureTable,
-    Control,
     DriveTable,
     IdentityTable,
     ModbusTable,
     NodeTable,
     OpcUaTable,
     PdoTable,
-    Reaction,
     Site,
     SiteTable,
     UserTable,
-    WordOrder,
     ZenohTable,
 )
 

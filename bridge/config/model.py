@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 import re
 from typing import Annotated, Final, Literal, cast
 
@@ -18,124 +17,34 @@ from pydantic import (
 
 from bridge.canopen.datatypes import TypeName, encode
 from bridge.config.download import Download
+from bridge.config.fields import (
+    LONGEST_TIMEOUT_MS,
+    Control,
+    ControllerName,
+    Downtime,
+    Endpoint,
+    Full,
+    Locator,
+    MandatoryMissing,
+    Name,
+    Network,
+    ObjectName,
+    OnFailedStart,
+    OnIgnoredStop,
+    OnIntruder,
+    OnLoss,
+    ParameterRights,
+    Prefix,
+    Reaction,
+    Reason,
+    RegularExpression,
+    SyncCounter,
+    TimeoutRange,
+    WordOrder,
+)
 
-OnLoss = Literal["restart", "stop_node", "stop_all", "nothing"]
-OnFailedStart = Literal["reset_communication", "report"]
-MandatoryMissing = Literal["go_on", "hold_all", "stop_all"]
-Control = Literal["modbus", "opcua", "zenoh", "lease", "none"]
-Reaction = Literal["disable_voltage", "quick_stop", "stop", "silence", "hold"]
-OnIgnoredStop = Literal["stop_node", "reset_node", "report"]
-OnIntruder = Literal["stop_node", "stop_all", "report"]
-ParameterRights = Literal["write", "read"]
-WordOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
-
-IGNORE_ALL_S: Final = -0.1
-"""``telegram_downtime_s`` that reports communication errors and otherwise ignores them (P513 = -0.1)."""
-
-LONGEST_TIMEOUT_MS: Final = 32767
-"""Of P151 (BU 2500 §7.1.1)."""
-
-_NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
-_PREFIX: Final = re.compile(r"[\w.-]+(/[\w.-]+)*", re.ASCII)
-_CONTROLLER: Final = re.compile(r"[A-Za-z0-9_.\-]{1,64}")
-_OBJECT: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})")
 _MAPPED: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})/([0-9]{1,2})")
 _PDO_BITS: Final = 64
-_MOST_COUNTER: Final = 240
-_SHORTEST_REASON: Final = 10
-_LOCATOR: Final = re.compile(r"[a-z][a-z0-9-]*/.+")
-
-
-def _regular_expression(text: str) -> str:
-    try:
-        re.compile(text)
-    except re.error as error:
-        raise ValueError(f"must be a regular expression: {error}") from None
-    return text
-
-
-def _reason(text: str) -> str:
-    if len(text.strip()) < _SHORTEST_REASON:
-        raise ValueError(f"must say why, in {_SHORTEST_REASON} characters or more")
-    return text
-
-
-def _name(text: str) -> str:
-    if not _NAME.fullmatch(text):
-        raise ValueError("must be lower_snake_case: a letter, then letters, digits and _")
-    return text
-
-
-def _prefix(text: str) -> str:
-    if not _PREFIX.fullmatch(text):
-        raise ValueError("must be words of letters, digits and _ . - with / between them")
-    return text
-
-
-def _endpoint(text: str) -> str:
-    host, colon, port = text.rpartition(":")
-    if not colon or not port.isdigit() or not 0 <= int(port) <= 65535:
-        raise ValueError("must be an address and a port such as 127.0.0.1:4840")
-    try:
-        ipaddress.ip_address(host.strip("[]"))
-    except ValueError:
-        raise ValueError("must start with an IP address; 0.0.0.0 is every interface") from None
-    return text
-
-
-def _network(text: str) -> str:
-    try:
-        ipaddress.ip_network(text, strict=True)
-    except ValueError as error:
-        raise ValueError(f"must be a network such as 192.168.1.0/24: {error}") from None
-    return text
-
-
-def _downtime(seconds: float) -> float:
-    if seconds in (IGNORE_ALL_S, 0) or 0.1 <= seconds <= 100.0:
-        return seconds
-    raise ValueError("must be -0.1 (ignore), 0 (off) or 0.1…100.0")
-
-
-def _counter(value: int) -> int:
-    if value == 0 or 2 <= value <= _MOST_COUNTER:
-        return value
-    raise ValueError("must be 0 (SYNC without a counter) or 2…240 (1019h)")
-
-
-def _range(limits: list[int]) -> list[int]:
-    if len(limits) != 2 or limits[0] > limits[1]:
-        raise ValueError("must be the lowest and the highest time such as [100, 2000]")
-    return limits
-
-
-def _locator(text: str) -> str:
-    if not _LOCATOR.fullmatch(text):
-        raise ValueError("must be a protocol and an address such as tcp/192.168.1.10:7447")
-    return text
-
-
-def _controller(text: str) -> str:
-    if not _CONTROLLER.fullmatch(text) or text == "anonymous":
-        raise ValueError("must be a user's name of 1…64 letters, digits and _ . -")
-    return text
-
-
-def _object(text: str) -> str:
-    if not _OBJECT.fullmatch(text):
-        raise ValueError('must be an object as "2097:01", index and sub-index in hexadecimal')
-    return text
-
-
-Name = Annotated[str, AfterValidator(_name)]
-RegularExpression = Annotated[str, AfterValidator(_regular_expression)]
-ObjectName = Annotated[str, AfterValidator(_object)]
-Endpoint = Annotated[str, AfterValidator(_endpoint)]
-Network = Annotated[str, AfterValidator(_network)]
-Locator = Annotated[str, AfterValidator(_locator)]
-ControllerName = Annotated[str, AfterValidator(_controller)]
-Timeout = Annotated[int, Field(ge=0, le=LONGEST_TIMEOUT_MS)]
-Full = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class Table(BaseModel):
@@ -204,9 +113,7 @@ PdoTables = Annotated[list[PdoTable], BeforeValidator(_listed)]
 class AcceptsTable(Table):
     """What a site takes knowingly, each with its reason."""
 
-    runs_on: Annotated[str, AfterValidator(_reason)] | None = Field(
-        None, description="why the drive may run on when the bridge falls silent"
-    )
+    runs_on: Reason | None = Field(None, description="why the drive may run on when the bridge falls silent")
 
 
 class DriveTable(Table):
@@ -218,10 +125,10 @@ class DriveTable(Table):
         None, ge=0, le=LONGEST_TIMEOUT_MS, description="0 (off) or 1…32767 ms, the twin of P151"
     )
     fieldbus_timeout_writable: bool = False
-    fieldbus_timeout_range_ms: Annotated[list[Timeout], AfterValidator(_range)] | None = Field(
+    fieldbus_timeout_range_ms: TimeoutRange | None = Field(
         None, description="[lowest, highest] that the owner may set, each 0…32767 ms"
     )
-    telegram_downtime_s: Annotated[float, AfterValidator(_downtime)] = 0.5
+    telegram_downtime_s: Downtime = 0.5
     on_expiry: Reaction = Field(
         "disable_voltage", description="disable_voltage, quick_stop, stop, silence or hold"
     )
@@ -338,7 +245,7 @@ class BusTable(Table):
     master_node_id: int = Field(127, ge=1, le=127, description="1…127")
     heartbeat_ms: int = Field(100, ge=0, le=65535, description="0 (off) or a time in ms")
     sync_period_ms: int = Field(10, ge=0, le=1000, description="0 (off) or 1…1000 ms")
-    sync_counter: Annotated[int, AfterValidator(_counter)] = Field(0, description="0 (none) or 2…240")
+    sync_counter: SyncCounter = Field(0, description="0 (none) or 2…240")
     sync_window_us: int = Field(0, ge=0, le=1_000_000, description="0 (not judged) or a time in µs")
     time_period_s: int = Field(0, ge=0, le=86_400, description="0 (off) or 1…86400 s")
     rpdo_period_ms: int | None = Field(None, ge=1, le=1000, description="1…1000 ms")
@@ -386,7 +293,7 @@ class ZenohTable(Table):
     mode: Literal["peer", "client"] = Field("peer", description="peer or client")
     listen: list[Locator] = Field(default_factory=lambda: ["tcp/127.0.0.1:7447"])
     connect: list[Locator] = Field(default_factory=list[str])
-    prefix: Annotated[str, AfterValidator(_prefix)] = "drives"
+    prefix: Prefix = "drives"
     encoding: Literal["json", "bare"] = "json"
     accept_put: bool = Field(False, description="true takes a plain put on a command key as a command")
     period_ms: int = Field(10, ge=1, le=10_000, description="1…10000 ms")

@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
-from bridge.config.model import Name
+from bridge.config.fields import Name
 from bridge.image import DataType
 
 __all__ = [

@@ -12,7 +12,7 @@ from typing import Literal
 from pydantic import Field
 
 from bridge.config import DriveTable
-from bridge.config.model import RegularExpression
+from bridge.config.fields import RegularExpression
 from bridge.mapping.aliases import Aliases
 from bridge.mapping.faults import EmcyEvent, EmcyNumber, EmcyTable, FaultNumbers, FaultParameter
 from bridge.mapping.fields import (

@@ -12,6 +12,7 @@ from bridge.northbound.opcua.logins import PasswordChecks
 
 RIGHT = "swordfish"
 ATTACKER, CLIENT = "10.0.0.9", "10.0.0.1"
+LIMIT_S = 20.0
 
 
 class Bench:
@@ -19,6 +20,8 @@ class Bench:
 
     def __init__(self) -> None:
         self.begun: list[str] = []
+        self.ended = 0
+        self._asked: list[asyncio.Task[bool]] = []
         self._go = threading.Semaphore(0)
         self.checks = PasswordChecks(self._verify)
 
@@ -30,21 +33,40 @@ class Bench:
         return password == RIGHT
 
     def ask(self, password: str, address: str = ATTACKER, known: str | None = "hash") -> asyncio.Task[bool]:
-        return asyncio.create_task(self.checks.is_right(known, password, address))
+        task = asyncio.create_task(self.checks.is_right(known, password, address))
+        self._asked.append(task)
+        return task
 
     async def end(self, count: int) -> None:
+        """End so many checks one after the other, or as many as there are."""
         for _ in range(count):
+            if not await self.begins():
+                return
             self._go.release()
-            await asyncio.sleep(0.02)
+            self.ended += 1
+            await self.begins()
+
+    async def begins(self) -> bool:
+        """Wait for a check that goes on; False where nobody waits for one any more."""
+        async with asyncio.timeout(LIMIT_S):
+            while len(self.begun) == self.ended:
+                await asyncio.sleep(0.001)
+                if all(task.done() for task in self._asked):
+                    return False
+        # The one before has ended in the loop, and is told to who asked for it.
+        await asyncio.sleep(0)
+        return True
+
+    def close(self) -> None:
+        self.checks.close()
+        self._go.release(len(self._asked))
 
 
 @pytest.fixture
 def bench() -> Iterator[Bench]:
     made = Bench()
     yield made
-    made.checks.close()
-    for _ in range(100):
-        made._go.release()  # pyright: ignore[reportPrivateUsage]
+    made.close()
 
 
 @pytest.mark.parametrize("address", [CLIENT, ATTACKER], ids=["another address", "the same address"])
@@ -80,10 +102,10 @@ async def test_one_that_was_right_is_known(bench: Bench) -> None:
     assert await first
     for n in range(5):
         bench.ask(f"wrong {n}")
-    await asyncio.sleep(0.01)
+    assert await bench.begins()
     assert await asyncio.wait_for(bench.ask(RIGHT), 1)
     again = bench.ask(RIGHT, known="hash of another user")
-    await asyncio.sleep(0.01)
+    await bench.end(1)
     assert not again.done(), "known for one hash is nothing for another"
     await bench.end(10)
     assert RIGHT not in str(vars(bench.checks))
@@ -91,9 +113,9 @@ async def test_one_that_was_right_is_known(bench: Bench) -> None:
 
 async def test_who_has_gone_is_not_checked(bench: Bench) -> None:
     bench.ask("first")
-    await asyncio.sleep(0.01)
+    assert await bench.begins()
     gone = [bench.ask(f"gone {n}") for n in range(3)]
-    await asyncio.sleep(0.01)
+    await asyncio.sleep(0)
     for task in gone:
         task.cancel()
     await asyncio.gather(*gone, return_exceptions=True)

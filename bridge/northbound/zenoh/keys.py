@@ -86,7 +86,10 @@ class KeySpace:
         if not key.startswith(f"{self.top}/"):
             return False
         tail = self.tail(key)
-        return _owner(tail) in self._owners or tail.startswith("@/controller/")
+        own = tail.removeprefix("@/controller")
+        if "/@" in own:  # which ** does not include
+            return False
+        return _owner(tail) in self._owners or (own != tail and own[:1] in ("", "/"))
 
     def share(self, key: str, payload: bytes | None) -> str:
         """Whose turn a query or put takes while others wait. zenoh does not tell who asks, but a user has

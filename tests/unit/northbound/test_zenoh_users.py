@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 import zenoh
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bridge.config import ZenohTable
@@ -106,6 +106,9 @@ words = st.sampled_from((*NAMES, "other", "actual", "@", "controller", "event", 
         st.sampled_from(SPACE.keys),
     )
 )
+@example("drives/demo/bridge/@")
+@example("drives/demo/@/controller/plc/@")
+@example("drives/demo/@/controller")
 def test_what_is_answered_without_waiting_is_what_zenoh_was_told(text: str) -> None:
     """A key that one takes for prompt and the other does not would let one client hold up all."""
     key = zenoh.KeyExpr.autocanonize(text)

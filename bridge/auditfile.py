@@ -60,7 +60,7 @@ class AuditFile:
     def close(self) -> None:
         """Write what waits, but do not wait for a disk that hangs."""
         with contextlib.suppress(queue.Full):
-            self._lines.put_nowait(None)
+            self._lines.put(None, timeout=_CLOSE_S)
             self._thread.join(_CLOSE_S)
 
     # the thread

@@ -121,7 +121,8 @@ def test_a_disk_that_hangs_holds_nobody_up(tmp_path: Path) -> None:
     assert file.all_lost >= 499, "the thread has taken one at most"
     file.close()
     assert time.monotonic() - begin < 5
-    os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))  # lets the thread go on
+    os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))  # lets the thread go on,
+    file.close()  # to its end
 
 
 # the lines
@@ -280,3 +281,4 @@ def test_a_flood_of_refusals_leaves_room_for_what_is_done(tmp_path: Path) -> Non
     log.start()
     log.close()
     assert len(lines(tmp_path / "state" / "audit.jsonl")) == 1
+    assert sum(len(lines(path)) for path in (tmp_path / "state").glob("audit-refused.*")) == 10_000

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from bridge.northbound.opcua.passwords import hash_password
 from tests.support import sites
+from tests.support.passwords import cheap_hash
 from tests.support.process import REPOSITORY, Process, free_port, running, until
 
 STRANGER: Final = "127.0.0.9"
@@ -105,9 +105,7 @@ def _bus() -> str:
 
 def write_site(folder: Path, modbus: int, opcua: int, zenoh: int) -> Path:
     """The site as ``folder/site.toml``."""
-    user = (
-        f'[[opcua.user]]\nname = "{GOOD}"\nrole = "operator"\npassword_hash = "{hash_password(PASSWORD)}"\n'
-    )
+    user = f'[[opcua.user]]\nname = "{GOOD}"\nrole = "operator"\npassword_hash = "{cheap_hash(PASSWORD)}"\n'
     zenoh_table = f"{sites.zenoh(zenoh)}accept_put = true\n"
     return sites.write(folder, _bus(), sites.modbus(modbus), sites.opcua(opcua), user, zenoh_table)
 

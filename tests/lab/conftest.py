@@ -5,16 +5,21 @@ itself would look like a proof that was never made, so here a skip is a failure.
 
 ``--share FOLDER`` is for several runs at once, each on buses of its own: a run takes the next module that
 no other has taken, and its fixtures with it, until none is left.
+
+``--cold`` starts each process of the product with its imports (``tests/support/warm.py``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
+from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests.support.warm import warm_interpreter
 
 NEEDS_VCAN = "The lab needs the CAN interface vcan0: run `make lab`, or tests/lab/vcan-run -- COMMAND."
 
@@ -25,6 +30,7 @@ def vcan_is_missing() -> bool:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--share", type=Path, metavar="FOLDER", help="run what no other run takes from FOLDER")
+    parser.addoption("--cold", action="store_true", help="start each process as a user does")
 
 
 def pytest_sessionstart() -> None:
@@ -37,6 +43,17 @@ def pytest_sessionstart() -> None:
 def _vcan() -> None:
     if vcan_is_missing():
         pytest.fail(NEEDS_VCAN, pytrace=False)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _warm(request: pytest.FixtureRequest) -> Iterator[None]:
+    with nullcontext() if request.config.getoption("--cold") else warm_interpreter():
+        yield
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest module first: of several runs none waits for it at the end."""
+    items.sort(key=lambda item: item.path.stem != "test_proof")
 
 
 @pytest.hookimpl(tryfirst=True)

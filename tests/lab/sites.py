@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from tests.support import sites
-from tests.support.process import REPOSITORY, free_port
+from tests.support.process import free_port, peer_called
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,9 +28,7 @@ class LabSite:
 
 def ask(site: LabSite, *questions: str) -> list[list[dict[str, object]]]:
     """Questions to zenoh from a second process: ``KEY=PAYLOAD``, or ``KEY=`` for the point itself."""
-    script = REPOSITORY / "tests" / "peers" / "zenoh_ask.py"
-    command = [sys.executable, str(script), site.zenoh_endpoint, *questions]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=Path("/"))
+    done = peer_called("zenoh_ask", site.zenoh_endpoint, *questions)
     assert done.returncode == 0, done.stderr
     return [json.loads(line) for line in done.stdout.splitlines()]
 

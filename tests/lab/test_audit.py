@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from typing import Any
 import pytest
 
 from tests.support import sites
-from tests.support.process import drivebridge
+from tests.support.process import drivebridge, drivebridge_called
 from tests.support.sniffer import sniffing
 
 NODES = (
@@ -47,8 +46,7 @@ class Commands:
 
     def call(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         command, *others = arguments
-        line = [sys.executable, "-m", "bridge", command, str(self.site), *others]
-        return subprocess.run(line, capture_output=True, text=True, timeout=100, check=False, cwd="/")
+        return drivebridge_called(command, str(self.site), *others)
 
     def verdicts(self) -> dict[str, Any]:
         done = self.call("audit", "--json")

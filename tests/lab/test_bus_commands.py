@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,15 +12,11 @@ import pytest
 
 from tests.lab.sites import LabSite, lab_site
 from tests.support.process import drivebridge, peer, until
+from tests.support.process import drivebridge_called as call
 from tests.support.sniffer import sniffing
 
 DIRECT = ("--interface", "socketcan", "--channel", "vcan0", "--bitrate", "1000000")
 SCAN_LIMIT_S = 2.0
-
-
-def call(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "bridge", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, cwd="/")
 
 
 def answer(*arguments: str) -> Any:

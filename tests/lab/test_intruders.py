@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
@@ -15,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from tests.lab.sites import LabSite, lab_site, values
-from tests.support.process import Process, drivebridge, peer, until
+from tests.support.process import Process, drivebridge, drivebridge_called, peer, until
 from tests.support.sniffer import Seen, Sniffer, sniffing
 
 SYNC, RPDO1, TPDO1, OWN, NMT = 0x080, 0x205, 0x185, 0x77F, 0x000
@@ -165,8 +164,7 @@ def test_a_tool_that_writes_is_an_intruder_and_one_that_reads_is_told(make_lab) 
     direct = ("--interface", "socketcan", "--channel", "vcan0")
 
     def sdo(*arguments: str) -> None:
-        command = [sys.executable, "-m", "bridge", "sdo", *arguments, *direct]
-        subprocess.run(command, capture_output=True, check=False, cwd="/")
+        drivebridge_called("sdo", *arguments, *direct)
 
     sdo("read", "5", "1008", "--type", "string")
     lab.bridge.wait_output("SDO request to conveyor (605h): read 1008h:00", 5.0)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.support.process import Process, peer
+from tests.support.process import Process, drivebridge_called, peer
 
 ON_VCAN0 = ("--interface", "socketcan", "--channel", "vcan0")
 ONE, OTHER = "00000038:00010203:00000007:00000A01", "00000038:00010203:00000007:80000B02"
@@ -24,13 +23,7 @@ def slaves(tmp_path: Path) -> Iterator[Process]:
 
 
 def lss(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "bridge", "lss", *arguments, *ON_VCAN0],
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-    )
+    return drivebridge_called("lss", *arguments, *ON_VCAN0)
 
 
 def test_two_new_devices_are_found_named_and_stored(slaves: Process) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from typing import Any
 import pytest
 
 from tests.lab.sites import LabSite, lab_site
-from tests.support.process import drivebridge
+from tests.support.process import drivebridge, drivebridge_called
 
 FU1 = "conveyor/fu1"
 
@@ -23,8 +22,7 @@ class Commands:
         self.folder = folder
 
     def call(self, command: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-        line = [sys.executable, "-m", "bridge", "parameters", command, self.site, FU1, *arguments]
-        return subprocess.run(line, capture_output=True, text=True, timeout=120, check=False, cwd="/")
+        return drivebridge_called("parameters", command, self.site, FU1, *arguments)
 
     def answer(self, command: str, *arguments: str) -> Any:
         done = self.call(command, *arguments, "--json")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.lab.sites import LabSite, lab_site
-from tests.support.process import drivebridge
+from tests.support.process import drivebridge, drivebridge_called
 from tests.support.sniffer import Sniffer, sniffing
 
 CHANNELS = {2: (0x345, 0x2C5), 3: (0x445, 0x3C5), 4: (0x545, 0x4C5)}
@@ -42,8 +41,7 @@ def wired(tmp_path: Path) -> Iterator[tuple[LabSite, Sniffer]]:
 
 
 def sdo(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "bridge", "sdo", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, cwd="/")
+    return drivebridge_called("sdo", *arguments)
 
 
 def test_the_boot_up_opens_them_and_reads_each_drive_over_its_own(wired: tuple[LabSite, Sniffer]) -> None:

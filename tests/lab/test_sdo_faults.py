@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
 
 import pytest
 
-from tests.support.process import peer
+from tests.support.process import drivebridge_called, peer
 from tests.support.sniffer import Sniffer, sniffing
 
 DIRECT = ("--interface", "socketcan", "--channel", "vcan0")
@@ -25,8 +23,7 @@ def bus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Sniffer]:
 
 
 def read(name: str) -> tuple[int, dict[str, object], str]:
-    command = [sys.executable, "-m", "bridge", "sdo", "read", "5", name, "--json", *DIRECT]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, cwd="/")
+    done = drivebridge_called("sdo", "read", "5", name, "--json", *DIRECT)
     return done.returncode, json.loads(done.stdout), done.stderr
 
 

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 from asyncua import Client
 from pymodbus.client import ModbusTcpClient
 
-from tests.lab.sites import LabSite, lab_site
-from tests.support.process import REPOSITORY, drivebridge, peer, until
+from tests.lab.sites import LabSite, ask, lab_site
+from tests.support.process import drivebridge, peer, until
 from tests.support.sniffer import sniffing
 
 TPDO1 = 0x185
@@ -69,11 +66,7 @@ async def by_opcua(site: LabSite) -> None:
 
 
 def by_zenoh(site: LabSite) -> None:
-    script = str(REPOSITORY / "tests" / "peers" / "zenoh_ask.py")
     keys = [f"drives/lab/conveyor/fu1/{leaf}=" for leaf in ("supervision/last_fault", "status/state")]
-    done = subprocess.run(
-        [sys.executable, script, site.zenoh_endpoint, *keys], capture_output=True, text=True, check=True
-    )
-    [[fault], [state]] = [json.loads(line) for line in done.stdout.splitlines()]
+    [[fault], [state]] = ask(site, *keys)
     assert fault["v"] == 10.3
     assert state["s"] == "fault"

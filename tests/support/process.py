@@ -11,9 +11,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
+from typing import Protocol
 
 START_LIMIT_S = 60.0
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -24,6 +25,65 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+class Child(Protocol):
+    """What is used of ``subprocess.Popen``."""
+
+    @property
+    def pid(self) -> int: ...
+    @property
+    def returncode(self) -> int | None: ...
+    def poll(self) -> int | None: ...
+    def wait(self, timeout: float | None = None) -> int: ...
+    def kill(self) -> None: ...
+
+
+class Start(Protocol):
+    def __call__(
+        self,
+        command: Sequence[str],
+        output: int,
+        error: int,
+        environment: Mapping[str, str],
+        folder: Path,
+        files: Sequence[int] = (),
+    ) -> Child: ...
+
+
+def start_cold(
+    command: Sequence[str],
+    output: int,
+    error: int,
+    environment: Mapping[str, str],
+    folder: Path,
+    files: Sequence[int] = (),
+) -> Child:
+    return subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=output,
+        stderr=error,
+        env=environment,
+        cwd=folder,
+        pass_fds=files,
+        # Leads a process group, as what a terminal starts does.
+        process_group=0,
+    )
+
+
+_start: Start = start_cold
+
+
+@contextmanager
+def started_by(start: Start) -> Iterator[None]:
+    """How processes are started meanwhile."""
+    global _start
+    before, _start = _start, start
+    try:
+        yield
+    finally:
+        _start = before
 
 
 class Process:
@@ -39,17 +99,9 @@ class Process:
         if notify:
             environment["NOTIFY_SOCKET"] = notify.getsockname()
         with log.open("wb") as output:
+            to = output.fileno()
             # A folder that is not the repository: nothing may be found by accident.
-            self.popen = subprocess.Popen(
-                command,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                env=environment,
-                cwd=log.parent,
-                pass_fds=files,
-                # Leads a process group, as what a terminal starts does.
-                process_group=0,
-            )
+            self.popen = _start(command, to, to, environment, log.parent, files)
 
     @property
     def pid(self) -> int:
@@ -143,6 +195,33 @@ def peer(
     """A script of ``tests/peers``: a client of the bridge in a process of its own."""
     script = REPOSITORY / "tests" / "peers" / f"{name}.py"
     return running(folder, name, sys.executable, str(script), *arguments, files=files)
+
+
+def called(*arguments: str, limit_s: float = 100.0) -> subprocess.CompletedProcess[str]:
+    """``python ARGUMENTS``, when it has ended."""
+    command = [sys.executable, *arguments]
+    with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as error:
+        child = _start(command, output.fileno(), error.fileno(), os.environ, Path("/"))
+        try:
+            status = child.wait(limit_s)
+        finally:
+            child.kill()
+            child.wait()
+        told: list[str] = []
+        for file in (output, error):
+            file.seek(0)
+            told.append(file.read().decode())
+    return subprocess.CompletedProcess(command, status, *told)
+
+
+def drivebridge_called(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """``drivebridge ARGUMENTS``, when it has ended."""
+    return called("-m", "bridge", *arguments)
+
+
+def peer_called(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """A script of ``tests/peers``, when it has ended."""
+    return called(str(REPOSITORY / "tests" / "peers" / f"{name}.py"), *arguments)
 
 
 def catches(pid: int, number: signal.Signals) -> bool:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
+import signal
 import socket
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,11 +12,7 @@ import pytest
 from bridge import __version__
 from tests.support import sites
 from tests.support.process import drivebridge, free_port
-
-
-def call(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "bridge", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, cwd="/")
+from tests.support.process import drivebridge_called as call
 
 
 def write_site(folder: Path, interface: str = "virtual", port: int | None = None) -> Path:
@@ -183,7 +178,7 @@ def test_run_serves_until_it_is_told_to_stop(tmp_path: Path) -> None:
     with drivebridge(tmp_path, "run", "run", str(write_site(tmp_path)), notify=True) as bridge:
         bridge.wait_ready()
         bridge.wait_output("node operational")
-        bridge.popen.terminate()
+        bridge.signal(signal.SIGTERM)
         assert bridge.popen.wait(15) == 0
         assert "Traceback" not in bridge.output()
         lines = bridge.output().splitlines()

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +15,7 @@ from bridge.command import Action, Code, Identity, Source
 from bridge.image import Quality
 from bridge.sim.catalogue import SIMULATED
 from tests.support.families import FamilyBridge, family_bridge, setpoint_of
-from tests.support.process import REPOSITORY, until
+from tests.support.process import drivebridge_called, peer_called, until
 
 ME = Identity(Source.ZENOH, "test")
 FAILING = ("cia402/velocity", "lenze/8400-motec", "nord/sk-tu4-cao", "stoeber/5000")
@@ -69,10 +67,10 @@ class Recording:
 
     def decoded(self, *options: str) -> Any:
         file = self._folder / "site.dbc"
-        export = [sys.executable, "-m", "bridge", "export", "dbc", str(self.site.path), *options]
-        file.write_bytes(subprocess.run(export, capture_output=True, check=True, timeout=60).stdout)
-        decode = [sys.executable, str(REPOSITORY / "tests/peers/dbc_decode.py"), str(file), str(self.log)]
-        done = subprocess.run(decode, capture_output=True, text=True, check=False, timeout=60)
+        exported = drivebridge_called("export", "dbc", str(self.site.path), *options)
+        assert exported.returncode == 0, exported.stderr
+        file.write_text(exported.stdout, encoding="utf-8")
+        done = peer_called("dbc_decode", str(file), str(self.log))
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)
 

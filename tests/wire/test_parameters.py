@@ -7,11 +7,11 @@ import json
 import re
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import AsyncIterator, Iterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +20,8 @@ from asyncua.client.client import Client
 from pymodbus.client import ModbusTcpClient
 
 from bridge.northbound.opcua.library import StatusCodes, get, make, node_id, ua, variant
-from bridge.northbound.opcua.security import hash_password
-from tests.support.process import REPOSITORY, drivebridge, free_port, until
+from tests.support.passwords import cheap_hash
+from tests.support.process import drivebridge, drivebridge_called, free_port, peer_called, until
 
 SITE = """
 [site]
@@ -79,25 +79,18 @@ class Shop:
 
     def map(self, name: str, table: str) -> int:
         """The address of a value of fu1, as ``export modbus`` says it."""
-        command = [
-            sys.executable,
-            "-m",
-            "bridge",
-            "export",
-            "modbus",
-            str(self.folder / "site.toml"),
-            "--json",
-        ]
-        done = subprocess.run(command, capture_output=True, text=True, check=True, cwd="/")
-        rows = [row for row in json.loads(done.stdout) if row["unit_id"] == 1]
+        rows = [row for row in self._export if row["unit_id"] == 1]
         (address,) = [row["address"] for row in rows if (row["name"], row["table"]) == (name, table)]
         return address
 
+    @cached_property
+    def _export(self) -> Any:
+        done = drivebridge_called("export", "modbus", str(self.folder / "site.toml"), "--json")
+        return json.loads(done.stdout)
+
     def ask(self, *questions: str) -> list[Any]:
-        script = REPOSITORY / "tests" / "peers" / "zenoh_ask.py"
-        endpoint = f"tcp/{HOST}:{self.zenoh}"
-        command = [sys.executable, str(script), endpoint, *questions]
-        done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+        done = peer_called("zenoh_ask", f"tcp/{HOST}:{self.zenoh}", *questions)
+        assert done.returncode == 0, done.stderr
         return [json.loads(line) for line in done.stdout.splitlines()]
 
     @asynccontextmanager
@@ -118,7 +111,7 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shop]:
         modbus=shop.modbus,
         opcua=shop.opcua,
         zenoh=shop.zenoh,
-        password_hash=hash_password(PASSWORD),
+        password_hash=cheap_hash(PASSWORD),
     )
     (folder / "site.toml").write_text(content, "utf-8")
     with drivebridge(folder, "shop", "run", str(folder / "site.toml"), notify=True) as process:

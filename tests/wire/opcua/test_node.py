@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 
 from bridge.config import OpcUaTable, UserTable
-from bridge.northbound.opcua.security import hash_password
 from tests.support.opcua_raw import cut, sessions
 from tests.support.opcua_site import OPEN, serving
+from tests.support.passwords import cheap_hash
 from tests.support.process import REPOSITORY
 
 FOLDER = REPOSITORY / "tests" / "wire" / "node"
@@ -62,7 +62,7 @@ async def answers(script: str, home: Path, *arguments: str) -> dict[str, Any]:
 
 
 def settings_for(*, encrypted: bool) -> OpcUaTable:
-    user = UserTable(name="anna", role="operator", password_hash=hash_password("swordfish"))
+    user = UserTable(name="anna", role="operator", password_hash=cheap_hash("swordfish"))
     return OpcUaTable(
         listen="127.0.0.1:0",
         no_security=not encrypted,

@@ -22,9 +22,11 @@ import pytest
 
 PATIENCE_S: Final = 3.0
 """What was told to end may take a moment."""
-_LOOP_WORKERS: Final = "asyncio_"
-"""Threads of ``asyncio.to_thread``. They belong to the loop, whose end waits for them: that of a module may
+_WORKERS: Final = ("thread asyncio_", "thread password_")
+"""Threads that a loop or a server starts when it first needs them, and ends with itself: that of a module may
 have them after one of its tests."""
+_LOOP_OF_MODULE: Final = "_module_scoped_runner"
+"""That of pytest-asyncio."""
 
 STARTERS: Final[set[int]] = set()
 """Processes that start others for the tests: these count, too."""
@@ -115,12 +117,15 @@ runners._cancel_all_tasks = _note_and_cancel  # pyright: ignore[reportPrivateUsa
 # the fixtures
 
 
-def _check(before: Held, besides: str = "") -> None:
+def _check(before: Held, besides: tuple[str, ...] = (), loop: asyncio.Runner | None = None) -> None:
     end = time.monotonic() + PATIENCE_S
-    while left := [one for one in Held.now().since(before) if not (besides and besides in one)]:
+    while left := [one for one in Held.now().since(before) if not one.startswith(besides)]:
         if time.monotonic() > end:
             break
-        time.sleep(0.01)
+        if loop:
+            loop.run(asyncio.sleep(0.01))
+        else:
+            time.sleep(0.01)
     left += _unended
     _unended.clear()
     if left:
@@ -128,10 +133,12 @@ def _check(before: Held, besides: str = "") -> None:
 
 
 @pytest.fixture(autouse=True)
-def leaves_nothing() -> Iterator[None]:
+def leaves_nothing(request: pytest.FixtureRequest) -> Iterator[None]:
+    # The loop of a module goes on to its next test, and only there would a connection be closed.
+    loop = request.getfixturevalue(_LOOP_OF_MODULE) if _LOOP_OF_MODULE in request.fixturenames else None
     before = Held.now()
     yield
-    _check(before, besides=f"thread {_LOOP_WORKERS}")
+    _check(before, _WORKERS, loop)
 
 
 @pytest.fixture(autouse=True, scope="module")

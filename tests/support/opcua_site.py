@@ -141,6 +141,19 @@ async def connected(server: OpcUaServer, **how: object) -> AsyncIterator[Client]
         await client.disconnect()
 
 
+def break_off(client: Client) -> None:
+    """As a client that has died: asyncua's own would go on asking and looking after itself for ever."""
+    client.disconnect_socket()
+    for task in (
+        client.uaclient._publish_task,
+        client._renew_channel_task,
+        client._supervisor_task,
+        client._stale_watchdog_task,
+    ):
+        if task:
+            task.cancel()
+
+
 async def namespace(client: Client) -> int:
     return await client.get_namespace_index("urn:drivebridge:points")
 

@@ -22,7 +22,7 @@ import bridge.northbound.opcua as package
 from bridge.northbound.opcua import decoding
 from tests.support.opcua_client import call, node, word, write
 from tests.support.opcua_raw import ask
-from tests.support.opcua_site import OPEN, connected, serving
+from tests.support.opcua_site import OPEN, break_off, connected, serving
 
 OVERRIDDEN = {
     "Listener": {"_make_protocol", "start", "stop"},
@@ -241,11 +241,11 @@ async def move(url: str) -> None:
         await second.open_secure_channel()
         second.uaclient.protocol.authentication_token = first.uaclient.protocol.authentication_token
         await second.uaclient.activate_session(ua.ActivateSessionParameters())
-        first.disconnect_socket()
+        break_off(first)
         for _ in range(3):
             await second.nodes.server_state.read_value()
     finally:
-        second.disconnect_socket()
+        break_off(second)
 
 
 async def test_each_private_name_is_there(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from bridge.northbound.opcua import admission, monitoring, shares
 from bridge.northbound.opcua.admission import DEADLINE_S, Stage
 from bridge.northbound.opcua.security import hash_password
 from bridge.northbound.opcua.server import OpcUaServer
-from tests.support.opcua_site import OPEN, connected, serving
+from tests.support.opcua_site import OPEN, break_off, connected, serving
 from tests.support.quiet import quiet_log
 
 Streams = list[tuple[asyncio.StreamReader, asyncio.StreamWriter]]
@@ -88,7 +88,7 @@ async def test_a_channel_without_a_session_is_closed(tmp_path: Path, monkeypatch
             with pytest.raises((ConnectionError, ua.UaError, TimeoutError)):
                 await client.create_session()
             await other.nodes.server_state.read_value()
-        client.disconnect_socket()
+        break_off(client)
 
 
 async def test_a_connection_whose_session_has_ended_is_closed(
@@ -134,7 +134,7 @@ async def test_wrong_passwords_hold_up_no_right_one(tmp_path: Path) -> None:
             await client.connect()
             await client.disconnect()
         except ua.UaError:
-            client.disconnect_socket()
+            break_off(client)
         return time.monotonic() - began
 
     async with serving(settings, tmp_path) as (server, _):
@@ -176,7 +176,7 @@ class TestSubscriptions:
                 await crashed.connect()
                 for _ in range(2):
                     await crashed.create_subscription(1000, None)
-                crashed.disconnect_socket()
+                break_off(crashed)
                 await asyncio.sleep(0.1)
 
     async def test_monitored_items_are_shared_out(

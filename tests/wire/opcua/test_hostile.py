@@ -32,7 +32,16 @@ from tests.support.opcua_hostile import (
     with_each,
     without_arrays,
 )
-from tests.support.opcua_site import OPEN, LocalView, connected, make_plant, namespace, serving, status_of
+from tests.support.opcua_site import (
+    OPEN,
+    LocalView,
+    break_off,
+    connected,
+    make_plant,
+    namespace,
+    serving,
+    status_of,
+)
 from tests.support.quiet import quiet_log
 from tests.support.zenoh_peer import until
 
@@ -112,7 +121,7 @@ async def come_far_enough_for(kind: type, served: Served) -> AsyncIterator[Clien
             await client.activate_session()
         yield client
     finally:
-        client.disconnect_socket()
+        break_off(client)
 
 
 def doubles_in(answer: Any) -> Iterator[float]:
@@ -251,7 +260,7 @@ async def test_before_a_session_little_is_decoded(served: Served, bystander: See
         assert await sent(client, with_many(kind, 1_001)) == Codes.BadEncodingLimitsExceeded
         assert await sent(client, with_many(kind, 300)) != Codes.BadEncodingLimitsExceeded
     finally:
-        client.disconnect_socket()
+        break_off(client)
     await assert_unharmed(served, bystander)
 
 

@@ -9,7 +9,7 @@ import pytest
 from asyncua import Client, ua
 
 from bridge.northbound.opcua.server import OpcUaServer
-from tests.support.opcua_site import LocalView, connected
+from tests.support.opcua_site import LocalView, break_off, connected
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 Served = tuple[OpcUaServer, LocalView]
@@ -56,7 +56,7 @@ async def test_what_is_larger_than_the_client_takes_is_refused(served: Served, w
             await client.uaclient.protocol.send_request(TOO_LARGE[what])
         await client.nodes.server_state.read_value()
     finally:
-        client.disconnect_socket()
+        break_off(client)
 
 
 @pytest.mark.parametrize("what", ["Read of one large value", "Read of another"])

@@ -15,7 +15,7 @@ from asyncua import Client, ua
 from bridge.northbound.opcua import admission, listener
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.opcua.transport import MOST_BEFORE_SESSION
-from tests.support.opcua_site import OPEN, LocalView, connected, serving
+from tests.support.opcua_site import OPEN, LocalView, break_off, connected, serving
 from tests.support.quiet import quiet_log
 from tests.support.zenoh_peer import until
 
@@ -41,7 +41,7 @@ async def channel(server: OpcUaServer) -> AsyncIterator[Client]:
     try:
         yield client
     finally:
-        client.disconnect_socket()
+        break_off(client)
 
 
 @asynccontextmanager

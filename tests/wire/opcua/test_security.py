@@ -27,7 +27,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 from bridge.config import OpcUaTable, UserTable
 from bridge.northbound.opcua.security import hash_password
 from bridge.northbound.opcua.server import OpcUaServer
-from tests.support.opcua_site import LocalView, connected, namespace, serving
+from tests.support.opcua_site import LocalView, break_off, connected, namespace, serving
 from tests.support.quiet import quiet_log
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -172,7 +172,7 @@ class TestEncrypted:
             with pytest.raises(ua.uaerrors.BadIdentityTokenRejected):
                 await client.uaclient.activate_session(token)
         finally:
-            client.disconnect_socket()
+            break_off(client)
 
     async def test_no_session_is_opened_without_security_that_is_not_offered(self, strict: Served) -> None:
         """asyncua lets it, whatever its endpoints say."""
@@ -186,7 +186,7 @@ class TestEncrypted:
             with pytest.raises(ua.uaerrors.BadSecurityPolicyRejected):
                 await client.create_session()
         finally:
-            client.disconnect_socket()
+            break_off(client)
 
     async def test_the_certificate_of_the_session_is_that_of_the_channel(
         self, strict: Served, scada: Peer, stranger: Peer
@@ -202,7 +202,7 @@ class TestEncrypted:
             with pytest.raises(ua.uaerrors.BadSecurityChecksFailed):
                 await client.uaclient.create_session(claimed)
         finally:
-            client.disconnect_socket()
+            break_off(client)
 
 
 class TestTrust:
@@ -308,7 +308,7 @@ class TestRoles:
             with pytest.raises(ua.uaerrors.BadIdentityTokenRejected):
                 await client.uaclient.activate_session(token)
         finally:
-            client.disconnect_socket()
+            break_off(client)
 
     async def test_nobody_changes_the_address_space(self, open_: Served) -> None:
         async with logged_in(open_, None, "anna", PASSWORD) as client:
@@ -365,7 +365,7 @@ class TestSessions:
                 with pytest.raises(ua.uaerrors.BadSecurityChecksFailed):
                     await thief.uaclient.activate_session(ua.ActivateSessionParameters())
             finally:
-                thief.disconnect_socket()
+                break_off(thief)
             assert await control_word(owner) == Codes.Good
 
     async def test_a_request_with_another_sessions_token_is_refused(self, open_: Served) -> None:

@@ -22,7 +22,7 @@ from tests.support.opcua_services import (
     subscription,
     view,
 )
-from tests.support.opcua_site import LocalView, connected
+from tests.support.opcua_site import LocalView, break_off, connected
 
 __all__ = ["client", "served", "server", "view"]
 
@@ -224,7 +224,7 @@ class TestReconnect:
         # The old connection has lost the session, and takes nothing with it when it goes.
         with pytest.raises((ua.UaError, ConnectionError)):
             await ask(before, "Republish", SubscriptionId=number, RetransmitSequenceNumber=1)
-        before.disconnect_socket()
+        break_off(before)
         await asyncio.gather(*lost, return_exceptions=True)
         await asyncio.sleep(0.1)
         load(view, 3.0)

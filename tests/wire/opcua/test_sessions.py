@@ -9,7 +9,7 @@ import pytest
 from asyncua import Client, ua
 
 from bridge.northbound.opcua.server import OpcUaServer
-from tests.support.opcua_site import LocalView, connected
+from tests.support.opcua_site import LocalView, break_off, connected
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 Served = tuple[OpcUaServer, LocalView]
@@ -40,7 +40,7 @@ async def test_no_session_no_good_answer_to_its_close(served: Served) -> None:
         with pytest.raises(ua.uaerrors.BadSessionIdInvalid):
             await close_session(client)
     finally:
-        client.disconnect_socket()
+        break_off(client)
 
 
 async def test_a_session_is_closed_by_the_channel_that_has_it_alone(served: Served) -> None:
@@ -52,7 +52,7 @@ async def test_a_session_is_closed_by_the_channel_that_has_it_alone(served: Serv
             with pytest.raises(ua.uaerrors.BadSessionIdInvalid):
                 await close_session(stranger)
         finally:
-            stranger.disconnect_socket()
+            break_off(stranger)
         await owner.nodes.server_state.read_value()
 
 
@@ -71,4 +71,4 @@ async def test_sessions_of_one_connection_leave_no_task_behind(served: Served) -
             counts.append(Counter(name for name in names if not name.startswith("Client.")))
         assert counts[2] == counts[0]
     finally:
-        client.disconnect_socket()
+        break_off(client)

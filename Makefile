@@ -86,8 +86,8 @@ endif
 compiled: $(VENV)/dev.stamp
 	@$(IN) -m compileall -q bridge tests/peers tests/support
 
-fuzz-short: compiled ## a minute of fuzzing for each protocol, two at a time, always the same
-	@echo "== fuzzing, a minute for each protocol"
+fuzz-short: compiled ## half a minute of fuzzing, always the same cases
+	@echo "== fuzzing, all protocols at a time"
 	@$(PYTEST) -p no:cacheprovider -rs tests/fuzz $(ARGS)
 
 FUZZ ?= 600

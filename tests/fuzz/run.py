@@ -9,7 +9,7 @@ import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
@@ -57,11 +57,15 @@ class Report:
 
 
 class Hand:
-    """Throws at one protocol from a thread of its own, until told to stop or nothing is left to throw."""
+    """Throws at one protocol from a thread of its own, until told to stop, or it has thrown all ``cases``, or
+    so many as ``most``."""
 
-    def __init__(self, protocol: str, target: Target, cases: Sequence[Case] | None = None) -> None:
+    def __init__(
+        self, protocol: str, target: Target, cases: Sequence[Case] | None = None, most: int | None = None
+    ) -> None:
         self.protocol = protocol
         self.thrown = 0
+        self._most = most
         self.last: deque[Case] = deque(maxlen=_KEPT)
         self.fault = ""
         self._target = target
@@ -85,7 +89,7 @@ class Hand:
     def _work(self) -> None:
         try:
             while not self._stopped.is_set():
-                if self._left is not None and not self._left:
+                if self.thrown == self._most or (self._left is not None and not self._left):
                     return
                 case = self._target.case() if self._left is None else self._left.popleft()
                 self.last.append(case)
@@ -104,12 +108,19 @@ def fuzz(
     seed: int,
     replay: Sequence[Case] | None = None,
     known: str = "",
+    most: Mapping[str, int] | None = None,
 ) -> Report:
-    """Throw for so long, or until something is wrong. ``replay`` is thrown instead of new cases; faults in
-    which ``known``, a regular expression, is found are let pass."""
+    """Throw for so long, or until ``most`` cases of each protocol are thrown, or something is wrong.
+    ``replay`` is thrown instead of new cases; faults in which ``known``, a regular expression, is found are
+    let pass."""
     judge = Judge(rig)
     hands = [
-        Hand(protocol, make_target(protocol, rig, Random(f"{seed}/{protocol}")), replay)
+        Hand(
+            protocol,
+            make_target(protocol, rig, Random(f"{seed}/{protocol}")),
+            replay,
+            None if most is None else most[protocol],
+        )
         for protocol in protocols
     ]
     begin = time.monotonic()

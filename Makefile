@@ -38,7 +38,7 @@ FEW_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 2)))
 LAB_SECONDS := 1800
 ON_VCAN := PYTHON=$(IN) PYTHONDONTWRITEBYTECODE=1
 VCAN := $(ON_VCAN) tests/lab/vcan-run -n 2 -t $(LAB_SECONDS) --
-LAB_RUN := $(ON_VCAN) tests/lab/run-lab -j 1 -t $(LAB_SECONDS) --
+LAB_RUN := $(ON_VCAN) tests/lab/run-lab -j $(FEW_JOBS) -t $(LAB_SECONDS) --
 PACKAGES := iproute2:ip kmod:insmod can-utils:cansend mbpoll:mbpoll nodejs:node npm:npm
 CLIENTS := tests/wire/node
 

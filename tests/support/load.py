@@ -76,6 +76,7 @@ class Load:
             await asyncio.sleep(TIMEOUT_S + 0.2)
 
     _last_telegram: float = 0.0
+    serving: asyncio.Task[None] | None = None
 
     def on_frame(self, frame: Frame) -> None:
         if frame.can_id == SYNC:
@@ -100,7 +101,8 @@ async def loaded(folder: Path) -> AsyncIterator[Load]:
     simulation = Simulation(wire.end("simulation"), [NordTu4(5)])
     ready, booted = asyncio.Event(), asyncio.Event()
     service.plant.on_event(lambda event: booted.set() if event.kind is Kind.NODE_BACK else None)
-    tasks = [asyncio.create_task(simulation.run()), asyncio.create_task(service.run(ready.set))]
+    load.serving = asyncio.create_task(service.run(ready.set))
+    tasks = [asyncio.create_task(simulation.run()), load.serving]
     try:
         await asyncio.wait_for(ready.wait(), 60)
         await asyncio.wait_for(booted.wait(), 30)

@@ -19,10 +19,15 @@ async def test_a_fault_of_our_own_leaves_no_drive_running_and_is_told(tmp_path: 
         master, network = load.service.master, load.service.plant
         network.on_time = broken  # type: ignore[method-assign]
         broke = time.monotonic()
-        with pytest.raises(OperationFailed, match="the master has failed: ZeroDivisionError"):
+        told = "the master has failed: ZeroDivisionError"
+        with pytest.raises(OperationFailed, match=told):
             await asyncio.wait_for(master.failed(), 5.0)
         await asyncio.sleep(DEADMAN_S + 0.3)
         assert max(load.syncs) <= broke + DEADMAN_S + SYNC_PERIOD_S
+        # The service ends by that, its front with it.
+        assert load.serving
+        with pytest.raises(OperationFailed, match=told):
+            await asyncio.wait_for(load.serving, 60.0)
 
 
 def broken(now: float) -> None:

@@ -28,10 +28,10 @@ _MOST_PAST: Final = 256
 class _Count:
     """How many frames of ours may come: ``left`` now, ``rate`` a second more, and those sent beside that.
 
-    What was sent within ``LINGER_S`` may come at once, after the bus was busy.
+    What was sent within ``LINGER_S`` may come at once, after the bus was busy, also at a rate that is over.
     """
 
-    __slots__ = ("_at", "_before", "_beside", "_since", "left", "rate")
+    __slots__ = ("_at", "_before", "_beside", "_past_rate", "_past_until", "_since", "left", "rate")
 
     def __init__(self) -> None:
         self.rate = 0.0
@@ -40,10 +40,14 @@ class _Count:
         self._beside = self._before = 0
         """Frames beside the rhythm since ``_since``, and in the time of the same length before."""
         self._since = float("-inf")
+        self._past_rate = 0.0
+        self._past_until = float("-inf")
 
     def repeat(self, rate: float, now: float) -> None:
         """So many come a second from now on."""
         self._advance(now)
+        self._past_rate = self._highest_rate(now)
+        self._past_until = now + LINGER_S
         self.left += LINGER_S * max(0.0, rate - self.rate)
         self.rate = rate
 
@@ -55,17 +59,19 @@ class _Count:
         self._beside += 1
         self.left += 1
 
-    def fill(self) -> None:
-        self.left = self._most
+    def fill(self, now: float) -> None:
+        self.left = self._most(now)
 
-    @property
-    def _most(self) -> float:
-        return _SPARE + LINGER_S * self.rate + self._beside + self._before
+    def _highest_rate(self, at: float) -> float:
+        return max(self.rate, self._past_rate) if at <= self._past_until else self.rate
+
+    def _most(self, at: float) -> float:
+        return _SPARE + LINGER_S * self._highest_rate(at) + self._beside + self._before
 
     def _advance(self, at: float) -> None:
         if at > self._at:
             if self._at > float("-inf"):
-                self.left = min(self.left + self.rate * (at - self._at), self._most)
+                self.left = min(self.left + self.rate * (at - self._at), self._most(at))
             self._at = at
 
     def take(self, at: float) -> bool:
@@ -141,7 +147,7 @@ class OwnFrames:
             return
         self._is_stalled = is_stalled
         for stream in self._streams.values():
-            stream.count.fill()
+            stream.count.fill(now)
             stream.retire(list(stream.past), now)
 
     def is_own(self, can_id: int, data: bytes, at: float) -> bool:

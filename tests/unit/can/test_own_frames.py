@@ -6,7 +6,7 @@ from __future__ import annotations
 import heapq
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bridge.can.ownframes import LINGER_S, OwnFrames
@@ -57,6 +57,8 @@ class Kernel:
         self.due = float("inf")
 
     def single(self, data: bytes) -> None:
+        """As ``tell``, with a look before it."""
+        assert self.look() == []
         self.own.sent(Frame(RPDO, data), self.now)
         self.send(data)
 
@@ -102,6 +104,7 @@ STEPS = st.one_of(
 
 @settings(max_examples=150, deadline=None)
 @given(st.lists(STEPS, max_size=60))
+@example([("tell", [ENABLING], 0.001, False), ("block", 0.9), ("run", 0.5), ("tell", [STOPPED], 0.1, False)])
 def test_our_own_frames_are_never_anothers(steps: list[tuple]) -> None:
     """Words change at any time, the bus is busy, and the process hangs."""
     kernel = Kernel(OwnFrames())

@@ -68,6 +68,12 @@ def load_family(name: str, folders: Sequence[Path] = ()) -> Family:
     return read_family(paths[0], folders)
 
 
+def is_family(name: str, folders: Sequence[Path]) -> bool:
+    """Whether a site can use a mapping of this name."""
+    paths = _files(folders).get(name)
+    return bool(paths) and not is_template(paths[0])
+
+
 def missing(name: str, *, template: bool) -> str:
     """Why no site can use a mapping of this name."""
     return f"{name!r} is a template: it can only be extended" if template else f"there is no mapping {name!r}"

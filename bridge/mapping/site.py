@@ -8,7 +8,14 @@ from typing import cast
 
 from bridge.config import Site, read_site
 from bridge.errors import Fault, FileFaults
-from bridge.mapping.loader import family_names, load_family, mapping_folders, missing, template_names
+from bridge.mapping.loader import (
+    family_names,
+    is_family,
+    load_family,
+    mapping_folders,
+    missing,
+    template_names,
+)
 from bridge.mapping.model import Family
 from bridge.mapping.own_places import impossible
 from bridge.mapping.process import SYNC_PERIOD
@@ -21,13 +28,12 @@ def load_site_and_families(path: Path) -> tuple[Site, dict[str, Family]]:
     families: dict[str, Family] = {}
     of_families: list[Fault] = []
     folders = mapping_folders(path)
-    known = family_names(folders)
-    templates = template_names(folders)
     for node in _nodes(file):
         name = node.text("mapping")
         if name is None or name in families:
             continue
-        if name not in known:
+        if not is_family(name, folders):
+            known, templates = family_names(folders), template_names(folders)
             near = difflib.get_close_matches(name, known, n=1)
             hint = f'did you mean "{near[0]}"?' if near else f"there are: {', '.join(known)}"
             file.fault((*node.key, "mapping"), missing(name, template=name in templates), hint)

@@ -7,6 +7,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
@@ -59,10 +60,9 @@ class TomlFile:
         """Raises ``FileFaults`` where the file cannot be read or is not TOML."""
         self.path = path
         self.faults: list[Fault] = []
-        text = self._read()
+        text = self._text = self._read()
         try:
             self.data: dict[str, Any] = tomllib.loads(text)
-            self._lines = key_lines(text)
         except tomllib.TOMLDecodeError as error:
             place = _SYNTAX_PLACE.search(str(error))
             line = int(place[1]) if place and place[1] else text.rstrip("\n").count("\n") + 1
@@ -72,6 +72,11 @@ class TomlFile:
             raise self._unreadable(0, "is nested too deeply") from error
         except ValueError as error:  # a number of more digits than Python reads
             raise self._unreadable(0, f"cannot be read: {error}") from error
+
+    @cached_property
+    def _lines(self) -> dict[Key, int]:
+        """Only a fault needs them, and most files have none."""
+        return key_lines(self._text)
 
     def _read(self) -> str:
         try:

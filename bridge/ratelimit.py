@@ -1,4 +1,4 @@
-"""How often something may be told: what somebody can bring about at will must not fill a disk. Sans-IO."""
+"""How often something may be reported: what anybody can cause at will must not fill a disk. Sans-IO."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Item = TypeVar("Item")
 
 PAUSE_S: Final = 60.0
 _MOST_SOURCES: Final = 200
-"""Of each kind: a bus has no more nodes. Further ones count as one."""
+"""Sources of each kind: a bus has no more nodes. Further ones count as one."""
 _MOST_KINDS: Final = 200
 
 
@@ -55,7 +55,7 @@ class PerSecond:
 
 
 class Pauses:
-    """One of each key, and no other of it for ``pause_s``."""
+    """Admits one of each key, and no other of that key for ``pause_s``."""
 
     __slots__ = ("_pause_s", "_told")
 
@@ -64,7 +64,7 @@ class Pauses:
         self._told: dict[Hashable, tuple[float, int]] = {}
 
     def take(self, now: float, key: Hashable = None) -> int | None:
-        """None where this one is left out; else how many were since the last one."""
+        """None if this one is left out; else how many were left out since the last one."""
         at, left_out = self._told.get(key, (float("-inf"), 0))
         if now - at < self._pause_s:
             self._told[key] = at, left_out + 1
@@ -85,15 +85,15 @@ class _Kept(Generic[Item]):
 
 
 class Repeats(Generic[Item]):
-    """The first of each kind and source are told, then how many there were: once every ``pause_s``, as long
-    as there are more."""
+    """Reports the first of each kind and source, then only their number: once every ``pause_s``, as long as
+    there are more."""
 
     def __init__(self, pause_s: float = PAUSE_S) -> None:
         self._pause_s = pause_s
         self._told: dict[Hashable, dict[Hashable, _Kept[Item]]] = {}
 
     def admits(self, kind: Hashable, source: Hashable, item: Item, now: float, first: int = 1) -> bool:
-        """Whether ``item`` is told now, as one of the ``first``; else it is counted."""
+        """Whether ``item`` is reported now, as one of the ``first``; else it is counted."""
         if kind not in self._told and len(self._told) >= _MOST_KINDS:
             self._forget(now)
             kind = kind if len(self._told) < _MOST_KINDS else None
@@ -112,7 +112,7 @@ class Repeats(Generic[Item]):
         return False
 
     def due(self, now: float) -> list[tuple[Item, int]]:
-        """The last of each that was left out, and how many were, where that is to be told by ``now``."""
+        """The last of each that was left out, with their number, if a report is due by ``now``."""
         self._forget(now)
         found: list[tuple[Item, int]] = []
         for sources in self._told.values():
@@ -126,7 +126,7 @@ class Repeats(Generic[Item]):
         return told.last is None and now - told.at >= self._pause_s
 
     def _forget(self, now: float) -> None:
-        """Those of which there were no more."""
+        """Forget those of which there were no more."""
         for kind, sources in list(self._told.items()):
             for source in [source for source, told in sources.items() if self._is_over(told, now)]:
                 del sources[source]
@@ -134,7 +134,7 @@ class Repeats(Generic[Item]):
                 del self._told[kind]
 
     def next_due(self) -> float | None:
-        """When ``due`` has something to say at the earliest; None where nothing was left out."""
+        """When the next report is due; None if nothing was left out."""
         waiting = (told.at for sources in self._told.values() for told in sources.values() if told.left_out)
         first = min(waiting, default=None)
         return None if first is None else first + self._pause_s

@@ -1,4 +1,4 @@
-"""What the buses without the kernel's broadcast manager share, such as bursts by a timer of ours."""
+"""What buses without the kernel's broadcast manager share, such as bursts by our own timer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bridge.can.wirebits import WireBits
 from bridge.canopen.frame import Frame
 
 _WITHIN_S: Final = 0.05
-"""A frame of a burst that cannot be sent within this time is stale."""
+"""A frame of a burst that cannot be sent within this time is dropped."""
 
 
 class SoftBus(ABC):

@@ -31,17 +31,17 @@ class Integer:
         object.__setattr__(self, "high", (1 << bits - self.signed) - 1)
 
     def encode(self, value: int) -> bytes:
-        """Raises ValueError where ``value`` does not fit."""
+        """Raises ValueError if ``value`` does not fit."""
         if not self.low <= value <= self.high:
             raise ValueError(f"takes {self.low}…{self.high}")
         return value.to_bytes(self.size, "little", signed=self.signed)
 
     def decode(self, data: bytes) -> int:
-        """Bytes beyond its type are ignored: some servers answer every read with four."""
+        """Surplus bytes are ignored: some servers answer every read with four."""
         return int.from_bytes(data[: self.size], "little", signed=self.signed)
 
     def from_word(self, word: int) -> int:
-        """What an unsigned word of the same length stands for: FFFFh of an INTEGER16 is -1."""
+        """The value of an unsigned word of the same length: FFFFh of an INTEGER16 is -1."""
         return word - (self.high - self.low + 1) if word > self.high else word
 
     def to_word(self, value: int) -> int:
@@ -57,15 +57,14 @@ class Real:
     layout: str
 
     def encode(self, value: float) -> bytes:
-        """Raises ValueError where ``value`` is too large."""
+        """Raises ValueError if ``value`` is too large."""
         try:
             return struct.pack(self.layout, value)
         except (OverflowError, struct.error):  # of a float, and of an integer
             raise ValueError("too large") from None
 
     def decode(self, data: bytes) -> float:
-        """May be infinite or no number. Raises ValueError where bytes are missing; those beyond the type's
-        are left out."""
+        """May be infinite or NaN. Raises ValueError if bytes are missing; surplus ones are ignored."""
         if len(data) < self.size:
             raise ValueError(f"{len(data)} bytes are too few")
         return struct.unpack_from(self.layout, data)[0]
@@ -87,7 +86,7 @@ NUMBERS: Final[dict[str, Integer | Real]] = {**INTEGERS, **REALS}
 
 
 def encode(kind: str, value: Plain) -> bytes:
-    """``value`` as it goes over the wire. Raises ValueError where it does not fit ``kind``."""
+    """``value`` as bytes. Raises ValueError if it does not fit ``kind``."""
     if kind == "bool":
         if value not in (0, 1) or isinstance(value, float | str):
             raise ValueError("a bool is true or false")
@@ -120,7 +119,7 @@ def encode(kind: str, value: Plain) -> bytes:
 def decode(kind: str, data: bytes) -> Plain:
     """The value of these bytes: a string up to its first zero byte, bytes in hexadecimal.
 
-    Raises ValueError where a number's bytes are missing; those beyond its type's are left out.
+    Raises ValueError if bytes of a number are missing; surplus ones are ignored.
     """
     if kind == "string":
         return text(data)

@@ -1,4 +1,4 @@
-"""What LSS messages say (CiA 305), for those who only listen. Sans-IO."""
+"""Decodes LSS messages (CiA 305) for listeners. Sans-IO."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _CONFIGURE: Final = {
     lss.BIT_TIMING: "configure bit timing",
     lss.STORE: "store configuration",
 }
-"""What is answered with an error code."""
+"""Commands that are answered with an error code."""
 _NUMBERS: Final = (
     {command: f"switch selective: {name}" for command, name in zip(lss.SELECT, lss.FIELDS, strict=True)}
     | {0x46: "identify: vendor id", 0x47: "identify: product code"}
     | {0x48: "identify: lowest revision number", 0x49: "identify: highest revision number"}
     | {0x4A: "identify: lowest serial number", 0x4B: "identify: highest serial number"}
 )
-"""What carries a number of 32 bits."""
+"""Commands with a 32-bit number."""
 _INQUIRIES: Final = {
     command: f"inquire {name}" for command, name in zip(lss.INQUIRE, lss.FIELDS, strict=True)
 }
@@ -34,7 +34,7 @@ _BARE: Final = {
     lss.IDENTIFIED: "identified",
     0x50: "identified: it has no node id",
 }
-"""What carries nothing."""
+"""Commands without data."""
 
 
 def said(data: bytes, *, by_master: bool) -> tuple[str, Facts]:
@@ -91,7 +91,7 @@ def _bit_timing(table: int, index: int) -> tuple[str, Facts]:
 
 
 def _fastscan(data: bytes) -> tuple[str, Facts]:
-    """A question: does the number fit from this bit up? The bits below are not compared."""
+    """The query: does your number match from this bit upwards? Lower bits are not compared."""
     number, bit, field, _ = lss.QUESTION.unpack_from(data, 1)
     if bit == lss.CONFIRM:
         return "fastscan: is anybody there?", ()

@@ -1,6 +1,6 @@
-"""What SDO frames say (CiA 301 §7.2.4.3), for those who only listen. Sans-IO.
+"""Decodes SDO frames (CiA 301 §7.2.4.3) for listeners. Sans-IO.
 
-A segment does not name its object: each channel remembers what its transfer is about.
+A segment does not name its object: each channel remembers the object of its transfer.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from bridge.canopen import abort
 from bridge.canopen.sdo_transfer import ABORT, MUX, U32, expedited, segment
 
 _MOST_COLLECTED: Final = 4096
-"""Bytes of one value that are kept; a monitor runs for days beside any kind of client."""
+"""Bytes of one value that are kept: a monitor runs for days beside clients of any kind."""
 _PRINTABLE: Final = range(0x20, 0x7F)
 
 Value = int | str
@@ -153,7 +153,7 @@ class SdoListener:
         return self._about(what, f"{self._object}: block segment {self._sequence}{last}")
 
     def _acknowledged(self, sequence: int) -> None:
-        """The receiver has taken segments up to ``sequence``: whatever it lacks comes again."""
+        """The receiver has taken segments up to ``sequence``; those after it are sent again."""
         if self._is_last and sequence == self._sequence:
             self._block = ""
 
@@ -190,7 +190,7 @@ def _size(data: bytes, is_given: int) -> str:
 
 
 def shown(value: bytes) -> str:
-    """A value of unknown type: as a number where it has the length of one, else as text or bytes."""
+    """A value of unknown type: as a number if it has the length of one, else as text or bytes."""
     text = value.rstrip(b"\0")
     readable = f'"{text.decode("ascii")}"' if text and all(c in _PRINTABLE for c in text) else ""
     if len(value) in (1, 2, 4, 8):

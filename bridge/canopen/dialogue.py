@@ -1,7 +1,7 @@
-"""Dialogues with a node: generators that yield one step after the other and are sent what came of it.
+"""Dialogues with a node: generators that yield one step after the other and are sent its result.
 
-What a step is, who writes the generator says. ``Read`` and ``Write`` are those that an SDO channel carries
-out. An error is thrown into the generator, at the step that it belongs to.
+The generator's author decides what a step is. ``Read`` and ``Write`` are steps for an SDO channel. An error
+is thrown into the generator at the step that it belongs to.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def ask(
 
 
 def attempt(index: int, sub: int = 0, channel: int = 1) -> Generator[Read, bytes | None, Result]:
-    """What became of reading an object, an error included."""
+    """The result of reading an object, which may be an error."""
     try:
         return (yield Read(index, sub, channel)) or b""
     except SdoError as error:
@@ -53,7 +53,7 @@ def attempt(index: int, sub: int = 0, channel: int = 1) -> Generator[Read, bytes
 
 
 def optional(index: int, sub: int = 0, channel: int = 1) -> Generator[Read, bytes | None, bytes | None]:
-    """An object that the node need not have: None where it aborts. A time-out is still an error."""
+    """An object that the node need not have: None if it aborts. A time-out is still an error."""
     try:
         return (yield Read(index, sub, channel))
     except SdoError as error:
@@ -70,7 +70,7 @@ E = TypeVar("E", bound=Exception)
 
 class Dialogue(Generic[S, A, R, E]):
     """Runs one generator. ``do`` carries out a step, and says whether its answer comes later, by ``go_on``.
-    ``done`` gets what the generator returns, or which of the errors ``fails`` has ended it."""
+    ``done`` gets the generator's return value, or the error, one of ``fails``, that has ended it."""
 
     def __init__(
         self,
@@ -85,8 +85,8 @@ class Dialogue(Generic[S, A, R, E]):
         self._fails = fails
 
     def go_on(self, answer: A | Exception | None, now: float) -> None:
-        """Begin with None, or go on with an answer, until something has to be waited for. Nothing happens
-        after the end."""
+        """Begin (None), or go on with an answer, until an answer has to be waited for. After the end nothing
+        happens."""
         while self._steps is not None:
             try:
                 if answer is None:

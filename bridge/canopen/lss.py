@@ -1,8 +1,8 @@
-"""LSS master (CiA 305): node ids and bit rates of devices that are told apart by their identity.
+"""LSS master (CiA 305): node ids and bit rates of devices that are identified by object 1018h.
 
-Each service is a generator. It yields ``LssExchange``s and is sent the reply's eight bytes, or None where
-none came in time; what it returns is the result. Services that need a device in configuration state say
-so: ``switch_selective``, ``switch_global`` or ``fastscan`` come first.
+Each service is a generator. It yields ``LssExchange``s and is sent the reply's eight bytes, or None if none
+came in time; its return value is the result. Services that need a device in configuration state say so:
+``switch_selective``, ``switch_global`` or ``fastscan`` come first.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Final, NamedTuple, TypeVar
 REQUEST_ID: Final = 0x7E5
 REPLY_ID: Final = 0x7E4
 NO_NODE_ID: Final = 0xFF
-"""A device that has none."""
+"""The node id of a device that has none."""
 
 BIT_RATES: Final = (1_000_000, 800_000, 500_000, 250_000, 125_000, None, 50_000, 20_000, 10_000)
 """By index in table 0 (CiA 305 §6.4.3; 5 is reserved)."""
@@ -49,7 +49,7 @@ _STANDARD_ERRORS: Final = {
 
 
 class LssError(Exception):
-    """A device refused, or did not answer."""
+    """A device refused a request, or did not answer."""
 
 
 class LssAddress(NamedTuple):
@@ -63,12 +63,12 @@ class LssAddress(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LssExchange:
-    """One request, empty where nothing is sent; ``reply`` is the command specifier that is waited for, None
-    where none comes.
+    """One request, empty if nothing is sent; ``reply`` is the command specifier of the expected answer, None
+    if there is none.
 
-    ``step`` says in words what is being done. ``fails`` false: silence is an answer. ``by_many``: any
-    number of devices may answer, or be answering something asked before, so the whole time is waited: a
-    late answer is not one to the next.
+    ``step`` says in words what is being done. ``fails`` false: silence is an answer, too. ``by_many``: any
+    number of devices may answer, or be late with an earlier answer, so the whole time is waited lest that be
+    taken for an answer to the next request.
     """
 
     request: bytes
@@ -77,7 +77,7 @@ class LssExchange:
     fails: bool = True
     by_many: bool = False
     is_first: bool = False
-    """The first question of a scan: how quick its devices are is not known yet."""
+    """The first query of a scan: how fast the devices answer is not known yet."""
 
 
 _R = TypeVar("_R")
@@ -89,23 +89,24 @@ def _message(command: int, rest: bytes = b"") -> bytes:
 
 
 def settle() -> Service[None]:
-    """Ask nothing for a whole answer time: what comes then is late, and not taken for an answer."""
+    """Send nothing for a whole answer time, so that late answers are not taken for those of the next
+    query."""
     yield LssExchange(b"", None, "waiting for late answers", fails=False, by_many=True)
 
 
 def switch_global(*, configuration: bool) -> Service[None]:
-    """All devices to configuration or to waiting state; nobody answers."""
+    """Switch all devices to configuration or waiting state; none answers."""
     name = "configuration" if configuration else "waiting"
     yield LssExchange(_message(SWITCH_GLOBAL, bytes((configuration,))), None, f"all devices to {name} state")
 
 
 def to_waiting() -> Service[None]:
-    """All devices to waiting state."""
+    """Switch all devices to waiting state."""
     return switch_global(configuration=False)
 
 
 def switch_selective(identity: LssAddress) -> Service[None]:
-    """The one device with this identity to configuration state. Raises LssError where it is not there."""
+    """Switch the device with this identity to configuration state. Raises LssError if there is none."""
     for command, value, name in zip(SELECT, identity, FIELDS, strict=True):
         last = command == SELECT[-1]
         reply = SELECTED if last else None
@@ -117,7 +118,7 @@ def switch_selective(identity: LssAddress) -> Service[None]:
 
 
 def inquire_identity() -> Service[LssAddress]:
-    """What the device in configuration state is. Several of them would answer at once."""
+    """The identity of the device in configuration state; several would answer at once."""
     values: list[int] = []
     for command, name in zip(INQUIRE, FIELDS, strict=True):
         answer = yield LssExchange(_message(command), command, f"asking for its {name}")
@@ -126,19 +127,19 @@ def inquire_identity() -> Service[LssAddress]:
 
 
 def inquire_node_id() -> Service[int]:
-    """Its present node id, ``NO_NODE_ID`` where it has none."""
+    """Its present node id, ``NO_NODE_ID`` if it has none."""
     answer = yield LssExchange(_message(INQUIRE_NODE_ID), INQUIRE_NODE_ID, "asking for its node id")
     return answer[1] if answer else NO_NODE_ID
 
 
 def configure_node_id(node_id: int) -> Service[None]:
-    """Its node id after the next reset of its communication, 1…127, or ``NO_NODE_ID``."""
+    """Set its node id, 1…127 or ``NO_NODE_ID``, valid from its next reset communication."""
     answer = yield LssExchange(_message(NODE_ID, bytes((node_id,))), NODE_ID, f"setting node id {node_id}")
     _check(answer)
 
 
 def configure_bit_rate(bit_rate: int | None) -> Service[None]:
-    """Its bit rate in bit/s after activation or its next start; None: it finds out by itself."""
+    """Set its bit rate in bit/s, valid after activation or its next start; None: automatic detection."""
     index = AUTOMATIC if bit_rate is None else BIT_RATES.index(bit_rate)
     step = "setting automatic bit rate" if bit_rate is None else f"setting {bit_rate} bit/s"
     answer = yield LssExchange(_message(BIT_TIMING, bytes((0, index))), BIT_TIMING, step)
@@ -146,26 +147,26 @@ def configure_bit_rate(bit_rate: int | None) -> Service[None]:
 
 
 def activate_bit_rate(delay_ms: int) -> Service[None]:
-    """All devices in configuration state change their bit rate: silent for ``delay_ms``, then switched,
-    then silent for as long again. Nobody answers."""
+    """All devices in configuration state change their bit rate: they are silent for ``delay_ms``, switch, and
+    are silent for as long again. None answers."""
     request = _message(ACTIVATE, U16.pack(delay_ms))
     yield LssExchange(request, None, f"activating the bit rate within {delay_ms} ms")
 
 
 def store() -> Service[None]:
-    """Node id and bit rate into the device's memory."""
+    """Save node id and bit rate in the device's non-volatile memory."""
     answer = yield LssExchange(_message(STORE), STORE, "storing")
     _check(answer)
 
 
 def _check(answer: bytes | None) -> None:
-    """Raises LssError where a configuration service was refused."""
+    """Raises LssError if a configuration service was refused."""
     if answer and (text := error_text(answer)):
         raise LssError(f"the device refused: {text}")
 
 
 def error_text(answer: bytes) -> str:
-    """What the error code of a configuration service says, empty where it is none."""
+    """The error of a configuration service in words, empty if there is none."""
     if answer[1] == 0xFF:
         return f"its own error {answer[2]}"
     default = f"error {answer[1]}" if answer[1] else ""
@@ -173,15 +174,15 @@ def error_text(answer: bytes) -> str:
 
 
 def is_anybody_there(*, is_first: bool = False) -> Service[bool]:
-    """Begin a scan: whether a device without a node id answers. Every device begins with the vendor id."""
+    """Begin a scan: whether any device without a node id answers. All start at the vendor id."""
     request = QUESTION.pack(0, CONFIRM, 0, 0)
     return (yield _question(request, "is anybody there?", is_first=is_first)) is not None
 
 
 def answers_everything() -> Service[bool]:
-    """Right after the beginning of a scan: whether somebody answers what is asked of nobody yet, for either
-    value of a serial number's first bit. CANopenNode does, once it has been found and is in configuration
-    state."""
+    """Right after the beginning of a scan: whether a device answers queries that none should answer yet, for
+    both values of a serial number's first bit. CANopenNode does, once it has been found and is in
+    configuration state."""
     for value in (0, 1 << 31):
         request = QUESTION.pack(value, 31, _SERIAL, _SERIAL)
         if (yield _question(request, "does somebody answer everything?")) is None:
@@ -190,10 +191,10 @@ def answers_everything() -> Service[bool]:
 
 
 def fastscan(known: LssAddress | None = None) -> Service[LssAddress]:
-    """After ``is_anybody_there``: find one of the devices; it is in configuration state then (CiA 305 §6.7).
+    """After ``is_anybody_there``: find one of the devices and leave it in configuration state (CiA 305 §6.7).
 
-    Each of 132 questions takes a whole reply time. ``known`` fills in fields that are the same for all
-    (not 0). Raises LssError where nobody confirms what was found.
+    Each of the 132 queries takes a whole reply time. ``known`` has the fields that are the same for all
+    devices (not 0). Raises LssError if no device confirms what was found.
     """
     found: list[int] = []
     for sub, name in enumerate(FIELDS):
@@ -207,15 +208,15 @@ def fastscan(known: LssAddress | None = None) -> Service[LssAddress]:
 
 
 def enter(sub: int, value: int) -> Service[bool]:
-    """Devices whose field ``sub`` is ``value`` go on to the next one, after the last to configuration state.
-    False: there is none."""
+    """Devices whose field ``sub`` is ``value`` go on to the next field, and after the last to configuration
+    state. False: there are none."""
     request = QUESTION.pack(value, 0, sub, (sub + 1) % len(FIELDS))
     return (yield _question(request, f"{FIELDS[sub]} is {value:08X}h")) is not None
 
 
 def has(sub: int, value: int, bit: int = 0) -> Service[bool]:
-    """Whether a device that has come to field ``sub`` has this ``value`` there, from ``bit`` on upwards. It
-    stays where it is."""
+    """Whether a device that is at field ``sub`` has this ``value`` there, from ``bit`` upwards. It stays at
+    that field."""
     request = QUESTION.pack(value, bit, sub, sub)
     return (yield _question(request, f"{FIELDS[sub]}, bit {bit}")) is not None
 

@@ -1,9 +1,9 @@
 """Every device without a node id: fastscan, one after the other (CiA 305 §6.7). Sans-IO.
 
-A device that was found is in configuration state and silent in a scan. Some are not: CANopenNode answers
-every question of a scan there, and hides all who have not been found. Where that shows, whoever keeps
-answering goes back to waiting state, where it answers only what fits it, whoever is silent is kept in
-configuration state by selecting it, and the others are told apart question by question.
+A device that was found is in configuration state and should be silent in a scan. CANopenNode is not: there it
+answers every query, and hides all devices that have not been found yet. If so, devices that keep answering
+are sent back to waiting state, where they answer only what matches them; silent ones are kept in
+configuration state by selecting them; and the others are told apart query by query.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _TOO_LATE: Final = "devices answer too late: allow them more time"
 
 @dataclass(slots=True)
 class Scanned:
-    """Filled while the scan goes on. ``keeps_answering``: who of those ``found`` answered further questions.
-    ``problem``: why there may be more devices, empty where there are none."""
+    """Filled while the scan goes on. ``keeps_answering``: which of those ``found`` answered further queries.
+    ``problem``: why there may be more devices, empty if there are none."""
 
     found: list[LssAddress] = field(default_factory=list[LssAddress])
     keeps_answering: list[LssAddress] = field(default_factory=list[LssAddress])
@@ -34,9 +34,9 @@ class Scanned:
 def find_all(known: LssAddress | None, scanned: Scanned | None = None) -> Service[Scanned]:
     """Every device without a node id, in ``scanned``; all are left in waiting state.
 
-    A late answer that was taken for one to another question spoils a scan: the device does not confirm,
-    or has another identity than was found. It is looked for again, with the time that the late answer has
-    shown to be needed; and what was found counts if the device can be selected by it.
+    A late answer that is taken for the answer to another query spoils a scan: no device confirms, or the
+    identity found is wrong. The search is repeated with the time that the late answer has shown to be needed,
+    and an identity counts only if the device can be selected by it.
     """
     scanned = scanned or Scanned()
     found = scanned.found
@@ -60,7 +60,7 @@ def find_all(known: LssAddress | None, scanned: Scanned | None = None) -> Servic
         if identity not in found:
             found.append(identity)
         elif identity not in scanned.keeps_answering:
-            # It did not go to configuration state, or its answers come late: now it is sent there.
+            # It did not enter configuration state, or answered late: now it is sent there.
             scanned.keeps_answering.append(identity)
             yield from _is_there(identity)
         else:
@@ -71,8 +71,8 @@ def find_all(known: LssAddress | None, scanned: Scanned | None = None) -> Servic
 
 
 def _keep_real(scanned: Scanned) -> Service[None]:
-    """Leave out what cannot be selected. One at a time is in configuration state: there CANopenNode takes any
-    identity for its own."""
+    """Drop identities that cannot be selected. Only one device at a time is in configuration state, because
+    there CANopenNode takes any identity for its own."""
     for identity in tuple(scanned.found):
         yield from lss.to_waiting()
         if not (yield from _is_there(identity)):
@@ -90,7 +90,7 @@ def _is_there(identity: LssAddress) -> Service[bool]:
 
 
 def _among_talkers(known: LssAddress | None, scanned: Scanned) -> Service[None]:
-    """Go on where somebody keeps answering."""
+    """Go on with a scan in which a device keeps answering."""
     silent: list[LssAddress] = []
     for identity in tuple(scanned.found):
         yield from lss.to_waiting()
@@ -115,7 +115,7 @@ def _among_talkers(known: LssAddress | None, scanned: Scanned) -> Service[None]:
 def _tell_all_apart(
     known: LssAddress | None, present: Collection[LssAddress], scanned: Scanned
 ) -> Service[None]:
-    """Add who is in waiting state. Once more where an answer was missing."""
+    """Add the devices in waiting state; once more if an answer was missing."""
     for _ in range(_MOST_SPOILT):
         is_sure = yield from _tell_apart(known, present, scanned.found)
         scanned.problem = "" if is_sure else _TOO_LATE
@@ -126,8 +126,8 @@ def _tell_all_apart(
 def _tell_apart(
     known: LssAddress | None, present: Collection[LssAddress], found: list[LssAddress]
 ) -> Service[bool]:
-    """Add every device in waiting state to ``found``; nobody leaves that state. Of those ``present`` it is
-    known that they answer, and nothing is asked. False: not all have confirmed what they answered.
+    """Add every device in waiting state to ``found``; none leaves that state. Those ``present`` are known to
+    answer and are not queried. False: not all confirmed what they had answered.
     """
     is_sure = True
     branches: list[tuple[int, ...]] = [()]
@@ -149,7 +149,7 @@ def _tell_apart(
 
 
 def _go_to(branch: tuple[int, ...]) -> Service[bool]:
-    """Begin anew, and have the devices whose first fields are these wait for the next one."""
+    """Begin again, and bring the devices whose first fields are these to the next field."""
     if not (yield from lss.is_anybody_there()):
         return False
     for sub, value in enumerate(branch):
@@ -159,7 +159,7 @@ def _go_to(branch: tuple[int, ...]) -> Service[bool]:
 
 
 def _values(sub: int, known: int, certain: Collection[int]) -> Service[tuple[list[int], bool]]:
-    """What field ``sub`` is in the devices that have come to it, and whether all values are confirmed."""
+    """The values of field ``sub`` in the devices that are at it, and whether all are confirmed."""
     if known:
         return [known], True  # who goes on says so
     found: list[int] = []
@@ -180,7 +180,7 @@ def _values(sub: int, known: int, certain: Collection[int]) -> Service[tuple[lis
         if _is_among(high, bit, certain) or (has_low and (yield from lss.has(sub, high, bit))):
             branches.append((high, bit - 1, True))
         elif not has_low:
-            # Somebody answered for the bits above: it has a 1 here, or its answer was lost.
+            # A device matched the bits above: it has a 1 here, or its answer was lost.
             branches.append((high, bit - 1, False))
     return found, confirmed
 

@@ -32,7 +32,7 @@ class NmtState(IntEnum):
 
     @property
     def words(self) -> str:
-        """As it is written in sentences."""
+        """As written in sentences."""
         return self.label.replace("_", "-") if self is NmtState.PRE_OPERATIONAL else self.label
 
 

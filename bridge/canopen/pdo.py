@@ -1,7 +1,7 @@
 """PDO codecs, compiled from a mapping (CiA 301 §7.5.2.36).
 
-Whole bytes, which is what drives map, become one ``struct.Struct``; anything else is taken apart with
-shifts: objects follow each other without gaps, the first at bit 0 of the first byte, little-endian.
+Whole bytes, which drives usually map, become one ``struct.Struct``; anything else is split with shifts:
+objects follow each other without gaps, the first at bit 0 of the first byte, little-endian.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class PdoEntry:
 
     @property
     def is_dummy(self) -> bool:
-        """It stands for a data type and fills a gap (CiA 301 §7.4.7): sent as 0, received by nobody."""
+        """It stands for a data type and fills a gap (CiA 301 §7.4.7): sent as 0, ignored when received."""
         return self.index in _DUMMY_INDICES
 
     def __str__(self) -> str:
@@ -47,13 +47,13 @@ class MappingError(ValueError):
 
 
 class PdoCodec:
-    """Packs and unpacks one PDO. Values are the integers of the entries, in order: unsigned, but for
-    the objects in ``signed``, which are (index, sub)."""
+    """Packs and unpacks one PDO. Values are the integers of the entries in order, unsigned except for the
+    objects in ``signed``, given as (index, sub)."""
 
     __slots__ = ("_fields", "_masks", "_pack", "_unpack", "entries", "has_signed", "length")
 
     def __init__(self, entries: tuple[PdoEntry, ...], signed: Collection[tuple[int, int]] = ()) -> None:
-        """Raises MappingError where an entry has not 1…64 bits or the sum exceeds eight bytes."""
+        """Raises MappingError if an entry does not have 1…64 bits or the sum exceeds eight bytes."""
         for entry in entries:
             if not 1 <= entry.bits <= MOST_BITS:
                 raise MappingError(f"{entry}: 1…{MOST_BITS} bits can be mapped")
@@ -66,7 +66,7 @@ class PdoCodec:
         self.has_signed = any(signs)
         self._masks = tuple((1 << entry.bits) - 1 for entry in entries)
         self._fields: tuple[tuple[int, int, int], ...] = ()
-        """Shift, mask and sign bit of each entry, where a Struct cannot do it."""
+        """Shift, mask and sign bit of each entry, if no Struct fits."""
         self._pack: struct.Struct | None = None
         self._unpack: struct.Struct | None = None
         if all(entry.bits in _CODES for entry in entries):
@@ -87,11 +87,11 @@ class PdoCodec:
         if self._unpack:
             return self._unpack.unpack(data)
         number = int.from_bytes(data, "little")
-        # (x ^ sign) - sign extends the sign, and is x where there is none.
+        # (x ^ sign) - sign extends the sign, and is x for sign = 0.
         return tuple(((number >> shift & mask) ^ sign) - sign for shift, mask, sign in self._fields)
 
     def pack(self, values: Sequence[int]) -> bytes:
-        """The frame's data; of a value its lowest bits count."""
+        """The frame's data; of each value only the lowest bits are sent."""
         masked = tuple(value & mask for value, mask in zip(values, self._masks, strict=True))
         if self._pack:
             return self._pack.pack(*masked)

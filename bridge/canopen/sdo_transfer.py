@@ -1,8 +1,8 @@
 """SDO transfers as generators: expedited and segmented (CiA 301 §7.2.4.3.3–8).
 
-A transfer yields what is to be sent and which answer belongs to it, and is sent that answer. Everything
-else the server says is not its business (``sdo.SdoChannel``). An abort by the server and a silent server
-are thrown into it as ``SdoError``, so that it can go on where the protocol says how.
+A transfer yields frames to be sent and which answer belongs to them, and is sent that answer;
+``sdo.SdoChannel`` handles everything else the server sends. An abort by the server and a time-out are thrown
+into it as ``SdoError``, so that it can go on where the protocol allows.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ U32: Final = struct.Struct("<I")
 ABORT: Final = 0x80
 SEGMENT: Final = 7
 MOST_BYTES: Final = 1 << 19
-"""Longest value taken from a server: longer ones are a fault of the server, not data."""
+"""Longest value accepted from a server; a longer one is the server's fault."""
 
 _UPLOAD: Final = 0x40
 _UPLOAD_SEGMENT: Final = 0x60
@@ -44,7 +44,7 @@ class SdoError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """An answer: ``data[0] & mask == command`` and, where it carries it, the multiplexer.
+    """An answer: ``data[0] & mask == command`` and, if it has one, the multiplexer.
 
     ``before`` is the answer before this one: the same frame once more is a repetition, not an answer.
     """
@@ -55,7 +55,7 @@ class Reply:
     before: bytes = b""
 
     def fits(self, data: bytes, unsent: int) -> bool:
-        """Whether ``data`` is this answer, while ``unsent`` frames of the request have not left yet."""
+        """Whether ``data`` is this answer, with ``unsent`` frames of the request still to be sent."""
         del unsent
         return (
             data[0] & self.mask == self.command
@@ -99,8 +99,8 @@ class BlockAck:
 
 @dataclass(frozen=True, slots=True)
 class Exchange:
-    """Frames to be sent, in order (none: only wait), and the answer that ends the exchange (None: there
-    is none, the transfer goes on at once)."""
+    """Frames to be sent in order (none: just wait), and the answer that ends the exchange (None: the transfer
+    goes on at once)."""
 
     requests: tuple[bytes, ...]
     reply: Reply | BlockStart | BlockSegment | BlockAck | None
@@ -115,7 +115,7 @@ def abort_request(index: int, sub: int, code: int) -> bytes:
 
 
 def announced_bytes(index: int, sub: int, reply: bytes) -> int:
-    """The length in bytes 4…7 of ``reply``. Raises SdoError where it is more than is taken."""
+    """The length in bytes 4…7 of ``reply``. Raises SdoError if it is more than is accepted."""
     announced: int = U32.unpack_from(reply, 4)[0]
     if announced > MOST_BYTES:
         raise SdoError(index, sub, abort.OUT_OF_MEMORY, by_server=False)
@@ -123,7 +123,7 @@ def announced_bytes(index: int, sub: int, reply: bytes) -> int:
 
 
 def check_length(index: int, sub: int, length: int, announced: int | None) -> None:
-    """Raises SdoError where the server has sent more or fewer bytes than it announced."""
+    """Raises SdoError if the server has sent more or fewer bytes than it announced."""
     if announced is None or length == announced:
         return
     code = abort.LENGTH_TOO_HIGH if length > announced else abort.LENGTH_TOO_LOW
@@ -141,7 +141,7 @@ def segment(data: bytes) -> bytes:
 
 
 def initiate_upload(index: int, sub: int) -> Generator[Exchange, bytes, tuple[bytes | None, int | None]]:
-    """Ask for an object. Returns its value where the answer held it, and else the announced length."""
+    """Ask for an object. Returns its value if the answer contains it, else the announced length."""
     mux = MUX.pack(index, sub)
     reply = yield Exchange((bytes((_UPLOAD,)) + mux + bytes(4),), Reply(0xE0, 0x40, mux))
     if reply[0] & 2:
@@ -150,7 +150,7 @@ def initiate_upload(index: int, sub: int) -> Generator[Exchange, bytes, tuple[by
 
 
 def upload_segments(index: int, sub: int, announced: int | None) -> Transfer:
-    """The segments after a segmented upload has been initiated."""
+    """The segments of an upload that has been initiated."""
     data = bytearray()
     toggle, reply = 0, b""
     most = MOST_BYTES if announced is None else announced
@@ -181,7 +181,7 @@ def upload(index: int, sub: int) -> Transfer:
 
 
 def download(index: int, sub: int, data: bytes) -> Transfer:
-    """Write an object: expedited up to four bytes, segmented above; returns nothing of interest."""
+    """Write an object: expedited up to four bytes, else segmented. The result has no meaning."""
     mux = MUX.pack(index, sub)
     done = Reply(0xE0, 0x60, mux)
     if 0 < len(data) <= 4:

@@ -112,7 +112,7 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
     for drive in report["drives"]:
         yield from _drive_lines(drive)
     yield "The drives stood still, disabled, before, during and after the test: it shows that they notice a "
-    yield "silent bridge and what they make of it, not how far a moving machine runs on until it stands."
+    yield "silent bridge and how they react, not how far a moving machine runs on."
     yield ""
     yield f"SHA-256 of the JSON report without `sha256`: `{report['sha256']}`"
     yield ""

@@ -26,7 +26,7 @@ _QUESTIONS = 134
 _NUMBER = re.compile(r"(?:0x)?([0-9a-f]{1,8})h?", re.IGNORECASE)
 
 Site = Annotated[Path | None, typer.Argument(metavar="[SITE]")]
-Timeout = Annotated[int, typer.Option(min=5, max=10_000, help="wait so long for each answer")]
+Timeout = Annotated[int, typer.Option(min=5, max=10_000, help="how long to wait for each answer")]
 Which = Annotated[
     str | None,
     typer.Option("--identity", help="the device: VENDOR:PRODUCT:REVISION:SERIAL, hexadecimal"),
@@ -44,7 +44,7 @@ def scan(
         str | None, typer.Option(help="as for --identity, 0 where unknown: these numbers are not searched")
     ] = None,
     timeout_ms: Annotated[
-        int, typer.Option(min=5, max=10_000, help="wait so long at least for each answer")
+        int, typer.Option(min=5, max=10_000, help="how long to wait at least for each answer")
     ] = 100,
     as_json: AsJson = False,
 ) -> None:

@@ -71,7 +71,7 @@ def monitor(
     site: Annotated[Path | None, typer.Argument(metavar="[SITE]", help="the site file")] = None,
     node: Annotated[list[str] | None, typer.Option(help="only this node; may be repeated")] = None,
     kind: Annotated[list[Kind] | None, typer.Option(help="only this kind; may be repeated")] = None,
-    count: Annotated[int | None, typer.Option(min=1, help="end after so many frames")] = None,
+    count: Annotated[int | None, typer.Option(min=1, help="end after this many frames")] = None,
     seconds: Annotated[float | None, typer.Option(min=0.01, help="end after this time")] = None,
     statistics: Annotated[bool, typer.Option("--statistics", help="count instead, by COB-ID")] = False,
     log: Annotated[Path | None, typer.Option(help="write the frames to a file as candump -L does")] = None,

@@ -39,7 +39,7 @@ def nmt(
     what: Annotated[list[str], typer.Argument(metavar="[SITE] COMMAND NODE|all")],
     which: BusChoice,
     seconds: Annotated[
-        float, typer.Option(min=0.05, max=60, help="wait so long for the nodes' states")
+        float, typer.Option(min=0.05, max=60, help="how long to wait for the nodes' states")
     ] = 2.0,
     as_json: AsJson = False,
 ) -> None:

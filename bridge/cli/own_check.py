@@ -65,7 +65,7 @@ def audit(
     site: Annotated[Path, typer.Argument(metavar="SITE", help="the site file")],
     bus: BusName = None,
     offline: Annotated[
-        bool, typer.Option("--offline", help="ask no drive: take what site file and factory say")
+        bool, typer.Option("--offline", help="ask no drive: use site file and factory settings")
     ] = False,
     as_json: AsJson = False,
 ) -> None:

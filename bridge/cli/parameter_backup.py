@@ -25,13 +25,13 @@ def backup(
     site: SiteArgument,
     drive: DriveArgument,
     file: FileArgument,
-    force: Annotated[bool, typer.Option("--force", help="write over FILE")] = False,
+    force: Annotated[bool, typer.Option("--force", help="overwrite FILE")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Read every setting that the mapping file lists, and write them to FILE."""
     target = find(site, drive)
     if file.exists() and not force:
-        raise typer.BadParameter(f"{file} is there already: --force writes over it")
+        raise typer.BadParameter(f"{file} exists already: --force overwrites it")
     found = backups.Backup()
     target.run(lambda now: backups.back_up(target.access, found, now))
     saved = datetime.now(UTC).isoformat(timespec="seconds")
@@ -102,7 +102,7 @@ def restore(
     if done.error:
         raise OperationFailed(
             f"{target.name}: {done.error}; it ended there: {len(done.written)} written, "
-            f"{len(done.left)} not come to"
+            f"{len(done.left)} not reached"
         )
 
 

@@ -27,9 +27,11 @@ def scan(
     site: Annotated[Path | None, typer.Argument(metavar="[SITE]", help="the site file")] = None,
     passive: Annotated[bool, typer.Option("--passive", help="send nothing, only listen")] = False,
     seconds: Annotated[
-        float | None, typer.Option(min=0.1, help="listen at least so long; 0.5, with --passive 3")
+        float | None, typer.Option(min=0.1, help="how long to listen at least; 0.5, with --passive 3")
     ] = None,
-    timeout_ms: Annotated[int, typer.Option(min=10, max=10_000, help="wait so long for each answer")] = 300,
+    timeout_ms: Annotated[
+        int, typer.Option(min=10, max=10_000, help="how long to wait for each answer")
+    ] = 300,
     as_json: AsJson = False,
 ) -> None:
     """List the nodes of a bus: by heartbeat, guarding and SDO."""

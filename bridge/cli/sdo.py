@@ -32,10 +32,10 @@ ValueType = Literal[TypeName, "float", "double"]
 _ALSO = {"float": "real32", "double": "real64"}
 """Names that points and other tools have for real numbers."""
 Timeout = Annotated[
-    int | None, typer.Option(min=10, max=60_000, help="wait so long for each answer; 500, or the site's")
+    int | None, typer.Option(min=10, max=60_000, help="how long to wait for each answer; 500, or the site's")
 ]
 Retries = Annotated[
-    int | None, typer.Option(min=0, max=10, help="ask so often again after silence; 0, or the site's")
+    int | None, typer.Option(min=0, max=10, help="how often to ask again after silence; 0, or the site's")
 ]
 Server = Annotated[
     int, typer.Option("--sdo-channel", min=1, max=128, help="one of the mapping's further SDO channels")

@@ -122,7 +122,7 @@ class DriveTable(Table):
     unit_id: int | None = Field(None, ge=1, le=247, description="a Modbus unit id, 1…247")
     control: Control = Field("none", description="modbus, opcua, zenoh, lease or none")
     fieldbus_timeout_ms: int | None = Field(
-        None, ge=0, le=LONGEST_TIMEOUT_MS, description="0 (off) or 1…32767 ms, the twin of P151"
+        None, ge=0, le=LONGEST_TIMEOUT_MS, description="0 (off) or 1…32767 ms, like P151"
     )
     fieldbus_timeout_writable: bool = False
     fieldbus_timeout_range_ms: TimeoutRange | None = Field(
@@ -228,7 +228,7 @@ class NodeTable(Table):
     sdo_channels: list[Annotated[int, Field(ge=2, le=128)]] = Field(default_factory=list[int])
     identity: IdentityTable = Field(default_factory=lambda: IdentityTable.model_validate({}))
     own_timeout_ms: int | None = Field(
-        None, ge=1, le=65535, description="the drives' own watch over the bridge, 1…65535 ms"
+        None, ge=1, le=65535, description="the drives' own supervision of the bridge, 1…65535 ms"
     )
     enforce: bool = Field(False, description="true writes own_timeout_ms at boot-up where it differs")
     configuration: str | None = None

@@ -1,4 +1,4 @@
-"""What a device description says, whatever its format."""
+"""The content of a device description, whatever its format."""
 
 from __future__ import annotations
 
@@ -75,14 +75,14 @@ class Access(StrEnum):
 
 class Severity(StrEnum):
     ERROR = "error"
-    """Something could not be read and is left out."""
+    """Something could not be read and was left out."""
     WARNING = "warning"
-    """Not as the standard has it; the text says how it was taken."""
+    """Something differs from the standard; the text says how it was understood."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """An oddity of a file. ``line`` counts from 1 and is 0 where the file as a whole is meant."""
+    """An oddity of a file. ``line`` counts from 1; 0 means the file as a whole."""
 
     line: int
     severity: Severity
@@ -98,13 +98,13 @@ Plain = int | float | str | bytes
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A value of the file. With ``plus_node_id`` the node's id is still to be added to it."""
+    """A value of the file. With ``plus_node_id`` the node id has to be added to it."""
 
     plain: Plain
     plus_node_id: bool = False
 
     def at(self, node_id: int | None) -> Plain | None:
-        """The value on the node ``node_id``; None where it needs one and none is known."""
+        """The value on the node ``node_id``; None if it depends on the node id and that is unknown."""
         if not self.plus_node_id or not isinstance(self.plain, int):
             return self.plain
         return None if node_id is None else self.plain + node_id
@@ -119,7 +119,7 @@ class Value:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One index and sub-index. ``data_type`` is None where the file does not tell or we do not know it.
+    """One index and sub-index. ``data_type`` is None if the file does not say or we do not know it.
 
     ``parameter_value`` is what a DCF or XDC configures; ``refuses_download`` is bit 0 of ObjFlags.
     """
@@ -139,7 +139,7 @@ class Entry:
 
     @property
     def current(self) -> Value | None:
-        """What the node holds when it is configured by this file."""
+        """The node's value once it is configured by this file."""
         return self.default if self.parameter_value is None else self.parameter_value
 
 
@@ -161,7 +161,7 @@ class Object:
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """Who made it and what it is. Numbers are None and texts empty where the file does not say."""
+    """Vendor and product. Numbers are None and texts empty if the file does not say."""
 
     vendor: str = ""
     vendor_id: int | None = None
@@ -175,7 +175,7 @@ class Device:
 
 @dataclass(frozen=True, slots=True)
 class Commissioning:
-    """Of a DCF or XDC: the one node that it is for."""
+    """The node that a DCF or XDC is for."""
 
     node_id: int | None = None
     node_name: str = ""
@@ -185,7 +185,7 @@ class Commissioning:
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A whole file: the device, its objects by index, and what was odd about it."""
+    """A whole file: the device, its objects by index, and the oddities found."""
 
     format: str
     device: Device = field(default_factory=Device)

@@ -31,14 +31,14 @@ _INTEGERS: Final = {
 
 
 class BadValue(ValueError):
-    """A text that is no such value; the message says why."""
+    """The text is no such value; the message says why."""
 
 
 def integer(text: str) -> tuple[int, str]:
-    """A whole number and what is odd about how it is written, or "".
+    """A whole number, and what is odd about how it is written, or "".
 
-    Raises BadValue. 001 is 1 and 010 is 10: padding, as the tools in the field write it. C's octal,
-    which the standard allows, is named where it would be another number.
+    Raises BadValue. 001 is 1 and 010 is 10: tools pad with zeros. The standard allows C's octal numbers;
+    where one would give another value, the text says so.
     """
     note = ""
     bare = text.strip()
@@ -62,7 +62,7 @@ def integer(text: str) -> tuple[int, str]:
 
 
 def expression(text: str) -> tuple[Value, str]:
-    """A number that may hold $NODEID once, in any order, and what is odd about it. Raises BadValue."""
+    """A number that may contain $NODEID once, on either side, and what is odd about it. Raises BadValue."""
     if not _NODE_ID.search(text):
         value, note = integer(text)
         return Value(value), note
@@ -104,7 +104,7 @@ def value(text: str, data_type: DataType | None) -> tuple[Value, str]:
 
 
 def encode(plain: int | float | str | bytes, data_type: DataType) -> bytes:
-    """A value as an SDO carries it. Raises BadValue where it does not fit its type."""
+    """A value as an SDO transfers it. Raises BadValue if it does not fit its type."""
     if isinstance(plain, bytes):
         return plain
     if isinstance(plain, str):

@@ -1,4 +1,4 @@
-"""Whom the limits of one address are for."""
+"""To whom a limit for one address applies."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ipaddress import IPv6Address, ip_address
 
 @lru_cache(maxsize=1024)
 def source_of(host: str) -> str:
-    """An IPv4 address, or an IPv6 network of 64 bits, because a single machine has all addresses of that."""
+    """An IPv4 address, or an IPv6 network of 64 bits, because a single machine may use all its addresses."""
     try:
         address = ip_address(host.partition("%")[0])
     except ValueError:

@@ -34,7 +34,7 @@ class Cia402Drive(SimulatedDevice):
         self._settings = Store(Cia402Settings)
         if settings is not None:
             self._settings.current = settings
-        self.save_settings()  # commissioned before it came onto this bus
+        self.save_settings()  # commissioned before it was connected to this bus
         self._communication = Store(lambda: factory_communication(node_id))
         self._emcy = EmcyProducer(self._communication, RULES)
         self.axis = Cia402Axis(lambda: self._settings.current, self._report)
@@ -55,7 +55,7 @@ class Cia402Drive(SimulatedDevice):
         return self._settings.current
 
     def save_settings(self) -> None:
-        """Who commissions the drive saves its parameters."""
+        """Save the parameters, as at commissioning."""
         self._settings.save()
 
     # What a test or a demonstration does to the node.
@@ -67,7 +67,7 @@ class Cia402Drive(SimulatedDevice):
         self._injected.append(lambda: self.axis.fail(code, lasting=lasting))
 
     def mend(self) -> None:
-        """The cause is gone."""
+        """Remove the cause."""
         self._injected.append(self.axis.automaton.cause_gone)
 
     # The application of the CANopen slave.
@@ -140,7 +140,8 @@ class Cia402Drive(SimulatedDevice):
         self._emcy.report(code, _register(code) if code else 0)
 
     def _abort_connection(self) -> None:
-        """1016h or life guarding: CiA 301 leads to Pre-Operational, CiA 402 does what 6007h says."""
+        """1016h or life guarding: the node goes to Pre-Operational (CiA 301), the drive follows 6007h (CiA
+        402)."""
         if not self.axis.abort_connection(_MASTER_LOST):
             self._emcy.report(_MASTER_LOST, _register(_MASTER_LOST))
         if self.slave.state is NmtState.OPERATIONAL:
@@ -148,7 +149,7 @@ class Cia402Drive(SimulatedDevice):
             self.slave.on_frame(Frame(0, command), self._now)
 
     def _master_is_back(self) -> None:
-        """Where it was no fault there is nothing to be reset: the error has gone."""
+        """If it was no fault, there is nothing to reset: the error is gone."""
         if self.axis.state not in (State.FAULT, State.FAULT_REACTION):
             self._emcy.report(0, 0)
 

@@ -18,7 +18,7 @@ _LOAD: Final = int.from_bytes(b"load", "little")
 
 @dataclass(frozen=True, slots=True)
 class DeviceIdentity:
-    """What the node says it is."""
+    """The node's identity, as it reports it."""
 
     device_type: int
     vendor_id: int
@@ -32,7 +32,7 @@ class DeviceIdentity:
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """What "save" and "load" do on this node."""
+    """How "save" and "load" work on this node."""
 
     save: Callable[[], None]
     load: Callable[[], None]

@@ -1,4 +1,4 @@
-"""What every simulated drive does with frames, time and power, whatever it simulates."""
+"""What all simulated drives have in common: frames, time and power."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ class SimulatedDevice(ABC):
     """The node as the CAN bus sees it, and the application of its CANopen slave. Times are seconds of the
     caller's monotonic clock.
 
-    What is injected happens at the next ``on_time`` or ``on_frame``; ``next_deadline`` says at once that
-    there is something to do.
+    What is injected takes effect at the next ``on_time`` or ``on_frame``; ``next_deadline`` is due at once.
     """
 
     slave: CanopenSlave
@@ -27,7 +26,7 @@ class SimulatedDevice(ABC):
         self._now = 0.0
         self._injected: list[Callable[[], None]] = []
 
-    # What a device is.
+    # To be defined by the device.
 
     @abstractmethod
     def _switch_on(self) -> None:
@@ -43,10 +42,10 @@ class SimulatedDevice(ABC):
 
     @abstractmethod
     def _deadlines(self) -> Iterable[float | None]:
-        """When something is due beside what the slave has to do."""
+        """Deadlines in addition to those of the slave."""
 
     def _finish(self) -> None:
-        """Send what has become due."""
+        """Send what is due."""
         self.slave.poll(self._now)
 
     def _hears(self) -> frozenset[int]:
@@ -61,12 +60,12 @@ class SimulatedDevice(ABC):
     def restarted(self, command: NmtCommand) -> None: ...
 
     def accepts_rpdo(self, number: int, length: int) -> bool:
-        """Too short ones do not come here; of a longer one the mapped bytes count."""
+        """Too short ones do not get here; of a longer one the mapped bytes are used."""
         del number, length
         return True
 
     def rpdo_applied(self, number: int) -> None:
-        """Nothing to do: the objects have acted when they were written."""
+        """Nothing to do: the objects took effect when they were written."""
         del number
 
     @abstractmethod

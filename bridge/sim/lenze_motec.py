@@ -34,7 +34,7 @@ class LenzeMotec(SimulatedDevice):
         self._codes = Store(lambda: LenzeCodes(node_id))
         if codes is not None:
             self._codes.current = codes
-        self.save()  # commissioned before it came onto this bus
+        self.save()  # commissioned before it was connected to this bus
         self._stack = Store(lambda: communication(self._codes.current, words))
         self.drive = LenzeDrive(lambda: self._codes.current)
         self.display = BusDisplay()

@@ -41,7 +41,7 @@ _BAUD_250: Final = 1
 
 @dataclass(frozen=True, slots=True)
 class InterfaceParts:
-    """What the dictionary shows and changes."""
+    """What the dictionary displays and changes."""
 
     node_id: int
     kind: Kind
@@ -57,7 +57,7 @@ class InterfaceParts:
 
 
 def identity(device_name: str) -> DeviceIdentity:
-    """What a NORD node says of itself."""
+    """The identity of a NORD node."""
     return DeviceIdentity(
         device_type=0x0001_0192,  # CiA 402, frequency converter
         vendor_id=0,  # the manual prints none of the numbers of 1018h, and an invented one would be believed

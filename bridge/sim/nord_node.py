@@ -22,7 +22,7 @@ from bridge.sim.store import Store
 
 
 class NordNode(SimulatedDevice):
-    """A family calls ``_build`` when it is ready to fill the dictionary."""
+    """A family calls ``_build`` once it can fill the dictionary."""
 
     def __init__(
         self,
@@ -49,7 +49,7 @@ class NordNode(SimulatedDevice):
             self.node_id, self._communication, dictionary, servers, emcy=self._emcy, application=self
         )
 
-    # What a family is.
+    # To be defined by the family.
 
     def _empty_dictionary(self) -> Dictionary:
         return Dictionary()
@@ -64,11 +64,11 @@ class NordNode(SimulatedDevice):
 
     @abstractmethod
     def _words_by_sdo(self) -> None:
-        """An SDO request has been answered: process words that it wrote act on the drives."""
+        """An SDO request has been answered: process words that it wrote take effect on the drives."""
 
     @abstractmethod
     def _watch_expired(self) -> None:
-        """The master's telegrams have failed to come."""
+        """The master's telegrams are missing."""
 
     @abstractmethod
     def _present_faults(self) -> Sequence[int | None]:
@@ -79,7 +79,7 @@ class NordNode(SimulatedDevice):
     def nmt_changed(self, state: NmtState) -> None:
         # §7.1.1 demands the next valid telegram within P151 of the last without naming an exception, and
         # §6.2 closes the PDO channel outside Operational. So nothing is done here: the watch goes on
-        # running and trips. A master that lets a drive run and leaves Operational fell silent.
+        # running and trips: a master that leaves Operational while a drive runs counts as silent.
         del state
 
     # How it works inside.

@@ -74,7 +74,7 @@ class Stoeber5000(SimulatedDevice):
     # The application of the CANopen slave.
 
     def nmt_changed(self, state: NmtState) -> None:
-        # The manual lets nothing but life guarding stop the drive: outside Operational it goes on.
+        # By the manual only life guarding stops the drive: outside Operational it goes on.
         del state
 
     def restarted(self, command: NmtCommand) -> None:

@@ -1,4 +1,4 @@
-"""The sockets of zenoh's connections, as far as zenoh does not leave them as we need them."""
+"""Settings of the sockets of zenoh's connections that zenoh itself does not offer."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Final
 _OFF: Final = struct.pack("ii", 0, 0)
 _IP: Final = (socket.AF_INET, socket.AF_INET6)
 _SO_DOMAIN: Final = 39
-"""asm-generic/socket.h; Python's socket has no name for it."""
+"""From asm-generic/socket.h; Python's socket module has no name for it."""
 
 
 class Connections:
@@ -45,7 +45,7 @@ class Connections:
 
 def _stop_waiting(number: int) -> str:
     """The other end of a connection that would have waited; else nothing. Raises OSError."""
-    # It may be closed, and its number be another's, at any moment: what is asked and set is our own copy's.
+    # It may be closed and its number reused at any moment, so we work on a copy of our own.
     copy = os.dup(number)
     try:
         return _let_go(copy)
@@ -55,7 +55,7 @@ def _stop_waiting(number: int) -> str:
 
 
 def _let_go(copy: int) -> str:
-    # Family and type are named, or Python would ask for the address, which not every socket has. An IPv4
+    # With family and type given, Python does not ask for the address, which not every socket has. An IPv4
     # socket tells its address all the same.
     connection = socket.socket(socket.AF_INET6, socket.SOCK_STREAM, 0, fileno=copy)
     try:

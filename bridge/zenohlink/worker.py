@@ -24,12 +24,12 @@ from bridge.zenohlink.strangers import Strangers
 _log = logging.getLogger(__name__)
 
 _LANES_END_S: Final = 1.0
-"""How long a closed session's lanes may take to notice it."""
+"""How long the lanes of a closed session may take to end."""
 _LOOK_S: Final = 0.5
-"""Between two looks for connections that come to no session: less than they have for that."""
+"""How often to look for connections that have not become a session: less than the time they have for that."""
 
 ZENOH_ERRORS: Final = (zenoh.ZError, RuntimeError, ValueError, TypeError, AttributeError)
-"""What zenoh's calls raise: ZError for what goes wrong, the others for what is closed meanwhile."""
+"""What zenoh's calls raise: ZError for failures, the others for objects that have been closed meanwhile."""
 
 
 class Declared(Protocol):
@@ -39,11 +39,11 @@ class Declared(Protocol):
 class Worker:
     """Opens a session, does jobs one after the other, closes the session.
 
-    ``opened`` (None, or the error) and ``closed`` are called on the worker's thread. The thread is a
-    daemon: where zenoh does not come back, the process can end without it.
+    ``opened`` (None, or the error) and ``closed`` are called on the worker's thread. The thread is a daemon:
+    if zenoh never returns, the process can still end.
 
-    ``is_for_strangers``: peers may hang, and must not hold up the others (``sockets.py``). Between our own
-    processes the supervisor ends a front that does.
+    ``is_for_strangers``: peers may hang, and must not delay the others (``sockets.py``). Between our own
+    processes, the supervisor ends a front that hangs.
     """
 
     def __init__(
@@ -59,10 +59,10 @@ class Worker:
         self.errors = 0
         self.is_stopping = False
         self.declared: list[Declared] = []
-        """What is undeclared before the session is closed; only jobs touch it."""
+        """Undeclared before the session is closed; only jobs touch it."""
         self.tokens: dict[str, zenoh.LivelinessToken] = {}
         self.on_strangers: Callable[[list[str]], object] = lambda _: None
-        """Is told, on the worker's thread, whose connections came to no session."""
+        """Called, on the worker's thread, with the connections that did not become a session."""
         self._config = config
         self._is_for_strangers = is_for_strangers
         self._connections = Connections()
@@ -85,7 +85,7 @@ class Worker:
         self._jobs.put(job)
 
     def lane(self, session: zenoh.Session) -> Lane:
-        """One more thread for calls of the session. It ends with the session, or before."""
+        """Another thread for calls of the session. It ends with the session at the latest."""
         lane = Lane(self.name, session, self.complain)
         with self._lanes_lock:
             self._lanes = {one for one in self._lanes if one.is_alive} | {lane}
@@ -94,7 +94,7 @@ class Worker:
         return lane
 
     def answers(self, session: zenoh.Session) -> tuple[Lane, Lane]:
-        """Where queries are answered: what never waits, and all else. Only jobs ask."""
+        """The lanes for answers: one for those that never wait, one for all others. Only jobs call this."""
         if self._answers is None:
             self._answers = self.lane(session), self.lane(session)
         return self._answers
@@ -108,12 +108,12 @@ class Worker:
         return self._thread.is_alive()
 
     def stop(self) -> None:
-        """Skip what waits and close the session."""
+        """Close the session without the jobs that still wait."""
         self.is_stopping = True
         self._jobs.put(lambda _: None)
 
     def complain(self, error: Exception) -> None:
-        """Count an error and log it at most once a minute, with its place where it is none of zenoh's."""
+        """Count an error and log it at most once a minute, with a traceback if it is not one of zenoh's."""
         self.errors += 1
         now = time.monotonic()
         if self._pauses.take(now) is not None:
@@ -124,7 +124,7 @@ class Worker:
         try:
             self._serve()
         finally:
-            # Also where the thread dies of something: the loop has to know.
+            # Also if the thread dies of an error: the loop has to know.
             self._closed()
 
     def _serve(self) -> None:

@@ -247,7 +247,7 @@ def test_every_fault_of_a_file_is_told_in_one_run_with_its_line(tmp_path: Path):
         "26: bus[0].node[0].drive[1].control: the drive is controlled by opcua, which this site does not "
         "serve (add a [opcua] table)",
         "27: bus[0].node[0].drive[1].fieldbus_timeout_ms: must be at most 32767, not 40000 "
-        "(0 (off) or 1…32767 ms, the twin of P151)",
+        "(0 (off) or 1…32767 ms, like P151)",
         "28: bus[0].node[0].drive[1].parameters.P105: must be more than 0.0, not -50.0",
         "30: bus[0].node[1].mapping: is missing "
         "(a file below mappings/ without .toml, such as nord/sk-tu4-cao)",

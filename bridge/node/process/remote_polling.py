@@ -26,7 +26,7 @@ class RemotePolling:
 
     def start(self, drives: Iterable[DrivePdos], now: float) -> None:
         self._asked = [
-            # The length of what is asked for: the two must not differ on the wire (ISO 11898-1).
+            # As long as the answer: a remote frame must have the DLC of the data frame (ISO 11898-1).
             _Polled(Frame(tpdo.cob_id | REMOTE, bytes(tpdo.plan.codec.length)), tpdo.rtr_poll_s, now)
             for pdos in drives
             for tpdo in pdos.tpdos

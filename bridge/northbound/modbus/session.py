@@ -15,37 +15,38 @@ from bridge.northbound.pulse import Pulse
 from bridge.northbound.sources import source_of
 
 TURN: Final = 16
-"""Requests of one connection that are handled before everything else gets its turn: about 0.3 ms."""
+"""Requests of one connection that are handled before all others get their turn: about 0.3 ms."""
 
 STALL_LIMIT_S: Final = 5.0
-"""How long a client may leave its answers unread before it is dropped."""
+"""How long a client may leave its answers unread; then it is disconnected."""
 
 READ_MOST: Final = 16 * 1024
-"""Bytes that are read at once, and that may wait here before no more are read: 64 requests of the longest."""
+"""Bytes that are read at once, and that may wait here before reading stops: 64 requests of the longest
+kind."""
 
-_UNREAD_MOST: Final = 32 * 1024  # bytes of answers that wait for a client before it is not served further
+_UNREAD_MOST: Final = 32 * 1024  # bytes of answers that may wait for a client; beyond that it is not served
 _KEEPALIVE: Final = (("TCP_KEEPIDLE", 30), ("TCP_KEEPINTVL", 10), ("TCP_KEEPCNT", 3))
 
 
 class Hall(Protocol):
-    """Who keeps the list of sessions."""
+    """The owner of the list of sessions."""
 
     def admit(self, session: Session, host: str, port: int) -> Identity | None:
-        """The identity of a client from this address, or None where it may not connect."""
+        """The identity of a client from this address, or None if it may not connect."""
         ...
 
     def leave(self, session: Session) -> None: ...
 
     def on_fault(self, session: Session, fault: str) -> None:
-        """The session is being closed by us for this reason."""
+        """We close the session for this reason."""
         ...
 
 
 class Session(asyncio.BufferedProtocol):
     """Pumps bytes between a socket and a ``Conversation``. ``clock`` is the plant's.
 
-    A client that does not read its answers is not read from either, and dropped after a while; one that
-    floods is handled ``TURN`` requests at a time, and what it writes does not count as fresh.
+    From a client that does not read its answers nothing is read either, and after a while it is disconnected.
+    One that floods is handled ``TURN`` requests at a time, and its writes do not count as fresh.
     """
 
     def __init__(self, dispatcher: Dispatcher, hall: Hall, clock: Callable[[], float], pulse: Pulse) -> None:
@@ -57,7 +58,7 @@ class Session(asyncio.BufferedProtocol):
         self._room = bytearray(READ_MOST)
         self._conversation = Conversation(self._handle, self._go_on)
         self.identity: Identity | None = None
-        """Who the hall says it is; None until it is admitted."""
+        """The identity given by the hall; None until the client is admitted."""
         self.heard_at = float("-inf")
         """When the client last sent something, or connected; in the plant's time."""
         self.has_spoken = False
@@ -75,7 +76,7 @@ class Session(asyncio.BufferedProtocol):
         return source_of(self.identity.user) if self.identity else ""
 
     def close(self) -> None:
-        """End the connection; answers that the client does not take are lost."""
+        """End the connection; answers that the client has not read are lost."""
         transport = self._transport
         if transport is None:
             return
@@ -132,12 +133,12 @@ class Session(asyncio.BufferedProtocol):
             self._dispatcher.handle(unit_id, pdu, self.identity, answer, received_at)
 
     def _go_on(self) -> None:
-        """There is something to do: now, unless a turn is coming anyway."""
+        """There is work: do it now, unless a turn is scheduled anyway."""
         if not self._scheduled:
             self._advance()
 
     def _advance(self) -> None:
-        """Handle some requests, send what may be sent, and see whether more can be taken in."""
+        """Handle some requests, send the answers that are due, and see whether more can be read."""
         self._scheduled = False
         transport = self._transport
         if transport is None or self.identity is None or self._stalled or transport.is_closing():
@@ -146,7 +147,7 @@ class Session(asyncio.BufferedProtocol):
         try:
             answers = conversation.advance(TURN)
         except Exception:
-            transport.abort()  # a fault of ours: better no connection than one that has lost its place
+            transport.abort()  # a bug of ours: better no connection than one that is out of step
             raise
         if answers:
             transport.write(answers)  # may call pause_writing
@@ -160,7 +161,8 @@ class Session(asyncio.BufferedProtocol):
             asyncio.get_running_loop().call_soon(self._advance)
 
     def _read_on(self, transport: asyncio.Transport) -> None:
-        """Go on reading as long as it can be: what waits here has a time, what waits elsewhere has none."""
+        """Keep reading as long as possible: bytes that wait here have a time of arrival, those in the kernel
+        have none."""
         conversation, inflow = self._conversation, self._inflow
         if conversation.is_full or self._stalled or conversation.waiting >= READ_MOST:
             transport.pause_reading()
@@ -177,7 +179,7 @@ class Session(asyncio.BufferedProtocol):
 
 
 def _keep_alive(sock: socket.socket) -> None:
-    """Let the kernel find a peer that is gone without a word, within about a minute."""
+    """Let the kernel notice within about a minute that a peer has vanished."""
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for name, value in _KEEPALIVE:
         option = getattr(socket, name, None)

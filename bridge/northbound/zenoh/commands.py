@@ -1,4 +1,4 @@
-"""A query with a payload as a request to the plant. Pure."""
+"""A query with a payload as a request to the plant. Sans-IO."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ METHODS: Final = (
     Action.SAVE_PARAMETERS,
 )
 _WITHOUT_PAYLOAD: Final = (Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE, Action.RELEASE_CONTROL)
-"""A stop is taken as it comes. Everything else must be meant: whoever reads a key by a plain get must not
-start or acknowledge anything by it."""
+"""These need no payload. Everything else does, so that reading a key with a plain get cannot start or
+acknowledge anything."""
 NODE_METHODS: Final = (
     Action.RESET,
     Action.RESET_COMMUNICATION,
@@ -55,14 +55,14 @@ MALFORMED: Final = "malformed"
 _LONGEST: Final = 4096
 _PARAMETER: Final = "/parameter/"
 _CACHED_MS: Final = 2**31
-"""As old as can be: whatever was read last."""
+"""Any age: whatever was read last."""
 _LONGEST_MS: Final = 2**32 - 1
 """As OPC UA's UInt32 argument."""
 _HEXADECIMAL: Final = re.compile(r"0[xX][0-9A-Fa-f]{1,8}")
 
 
 class BadCommand(Exception):
-    """The query is no command. ``code`` is that of an outcome, or ``malformed``."""
+    """The query is not a valid command. ``code`` is that of an outcome, or ``malformed``."""
 
     def __init__(self, code: str, message: str) -> None:
         super().__init__(message)
@@ -92,7 +92,7 @@ _controller = msgspec.json.Decoder(_Controller)
 def identity_of(attachment: bytes | None) -> Identity:
     """Who asks: ``{"controller": "<name>"}`` in the attachment. Raises BadCommand.
 
-    The name is what the asker says, and nobody checks it: this is for where there are no users.
+    Nobody checks the name: this is for sites without users.
     """
     if not attachment:
         return Identity(Source.ZENOH, ANONYMOUS)
@@ -109,7 +109,7 @@ def identity_of(attachment: bytes | None) -> Identity:
 
 
 class Commands:
-    """What can be commanded on a site, read off its points."""
+    """What can be commanded on a site, derived from its points."""
 
     def __init__(self, points: Iterable[Point]) -> None:
         self._points = {point.name: point for point in points}
@@ -118,7 +118,7 @@ class Commands:
         self._buses = _owners((name for name in self._points if name.startswith("bus/")), "/nmt_state")
 
     def is_method(self, tail: str) -> bool:
-        """Whether the key stands for something to do and not for a value."""
+        """Whether the key is that of a method, not of a value."""
         owner, _, leaf = tail.rpartition("/")
         target, _, group = owner.rpartition("/")
         if group == "command" and target in self._drives:
@@ -153,18 +153,18 @@ class Commands:
         return Request(identity, target, Write({leaf: _decode_value(point, payload)}))
 
     def parameter(self, tail: str) -> tuple[str, str]:
-        """The drive and the parameter's name where ``tail`` is ``<node>/<drive>/parameter/<name>``, or
-        empty texts.
+        """The drive and the parameter's name if ``tail`` is ``<node>/<drive>/parameter/<name>``, else empty
+        texts.
 
-        The name may have further slashes (``C00039/1``), and what a key cannot hold (``* $ ? #``) or a
-        tool does not take (``[ ]``) may be written with per cent signs.
+        The name may contain slashes (``C00039/1``); characters that a key cannot have (``* $ ? #``) or a tool
+        does not take (``[ ]``) may be percent-encoded.
         """
         drive, found, name = tail.partition(_PARAMETER)
         return (drive, unquote(name)) if found and drive in self._drives else ("", "")
 
     def meant(self, tail: str) -> tuple[str, Action]:
-        """The drive, node or bus that a key is about which is no command, or the key itself where it is about
-        none; and what would have been done."""
+        """For a key that is no command: the drive, node or bus it is about, or else the key itself; and the
+        action."""
         drive, name = self.parameter(tail)
         if name:
             return drive, Action.WRITE_PARAMETER
@@ -175,7 +175,7 @@ class Commands:
         return target or tail, action
 
     def reading(self, drive: str, name: str, identity: Identity, *, cached: bool) -> Request:
-        """The request for the value of a parameter, from the drive or as it was last read."""
+        """The request for a parameter's value, read from the drive or as last read."""
         age_ms = _CACHED_MS if cached else 0
         return Request(identity, drive, ReadParameter(name, age_ms))
 
@@ -224,8 +224,8 @@ def _decode_whole(point: Point, payload: bytes) -> int:
 
 
 def _decode_parameter(name: str, payload: bytes) -> Value:
-    """A number, a text in quotes, true or false, or an object with it as ``v``; else the bare text, which
-    may be a state's."""
+    """A number, a quoted text, true or false, or an object with one of these as ``v``; else the bare text,
+    for instance a state's name."""
     bare = payload.strip()
     try:
         text = bare.decode()
@@ -257,7 +257,7 @@ def _decode_telegram(drive: str, payload: bytes) -> dict[str, Value]:
 
 
 def _bounded(name: str, value: Value) -> Value:
-    """JSON knows no largest integer; no point has more than 32 bits."""
+    """JSON integers have no limit; no point has more than 32 bits."""
     if isinstance(value, int) and abs(value) >= 2**63:
         raise BadCommand(Code.OUT_OF_RANGE, f"{name}: the number is too large")
     return value

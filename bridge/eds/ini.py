@@ -105,7 +105,7 @@ class _Reader:
         first = self._sections.get(key)
         if first:
             self._report.warning(
-                number, f"section [{shown(name)}] is there again, first in line {first.line}: joined"
+                number, f"section [{shown(name)}] appears again, first in line {first.line}: joined"
             )
         else:
             self._sections[key] = Section(name, number)
@@ -117,7 +117,7 @@ class _Reader:
             self._other_spelling.append((number, key))
         first = section.keys.get(name)
         if first and first.text:
-            where = f"{shown(key)} is there again in [{shown(section.name)}], first in line {first.line}"
+            where = f"{shown(key)} appears again in [{shown(section.name)}], first in line {first.line}"
             if value in (first.text, ""):
                 self._report.warning(number, f"{where}, and says the same")
             else:

@@ -57,7 +57,7 @@ class _XddReader:
             if index is None:
                 continue
             if index in roots:
-                self._report.error(element.line, f"{index:04X}h is there again: left out")
+                self._report.error(element.line, f"{index:04X}h appears again: left out")
                 continue
             roots[index] = self._section(element, f"{index:04X}")
             for child in element.all("CANopenSubObject"):
@@ -65,7 +65,7 @@ class _XddReader:
                 if sub is None:
                     continue
                 if sub in subs.setdefault(index, {}):
-                    self._report.error(child.line, f"{index:04X}h:{sub:02X} is there again: left out")
+                    self._report.error(child.line, f"{index:04X}h:{sub:02X} appears again: left out")
                     continue
                 subs[index][sub] = self._section(child, f"{index:04X}sub{sub:X}")
         reader = ObjectReader(self._fields, self._report, roots, subs, {})

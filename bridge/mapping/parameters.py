@@ -96,7 +96,7 @@ class RamOnly(Table):
 class Eeprom(Table):
     """What writing parameters wears out, and how they are saved."""
 
-    cycles: int | None = Field(None, gt=0, description="writes that it stands")
+    cycles: int | None = Field(None, gt=0, description="writes that it endures")
     ram_only: RamOnly | None = None
     save: Ref | None = Field(None, description='"save" is written here, on request only')
     written_on_save_only: bool = Field(False, description="true: a write stays in the RAM until it is saved")

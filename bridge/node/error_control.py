@@ -56,7 +56,7 @@ class ErrorControl:
             return f"E: lost: no heartbeat for {self._table.supervision_ms} ms: {HINTS['E']}"
         wrong = self.toggle_errors - self._toggle_errors_before
         if wrong:
-            return f"F: lost: no right answer to node guarding, {wrong} with the wrong toggle bit"
+            return f"F: lost: no correct answer to node guarding, {wrong} with the wrong toggle bit"
         return f"F: lost: no answer to node guarding: {HINTS['E']}"
 
     @property

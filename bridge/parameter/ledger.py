@@ -1,10 +1,10 @@
 """The EEPROM guard: how often each parameter was written, and which writes are too many.
 
-Writing wears an EEPROM out: NORD's stands 100,000 writes (BU 2500 §6.6). Each write is counted by drive and
-object and kept across restarts (``ledger_file``); a warning comes at every tenth of what the family stands.
-More than ``MOST_WRITES`` writes of a parameter within ``WINDOW_S``, or more than ``MOST_A_DAY`` within a day,
-are cyclic writing, which no EEPROM is made for, and are refused; so is every write beyond what the EEPROM
-stands.
+Writing wears an EEPROM out: NORD's endures 100,000 writes (BU 2500 §6.6). Each write is counted by drive and
+object and kept across restarts (``ledger_file``); a warning comes at every tenth of what the family's EEPROM
+endures. More than ``MOST_WRITES`` writes of a parameter within ``WINDOW_S``, or more than ``MOST_A_DAY``
+within a day, are cyclic writing, which no EEPROM is made for, and are refused; so is every write
+beyond what the EEPROM endures.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ class Ledger:
 
     def check(self, key: Key, name: str, now: float, cycles: int | None = None) -> None:
         """Raises ``ParameterError`` where one more write would be one too many; ``cycles`` is what the
-        EEPROM stands."""
+        EEPROM endures."""
         count = self._counts.get(key)
         if count is None:
             return
         if cycles and count.writes >= cycles:
             raise ParameterError(
                 Why.TOO_OFTEN,
-                f"{name} of {key[0]} was written {count.writes} times, and its EEPROM stands {cycles} "
+                f"{name} of {key[0]} was written {count.writes} times, and its EEPROM endures {cycles} "
                 f"writes: exchange the drive, then remove {key[1]} of {key[0]} from eeprom.json in the "
                 "state_dir while the service is stopped; or have the drive write to its RAM only",
             )
@@ -83,7 +83,7 @@ class Ledger:
         self._unsaved.setdefault(key, []).append(now)
         if not cycles or count.writes * 10 // cycles == (count.writes - 1) * 10 // cycles:
             return ""
-        return f"{name} of {key[0]} was written {count.writes} times: its EEPROM stands {cycles} writes"
+        return f"{name} of {key[0]} was written {count.writes} times: its EEPROM endures {cycles} writes"
 
     def take_unsaved(self) -> dict[Key, list[float]]:
         """The times of the writes since the last call."""

@@ -32,7 +32,7 @@ def parameters(family: Family) -> Iterator[str]:
         return
     said: list[str] = []
     if eeprom.cycles:
-        said.append(f"It stands {eeprom.cycles:,} writes.")
+        said.append(f"It endures {eeprom.cycles:,} writes.")
     if eeprom.ram_only:
         said.append(
             f"While {eeprom.ram_only.parameter} is {eeprom.ram_only.value:g}, writes go to the RAM alone."

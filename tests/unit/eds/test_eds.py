@@ -105,7 +105,7 @@ def test_a_section_that_is_there_twice_is_joined() -> None:
     found = description.entry(0x2000)
     assert found
     assert (found.data_type, found.access) == (DataType.UNSIGNED16, Access.WO)
-    assert "is there again, first in line 21" in finding.text
+    assert "appears again, first in line 21" in finding.text
 
 
 @pytest.mark.parametrize(

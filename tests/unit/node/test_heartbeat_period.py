@@ -165,4 +165,4 @@ def test_a_node_that_is_lost_by_its_toggle_bit_is_said_so(tmp_path: Path) -> Non
     for _ in range(60):
         quick.run(0.01)
         seen.add(quick.status(1))
-    assert [text for text in seen if text.startswith("F: lost: no right answer to node guarding, ")]
+    assert [text for text in seen if text.startswith("F: lost: no correct answer to node guarding, ")]

@@ -129,7 +129,7 @@ def test_a_refusal_ends_it_and_says_what_was_done(workshop: Workshop) -> None:
     done = workshop.restore(values)
     assert [one.reading.entry.name for one in done.written] == ["P102.1"]
     assert (done.failed, done.left) == ("P104.1", ["P105.1"])
-    assert "EEPROM stands 100000 writes" in str(done.error)
+    assert "EEPROM endures 100000 writes" in str(done.error)
 
 
 def test_a_drive_that_goes_away_ends_it(workshop: Workshop) -> None:

@@ -285,7 +285,7 @@ def test_a_warning_comes_with_each_tenth(parameters: Parameters) -> None:
     ledger.restore({("conveyor/fu1", "2066:01"): Saved(9_999)}, 0.0, 0.0)
     assert parameters.write("P102", 1.0).ok
     told = [event.message for event in parameters.bench.events if event.severity == 600]
-    assert told == ["P102 of conveyor/fu1 was written 10000 times: its EEPROM stands 100000 writes"]
+    assert told == ["P102 of conveyor/fu1 was written 10000 times: its EEPROM endures 100000 writes"]
 
 
 # points

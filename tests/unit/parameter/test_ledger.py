@@ -43,7 +43,7 @@ def test_each_tenth_of_what_the_eeprom_stands_is_told_once() -> None:
     told = [ledger.count(KEY, "P102", 100, float(one)) for one in range(1, 101)]
     warned = [number for number, warning in enumerate(told, 1) if warning]
     assert warned == [10, 20, 30, 40, 50, 60, 70, 80, 90, 100]
-    assert told[9] == "P102 of conveyor/fu1 was written 10 times: its EEPROM stands 100 writes"
+    assert told[9] == "P102 of conveyor/fu1 was written 10 times: its EEPROM endures 100 writes"
 
 
 def test_where_no_limit_is_known_nothing_is_told() -> None:

@@ -93,8 +93,8 @@ endif
 compiled: $(VENV)/dev.stamp
 	@$(IN) -m compileall -q bridge tests/peers tests/support
 
-fuzz-short: compiled ## half a minute of fuzzing, always the same cases
-	@echo "== fuzzing, all protocols at a time"
+fuzz-short: compiled ## a minute of fuzzing, always the same cases
+	@echo "== fuzzing, two protocols at a time"
 	@$(PYTEST) -p no:cacheprovider -rs tests/fuzz $(ARGS)
 
 FUZZ ?= 600

@@ -119,6 +119,9 @@ proof: compiled packages ## inject every fault 12 times, write docs/explanation/
 proof-mutants: compiled packages ## seed faults in the chain, which the proof has to find (12 minutes)
 	@$(ON_VCAN) tests/proof/run-proof -m -j $(FEW_JOBS) -o build/mutants.json docs/explanation/proof.md
 
+mutants: compiled ## change the code and see whether unit tests notice: hours, or ARGS='bridge/canopen/sdo.py'
+	@$(IN) -m tools.mutants --jobs $(FEW_JOBS) $(ARGS)
+
 ##@ Check
 check: check-style check-format check-types check-imports ## style, format, types, import rules (-k: all of them even if one fails)
 
@@ -187,5 +190,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test unit wire lab packages clients compiled fuzz fuzz-short bench proof proof-mutants check check-style check-format check-types \
+.PHONY: demo test unit wire lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types \
   check-imports format docs setup lock wheel clean help

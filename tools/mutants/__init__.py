@@ -1,0 +1,1 @@
+"""Mutants of the program, and whether the unit tests notice them."""

@@ -15,7 +15,7 @@ from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.nmt_slave import COMMANDED_STATE, ErrorControl, NmtCommand, NmtState, nmt_command_for
 from bridge.sim.pdo import Rpdo, Tpdo, pack, unpack
 from bridge.sim.sdo_server import SdoServer
-from bridge.sim.settings import CommunicationSettings, PdoSettings
+from bridge.sim.settings import CommunicationSettings, PdoSettings, SdoSettings
 from bridge.sim.store import Store
 
 _ERROR_CONTROL: Final = 0x700
@@ -67,7 +67,6 @@ class CanopenSlave:
         self.emcy = emcy
         self.state = NmtState.INITIALISING
         self.silent = False
-        self.frames_dropped = 0
         self.rpdos_ignored = 0
         self._store = store
         self._dictionary = dictionary
@@ -145,7 +144,7 @@ class CanopenSlave:
         """The identifiers that concern this node with its present settings."""
         settings = self._store.current
         own = {0, _ERROR_CONTROL + self.node_id, settings.sync_cob_id}
-        own.update(channel.receive_cob_id for channel in settings.sdo)
+        own.update(channel.receive_cob_id for channel in self._sdo_channels)
         own.update(pdo.cob_id for pdo in settings.rpdo)
         return frozenset(own)
 
@@ -175,9 +174,14 @@ class CanopenSlave:
         self._application.restarted(command)
         self.boot()
 
+    @property
+    def _sdo_channels(self) -> list[SdoSettings]:
+        """Those that are in effect."""
+        return self._store.current.sdo
+
     def _on_object(self, cob_id: int, data: bytes, now: float) -> None:
         settings = self._store.current
-        for server, channel in zip(self._servers, settings.sdo, strict=True):
+        for server, channel in zip(self._servers, self._sdo_channels, strict=True):
             if channel.enabled and cob_id == channel.receive_cob_id:
                 for answer in server.on_request(data):
                     self._send(channel.send_cob_id, answer)
@@ -192,13 +196,15 @@ class CanopenSlave:
                 self._on_rpdo(number, pdo, data)
 
     def _on_rpdo(self, number: int, pdo: PdoSettings, data: bytes) -> None:
-        too_short = not pdo.count or len(data) * 8 < pdo.mapped_bits
-        if too_short or not self._application.accepts_rpdo(number, len(data)):
+        if not pdo.count or not self._accepts(number, pdo, data):
             self.rpdos_ignored += 1
             return
         effective = self._rpdos[number].on_data(pdo, data)
         if effective is not None:
             self._apply(number, pdo, effective)
+
+    def _accepts(self, number: int, pdo: PdoSettings, data: bytes) -> bool:
+        return len(data) * 8 >= pdo.mapped_bits and self._application.accepts_rpdo(number, len(data))
 
     def _on_sync(self, now: float) -> None:
         # TPDOs are sampled before RPDOs act, because both refer to the moment of the SYNC (CiA 301 §7.2.2.2).
@@ -245,5 +251,4 @@ class CanopenSlave:
             return
         if len(self._outbox) >= _OUTBOX_MAX:
             self._outbox.popleft()
-            self.frames_dropped += 1
         self._outbox.append(Frame(cob_id, data))

@@ -123,9 +123,6 @@ class StoeberSlave(CanopenSlave):
             deadlines.append(self._sync.next_deadline())
         return min((deadline for deadline in deadlines if deadline is not None), default=None)
 
-    def hears(self) -> frozenset[int]:
-        return super().hears() | {channel.receive_cob_id for channel in self._open_sdo}
-
     def _on_nmt(self, data: bytes) -> None:
         if nmt_command_for(self.node_id, data) is NmtCommand.RESET_COMMUNICATION:
             self._application.restarted(NmtCommand.RESET_COMMUNICATION)
@@ -139,29 +136,12 @@ class StoeberSlave(CanopenSlave):
         self._sync.reset()
         super()._enter(state)
 
-    def _on_object(self, cob_id: int, data: bytes, now: float) -> None:
-        for server, channel in zip(self._servers, self._open_sdo, strict=True):
-            if channel.enabled and cob_id == channel.receive_cob_id:
-                for answer in server.on_request(data):
-                    self._send(channel.send_cob_id, answer)
-                return
-        if self.state is not NmtState.OPERATIONAL:
-            return
-        settings = self._store.current
-        if settings.sync_on and cob_id == settings.sync_cob_id:
-            self._on_sync(now)
-            return
-        for number, pdo in enumerate(settings.rpdo):
-            if pdo.enabled and cob_id == pdo.cob_id:
-                self._on_rpdo(number, pdo, data)
+    @property
+    def _sdo_channels(self) -> list[SdoSettings]:
+        return self._open_sdo
 
-    def _on_rpdo(self, number: int, pdo: PdoSettings, data: bytes) -> None:
-        if not pdo.count:
-            self.rpdos_ignored += 1
-            return
-        effective = self._rpdos[number].on_data(pdo, data)
-        if effective is not None:
-            self._apply(number, pdo, effective)
+    def _accepts(self, number: int, pdo: PdoSettings, data: bytes) -> bool:
+        return True
 
     def _on_sync(self, now: float) -> None:
         self._sync.on_sync(now)

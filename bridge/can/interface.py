@@ -23,7 +23,6 @@ class BusStatus:
     rx_errors: int = 0
     frames_lost: int = 0
     frames_received: int = 0
-    frames_sent: int = 0
     frames_expired: int = 0
     bits: int = 0
     """All bits that have passed on the bus, everybody's, as far as the bus can know."""

@@ -146,7 +146,6 @@ class PythonCanBus(SoftBus):
             )
             try:
                 bus.send(message, timeout=max(0.0, deadline - time.monotonic()))
-                self._status.frames_sent += 1
                 self._bits.add(frame)
             except (can.CanError, OSError, ValueError):
                 self._status.frames_expired += 1

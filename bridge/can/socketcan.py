@@ -240,7 +240,6 @@ class SocketCanBus:
                 return False
             self._break_down(error, now)
             return False
-        self._status.frames_sent += 1
         self._wire.sample(frame)
         return True
 

@@ -7,7 +7,6 @@ import random
 from collections import deque
 from collections.abc import Callable
 
-from bridge.can.interface import ControllerState
 from bridge.can.softbus import SoftBus
 from bridge.canopen.frame import Frame
 
@@ -64,8 +63,7 @@ class VirtualBus(SoftBus):
     def pass_by(self, frame: Frame, now: float) -> None:
         """Somebody else's frame is on the wire."""
         self._bits.add(frame)
-        is_down = self._wake is None or self._status.state is ControllerState.DOWN
-        if frame.can_id in self._ours and not is_down and len(self._foreign) < _MOST_WAITING:
+        if frame.can_id in self._ours and self._wake and len(self._foreign) < _MOST_WAITING:
             self._foreign.append(frame)
             self._rouse(frame.time - now)
 
@@ -75,7 +73,7 @@ class VirtualBus(SoftBus):
             self._give(frame, now)
 
     def _give(self, frame: Frame, now: float) -> None:
-        if self._wake is None or self._loop is None or self._status.state is ControllerState.DOWN:
+        if self._wake is None:
             return
         if len(self._waiting) >= _MOST_WAITING:
             self._status.frames_lost += 1
@@ -103,27 +101,11 @@ class VirtualBus(SoftBus):
         return frames
 
     def send(self, frame: Frame, now: float, deadline: float) -> None:
-        if self._wake is None or self._status.state is ControllerState.DOWN:
+        if self._wake is None:
             self._status.frames_expired += 1
             return
-        self._status.frames_sent += 1
         self._bits.add(frame)
         self._wire.put(frame, self, now)
-
-    def break_down(self) -> None:
-        """The interface goes away, as by ``ip link set down``."""
-        self._status.state = ControllerState.DOWN
-        self._status.note_error("the interface is down")
-        self._bursts.clear()
-        self._waiting.clear()
-        self._foreign.clear()
-        if self._loop and self._wake:
-            self._loop.call_soon(self._wake)
-
-    def repair(self) -> None:
-        self._status.state = ControllerState.OK
-        if self._loop and self._wake:
-            self._loop.call_soon(self._wake)
 
     def close(self) -> None:
         self._wake = None

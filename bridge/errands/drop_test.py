@@ -119,7 +119,6 @@ class DropTest:
         self._bus = bus
         self._done = done
         self._since: float | None = None
-        self._muted_at = 0.0
         plant.on_event(self._on_event)
 
     # the master's rounds

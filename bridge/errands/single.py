@@ -47,7 +47,6 @@ class SdoErrand:
         """How much it is; of a read it is known once the server has announced it."""
         self._mux = MUX.pack(index, sub)
         self._writes = data is not None
-        self._begun = False
         request, reply = (server.request, server.reply) if server else (cobid.SDO_REQUEST, cobid.SDO_REPLY)
         self._channel = SdoChannel(request + node_id, reply + node_id, timeout_s, retries=retries)
         if data is None:

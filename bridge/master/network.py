@@ -81,7 +81,6 @@ class Network:
         self._has_booted = False
         self._nmt_for_all: Frame | None = None
         plant.bus_commands[f"bus/{bus.name}"] = self.charge.guarded(self.command)
-        self.unrouted = 0
         self._routes_changed = True
         self._routes: dict[int, Handler] = {}
         self._routings = 0
@@ -96,13 +95,11 @@ class Network:
         self._error_limit = RateLimit(1, _ERRORS_EVERY_S)
 
     def on_frames(self, frames: list[Frame], now: float) -> None:
-        """Everything received, in order. A frame nobody waits for is counted."""
+        """Everything received, in order."""
         routes = self._routes
         for frame in frames:
             handler = routes.get(frame.can_id)
-            if handler is None:
-                self.unrouted += 1
-            else:
+            if handler is not None:
                 handler(frame)
         self._pump(now)
 

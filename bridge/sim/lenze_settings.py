@@ -29,7 +29,6 @@ RULES: Final = SlaveRules(
     cob_id_change_needs_disabled=True,  # §13, I-1400: off, change, on
     emcy_inhibit_unit_s=1e-3,  # C00324/1
     error_entries=10,  # §13, I-1003
-    map_entries=PORT_WORDS,
     sdo_block_segments=127,  # §4.2
 )
 

@@ -31,7 +31,6 @@ RULES: Final = SlaveRules(
     cob_id_change_needs_disabled=False,
     cob_id_fixed_bits=0x4000_0000,
     emcy_inhibit_unit_s=1e-3,  # §6.7.2 gives ms
-    map_entries=PDO_WORDS,
 )
 
 _TPDO_BASES: Final = (0x180, 0x280, 0x380, 0x480, 0x1C0)

@@ -28,7 +28,6 @@ class SlaveRules:
     """Unit of 1015h; CiA 301 has 100 µs."""
     error_entries: int = 8
     """Errors that 1003h remembers."""
-    map_entries: int = 8
     sdo_block_segments: int = 0
     """Segments in a block that the SDO servers accept; 0: no block transfer."""
 

@@ -16,7 +16,6 @@ ANSWERED: Final = 254
 RULES: Final = SlaveRules(
     remap_needs_disabled=False,  # §7.3.1 and §8.1.1 ask for Pre-Operational only
     cob_id_change_needs_disabled=False,
-    map_entries=MAP_ENTRIES,
 )
 
 RPDO_BASES: Final = (0x200, 0x300, 0x400, 0x500)

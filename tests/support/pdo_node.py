@@ -23,7 +23,6 @@ class PdoNode(QuickNode):
         super().__init__(node_id)
         self._react = react
         self._sent: dict[int, tuple[bytes, float]] = {}
-        self._changed_at = 0.0
 
     def put(self, name: str, size: int, value: int) -> None:
         """The object called ``"6041:00"`` holds this number."""

@@ -18,7 +18,7 @@ from tests.support.process import Process, drivebridge, free_port, only_demo, un
 BACK_S = 5.0
 NOISE_S = 5.0
 """A machine that is busy with other things."""
-TRIPS, KEEP_ALIVE, UNIT = 14, 10, 1
+KEEP_ALIVE, UNIT = 10, 1
 
 
 def children(pid: int) -> list[int]:

@@ -9,7 +9,6 @@ from bridge.sim.cia402_settings import Cia402Settings, Mode
 from bridge.sim.cia402_states import State
 
 MASTER = 0x77F
-PV_ENTRIES = (0x60400010, 0x60FF0020)
 STATUS_ENTRIES = (0x60410010, 0x60640020)
 
 

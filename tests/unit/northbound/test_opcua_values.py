@@ -106,7 +106,7 @@ def test_events_are_bounded_to_a_burst_and_a_rate() -> None:
     heard: list[str] = []
 
     class Listener:
-        listening = 1
+        is_listening = True
 
         def hear(self, one: Occurrence) -> None:
             heard.append(one.fields["Message"].Value.Text)

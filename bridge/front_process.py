@@ -99,18 +99,23 @@ class Front:
         self, process: asyncio.subprocess.Process, ear: _Ear | None, serves: Callable[[], None]
     ) -> str:
         """Until it ends, or is killed because it hangs."""
-        while ear is None or ear.silent_looks < _SILENT_LOOKS:
-            try:
-                code = await asyncio.wait_for(process.wait(), SIGN_PERIOD_S)
-                return f"ended ({_how(code)})" + (f": {ear.reason}" if ear and ear.reason else "")
-            except TimeoutError:
+        # One wait for all looks: of each that is given up, asyncio keeps a future until the process ends.
+        ended = asyncio.create_task(process.wait())
+        try:
+            while ear is None or ear.silent_looks < _SILENT_LOOKS:
+                if (await asyncio.wait({ended}, timeout=SIGN_PERIOD_S))[0]:
+                    return f"ended ({_how(ended.result())})" + (
+                        f": {ear.reason}" if ear and ear.reason else ""
+                    )
                 if ear:
                     ear.look()
                 else:
                     serves()
-        with contextlib.suppress(ProcessLookupError):
-            process.kill()
-        await process.wait()
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await ended
+        finally:
+            ended.cancel()
         return f"gave no sign of life for {_SILENT_LOOKS * SIGN_PERIOD_S:g} s and was killed"
 
     async def _stop(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 import os
 import signal
 import socket
@@ -107,6 +108,24 @@ async def test_one_that_does_not_stay_up_is_told_once_a_minute(monkeypatch: pyte
     await until_in_loop(lambda: spawns.count >= 5, "some more starts")
     await kept.end()
     assert len(kept.events) <= 2
+
+
+async def test_looking_after_a_front_for_long_keeps_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A look a second, for years."""
+    looks: list[int] = []
+    Spawns(monkeypatch, "import time; time.sleep(60)")
+    monkeypatch.setattr(front_process, "SIGN_PERIOD_S", 0.001)
+    running_front = asyncio.create_task(Front("opcua", []).run_once(lambda: looks.append(len(looks))))
+    await until_in_loop(lambda: len(looks) >= 50, "it has been looked after for a while")
+    gc.collect()
+    before = len(gc.get_objects())
+    await until_in_loop(lambda: len(looks) >= 550, "it has been looked after for longer")
+    gc.collect()
+    grown = len(gc.get_objects()) - before
+    running_front.cancel()
+    with contextlib.suppress(asyncio.CancelledError):
+        await running_front
+    assert grown < 50
 
 
 async def test_a_front_without_listener_ends() -> None:

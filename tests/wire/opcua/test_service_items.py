@@ -88,7 +88,8 @@ class TestItems:
             found += [one.Value.Value for one in await told(client, 1)]
         assert len(found) <= took / 0.375 + 2
 
-    async def test_part_of_a_value_is_monitored(self, client: Client) -> None:
+    async def test_part_of_a_value_is_monitored(self, client: Client, view: LocalView) -> None:
+        load(view, 1.0)
         number = await subscription(client)
         wanted = [
             item(NAMESPACES, index_range="1"),

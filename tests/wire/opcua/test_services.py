@@ -70,7 +70,9 @@ async def test_a_service_is_carried_out_or_refused_as_the_table_says(
 
 
 class TestRead:
-    async def test_part_of_a_value_is_read(self, client: Client) -> None:
+    async def test_part_of_a_value_is_read(self, client: Client, view: LocalView) -> None:
+        load(view, 1.0)
+
         async def read(node: ua.NodeId, index_range: str) -> ua.DataValue:
             wanted = ua.ReadValueId(NodeId=node, AttributeId=Attribute.Value, IndexRange=index_range)
             (found,) = (await ask(client, "Read", NodesToRead=[wanted])).Results

@@ -13,7 +13,7 @@ from typing import Final
 from bridge import __version__, clock
 from bridge.auditlog import AuditLog
 from bridge.can import Bus, open_bus
-from bridge.command import Plant
+from bridge.command import Plant, PlantView
 from bridge.config import BusTable
 from bridge.errors import BridgeError, OperationFailed
 from bridge.eventlog import EventLog
@@ -26,6 +26,7 @@ from bridge.master.standstill import Alarm
 from bridge.mirror.endpoint import socket_endpoint
 from bridge.mirror.publisher import MirrorPublisher
 from bridge.northbound.listening import Port
+from bridge.northbound.modbus.registers import units_of
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.zenoh.session import ZenohServer
 from bridge.notify import Notifier
@@ -79,14 +80,13 @@ class Service:
         ]
         self._networks = [network for _, network in networks]
         self.master = Master(networks, self.plant, clock.now, self.notifier.alive, alarm, clock.suspended_s)
-        self.modbus = ModbusServer(self.plant, site.modbus, clock.now) if site.modbus else None
-        self.zenoh = (
-            ZenohServer(self.plant, site.zenoh, site.site.name, clock.now, clock.epoch_ns)
-            if site.zenoh
-            else None
+        self.view = PlantView(self.plant, clock.now, clock.epoch_ns, self.master.carry_out, self.master.wake)
+        self.modbus = (
+            ModbusServer(self.view, units_of(self.plant), site.modbus, clock.now) if site.modbus else None
         )
+        self.zenoh = ZenohServer(self.view, site.zenoh, site.site.name, clock.now) if site.zenoh else None
         endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
-        self.mirror = MirrorPublisher(self.plant, endpoint, clock.now, clock.epoch_ns)
+        self.mirror = MirrorPublisher(self.view, endpoint, clock.now)
         self._tasks: list[asyncio.Task[None]] = []
         self._ending: Ending | None = None
         drives, buses = count(len(self.plant.drives), "drive"), count(len(site.bus), "bus")

@@ -20,7 +20,7 @@ from bridge.image import Point
 from bridge.lint import family_dictionaries
 from bridge.lint.bus import view_bus
 from bridge.mapping.loader import mapping_folders
-from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row, bridge_rows, drive_maps
+from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row, drive_maps, units_of
 from bridge.northbound.zenoh.keys import KeySpace
 from bridge.project import load_project
 
@@ -45,7 +45,7 @@ def modbus(site: SiteArgument, as_json: AsJson = False) -> None:
         for drive_map in drive_maps(plant)
         for row in drive_map.rows
     ]
-    rows += [(BRIDGE_UNITS[0], "bridge", *_register(row)) for row in bridge_rows(plant)]
+    rows += [(BRIDGE_UNITS[0], "bridge", *_register(row)) for row in units_of(plant).bridge_rows]
     _print(_MODBUS, rows, as_json)
 
 

@@ -23,6 +23,7 @@ from bridge.command.request import (
     WriteParameter,
     command_of,
 )
+from bridge.command.view import PlantView
 
 __all__ = [
     "Action",
@@ -37,6 +38,7 @@ __all__ = [
     "Node",
     "Outcome",
     "Plant",
+    "PlantView",
     "ReadParameter",
     "Rejection",
     "Reply",

@@ -43,11 +43,6 @@ class FurtherTpdo:
         self.quality = Quality.STALE
         return True
 
-    def quality_at(self, now: float) -> Quality:
-        """Judged now, while ``quality`` follows a passed deadline only when its timer runs."""
-        is_late = self.quality is Quality.GOOD and not self.is_fresh(now)
-        return Quality.STALE if is_late else self.quality
-
     def is_fresh(self, now: float) -> bool:
         """It has arrived since the boot-up, and is not late."""
         if self.quality is not Quality.GOOD or self.last is None:
@@ -86,8 +81,6 @@ class ActualData:
         self.words: list[int] = [0] * len(self._process)
         """The words of the last TPDOs, the status word first."""
         self.quality = Quality.WAITING
-        self.is_even = True
-        """All words have the quality of the status word, because they come with it."""
         self._carried = family.carried(slot)[1][1:]
         self._places = [self._process.index(word) for word in self._carried]
         self._has_all = len(self._carried) == len(self._process) - 1
@@ -100,7 +93,6 @@ class ActualData:
         self._others: list[ValueCodec] = []
         self._further: list[FurtherTpdo] = []
         self._judged: list[_Judged] = []
-        self._by_leaf: dict[str, _Judged] = {}
         self._status: list[int] = []
         self._indices: list[int] = []
         self._shown: tuple[Quality, str] | None = None
@@ -127,10 +119,6 @@ class ActualData:
             for codec in plain
         ]
         self._judged = list(self._to_judge(unserved))
-        leaves = [f"actual/{word}" for word in self._carried] + [codec.model.leaf for codec in self._codecs]
-        self._by_leaf = dict(zip(leaves, self._judged[len(self._status) :], strict=True))
-        words = self._judged[len(self._status) :][: len(self._carried)]
-        self.is_even = not any(point.why or point.further for point in words)
         self._shown = None
 
     def _to_judge(self, unserved: Mapping[str, str]) -> Iterable[_Judged]:
@@ -170,11 +158,12 @@ class ActualData:
             self._shown = None
         self.refresh(now)
 
-    def on_time(self, now: float) -> None:
-        """Judge the age of further TPDOs; called a few times a second."""
-        late = [pdo for pdo in self._further if pdo.on_time(now)]
-        if late:
+    def look(self, now: float) -> None:
+        """Judge how good everything is at this moment: of a deadline that has passed the image learns
+        otherwise when a timer runs."""
+        if [pdo for pdo in self._further if pdo.on_time(now)]:
             self._shown = None
+        if not self._is_good(now):
             self.refresh(now)
 
     def on_words(self, words: Sequence[int], now: float) -> None:
@@ -194,10 +183,7 @@ class ActualData:
     def refresh(self, now: float) -> None:
         channel = self._channel
         if not self._is_good(now):
-            quality = channel.link.quality(now)
-            self._judge(quality, now)
-            if not quality.has_value:
-                return
+            self._judge(channel.link.quality(now), now)
         status = (
             channel.status_word,
             channel.drive_status_word,
@@ -205,7 +191,8 @@ class ActualData:
             channel.emcy_code,
         )
         self._image.set_values(self._status, status, now)
-        self._refresh_values(now)
+        if self.quality.has_value:
+            self._refresh_values(now)
 
     def _is_good(self, now: float) -> bool:
         """The process data are good, and the image says so."""
@@ -230,30 +217,21 @@ class ActualData:
             return
         self._shown = _GOOD if quality is Quality.GOOD else (quality, reason)
         for point in self._judged:
-            own, why = self._quality_of(point, quality, [pdo.quality for pdo in point.further])
+            own, why = self._quality_of(point, quality)
             self._image.judge((point.index,), own, now, why or reason)
 
-    def quality_at(self, leaf: str, now: float) -> Quality:
-        """The quality of a word (``actual/value_2``) or of a value made of words, judged now."""
-        point = self._by_leaf[leaf]
-        further = [pdo.quality_at(now) for pdo in point.further]
-        return self._quality_of(point, self._channel.link.quality(now), further)[0]
-
-    def _quality_of(
-        self, point: _Judged, quality: Quality, further: Sequence[Quality]
-    ) -> tuple[Quality, str]:
-        """A point's quality, and the reason where that is not the one of the drive's: with the ``quality`` of
-        the drive's data and those of its further TPDOs."""
+    def _quality_of(self, point: _Judged, quality: Quality) -> tuple[Quality, str]:
+        """A point's quality, and the reason where that is not the one of the drive's ``quality``."""
         if not quality.has_value:
             return quality, ""
         unknown = point.why or self._why_unknown(point)
         if unknown:
             return Quality.CONFIG_ERROR, unknown
-        for own, pdo in sorted(zip(further, point.further, strict=True), key=_goodness):
+        for pdo in sorted(point.further, key=_goodness):
             # Waiting goes first, then stale.
-            is_worse = quality is Quality.GOOD or own is Quality.WAITING
-            if own is not Quality.GOOD and is_worse:
-                return own, f"no {pdo.name} from the drive"
+            is_worse = quality is Quality.GOOD or pdo.quality is Quality.WAITING
+            if pdo.quality is not Quality.GOOD and is_worse:
+                return pdo.quality, f"no {pdo.name} from the drive"
         return quality, ""
 
     def _why_unknown(self, point: _Judged) -> str:
@@ -261,5 +239,5 @@ class ActualData:
         return self._set.why_unknown(self.words[0], point.scaled_by) if point.scaled_by else ""
 
 
-def _goodness(pair: tuple[Quality, FurtherTpdo]) -> int:
-    return (Quality.WAITING, Quality.STALE, Quality.GOOD).index(pair[0])
+def _goodness(pdo: FurtherTpdo) -> int:
+    return (Quality.WAITING, Quality.STALE, Quality.GOOD).index(pdo.quality)

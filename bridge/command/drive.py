@@ -75,8 +75,6 @@ class Drive:
         self.own: OwnJudgement | None = None
         """What it does by itself when the bridge falls silent; None until the boot-up has read it, and empty
         where that is not true any more."""
-        self.sdo_abort_code = 0
-        """Why the drive last refused an SDO that a client had asked for; 0 before that."""
         self.bus = bus
         self.rpdo_type = _ASYNCHRONOUS
         """Transmission type of the RPDO with the control word; read by the boot-up."""
@@ -111,7 +109,7 @@ class Drive:
             *parameter_points(self.name, family),
         ]
 
-    def bind(self, image: Image) -> None:
+    def bind(self, image: Image, now: float) -> None:
         """Find this drive's points in the image, and show in it from now on what happens to the drive."""
         self._image = image
 
@@ -123,11 +121,13 @@ class Drive:
         self._value_indices = places("command", [codec.model.name for codec in self._commands])
         self._supervision = places("status", ("fault_text",)) + places("supervision", _SUPERVISION)
         self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms", "telegrams"))
+        (self._abort_code,) = places("supervision", ("sdo_abort_code",))
         self._follows = places("supervision", ("follows", "last_stop"))
         self._stop_ms, self._bridge_ms = places("supervision", ("worst_case_stop_ms", "worst_case_bridge_ms"))
         self._identity = places("identity", _IDENTITY)
         self._actual.bind(image)
         self.channel.settled = self.refresh
+        image.set(self._abort_code, 0, now)
 
     @property
     def quality(self) -> Quality:
@@ -137,15 +137,6 @@ class Drive:
     def words(self) -> list[int]:
         """The words of the last TPDOs, the status word first, in the order of ``process.tpdo``."""
         return self._actual.words
-
-    @property
-    def is_even(self) -> bool:
-        """All of its actual words are as good as the status word."""
-        return self._actual.is_even
-
-    def quality_at(self, leaf: str, now: float) -> Quality:
-        """The quality of process data, such as ``actual/value_2`` or ``actual/frequency``, judged now."""
-        return self._actual.quality_at(leaf, now)
 
     @property
     def rpdo_period_ms(self) -> int:
@@ -256,6 +247,10 @@ class Drive:
         self.identification = identification
         self._show(self._identity, [getattr(identification, leaf) for leaf in _IDENTITY], now)
 
+    def on_sdo_refused(self, abort_code: int, now: float) -> None:
+        """It has refused an SDO that a client had asked for."""
+        self._image.set(self._abort_code, abort_code, now)
+
     # time
 
     def on_time(self, now: float) -> list[Verdict]:
@@ -343,13 +338,17 @@ class Drive:
         quality = Quality.CONFIG_ERROR if stop.unknown else Quality.GOOD
         self._image.set(self._stop_ms, stop.ms, now, quality, stop.unknown)
 
-    def refresh_ages(self, now: float) -> None:
-        """The points that change by themselves; called a few times a second."""
-        channel = self.channel
-        self._actual.on_time(now)
+    def look(self, now: float) -> None:
+        """Bring to this moment what changes by itself: ages, and how good the drive's data are. Called a few
+        times a second, and when somebody wants to know."""
+        self._actual.look(now)
         self._refresh_follows(now)
+        channel = self.channel
         watchdog = channel.watchdog
-        self._show(self._ages, (watchdog.left_ms(now), channel.link.age_ms(now), watchdog.telegrams), now)
+        left, age, telegrams = self._ages
+        self._image.keep(left, watchdog.left_ms(now), now)
+        self._image.keep(age, channel.link.age_ms(now), now)
+        self._image.keep(telegrams, watchdog.telegrams, now)
 
     def _show(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:
         """Values that the bridge itself knows: their quality is always good."""

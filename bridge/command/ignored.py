@@ -12,7 +12,7 @@ from bridge.command.request import Action
 
 if TYPE_CHECKING:
     from bridge.command.drive import Drive
-    from bridge.command.plant import Node
+    from bridge.command.plant import Enforce, Node
 
 _WORST: Final = 1000
 """The highest severity there is (OPC UA Part 5 §6.4.2)."""
@@ -20,7 +20,13 @@ _WORDS: Final = {Action.STOP_NODE: "NMT stop", Action.RESET: "NMT reset node"}
 
 
 def conclude(
-    node: Node, drive: Drive, verdict: Verdict, now: float, tell: Callable[[Event], None], audit: AuditTrail
+    node: Node,
+    drive: Drive,
+    verdict: Verdict,
+    now: float,
+    tell: Callable[[Event], None],
+    audit: AuditTrail,
+    enforce: Enforce,
 ) -> None:
     """Report how the drive's last stop ended, and stop the node of a drive that ignores it."""
     took_s = verdict.at - verdict.since
@@ -44,8 +50,8 @@ def conclude(
     message = f"{what}, {_heard(drive)}; {_done(action, node, drive)}"
     audit.stop_ended(drive.name, verdict.outcome.label, message, now)
     tell(Event(now, Kind.WATCHDOG, drive.name, _WORST, message))
-    if action is not None and node.enforce is not None:
-        node.enforce(action, f"the bridge: {drive.name} ignores its stop", now)
+    if action is not None:
+        enforce(node.name, action, f"the bridge: {drive.name} ignores its stop", now)
 
 
 def _reaction(drive: Drive, verdict: Verdict) -> Action | None:

@@ -5,10 +5,11 @@ Northbounds read the image and submit requests; the master feeds it. Neither kno
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Final, Protocol
+from typing import Final
 
 from bridge.command.audit import AuditTrail, Rejection
 from bridge.command.deadlines import Deadlines
@@ -16,7 +17,7 @@ from bridge.command.drive import Drive
 from bridge.command.event import Event, EventGate, Kind
 from bridge.command.ignored import conclude
 from bridge.command.link import NodeState
-from bridge.command.points import CONNECTION_COUNTS, bridge_points, bus_points, node_points
+from bridge.command.points import CONNECTION_COUNTS, NODE_CODES, bridge_points, bus_points, node_points
 from bridge.command.request import (
     NODE_ACTIONS,
     PARAMETER_ACTIONS,
@@ -38,30 +39,27 @@ from bridge.parameter import Ledger
 _LOOK_PER_DRIVE_S: Final = 50e-6
 """Readings alone make us look at all timers this often at most, so that looking takes a tenth of the CPU."""
 
-NodeCommand = Callable[[Request, float, Reply], None]
-Enforce = Callable[[Action, str, float], None]
-"""Does something to a node in the bridge's own name; the text says why."""
+CarryOut = Callable[[Request, float, Reply], bool]
+"""Takes a command on a node or a bus, or a request for a parameter; False where there is nobody to do it."""
 
 
-class ParameterAccess(Protocol):
-    """Reads and writes the parameters of a node's drives."""
+def nobody(request: Request, now: float, reply: Reply) -> bool:
+    """The plant is on no bus."""
+    return False
 
-    def submit(self, request: Request, drive: Drive, now: float, reply: Reply) -> None: ...
 
-    def on_node(self, state: NodeState, now: float) -> None: ...
+Enforce = Callable[[str, Action, str, float], None]
+"""Does something to a node in the bridge's own name; the second text says why."""
 
 
 @dataclass(slots=True)
 class Node:
-    """A configured node: its drives, and who carries out commands on it."""
+    """A configured node and its drives."""
 
     bus: BusTable
     table: NodeTable
     family: Family
     drives: list[Drive] = field(default_factory=list[Drive])
-    command: NodeCommand | None = None
-    enforce: Enforce | None = None
-    parameters: ParameterAccess | None = None
 
     @property
     def name(self) -> str:
@@ -81,9 +79,8 @@ _BRINGS_TIMERS_FORWARD: Final = (Action.SET_TIMEOUT, Action.TAKE_CONTROL)
 class Plant:
     """All drives of a site.
 
-    ``began`` is the monotonic time of what is known from the start, such as the version.
-    ``outputs_changed`` is called when a channel's output may have changed and should go to the bus at
-    once; ``on_event`` callbacks get the events.
+    ``began`` is the monotonic time of what is known from the start, such as the version. ``on_event``
+    callbacks get the events.
     """
 
     def __init__(self, site: Site, families: dict[str, Family], version: str, began: float = 0.0) -> None:
@@ -92,9 +89,6 @@ class Plant:
         self.nodes: dict[str, Node] = {}
         self.drives: dict[str, Drive] = {}
         self.by_unit: dict[int, Drive] = {}
-        self.bus_commands: dict[str, NodeCommand] = {}
-        """Who carries out commands on all nodes of a bus, by ``bus/<name>``."""
-        self.outputs_changed: Callable[[], None] = lambda: None
         self.eeprom_writes = Ledger()
         """How often parameters were written; whoever keeps it across restarts fills it first."""
         self.stop_due: float | None = None
@@ -105,10 +99,12 @@ class Plant:
         """Drives with a stop that has not been handed to the bus yet."""
         self._deadlines = Deadlines(self._next_of_drives)
         self._listeners: list[Callable[[Event], None]] = []
+        self._outcomes: deque[tuple[Reply, Outcome]] = deque()
         self._gate = EventGate()
         self._guard = Guard("event")
         self._refused_by_others = 0
         self._is_closing = False
+        self._buses = frozenset(f"bus/{bus.name}" for bus in site.bus)
         points = bridge_points()
         units = _unit_ids(site)
         for bus in site.bus:
@@ -126,17 +122,15 @@ class Plant:
                     points += drive.points
         self.image = Image(points)
         self.audit = AuditTrail(self.image)
-        self._node_faults = {
-            name: (
-                self.image.index[f"{name}/node/current_fault"],
-                self.image.index[f"{name}/node/last_fault"],
-            )
+        index = self.image.index
+        self._node_points = {
+            name: [index[f"{name}/node/{leaf}"] for leaf in ("state", "current_fault", "last_fault")]
             for name in self.nodes
         }
         for node in self.nodes.values():
-            self.image.set(self._node_faults[node.name][1], 0.0, began)
+            self.image.set(self._node_points[node.name][2], 0.0, began)
             for drive in node.drives:
-                drive.bind(self.image)
+                drive.bind(self.image, began)
                 drive.channel.settled = partial(self._settled, node, drive)
                 drive.channel.on_trip(self._tripped)
                 self._settled(node, drive, began)
@@ -176,45 +170,50 @@ class Plant:
         """Set a point by its full name."""
         self.image.set(self.image.index[name], value, now, quality, reason)
 
-    def submit(self, request: Request, now: float, reply: Reply) -> None:
-        """Carry out ``request``; ``reply`` is called exactly once, now or later."""
+    def submit(self, request: Request, now: float, reply: Reply, carry_out: CarryOut = nobody) -> bool:
+        """Carry out ``request``; ``reply`` is called exactly once, now or later. ``carry_out`` takes what is
+        not done by a drive's channel.
+
+        True where the bus should be told at once.
+        """
         reply = self.audit.follow(request, now, reply)
         if self._is_closing and request.action not in STOP_ACTIONS:
             reply(Outcome(Code.NOT_READY, "the bridge is being stopped", forwarded=False))
-            return
+            return False
         self._deadlines.on_change()
         if request.action in NODE_ACTIONS:
-            node = self.nodes.get(request.target)
-            command = node.command if node else self.bus_commands.get(request.target)
             reply = self._telling(request, now, reply)
-            if command is None:
+            is_taken = carry_out(request, now, reply)
+            if not is_taken:
                 reply(Outcome(Code.UNKNOWN_TARGET, f"there is no node {request.target!r}"))
-            else:
-                command(request, now, reply)
-                self.outputs_changed()
-            return
+            return is_taken
         drive = self.drives.get(request.target)
         if drive is None:
             reply = self._telling(request, now, reply)
             reply(Outcome(Code.UNKNOWN_TARGET, f"there is no drive {request.target!r}"))
-            return
+            return False
         if request.action in PARAMETER_ACTIONS:
-            access = self.nodes[drive.node_name].parameters
-            if access is None:
+            is_taken = carry_out(request, now, reply)
+            if not is_taken:
                 reply = self._telling(request, now, reply)
                 reply(Outcome(Code.NOT_READY, f"{drive.name} is on no bus", forwarded=False))
-                return
-            access.submit(request, drive, now, reply)
-            self.outputs_changed()
-            return
+            return is_taken
         before, until = drive.channel.output, drive.channel.until
-        try:
-            drive.channel.handle(request, now, reply)
-        finally:
-            is_changed = drive.channel.output != before or request.action in _BRINGS_TIMERS_FORWARD
-            if is_changed or (until is not None and until < now + drive.burst_s):
-                # The bus may have been told to stop the drive by itself: not any more, its owner is there.
-                self.outputs_changed()
+        drive.channel.handle(request, now, reply)
+        is_changed = drive.channel.output != before or request.action in _BRINGS_TIMERS_FORWARD
+        # The bus may have been told to stop the drive by itself: not any more, its owner is there.
+        return is_changed or (until is not None and until < now + drive.burst_s)
+
+    def later(self, reply: Reply) -> Reply:
+        """A reply that waits for ``tell``: what an outcome causes does not happen in the midst of what has
+        brought it about."""
+        return lambda outcome: self._outcomes.append((reply, outcome))
+
+    def tell(self) -> None:
+        """Tell the outcomes that wait, and those that come of it."""
+        while self._outcomes:
+            reply, outcome = self._outcomes.popleft()
+            reply(outcome)
 
     def on_connection(self, identity: Identity, now: float, *, is_there: bool) -> None:
         """``identity`` has connected, or its last connection has ended: no telegram, and no end of control.
@@ -233,7 +232,7 @@ class Plant:
     def _tell_refusal(
         self, what: str, identity: Identity, target: str, why: str, now: float, count: int = 1
     ) -> None:
-        is_known = target in self.drives or target in self.nodes or target in self.bus_commands
+        is_known = target in self.drives or target in self.nodes or target in self._buses
         source = target.removeprefix("bus/") if is_known else "bridge"
         what = what if is_known else f"{what} on {target[:_LONGEST_NAME]!r}"
         self._refused_by_others += count
@@ -254,20 +253,23 @@ class Plant:
         index = self.image.index[f"bridge/{leaf}"]
         self.image.set(index, int(self.image[index].value) + by, now)
 
-    def on_time(self, now: float) -> None:
-        """Let the timers of every channel run and bring the image up to date."""
+    def on_time(self, now: float, enforce: Enforce = lambda node, action, why, now: None) -> None:
+        """Let the timers of every channel run and bring the image up to date. ``enforce`` acts on the node of
+        a drive that ignores its stop."""
         if not self._deadlines.is_due(now):
             return
         for drive in self.drives.values():
             deadline = drive.next_deadline(now)
             if deadline is not None and deadline <= now:
+                node = self.nodes[drive.node_name]
                 for verdict in drive.on_time(now):
-                    conclude(self.nodes[drive.node_name], drive, verdict, now, self.report, self.audit)
+                    conclude(node, drive, verdict, now, self.report, self.audit, enforce)
 
     def refresh(self, now: float) -> None:
         """The slow part: ages, counters and the faults of the nodes; a few times a second."""
         for drive in self.drives.values():
-            drive.refresh_ages(now)
+            drive.look(now)
+        self.image.tell_kept()
         good = sum(drive.quality is Quality.GOOD for drive in self.drives.values())
         self.set("bridge/drives_good", good, now)
         refused = sum(drive.channel.refused_writes for drive in self.drives.values())
@@ -288,7 +290,8 @@ class Plant:
             drive.channel.is_tripped and drive.channel.watchdog.controller_is_silent for drive in node.drives
         )
         fault = node.family.faults.bridge_timeout if silent else 0.0
-        current, last = self._node_faults[node.name]
+        state, current, last = self._node_points[node.name]
+        self.image.set(state, NODE_CODES[node.drives[0].channel.link.node], now)
         before = self.image[current].value
         if before and not fault:
             self.image.set(last, before, now)
@@ -316,8 +319,6 @@ class Plant:
         self._deadlines.on_change()
         for drive in node.drives:
             drive.channel.on_node(state, now)
-        if node.parameters:
-            node.parameters.on_node(state, now)
         if not tell:
             return
         if state is NodeState.LOST:

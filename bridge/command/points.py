@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.command import follow, watchdog
+from bridge.command.link import NodeState
 from bridge.config import BusTable, NodeTable
 from bridge.drive import STATES, LinearScale, ValueCodec
 from bridge.image import DataType, Point
@@ -18,6 +19,16 @@ NMT_STATES: Final = (
     (127, "pre_operational"),
     (255, "unknown"),
 )
+NODE_CODES: Final = {
+    NodeState.ABSENT: 0,
+    NodeState.BOOTING: 1,
+    NodeState.OPERATIONAL: 2,
+    NodeState.LOST: 3,
+    NodeState.STOPPED: 4,
+    NodeState.DISABLED: 5,
+    NodeState.CONFIG_ERROR: 6,
+}
+NODE_STATES: Final = tuple((code, state.name.lower()) for state, code in NODE_CODES.items())
 CONNECTION_COUNTS: Final = {
     "modbus_refused_connections": "Modbus connections that were refused",
     "modbus_broken_connections": "Modbus connections that the bridge ended",
@@ -161,6 +172,11 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
             description="how the last stop ended",
         ),
         _word(f"{top}/telegrams", "number of the owner's last valid telegram, modulo 65536"),
+        Point(
+            name=f"{top}/sdo_abort_code",
+            data_type=u32,
+            description="why the drive last refused an SDO of a client; 0: never",
+        ),
     ]
 
 
@@ -223,6 +239,12 @@ def node_points(node: NodeTable, polls: list[Poll]) -> list[Point]:
             name=f"{top}/device_errors",
             data_type=DataType.STRING,
             description="errors that the node reported at its last boot-up, 1001h and 1003h",
+        ),
+        Point(
+            name=f"{top}/state",
+            data_type=DataType.UINT8,
+            states=NODE_STATES,
+            description="what the bridge does with the node",
         ),
     ]
 

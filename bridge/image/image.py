@@ -66,6 +66,7 @@ class Image:
         self._times = [0.0] * count
         self._reasons = [""] * count
         self._feeds: list[Feed] = []
+        self._untold: dict[int, None] = {}
 
     def feed(self) -> Feed:
         """A new consumer; it is shown every point once, then each change."""
@@ -84,6 +85,10 @@ class Image:
     def qualities(self, indices: Iterable[int]) -> list[Quality]:
         """The present qualities of these points."""
         return [self._qualities[index] for index in indices]
+
+    def values(self, indices: Iterable[int]) -> list[Value]:
+        """The present values of these points, whatever their quality."""
+        return [self._values[index] for index in indices]
 
     def read(self, name: str) -> Reading:
         """The present state of the named point. Raises KeyError where there is none."""
@@ -113,6 +118,21 @@ class Image:
         self.set(index, value, now)
         for feed in self._feeds:
             feed.mark(index)
+
+    def keep(self, index: int, value: Value, now: float) -> None:
+        """Store a good value that changes by itself, such as an age. Feeds hear of it with ``tell_kept``,
+        however often it is looked at before."""
+        if self._values[index] != value or self._qualities[index] is not Quality.GOOD:
+            self._values[index] = value
+            self._qualities[index] = Quality.GOOD
+            self._times[index] = now
+            self._untold[index] = None
+
+    def tell_kept(self) -> None:
+        """Mark what ``keep`` has changed."""
+        for feed in self._feeds:
+            feed.mark_all(self._untold)
+        self._untold.clear()
 
     def set_values(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:
         """Store values of points whose quality stays as it is; ``indices`` and ``values`` go together."""

@@ -15,6 +15,7 @@ from bridge.tomlfile import Key
 
 _NODE_POINTS: Final = (
     "nmt_state",
+    "state",
     "supervision_state",
     "boot_status",
     "software_version",

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from bridge.command import Code, Event, Kind, Outcome, Plant, Reply, Request
-from bridge.command.plant import NodeCommand
+from bridge.command import Event, Kind, Plant
 from bridge.config import BusTable
 from bridge.master.listening import Listening, listen_s
 from bridge.node.node import NodeCore
@@ -28,9 +27,6 @@ class Charge:
         self._plant = plant
         self._forget = forget
         self._listening = listening or Listening(listen_s(bus))
-        for node in nodes:
-            if node.node.command:
-                node.node.command = self.guarded(node.node.command)
 
     def acts(self) -> bool:
         """Whether this bridge acts: otherwise nothing is sent."""
@@ -41,17 +37,10 @@ class Charge:
         """Whether another bridge is in charge."""
         return self._listening.is_passive
 
-    def guarded(self, command: NodeCommand) -> NodeCommand:
-        """``command``, which is refused as long as nothing may be sent."""
-
-        def take(request: Request, now: float, reply: Reply) -> None:
-            if self.acts():
-                command(request, now, reply)
-            else:
-                why = f"on {self._bus.name} the bridge {self._listening.part.value}"
-                reply(Outcome(Code.NOT_READY, why, forwarded=False))
-
-        return take
+    @property
+    def why_not(self) -> str:
+        """Why nothing is sent; empty where this bridge acts."""
+        return "" if self.acts() else f"on {self._bus.name} the bridge {self._listening.part.value}"
 
     def heard(self, sign: str, now: float) -> None:
         """``sign`` reveals another bridge. If this one gives way it sends nothing more, not even stops."""

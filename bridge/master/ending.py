@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from bridge.command import Action, Drive, Plant
 from bridge.command.follow import LastStop
+from bridge.command.plant import Enforce
 from bridge.image import Quality
 
 
@@ -43,7 +44,7 @@ def waits_for(plant: Plant) -> bool:
     return any(drive.following.is_judged and not _has_followed(drive) for drive in plant.drives.values())
 
 
-def end(plant: Plant, now: float, *, can_send: bool = True) -> Ending:
+def end(plant: Plant, now: float, enforce: Enforce, *, can_send: bool = True) -> Ending:
     """NMT stop for the nodes of drives that have not followed, unless the site file exempts them. A master
     that has failed (not ``can_send``) sends nothing and hears nobody."""
     ignoring = [drive for drive in plant.drives.values() if can_send and _ignores(drive)]
@@ -56,19 +57,17 @@ def end(plant: Plant, now: float, *, can_send: bool = True) -> Ending:
         len(plant.drives),
         tuple(drive.name for drive in ignoring),
         tuple(unheard),
-        tuple(dict.fromkeys(_stopped(plant, ignoring, now))),
+        tuple(dict.fromkeys(_stopped(ignoring, now, enforce))),
     )
 
 
-def _stopped(plant: Plant, ignoring: list[Drive], now: float) -> Iterator[str]:
+def _stopped(ignoring: list[Drive], now: float, enforce: Enforce) -> Iterator[str]:
     why = "the bridge at its end: {} does not follow its stop"
     for drive in ignoring:
-        node = plant.nodes[drive.node_name]
-        if drive.table.reacts_to_ignored_stop == "report" or node.enforce is None:
-            continue
-        if drive.following.is_judged:
-            node.enforce(Action.STOP_NODE, why.format(drive.name), now)
-        yield node.name
+        if drive.table.reacts_to_ignored_stop != "report":
+            if drive.following.is_judged:
+                enforce(drive.node_name, Action.STOP_NODE, why.format(drive.name), now)
+            yield drive.node_name
 
 
 def _has_followed(drive: Drive) -> bool:

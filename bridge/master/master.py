@@ -9,25 +9,20 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import partial
 from math import inf
 
 from bridge.can import open_all
-from bridge.can.burstend import MOST_FRAMES, BurstEnd
 from bridge.can.interface import Bus, ControllerState
-from bridge.canopen.frame import Frame
-from bridge.canopen.sync import burst_length
-from bridge.command import Event, Kind, Plant
+from bridge.command import Action, Event, Kind, Plant, Reply, Request
 from bridge.errors import OperationFailed
 from bridge.master.ending import Ending, end, waits_for
 from bridge.master.lateness import Lateness
-from bridge.master.network import Beats, Network
+from bridge.master.line import RENEWALS, Line
+from bridge.master.network import Network
 from bridge.master.standstill import Alarm
 from bridge.master.suspend import SuspendWatch
 from bridge.master.timer import LoopTimer
-from bridge.node.process.process_data import Beat, Told
-from bridge.ratelimit import RateLimit
 
 _log = logging.getLogger(__name__)
 
@@ -39,11 +34,7 @@ _STOP_DRIVES_S = 0.1
 _DRIVES_FOLLOW_S = 5.0
 """How long they are sent at most, while a drive has not said that it follows: a quarter of TimeoutStopSec."""
 _LOOK_S = 0.02
-_RENEWALS = 3
-"""How often a burst is renewed within its dead-man time."""
 
-_BUS_EVENTS = 10
-_BUS_EVENT_EVERY_S = 5.0
 _SEVERITIES = {
     ControllerState.OK: 200,
     ControllerState.WARNING: 300,
@@ -51,65 +42,6 @@ _SEVERITIES = {
     ControllerState.BUS_OFF: 900,
     ControllerState.DOWN: 900,
 }
-
-
-@dataclass(slots=True)
-class _Line:
-    """One bus with its network, and what the bus has been told to repeat."""
-
-    bus: Bus
-    network: Network
-    beating: dict[int, Told] = field(default_factory=dict[int, Told])
-    beats: Beats | None = None
-    renew_at: float = 0.0
-    hold_at: float = inf
-    """When bursts have to be renewed so that they last as long as a drive needs them."""
-    was_up: bool = True
-    shown: ControllerState = ControllerState.OK
-    shown_refusal: str = ""
-    limit: RateLimit = field(default_factory=lambda: RateLimit(_BUS_EVENTS, _BUS_EVENT_EVERY_S))
-    outages: int = 0
-
-    @property
-    def burst_s(self) -> float:
-        """How long a burst goes on without being renewed."""
-        return self.network.bus.deadman_ms / 1000
-
-    @property
-    def renew_s(self) -> float:
-        """How often bursts are renewed. One that has to end in a stop is no longer than the longest sequence
-        that the kernel takes."""
-        return min(self.burst_s, MOST_FRAMES * self.network.bus.rpdo_period_s) / _RENEWALS
-
-    def ended(self, beats: Beats, frames: list[Frame]) -> set[int]:
-        """The bursts that end: what is sent once takes their place, too."""
-        return self.beating.keys() - (beats.keys() - {frame.can_id for frame in frames})
-
-    def due(self, beats: Beats, now: float, *, renew: bool) -> list[tuple[Beat, bool]]:
-        """What to hand to the bus, and whether it is new: setpoints before the enabling word.
-
-        Mere renewals go in reverse order: what is handed over later has no more frames left until the
-        deadline than what went before it, so setpoints end before the stop comes.
-        """
-        new, kept = list[tuple[Beat, bool]](), list[tuple[Beat, bool]]()
-        for can_id, beat in beats.items():
-            told = self.beating.get(can_id)
-            if told is None or told.frames != beat.frames:
-                new.append((beat, True))
-            elif renew or not told.ends_as(beat, now):
-                kept.append((beat, False))
-        return [*new, *reversed(kept)]
-
-    def beat(self, beat: Beat, now: float, *, at_once: bool) -> None:
-        """Make the bus repeat this for the dead-man time, then what follows if its own time ends earlier."""
-        ending = None
-        # A deadline further ahead does not concern this burst, however long the hand-over takes.
-        if beat.until is not None and beat.until < now + 2 * self.burst_s + beat.period_s:
-            ending = BurstEnd(beat.until, beat.then())
-        count = burst_length(beat.period_s, self.network.bus.deadman_ms)
-        self.bus.burst(beat.frames, now, beat.period_s, count, at_once=at_once, ending=ending)
-        ends = now + self.burst_s + beat.period_s
-        self.beating[beat.frames[0].can_id] = Told(beat.frames, beat.until, ends, now)
 
 
 class Master:
@@ -129,7 +61,7 @@ class Master:
         alarm: Alarm | None = None,
         suspended: Callable[[], tuple[float, float]] = lambda: (0.0, 0.0),
     ) -> None:
-        self._lines = [_Line(bus, network) for bus, network in lines]
+        self._lines = [Line(bus, network) for bus, network in lines]
         self._plant = plant
         self._clock = clock
         self._alive = alive
@@ -142,34 +74,30 @@ class Master:
         self._refresh_at = 0.0
         self._last_round: float | None = None
         self._running = False
-        self._in_round = False
-        self._again = False
         self._failure: asyncio.Future[None] | None = None
         self.gaps = 0
 
     async def start(self) -> None:
         """Open the buses. Raises ``Unavailable`` with all that cannot be opened; none stays open then."""
         try:
-            open_all(partial(line.bus.open, self._wake) for line in self._lines)
+            open_all(partial(line.bus.open, self.wake) for line in self._lines)
         except BaseException:
             self._close_buses()
             raise
         self._failure = asyncio.get_running_loop().create_future()
-        self._timer = LoopTimer(asyncio.get_running_loop(), self._clock, self._wake)
+        self._timer = LoopTimer(asyncio.get_running_loop(), self._clock, self.wake)
         self.attach(self._timer.arm)
-        self._wake()
+        self.wake()
 
     def attach(self, set_timer: Callable[[float], None]) -> None:
         """Run by whoever calls ``pump`` at the times given to ``set_timer``."""
         self._set_timer = set_timer
-        # A changed output goes out at once, but like everything else in a complete round.
-        self._plant.outputs_changed = self._wake
         self._running = True
 
     def halt(self, now: float) -> None:
         """Take no more commands, and hand stopped words to the buses at once. May be called again."""
         self._plant.close(now)
-        self._wake()
+        self.wake()
 
     async def stop_drives(self, now: float) -> Ending:
         """Take no more commands and send stopped words until every drive follows, unless the master has
@@ -181,9 +109,9 @@ class Master:
             if not self._running or not waits_for(self._plant) or self._clock() > now + _DRIVES_FOLLOW_S:
                 break
             await asyncio.sleep(_LOOK_S)
-        ending = end(self._plant, self._clock(), can_send=self._running)
+        ending = end(self._plant, self._clock(), self._enforce, can_send=self._running)
         if ending.nodes_stopped:
-            self._wake()
+            self.wake()
             await asyncio.sleep(_STOP_DRIVES_S)
         return ending
 
@@ -191,7 +119,6 @@ class Master:
         """Stop every drive's process data and close the buses."""
         self._running = False
         self._alarm.set(0.0)
-        self._plant.outputs_changed = lambda: None
         if self._timer:
             self._timer.close()
         for line in self._lines:
@@ -203,30 +130,25 @@ class Master:
         for line in self._lines:
             line.bus.close()
 
-    def _wake(self) -> None:
-        """One round, while running. A fault of our own ends it: no drive is left to a master that does half
-        of its work. Each drive gets a last, stopped word if possible; the bursts end within the dead-man
-        time, and ``failed`` says why."""
+    def carry_out(self, request: Request, now: float, reply: Reply) -> bool:
+        """A command on a node or a bus, or a request for a parameter; False if there is no such target."""
+        return any(line.network.carry_out(request, now, reply) for line in self._lines)
+
+    def wake(self) -> None:
+        """One round, while running. Nothing in a round calls this: outcomes are delivered after it.
+
+        A fault of our own ends it: no drive is left to a master that does half of its work. Each drive gets a
+        last, stopped word if possible; the bursts end within the dead-man time, and ``failed`` says why."""
         if not self._running:
             return
-        if self._in_round:
-            # Asked for by something that this round has caused: there is one more, not one within.
-            self._again = True
-            return
-        self._in_round = True
         try:
             self.pump()
-            while self._again:
-                self._again = False
-                self.pump()
         except Exception as error:
             self._running = False
             if self._failure and not self._failure.done():
                 self._failure.set_exception(OperationFailed(f"the master has failed: {error!r}"))
             self._send_last_words()
             raise
-        finally:
-            self._in_round = False
 
     def _send_last_words(self) -> None:
         """After a fault of our own: what fails for one bus must not keep the others' drives running."""
@@ -247,7 +169,7 @@ class Master:
             await self._failure
 
     def pump(self) -> None:
-        """One round: drain, judge, send, renew."""
+        """One round: drain, judge, send, renew; then outcomes are told."""
         now = self._clock()
         self._check_gap(now)
         if self._due is not None:
@@ -261,7 +183,7 @@ class Master:
             foreign = line.bus.take_foreign(now)
             if foreign:
                 line.network.on_foreign(foreign, now)
-        self._plant.on_time(now)
+        self._plant.on_time(now, self._enforce)
         for line in self._lines:
             line.network.on_time(now)
             self._watch_bus(line, now)
@@ -275,7 +197,7 @@ class Master:
         self._last_round = now
         now = self._clock()
         self._check_gap(now)
-        self._plant.on_time(now)
+        self._plant.on_time(now, self._enforce)
         for line in self._lines:
             self._flush(line, now)
             if not self._stood_still(line, now):
@@ -286,8 +208,14 @@ class Master:
         self._last_round = now
         self._alive(now)
         self._arm(now)
+        # What this causes is done in a round of its own: the present one is over.
+        self._plant.tell()
 
-    def _stood_still(self, line: _Line, since: float) -> bool:
+    def _enforce(self, node: str, action: Action, why: str, now: float) -> None:
+        for line in self._lines:
+            line.network.enforce(node, action, why, now)
+
+    def _stood_still(self, line: Line, since: float) -> bool:
         """The process was stopped after ``since`` for longer than deadman_ms, so words computed before are
         stale. The next round finds the gap."""
         return (self._clock() - since) * 1000 > line.network.bus.deadman_ms
@@ -314,7 +242,7 @@ class Master:
                     drive.channel.on_bridge_gap(now)
                     drive.refresh(now)
 
-    def _watch_bus(self, line: _Line, now: float) -> None:
+    def _watch_bus(self, line: Line, now: float) -> None:
         status = line.bus.status
         is_up = status.state not in (ControllerState.DOWN, ControllerState.BUS_OFF)
         self._tell_state(line, now)
@@ -337,7 +265,7 @@ class Master:
         else:
             line.network.bus_is_gone(now)
 
-    def _tell_state(self, line: _Line, now: float) -> None:
+    def _tell_state(self, line: Line, now: float) -> None:
         """The controller is in another state. A loose plug changes it a hundred times a second: the last
         one is told in any case, those before it no more often than the limit allows."""
         status = line.bus.status
@@ -350,7 +278,7 @@ class Master:
             message += f": {status.last_error}"
         self._plant.report(Event(now, Kind.BUS, line.bus.name, _SEVERITIES[status.state], message))
 
-    def _tell_refusal(self, line: _Line, now: float) -> None:
+    def _tell_refusal(self, line: Line, now: float) -> None:
         """The kernel no longer takes bursts, or takes them again."""
         refusal = line.bus.status.bursts_refused
         if refusal == line.shown_refusal or not line.limit.allows(now):
@@ -361,7 +289,7 @@ class Master:
             message = f"the kernel takes no bursts ({refusal}): the bridge sends them itself, less evenly"
         self._plant.report(Event(now, Kind.BUS, line.bus.name, 600 if refusal else 200, message))
 
-    def _flush(self, line: _Line, now: float) -> None:
+    def _flush(self, line: Line, now: float) -> None:
         bus, network = line.bus, line.network
         routes = network.take_routes()
         if routes is not None:
@@ -404,7 +332,7 @@ class Master:
         for line in self._lines:
             # Also with the bus down: a round that comes too late means that the process hung.
             renew_at = max(min(line.renew_at, line.hold_at), now)
-            times.append(renew_at if line.was_up else now + _REFRESH_S / _RENEWALS)
+            times.append(renew_at if line.was_up else now + _REFRESH_S / RENEWALS)
             times += [t for t in (line.network.next_deadline(), line.bus.next_deadline()) if t is not None]
         self._due = max(min(times), now)
         self._set_timer(self._due)

@@ -6,7 +6,6 @@ Says which frames are to be sent once and which are to be repeated; the holder o
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from types import MappingProxyType
 from typing import Final
 
@@ -16,9 +15,11 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.canopen.sync import SyncWindow, sync_frames
 from bridge.canopen.time_stamp import TimeProducer
-from bridge.command import Action, Event, Kind, Plant, Reply, Request
+from bridge.command import Action, Code, Event, Kind, Outcome, Plant, Reply, Request
+from bridge.command.request import NODE_ACTIONS
 from bridge.config import BusTable
 from bridge.config.download import Download
+from bridge.master.bus_points import BusPoints
 from bridge.master.charge import Charge
 from bridge.master.intruders import Intruders
 from bridge.master.listening import Listening
@@ -30,11 +31,6 @@ from bridge.node.neighbours import Neighbour
 from bridge.node.node import NodeCore
 from bridge.node.process.process_data import Beat
 from bridge.node.wire import Handler
-from bridge.ratelimit import RateLimit
-
-_LOAD_PERIOD_S: Final = 1.0
-_ERRORS_EVERY_S: Final = 10.0
-"""A broken wire gives thousands of error frames a second: one line reports all of them."""
 
 NOTHING: Final[Mapping[str, Sequence[Download]]] = MappingProxyType({})
 
@@ -65,10 +61,6 @@ class Network:
             for node in plant.nodes.values()
             if node.bus is bus
         ]
-        for node in self.nodes:
-            others = [other for other in self.nodes if other is not node]
-            node.wire.is_taken = partial(_is_taken, others)
-            node.wire.is_foreign = partial(_is_foreign, others)
         self._gate = StartGate(bus.mandatory_missing, self.nodes)
         self._schedule = Schedule(self.nodes)
         own_id = bus.master_node_id if bus.heartbeat_ms else None
@@ -80,19 +72,16 @@ class Network:
         """Identifiers on which nobody else may send what we repeat; brought up to date by ``take_routes``."""
         self._has_booted = False
         self._nmt_for_all: Frame | None = None
-        plant.bus_commands[f"bus/{bus.name}"] = self.charge.guarded(self.command)
         self._routes_changed = True
         self._routes: dict[int, Handler] = {}
         self._routings = 0
         self._beats: Beats = {}
         self._beats_for: tuple[int, int, NmtState, bool] | None = None
-        self._measured: tuple[float, int] | None = None
         self._sync = sync_frames(bus.sync_counter)
         self._window = SyncWindow(bus.sync_window_us / 1e6) if bus.sync_window_us else None
         self._time = TimeProducer(bus.time_period_s, epoch_ns) if bus.time_period_s and epoch_ns else None
         self._frames: list[Frame] = []
-        self._errors_told = 0
-        self._error_limit = RateLimit(1, _ERRORS_EVERY_S)
+        self._points = BusPoints(bus, plant)
 
     def on_frames(self, frames: list[Frame], now: float) -> None:
         """Everything received, in order."""
@@ -187,11 +176,38 @@ class Network:
             return NmtState.INITIALISING
         return NmtState.OPERATIONAL if self._gate.is_open else NmtState.PRE_OPERATIONAL
 
-    def command(self, request: Request, now: float, reply: Reply) -> None:
-        """NMT for every node of the bus."""
-        is_for_all = node_commands.answer(request, self.bus.name, self.nodes, self._plant, now, reply)
-        if is_for_all:
+    # requests
+
+    def carry_out(self, request: Request, now: float, reply: Reply) -> bool:
+        """A command on a node or on all of them, or a request for a parameter; False where its target is not
+        on this bus."""
+        if request.action not in NODE_ACTIONS:
+            return self._ask_drive(request, now, reply)
+        is_bus = request.target == f"bus/{self.bus.name}"
+        nodes = [node for node in self.nodes if is_bus or node.node.name == request.target]
+        if not (nodes or is_bus):
+            return False
+        if self.charge.why_not:
+            reply(Outcome(Code.NOT_READY, self.charge.why_not, forwarded=False))
+            return True
+        name = self.bus.name if is_bus else request.target
+        if node_commands.answer(request, name, nodes, self._plant, now, reply):
             self._nmt_for_all = nmt.command(node_commands.NMT[request.action], 0)
+        return True
+
+    def _ask_drive(self, request: Request, now: float, reply: Reply) -> bool:
+        for node in self.nodes:
+            for drive in node.node.drives:
+                if drive.name == request.target:
+                    node.parameters.submit(request, drive, now, reply)
+                    return True
+        return False
+
+    def enforce(self, name: str, action: Action, why: str, now: float) -> None:
+        """Do this to the node ``name``, if it is on this bus."""
+        for node in self.nodes:
+            if node.node.name == name:
+                node.enforce(action, why, now)
 
     # as its nodes see it
 
@@ -220,6 +236,20 @@ class Network:
 
     def duplicate(self, node: Neighbour, sign: str, now: float) -> None:
         self._watch.on_duplicate(node.table.id, sign, now)
+
+    def is_taken(self, node: Neighbour, cob_id: int) -> bool:
+        """Whether another node of the bus has a PDO, or anything else, on this identifier."""
+        return any(
+            cob_id in other.wire.routes
+            or any(cob_id == rpdo.cob_id for pdos in other.wire.drives.values() for rpdo in pdos.rpdos)
+            for other in self.nodes
+            if other is not node
+        )
+
+    def is_foreign(self, node: Neighbour, cob_id: int) -> bool:
+        """Whether an identifier is that of another node, or will be."""
+        others = (other for other in self.nodes if other is not node)
+        return self.is_taken(node, cob_id) or any(cob_id in one.wire.stop_words.given_ids for one in others)
 
     # sending
 
@@ -339,17 +369,9 @@ class Network:
 
     def refresh(self, status: BusStatus, now: float) -> None:
         """Bring the points of the bus and its nodes up to date; a few times a second."""
+        self._points.refresh(status, now)
         top = f"bus/{self.bus.name}"
-        self._plant.set(f"{top}/state", int(status.state), now)
-        self._plant.set(f"{top}/tx_errors", status.tx_errors, now)
-        self._plant.set(f"{top}/rx_errors", status.rx_errors, now)
-        self._plant.set(f"{top}/frames_lost", status.frames_lost, now)
-        self._plant.set(f"{top}/frames_expired", status.frames_expired, now)
-        self._plant.set(f"{top}/error_frames", status.error_frames, now)
-        self._plant.set(f"{top}/last_error", status.last_error, now)
         self._plant.set(f"{top}/sync_window_misses", self._window.misses if self._window else 0, now)
-        self._show_load(status, now)
-        self._tell_errors(status, now)
         self._plant.set(f"{top}/nmt_state", int(self.nmt_state), now)
         self._plant.set(f"{top}/held_by", ", ".join(self._gate.missing), now)
         self._watch.refresh(now)
@@ -360,36 +382,3 @@ class Network:
             node.wire.refresh(now)
             # Whoever has asked it for something meanwhile: its deadlines are looked at.
             self._schedule.plan(node)
-
-    def _show_load(self, status: BusStatus, now: float) -> None:
-        bits = status.bits
-        if self._measured is None:
-            self._measured = now, bits
-            return
-        since, before = self._measured
-        if now >= since + _LOAD_PERIOD_S:
-            load = 100 * (bits - before) / (now - since) / self.bus.bitrate
-            self._plant.set(f"bus/{self.bus.name}/load", round(min(100.0, load), 1), now)
-            self._measured = now, bits
-
-    def _tell_errors(self, status: BusStatus, now: float) -> None:
-        """Error frames since the last time, in one event."""
-        number = status.error_frames - self._errors_told
-        if number and self._error_limit.allows(now):
-            self._errors_told = status.error_frames
-            what = "an error frame" if number == 1 else f"{number} error frames"
-            self._plant.report(Event(now, Kind.BUS, self.bus.name, 500, f"{what}: {status.last_error}"))
-
-
-def _is_foreign(others: list[NodeCore], cob_id: int) -> bool:
-    """Whether an identifier is one of the other nodes', or will be."""
-    return _is_taken(others, cob_id) or any(cob_id in node.wire.stop_words.given_ids for node in others)
-
-
-def _is_taken(others: list[NodeCore], cob_id: int) -> bool:
-    """Whether one of the other nodes of the bus has a PDO, or anything else, on this identifier."""
-    return any(
-        cob_id in node.wire.routes
-        or any(cob_id == rpdo.cob_id for pdos in node.wire.drives.values() for rpdo in pdos.rpdos)
-        for node in others
-    )

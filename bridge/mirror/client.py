@@ -8,9 +8,10 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
-from bridge.command import Code, Event, Outcome, Rejection, Request
+from bridge.command import Code, Event, Outcome, Rejection, Reply, Request
 from bridge.errors import OperationFailed
 from bridge.guard import Guard
 from bridge.image import Image, Quality
@@ -57,6 +58,7 @@ class MirrorClient:
         self._is_dead = False
         self._points_changed = False
         self._listeners: list[Callable[[Event], None]] = []
+        self._asking = set[asyncio.Task[Outcome]]()
         self._rejections = Rejections()
         self._counts = Counter[str]()
         self._guard = Guard("mirror")
@@ -79,8 +81,24 @@ class MirrorClient:
         """``Reading.time`` is already wall clock here; a double is good for a quarter of a µs."""
         return round(time * 1e9)
 
+    def look(self, drive: str) -> None:
+        """What was told last is all that is known here."""
+
     def on_event(self, listener: Callable[[Event], None]) -> None:
         self._listeners.append(listener)
+
+    def forget(self, listener: Callable[[Event], None]) -> None:
+        self._listeners.remove(listener)
+
+    def submit(self, request: Request, reply: Reply) -> None:
+        asking = asyncio.get_running_loop().create_task(self.request(request))
+        self._asking.add(asking)
+        asking.add_done_callback(partial(self._on_answer, reply))
+
+    def _on_answer(self, reply: Reply, asking: asyncio.Task[Outcome]) -> None:
+        self._asking.discard(asking)
+        with self._guard:
+            reply(Outcome(Code.CANCELLED, "closed meanwhile") if asking.cancelled() else asking.result())
 
     async def request(self, request: Request, timeout_s: float = 5.0) -> Outcome:
         """Send ``request`` to the bus process; any number may be under way at once.
@@ -106,9 +124,9 @@ class MirrorClient:
         """Told to the bus process within 0.1 s. While that is away nobody keeps a log, and it is lost."""
         self._rejections.add(rejection, self._clock())
 
-    def count(self, leaf: str) -> None:
+    def count(self, leaf: str, by: int = 1) -> None:
         """Told to the bus process within 0.1 s."""
-        self._counts[leaf] += 1
+        self._counts[leaf] += by
 
     def _tell_rejections(self) -> None:
         for rejected in self._rejections.take():
@@ -162,6 +180,8 @@ class MirrorClient:
             await asyncio.sleep(_LOOK_EVERY_S)
 
     async def close(self) -> None:
+        for asking in tuple(self._asking):
+            asking.cancel()
         await self._link.close()
 
     async def failed(self) -> None:

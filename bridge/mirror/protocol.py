@@ -1,8 +1,8 @@
 """What goes over the link between the bus process and its fronts, in MessagePack. Pure.
 
-Times are ns since 1970 UTC, except those in ``RequestMessage``, ``Request`` and ``Rejected``, which are in
-seconds of the monotonic clock: both ends run on one machine, and a stepped wall clock must not make a
-request old.
+Times are ns since 1970 UTC (in an ``Outcome`` seconds), except those in ``RequestMessage``, ``Request`` and
+``Rejected``, which are in seconds of the monotonic clock: both ends run on one machine, and a stepped wall
+clock must not make a request old.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from bridge.command import Code, Event, Outcome, Plant
+from bridge.command import Code, Event, Outcome, PlantView
 from bridge.command.freshness import NEVER
 from bridge.command.request import STOP_ACTIONS
 from bridge.errors import Unavailable
@@ -28,28 +28,21 @@ _HEARTBEAT_S: Final = 0.25
 class MirrorPublisher:
     """Shows the plant to the fronts and takes their requests.
 
-    ``clock`` is the machine's monotonic clock in seconds (a front's requests carry deadlines in it),
-    ``epoch`` turns such a time into ns since 1970 UTC.
+    ``clock`` is the machine's monotonic clock in seconds: a front's requests carry deadlines in it.
     """
 
     def __init__(
-        self,
-        plant: Plant,
-        endpoint: str,
-        clock: Callable[[], float],
-        epoch: Callable[[float], int],
-        *,
-        period_s: float = 0.01,
+        self, view: PlantView, endpoint: str, clock: Callable[[], float], *, period_s: float = 0.01
     ) -> None:
         self.malformed = 0
         """Messages of fronts that could not be read."""
-        self._plant = plant
+        self._view = view
+        self._image = view.image
         self._endpoint = endpoint
         self._clock = clock
-        self._epoch = epoch
         self._period_s = period_s
         self._link = self._new_link()
-        self._feed = plant.image.feed()
+        self._feed = self._image.feed()
         self._instance = random.getrandbits(63)
         self._sequence = 0
         self._last_delta = float("-inf")
@@ -65,7 +58,7 @@ class MirrorPublisher:
         if self._was_started:
             await self.close()
             self._link = self._new_link()
-            self._feed = self._plant.image.feed()
+            self._feed = self._image.feed()
         self._was_started = True
         prepare_folder(self._endpoint)
         try:
@@ -79,7 +72,7 @@ class MirrorPublisher:
         self._link.declare_subscriber(protocol.REJECTED, self._on_rejected)
         self._link.declare_subscriber(protocol.COUNTED, self._on_counted)
         self._link.declare_token(protocol.TOKEN)
-        self._plant.on_event(self._on_event)
+        self._view.on_event(self._on_event)
         self._tick()
 
     async def close(self) -> None:
@@ -87,8 +80,8 @@ class MirrorPublisher:
             self._timer.cancel()
         for task in tuple(self._snapshots):
             task.cancel()
-        self._plant.forget(self._on_event)
-        self._plant.image.drop_feed(self._feed)
+        self._view.forget(self._on_event)
+        self._image.drop_feed(self._feed)
         await self._link.close()
 
     async def failed(self) -> None:
@@ -106,7 +99,7 @@ class MirrorPublisher:
 
     def _publish_delta(self) -> None:
         self._sequence += 1
-        at_zero_ns = self._epoch(0.0)
+        at_zero_ns = self._view.epoch_ns(0.0)
         readings = tuple(self._changed(index, at_zero_ns) for index in self._feed.take(_POINTS_PER_DELTA))
         # Where a front or the worker cannot follow, a delta is lost; the gap makes the front ask for
         # a new snapshot.
@@ -114,11 +107,11 @@ class MirrorPublisher:
 
     def _changed(self, index: int, at_zero_ns: int) -> Changed:
         """``at_zero_ns``: the wall clock at monotonic 0, which is read once for many points."""
-        reading = self._plant.image[index]
+        reading = self._image[index]
         return Changed.of(index, reading, at_zero_ns + round(reading.time * 1e9))
 
     def _on_event(self, event: Event) -> None:
-        self._send(protocol.EVENT, EventMessage.of(event, self._epoch(event.time)))
+        self._send(protocol.EVENT, EventMessage.of(event, self._view.epoch_ns(event.time)))
 
     def _send(self, key: str, message: Delta | EventMessage) -> None:
         self._link.send(Message(key, protocol.encode(message)))
@@ -136,9 +129,9 @@ class MirrorPublisher:
         A reading that is newer than ``sequence`` does no harm: the deltas that follow lead to it again.
         """
         sequence = self._sequence
-        points = self._plant.image.points
+        points = self._image.points
         readings: list[Changed] = []
-        at_zero_ns = self._epoch(0.0)
+        at_zero_ns = self._view.epoch_ns(0.0)
         for index in range(len(points)):
             readings.append(self._changed(index, at_zero_ns))
             if index % _POINTS_PER_DELTA == 0:
@@ -153,7 +146,7 @@ class MirrorPublisher:
         except Malformed:
             self.malformed += 1
             return
-        self._plant.rejected(told.rejection, told.time_s, told.count)
+        self._view.rejected(told.rejection, told.time_s, told.count)
 
     def _on_counted(self, message: Message) -> None:
         try:
@@ -161,10 +154,12 @@ class MirrorPublisher:
         except Malformed:
             self.malformed += 1
             return
-        self._plant.count(told.leaf, self._clock(), told.by)
+        self._view.count(told.leaf, told.by)
 
     def _on_request(self, asked: Asked) -> None:
         def reply(outcome: Outcome) -> None:
+            if outcome.value is not None:
+                outcome = replace(outcome, time=self._view.epoch_ns(outcome.time) / 1e9)
             asked.send([Message(protocol.REQUEST, protocol.encode(outcome))])
             asked.finish()
 
@@ -183,4 +178,4 @@ class MirrorPublisher:
         if request.received_at is None or request.received_at > now:
             # No time, or one of another machine's clock: nobody knows how old it is.
             request = replace(request, received_at=NEVER)
-        self._plant.submit(request, now, reply)
+        self._view.submit(request, reply)

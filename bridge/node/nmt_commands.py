@@ -8,7 +8,7 @@ from typing import Final, Protocol
 from bridge.canopen.nmt import NmtCommand
 from bridge.command import Action, Code, Drive, Event, Kind, Outcome, Plant, Reply, Request, Role
 from bridge.command.link import NodeState
-from bridge.command.plant import Node, NodeCommand
+from bridge.command.plant import Node
 from bridge.node.leaving import Leaving
 from bridge.node.put_off import CANCELS_WORDS
 from bridge.node.wire import NodeWire
@@ -52,15 +52,6 @@ class Commandable(Protocol):
     leaving: Leaving
 
     def carry_out_command(self, action: Action, who: str, now: float, *, send: bool = True) -> None: ...
-
-
-def taker(name: str, nodes: Sequence[Commandable], plant: Plant) -> NodeCommand:
-    """Takes every request for these nodes."""
-
-    def take(request: Request, now: float, reply: Reply) -> None:
-        answer(request, name, nodes, plant, now, reply)
-
-    return take
 
 
 def answer(

@@ -43,7 +43,13 @@ class NodeCore:
         self.state = NodeState.ABSENT
         self._view = NodeView(node, plant)
         self._touch = partial(neighbours.touched, self)
-        listener = Listener(self._on_sign, self._touch, partial(neighbours.duplicate, self))
+        listener = Listener(
+            self._on_sign,
+            self._touch,
+            partial(neighbours.duplicate, self),
+            partial(neighbours.is_taken, self),
+            partial(neighbours.is_foreign, self),
+        )
         self._memory = boot.BootMemory(count_write=self._count_write)
         configured = (*downloads, *(entry.download for entry in table.configure))
         self.wire = NodeWire(node, plant, listener, StopWords(node, configured, self._memory))
@@ -61,8 +67,6 @@ class NodeCore:
         self._back_off = BackOff()
         self._last_boot = float("-inf")
         self._operational_since = 0.0
-        node.command = node_commands.taker(node.name, [self], plant)
-        node.enforce = self.enforce
         if not table.enabled:
             self.boot_at = None
             self.set_state(NodeState.DISABLED, plant.began)
@@ -359,6 +363,7 @@ class NodeCore:
             return
         self.state = state
         self.plant.on_node(self.node, state, now, tell=not self._back_off.is_flapping)
+        self.parameters.on_node(state, now)
         self._show(now)
 
     def _takes_words(self) -> bool:

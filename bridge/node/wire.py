@@ -28,7 +28,7 @@ Handler = Callable[[Frame], None]
 
 @dataclass(frozen=True, slots=True)
 class Listener:
-    """Who is told what comes in."""
+    """Who is told what comes in, and knows the other nodes."""
 
     on_sign: Callable[[Sign, float], None]
     """An error control message, and when it came."""
@@ -36,6 +36,9 @@ class Listener:
     """Something came that may change frames to be sent or deadlines."""
     on_duplicate: Callable[[str, float], None]
     """Two devices seem to have this node id."""
+    is_taken: Callable[[int], bool]
+    is_foreign: Callable[[int], bool]
+    """Whether an identifier is another node's, as ``Neighbours`` says it."""
 
 
 class NodeWire:
@@ -48,10 +51,6 @@ class NodeWire:
         self._listener = listener
         self.sdo = SdoChannels(node)
         self.rejected = 0
-        self.is_taken: Callable[[int], bool] = lambda cob_id: False
-        """Whether another node of the bus has something on this identifier."""
-        self.is_foreign: Callable[[int], bool] = self.is_taken
-        """Whether it is that of another node, or will be by the site's files."""
         self.faults = FaultReading(node, self.sdo)
         self._emergencies = Emergencies(node, plant, self.reject, self.faults.on_emcy)
         self.error_control = ErrorControl(node.table, listener.on_duplicate)
@@ -120,7 +119,7 @@ class NodeWire:
                 raise AssertionError(f"{action} waits for an answer")
 
     def send_stopped(self) -> None:
-        self._frames += self.stop_words.frames(self.drives, self.is_foreign)
+        self._frames += self.stop_words.frames(self.drives, self._listener.is_foreign)
 
     def _on_sdo(self, channel: SdoChannel, frame: Frame) -> None:
         unmatched, late = channel.unmatched, channel.late
@@ -182,7 +181,7 @@ class NodeWire:
         self.error_control.produces_every(result.heartbeat_ms / 1000 or None)
         self._emcy_id = self._usable_emcy_id(result)
         self._plant.set(f"{self._node.name}/node/software_version", result.software_version, now)
-        self.drives = connect(self._node, result, self.reject, self.is_taken, now)
+        self.drives = connect(self._node, result, self.reject, self._listener.is_taken, now)
         self.routes = self._basic_routes()
         for pdos in self.drives.values():
             self.routes |= pdos.handlers
@@ -194,7 +193,7 @@ class NodeWire:
         """Where emergency messages come, unless that is somebody else's."""
         default = cobid.EMCY + self._node.table.id
         wanted = result.emcy_id
-        if wanted in (None, default) or not self.is_taken(wanted):
+        if wanted in (None, default) or not self._listener.is_taken(wanted):
             return wanted
         result.notes.append(f"another node has {wanted:03X}h, too: emergency messages are not taken there")
         return default

@@ -5,28 +5,52 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from bridge.command import Event, Outcome, Rejection, Request
+from bridge.command import Event, Identity, Rejection, Reply, Request
 from bridge.image import Image
 
 
 class View(Protocol):
-    """The image to read, requests to make, events to hear; nothing of what is behind them."""
+    """Points to read and to follow, requests to make, events to hear; nothing of what is behind them.
+
+    That may be a plant of this process, or a copy of one or of many that run elsewhere: the times of
+    readings, events and outcomes are the view's own, and only ``epoch_ns`` says when they were. The time of a
+    request is monotonic and of the process that makes it.
+    """
 
     @property
     def image(self) -> Image: ...
 
-    def epoch_ns(self, time: float) -> int:
-        """Wall clock, in ns since 1970 UTC, of a ``Reading.time``."""
+    def look(self, drive: str) -> None:
+        """Bring the points of this drive, ``<node>/<drive>``, to this moment, as far as they are known here:
+        before that, a deadline that has passed since the last round is not seen in them."""
         ...
 
-    async def request(self, request: Request) -> Outcome: ...
+    def epoch_ns(self, time: float, /) -> int:
+        """Wall clock, in ns since 1970 UTC, of a time that the view has given."""
+        ...
+
+    def submit(self, request: Request, reply: Reply) -> None:
+        """Have ``request`` carried out; ``reply`` is called exactly once, before this returns or later."""
+        ...
 
     def rejected(self, rejection: Rejection) -> None:
         """Report that the server has refused something by itself; the client has its answer."""
         ...
 
-    def count(self, leaf: str) -> None:
+    def count(self, leaf: str, by: int = 1) -> None:
         """Count up a point of the bridge's own, such as ``opcua_refused_connections``."""
         ...
 
     def on_event(self, listener: Callable[[Event], None]) -> None: ...
+
+    def forget(self, listener: Callable[[Event], None]) -> None:
+        """Tell ``listener`` no more."""
+        ...
+
+
+class ConnectionView(View, Protocol):
+    """A view that is told who is connected, by a protocol that knows it."""
+
+    def on_connection(self, identity: Identity, *, is_there: bool) -> None:
+        """``identity`` has its first connection, or none any more: no telegram, and no end of control."""
+        ...

@@ -13,7 +13,7 @@ from bridge.can.burstend import BurstEnd
 from bridge.can.interface import BusStatus, ControllerState
 from bridge.can.softbursts import SoftBursts
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Source, command_of
+from bridge.command import Action, Event, Identity, Outcome, Plant, PlantView, Request, Source, command_of
 from bridge.config import Site, load_site
 from bridge.mapping import Family, load_family
 from bridge.master.listening import Listening, listen_s
@@ -140,6 +140,7 @@ class Bench:
         listening = Listening(listen_s(site.bus[0]) if listens else 0.0, lambda: 0.0)
         self.network = Network(site.bus[0], self.plant, epoch_ns, listening=listening)
         self.master = Master([(self.bus, self.network)], self.plant, self.clock)
+        self.view = PlantView(self.plant, self.clock, epoch_ns, self.master.carry_out, self.master.wake)
         self._wake_at = self.now
         self.master.attach(self._set_timer)
         self.node = NordTu4(5) if node is None else node
@@ -213,7 +214,7 @@ class Bench:
     ) -> Outcome:
         outcomes: list[Outcome] = []
         request = Request(identity, target, command_of(action, **more))
-        self.plant.submit(request, self.now, outcomes.append)
+        self.view.submit(request, outcomes.append)
         assert len(outcomes) == 1, "one request, one outcome"
         return outcomes[0]
 

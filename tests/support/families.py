@@ -144,8 +144,7 @@ class FamilyBridge:
         outcomes: list[Outcome] = []
         request = Request(identity, drive, command_of(action, **more))
         assert self._loop
-        now = self._loop.time
-        self.call(lambda: self.service.plant.submit(request, now(), outcomes.append))
+        self.call(lambda: self.service.view.submit(request, outcomes.append))
         until(lambda: outcomes, 5.0, f"an outcome of {action} {drive}")
         return outcomes[0]
 

@@ -71,7 +71,7 @@ class Load:
             for word in (0x047E, 0x04FE, 0x047E, 0x047F):
                 request = Request(_PLC, "conveyor/fu1", Write({"control_word": word}))
                 last = time.monotonic()
-                self.service.plant.submit(request, last, lambda outcome: None)
+                self.service.view.submit(request, lambda outcome: None)
             self._last_telegram = last
             await asyncio.sleep(TIMEOUT_S + 0.2)
 

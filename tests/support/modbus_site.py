@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from bridge.command import Drive, Identity, Plant, Source
 from bridge.command.link import NodeState
 from bridge.config import WordOrder
-from bridge.northbound.modbus.dispatch import Dispatcher
 from tests.support import sites
+from tests.support.views import dispatcher_of, view_of
 
 _OF_FU3 = "fieldbus_timeout_writable = true\nstop_by_anyone = false"
 SITE = sites.site(
@@ -41,7 +41,8 @@ class Rig:
     def __init__(self, word_order: WordOrder = "ABCD") -> None:
         self.plant = make_plant()
         self.now = 100.0
-        self.dispatcher = Dispatcher(self.plant, word_order, lambda: self.now)
+        self.view = view_of(self.plant, lambda: self.now)
+        self.dispatcher = dispatcher_of(self.plant, lambda: self.now, word_order, self.view)
         self.fu1 = self.plant.drives["conveyor/fu1"]
 
     def node(self, state: NodeState) -> None:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
 from asyncua import Client, ua
 
-from bridge.command import Event, Identification, Outcome, Plant, Rejection, Request, Role
+from bridge.command import Identification, Outcome, Plant, PlantView, Rejection, Request, Role
 from bridge.command.link import NodeState
-from bridge.command.request import DONE, Code, Reply
+from bridge.command.request import DONE, NODE_ACTIONS, Code, Reply
 from bridge.config import OpcUaTable
-from bridge.image import Image
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support import sites
 
@@ -48,9 +47,8 @@ def make_plant() -> Plant:
     return plant
 
 
-class LocalView:
-    """A ``View`` on a plant of this process; ``requests`` and ``rejections`` keep what was
-    asked.
+class LocalView(PlantView):
+    """Without a bus; ``requests`` and ``rejections`` keep what was asked.
 
     With ``answers`` False the drives say nothing to what they are sent.
     """
@@ -60,42 +58,23 @@ class LocalView:
         self.requests: list[Request] = []
         self.rejections: list[Rejection] = []
         self.answers = True
-        self._offset_ns = time.time_ns() - time.monotonic_ns()
-        for node in plant.nodes.values():
-            node.command = self._node_command
-        plant.bus_commands["bus/can0"] = self._node_command
+        offset_ns = time.time_ns() - time.monotonic_ns()
+        super().__init__(plant, time.monotonic, lambda at: int(at * 1e9) + offset_ns, self._command_node)
 
-    @property
-    def image(self) -> Image:
-        return self.plant.image
-
-    def epoch_ns(self, time: float) -> int:
-        return int(time * 1e9) + self._offset_ns
-
-    def on_event(self, listener: Callable[[Event], None]) -> None:
-        self.plant.on_event(listener)
-
-    async def request(self, request: Request) -> Outcome:
+    def submit(self, request: Request, reply: Reply) -> None:
         self.requests.append(request)
-        outcome: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
+        super().submit(request, reply)
 
-        def reply(found: Outcome) -> None:
-            if not outcome.done():
-                outcome.set_result(found)
-
-        self.plant.submit(request, time.monotonic(), reply)
-        return await outcome
-
-    def rejected(self, rejection: Rejection) -> None:
+    def rejected(self, rejection: Rejection, at: float | None = None, count: int = 1) -> None:
         self.rejections.append(rejection)
-        self.plant.rejected(rejection, time.monotonic())
+        super().rejected(rejection, at, count)
 
-    def count(self, leaf: str) -> None:
-        self.plant.count(leaf, time.monotonic())
-
-    def _node_command(self, request: Request, now: float, reply: Reply) -> None:
+    def _command_node(self, request: Request, now: float, reply: Reply) -> bool:
+        if request.action not in NODE_ACTIONS or request.target not in ("bus/can0", *self.plant.nodes):
+            return False
         allowed = request.identity.role >= Role.OPERATOR
         reply(DONE if allowed else Outcome(Code.NOT_ALLOWED, "may only read"))
+        return True
 
     async def run(self) -> None:
         """The drives and the timers, every 5 ms."""
@@ -105,6 +84,7 @@ class LocalView:
                 if self.answers:
                     drive.on_process_data(_answer(drive.channel.output.words), now)
             self.plant.on_time(now)
+            self.plant.tell()
             await asyncio.sleep(0.005)
 
 

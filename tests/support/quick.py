@@ -165,7 +165,7 @@ class Quick:
                 node.on_time(self.now)
         self.deliver()
         self.network.on_time(self.now)
-        self.plant.on_time(self.now)
+        self.plant.on_time(self.now, self.network.enforce)
         if self.now >= self.refresh_at:
             self.refresh_at = self.now + 0.1
             self.plant.refresh(self.now)
@@ -202,7 +202,8 @@ class Quick:
 
     def ask(self, action: Action, target: str, identity: Identity = ENGINEER) -> Outcome:
         outcomes: list[Outcome] = []
-        self.plant.submit(Request(identity, target, command_of(action)), self.now, outcomes.append)
+        request = Request(identity, target, command_of(action))
+        self.plant.submit(request, self.now, outcomes.append, self.network.carry_out)
         assert len(outcomes) == 1, "one request, one outcome"
         return outcomes[0]
 

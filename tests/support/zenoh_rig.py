@@ -9,6 +9,7 @@ from contextlib import asynccontextmanager
 from bridge.command import Drive, Plant
 from bridge.config import ZenohTable
 from bridge.northbound.zenoh import ZenohServer
+from tests.support.views import view_of
 from tests.support.zenoh_peer import Peer, free_port, until, zenoh_peer
 from tests.support.zenoh_site import epoch, make_plant
 
@@ -58,7 +59,7 @@ async def rig(
     sockets = f"#so_sndbuf={room}" if room else ""
     places = {"connect": [router], "listen": []} if router else {"listen": [endpoint + sockets]}
     table = ZenohTable.model_validate({**places, **settings})
-    server = ZenohServer(plant, table, "demo", time.monotonic, epoch)
+    server = ZenohServer(view_of(plant, epoch_ns=epoch), table, "demo", time.monotonic)
     await server.start()
     try:
         async with zenoh_peer(router or endpoint, *login, mode=mode) as peer:

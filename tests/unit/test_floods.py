@@ -19,7 +19,7 @@ from bridge.command.link import NodeState
 from bridge.config import ModbusTable, ZenohTable
 from bridge.eventlog import EventLog
 from bridge.mirror.client import MirrorClient
-from bridge.northbound.modbus.dispatch import Dispatcher
+from bridge.northbound.modbus.registers import units_of
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.session import Session
 from bridge.northbound.sources import source_of
@@ -33,6 +33,7 @@ from tests.support import sites
 from tests.support.bench import Bench, write_site
 from tests.support.quiet import QuietLog, quiet_log
 from tests.support.rig import ENABLE, ENGINEER, OTHER_PLC, PLC, SHUT_DOWN, emergency
+from tests.support.views import dispatcher_of, view_of
 
 TIMES: Final = 1000
 STEP_S: Final = 0.05
@@ -58,7 +59,7 @@ class Hall:
         self.log = log
         self.node = self.plant.nodes["conveyor"]
         self.plant.on_node(self.node, NodeState.OPERATIONAL, self.now)
-        self.dispatcher = Dispatcher(self.plant, "ABCD", lambda: self.now)
+        self.dispatcher = dispatcher_of(self.plant, lambda: self.now)
 
     @property
     def now(self) -> float:
@@ -309,7 +310,7 @@ class _Visitor:
 async def test_connections_that_come_and_go(log: QuietLog, stranger: str, guest: str) -> None:
     plant = sites.plant_of(SITE)
     table = ModbusTable.model_validate({"allow": ["10.0.0.0/8", "fd00::/8"], "max_connections": 2})
-    server = ModbusServer(plant, table, lambda: log.now)
+    server = ModbusServer(view_of(plant, lambda: log.now), units_of(plant), table, lambda: log.now)
     for number in range(TIMES):
         host = guest.format(number)
         visitor = cast(Session, _Visitor(source=source_of(host)))
@@ -326,7 +327,7 @@ async def test_connections_that_come_and_go(log: QuietLog, stranger: str, guest:
 async def test_puts_that_are_no_commands(log: QuietLog) -> None:
     plant = sites.plant_of(SITE)
     table = ZenohTable.model_validate({"accept_put": True})
-    server = ZenohServer(plant, table, "hall", lambda: log.now, lambda at: 0)
+    server = ZenohServer(view_of(plant, lambda: log.now), table, "hall", lambda: log.now)
     for number in range(TIMES):
         server._on_put(Message(f"drives/hall/attic/{number}", b"\xff"))
     assert len(log.lines) == 1

@@ -13,7 +13,7 @@ from asyncua.ua.status_codes import get_name_and_doc
 from bridge import __version__
 from bridge.cli.app import make_app
 from bridge.command import Kind, Plant
-from bridge.command.points import CONTROLLER_STATES, NMT_STATES
+from bridge.command.points import CONTROLLER_STATES, NMT_STATES, NODE_STATES
 from bridge.command.request import Code
 from bridge.command.watchdog import STATES as WATCHDOG_STATES
 from bridge.command.watchdog import Stimulus
@@ -26,7 +26,7 @@ from bridge.mapping.model import MappedObject as MappingObject
 from bridge.node.boot.status import TEXTS as BOOT_TEXTS
 from bridge.northbound.modbus.dispatch import EXCEPTIONS
 from bridge.northbound.modbus.pdu import Function
-from bridge.northbound.modbus.registers import DriveMap, Row, Table, bridge_rows, drive_maps
+from bridge.northbound.modbus.registers import DriveMap, Row, Table, drive_maps, units_of
 from bridge.northbound.opcua.events import type_name
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, layout
 from bridge.northbound.opcua.services import SERVICES
@@ -114,6 +114,7 @@ def test_every_point_is_described(plant: Plant) -> None:
         ("Drive states", STATES),
         ("Watchdog states", WATCHDOG_STATES),
         ("NMT states", NMT_STATES),
+        ("Node states", NODE_STATES),
         ("CAN controller states", CONTROLLER_STATES),
         ("Quality", tuple((quality.value, quality.label) for quality in Quality)),
     ],
@@ -156,7 +157,7 @@ def test_the_register_map_is_that_of_the_export(plant: Plant) -> None:
             for row in reference.table(heading)
         ]
         assert shown == registers(rows), heading
-    bridge = [row for row in bridge_rows(plant) if "/" not in row.name]
+    bridge = [row for row in units_of(plant).bridge_rows if "/" not in row.name]
     shown = [(row["address"], row["name"], row["unit"]) for row in reference.table("The bridge's own unit")]
     assert shown[:-1] == [(str(row.address), row.name, row.unit or "–") for row in bridge]
 

@@ -14,16 +14,18 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command import Action, Code, Do, Identity, Outcome, Plant, Reply, Request, Source
+from bridge.command import Action, Code, Do, Identity, Plant, Reply, Request, Source
 from bridge.command.link import NodeState
 from bridge.config import ModbusTable, ZenohTable
 from bridge.mirror import MirrorClient, MirrorPublisher, socket_endpoint
+from bridge.northbound.modbus.registers import units_of
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.zenoh import ZenohServer
 from tests.support import sites
 from tests.support.modbus_site import ENABLED, READY, SWITCH_ON_INHIBITED
 from tests.support.opcua_site import OPEN, LocalView
+from tests.support.views import view_of
 from tests.support.zenoh_peer import free_port
 from tests.support.zenoh_site import epoch
 
@@ -102,7 +104,9 @@ async def enabled_after_it_hung(plant: Plant, peer: str, *arguments: object) -> 
 @pytest.mark.parametrize(("connections", "seconds"), [(1, 0.0005), (1, 1.0), (8, 1.0)])
 async def test_a_backlog_of_modbus_does_not_keep_a_drive_moving(connections: int, seconds: float) -> None:
     plant = plant_for("modbus")
-    server = ModbusServer(plant, ModbusTable.model_validate({"listen": "127.0.0.1:0"}), time.monotonic)
+    server = ModbusServer(
+        view_of(plant), units_of(plant), ModbusTable.model_validate({"listen": "127.0.0.1:0"}), time.monotonic
+    )
     await server.start()
     try:
         after = await enabled_after_it_hung(plant, "modbus_backlog.py", server.port, 1, connections, seconds)
@@ -117,11 +121,15 @@ class BusyView(LocalView):
     def __init__(self, plant: Plant) -> None:
         super().__init__(plant)
         self._lock = asyncio.Lock()
+        self._waiting: list[asyncio.Task[None]] = []
 
-    async def request(self, request: Request) -> Outcome:
+    def submit(self, request: Request, reply: Reply) -> None:
+        self._waiting.append(asyncio.create_task(self._submit(request, reply)))
+
+    async def _submit(self, request: Request, reply: Reply) -> None:
         async with self._lock:
             await asyncio.sleep(0.02)
-            return await super().request(request)
+            super().submit(request, reply)
 
 
 async def test_a_backlog_of_opcua_does_not_keep_a_drive_moving(tmp_path: Path) -> None:
@@ -139,16 +147,17 @@ async def test_a_backlog_of_opcua_does_not_keep_a_drive_moving(tmp_path: Path) -
 async def test_a_backlog_of_zenoh_does_not_keep_a_drive_moving(monkeypatch: pytest.MonkeyPatch) -> None:
     """In a bus process that is busy with other things."""
     plant = plant_for("zenoh")
-    submit = plant.submit
+    view = view_of(plant, epoch_ns=epoch)
+    submit = view.submit
 
-    def submit_slowly(request: Request, now: float, reply: Reply) -> None:
+    def submit_slowly(request: Request, reply: Reply) -> None:
         time.sleep(0.005)
-        submit(request, time.monotonic(), reply)
+        submit(request, reply)
 
-    monkeypatch.setattr(plant, "submit", submit_slowly)
+    monkeypatch.setattr(view, "submit", submit_slowly)
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     settings = ZenohTable.model_validate({"listen": [endpoint]})
-    server = ZenohServer(plant, settings, "hall", time.monotonic, epoch)
+    server = ZenohServer(view, settings, "hall", time.monotonic)
     await server.start()
     try:
         key = "drives/hall/conveyor/fu1/command"
@@ -161,7 +170,7 @@ async def test_a_backlog_of_zenoh_does_not_keep_a_drive_moving(monkeypatch: pyte
 async def test_what_has_waited_on_the_link_between_our_processes_does_not_count(tmp_path: Path) -> None:
     plant = plant_for("opcua")
     endpoint = socket_endpoint(tmp_path / "run", "hall")
-    publisher = MirrorPublisher(plant, endpoint, time.monotonic, epoch)
+    publisher = MirrorPublisher(view_of(plant, epoch_ns=epoch), endpoint, time.monotonic)
     await publisher.start()
     front = MirrorClient(endpoint)
     try:

@@ -40,6 +40,7 @@ from bridge.mirror.client import UNREACHABLE
 from bridge.mirror.endpoint import socket_path
 from bridge.northbound.view import View
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
+from tests.support.views import view_of
 from tests.support.zenoh_peer import until
 from tests.support.zenoh_site import ENABLED, READY, drive_says, epoch, make_plant, node_is
 
@@ -56,7 +57,7 @@ def endpoint() -> Iterator[str]:
 
 @asynccontextmanager
 async def publishing(endpoint: str, plant: Plant) -> AsyncIterator[MirrorPublisher]:
-    publisher = MirrorPublisher(plant, endpoint, time.monotonic, epoch)
+    publisher = MirrorPublisher(view_of(plant, epoch_ns=epoch), endpoint, time.monotonic)
     await publisher.start()
     try:
         yield publisher
@@ -177,6 +178,7 @@ async def test_a_start_that_takes_its_time_holds_up_no_other_request(endpoint: s
         assert time.monotonic() - begin < 3
         assert not start.done()
         drive_says(fu4, ENABLED)
+        plant.tell()
         assert await start == Outcome(Code.OK)
 
 
@@ -254,7 +256,7 @@ async def test_garbage_on_the_link_does_no_harm(endpoint: str) -> None:
 
 async def test_a_second_publisher_is_told_that_the_site_is_run_already(endpoint: str) -> None:
     async with publishing(endpoint, make_plant()):
-        second = MirrorPublisher(make_plant(), endpoint, time.monotonic, epoch)
+        second = MirrorPublisher(view_of(make_plant(), epoch_ns=epoch), endpoint, time.monotonic)
         with pytest.raises(Unavailable, match="already being run"):
             await second.start()
         await second.close()

@@ -19,17 +19,18 @@ import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
 from bridge.auditlog import AuditLog
-from bridge.command import Code, Identification, Outcome, Plant, Reply, Request
+from bridge.command import Code, Identification, Outcome, Plant, PlantView, Reply, Request
 from bridge.command.actual import FurtherTpdo
 from bridge.command.link import NodeState
 from bridge.config import ModbusTable
 from bridge.config.model import AuditTable
 from bridge.errors import Unavailable
 from bridge.northbound.modbus import session
-from bridge.northbound.modbus.registers import DriveMap
+from bridge.northbound.modbus.registers import DriveMap, units_of
 from bridge.northbound.modbus.server import ModbusServer
 from tests.support import sites
 from tests.support.modbus_site import ENABLED, READY, SWITCH_ON_INHIBITED, float_words, make_plant
+from tests.support.views import view_of
 
 HOST = "127.0.0.1"
 
@@ -47,7 +48,7 @@ def on_the_bus(plant: Plant) -> tuple[int, ...]:
 @asynccontextmanager
 async def serving(plant: Plant, **settings: object) -> AsyncIterator[ModbusServer]:
     table = ModbusTable.model_validate({"listen": f"{HOST}:0", **settings})
-    server = ModbusServer(plant, table, time.monotonic)
+    server = ModbusServer(view_of(plant), units_of(plant), table, time.monotonic)
     await server.start()
     try:
         yield server
@@ -254,9 +255,12 @@ async def test_an_owner_that_is_gone_and_not_watched_holds_nobody_up():
     plant = sites.plant_of(sites.site(sites.bus(sites.node(sites.drive("fu1", "modbus", 0, "unit_id = 1")))))
     drive_says(plant, READY)
     later = 0.0
-    server = ModbusServer(
-        plant, ModbusTable.model_validate({"listen": f"{HOST}:0"}), lambda: time.monotonic() + later
-    )
+
+    def clock() -> float:
+        return time.monotonic() + later
+
+    table = ModbusTable.model_validate({"listen": f"{HOST}:0"})
+    server = ModbusServer(view_of(plant, clock), units_of(plant), table, clock)
     await server.start()
     try:
         async with pymodbus(server, "127.0.0.2") as other:
@@ -302,10 +306,10 @@ async def test_sixteen_requests_in_one_segment_are_answered_in_order(server: Mod
 async def test_an_outcome_that_comes_later_keeps_its_place(
     server: ModbusServer, monkeypatch: pytest.MonkeyPatch
 ):
-    def submit_later(self: Plant, request: Request, now: float, reply: Reply) -> None:
+    def submit_later(self: PlantView, request: Request, reply: Reply) -> None:
         asyncio.get_running_loop().call_later(0.01, reply, Outcome(Code.TIMED_OUT))
 
-    monkeypatch.setattr(Plant, "submit", submit_later)
+    monkeypatch.setattr(PlantView, "submit", submit_later)
     reader, writer = await asyncio.open_connection(HOST, server.port)
     pair = (bytes.fromhex("06 0000 047E"), bytes.fromhex("03 0000 0001"))
     writer.write(b"".join(adu(i, 1, pair[i % 2]) for i in range(200)))

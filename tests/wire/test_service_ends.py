@@ -98,7 +98,7 @@ async def moving(folder: Path) -> AsyncIterator[Moving]:
         await asyncio.wait_for(booted.wait(), 15)
         for word in (0x047E, 0x047F):
             request = Request(PLC, "conveyor/fu1", Write({"control_word": word}))
-            service.plant.submit(request, asyncio.get_running_loop().time(), lambda outcome: None)
+            service.view.submit(request, lambda outcome: None)
         await asyncio.wait_for(enabled.wait(), 15)
         move.happened.clear()
         yield move

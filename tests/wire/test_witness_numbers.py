@@ -11,9 +11,11 @@ import pytest
 from bridge.command import Action, Do, Identity, Plant, Request, SetTimeout, Source
 from bridge.command.link import NodeState
 from bridge.config import ModbusTable
+from bridge.northbound.modbus.registers import units_of
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.witness.numbers import Numbers, Reading
 from tests.support.modbus_site import READY, make_plant
+from tests.support.views import view_of
 
 HOST = "127.0.0.1"
 PLC = Identity(Source.MODBUS, "10.0.0.5", address="10.0.0.5:40001")
@@ -22,7 +24,7 @@ FU3 = "conveyor/fu3"
 
 async def served(plant: Plant, **settings: object) -> ModbusServer:
     table = ModbusTable.model_validate({"listen": f"{HOST}:0", **settings})
-    server = ModbusServer(plant, table, time.monotonic)
+    server = ModbusServer(view_of(plant), units_of(plant), table, time.monotonic)
     await server.start()
     return server
 

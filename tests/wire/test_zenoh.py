@@ -12,6 +12,7 @@ import pytest
 from bridge.command.link import NodeState
 from bridge.config import ZenohTable
 from bridge.northbound.zenoh import ZenohServer
+from tests.support.views import view_of
 from tests.support.zenoh_peer import free_port, until, zenoh_peer
 from tests.support.zenoh_rig import FU3, TOP, rig
 from tests.support.zenoh_site import (
@@ -70,6 +71,7 @@ async def test_methods() -> None:
         await until(lambda: r.on_the_bus[0] == 0x047F, "the enabling control word")
         assert not started.done()
         drive_says(r.fu3, ENABLED)
+        r.plant.tell()
         assert await started == {"ok": True, "forwarded": True}
         assert (await r.peer.command(f"{FU3}/command/keep_alive", {}, controller="plc"))["ok"]
         assert (await r.peer.command(f"{FU3}/command/stop", "{}", controller="somebody"))["ok"]
@@ -259,7 +261,7 @@ async def test_a_client_that_stalls_costs_the_loop_nothing() -> None:
 async def test_connections_that_have_ended_are_counted() -> None:
     plant, endpoint = make_plant(), f"tcp/127.0.0.1:{free_port()}"
     table = ZenohTable.model_validate({"listen": [endpoint]})
-    server = ZenohServer(plant, table, "demo", time.monotonic, epoch)
+    server = ZenohServer(view_of(plant, epoch_ns=epoch), table, "demo", time.monotonic)
     await server.start()
     try:
         for number in (1, 2):

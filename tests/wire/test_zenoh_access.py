@@ -10,6 +10,7 @@ import pytest
 from bridge.config import ZenohTable
 from bridge.errors import Unavailable
 from bridge.northbound.zenoh import ZenohServer
+from tests.support.views import view_of
 from tests.support.zenoh_peer import free_port
 from tests.support.zenoh_rig import rig
 from tests.support.zenoh_site import epoch, make_plant
@@ -18,7 +19,9 @@ from tests.support.zenoh_site import epoch, make_plant
 async def test_a_taken_port_is_told_in_one_sentence() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     table = ZenohTable(listen=[endpoint])
-    first, second = (ZenohServer(make_plant(), table, "demo", time.monotonic, epoch) for _ in range(2))
+    first, second = (
+        ZenohServer(view_of(make_plant(), epoch_ns=epoch), table, "demo", time.monotonic) for _ in range(2)
+    )
     await first.start()
     with pytest.raises(Unavailable, match=r"Address already in use.*another bridge"):
         await second.start()
@@ -49,4 +52,4 @@ def test_the_bridge_is_one_of_the_users(tmp_path: Path) -> None:
     ):
         table = ZenohTable(user=user, password_file=str(file) if file else None)
         with pytest.raises(Unavailable, match=words):
-            ZenohServer(make_plant(), table, "demo", time.monotonic, epoch)
+            ZenohServer(view_of(make_plant(), epoch_ns=epoch), table, "demo", time.monotonic)

@@ -93,7 +93,6 @@ class NodeParameters:
         }
         self._reading: dict[tuple[str, Address], Waiting] = {}
         self._writing: set[tuple[str, Address]] = set()
-        node.parameters = self
 
     # the node
 
@@ -265,7 +264,7 @@ class NodeParameters:
     def _conclude(self, request: Request, drive: Drive, reply: Reply, outcome: Outcome) -> None:
         """Tell the outcome; a refusal of a write is an event, too."""
         if outcome.abort_code:
-            drive.sdo_abort_code = outcome.abort_code
+            drive.on_sdo_refused(outcome.abort_code, self._now)
         if not outcome.ok and request.action is not Action.READ_PARAMETER:
             message = f"{request.action} by {request.identity} refused: {outcome.message}"
             drive.channel.on_refused(self._now)

@@ -1,4 +1,4 @@
-"""One request PDU in, one answer PDU out: units, exceptions and the way to the plant."""
+"""One request PDU in, one answer PDU out: units, exceptions and the way to the view."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
 
-from bridge.command import Action, Code, Identity, Outcome, Plant, Rejection, Request
+from bridge.command import Action, Code, Identity, Outcome, Rejection, Request
 from bridge.command.freshness import NOW_S
 from bridge.config import WordOrder
 from bridge.northbound.modbus.drive_unit import DriveUnit
@@ -30,8 +30,9 @@ from bridge.northbound.modbus.pdu import (
     refusal,
     words_answer,
 )
-from bridge.northbound.modbus.registers import BRIDGE_UNITS, Table, Words32
+from bridge.northbound.modbus.registers import BRIDGE_UNITS, Table, Units, Words32
 from bridge.northbound.modbus.unit import BridgeUnit, Unit
+from bridge.northbound.view import View
 
 Answer = Callable[[bytes], None]
 
@@ -85,17 +86,18 @@ _TEXT_MOST: Final = 240  # an object of FC43/14 must fit into one PDU
 
 
 class Dispatcher:
-    """All units of a plant. ``clock`` gives monotonic seconds."""
+    """All units of a site. ``clock`` is that of ``received_at``, in monotonic seconds."""
 
-    def __init__(self, plant: Plant, word_order: WordOrder, clock: Callable[[], float]) -> None:
-        self._plant = plant
+    def __init__(self, view: View, units: Units, word_order: WordOrder, clock: Callable[[], float]) -> None:
+        self._view = view
         self._clock = clock
+        self._names = {drive.unit_id: drive.drive_name for drive in units.drives}
         words32 = Words32(word_order)
         self._units: dict[int, Unit] = {
-            unit_id: DriveUnit(drive, plant.image, words32) for unit_id, drive in plant.by_unit.items()
+            drive.unit_id: DriveUnit(drive, view, words32) for drive in units.drives
         }
         for unit_id in BRIDGE_UNITS:
-            self._units[unit_id] = BridgeUnit(plant)
+            self._units[unit_id] = BridgeUnit(units, view)
 
     def handle(
         self, unit_id: int, pdu: bytes, caller: Identity, answer: Answer, received_at: float = math.inf
@@ -121,21 +123,20 @@ class Dispatcher:
 
     def _note_refusal(self, unit_id: int, function: int, caller: Identity, code: ExceptionCode) -> None:
         """A write that was refused before it became a request, for the audit log."""
-        drive = self._plant.by_unit.get(unit_id)
-        target = drive.name if drive else f"unit {unit_id}"
+        target = self._names.get(unit_id, f"unit {unit_id}")
         message = f"function {function} refused with exception {code.value:02X}h"
         ending = _CODES.get(code, Code.NOT_READY)
-        self._plant.rejected(Rejection(caller, target, Action.WRITE, ending, message), self._clock())
+        self._view.rejected(Rejection(caller, target, Action.WRITE, ending, message))
 
     def _read(
         self, unit: Unit, request: ReadWords | ReadBits | Identify | Loopback, caller: Identity
     ) -> bytes:
         match request:
             case ReadWords(function, start, count):
-                words = unit.read_words(_TABLES[function], start, count, caller, self._clock())
+                words = unit.read_words(_TABLES[function], start, count, caller)
                 return words_answer(function, words)
             case ReadBits(function, start, count):
-                return bits_answer(function, unit.read_bits(_TABLES[function], start, count, self._clock()))
+                return bits_answer(function, unit.read_bits(_TABLES[function], start, count))
             case Identify():
                 objects = {number: _ascii(text) for number, text in unit.identify().items()}
                 return identification_answer(request, objects)
@@ -181,7 +182,7 @@ class Dispatcher:
 
     def _read_back(self, unit: Unit, request: ReadWrite, caller: Identity) -> bytes:
         start, count = request.read_start, request.read_count
-        words = unit.read_words(Table.HOLDING_REGISTER, start, count, caller, self._clock())
+        words = unit.read_words(Table.HOLDING_REGISTER, start, count, caller)
         return words_answer(Function.READ_WRITE, words)
 
     def _submit(self, plan: Sequence[Request], conclude: Callable[[Outcome], None]) -> None:
@@ -194,7 +195,7 @@ class Dispatcher:
             else:
                 conclude(outcome)
 
-        self._plant.submit(first, self._clock(), on_outcome)
+        self._view.submit(first, on_outcome)
 
 
 def _ascii(text: str) -> bytes:

@@ -19,14 +19,15 @@ register 21 says so.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from bridge.command import Action, Do, Drive, Identity, Request, SetTimeout, Write, WriteParameter
-from bridge.image import Image, Quality, Value
+from bridge.command import Action, Do, Identity, Request, SetTimeout, Source, Write, WriteParameter
+from bridge.image import Quality, Value
 from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, Refused
 from bridge.northbound.modbus.registers import (
+    ABORT_CODE,
     ACKNOWLEDGE,
     DIAGNOSTICS,
     KEEP_ALIVE,
@@ -41,209 +42,193 @@ from bridge.northbound.modbus.registers import (
     Row,
     Table,
     Words32,
-    actual_words,
-    setpoint_words,
 )
 from bridge.northbound.modbus.unit import refuse_quality, state_code
+from bridge.northbound.view import View
 
 _WORD_BITS: Final = 16
 _FLAGS: Final = 32  # 32-bit values that have a bit in registers 22 and 23
-_ACTUAL: Final = "actual/"
 _RESERVED: Final = 9  # between the setpoints and the keep-alive, so that one write can reach both
+_DIAGNOSTICS: Final = (
+    "status/state",
+    "status/emcy_code",
+    "supervision/last_fault",
+    "supervision/watchdog_state",
+    "supervision/watchdog_left_ms",
+    "supervision/pdo_age_ms",
+    ABORT_CODE,
+    "supervision/owner",
+    "supervision/telegrams",
+)
+_IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
+_SOURCES: Final = {source.label: source for source in Source}
 _STOPS: Final = {1: Action.STOP, 2: Action.QUICK_STOP, 3: Action.DISABLE_VOLTAGE}
 
 
 class DriveUnit:
     """One drive's unit id."""
 
-    __slots__ = (
-        "_drive",
-        "_flagged",
-        "_flagged_actual",
-        "_halves",
-        "_image",
-        "_inputs",
-        "_map",
-        "_parameters",
-        "_setpoints",
-        "_words",
-        "_words32",
-    )
-
-    def __init__(self, drive: Drive, image: Image, words32: Words32) -> None:
-        self._drive = drive
-        self._image = image
+    def __init__(self, drive_map: DriveMap, view: View, words32: Words32) -> None:
+        self._map = drive_map
+        self._view = view
+        self._image = view.image
         self._words32 = words32
-        self._map = drive_map = DriveMap(drive)
-        self._inputs: Final = [(row, image.index[f"{drive.name}/{row.name}"]) for row in drive_map.inputs]
-        flagged = self._inputs[:_FLAGS]
-        self._flagged: Final = [index for _, index in flagged]
-        actual = (place for place, (row, _) in enumerate(flagged) if row.name.startswith(_ACTUAL))
-        self._flagged_actual: Final = tuple(actual)
-        self._setpoints: Final = [(r, image.index[f"{drive.name}/{r.name}"]) for r in drive_map.setpoints]
-        self._parameters: Final = [(r, image.index[f"{drive.name}/{r.name}"]) for r in drive_map.parameters]
+
+        def place(leaf: str) -> int:
+            return view.image.index[f"{drive_map.drive_name}/{leaf}"]
+
+        def places(rows: Iterable[Row]) -> list[tuple[Row, int]]:
+            return [(row, place(row.name)) for row in rows]
+
+        self._status: Final = place("status/status_word")
         self._words: Final = {
-            Table.INPUT_REGISTER: {place: f"actual/{word}" for place, word in actual_words(drive)},
-            Table.HOLDING_REGISTER: {place: f"command/{word}" for place, word in setpoint_words(drive)},
+            table: {address: place(leaf) for address, leaf in words.items()}
+            for table, words in drive_map.words.items()
         }
+        self._data: Final = {
+            0: self._status,
+            **self._words[Table.INPUT_REGISTER],
+            _RESERVED: place("status/drive_status_word"),
+        }
+        self._diagnostics: Final = [place(leaf) for leaf in _DIAGNOSTICS]
+        self._commands: Final = {0: place("command/control_word"), **self._words[Table.HOLDING_REGISTER]}
+        self._owner, self._timeout = place("supervision/owner"), place("supervision/fieldbus_timeout_ms")
+        self._identity: Final = [place(f"identity/{leaf}") for leaf in _IDENTITY]
+        self._inputs: Final = places(drive_map.inputs)
+        self._flagged: Final = [index for _, index in self._inputs[:_FLAGS]]
+        self._setpoints: Final = places(drive_map.setpoints)
+        self._parameters: Final = places(drive_map.parameters)
         self._halves: Final = {table: drive_map.second_halves(table) for table in Table}
 
     # reading
 
-    def read_bits(self, table: Table, start: int, count: int, now: float) -> Sequence[bool]:
-        channel = self._drive.channel
-        quality = channel.link.quality(now)
+    def _look(self) -> Quality:
+        """The quality of the drive's data; its points are true at this moment."""
+        self._view.look(self._map.drive_name)
+        return self._image[self._status].quality
+
+    def read_bits(self, table: Table, start: int, count: int) -> Sequence[bool]:
         if table is Table.COIL:
-            bits = _bits(channel.control_word)
+            bits, quality = _bits(self._control_word), Quality.GOOD
         else:
-            bits = _bits(channel.status_word) + [quality is each for each in Quality]
+            quality = self._look()
+            bits = _bits(int(self._image[self._status].value)) + [quality is each for each in Quality]
         if start + count > len(bits):
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
-        if table is Table.DISCRETE_INPUT and start < QUALITY_BITS:
+        if start < QUALITY_BITS:
             refuse_quality(quality)
         return bits[start : start + count]
 
-    def read_words(self, table: Table, start: int, count: int, caller: Identity, now: float) -> Sequence[int]:
+    def read_words(self, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]:
         is_input = table is Table.INPUT_REGISTER
         end = start + count
         self._check_range(table, start, end)
         if start >= PARAMETERS and not is_input:
-            return self._values(self._parameters, start, end, now, PARAMETERS)
+            return self._values(self._parameters, start, end, PARAMETERS)
         if is_input:
-            quality = self._drive.channel.link.quality(now)
+            quality = self._look()
             if quality.has_value:
-                self._check_words(table, start, end, now)
-            words = self._input_words(start, end, quality, now)
+                self._check_words(table, start, end)
+            words = self._input_words(start, end, quality)
             if end > VALUES:
-                words += self._values(self._inputs, start, end, now)
+                words += self._values(self._inputs, start, end)
         else:
-            self._check_words(table, start, end, now)
+            self._check_words(table, start, end)
             words = self._holding_words(caller)[start:end] if start < VALUES else []
             if end > VALUES:
-                words += self._values(self._setpoints, start, end, now)
+                words += self._values(self._setpoints, start, end)
         return words
 
     def _check_range(self, table: Table, start: int, end: int) -> None:
         halves = self._halves[table]
-        if table is Table.INPUT_REGISTER:
-            most = self._map.input_end
-        else:
-            most = self._map.holding_end if start < PARAMETERS else self._map.parameter_end
-        if end > most or start in halves or end in halves:
+        if end > self._map.end(table, start) or start in halves or end in halves:
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
 
-    def _check_words(self, table: Table, start: int, end: int, now: float) -> None:
+    def _check_words(self, table: Table, start: int, end: int) -> None:
         """A range of nothing but words that the drive does not have, that its node does not carry, or that
         never came."""
         if not start or end > PROCESS_WORDS + 1:
             return
         words = self._words[table]
-        leaves = [words[address] for address in range(start, end) if address in words]
-        if not leaves:
+        qualities = self._image.qualities(words[address] for address in range(start, end) if address in words)
+        if not qualities:
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
-        qualities = [self._word_quality(table, leaf, now) for leaf in leaves]
         if not any(quality.has_value for quality in qualities):
             refuse_quality(qualities[0])
 
-    def _word_quality(self, table: Table, leaf: str, now: float) -> Quality:
-        if table is Table.INPUT_REGISTER:
-            return self._drive.quality_at(leaf, now)
-        return Quality.CONFIG_ERROR if leaf in self._drive.channel.unserved else Quality.GOOD
-
-    def _input_words(self, start: int, end: int, quality: Quality, now: float) -> list[int]:
+    def _input_words(self, start: int, end: int, quality: Quality) -> list[int]:
         """Those of input registers 0 … 31 that are in the range."""
         words: list[int] = []
         if start < DIAGNOSTICS:
             refuse_quality(quality)
-            words = self._data(now)[start:end]
+            words = self._data_words()[start:end]
         if start < VALUES and end > DIAGNOSTICS:
-            words += self._diagnostics(quality, end, now)[max(start - DIAGNOSTICS, 0) : end - DIAGNOSTICS]
+            words += self._diagnostic_words(quality, end)[max(start - DIAGNOSTICS, 0) : end - DIAGNOSTICS]
         return words
 
-    def _data(self, now: float) -> list[int]:
+    def _data_words(self) -> list[int]:
         """Input registers 0 … 9."""
-        channel = self._drive.channel
-        values = self._drive.words[1 : PROCESS_WORDS + 1]
-        gap = [0] * (PROCESS_WORDS - len(values))
-        words = [channel.status_word, *values, *gap, channel.drive_status_word]
-        if self._drive.is_even:
-            return words
-        for place, leaf in self._words[Table.INPUT_REGISTER].items():
-            if not self._drive.quality_at(leaf, now).has_value:
-                words[place] = 0  # what it was before the node restarted says nothing
+        words = [0] * DIAGNOSTICS
+        values = self._image.values(self._data.values())
+        qualities = self._image.qualities(self._data.values())
+        for address, value, quality in zip(self._data, values, qualities, strict=True):
+            if quality.has_value:  # otherwise what it was before the node restarted, which says nothing
+                words[address] = int(value)
         return words
 
-    def _diagnostics(self, quality: Quality, end: int, now: float) -> list[int]:
+    def _diagnostic_words(self, quality: Quality, end: int) -> list[int]:
         """Input registers 10 … 31; what takes longer only as far as ``end``."""
-        channel = self._drive.channel
         from_int = self._words32.from_int
-        owner = channel.owner
+        values = self._image.values(self._diagnostics)
+        state, emcy, fault, watchdog, left_ms, age_ms, abort_code, owner, telegrams = values
         words = [
-            state_code(self._drive, quality),
+            state_code(state, watchdog, quality),
             quality,
-            channel.emcy_code,
-            min(round(channel.last_fault * 10), 0xFFFF),
-            channel.watchdog.state,
-            channel.watchdog.left_ms(now),
-            *from_int(max(channel.link.age_ms(now), 0)),
-            *from_int(self._drive.sdo_abort_code),
-            owner.source if owner else 0,
+            int(emcy),
+            min(round(float(fault) * 10), 0xFFFF),
+            int(watchdog),
+            int(left_ms),
+            *from_int(int(age_ms)),
+            *from_int(int(abort_code)),
+            _SOURCES.get(str(owner).partition(":")[0], Source.NONE),
         ]
         if end > WORDS_NOT_GOOD:
-            words += [self._words_not_good(quality, now), *from_int(self._values_not_good(now))]
-            words.append(channel.watchdog.telegrams)
+            # A word that the drive does not have is no bad one.
+            places = self._words[Table.INPUT_REGISTER]
+            words.append(self._not_good((place - 1 for place in places), places.values()))
+            words += from_int(self._not_good(range(_FLAGS), self._flagged))
+            words.append(int(telegrams))
         return words + [0] * (VALUES - DIAGNOSTICS - len(words))
 
-    def _words_not_good(self, quality: Quality, now: float) -> int:
-        """Bit 0 is actual value word 1; a word that the drive does not have is no bad one."""
-        if self._drive.is_even and quality is Quality.GOOD:
-            return 0
-        words = self._words[Table.INPUT_REGISTER].items()
-        bad = (place for place, leaf in words if self._drive.quality_at(leaf, now) is not Quality.GOOD)
-        return sum(1 << place - 1 for place in bad)
-
-    def _values_not_good(self, now: float) -> int:
-        """Bit 0 is the first 32-bit value."""
-        qualities = self._image.qualities(self._flagged)
-        for place in self._flagged_actual:
-            qualities[place] = self._drive.quality_at(self._inputs[place][0].name, now)
-        return sum(1 << place for place, one in enumerate(qualities) if one is not Quality.GOOD)
-
-    def _quality(self, row: Row, index: int, now: float) -> Quality:
-        """The quality of a 32-bit value. Process data are judged now: the image learns of a passed deadline
-        only when its timer has run."""
-        if row.name.startswith(_ACTUAL):
-            return self._drive.quality_at(row.name, now)
-        return self._image[index].quality
-
-    def _values(
-        self,
-        values: list[tuple[Row, int]],
-        start: int,
-        end: int,
-        now: float,
-        first: int = VALUES,
-    ) -> list[int]:
+    def _values(self, values: list[tuple[Row, int]], start: int, end: int, first: int = VALUES) -> list[int]:
         """The 32-bit values in the range, which begins and ends between values."""
         words: list[int] = []
         for row, index in values[max(start - first, 0) // 2 : (end - first) // 2]:
-            refuse_quality(self._quality(row, index, now))
             reading = self._image[index]
+            refuse_quality(reading.quality)
             if row.type == "float32":
                 words += self._words32.from_float(float(reading.value))
             else:
                 words += self._words32.from_int(int(reading.value))
         return words
 
+    def _not_good(self, bits: Iterable[int], indices: Iterable[int]) -> int:
+        """The bits of those points that are not good."""
+        qualities = self._image.qualities(indices)
+        return sum(1 << bit for bit, one in zip(bits, qualities, strict=False) if one is not Quality.GOOD)
+
+    @property
+    def _control_word(self) -> int:
+        return int(self._image[self._commands[0]].value)
+
     def _holding_words(self, caller: Identity) -> list[int]:
         """Holding registers 0 … 31: what the owner wrote."""
-        channel = self._drive.channel
         words = [0] * VALUES
-        setpoints = channel.setpoints[:PROCESS_WORDS]
-        words[0] = channel.control_word
-        words[1 : len(setpoints) + 1] = setpoints
-        words[KEEP_ALIVE] = int(caller.is_same(channel.owner))
-        words[TIMEOUT] = channel.watchdog.timeout_ms
+        for address, value in zip(self._commands, self._image.values(self._commands.values()), strict=True):
+            words[address] = int(value)
+        owner, timeout_ms = self._image.values((self._owner, self._timeout))
+        words[KEEP_ALIVE] = int(owner == str(caller))
+        words[TIMEOUT] = int(timeout_ms)
         return words
 
     # writing
@@ -251,7 +236,7 @@ class DriveUnit:
     def plan_bits(self, start: int, bits: Sequence[bool], caller: Identity) -> list[Request]:
         if start + len(bits) > _WORD_BITS:
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
-        word = self._drive.channel.control_word
+        word = self._control_word
         for position, bit in enumerate(bits, start):
             word = word | 1 << position if bit else word & ~(1 << position)
         return _unpressed([self._write({"control_word": word}, caller)])
@@ -274,7 +259,7 @@ class DriveUnit:
         """
         end = start + len(words)
         self._check_range(Table.HOLDING_REGISTER, start, end)
-        self._check_words(Table.HOLDING_REGISTER, start, end, 0.0)
+        self._check_words(Table.HOLDING_REGISTER, start, end)
         if start >= PARAMETERS:
             return [self._parameter(start, words, caller)]
         self._check_writable(start, end)
@@ -298,16 +283,15 @@ class DriveUnit:
     def _with_commands(
         self, requests: list[Request], block: dict[int, int], caller: Identity
     ) -> list[Request]:
-        target = self._drive.name
+        target = self._map.drive_name
         is_pressed = bool(block.get(ACKNOWLEDGE))
         if is_pressed:
             requests.append(Request(caller, target, Do(Action.RESET_FAULT), pressed=True))
         if TIMEOUT in block:
             timeout_ms = block[TIMEOUT]
             request = Request(caller, target, SetTimeout(timeout_ms))
-            settings = self._drive.channel.settings
-            low, high = settings.timeout_range_ms
-            if not settings.fieldbus_timeout_writable or not low <= timeout_ms <= high:
+            limits = self._map.timeout_range_ms
+            if limits is None or not limits[0] <= timeout_ms <= limits[1]:
                 return [request]
             requests.append(request)
         if KEEP_ALIVE in block:
@@ -321,7 +305,7 @@ class DriveUnit:
         action = _STOPS.get(code)
         if action is None:
             raise Refused(ExceptionCode.ILLEGAL_VALUE)
-        return Request(caller, self._drive.name, Do(action))
+        return Request(caller, self._map.drive_name, Do(action))
 
     def _check_writable(self, start: int, end: int) -> None:
         only_reserved = start == _RESERVED and end == KEEP_ALIVE
@@ -330,15 +314,16 @@ class DriveUnit:
 
     def _process_values(self, block: dict[int, int]) -> dict[str, Value]:
         """Registers 0 … 8 of a write as values of the command group."""
-        leaves = self._words[Table.HOLDING_REGISTER]
-        unserved = self._drive.channel.unserved
+        words = self._words[Table.HOLDING_REGISTER]
         values: dict[str, Value] = {"control_word": block[0]} if 0 in block else {}
         for address in range(1, PROCESS_WORDS + 1):
-            leaf, word = leaves.get(address), block.get(address, 0)
-            if leaf is None and word:
+            index, word = words.get(address), block.get(address, 0)
+            if index is None and word:
                 raise Refused(ExceptionCode.ILLEGAL_VALUE)
-            if leaf is not None and address in block and (word or leaf not in unserved):
-                values[leaf.removeprefix("command/")] = word
+            if index is None or address not in block:
+                continue
+            if word or self._image[index].quality is Quality.GOOD:
+                values[self._image.points[index].leaf] = word
         return values
 
     def _setpoint_values(self, start: int, words: Sequence[int]) -> dict[str, Value]:
@@ -363,27 +348,28 @@ class DriveUnit:
         row = self._map.parameters[(start - PARAMETERS) // 2]
         value = self._value(row, words)
         name = row.name.removeprefix("parameter/")
-        return Request(caller, self._drive.name, WriteParameter(name, value))
+        return Request(caller, self._map.drive_name, WriteParameter(name, value))
 
     def _write(self, values: Mapping[str, Value], caller: Identity) -> Request:
-        return Request(caller, self._drive.name, Write(values))
+        return Request(caller, self._map.drive_name, Write(values))
 
     # identification
 
     def identify(self) -> Mapping[int, str]:
         """The drive's family, and from 80h on the numbers of 1018h as the node gives them."""
-        family, known = self._drive.family.family, self._drive.identification
+        vendor, product, revision, serial, device_name = self._image.values(self._identity)
+        number, texts = int(revision), self._map.texts
         return {
-            0x00: family.vendor,
-            0x01: family.name,
-            0x02: f"{known.revision >> 16}.{known.revision & 0xFFFF}",
-            0x04: known.device_name or family.name,
-            0x05: self._drive.slot.name,
-            0x06: self._drive.name,
-            0x80: f"{known.vendor:08X}",
-            0x81: f"{known.product:08X}",
-            0x82: f"{known.revision:08X}",
-            0x83: f"{known.serial:08X}",
+            0x00: texts[0x00],
+            0x01: texts[0x01],
+            0x02: f"{number >> 16}.{number & 0xFFFF}",
+            0x04: str(device_name) or texts[0x01],
+            0x05: texts[0x05],
+            0x06: texts[0x06],
+            0x80: f"{int(vendor):08X}",
+            0x81: f"{int(product):08X}",
+            0x82: f"{number:08X}",
+            0x83: f"{int(serial):08X}",
         }
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
@@ -18,6 +18,7 @@ from bridge.command import Drive, Plant, Source
 from bridge.command.rights import rights_of
 from bridge.config import WordOrder
 from bridge.image import DataType, Point, Quality
+from bridge.mapping.model import Family
 
 BRIDGE_UNITS: Final = (255, 0)
 """Unit ids of the bridge itself; the first is the one to show."""
@@ -43,6 +44,8 @@ QUALITY_BITS: Final = 16
 """First discrete input of the quality."""
 BRIDGE_DRIVES: Final = 5
 """First input register of the bridge's one word per drive."""
+ABORT_CODE: Final = "supervision/sdo_abort_code"
+"""The point behind the register ``sdo_abort_code``."""
 
 
 class Table(StrEnum):
@@ -104,18 +107,20 @@ def _access(is_writable: bool) -> str:
 
 class DriveMap:
     """The map of one drive. ``inputs`` and ``setpoints`` are the 32-bit values from register 32 on,
-    ``parameters`` those from register 1000 on."""
+    ``parameters`` those from register 1000 on. ``words`` are the process words by table and register,
+    ``timeout_range_ms`` what an owner may write to ``TIMEOUT``, None where that is nothing. ``texts`` is what
+    device identification knows without asking the drive, by object id."""
 
     __slots__ = (
         "drive_name",
-        "holding_end",
-        "input_end",
         "inputs",
-        "parameter_end",
         "parameters",
         "rows",
         "setpoints",
+        "texts",
+        "timeout_range_ms",
         "unit_id",
+        "words",
     )
 
     def __init__(self, drive: Drive, allows: Allows | None = None) -> None:
@@ -123,11 +128,22 @@ class DriveMap:
         allows = allows or Allows()
         self.drive_name = drive.name
         self.unit_id = drive.unit_id
+        family, slot = drive.family, drive.slot
+        self.texts = {0: family.family.vendor, 1: family.family.name, 5: slot.name, 6: drive.name}
+        is_writable = drive.table.fieldbus_timeout_writable
+        self.timeout_range_ms = drive.table.timeout_range_ms if is_writable else None
+        self.words: dict[Table, dict[int, str]] = {
+            Table.INPUT_REGISTER: _words("actual", family.process.tpdo, family.carried(slot)[1]),
+            Table.HOLDING_REGISTER: _words("command", family.process.rpdo, family.carried(slot)[0]),
+        }
         points = {point.name[len(drive.name) + 1 :]: point for point in drive.points}
-        fixed = (*_input_rows(drive), *_holding_rows(drive, allows))
-        values = drive.family.values_of(drive.slot)
+        fixed = (
+            *_input_rows(self.words[Table.INPUT_REGISTER]),
+            *_holding_rows(self.words[Table.HOLDING_REGISTER], allows, may_set=is_writable),
+        )
+        values = family.values_of(slot)
         scaled = [value.name for value in values if value.group == "actual"]
-        taken = {row.name for row in fixed}
+        taken = {row.name for row in fixed} | {ABORT_CODE}
         more = [
             leaf
             for leaf, point in points.items()
@@ -146,17 +162,20 @@ class DriveMap:
             if leaf.startswith("parameter/") and point.writable and point.data_type is not DataType.STRING
         ]
         self.parameters = _value_rows(Table.HOLDING_REGISTER, writable, points, allows, PARAMETERS)
-        self.parameter_end = PARAMETERS + 2 * len(self.parameters)
-        self.input_end = VALUES + 2 * len(self.inputs)
-        self.holding_end = VALUES + 2 * len(self.setpoints)
         self.rows: tuple[Row, ...] = (
             *(row for row in fixed if row.table is Table.INPUT_REGISTER),
             *self.inputs,
             *(row for row in fixed if row.table is Table.HOLDING_REGISTER),
             *self.setpoints,
             *self.parameters,
-            *_bit_rows(drive, allows),
+            *_bit_rows(family, allows),
         )
+
+    def end(self, table: Table, start: int) -> int:
+        """Where the registers end among which ``start`` is."""
+        if table is not Table.INPUT_REGISTER and start >= PARAMETERS:
+            return PARAMETERS + 2 * len(self.parameters)
+        return VALUES + 2 * len(self.inputs if table is Table.INPUT_REGISTER else self.setpoints)
 
     def second_halves(self, table: Table) -> frozenset[int]:
         """Addresses at which no read and no write may begin or end, lest a value be torn."""
@@ -174,20 +193,40 @@ def drive_maps(plant: Plant) -> tuple[DriveMap, ...]:
     return tuple(DriveMap(drive, allows(drive)) for _, drive in sorted(plant.by_unit.items()))
 
 
-def bridge_rows(plant: Plant) -> tuple[Row, ...]:
-    """The map of the bridge's own unit."""
-    row = _row_maker(Table.INPUT_REGISTER, "r")
-    drives = enumerate(plant.drives.values(), BRIDGE_DRIVES)
-    return (
-        row(0, "module_state", "uint16", "", _MODULE_STATE),
-        row(1, "load", "uint16", "0.1 %", "bus load of the first bus"),
-        row(2, "state", "uint16", "", "CAN controller: 0 ok, 1 warning, 2 passive, 3 bus-off, 4 down"),
-        row(3, "drives_configured", "uint16", "", "drives in the site file"),
-        row(4, "drives_good", "uint16", "", "drives with good data"),
-        *(
-            row(address, drive.name, "uint16", "", f"unit {drive.unit_id}: quality + 256 × state")
-            for address, drive in drives
-        ),
+@dataclass(frozen=True, slots=True)
+class Units:
+    """What has a unit id: the drives, and the bridge itself with its buses and its nodes, but those that the
+    site file leaves out of service. All are in the order of the site file."""
+
+    site: str
+    buses: tuple[str, ...]
+    nodes: tuple[str, ...]
+    drives: tuple[DriveMap, ...]
+
+    @property
+    def bridge_rows(self) -> tuple[Row, ...]:
+        """The map of the bridge's own unit."""
+        row = _row_maker(Table.INPUT_REGISTER, "r")
+        return (
+            row(0, "module_state", "uint16", "", _MODULE_STATE),
+            row(1, "load", "uint16", "0.1 %", "bus load of the first bus"),
+            row(2, "state", "uint16", "", "CAN controller: 0 ok, 1 warning, 2 passive, 3 bus-off, 4 down"),
+            row(3, "drives_configured", "uint16", "", "drives in the site file"),
+            row(4, "drives_good", "uint16", "", "drives with good data"),
+            *(
+                row(address, drive.drive_name, "uint16", "", f"unit {drive.unit_id}: quality + 256 × state")
+                for address, drive in enumerate(self.drives, BRIDGE_DRIVES)
+            ),
+        )
+
+
+def units_of(plant: Plant) -> Units:
+    """The units of a site; what may be written is not looked at."""
+    return Units(
+        plant.site.site.name,
+        tuple(bus.name for bus in plant.site.bus),
+        tuple(node.name for node in plant.nodes.values() if node.table.enabled),
+        tuple(map(DriveMap, plant.drives.values())),
     )
 
 
@@ -207,27 +246,20 @@ def _row_maker(table: Table, access: str) -> Callable[[int, str, str, str, str],
     return make
 
 
-def actual_words(drive: Drive) -> list[tuple[int, str]]:
-    """Register and name of each actual value word that the drive has; the register is the word's place in
-    its family."""
-    process = drive.family.process.tpdo
-    return [(process.index(word), word) for word in drive.family.carried(drive.slot)[1][1:]]
+def _words(group: str, process: list[str], carried: list[str]) -> dict[int, str]:
+    """The words that a drive has beside its control or status word; the register of each is its place in the
+    family."""
+    return {process.index(word): f"{group}/{word}" for word in carried[1:]}
 
 
-def setpoint_words(drive: Drive) -> list[tuple[int, str]]:
-    """The same for the setpoint words."""
-    process = drive.family.process.rpdo
-    return [(process.index(word), word) for word in drive.family.carried(drive.slot)[0][1:]]
-
-
-def _input_rows(drive: Drive) -> list[Row]:
+def _input_rows(actual: Mapping[int, str]) -> list[Row]:
     row = _row_maker(Table.INPUT_REGISTER, "r")
     qualities = ", ".join(f"{quality.value} {quality.label}" for quality in Quality)
     states = "0 not ready, 1 switch-on inhibited, 2 ready, 3 switched on, 4 operation enabled, \
 5 quick stop active, 6 fault reaction active, 7 fault, 255 unknown"
     return [
         row(0, "status/status_word", "uint16", "", "status word; shows fault while tripped"),
-        *(row(i, f"actual/{name}", "uint16", "", "actual value, raw") for i, name in actual_words(drive)),
+        *(row(i, leaf, "uint16", "", "actual value, raw") for i, leaf in actual.items()),
         row(9, "status/drive_status_word", "uint16", "", "status word as the drive sent it"),
         row(10, "status/state", "uint16", "", states),
         row(11, "quality", "uint16", "", qualities),
@@ -250,15 +282,14 @@ def _input_rows(drive: Drive) -> list[Row]:
     ]
 
 
-def _holding_rows(drive: Drive, allows: Allows) -> list[Row]:
+def _holding_rows(setpoints: Mapping[int, str], allows: Allows, *, may_set: bool) -> list[Row]:
     row = _row_maker(Table.HOLDING_REGISTER, _access(allows.may_command))
     stop = _row_maker(Table.HOLDING_REGISTER, _access(allows.may_stop))
-    may_set = allows.may_command and drive.channel.settings.fieldbus_timeout_writable
-    timeout = _row_maker(Table.HOLDING_REGISTER, _access(may_set))
+    timeout = _row_maker(Table.HOLDING_REGISTER, _access(may_set and allows.may_command))
     name, text = "supervision/fieldbus_timeout_ms", "how long the controller may be silent; 0: off (as P151)"
     return [
         row(0, "command/control_word", "uint16", "", "control word"),
-        *(row(i, f"command/{leaf}", "uint16", "", "setpoint, raw") for i, leaf in setpoint_words(drive)),
+        *(row(i, leaf, "uint16", "", "setpoint, raw") for i, leaf in setpoints.items()),
         row(KEEP_ALIVE, "keep_alive", "uint16", "", "not 0: a telegram; 0: release; reads 1 for the owner"),
         row(ACKNOWLEDGE, "acknowledge", "uint16", "", "write 1 to acknowledge a fault; reads 0"),
         timeout(TIMEOUT, name, "uint16", "ms", text),
@@ -283,13 +314,13 @@ def _value_rows(
     return tuple(rows)
 
 
-def _bit_rows(drive: Drive, allows: Allows) -> list[Row]:
+def _bit_rows(family: Family, allows: Allows) -> list[Row]:
     status = _row_maker(Table.DISCRETE_INPUT, "r")
     coil = _row_maker(Table.COIL, _access(allows.may_command))
     return [
         *(
             status(i, f"status/{name or i}", "bool", "", _bit_text(i, "status word as served", name))
-            for i, name in enumerate(_padded(drive.family.status_word.bits))
+            for i, name in enumerate(_padded(family.status_word.bits))
         ),
         *(
             status(
@@ -299,7 +330,7 @@ def _bit_rows(drive: Drive, allows: Allows) -> list[Row]:
         ),
         *(
             coil(i, f"command/{name or i}", "bool", "", _bit_text(i, "control word", name))
-            for i, name in enumerate(_padded(drive.family.control_word.bits))
+            for i, name in enumerate(_padded(family.control_word.bits))
         ),
     ]
 

@@ -10,13 +10,15 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Final
 
-from bridge.command import Identity, Plant, Role, Source
+from bridge.command import Identity, Role, Source
 from bridge.config import ModbusTable
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.modbus.dispatch import Dispatcher
+from bridge.northbound.modbus.registers import Units
 from bridge.northbound.modbus.session import READ_MOST, Session
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.sources import source_of
+from bridge.northbound.view import ConnectionView
 from bridge.quietlog import about
 
 _log = logging.getLogger(__name__)
@@ -28,12 +30,15 @@ IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
 class ModbusServer:
-    """Serves ``plant`` as ``settings`` say. ``clock`` gives monotonic seconds, the plant's time."""
+    """Serves ``units`` as ``settings`` say. ``clock`` gives monotonic seconds."""
 
-    def __init__(self, plant: Plant, settings: ModbusTable, clock: Callable[[], float]) -> None:
+    def __init__(
+        self, view: ConnectionView, units: Units, settings: ModbusTable, clock: Callable[[], float]
+    ) -> None:
         self._settings = settings
-        self._plant = plant
-        self._dispatcher = Dispatcher(plant, settings.word_order, clock)
+        self._view = view
+        self._dispatcher = Dispatcher(view, units, settings.word_order, clock)
+        self._owners = [view.image.index[f"{drive.drive_name}/supervision/owner"] for drive in units.drives]
         self._allowed = [ipaddress.ip_network(network) for network in settings.allow]
         self._clock = clock
         self._pulse = Pulse(clock)
@@ -91,7 +96,7 @@ class ModbusServer:
         """The identity of a client, or None where its address may not connect."""
         address = _normalised(host)
         if not any(address in network for network in self._allowed):
-            self._plant.count("modbus_refused_connections", self._clock())
+            self._view.count("modbus_refused_connections")
             _log.warning(
                 "connection of %s refused: it is in none of the networks of modbus.allow",
                 address,
@@ -104,35 +109,35 @@ class ModbusServer:
         shown = f"[{address}]" if address.version == 6 else str(address)
         sets = self._settings.parameters == "write"
         identity = Identity(Source.MODBUS, str(address), Role.OPERATOR, f"{shown}:{port}", sets)
-        self._plant.on_connection(identity, self._clock(), is_there=True)
+        self._view.on_connection(identity, is_there=True)
         return identity
 
     def leave(self, session: Session) -> None:
         self._sessions.discard(session)
         identity = session.identity
         if identity is not None and not any(identity.is_same(other.identity) for other in self._sessions):
-            self._plant.on_connection(identity, self._clock(), is_there=False)
+            self._view.on_connection(identity, is_there=False)
 
     def on_fault(self, session: Session, fault: str) -> None:
-        self._plant.count("modbus_broken_connections", self._clock())
+        self._view.count("modbus_broken_connections")
         _log.warning("connection of %s closed: %s", session.address, fault, extra=about(session.source))
 
     def _make_room(self, newcomer: str) -> None:
         """End the connection that is missed least: one of the address that has the most, so that a crowd
         pushes out itself; of them one that has said nothing yet, or the one that is idle the longest."""
-        owners = [drive.channel.owner for drive in self._plant.drives.values()]
+        owners = self._view.image.values(self._owners)
         crowds = Counter(session.source for session in self._sessions)
         crowds[newcomer] += 1
 
         def is_missed(session: Session) -> tuple[bool, int, bool, float]:
             identity, crowd = session.identity, crowds[session.source]
             # An owner's address has its share before all others, but no more than that.
-            owns = identity is not None and any(map(identity.is_same, owners))
+            owns = identity is not None and str(identity) in owners
             has_share = crowd <= max(1, self._settings.max_connections // 2)
             return owns and has_share, -crowd, session.has_spoken, session.heard_at
 
         idlest = min(self._sessions, key=is_missed)
-        self._plant.count("modbus_broken_connections", self._clock())
+        self._view.count("modbus_broken_connections")
         _log.warning(
             "connection of %s closed to make room: there are %d, and it is missed least",
             idlest.address,

@@ -5,14 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final, Protocol
 
-from bridge.command import Drive, Identity, Node, Plant, Request
+from bridge.command import Identity, Request
 from bridge.command.link import NodeState
+from bridge.command.points import NODE_CODES
+from bridge.command.watchdog import WatchdogState
 from bridge.drive import DriveState
-from bridge.image import Quality
+from bridge.image import Quality, Value
 from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, Refused
-from bridge.northbound.modbus.registers import BRIDGE_DRIVES, Table
+from bridge.northbound.modbus.registers import BRIDGE_DRIVES, Table, Units
+from bridge.northbound.view import View
 
 _BUS_WARNING, _BUS_PASSIVE, _BUS_OFF, _BUS_DOWN = 1, 2, 3, 4
+_LOST: Final = NODE_CODES[NodeState.LOST]
+_OPERATIONAL: Final = NODE_CODES[NodeState.OPERATIONAL]
+_STARTING: Final = tuple(
+    NODE_CODES[state] for state in (NodeState.ABSENT, NodeState.BOOTING, NodeState.CONFIG_ERROR)
+)
 
 
 class Unit(Protocol):
@@ -22,11 +30,9 @@ class Unit(Protocol):
     submitted; all but the first can only fail if the first one does.
     """
 
-    def read_bits(self, table: Table, start: int, count: int, now: float) -> Sequence[bool]: ...
+    def read_bits(self, table: Table, start: int, count: int) -> Sequence[bool]: ...
 
-    def read_words(
-        self, table: Table, start: int, count: int, caller: Identity, now: float
-    ) -> Sequence[int]: ...
+    def read_words(self, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]: ...
 
     def plan_bits(self, start: int, bits: Sequence[bool], caller: Identity) -> list[Request]: ...
 
@@ -46,68 +52,71 @@ def refuse_quality(quality: Quality) -> None:
         raise Refused(ExceptionCode.NOT_RESPONDING if configured else ExceptionCode.PATH_UNAVAILABLE)
 
 
-def state_code(drive: Drive, quality: Quality) -> int:
+def state_code(state: Value, watchdog_state: Value, quality: Quality) -> int:
     """The state as served; what a drive was doing when it was last heard of is not its state."""
-    if quality.has_value or drive.channel.is_tripped:
-        return drive.channel.served_state
-    return DriveState.UNKNOWN
+    is_known = quality.has_value or watchdog_state == WatchdogState.TRIPPED
+    return int(state) if is_known else DriveState.UNKNOWN
 
 
 class BridgeUnit:
     """The bridge itself: input registers only, any other table is an illegal function."""
 
-    __slots__ = ("_buses", "_nodes", "_plant", "_version")
+    __slots__ = ("_drives", "_image", "_load", "_nodes", "_site", "_states", "_version", "_view")
 
-    def __init__(self, plant: Plant) -> None:
-        self._plant = plant
-        self._buses: Final = tuple(bus.name for bus in plant.site.bus)
-        self._nodes: Final = tuple(plant.nodes.values())
+    def __init__(self, units: Units, view: View) -> None:
+        self._site = units.site
+        self._view = view
+        self._image = view.image
+        index = view.image.index
+        self._states: Final = [index[f"bus/{name}/state"] for name in units.buses]
+        self._load: Final = index[f"bus/{units.buses[0]}/load"]
+        self._nodes: Final = [index[f"{name}/node/state"] for name in units.nodes]
+        self._drives: Final = {
+            name: (index[f"{name}/status/state"], index[f"{name}/supervision/watchdog_state"])
+            for name in (drive.drive_name for drive in units.drives)
+        }
+        self._version: Final = index["bridge/version"]
 
-    def read_words(self, table: Table, start: int, count: int, caller: Identity, now: float) -> Sequence[int]:
+    def read_words(self, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]:
         if table is not Table.INPUT_REGISTER:
             raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
-        drives = self._plant.drives.values()
-        if start + count > BRIDGE_DRIVES + len(drives):
+        if start + count > BRIDGE_DRIVES + len(self._drives):
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
-        qualities = [drive.channel.link.quality(now) for drive in drives]
+        for name in self._drives:
+            self._view.look(name)
+        image, places = self._image, self._drives.values()
+        qualities = image.qualities(state for state, _ in places)
+        watchdogs = image.values(watchdog for _, watchdog in places)
+        states = image.values(state for state, _ in places)
         bus_state = self._bus_state()
         words = [
-            self._module_state(bus_state),
-            self._load(),
+            self._module_state(bus_state, tripped=WatchdogState.TRIPPED in watchdogs),
+            min(max(round(float(image[self._load].value) * 10), 0), 0xFFFF),
             bus_state,
             len(qualities),
-            sum(quality is Quality.GOOD for quality in qualities),
+            qualities.count(Quality.GOOD),
             *(
-                quality | state_code(drive, quality) << 8
-                for drive, quality in zip(drives, qualities, strict=True)
+                quality | state_code(state, watchdog, quality) << 8
+                for state, watchdog, quality in zip(states, watchdogs, qualities, strict=True)
             ),
         ]
         return words[start : start + count]
 
     def _bus_state(self) -> int:
         """The worst controller state of all buses; a bus that was not opened yet is down."""
-        readings = [self._plant.image.read(f"bus/{name}/state") for name in self._buses]
+        readings = [self._image[index] for index in self._states]
         return max(int(reading.value) if reading.quality.has_value else _BUS_DOWN for reading in readings)
 
-    def _load(self) -> int:
-        """Load of the first bus in 0.1 %."""
-        reading = self._plant.image.read(f"bus/{self._buses[0]}/load")
-        return min(max(round(float(reading.value) * 10), 0), 0xFFFF)
-
-    def _module_state(self, bus_state: int) -> int:
+    def _module_state(self, bus_state: int, *, tripped: bool) -> int:
         """The bits of P173 (BU 2500 §7.1.3). Bits 8 … 15 are about drives and have a register each here."""
-        states = [_node_state(node) for node in self._nodes if node.table.enabled]
-        operational = all(state is NodeState.OPERATIONAL for state in states)
-        starting = any(
-            state in (NodeState.ABSENT, NodeState.BOOTING, NodeState.CONFIG_ERROR) for state in states
-        )
-        lost = NodeState.LOST in states
-        tripped = any(drive.channel.is_tripped for drive in self._plant.drives.values())
+        states = self._image.values(self._nodes)
+        operational = all(state == _OPERATIONAL for state in states)
+        starting = any(state in _STARTING for state in states)
         warning = bus_state in (_BUS_WARNING, _BUS_PASSIVE)
-        bits = (starting, operational, lost, tripped, warning, bus_state == _BUS_OFF)
+        bits = (starting, operational, _LOST in states, tripped, warning, bus_state == _BUS_OFF)
         return sum(bit << position for position, bit in enumerate(bits))
 
-    def read_bits(self, table: Table, start: int, count: int, now: float) -> Sequence[bool]:
+    def read_bits(self, table: Table, start: int, count: int) -> Sequence[bool]:
         raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
 
     def plan_bits(self, start: int, bits: Sequence[bool], caller: Identity) -> list[Request]:
@@ -120,16 +129,5 @@ class BridgeUnit:
         raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
 
     def identify(self) -> Mapping[int, str]:
-        version = str(self._plant.image.read("bridge/version").value)
-        return {
-            0: "drivebridge",
-            1: "drivebridge",
-            2: version,
-            4: "drivebridge",
-            6: self._plant.site.site.name,
-        }
-
-
-def _node_state(node: Node) -> NodeState:
-    """All drives of a node are told the same."""
-    return node.drives[0].channel.link.node
+        version = str(self._image[self._version].value)
+        return {0: "drivebridge", 1: "drivebridge", 2: version, 4: "drivebridge", 6: self._site}

@@ -87,9 +87,16 @@ _ALONE: Final[Mapping[str, type[_Telegram]]] = {"parameter": _Parameter, "superv
 
 async def ask(view: View, request: Request) -> Outcome:
     """Make a request and wait for its outcome."""
+    outcome: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
+
+    def reply(found: Outcome) -> None:
+        if not outcome.done():
+            outcome.set_result(found)
+
+    view.submit(replace(request, received_at=received_at.get()), reply)
     try:
         async with asyncio.timeout(ANSWER_LIMIT_S):
-            return await view.request(replace(request, received_at=received_at.get()))
+            return await outcome
     except TimeoutError:
         _log.warning(
             "%s on %s: no outcome within %g s",

@@ -17,13 +17,16 @@ from typing import Final
 
 import zenoh
 
-from bridge.command import Code, Event, Identity, Outcome, Plant, Rejection, Reply, Request, Source
+from bridge.command import Code, Event, Identity, Outcome, Rejection, Reply, Request, Source
 from bridge.command.link import NodeState
+from bridge.command.points import NODE_CODES
 from bridge.command.request import STOP_ACTIONS
 from bridge.config import ZenohTable
 from bridge.errors import Unavailable
+from bridge.image import Quality, Reading
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.sources import source_of
+from bridge.northbound.view import View
 from bridge.northbound.zenoh import keys
 from bridge.northbound.zenoh.access import access_control
 from bridge.northbound.zenoh.askers import Askers
@@ -34,6 +37,8 @@ from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 
 _log = logging.getLogger(__name__)
 
+_NODE_STATE: Final = "/node/state"
+_OPERATIONAL: Final = NODE_CODES[NodeState.OPERATIONAL]
 _POINTS_PER_TICK: Final = 500
 _REPLIES_AT_ONCE: Final = 200
 _GETS_AT_ONCE: Final = 16
@@ -43,30 +48,25 @@ _SLOW_GET_S: Final = 5.0
 
 
 class ZenohServer:
-    """Serves one plant under zenoh keys.
+    """Serves one site under zenoh keys. ``clock`` is the machine's monotonic clock in seconds."""
 
-    ``clock`` is the machine's monotonic clock in seconds; ``epoch`` turns such a time into ns since 1970 UTC.
-    """
-
-    def __init__(
-        self,
-        plant: Plant,
-        settings: ZenohTable,
-        site_name: str,
-        clock: Callable[[], float],
-        epoch: Callable[[float], int],
-    ) -> None:
-        self._plant = plant
+    def __init__(self, view: View, settings: ZenohTable, site_name: str, clock: Callable[[], float]) -> None:
+        self._view = view
+        self._image = view.image
         self._settings = settings
         self._clock = clock
-        self._epoch = epoch
-        self._keys = keys.KeySpace(settings.prefix, site_name, plant.image.points)
-        self._commands = Commands(plant.image.points)
+        self._keys = keys.KeySpace(settings.prefix, site_name, self._image.points)
+        self._commands = Commands(self._image.points)
+        self._node_states = [
+            (name.removesuffix(_NODE_STATE), index)
+            for name, index in self._image.index.items()
+            if name.endswith(_NODE_STATE) and not name.startswith("bus/")
+        ]
         self._users = read_users(settings)
         self._link = self._new_link()
         self._pulse = Pulse(clock)
         self._askers = Askers()
-        self._feed = plant.image.feed()
+        self._feed = self._image.feed()
         self._present: set[str] = set()
         self._gets: dict[asyncio.Task[None], float] = {}
         """Since when they are answered, the oldest first."""
@@ -98,9 +98,9 @@ class ZenohServer:
             if self._settings.accept_put:
                 self._link.declare_subscriber(space.own_commands, self._on_put, share, from_others=True)
         self._link.declare_token(space.bridge_token)
-        self._link.follow_endings(lambda: self._plant.count("zenoh_broken_connections", self._clock()))
+        self._link.follow_endings(lambda: self._view.count("zenoh_broken_connections"))
         self._link.follow_strangers(self._on_strangers)
-        self._plant.on_event(self._on_event)
+        self._view.on_event(self._on_event)
         self._tick()
 
     async def _start_anew(self) -> None:
@@ -108,7 +108,7 @@ class ZenohServer:
         await self.close()
         self._users = read_users(self._settings)
         self._link = self._new_link()
-        self._feed = self._plant.image.feed()
+        self._feed = self._image.feed()
         self._present.clear()
 
     async def close(self) -> None:
@@ -117,8 +117,8 @@ class ZenohServer:
             self._tick_timer.cancel()
         for task in tuple(self._gets):
             task.cancel()
-        self._plant.forget(self._on_event)
-        self._plant.image.drop_feed(self._feed)
+        self._view.forget(self._on_event)
+        self._image.drop_feed(self._feed)
         await self._link.close()
 
     async def failed(self) -> None:
@@ -129,14 +129,15 @@ class ZenohServer:
 
     def _tick(self) -> None:
         self._tick_timer = asyncio.get_running_loop().call_later(self._settings.period_ms / 1000, self._tick)
-        at_zero_ns = self._epoch(0.0)
+        at_zero_ns = self._view.epoch_ns(0.0)
         for index in self._feed.take(_POINTS_PER_TICK):
             self._link.put(self._render(index, at_zero_ns))
-        for node in self._plant.nodes.values():
-            self._follow_node(node.name, node.drives[0].channel.link.node is NodeState.OPERATIONAL)
+        for node, index in self._node_states:
+            self._follow_node(node, self._image[index])
 
-    def _follow_node(self, name: str, is_operational: bool) -> None:
+    def _follow_node(self, name: str, state: Reading) -> None:
         """A node's token is there while the node is operational."""
+        is_operational = state.quality is Quality.GOOD and state.value == _OPERATIONAL
         if is_operational and name not in self._present:
             self._present.add(name)
             self._link.declare_token(self._keys.node_token(name))
@@ -145,8 +146,8 @@ class ZenohServer:
             self._link.drop_token(self._keys.node_token(name))
 
     def _render(self, index: int, at_zero_ns: int) -> Message:
-        """``at_zero_ns``: the wall clock at monotonic 0, which is read once for many points."""
-        reading = self._plant.image[index]
+        """``at_zero_ns``: the wall clock at time 0, which is read once for many points."""
+        reading = self._image[index]
         key = self._keys.keys[index]
         epoch_ns = at_zero_ns + round(reading.time * 1e9)
         if self._settings.encoding == "json":
@@ -155,12 +156,12 @@ class ZenohServer:
         return Message(key, value, keys.TEXT, attachment)
 
     def _on_event(self, event: Event) -> None:
-        payload = keys.event_json(event, self._epoch(event.time))
+        payload = keys.event_json(event, self._view.epoch_ns(event.time))
         self._link.send(Message(self._keys.event_key(event), payload, keys.JSON))
 
     def _on_strangers(self, places: list[str]) -> None:
         """Silent, or not what zenoh lets in."""
-        self._plant.count("zenoh_broken_connections", self._clock(), len(places))
+        self._view.count("zenoh_broken_connections", len(places))
         sources = Counter(source_of(place.rpartition(":")[0].strip("[]")) for place in places)
         for source, count in sources.items():
             _log.warning("connections of %s came to no zenoh session: %d", source, count, extra=about(source))
@@ -179,7 +180,7 @@ class ZenohServer:
         elif self._commands.parameter(tail)[1]:
             self._read_parameter(asked, owner, tail)
         elif asked.key in self._keys.index:
-            asked.send([self._render(self._keys.index[asked.key], self._epoch(0.0))])
+            asked.send([self._render(self._keys.index[asked.key], self._view.epoch_ns(0.0))])
             asked.finish()
         elif not is_pattern:
             _refuse(asked, BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}"))
@@ -207,7 +208,7 @@ class ZenohServer:
         end = partial(_refuse, asked, BadCommand("busy", "others wait and this is read slowly; ask for less"))
         try:
             for portion in self._matching(zenoh.KeyExpr(asked.key)):
-                at_zero_ns = self._epoch(0.0)
+                at_zero_ns = self._view.epoch_ns(0.0)
                 asked.send([self._render(index, at_zero_ns) for index in portion])
                 await asked.settle()
             end = asked.finish
@@ -248,7 +249,7 @@ class ZenohServer:
         """``received_at``: when zenoh handed it over."""
         now = self._clock()
         came_at = self._askers.arrival(request.identity.user, received_at, now, self._pulse.look)
-        self._plant.submit(replace(request, received_at=came_at), now, reply)
+        self._view.submit(replace(request, received_at=came_at), reply)
 
     def _identity(self, owner: str, attachment: bytes | None) -> Identity:
         """Raises ``BadCommand``."""
@@ -263,7 +264,7 @@ class ZenohServer:
         drive, name = self._commands.parameter(tail)
         cached = "cached" in re.split("[;&=]", asked.parameters)
         if cached and asked.key in self._keys.index:
-            asked.send([self._render(self._keys.index[asked.key], self._epoch(0.0))])
+            asked.send([self._render(self._keys.index[asked.key], self._view.epoch_ns(0.0))])
             asked.finish()
             return
 
@@ -271,7 +272,7 @@ class ZenohServer:
             if not outcome.ok or outcome.value is None:
                 asked.fail(keys.outcome_json(outcome), keys.JSON)
                 return
-            epoch_ns = self._epoch(outcome.time)
+            epoch_ns = self._view.epoch_ns(outcome.time)
             if self._settings.encoding == "json":
                 message = Message(asked.key, keys.parameter_json(outcome.value, epoch_ns), keys.JSON)
             else:
@@ -286,7 +287,7 @@ class ZenohServer:
         except BadCommand as bad:
             _refuse(asked, bad)
             return
-        self._plant.submit(request, self._clock(), reply)
+        self._view.submit(request, reply)
 
     def _note_refusal(self, owner: str, tail: str, attachment: bytes | None, bad: BadCommand) -> None:
         """A command that was refused before it became a request, for the audit log."""
@@ -295,7 +296,7 @@ class ZenohServer:
         except BadCommand:
             identity = identity_of(None)
         target, action = self._commands.meant(tail)
-        self._plant.rejected(Rejection(identity, target, action, bad.code, bad.message), self._clock())
+        self._view.rejected(Rejection(identity, target, action, bad.code, bad.message))
 
     def _on_put(self, message: Message) -> None:
         """A plain put on a command key, where the site takes them. Nobody is there to be told."""

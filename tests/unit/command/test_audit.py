@@ -12,6 +12,7 @@ from bridge.command import (
     Kind,
     Outcome,
     Rejection,
+    Reply,
     Request,
     Source,
     Start,
@@ -150,10 +151,14 @@ def test_commands_of_nodes_and_to_nobody_are_told(hall: Hall) -> None:
 
 
 def test_a_refused_command_of_a_node_is_an_event_and_counts(hall: Hall) -> None:
-    hall.plant.nodes["conveyor"].command = lambda request, now, reply: reply(
-        Outcome(Code.NOT_ALLOWED, "may only read", forwarded=False)
-    )
-    assert not hall.ask(Action.RESET, OBSERVER, "conveyor").ok
+    def refuse(request: Request, now: float, reply: Reply) -> bool:
+        reply(Outcome(Code.NOT_ALLOWED, "may only read", forwarded=False))
+        return True
+
+    request = Request(OBSERVER, "conveyor", command_of(Action.RESET))
+    outcomes: list[Outcome] = []
+    hall.plant.submit(request, hall.now, outcomes.append, refuse)
+    assert not outcomes[0].ok
     (event,) = [event for event in hall.events if event.kind is Kind.REFUSED]
     assert (event.source, event.message) == ("conveyor", "reset by opcua:guest refused: may only read")
     hall.plant.refresh(hall.now)

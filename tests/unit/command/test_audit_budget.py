@@ -16,9 +16,9 @@ from bridge.command import Action, Code, Do, Identity, Rejection, Request, Sourc
 from bridge.command.audit import AT_ONCE, DONE_EVERY_S, REFUSED_EVERY_S, SUMMARY_S, AuditEntry, client_of
 from bridge.command.link import NodeState
 from bridge.image import Value
-from bridge.northbound.modbus.dispatch import Dispatcher
 from tests.support import sites
 from tests.support.rig import ENABLE, SHUT_DOWN
+from tests.support.views import dispatcher_of
 
 FU1 = "conveyor/fu1"
 SITE = sites.site(sites.bus(sites.node(sites.drive("fu1", "modbus", 0))), sites.modbus())
@@ -37,7 +37,7 @@ class Hall:
         self.now = 100.0
         self.plant.on_node(self.plant.nodes["conveyor"], NodeState.OPERATIONAL, self.now)
         self.plant.audit.on_time(self.now)
-        self.dispatcher = Dispatcher(self.plant, "ABCD", lambda: self.now)
+        self.dispatcher = dispatcher_of(self.plant, lambda: self.now)
 
     def pass_time(self, seconds: float) -> None:
         self.now += seconds

@@ -13,6 +13,8 @@ from bridge.command import (
     Identification,
     Kind,
     Outcome,
+    PlantView,
+    Reply,
     Request,
     Start,
     Write,
@@ -57,8 +59,23 @@ class Hall:
         self.events: list[Event] = []
         self.plant.on_event(self.events.append)
         self.flushed: list[tuple[int, ...]] = []
-        self.plant.outputs_changed = lambda: self.flushed.append(self.drive.channel.output.words)
         self.now = 100.0
+        self.view = PlantView(
+            self.plant,
+            lambda: self.now,
+            lambda at: round(at * 1e9),
+            lambda request, now, reply: self.carry_out(request, reply),
+            lambda: self.flushed.append(self.drive.channel.output.words),
+        )
+
+    def carry_out(self, request: Request, reply: Reply) -> bool:
+        """There is a bus, where ``on_bus`` says so, with one node."""
+        if self.on_bus and request.target == "conveyor":
+            reply(Outcome(Code.OK, request.target))
+            return True
+        return False
+
+    on_bus = False
 
     @property
     def drive(self) -> Drive:
@@ -66,7 +83,7 @@ class Hall:
 
     def submit(self, action: Action, target: str = "conveyor/fu1", identity=PLC, **more) -> Outcome:
         outcomes: list[Outcome] = []
-        self.plant.submit(Request(identity, target, command_of(action, **more)), self.now, outcomes.append)
+        self.view.submit(Request(identity, target, command_of(action, **more)), outcomes.append)
         (outcome,) = outcomes
         return outcome
 
@@ -341,7 +358,7 @@ class TestRequests:
             seen.append(running.value("command/frequency"))
 
         request = Request(PLC, "conveyor/fu1", Write({"frequency": 5.0}))
-        running.plant.submit(request, running.now, on_outcome)
+        running.view.submit(request, on_outcome)
         assert seen == [pytest.approx(5.0, abs=0.01)]
 
     def test_a_stop_reaches_the_bus_even_if_its_answer_cannot_be_told(self, running: Hall):
@@ -352,8 +369,21 @@ class TestRequests:
 
         request = Request(OPERATOR, "conveyor/fu1", Do(Action.STOP))
         with pytest.raises(ConnectionResetError):
-            running.plant.submit(request, running.now, on_outcome)
+            running.view.submit(request, on_outcome)
         assert running.flushed == [(SHUT_DOWN, 0, 0, 0, 0)]
+
+    def test_of_a_telegram_of_several_requests_the_bus_gets_what_the_last_one_leaves(self, running: Hall):
+        """An enable that is written together with a release is none."""
+        running.flushed.clear()
+
+        def on_written(outcome: Outcome) -> None:
+            running.view.submit(Request(PLC, "conveyor/fu1", Do(Action.RELEASE_CONTROL)), outcomes.append)
+
+        outcomes: list[Outcome] = []
+        write = Request(PLC, "conveyor/fu1", Write({"control_word": ENABLE, "setpoint_1": 0x1000}))
+        running.view.submit(write, on_written)
+        assert [outcome.ok for outcome in outcomes] == [True]
+        assert {words[:2] for words in running.flushed} == {(SHUT_DOWN, 0)}
 
     def test_refused_ones_are_counted(self, running: Hall):
         assert running.write(OTHER_PLC, control_word=SHUT_DOWN).code is Code.NOT_ALLOWED
@@ -367,7 +397,7 @@ class TestRequests:
 
     def test_on_a_node_go_to_who_looks_after_it(self, hall: Hall):
         assert hall.submit(Action.RESET, "conveyor").code is Code.UNKNOWN_TARGET
-        hall.node.command = lambda request, now, reply: reply(Outcome(Code.OK, request.target))
+        hall.on_bus = True
         assert hall.submit(Action.RESET, "conveyor").message == "conveyor"
         assert hall.submit(Action.RESET, "lift").code is Code.UNKNOWN_TARGET
 
@@ -376,9 +406,11 @@ class TestRequests:
         hall.pdo(INHIBITED)
         seen: list[Value] = []
         request = Request(PLC, "conveyor/fu1", Start())
-        hall.plant.submit(request, hall.now, lambda outcome: seen.append(hall.value("status/state")))
+        hall.view.submit(request, lambda outcome: seen.append(hall.value("status/state")))
         hall.pdo(READY)
         hall.pdo(ENABLED)
+        assert not seen, "nothing is told in the midst of a round"
+        hall.plant.tell()
         assert seen == [4]
 
 
@@ -402,3 +434,32 @@ def test_a_feed_sees_what_a_tpdo_changed_and_nothing_else(running: Hall):
     running.pdo(ENABLED, 0x2100, 0x4000)
     changed = [running.plant.image.points[index].name for index in feed.take(10_000)]
     assert changed == ["conveyor/fu1/actual/value_1", "conveyor/fu1/actual/frequency"]
+
+
+def test_who_looks_sees_what_no_timer_has_told_yet(running: Hall):
+    feed = running.plant.image.feed()
+    feed.take(10_000)
+    running.now += 0.15
+    assert running.read("status/status_word").quality is Quality.GOOD, "as of the last round"
+    running.view.look("conveyor/fu1")
+    assert running.read("status/status_word").quality is Quality.STALE
+    assert running.value("supervision/pdo_age_ms") == 150
+    names = {running.plant.image.points[index].leaf for index in feed.take(10_000)}
+    assert "status_word" in names
+    assert "pdo_age_ms" not in names, "ages are told a few times a second, however often they are read"
+    running.plant.refresh(running.now)
+    assert "pdo_age_ms" in {running.plant.image.points[index].leaf for index in feed.take(10_000)}
+
+
+def test_a_node_has_the_state_that_the_bridge_gives_it(hall: Hall):
+    codes = {NodeState.LOST: 3, NodeState.DISABLED: 5, NodeState.OPERATIONAL: 2}
+    assert hall.plant.image.read("conveyor/node/state").value == 0
+    for state, code in codes.items():
+        hall.plant.on_node(hall.node, state, hall.now)
+        assert hall.plant.image.read("conveyor/node/state").value == code
+
+
+def test_an_emergency_of_a_drive_without_data_is_known(hall: Hall):
+    hall.drive.channel.on_emcy(emergency(0x8100), hall.now)
+    reading = hall.read("status/emcy_code")
+    assert (reading.value, reading.quality) == (0x8100, Quality.WAITING)

@@ -114,6 +114,29 @@ class TestFeed:
         assert seen(quick) == [0, 1, 2, 3]
         assert len(slow) == 4
 
+    def test_what_changes_by_itself_is_there_at_once_and_told_later(self, image: Image):
+        feed = image.feed()
+        seen(feed)
+        image.keep(1, 7, 1.0)
+        assert image[1].value == 7
+        assert (image[1].quality, image[1].time) == (Quality.GOOD, 1.0)
+        assert not feed
+        image.tell_kept()
+        assert seen(feed) == [1]
+        image.keep(1, 7, 2.0)
+        image.tell_kept()
+        assert not feed, "nothing has changed"
+
+    def test_what_was_looked_at_before_it_is_told_is_told_all_the_same(self, image: Image):
+        feed = image.feed()
+        image.keep(1, 7, 1.0)
+        image.tell_kept()
+        seen(feed)
+        image.keep(1, 8, 2.0)
+        image.keep(1, 9, 2.1)
+        image.tell_kept()
+        assert seen(feed) == [1]
+
     def test_a_dropped_one_is_marked_no_more(self, image: Image):
         feed = image.feed()
         seen(feed)

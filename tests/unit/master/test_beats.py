@@ -45,7 +45,7 @@ def test_a_changed_word_is_in_it_at_once(tmp_path: Path) -> None:
     before = bench.network.beats()[RPDO1 + 5]
     request = Request(PLC, "conveyor/fu1", Write({"control_word": 0x047E}))
     outcomes: list[Outcome] = []
-    bench.plant.submit(request, bench.now, outcomes.append)
+    bench.view.submit(request, outcomes.append)
     assert outcomes[0].forwarded
     assert bench.network.beats()[RPDO1 + 5] != before
 

@@ -11,6 +11,7 @@ from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtState
 from bridge.command import Action, Code
+from bridge.command.plant import Enforce
 from bridge.image import Quality
 from bridge.mapping.model import IdentityRule
 from bridge.master.standstill import Alarm
@@ -207,13 +208,15 @@ def test_a_process_stopped_within_a_round_sends_nothing_that_was_right_before(
     running(bench)
     judge = bench.plant.on_time
 
-    def judge_and_stand_still(now: float) -> None:
-        judge(now)
+    def judge_and_stand_still(now: float, enforce: Enforce) -> None:
+        judge(now, enforce)
         bench.now += 1.0
 
     bench.log.clear()
     with monkeypatch.context() as patched:
-        patched.setattr(type(bench.plant), "on_time", lambda _, now: judge_and_stand_still(now))
+        patched.setattr(
+            type(bench.plant), "on_time", lambda _, now, enforce: judge_and_stand_still(now, enforce)
+        )
         bench.write(control_word=0x047F, setpoint_1=0x2100)
     bench.run(0.5)
     assert bench.sent(RPDO1)

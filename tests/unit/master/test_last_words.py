@@ -106,7 +106,7 @@ def moving(folder: Path, mapping: str, kind: int, *, node: str = "", bus: str = 
     bench.run(2.5)
     (name, *_) = bench.plant.drives
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, name, Start(direction=0)), bench.now, outcomes.append)
+    bench.view.submit(Request(PLC, name, Start(direction=0)), outcomes.append)
     bench.run(3.1)
     assert [outcome.ok for outcome in outcomes] == [True], outcomes
     bench.write(name, setpoint_1=400 if mapping.startswith("cia402/") else 0x1000)

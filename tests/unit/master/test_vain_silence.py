@@ -68,7 +68,7 @@ class Silent(Bench):
     def set(self, parameter: str, value: float, identity: Identity = ENGINEER) -> Outcome:
         outcomes: list[Outcome] = []
         request = Request(identity, self.name, WriteParameter(parameter=parameter, value=value))
-        self.plant.submit(request, self.now, outcomes.append)
+        self.view.submit(request, outcomes.append)
         self.run(0.5)
         (outcome,) = outcomes
         return outcome

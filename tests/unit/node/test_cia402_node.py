@@ -76,7 +76,7 @@ def word(frame: Frame) -> int:
 
 def start(bench: Bench) -> None:
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, DRIVE, Start()), bench.now, outcomes.append)
+    bench.view.submit(Request(PLC, DRIVE, Start()), outcomes.append)
     bench.run(0.2)
     assert [outcome.code for outcome in outcomes] == [Code.OK]
     assert state(bench) is DriveState.OPERATION_ENABLED
@@ -438,7 +438,7 @@ def test_a_start_after_a_quick_stop_enables_again(booted, option: int) -> None:
     bench.ask(Action.QUICK_STOP, DRIVE)
     keep_alive(bench, 2.0)
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, DRIVE, Start()), bench.now, outcomes.append)
+    bench.view.submit(Request(PLC, DRIVE, Start()), outcomes.append)
     keep_alive(bench, 2.0)
     assert [outcome.code for outcome in outcomes] == [Code.OK]
     assert state(bench) is DriveState.OPERATION_ENABLED

@@ -72,7 +72,7 @@ def bench(tmp_path: Path, spin: Spin) -> Bench:
 def ask(bench: Bench, action: Action) -> Code:
     """The code of the outcome, and a moment for the drive to do it."""
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, DRIVE, command_of(action)), bench.now, outcomes.append)
+    bench.view.submit(Request(PLC, DRIVE, command_of(action)), outcomes.append)
     bench.run(0.2)
     (outcome,) = outcomes
     return outcome.code

@@ -99,7 +99,7 @@ def start(bench: Bench) -> None:
     bench.run(2.5)
     outcomes: list[Outcome] = []
     (name, *_) = bench.plant.drives
-    bench.plant.submit(Request(PLC, name, Start()), bench.now, outcomes.append)
+    bench.view.submit(Request(PLC, name, Start()), outcomes.append)
     bench.run(1.0)
     assert [outcome.ok for outcome in outcomes] == [True], outcomes
     assert is_running(bench.node)

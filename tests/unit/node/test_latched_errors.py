@@ -67,7 +67,7 @@ def begin(bench: LatchingBench) -> None:
     bench.run(2.5)
     (name, *_) = bench.plant.drives
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, name, Start()), bench.now, outcomes.append)
+    bench.view.submit(Request(PLC, name, Start()), outcomes.append)
     bench.run(1.0)
     assert [outcome.ok for outcome in outcomes] == [True], outcomes
     assert is_running(bench.slave.node)
@@ -264,7 +264,7 @@ def happen(bench: LatchingBench, event: str) -> None:
         case "disturb":
             bench.disturb()
         case "start the drive":
-            bench.plant.submit(Request(PLC, "n/drive", Start()), bench.now, lambda outcome: None)
+            bench.view.submit(Request(PLC, "n/drive", Start()), lambda outcome: None)
         case "unplug" | "plug":
             bench.cut = event == "unplug"
         case "power cycle":

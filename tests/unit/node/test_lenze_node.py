@@ -104,7 +104,7 @@ def test_it_follows_the_setpoint_and_stops(booted) -> None:
 def test_start_leads_to_operation_enabled(booted) -> None:
     bench = booted()
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, DRIVE, Start()), bench.now, outcomes.append)
+    bench.view.submit(Request(PLC, DRIVE, Start()), outcomes.append)
     bench.run(0.2)
     assert [outcome.code for outcome in outcomes] == [Code.OK]
     assert bench.node.drive.state is DeviceState.OPERATION_ENABLED

@@ -37,9 +37,7 @@ class Parameters:
     def begin(self, action: Action, identity: Identity = ENGINEER, **more: Any) -> list[Outcome]:
         outcomes: list[Outcome] = []
         target = more.pop("target", "conveyor/fu1")
-        self.bench.plant.submit(
-            Request(identity, target, command_of(action, **more)), self.bench.now, outcomes.append
-        )
+        self.bench.view.submit(Request(identity, target, command_of(action, **more)), outcomes.append)
         return outcomes
 
     def ask(self, action: Action, identity: Identity = ENGINEER, **more: Any) -> Outcome:
@@ -96,7 +94,7 @@ def test_a_parameter_that_the_drive_does_not_have_brings_its_abort_code(paramete
     outcome = parameters.ask(READ, parameter="P999")
     assert (outcome.code, outcome.abort_code) == (Code.REFUSED_BY_DRIVE, 0x0602_0000)
     assert "object does not exist" in outcome.message
-    assert parameters.bench.plant.drives["conveyor/fu1"].sdo_abort_code == 0x0602_0000
+    assert parameters.bench.value("conveyor/fu1/supervision/sdo_abort_code") == 0x0602_0000
 
 
 def test_several_who_read_at_once_share_one_answer(parameters: Parameters) -> None:

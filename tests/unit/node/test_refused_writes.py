@@ -72,7 +72,7 @@ def test_it_counts_once_and_is_one_event(bench: Bench, what: str) -> None:
     before = bench.number("bridge/refused_writes")
     bench.events.clear()
     outcomes: list[Outcome] = []
-    bench.plant.submit(REFUSED[what], bench.now, outcomes.append)
+    bench.view.submit(REFUSED[what], outcomes.append)
     bench.run(1.0)
     (outcome,) = outcomes
     assert not outcome.ok
@@ -94,6 +94,6 @@ def test_reading_counts_for_nothing(bench: Bench) -> None:
     before = bench.number("bridge/refused_writes")
     for drive, name in ((FU1, "P9999"), ("attic/fu9", "P102"), ("conveyor/fu2", "P102")):
         request = Request(PLC, drive, ReadParameter(parameter=name))
-        bench.plant.submit(request, bench.now, lambda outcome: None)
+        bench.view.submit(request, lambda outcome: None)
     bench.run(1.0)
     assert bench.number("bridge/refused_writes") == before

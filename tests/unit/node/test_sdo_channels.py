@@ -70,13 +70,13 @@ def test_a_drive_that_is_away_leaves_the_others_in_service(tmp_path: Path) -> No
     bench.run(2.0)
     assert full_of(bench, "conveyor/fu2") == 50.0
     assert str(bench.value("conveyor/node/boot_status")).startswith("ok")
-    drives = bench.plant.drives
-    codes = [drive.sdo_abort_code for drive in drives.values()]
+    names = [f"{drive}/supervision/sdo_abort_code" for drive in bench.plant.drives]
+    codes = [bench.value(name) for name in names]
     assert codes == [0, 0], "what the bridge itself was refused is nothing that a client asked for"
     reader = Request(Identity(Source.MODBUS, "10.0.0.1"), "conveyor/fu2", ReadParameter("P102"))
-    bench.plant.submit(reader, bench.now, lambda outcome: None)
+    bench.view.submit(reader, lambda outcome: None)
     bench.run(1.0)
-    assert [drive.sdo_abort_code for drive in drives.values()] == [0, 0x0606_0000]
+    assert [bench.value(name) for name in names] == [0, 0x0606_0000]
 
 
 def test_both_channels_of_a_node_are_asked_at_the_same_time(tmp_path: Path) -> None:

@@ -162,7 +162,7 @@ def test_a_fault_is_told_by_its_event_and_acknowledged(bench: Bench):
 def test_start_and_release(bench: Bench):
     bench.write(velocity=300.0, drive=DRIVE_1)
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, DRIVE_1, Start()), bench.now, outcomes.append)
+    bench.view.submit(Request(PLC, DRIVE_1, Start()), outcomes.append)
     bench.run(0.15)
     assert [outcome.code for outcome in outcomes] == [Code.OK]
     assert bench.node.axes[0].state is AxisState.ENABLED

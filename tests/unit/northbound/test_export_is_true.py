@@ -30,11 +30,11 @@ from bridge.command.rights import rights_of
 from bridge.config import load_site
 from bridge.image import Point
 from bridge.mapping import family_names
-from bridge.northbound.modbus.dispatch import Dispatcher
-from bridge.northbound.modbus.registers import STOP, Row, Table, bridge_rows, drive_maps
+from bridge.northbound.modbus.registers import STOP, Row, Table, drive_maps, units_of
 from tests.support import sites
 from tests.support.bench import Bench
 from tests.support.rig import ENABLE, SHUT_DOWN
+from tests.support.views import dispatcher_of
 
 NOT_ALLOWED: Final = (0x01, 0x02, 0x0A)
 """Exceptions that say that this is never written here, by this client."""
@@ -91,7 +91,7 @@ class Client:
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
-        self._dispatcher = Dispatcher(bench.plant, "ABCD", lambda: bench.now)
+        self._dispatcher = dispatcher_of(bench.plant, lambda: bench.now, view=bench.view)
         assert bench.plant.site.modbus is not None
         sets = bench.plant.site.modbus.parameters == "write"
         self._who = Identity(Source.MODBUS, "10.0.0.5", address="10.0.0.5:4000", sets_parameters=sets)
@@ -158,7 +158,7 @@ class Asker:
 
     def ask(self, request: Request) -> Outcome:
         outcomes: list[Outcome] = []
-        self._bench.plant.submit(request, self._bench.now, outcomes.append)
+        self._bench.view.submit(request, outcomes.append)
         self._bench.run(0.0 if outcomes else 1.0)
         (outcome,) = outcomes
         return outcome
@@ -202,7 +202,7 @@ def test_every_row_says_what_it_is(mapping: str) -> None:
         sites.bus(sites.node(sites.drive(family.slot[0].name, "modbus", 0, ""), mapping=mapping))
     )
     plant: Plant = sites.plant_of(text, mapping)
-    rows = list(itertools.chain(bridge_rows(plant), *(one.rows for one in drive_maps(plant))))
+    rows = list(itertools.chain(units_of(plant).bridge_rows, *(one.rows for one in drive_maps(plant))))
     assert [row.name for row in rows if not row.description] == []
     assert [point.name for point in plant.image.points if not point.description] == []
     bits = [row for row in rows if row.type == "bool"]

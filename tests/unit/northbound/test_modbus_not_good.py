@@ -17,11 +17,11 @@ from bridge.command.actual import FurtherTpdo
 from bridge.command.link import NodeState
 from bridge.image import Quality
 from bridge.mapping import family_names
-from bridge.northbound.modbus.dispatch import Dispatcher
 from bridge.northbound.modbus.registers import DriveMap
 from tests.support import sites
 from tests.support.invented import SPIN, spin_bench, spindle
 from tests.support.modbus_site import PLC
+from tests.support.views import dispatcher_of
 
 UNIT = 1
 DEADLINE_S = 0.1
@@ -36,7 +36,7 @@ class Reader:
     """What a PLC reads of unit 1."""
 
     def __init__(self, plant: Plant, clock: list[float]) -> None:
-        self._dispatcher = Dispatcher(plant, "ABCD", lambda: clock[0])
+        self._dispatcher = dispatcher_of(plant, lambda: clock[0])
         self.map = DriveMap(plant.by_unit[UNIT])
 
     def read(self, start: int, count: int) -> list[int]:

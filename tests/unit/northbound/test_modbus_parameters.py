@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from bridge.command import Identity, Role, Source
-from bridge.northbound.modbus.dispatch import Dispatcher
 from bridge.northbound.modbus.pdu import ExceptionCode
 from bridge.northbound.modbus.registers import PARAMETERS, DriveMap, Table
 from bridge.sim.nord_supervision import Presence
 from tests.support.bench import Bench, write_site
+from tests.support.views import dispatcher_of
 
 PLC = Identity(Source.MODBUS, "10.0.0.1", Role.OPERATOR, sets_parameters=True)
 UNIT = 1
@@ -24,7 +24,7 @@ class Station:
     def __init__(self, folder: Path) -> None:
         self.bench = Bench(write_site(folder))
         self.bench.run(SETTLED_S)
-        self.dispatcher = Dispatcher(self.bench.plant, "ABCD", lambda: self.bench.now)
+        self.dispatcher = dispatcher_of(self.bench.plant, lambda: self.bench.now, view=self.bench.view)
         self.map = DriveMap(self.bench.plant.by_unit[UNIT])
 
     def place(self, name: str) -> int:
@@ -93,7 +93,7 @@ def test_who_may_not_set_parameters_is_exception_01(station: Station) -> None:
 def test_a_value_that_was_never_read_is_not_served(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path), present=False)
     bench.run(1.0)
-    dispatcher = Dispatcher(bench.plant, "ABCD", lambda: bench.now)
+    dispatcher = dispatcher_of(bench.plant, lambda: bench.now, view=bench.view)
     answers: list[bytes] = []
     dispatcher.handle(UNIT, struct.pack(">BHH", 3, PARAMETERS, 2), PLC, answers.append)
     assert answers == [bytes((0x83, ExceptionCode.NOT_RESPONDING))]

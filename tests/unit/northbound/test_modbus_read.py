@@ -14,7 +14,7 @@ from bridge.config import WordOrder
 from bridge.drive import OwnJudgement
 from bridge.northbound.modbus.dispatch import EXCEPTIONS
 from bridge.northbound.modbus.pdu import PDU_MOST, Identify, identification_answer
-from bridge.northbound.modbus.registers import DriveMap, Table, Words32, bridge_rows, drive_maps
+from bridge.northbound.modbus.registers import DriveMap, Table, Words32, drive_maps, units_of
 from bridge.northbound.modbus.unit import BridgeUnit
 from tests.support import sites
 from tests.support.modbus_site import (
@@ -28,6 +28,7 @@ from tests.support.modbus_site import (
     make_plant,
 )
 from tests.support.rig import emergency
+from tests.support.views import view_of
 
 NO_FUNCTION, NO_ADDRESS, BAD_VALUE, NOT_CONFIGURED, NOT_RESPONDING = -1, -2, -3, -0x0A, -0x0B
 
@@ -35,7 +36,7 @@ NO_FUNCTION, NO_ADDRESS, BAD_VALUE, NOT_CONFIGURED, NOT_RESPONDING = -1, -2, -3,
 def test_input_registers_of_a_running_drive():
     rig = Rig()
     rig.runs(ENABLED, 0x2000, 0x1234, 0xC000)
-    rig.fu1.sdo_abort_code = 0x06020000
+    rig.fu1.on_sdo_refused(0x06020000, rig.now)
     rig.fu1.channel.on_emcy(emergency(0x8100), rig.now)
     rig.write(0, 0x047E)
     rig.now += 0.050
@@ -127,7 +128,7 @@ def test_a_32_bit_value_is_not_read_by_halves(start: int, count: int):
 def test_word_order_of_the_site(order: WordOrder, expected: list[int]):
     rig = Rig(order)
     rig.runs(ENABLED, 0x2000)
-    rig.fu1.sdo_abort_code = 0x41C80000
+    rig.fu1.on_sdo_refused(0x41C80000, rig.now)
     assert rig.read(4, 32, 2) == expected
     assert rig.read(4, 18, 2) == expected
     assert rig.write(0, 0x047E) == 0
@@ -278,8 +279,22 @@ def test_a_node_that_is_out_of_service_says_nothing_of_the_module():
     plant.set("bus/can0/state", 0, 100.0)
     plant.on_node(plant.nodes["conveyor"], NodeState.OPERATIONAL, 100.0)
     plant.on_node(plant.nodes["spare"], NodeState.DISABLED, 100.0)
-    (state,) = BridgeUnit(plant).read_words(Table.INPUT_REGISTER, 0, 1, PLC, 100.0)
+    unit = BridgeUnit(units_of(plant), view_of(plant, lambda: 100.0))
+    (state,) = unit.read_words(Table.INPUT_REGISTER, 0, 1, PLC)
     assert state == 0x02, "operational, and nothing else"
+
+
+def test_a_node_whose_first_drive_has_no_process_data_is_not_in_operation():
+    rig = Rig()
+    rig.plant.set("bus/can0/state", 0, 100.0)
+    node = rig.plant.nodes["conveyor"]
+    rig.plant.on_node(node, NodeState.OPERATIONAL, 100.0)
+    assert rig.read(4, 0, 1, 255)[0] & 0x03 == 0x02
+    node.drives[1].channel.on_node(NodeState.CONFIG_ERROR, 100.0)
+    assert rig.read(4, 0, 1, 255)[0] & 0x03 == 0x02, "the first one has them"
+    node.drives[0].channel.on_node(NodeState.CONFIG_ERROR, 100.0)
+    assert rig.read(4, 0, 1, 255)[0] & 0x03 == 0x01, "starting"
+    assert rig.plant.image.read("conveyor/node/state").value == 6
 
 
 # exceptions
@@ -445,7 +460,8 @@ def test_the_list_is_complete_and_without_overlap():
     access = {(m.unit_id, r.name): r.access for m in drive_maps(plant) for r in m.rows}
     assert access[1, "supervision/fieldbus_timeout_ms"] == "r"
     assert access[9, "supervision/fieldbus_timeout_ms"] == "rw"
-    assert [row.name for row in bridge_rows(plant)][-3:] == ["conveyor/fu1", "conveyor/fu2", "conveyor/fu3"]
+    bridge = units_of(plant).bridge_rows
+    assert [row.name for row in bridge][-3:] == ["conveyor/fu1", "conveyor/fu2", "conveyor/fu3"]
 
 
 def test_every_listed_register_can_be_read():

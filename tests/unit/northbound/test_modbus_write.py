@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.command import Code, Event, Identity, Kind, Outcome, Plant, Reply, Request, Write
+from bridge.command import Code, Event, Identity, Kind, Outcome, PlantView, Reply, Request, Write
 from tests.support.modbus_site import (
     ENABLED,
     OTHER_PLC,
@@ -30,15 +30,15 @@ def rig() -> Rig:
 
 
 def requests_of(rig: Rig) -> list[Request]:
-    """Every request that reaches the plant from now on."""
+    """Every request that is made from now on."""
     seen: list[Request] = []
-    submit = rig.plant.submit
+    submit = rig.view.submit
 
-    def spy(request: Request, now: float, reply: Reply) -> None:
+    def spy(request: Request, reply: Reply) -> None:
         seen.append(request)
-        submit(request, now, reply)
+        submit(request, reply)
 
-    rig.plant.submit = spy  # pyright: ignore[reportAttributeAccessIssue]
+    rig.view.submit = spy  # pyright: ignore[reportAttributeAccessIssue]
     return seen
 
 
@@ -426,10 +426,10 @@ def test_coils_are_bits_of_the_control_word(rig: Rig):
 def test_a_late_outcome_is_answered_when_it_comes(rig: Rig, monkeypatch: pytest.MonkeyPatch):
     waiting: list[Reply] = []
 
-    def submit(self: Plant, request: Request, now: float, reply: Reply) -> None:
+    def submit(self: PlantView, request: Request, reply: Reply) -> None:
         waiting.append(reply)
 
-    monkeypatch.setattr(Plant, "submit", submit)
+    monkeypatch.setattr(PlantView, "submit", submit)
     answers: list[bytes] = []
     pdu = struct.pack(">BHHB11H", 16, 0, 11, 22, 0x047E, *[0] * 9, 1)
     rig.dispatcher.handle(1, pdu, OTHER_PLC, answers.append)

@@ -10,12 +10,12 @@ import pytest
 
 from bridge.canopen.frame import Frame
 from bridge.errands.decode import Decoder
-from bridge.northbound.modbus.dispatch import Dispatcher
 from bridge.northbound.modbus.registers import DriveMap, Table
 from bridge.northbound.opcua.nodes import ObjectNode, VariableKind, VariableNode, layout
 from bridge.northbound.zenoh.keys import KeySpace
 from tests.support.bench import PLC, Bench
 from tests.support.invented import NAME, command, spin_bench, spindle
+from tests.support.views import dispatcher_of
 
 DRIVE = "spindle/drive"
 
@@ -69,7 +69,7 @@ def test_modbus_has_two_registers_of_the_right_type_for_each(bench: Bench) -> No
 
 def test_modbus_writes_an_enumeration_as_a_number(bench: Bench) -> None:
     rows = {row.name: row for row in DriveMap(bench.plant.drives[DRIVE]).rows}
-    dispatcher = Dispatcher(bench.plant, "ABCD", lambda: bench.now)
+    dispatcher = dispatcher_of(bench.plant, lambda: bench.now, view=bench.view)
     answers: list[bytes] = []
     for number, code in ((3, 0x10), (2, 0x90)):
         pdu = struct.pack(">BHHBI", 16, rows["command/mode"].address, 2, 4, number)

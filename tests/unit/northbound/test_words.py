@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from bridge.command import Code, Identity, Outcome, Plant, Request, Source, Write
 from bridge.command.link import NodeState
 from bridge.image import Value
-from bridge.northbound.modbus.dispatch import Dispatcher
 from bridge.northbound.opcua.values import point_value
 from bridge.northbound.zenoh.commands import BadCommand, Commands
 from tests.support import sites
+from tests.support.views import dispatcher_of
 
 SITE = sites.site(
     sites.bus(
@@ -144,7 +144,7 @@ def test_zenoh_bare(payload: str):
 def test_modbus_whose_registers_are_words(word: int, leaf: str):
     made, drive = plant(), "conveyor/fu1"
     answers: list[bytes] = []
-    dispatcher = Dispatcher(made, "ABCD", lambda: 1.0)
+    dispatcher = dispatcher_of(made, lambda: 1.0)
     pdu = struct.pack(">BHH", 6, LEAVES.index(leaf), word)
     dispatcher.handle(1, pdu, Identity(Source.MODBUS, "10.0.0.5"), answers.append)
     code = Code.NOT_VALID if answers[0][0] & 0x80 else Code.OK

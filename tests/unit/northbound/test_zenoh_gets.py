@@ -8,7 +8,8 @@ from typing import Any, cast
 
 from bridge.config import ZenohTable
 from bridge.northbound.zenoh import ZenohServer
-from tests.support.zenoh_site import epoch, make_plant
+from tests.support.views import view_of
+from tests.support.zenoh_site import make_plant
 
 PLACES = 16
 
@@ -43,7 +44,7 @@ class Get:
 class Hall:
     def __init__(self) -> None:
         self.now = 100.0
-        self._server = ZenohServer(make_plant(), ZenohTable(), "demo", lambda: self.now, epoch)
+        self._server = ZenohServer(view_of(make_plant()), ZenohTable(), "demo", lambda: self.now)
 
     async def ask(self) -> Get:
         get = Get()

@@ -261,7 +261,7 @@ def running(folder: Path, mapping: str) -> tuple[Bench, str]:
     bench.run(2.5)
     (name,) = bench.plant.drives
     outcomes: list[Outcome] = []
-    bench.plant.submit(Request(PLC, name, Start()), bench.now, outcomes.append)
+    bench.view.submit(Request(PLC, name, Start()), outcomes.append)
     bench.run(1.0)
     assert bench.value(f"{name}/status/state") == DriveState.OPERATION_ENABLED
     return bench, name
@@ -279,7 +279,7 @@ def test_a_drive_is_not_made_deaf_by_another_name(tmp_path: Path, mapping: str, 
     for parameter, value, *_ in DEAF[mapping]:
         outcomes: list[Outcome] = []
         request = Request(who, name, WriteParameter(parameter=parameter, value=value))
-        bench.plant.submit(request, bench.now, outcomes.append)
+        bench.view.submit(request, outcomes.append)
         bench.run(0.5)
         (outcome,) = outcomes
         assert outcome.code is Code.NOT_ALLOWED

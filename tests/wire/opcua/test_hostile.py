@@ -43,6 +43,7 @@ from tests.support.opcua_site import (
     status_of,
 )
 from tests.support.quiet import quiet_log
+from tests.support.views import view_of
 from tests.support.zenoh_peer import until
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -383,7 +384,7 @@ async def test_what_a_front_refuses_does_not_end_it() -> None:
     plant = make_plant()
     with tempfile.TemporaryDirectory(prefix="db-") as folder:
         endpoint = socket_endpoint(Path(folder) / "run", "demo")
-        publisher = MirrorPublisher(plant, endpoint, time.monotonic, lambda t: int(t * 1e9))
+        publisher = MirrorPublisher(view_of(plant), endpoint, time.monotonic)
         await publisher.start()
         mirror = MirrorClient(endpoint)
         await mirror.open()

@@ -14,13 +14,14 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from bridge.command.link import NodeState
 from bridge.mirror import MirrorPublisher
+from tests.support.views import view_of
 from tests.support.zenoh_site import ENABLED, drive_says, epoch, make_plant, node_is
 
 
 async def main() -> None:
     endpoint, *node = sys.argv[1:]
     plant = make_plant(*node)
-    publisher = MirrorPublisher(plant, endpoint, time.monotonic, epoch)
+    publisher = MirrorPublisher(view_of(plant, epoch_ns=epoch), endpoint, time.monotonic)
     await publisher.start()
     node_is(plant, NodeState.OPERATIONAL)
     print("ready", flush=True)

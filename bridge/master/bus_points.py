@@ -1,0 +1,58 @@
+"""What a CAN controller says of itself and of its bus, as points and events. Sans-IO."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.can.interface import BusStatus
+from bridge.command import Event, Kind, Plant
+from bridge.config import BusTable
+from bridge.ratelimit import RateLimit
+
+_LOAD_PERIOD_S: Final = 1.0
+_ERRORS_EVERY_S: Final = 10.0
+"""A broken wire gives thousands of error frames a second: one line reports all of them."""
+
+
+class BusPoints:
+    def __init__(self, bus: BusTable, plant: Plant) -> None:
+        self._bus = bus
+        self._plant = plant
+        self._measured: tuple[float, int] | None = None
+        self._errors_told = 0
+        self._error_limit = RateLimit(1, _ERRORS_EVERY_S)
+
+    def refresh(self, status: BusStatus, now: float) -> None:
+        """A few times a second."""
+        values = {
+            "state": int(status.state),
+            "tx_errors": status.tx_errors,
+            "rx_errors": status.rx_errors,
+            "frames_lost": status.frames_lost,
+            "frames_expired": status.frames_expired,
+            "error_frames": status.error_frames,
+            "last_error": status.last_error,
+        }
+        for leaf, value in values.items():
+            self._plant.set(f"bus/{self._bus.name}/{leaf}", value, now)
+        self._show_load(status, now)
+        self._tell_errors(status, now)
+
+    def _show_load(self, status: BusStatus, now: float) -> None:
+        bits = status.bits
+        if self._measured is None:
+            self._measured = now, bits
+            return
+        since, before = self._measured
+        if now >= since + _LOAD_PERIOD_S:
+            load = 100 * (bits - before) / (now - since) / self._bus.bitrate
+            self._plant.set(f"bus/{self._bus.name}/load", round(min(100.0, load), 1), now)
+            self._measured = now, bits
+
+    def _tell_errors(self, status: BusStatus, now: float) -> None:
+        """Error frames since the last time, in one event."""
+        number = status.error_frames - self._errors_told
+        if number and self._error_limit.allows(now):
+            self._errors_told = status.error_frames
+            what = "an error frame" if number == 1 else f"{number} error frames"
+            self._plant.report(Event(now, Kind.BUS, self._bus.name, 500, f"{what}: {status.last_error}"))

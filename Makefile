@@ -47,18 +47,11 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 	@exec $(IN) -m bridge demo $(ARGS)
 
 ##@ Test
-# The others wait for a drive or a client half of their time, and unit tests take the CPUs meanwhile.
-ifeq ($(FEW_JOBS),2)
-test: compiled packages clients ## all tests: unit beside lab, wire and a short fuzzing (10 minutes on two CPUs)
-	@tools/side-by-side -b unit "lab wire fuzz-short"
-else
-test: unit lab wire fuzz-short
-endif
+test: unit wire fuzz-short lab ## all tests: unit, wire, a minute of fuzzing, lab
 
-# Behind the others a test may wait for minutes until it has had its seconds of a CPU.
 unit: $(VENV)/dev.stamp ## tests of the code alone
 	@echo "== unit tests"
-	@$(PYTEST) -n $(JOBS) -o timeout=600 tests/unit $(ARGS)
+	@$(PYTEST) -n $(JOBS) tests/unit $(ARGS)
 
 wire: compiled packages clients ## tests with real protocol clients on loopback
 	@echo "== wire tests"

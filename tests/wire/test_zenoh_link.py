@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -85,6 +86,11 @@ async def test_a_client_waits_for_its_router_and_can_be_closed_meanwhile() -> No
     begin = time.monotonic()
     assert not await hopeless.close(timeout_s=0.3)
     assert time.monotonic() - begin < 1
+    async with link(endpoint):
+        # Its thread ends when zenoh has come to the end of opening.
+        await until(
+            lambda: not any(thread.name == "zenoh-zenoh" for thread in threading.enumerate()), "its end"
+        )
 
 
 async def test_queries_are_answered_from_the_loop() -> None:

@@ -18,7 +18,7 @@ MOST_OF_ADDRESS: Final = 100
 MOST_ITEMS: Final = 100_000
 """Monitored items of all clients together."""
 MOST_ITEMS_OF_ADDRESS: Final = 50_000
-MOST_ON_ONE: Final = 200
+MOST_ON_ONE: Final = 1_000
 """Of one address on one attribute: each is told of every change of it."""
 MOST_LISTENERS: Final = 1_000
 """What the items for events of all clients weigh: each is asked about every event."""

@@ -31,7 +31,7 @@ async def served(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[tupl
     many = [Point(name=f"bus/can0/{n // 50}/{n}", data_type=DataType.UINT32) for n in range(MANY)]
     plant.image = Image([*plant.image.points, *many])
     for drive in plant.drives.values():
-        drive.bind(plant.image)
+        drive.bind(plant.image, time.monotonic())
         drive.refresh(time.monotonic())
     async with serving(OPEN, tmp_path_factory.mktemp("state"), plant) as found:
         yield found

@@ -28,7 +28,7 @@ def _compared(how: Callable[[Any, Any], bool]) -> Callable[..., bool | None]:
             return None
         try:
             return how(left, right)
-        except TypeError:
+        except (TypeError, AttributeError):  # the latter from asyncua's NodeId
             return None
 
     return compare

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from datetime import UTC, datetime
 
 import pytest
@@ -309,6 +310,19 @@ OPERANDS = st.one_of(
     st.just(ua.ExtensionObject()),
 )
 ELEMENTS = st.builds(ua.ContentFilterElement, st.sampled_from(list(Op)), st.lists(OPERANDS, max_size=4))
+
+
+KINDS = [
+    *(None, True, 1, 1.5, "x", b"x", datetime(2026, 1, 1, tzinfo=UTC), [1, 2]),
+    *(ua.NodeId(Ids.BaseEventType), ua.NodeId("mine", 2), ua.LocalizedText("x"), ua.QualifiedName("x")),
+]
+
+
+@pytest.mark.parametrize("comparison", [Op.Equals, Op.GreaterThan, Op.LessThan, Op.GreaterThanOrEqual])
+def test_any_two_kinds_can_be_compared(types: EventTypes, comparison: ua.FilterOperator) -> None:
+    for left, right in itertools.product(KINDS, KINDS):
+        element = ua.ContentFilterElement(comparison, [literal(left), literal(right)])
+        assert event_filter(asked(element), types).passes(EVENT) in (True, False)
 
 
 @given(st.lists(ELEMENTS, max_size=8))

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draw the watchdog's state table from the code into docs/explanation/dead-man-chain.md.
+"""Draw the table of the controller leg from the code into docs/explanation/dead-man-chain.md.
 
     .venv/bin/python -m tools.state_table
 
@@ -8,39 +8,57 @@ What stands between the two marks is replaced; a test fails where it is not up t
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
-from bridge.command.watchdog import TABLE, Effect, Stimulus, WatchdogState
+from bridge.command.leg.state import MEANING, STARTING, TRIPPED, WAY, Stage
+from bridge.command.leg.table import TABLE, Deed, Stimulus
 
 PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "dead-man-chain.md"
 BEGIN: Final = "<!-- drawn by tools/state_table.py: begin -->"
 END: Final = "<!-- drawn by tools/state_table.py: end -->"
+PARTS: Final = {
+    "Neither tripped nor in a start": WAY,
+    "While a start goes on": STARTING,
+    "While tripped": TRIPPED,
+}
 
 
-def table() -> str:
-    """One row for each event, one column for each state; → names the next state where it is another."""
-    states = [state.label for state in WatchdogState]
-    rows = [["event", *states], ["---"] * (len(states) + 1)]
-    rows += [[stimulus.value, *(_cell(state, stimulus) for state in WatchdogState)] for stimulus in Stimulus]
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows).replace(" --- ", "---")
+def tables() -> str:
+    """What the stages are; then a table for each group of them: one column for each stage, one row for each
+    event that changes one of them or is answered."""
+    parts = [_table([["stage", "what it is"], *([f"**{stage}**", MEANING[stage]] for stage in Stage)])]
+    for heading, group in PARTS.items():
+        stages = [stage for stage in Stage if stage in group]
+        rows = [[stimulus.value, *(_cell(stage, stimulus) for stage in stages)] for stimulus in Stimulus]
+        happens = [row for row in rows if set(row[1:]) != {Deed.NOTHING.value}]
+        parts += [f"### {heading}", _table([["event", *stages], *happens])]
+    return "\n\n".join(parts)
 
 
-def _cell(state: WatchdogState, stimulus: Stimulus) -> str:
-    after, effect = TABLE[state, stimulus]
-    what = "–" if effect is Effect.NOTHING else effect.value
-    return what if after is state else f"→ **{after.label}**: {what}"
+def _table(rows: Iterable[list[str]]) -> str:
+    first, *others = rows
+    return "\n".join(f"| {' | '.join(row)} |" for row in (first, ["---"] * len(first), *others)).replace(
+        " --- ", "---"
+    )
+
+
+def _cell(stage: Stage, stimulus: Stimulus) -> str:
+    """→ names the next stage where it is another."""
+    after, deed = TABLE[stage, stimulus]
+    return deed.value if after is stage else f"→ **{after}**: {deed}"
 
 
 def drawn(text: str) -> str:
-    """``text`` of a page with the table as it is now. Raises ValueError where the page has no marks."""
+    """``text`` of a page with the tables as they are now. Raises ValueError where the page has no marks."""
     before, begin, rest = text.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:
         raise ValueError(f"the page has no line {BEGIN!r} with {END!r} after it")
-    return f"{before}{BEGIN}\n\n{table()}\n\n{END}{after}"
+    return f"{before}{BEGIN}\n\n{tables()}\n\n{END}{after}"
 
 
 if __name__ == "__main__":
     PAGE.write_text(drawn(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
-    print(f"{PAGE.name}: {len(Stimulus)} events, {len(WatchdogState)} states")
+    print(f"{PAGE.name}: {len(Stimulus)} events, {len(Stage)} stages")

@@ -1,34 +1,38 @@
-"""One drive's command channel: requests in, RPDO words and outcomes out.
+"""One drive's command channel: what the bus and the clients say becomes events of the leg, and what comes of
+them becomes outcomes, events and words.
 
-Puts the controller leg and the drive leg of one drive together. Sans-IO: every entry takes ``now``
-(monotonic seconds). A request lets the controller's timers run first, so a telegram that waited in a
-buffer while the process hung cannot save a drive whose time was up. The drive's own timers are judged
-in ``on_time`` alone, which is called after the bus has been drained: a late process must not look like
-a dead drive.
+Sans-IO: every entry takes ``now`` (monotonic seconds). A request lets the controller's timers run first, so a
+telegram that waited in a buffer while the process hung cannot save a drive whose time was up. The drive's own
+timers are judged in ``on_time`` alone, which is called after the bus has been drained: a late process must
+not look like a dead drive.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from bridge.command.controller import ControllerLeg
 from bridge.command.event import Event, Kind
+from bridge.command.leg import event, rules
+from bridge.command.leg.effect import Answer, Effect, Heard, Ignored, StartBegun, StartEnded, Tell, Tripped
+from bridge.command.leg.settings import leg_settings
+from bridge.command.leg.state import AWAITS_REPORT, INTERLOCKED, LegState, Output, WatchdogState, Way
+from bridge.command.leg.step import initial, next_deadline, output_then, step, until, watchdog_state
 from bridge.command.link import Link, NodeState
-from bridge.command.output import Output
-from bridge.command.request import Code, Identity, Outcome, Reply, Request
+from bridge.command.request import Identity, Outcome, Reply, Request
 from bridge.command.status import DriveStatus
-from bridge.command.watchdog import Stimulus, WatchdogState
+from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
-from bridge.drive import DriveState, LinearScale, Told, scale_of
+from bridge.drive import FAULTED, DriveState, LinearScale, Told, scale_of
+from bridge.image import Quality
 from bridge.mapping.model import Family
 
 
 class DriveChannel:
     """The command side of one drive.
 
-    ``report`` gets the events. After any call the caller compares ``output`` and sends it. ``settled``
-    is called when what others may see has changed beyond the status word, before outcomes are told:
-    who reads on an outcome reads what it is about.
+    ``report`` gets the events. After any call the caller compares ``output`` and sends it. ``settled`` is
+    called when what others may see has changed beyond the status word, before outcomes are told: so a client
+    that reads after its outcome sees the new values.
     """
 
     def __init__(
@@ -52,75 +56,97 @@ class DriveChannel:
             if scale is not None:
                 self.scales[value.leaf] = scale
         self.settled: Callable[[float], None] = lambda now: None
-        self._report = report
-        self._status = status = DriveStatus(family)
         self.link = Link(settings.telegram_downtime_s, hold_ms)
-        self._leg = leg = ControllerLeg(
-            name, family, settings, self.link, status, self.scales, self.unserved, self._tell
-        )
-        self.authority = leg.authority
-        self.watchdog = leg.watchdog
-        self.words = leg.words
-        self._gate = leg.gate
+        self._report = report
+        self._status = DriveStatus(family)
+        decode = TelegramDecoder(
+            name, family, family.slot_named(settings.slot), self.scales, self.unserved
+        ).decode
+        self.leg_settings = leg_settings(family, settings, decode)
+        self.words = self.leg_settings.words
+        self.leg = initial(self.leg_settings)
+        """The state of the leg."""
+        self._followed = frozenset(source for _, source in self.leg_settings.follows)
+        self._why_lacking: Callable[[frozenset[int], float], str] = lambda places, now: ""
+        self._tripped: Callable[[float], None] = lambda due: None
+        self._start_reply: Reply | None = None
+        self.trips = 0
+        self.refused_writes = 0
+        self.telegrams = 0
+        """Number of the last valid telegram, modulo 2¹⁶: a witness outside sees by it that one came."""
 
     def look_up(self, why_lacking: Callable[[frozenset[int], float], str]) -> None:
         """Ask this why actual words, by their places in ``process.tpdo``, are not known at a time; it says
         nothing where they are."""
-        self._leg.why_lacking = why_lacking
+        self._why_lacking = why_lacking
 
     def on_trip(self, tripped: Callable[[float], None]) -> None:
         """Call this with the deadline whenever the watchdog trips."""
-        self._leg.tripped = tripped
+        self._tripped = tripped
 
     # what others may see
 
     @property
     def output(self) -> Output:
         """The words that belong on the bus now."""
-        return self._gate.sent
+        return self.leg.sent
 
     @property
     def until(self) -> float | None:
         """Until when ``output`` may be on the bus if nothing more is heard of the owner; None where no time
         ends it."""
-        return self._leg.until
+        return until(self.leg_settings, self.leg)
 
     def output_then(self) -> Output:
         """What belongs on the bus from ``until`` on."""
-        return self._leg.output_then()
+        return output_then(self.leg_settings, self.leg)
 
     @property
     def control_word(self) -> int:
-        return self._leg.control_word
+        """The owner's control word, or what was led or stopped with since; the acknowledge bit is always as
+        the owner wrote it, so that whoever changes a bit beside it makes no edge of it."""
+        return self.leg.word | (self.words.acknowledge_mask if self.leg.edges.bit else 0)
 
     @property
     def setpoints(self) -> tuple[int, ...]:
-        return self._gate.setpoints
+        return self.leg.setpoints
 
     @property
     def silence_stops(self) -> bool:
         """The drive is known to stop by itself when it gets no RPDO any more, or nobody has asked it yet."""
-        return self._gate.silence_stops
+        return self.leg.silence_stops
 
     @property
     def restart_interlock(self) -> bool:
-        return self._gate.interlocked
+        return self.leg.stage in INTERLOCKED
 
     @property
     def owner(self) -> Identity | None:
-        return self.authority.owner
+        return self.leg.owner.identity
 
     @property
-    def trips(self) -> int:
-        return self._leg.trips
+    def watchdog_state(self) -> WatchdogState:
+        return watchdog_state(self.leg_settings, self.leg)
 
     @property
-    def refused_writes(self) -> int:
-        return self._leg.refused_writes
+    def controller_is_silent(self) -> bool:
+        """No valid telegram for longer than the time-out, after there had been one."""
+        return self.leg.timer.is_silent
+
+    @property
+    def timeout_ms(self) -> int:
+        return self.leg.timer.timeout_ms
+
+    def left_ms(self, now: float) -> int:
+        """Time until the trip; 0 when the timer does not run."""
+        deadline = self.leg.timer.deadline
+        if deadline is None or self.watchdog_state is not WatchdogState.RUNNING:
+            return 0
+        return max(0, round((deadline - now) * 1000))
 
     @property
     def is_tripped(self) -> bool:
-        return self.watchdog.state is WatchdogState.TRIPPED
+        return self.leg.stage.is_tripped
 
     @property
     def drive_status_word(self) -> int:
@@ -131,9 +157,7 @@ class DriveChannel:
     def status_word(self) -> int:
         """The status word as served: *fault* while tripped, as a bus interface would show it."""
         status = self._status
-        if self.watchdog.state is WatchdogState.TRIPPED:
-            return status.words.as_fault(status.word)
-        return status.word
+        return status.words.as_fault(status.word) if self.is_tripped else status.word
 
     @property
     def state(self) -> DriveState:
@@ -142,7 +166,7 @@ class DriveChannel:
 
     @property
     def served_state(self) -> DriveState:
-        return DriveState.FAULT if self.watchdog.state is WatchdogState.TRIPPED else self._status.state
+        return DriveState.FAULT if self.is_tripped else self._status.state
 
     @property
     def emcy_code(self) -> int:
@@ -166,154 +190,196 @@ class DriveChannel:
     def fault_text(self) -> str:
         return self._status.fault_text(self._bridge_fault)
 
+    def refusal(self, identity: Identity) -> str:
+        """Why ``identity`` may not command the drive, whose owner is there; empty where it may."""
+        return rules.refusal(self.settings.control, self.leg.owner, identity, owner_is_silent=False)
+
     # from the drive
 
     def on_own_watch(self, why_not: str, now: float) -> None:
         """Whether the drive stops by itself when it gets no RPDO any more: ``why_not``, or an empty text."""
         stops = not why_not
-        if stops is self._gate.silence_stops:
+        if stops is self.leg.silence_stops:
             return
-        self._gate.silence_stops = stops
         if why_not and self.settings.falls_silent:
             message = f"silence does not stop the drive, it gets disable voltage instead: {why_not}"
             self._tell(now, Kind.WATCHDOG, 700, message)
-        self._settle(now)
+        self._happen(event.OwnWatch(stops), now)
 
     def on_status_word(self, word: int, now: float) -> None:
         """A TPDO brought this status word."""
-        status = self._status
-        status.word = word
+        status, leg, handshake = self._status, self.leg, self.leg_settings.handshake
         state = status.words.state(word)
-        is_awaited = self._gate.on_status_word(word)
-        if state is status.state and not (is_awaited or self._gate.awaits_rest):
-            self._on_same_state(now)
-            return
-        status.state = state
-        self._gate.on_state(state)
-        self._leg.start.on_state(state, now, self.fault_text)
-        self._settle(now)
-
-    def _on_same_state(self, now: float) -> None:
-        start = self._leg.start
-        if start.awaits_report:
-            start.on_report(self._status.state, now)
-            self._settle(now)
+        is_taken = handshake is not None and bool(word & handshake.acknowledged)
+        is_news = state is not leg.drive or (handshake is not None and word != status.word)
+        status.word = word
+        if is_news or leg.stage in AWAITS_REPORT or leg.trip.ramps_until is not None:
+            status.state = state
+            text = self.fault_text if state in FAULTED else ""
+            self._happen(event.Report(state, is_taken, text), now)
 
     def on_unchanged(self, now: float) -> None:
         """A TPDO arrived that says what the last one said."""
         self.on_pdo(now)
-        self._on_same_state(now)
+        if self.leg.stage in AWAITS_REPORT:
+            self._happen(event.Report(self.leg.drive, self.leg.is_taken), now)
 
     def on_actual_words(self, words: Sequence[int], now: float) -> None:
         """What TPDOs have brought, the status word first, in the order of ``process.tpdo``."""
-        if self._gate.follow(words):
-            self._settle(now)
+        follows, rest = self.leg_settings.follows, self.leg.rest
+        if any(rest[place] != words[source] for place, source in follows):
+            self._happen(event.ActualWords(tuple(words)), now)
 
     def on_pdo(self, now: float) -> None:
         """A TPDO arrived; what it says comes after this."""
         if self.link.on_pdo(now):
             self._status.link_fault = 0.0
-            self._settle(now)
+            self._happen(self._way(now), now)
+        elif not self.leg.way.is_heard and self.link.is_heard:
+            self.leg = self.leg._replace(way=self.leg.way._replace(is_heard=True))
 
     def on_emcy(self, told: Told, now: float) -> None:
         """An emergency message about this drive."""
         self._status.on_emcy(told)
         severity = 100 if told.is_gone else 700
         self._tell(now, Kind.EMERGENCY, severity, f"emergency {told.code:04X}h: {told.text}")
-        self._settle(now)
+        self.settled(now)
 
     def on_drive_fault(self, current: float | None, last: float | None, now: float) -> None:
         """The drive has been asked for its present and its last fault; None for what it did not tell."""
         if self._status.on_drive_fault(current, last):
-            self._settle(now)
+            self.settled(now)
 
     def on_node(self, state: NodeState, now: float) -> None:
         """The node behind the drive is in another state now."""
         before = self.link.node
         self.link.on_node(state, now)
         if state is not before:
-            if state is NodeState.OPERATIONAL:
-                # It may have been switched off and on: whatever it was told before does not count.
-                self._gate.interlocked = True
-                self._leg.start.end(Outcome(Code.CANCELLED, "the node has restarted"))
             if state in (NodeState.OPERATIONAL, NodeState.DISABLED):
                 self._status.link_fault = 0.0
             if state is NodeState.LOST:
                 self._link_is_lost(self.family.faults.node_missing, "the node is lost", now)
-        self._settle(now)
+            if state is NodeState.OPERATIONAL:
+                self._happen(event.NodeBack(), now)
+        self._happen(self._way(now), now)
 
     def _link_is_lost(self, fault: float, reason: str, now: float) -> None:
         self._status.link_fault = self._status.last_fault = fault
         self._tell(now, Kind.WATCHDOG, 700, f"{self.family.faults.prefix}{fault:.1f}: {reason}")
 
+    def _way(self, now: float) -> Way:
+        link = self.link
+        why = ""
+        if link.is_expired:
+            why = link.reason(Quality.LOST)
+        elif not link.may_enable:
+            why = f"the drive's node is {link.node.value}"
+        return Way(link.may_enable, why, self._why_unplaced(now), link.is_heard)
+
+    def _why_unplaced(self, now: float) -> str:
+        if not self._followed:
+            return ""
+        quality = self.link.quality(now)
+        why = self.link.reason(quality)
+        if quality is Quality.GOOD:
+            why = self._why_lacking(self._followed, now)
+        return f"the drive's own position is not known: {why}" if why else ""
+
     # time
 
     def on_time(self, now: float) -> None:
         """Let everything happen that is due by ``now``. Call it when the bus has been drained."""
-        self._leg.judge(now)
-        if self.link.on_time(now):
-            self._link_is_lost(self.family.faults.telegram_downtime, "no process data from the drive", now)
-        self._leg.start.on_time(self._status.state, now)
-        self._settle(now)
+        is_lost = self.link.on_time(now)
+        self._happen(event.Time(self._way(now)), now, is_lost=is_lost)
 
     def next_deadline(self, now: float) -> float | None:
         """When ``on_time`` is to be called; ``now`` where something is due already, None for never."""
-        earliest = self.link.next_deadline()
-        for time in self._leg.next_deadlines():
-            if time is not None and (earliest is None or time < earliest):
-                earliest = time
-        return None if earliest is None else max(earliest, now)
+        of_link, of_leg = self.link.next_deadline(), next_deadline(self.leg)
+        if of_link is None:
+            return None if of_leg is None else max(of_leg, now)
+        return max(of_link if of_leg is None else min(of_link, of_leg), now)
 
     def on_bridge_gap(self, now: float) -> None:
         """The bridge itself was not there for longer than the dead-man time: start as if anew."""
-        self._leg.judge(now)
-        if self.is_tripped:
-            # Still tripped; but a "hold" does not outlive the one who held.
-            self._gate.stop(self.words.stop(self._gate.sent.words[0]))
-        else:
-            self._leg.leave(Stimulus.STARTED, now)
-        self._settle(now)
+        self._happen(event.BridgeGap(), now)
 
     def start_anew(self, now: float) -> None:
         """The bus was gone, or the node was stopped or has restarted: whatever the drive was told does not
         count any more, not even where communication errors are ignored."""
-        self._leg.start.end(Outcome(Code.CANCELLED, "the drive has to be enabled anew"))
-        self._gate.stop(self.words.stop(self._gate.sent.words[0]))
-        self._settle(now)
-        self._gate.forget()
+        self._happen(event.StartAnew(), now)
 
     # requests
 
     def handle(self, request: Request, now: float, reply: Reply) -> None:
         """Do what ``request`` asks; ``reply`` is called exactly once, now or later."""
-        self._leg.handle(request, now, reply)
-        self._settle(now)
+        self._happen(request, now, reply)
+
+    def on_connection(self, identity: Identity, now: float, *, is_there: bool) -> None:
+        """``identity`` has its first connection, or none any more: no telegram, and no end of control."""
+        self.leg, _ = step(self.leg_settings, self.leg, event.Connection(identity, is_there), now)
 
     def on_refused(self, now: float) -> None:
         """A request about this drive was refused elsewhere, and counts as one that is refused here."""
-        self._leg.refused_writes += 1
+        self.refused_writes += 1
         self.settled(now)
 
-    def _settle(self, now: float) -> None:
-        """The end of every entry: what is sent and seen is brought up to date, then outcomes are told."""
-        leg = self._leg
-        may_enable = leg.may_enable(now)
-        if not may_enable:
-            self._gate.interlocked = True
-            if leg.start.is_going_on:
-                leg.start.end(Outcome(Code.NOT_READY, leg.why_blocked(now)))
-        self._gate.compute(now, may_enable=may_enable)
-        if self._gate.take_untaken():
-            self._tell(
-                now,
-                Kind.REFUSED,
-                500,
-                "the drive has not taken the position that was written: no answer within 1 s",
-            )
+    # what comes of it
+
+    def _happen(
+        self, what: event.Event, now: float, reply: Reply | None = None, *, is_lost: bool = False
+    ) -> None:
+        outcomes: list[tuple[Reply, Outcome]] = []
+        brings_way = isinstance(what, event.Time | Way)
+        if self._followed and not brings_way and self._why_unplaced(now) != self.leg.way.why_unplaced:
+            outcomes = self._take_in(*step(self.leg_settings, self.leg, self._way(now), now), now, None)
+        outcomes += self._take_in(*step(self.leg_settings, self.leg, what, now), now, reply)
+        if is_lost:
+            self._link_is_lost(self.family.faults.telegram_downtime, "no process data from the drive", now)
         self.settled(now)
-        while leg.outcomes:
-            reply, outcome = leg.outcomes.pop(0)
-            reply(outcome)
+        for answer, outcome in outcomes:
+            answer(outcome)
+
+    def _take_in(
+        self, leg: LegState, effects: list[Effect], now: float, reply: Reply | None
+    ) -> list[tuple[Reply, Outcome]]:
+        """Be in this state; the outcomes that are to be told once everybody can see it."""
+        self.leg = leg
+        outcomes: list[tuple[Reply, Outcome]] = []
+        for effect in effects:
+            match effect:
+                case Heard():
+                    self.telegrams = (self.telegrams + 1) & 0xFFFF
+                case Answer(outcome=outcome, is_refused=is_refused):
+                    self.refused_writes += is_refused
+                    if reply is not None:
+                        outcomes.append((reply, outcome))
+                case StartBegun():
+                    self._start_reply = reply
+                case StartEnded(outcome=outcome):
+                    started, self._start_reply = self._start_reply, None
+                    if started is not None:
+                        outcomes.append((started, outcome))
+                case Tripped():
+                    self._on_tripped(effect, now)
+                case Ignored():
+                    self._status.last_fault = self.family.faults.controller_silent
+                    why = "the controller is silent; ignored (telegram_downtime_s)"
+                    self._tell(now, Kind.WATCHDOG, 500, why)
+                case Tell(kind=kind, severity=severity, message=message):
+                    self._tell(now, kind, severity, message)
+        return outcomes
+
+    def _on_tripped(self, tripped: Tripped, now: float) -> None:
+        fault = self.family.faults.controller_silent
+        self.trips += 1
+        self._status.last_fault = fault
+        reaction = self.settings.on_expiry
+        if reaction == "silence" and not self.leg.silence_stops:
+            reaction = "disable_voltage"
+        silent = f"{tripped.who} was silent for {tripped.timeout_ms} ms"
+        message = f"{silent}: {reaction}, {self._status.fault_text(fault)}"
+        self._tell(now, Kind.WATCHDOG, 900, message)
+        self._tripped(tripped.due)
 
     def _tell(self, now: float, kind: Kind, severity: int, message: str) -> None:
         self._report(Event(now, kind, self.name, severity, message))

@@ -150,7 +150,7 @@ class Drive:
 
     def stop_time(self) -> StopTime:
         """Longest time from the controller's last telegram to the stop on the bus."""
-        timeout_ms = self.channel.watchdog.timeout_ms
+        timeout_ms = self.channel.timeout_ms
         return stop_time(self.table, self.bus, timeout_ms, self.rpdo_type, self.wire, self._own_ms)
 
     @property
@@ -316,8 +316,8 @@ class Drive:
         values: tuple[Value, ...] = (
             channel.fault_text,
             str(channel.owner or ""),
-            int(channel.watchdog.state),
-            channel.watchdog.timeout_ms,
+            int(channel.watchdog_state),
+            channel.timeout_ms,
             channel.settings.telegram_downtime_s,
             channel.last_fault,
             channel.current_fault,
@@ -330,7 +330,7 @@ class Drive:
         self._show_stop_time(now)
 
     def _show_stop_time(self, now: float) -> None:
-        settings = self.channel.watchdog.timeout_ms, self.rpdo_type, self.wire, self._own_ms
+        settings = self.channel.timeout_ms, self.rpdo_type, self.wire, self._own_ms
         if settings == self._shown_for:
             return
         self._shown_for = settings
@@ -344,11 +344,10 @@ class Drive:
         self._actual.look(now)
         self._refresh_follows(now)
         channel = self.channel
-        watchdog = channel.watchdog
         left, age, telegrams = self._ages
-        self._image.keep(left, watchdog.left_ms(now), now)
+        self._image.keep(left, channel.left_ms(now), now)
         self._image.keep(age, channel.link.age_ms(now), now)
-        self._image.keep(telegrams, watchdog.telegrams, now)
+        self._image.keep(telegrams, channel.telegrams, now)
 
     def _show(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:
         """Values that the bridge itself knows: their quality is always good."""

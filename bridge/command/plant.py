@@ -219,7 +219,7 @@ class Plant:
         """``identity`` has connected, or its last connection has ended: no telegram, and no end of control.
         Told where a protocol knows it."""
         for drive in self.drives.values():
-            drive.channel.authority.on_connection(identity, now, is_there=is_there)
+            drive.channel.on_connection(identity, now, is_there=is_there)
 
     def rejected(self, rejection: Rejection, now: float, count: int = 1) -> None:
         """What a protocol has refused by itself, ``count`` times: counted, told and written to the audit log
@@ -286,9 +286,7 @@ class Plant:
         drive.refresh(now)
         if drive.following.awaits_sending:
             self.unsent.add(drive)
-        silent = any(
-            drive.channel.is_tripped and drive.channel.watchdog.controller_is_silent for drive in node.drives
-        )
+        silent = any(drive.channel.is_tripped and drive.channel.controller_is_silent for drive in node.drives)
         fault = node.family.faults.bridge_timeout if silent else 0.0
         state, current, last = self._node_points[node.name]
         self.image.set(state, NODE_CODES[node.drives[0].channel.link.node], now)

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.command import follow, watchdog
+from bridge.command import follow
+from bridge.command.leg.state import STATES as WATCHDOG_STATES
 from bridge.command.link import NodeState
 from bridge.config import BusTable, NodeTable
 from bridge.drive import STATES, LinearScale, ValueCodec
@@ -120,7 +121,7 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
         Point(
             name=f"{top}/watchdog_state",
             data_type=DataType.UINT8,
-            states=watchdog.STATES,
+            states=WATCHDOG_STATES,
             description="state of the watchdog on the controller",
         ),
         Point(name=f"{top}/watchdog_left_ms", data_type=u32, unit=ms, description="time until the trip"),

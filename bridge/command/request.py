@@ -59,6 +59,8 @@ class Identity:
 
 
 class Action(StrEnum):
+    __hash__ = str.__hash__  # in C: each telegram is looked up by it
+
     # on a drive
     WRITE = "write"
     KEEP_ALIVE = "keep_alive"

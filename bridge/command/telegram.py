@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from bridge.command.request import Code
 from bridge.drive import LinearScale, ParameterSet, ValueCodec, Written
@@ -31,26 +31,29 @@ class Telegram:
     setpoints: tuple[int, ...]
 
 
-@dataclass(slots=True)
 class _Setpoints:
     """What a write has set so far, by the word's place: which bits, and to what."""
 
-    masks: dict[int, int] = field(default_factory=dict[int, int])
-    bits: dict[int, int] = field(default_factory=dict[int, int])
+    __slots__ = ("_bits", "_masks")
+
+    def __init__(self) -> None:
+        self._masks: dict[int, int] = {}
+        self._bits: dict[int, int] = {}
 
     def put(self, leaf: str, written: Written) -> None:
         """Raises ``Refusal`` where the same bits have been written otherwise."""
-        mask, bits = self.masks.get(written.place, 0), self.bits.get(written.place, 0)
+        mask, bits = self._masks.get(written.place, 0), self._bits.get(written.place, 0)
         if (bits ^ written.bits) & mask & written.mask:
             raise Refusal(Code.OUT_OF_RANGE, f"{leaf} and the word it is made from do not agree")
-        self.masks[written.place] = mask | written.mask
-        self.bits[written.place] = bits | written.bits
+        self._masks[written.place] = mask | written.mask
+        self._bits[written.place] = bits | written.bits
 
     def over(self, before: tuple[int, ...]) -> tuple[int, ...]:
         """``before`` with what was written."""
-        return tuple(
-            word & ~self.masks.get(place, 0) | self.bits.get(place, 0) for place, word in enumerate(before)
-        )
+        after = list(before)
+        for place, mask in self._masks.items():
+            after[place] = after[place] & ~mask | self._bits[place]
+        return tuple(after)
 
 
 class TelegramDecoder:

@@ -1,7 +1,6 @@
 """Drive logic without vendor names: words, states, values, emergencies."""
 
 from bridge.drive.emergency import EmergencyReader, Told
-from bridge.drive.handshake import Handshake
 from bridge.drive.own_supervision import OwnJudgement, OwnVerdict
 from bridge.drive.parameter_set import ParameterSet
 from bridge.drive.scaling import LinearScale, scale_of
@@ -15,7 +14,6 @@ __all__ = [
     "ControlWords",
     "DriveState",
     "EmergencyReader",
-    "Handshake",
     "LinearScale",
     "OwnJudgement",
     "OwnVerdict",

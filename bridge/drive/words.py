@@ -14,6 +14,8 @@ from bridge.mapping.model import Command, ControlWord, StatusWord, pattern_bits
 class DriveState(IntEnum):
     """State of the drive's state machine, numbered as Modbus serves it (input register 10)."""
 
+    __hash__ = int.__hash__  # in C: it is looked up with every report
+
     NOT_READY = 0
     SWITCH_ON_INHIBITED = 1
     READY = 2

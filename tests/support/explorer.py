@@ -13,7 +13,7 @@ from enum import Enum
 from itertools import pairwise
 from typing import Any, Protocol
 
-_OURS = ("bridge.command.", "bridge.drive.handshake", "tests.support.handshake_model")
+_OURS = ("bridge.command.", "tests.support.handshake_model")
 _PLAIN = (int, float, str, bytes, tuple, Enum, type(None))
 
 State = tuple[Hashable, ...]
@@ -71,13 +71,15 @@ class Parts:
         if now == self._at:
             return state
         return tuple(
-            self._brought_back(name, value, now)
-            if type(value) is float and self._epoch <= value < float("inf")
-            else value
-            for (_, name), value in zip(self._fields, state, strict=True)
+            self._brought_back(name, value, now) for (_, name), value in zip(self._fields, state, strict=True)
         )
 
-    def _brought_back(self, name: str, value: float, now: float) -> float | None:
+    def _brought_back(self, name: str, value: Any, now: float) -> Any:
+        if isinstance(value, tuple) and hasattr(value, "_fields"):
+            parts = zip(value._fields, value, strict=True)
+            return type(value)(*(self._brought_back(part, each, now) for part, each in parts))
+        if type(value) is not float or not self._epoch <= value < float("inf"):
+            return value
         if name in self._spent and value <= now:
             return None
         return round(self._at + max(value - now, -self._memory_s.get(name, 0.0)), 6)

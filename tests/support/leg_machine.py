@@ -19,9 +19,10 @@ from bridge.command import (
     Write,
 )
 from bridge.command.channel import DriveChannel
+from bridge.command.leg.state import Stage as LegStage
+from bridge.command.leg.table import Stimulus
 from bridge.command.link import NodeState
 from bridge.command.request import STOP_ACTIONS
-from bridge.command.watchdog import Stimulus, WatchdogState
 from bridge.drive import DriveState
 from bridge.image import Value
 from tests.support.explorer import Parts, State
@@ -48,7 +49,7 @@ _NOW: Final = 2000.0
 _HUNG_S: Final = 20.0
 _A_MOMENT_S: Final = 0.001
 
-Transition = tuple[WatchdogState, Stimulus, str]
+Transition = tuple[LegStage, Stimulus, str]
 """Where the watchdog was, what happened, and in which of ``GATES`` the way to the bus was."""
 GATES: Final = ("open", "interlocked", "node gone")
 
@@ -124,9 +125,8 @@ class LegMachine:
             self._channel,
             epoch=_EPOCH,
             at=_NOW,
-            memory_s={"_tripped_at": silence_ms / 1000},
             only_shown=("trips", "refused_writes", "last_fault", "telegrams"),
-            spent=("_acknowledge_until",),
+            spent=("pulse_until",),
         )
         model = LegModel(
             control=given["control"],
@@ -168,9 +168,6 @@ class LegMachine:
         seen = tuple((state, stimulus, gate) for state, stimulus in self._recorder.seen)
         self.trips += self._channel.trips - trips
         self._rig.events.clear()
-        start = self._channel._leg.start
-        if not start.is_going_on:
-            start._deadline = 0.0  # that of one that is over
         if not self._hung:
             self._see()
             self._check()
@@ -351,7 +348,7 @@ class LegMachine:
         for name, attribute in vars(DriveChannel).items():
             if isinstance(attribute, property):
                 getattr(self._channel, name)
-        self._channel.watchdog.left_ms(now)
+        self._channel.left_ms(now)
         self._channel.link.quality(now)
         self._channel.link.age_ms(now)
         self._channel.next_deadline(now)

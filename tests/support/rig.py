@@ -146,7 +146,7 @@ class Rig:
 
     @property
     def watchdog(self) -> str:
-        return self.channel.watchdog.state.label
+        return self.channel.watchdog_state.label
 
     def told(self, kind: Kind) -> list[str]:
         return [event.message for event in self.events if event.kind is kind]

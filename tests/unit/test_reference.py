@@ -13,10 +13,11 @@ from asyncua.ua.status_codes import get_name_and_doc
 from bridge import __version__
 from bridge.cli.app import make_app
 from bridge.command import Kind, Plant
+from bridge.command.leg.state import STATES as WATCHDOG_STATES
+from bridge.command.leg.state import Stage
+from bridge.command.leg.table import TABLE
 from bridge.command.points import CONTROLLER_STATES, NMT_STATES, NODE_STATES
 from bridge.command.request import Code
-from bridge.command.watchdog import STATES as WATCHDOG_STATES
-from bridge.command.watchdog import Stimulus
 from bridge.config import Reaction, Site
 from bridge.config.model import MappedObject
 from bridge.drive import STATES
@@ -275,8 +276,21 @@ def test_every_command_and_option_is_described() -> None:
 # explanation
 
 
-def test_the_state_table_is_that_of_the_watchdog() -> None:
+def test_the_tables_of_the_controller_leg_are_those_of_the_code() -> None:
     text = state_table.PAGE.read_text(encoding="utf-8")
     assert text == state_table.drawn(text), "draw it anew: python -m tools.state_table"
-    shown = page("explanation/dead-man-chain.md").table("The controller leg as a table")
-    assert [row["event"] for row in shown] == [stimulus.value for stimulus in Stimulus], "one that is read"
+    shown = page("explanation/dead-man-chain.md")
+    stages = shown.column("The controller leg as a table", "stage")
+    assert [stage.strip("*") for stage in stages] == list(Stage)
+    cells = {
+        (stage, row["event"]): cell
+        for heading in state_table.PARTS
+        for row in shown.table(heading)
+        for stage, cell in row.items()
+        if stage != "event"
+    }
+    assert {stage for stage, _ in cells} == set(Stage)
+    for (stage, stimulus), (after, deed) in TABLE.items():
+        cell = cells.get((stage.value, stimulus.value), "–")
+        assert (f"**{after}**" in cell) is (after is not stage), "where it leads to can be read"
+        assert deed in cell

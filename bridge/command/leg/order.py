@@ -1,11 +1,11 @@
 """The new set-point handshake of a positioning drive (CiA 402-2, profile position: bit 4, status bit 12).
 
-The bridge does it for who writes the position as a value: the bit rises with the new words, stays until the
-drive says that it has taken them, falls, and may rise again when the drive has seen that. A drive that
-does not say so within a second has not taken them.
+The bridge does it for clients that write the position as a value: the bit rises with the new words, stays
+until the drive reports that it has taken them, falls, and may rise again when the drive has seen that. A
+drive that does not report within a second has not taken them.
 
-An order with the words that the drive has already is none: a controller that writes cyclically moves nothing
-twice. What the drive has taken counts as long as it is enabled.
+An order with words that the drive has already taken does nothing: a controller that writes cyclically must
+not start a movement twice. What the drive has taken counts as long as it is enabled.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from typing import Final
 from bridge.command.leg.state import Order
 
 _LIMIT_S: Final = 1.0
-"""How long the drive may take to say that it has a position; the profile names no time."""
+"""How long the drive may take to report that it has a position; the profile names no time."""
 _LOW_S: Final = 0.1
 """How long the bit stays down after that: longer than any cycle we send with, so that an edge is seen."""
 
 
 def dropped(order: Order) -> Order:
-    """The drive is stopped: what was ordered does not count any more."""
+    """The drive is stopped: pending orders are dropped."""
     if order.is_waiting or order.is_raised or order.taken is not None or order.deadline is not None:
         return order._replace(is_waiting=False, is_raised=False, taken=None, deadline=None)
     return order

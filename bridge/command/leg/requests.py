@@ -133,8 +133,10 @@ def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome
     _own(turn, request)
     if word is not None:
         mask = words.acknowledge_mask
-        is_edge = bool(word & mask) and turn.edges.bit is False
-        turn.edges = turn.edges._replace(bit=bool(word & mask))
+        is_set, was_set = bool(word & mask), turn.edges.bit
+        is_edge = is_set and was_set is False
+        if is_set is not was_set:
+            turn.edges = turn.edges._replace(bit=is_set)
         if is_edge and turn.is_tripped:
             _acknowledge(turn, request, pulse=False)
             # The edge itself goes on to the drive; whatever else the word asks has to be asked anew.
@@ -151,6 +153,7 @@ def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome
 def _take(turn: Turn, word: int | None, setpoints: tuple[int, ...], values: Mapping[str, Value]) -> Deed:
     """The words of a valid telegram. With one that does not enable, what was ordered before it is not gone to
     any more, nor what comes with a stop of a running drive."""
+    turn.look_at_way()
     turn.setpoints = setpoints
     turn.keep_at_rest()
     is_stop = word is not None and not turn.settings.words.enables(word)
@@ -195,8 +198,12 @@ def _hear(turn: Turn, request: Request) -> None:
 
 def _renew(turn: Turn, at: float) -> None:
     """The owner has shown that it is there: its lease runs anew."""
-    identity, lease_s, *_ = turn.owner
-    turn.owner = Owner(identity, lease_s, at + lease_s if turn.settings.control == "lease" else None)
+    identity, lease_s, lease_until, absent_until, stopped_until = turn.owner
+    if turn.settings.control == "lease":
+        lease_until = at + lease_s
+    elif absent_until is None and stopped_until is None:
+        return
+    turn.owner = Owner(identity, lease_s, lease_until)
 
 
 # owners

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from bridge.command.telegram import Telegram
-from bridge.config import Reaction
+from bridge.config import IGNORE_ALL_S, DriveTable, Reaction
 from bridge.drive import ControlWords, ValueCodec
 from bridge.image import Value
 from bridge.mapping.model import Family, Slot
@@ -27,18 +27,6 @@ class HandshakeSettings:
     places: tuple[int, ...]
 
 
-def handshake_of(family: Family, slot: Slot) -> HandshakeSettings | None:
-    """The handshake by which this drive takes over positions, or None where it has none."""
-    model = family.control_word.handshake
-    if model is None:
-        return None
-    for value in family.values_of(slot):
-        if (value.group, value.name) == ("command", model.value):
-            places = tuple(ValueCodec(value, family.process.rpdo[1:]).places)
-            return HandshakeSettings(model.value, 1 << model.bit, 1 << model.acknowledge_bit, places)
-    return None
-
-
 @dataclass(frozen=True, slots=True)
 class LegSettings:
     words: ControlWords
@@ -57,3 +45,47 @@ class LegSettings:
     """Places of setpoints that are the drive's actual words, and those of these words, as long as nothing is
     commanded: enabling moves nothing then."""
     handshake: HandshakeSettings | None = None
+
+
+def leg_settings(family: Family, table: DriveTable, decode: Decode) -> LegSettings:
+    """Those of a drive of this family, as the site file has it."""
+    slot = family.slot_named(table.slot)
+    low_ms, high_ms = table.timeout_range_ms
+    return LegSettings(
+        words=ControlWords(family.control_word),
+        decode=decode,
+        setpoints=len(family.process.rpdo) - 1,
+        control=table.control,
+        reaction=table.on_expiry,
+        timeout_ms=table.fieldbus_timeout_ms or 0,
+        then_silence_s=table.then_silence_ms / 1000,
+        ignores_errors=table.telegram_downtime_s == IGNORE_ALL_S,
+        stop_by_anyone=table.stop_by_anyone,
+        timeout_writable=table.fieldbus_timeout_writable,
+        timeout_range_ms=(low_ms, high_ms),
+        follows=_followers(family, slot),
+        handshake=_handshake(family, slot),
+    )
+
+
+def _handshake(family: Family, slot: Slot) -> HandshakeSettings | None:
+    """How this drive takes over positions, None where it has no handshake."""
+    model = family.control_word.handshake
+    if model is None:
+        return None
+    for value in family.values_of(slot):
+        if (value.group, value.name) == ("command", model.value):
+            places = tuple(ValueCodec(value, family.process.rpdo[1:]).places)
+            return HandshakeSettings(model.value, 1 << model.bit, 1 << model.acknowledge_bit, places)
+    return None
+
+
+def _followers(family: Family, slot: Slot) -> tuple[tuple[int, int], ...]:
+    """Setpoints that follow actual words: the place of each setpoint, and that of its actual word."""
+    values = {value.leaf: value for value in family.values_of(slot)}
+    return tuple(
+        (family.process.rpdo.index(word) - 1, family.process.tpdo.index(source))
+        for value in values.values()
+        if value.follows is not None and (followed := values.get(f"actual/{value.follows}"))
+        for word, source in zip(value.word_names, followed.word_names, strict=True)
+    )

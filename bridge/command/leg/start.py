@@ -166,8 +166,6 @@ def _give_up(turn: Turn, stimulus: Stimulus, code: Code, message: str) -> None:
     turn.stop(turn.word_at_rest)
 
 
-def next_deadline(start: Start | None) -> float | None:
-    if start is None:
-        return None
+def next_deadline(start: Start) -> float:
     times = (start.believed_at, start.leaves_at, start.until)
     return min(time for time in times if time is not None)

@@ -28,6 +28,8 @@ STATES: Final = tuple((state.value, state.label) for state in WatchdogState)
 class Stage(StrEnum):
     """Where the way to the drive stands."""
 
+    __hash__ = str.__hash__  # in C: it is looked up at every step
+
     CLOSED = "closed"
     INTERLOCKED = "interlocked"
     READY = "ready"
@@ -87,12 +89,16 @@ AWAITS_REPORT: Final = UNHEARD | {Stage.SETTLING}
 """What the drive says next counts, also where it says nothing new."""
 REACTING: Final = frozenset((Stage.RAMPING, Stage.TRIPPED, Stage.SILENCED))
 TRIPPED: Final = REACTING | {Stage.HELD, Stage.LET_GO}
+INTERLOCKED: Final = TRIPPED | {Stage.CLOSED, Stage.INTERLOCKED}
+"""The owner has to send a word that does not enable before one that does goes to the drive."""
 BLOCKED: Final = frozenset((Stage.CLOSED, Stage.INTERLOCKED, Stage.LET_GO))
 """A word of the owner's that enables is replaced by the stop that is in force."""
 
 
 class Motion(StrEnum):
     """What the drive's reports say since the last word that enabled it."""
+
+    __hash__ = str.__hash__
 
     EXPECTED = "the drive has reported no motion since"
     SEEN = "the drive has reported motion since"
@@ -135,7 +141,7 @@ class Owner(NamedTuple):
 
 class Edges(NamedTuple):
     """The acknowledge bit of the owner's last control word, None where it has written none since it owns the
-    drive; and whose last telegram had 1 in the acknowledge register, which outlasts control of the drive."""
+    drive; and whose last telegram had 1 in the acknowledge register, kept after the owner has gone."""
 
     bit: bool | None = None
     pressed_by: Identity | None = None
@@ -186,30 +192,32 @@ class Way(NamedTuple):
 
 
 class LegState(NamedTuple):
-    stage: Stage
-    owner: Owner
+    """What has a value here has it at the start of the bridge: nobody owns the drive."""
+
+    way: Way
     timer: Timer
-    edges: Edges
     word: int
     """The owner's control word, as it would like it, or what was led or stopped with since."""
-    is_ours: bool
-    """``word`` is a stop by the bridge, not the owner's."""
-    is_asked: bool
-    """The stop in force is one that somebody has asked for: it stays as it is."""
+    sent: Output
     setpoints: tuple[int, ...]
     rest: tuple[int, ...]
     """The setpoints of a drive that nobody commands."""
-    sent: Output
-    drive: DriveState
-    is_taken: bool
+    stage: Stage = Stage.CLOSED
+    owner: Owner = Owner()
+    edges: Edges = Edges()
+    is_ours: bool = True
+    """``word`` is a stop by the bridge, not the owner's."""
+    is_asked: bool = False
+    """The stop in force is one that somebody has asked for: it stays as it is."""
+    drive: DriveState = DriveState.UNKNOWN
+    is_taken: bool = False
     """The drive's status word has the bit "set-point acknowledge"."""
-    motion: Motion
-    start: Start | None
-    trip: Trip
-    order: Order
-    pulse_until: float | None
+    motion: Motion = Motion.SEEN
+    start: Start | None = None
+    trip: Trip = Trip()
+    order: Order = Order()
+    pulse_until: float | None = None
     """Until when an acknowledge bit of the bridge's own is sent."""
-    way: Way
-    silence_stops: bool
+    silence_stops: bool = True
     """The drive stops by itself without its RPDOs. Where it does not, or nobody knows, it gets disable
     voltage in place of silence."""

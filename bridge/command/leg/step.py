@@ -20,15 +20,10 @@ from bridge.command.leg.event import (
 )
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import (
-    Edges,
     LegState,
     Motion,
-    Order,
     Output,
-    Owner,
-    Stage,
     Timer,
-    Trip,
     WatchdogState,
     Way,
 )
@@ -36,34 +31,16 @@ from bridge.command.leg.table import Stimulus
 from bridge.command.leg.turn import Turn
 from bridge.command.leg.words import if_left, if_tripped
 from bridge.command.request import Code, Outcome, Request
-from bridge.drive import DriveState
 
 
 def initial(settings: LegSettings) -> LegState:
     """Of a bridge that starts: nobody owns the drive, and its node has not been seen."""
     rest = (0,) * settings.setpoints
     stopped = settings.words.stopped
-    return LegState(
-        stage=Stage.CLOSED,
-        owner=Owner(),
-        timer=Timer(settings.timeout_ms),
-        edges=Edges(),
-        word=stopped,
-        is_ours=True,
-        is_asked=False,
-        setpoints=rest,
-        rest=rest,
-        sent=Output((stopped, *rest)),
-        drive=DriveState.UNKNOWN,
-        is_taken=False,
-        motion=Motion.SEEN,
-        start=None,
-        trip=Trip(),
-        order=Order(),
-        pulse_until=None,
-        way=Way(is_open=False, why="the drive's node is not seen yet"),
-        silence_stops=True,
-    )
+    timer = Timer(settings.timeout_ms)
+    way = Way(is_open=False, why="the drive's node is not seen yet")
+    sent = Output((stopped, *rest))
+    return LegState(way=way, timer=timer, word=stopped, sent=sent, setpoints=rest, rest=rest)
 
 
 def step(settings: LegSettings, state: LegState, event: Event, now: float) -> tuple[LegState, list[Effect]]:
@@ -179,6 +156,9 @@ def next_deadline(state: LegState) -> float | None:
         state.pulse_until,
         state.order.deadline,
         state.order.rises_at,
-        start.next_deadline(state.start),
     )
-    return min((time for time in times if time is not None), default=None)
+    earliest = None if state.start is None else start.next_deadline(state.start)
+    for time in times:
+        if time is not None and (earliest is None or time < earliest):
+            earliest = time
+    return earliest

@@ -16,6 +16,8 @@ _S = Stage
 
 
 class Stimulus(StrEnum):
+    __hash__ = str.__hash__  # as that of Stage
+
     # the owner
     STOP_WORD = "owner's control word that does not enable"
     ENABLING_WORD = "owner's control word that enables"

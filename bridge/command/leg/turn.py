@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import Final
 
 from bridge.command.event import Kind
@@ -36,6 +37,8 @@ _EXPIRED: Final[dict[Reaction, Stimulus]] = {
     "hold": Stimulus.EXPIRED_HOLD,
 }
 
+_values = attrgetter(*LegState._fields)
+
 
 class Turn:
     """Made from a state, changed, and made a state again. The attributes are those of ``LegState``."""
@@ -47,16 +50,17 @@ class Turn:
         self.now = now
         self.effects: list[Effect] = []
         (
-            self.stage,
-            self.owner,
+            self.way,
             self.timer,
-            self.edges,
             self.word,
-            self.is_ours,
-            self.is_asked,
+            self.sent,
             self.setpoints,
             self.rest,
-            self.sent,
+            self.stage,
+            self.owner,
+            self.edges,
+            self.is_ours,
+            self.is_asked,
             self.drive,
             self.is_taken,
             self.motion,
@@ -64,32 +68,11 @@ class Turn:
             self.trip,
             self.order,
             self.pulse_until,
-            self.way,
             self.silence_stops,
         ) = state
 
     def end(self) -> LegState:
-        return LegState(
-            self.stage,
-            self.owner,
-            self.timer,
-            self.edges,
-            self.word,
-            self.is_ours,
-            self.is_asked,
-            self.setpoints,
-            self.rest,
-            self.sent,
-            self.drive,
-            self.is_taken,
-            self.motion,
-            self.start,
-            self.trip,
-            self.order,
-            self.pulse_until,
-            self.way,
-            self.silence_stops,
-        )
+        return LegState._make(_values(self))
 
     # the table
 
@@ -270,15 +253,20 @@ class Turn:
 
     # the end of each step
 
+    def look_at_way(self) -> None:
+        """Go on as the way to the drive is now. What was sent last may have closed it: a drive that is
+        stopped needs a known position before it is enabled anew."""
+        if self.may_enable:
+            self.happens(Stimulus.WAY_OPEN)
+            return
+        if self.stage is not Stage.HELD or self.is_enabling:
+            self.happens(Stimulus.WAY_CLOSED, Outcome(Code.NOT_READY, self.why_blocked))
+        self.order = order.dropped(self.order)
+
     def settle(self) -> None:
         """Bring the way to the drive and what is sent up to date."""
-        now, may_enable = self.now, self.may_enable
-        if may_enable:
-            self.happens(Stimulus.WAY_OPEN)
-        elif self.stage is not Stage.HELD or self.is_enabling:
-            self.happens(Stimulus.WAY_CLOSED, Outcome(Code.NOT_READY, self.why_blocked))
-        if not may_enable:
-            self.order = order.dropped(self.order)
+        now = self.now
+        self.look_at_way()
         ramps_until, silent_from = self.trip
         if ramps_until is not None and now >= ramps_until:
             self.happens(Stimulus.RAMP_OVERDUE)

@@ -309,7 +309,7 @@ def _why_not_set(identity: Identity, drive: Drive) -> str:
         return ""
     if not identity.may_set_parameters:
         return f"{identity} may not set parameters: an engineer may"
-    return drive.channel.authority.refusal(identity, owner_is_silent=False) or ""
+    return drive.channel.refusal(identity)
 
 
 def _why_protected(protection: str, entry: Entry, identity: Identity, drive: Drive) -> str:

@@ -11,7 +11,7 @@ from bridge.canopen.sync import LAST_SYNCHRONOUS, REMOTE_SYNCHRONOUS, REMOTE_TYP
 from bridge.command import Drive
 from bridge.command.actual import FurtherTpdo
 from bridge.command.channel import DriveChannel
-from bridge.command.output import Output
+from bridge.command.leg.state import Output
 from bridge.command.plant import Node
 from bridge.config import BusTable
 from bridge.image import Quality

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Final, Protocol
 
 from bridge.command import Identity, Request
+from bridge.command.leg.state import WatchdogState
 from bridge.command.link import NodeState
 from bridge.command.points import NODE_CODES
-from bridge.command.watchdog import WatchdogState
 from bridge.drive import DriveState
 from bridge.image import Quality, Value
 from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, Refused

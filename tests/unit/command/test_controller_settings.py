@@ -61,7 +61,7 @@ class TestIgnoreAll:
 class TestSetTimeout:
     def test_is_refused_where_the_site_file_does_not_allow_it(self, running: Rig):
         assert running.ask(Action.SET_TIMEOUT, timeout_ms=500).code is Code.NOT_ALLOWED
-        assert running.channel.watchdog.timeout_ms == 200
+        assert running.channel.timeout_ms == 200
 
     @pytest.fixture
     def writable(self) -> Rig:
@@ -72,7 +72,7 @@ class TestSetTimeout:
     @pytest.mark.parametrize("timeout_ms", [-1, 1001, 32768])
     def test_takes_the_range_of_the_site_file(self, writable: Rig, timeout_ms: int):
         assert writable.ask(Action.SET_TIMEOUT, timeout_ms=timeout_ms).code is Code.OUT_OF_RANGE
-        assert writable.channel.watchdog.timeout_ms == 200
+        assert writable.channel.timeout_ms == 200
 
     @pytest.mark.parametrize(
         ("site_ms", "taken", "refused"),
@@ -134,8 +134,8 @@ class TestSetTimeout:
         assert told == 1
         for timeout_ms in (400, 0, 300):
             assert rig.ask(Action.SET_TIMEOUT, timeout_ms=timeout_ms).ok
-            assert rig.channel.watchdog.next_deadline() is None
-        assert rig.channel.watchdog.controller_is_silent
+            assert rig.channel.leg.timer.deadline is None
+        assert rig.channel.controller_is_silent
         rig.wait(10)
         assert len(rig.told(Kind.WATCHDOG)) == told
         assert rig.channel.trips == (downtime_s > 0)
@@ -150,7 +150,7 @@ class TestSetTimeout:
             rig.ask(Action.RELEASE_CONTROL)
         owner = rig.channel.owner
         assert rig.ask(Action.SET_TIMEOUT, who, timeout_ms=300).code is Code.NOT_ALLOWED
-        assert rig.channel.watchdog.timeout_ms == 200
+        assert rig.channel.timeout_ms == 200
         assert rig.channel.owner == owner
 
 
@@ -192,7 +192,7 @@ class TestTheSitesTimeoutIsBack:
         assert rig.ask(Action.SET_TIMEOUT, timeout_ms=800).ok
         goes(rig)
         assert rig.channel.owner != PLC
-        assert rig.channel.watchdog.timeout_ms == 200
+        assert rig.channel.timeout_ms == 200
         assert "fieldbus_timeout_ms = 200 again, as in the site file" in rig.told(Kind.CONFIGURATION)
 
     def test_when_a_lease_runs_out_and_the_next_owner_is_watched(self):
@@ -214,7 +214,7 @@ class TestTheSitesTimeoutIsBack:
         rig.write(SHUT_DOWN, identity=OTHER_PLC)
         assert rig.watchdog == "tripped", "a trip stays a trip"
         rig.write(ACKNOWLEDGE, identity=OTHER_PLC)
-        assert rig.channel.watchdog.left_ms(rig.now) == 200
+        assert rig.channel.left_ms(rig.now) == 200
 
     def test_a_trip_and_a_bus_that_was_gone_leave_it_with_its_owner(self):
         rig = self.rig()
@@ -223,4 +223,4 @@ class TestTheSitesTimeoutIsBack:
         rig.wait(0.3)
         rig.write(SHUT_DOWN)
         assert rig.watchdog == "tripped"
-        assert rig.channel.watchdog.timeout_ms == 300
+        assert rig.channel.timeout_ms == 300

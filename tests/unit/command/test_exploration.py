@@ -10,17 +10,15 @@ drive's own beside it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import product
 from typing import Any, Final
 from unittest.mock import patch
 
 import pytest
 
-from bridge.command import authority, output
-from bridge.command.watchdog import TABLE, Effect, Stimulus, Watchdog, WatchdogState
+from bridge.command.leg import rules, turn
 from tests.support.explorer import Map, explore
 from tests.support.leg_events import A_MOMENT_BEFORE, NO_LEASE, NO_NEWS, PULSES, REFUSED
-from tests.support.leg_machine import GATES, LegMachine
+from tests.support.leg_machine import LegMachine
 from tests.support.leg_model import GONE_S, QUICK_STOP_LIMIT_S
 from tests.support.leg_words import HOMING, LENZE, NORD_TU3, POSITION, STOEBER, VELOCITY
 from tests.support.recorded_table import recorded_table
@@ -106,12 +104,11 @@ _FAMILIES: Final[dict[str, dict[str, Any]]] = {
 """Those of the others, each with settings of its own."""
 _WATCHED: Final = ("disable_voltage", "lease that ends before the watchdog")
 _OFF: Final = ("ignored", "ignored, lease", "off", "off, lease")
-"""Together each of these groups covers its part of the table."""
 
 
 def explored(given: Mapping[str, Any]) -> Map:
-    limit = patch.object(output, "_QUICK_STOP_LIMIT_S", QUICK_STOP_LIMIT_S)
-    gone = patch.object(authority, "GONE_S", GONE_S)
+    limit = patch.object(turn, "_RAMP_LIMIT_S", QUICK_STOP_LIMIT_S)
+    gone = patch.object(rules, "GONE_S", GONE_S)
     with recorded_table() as table, limit, gone:
         machine = LegMachine(table, **given)
         found = explore(machine, _MOST)
@@ -133,94 +130,6 @@ def test_whatever_happens_in_the_words_of_every_family(profile: str) -> None:
     explored({"without": NO_NEWS, **_FAMILIES[profile]})
 
 
-# what was covered
-
-Row = tuple[WatchdogState, Stimulus]
-
-_NEVER: Final[dict[Row, str]] = {
-    (WatchdogState.IDLE, Stimulus.EXPIRED): "the timer runs from the first valid telegram",
-    (WatchdogState.TRIPPED, Stimulus.STARTED): "a trip outlives a gap; a bridge that starts has none",
-}
-"""Rows that a channel cannot come to; ``test_the_table_by_itself`` has them, too."""
-_STOPS_THE_TIMER: Final = (
-    Stimulus.EXPIRED,
-    Stimulus.RELEASED,
-    Stimulus.OWNER_CHANGED,
-    Stimulus.STARTED,
-)
-
-
-def rows(*states: WatchdogState) -> set[Row]:
-    return {row for row in TABLE if row[0] in states and row not in _NEVER}
-
-
-def pairs(wanted: set[Row]) -> set[tuple[Row, Row]]:
-    """Each row with each that can follow it: an expiry needs a timer that runs."""
-    return {
-        (first, second)
-        for first, second in product(wanted, wanted)
-        if second[0] is TABLE[first][0]
-        and not (first[1] in _STOPS_THE_TIMER and second[1] is Stimulus.EXPIRED)
-    }
-
-
-def gates(row: Row) -> set[str]:
-    """States of the way to the bus in which ``row`` can happen."""
-    if row[0] is WatchdogState.IDLE:
-        return set(GATES) - {
-            "open"
-        }  # whoever leaves closes the interlock, and a word that opens it is a telegram
-    if row == (WatchdogState.OFF, Stimulus.EXPIRED):
-        # A timer that only reports goes with ignoring lost nodes.
-        return set(GATES) - {"node gone"}
-    return set(GATES)
-
-
-@pytest.mark.parametrize(
-    ("profiles", "states"),
-    [
-        (_WATCHED, (WatchdogState.IDLE, WatchdogState.RUNNING, WatchdogState.TRIPPED)),
-        (_OFF, (WatchdogState.OFF,)),
-    ],
-)
-def test_whatever_happens_and_every_transition_and_pair_of_them_does(
-    profiles: tuple[str, ...], states: tuple[WatchdogState, ...]
-) -> None:
-    maps = [explored(_PROFILES[profile]) for profile in profiles]
-    transitions = {transition for found in maps for transition in found.transitions()}
-    successive = {(a[:2], b[:2]) for found in maps for a, b in found.pairs()}
-    wanted = rows(*states)
-    assert transitions == {(*row, gate) for row in wanted for gate in gates(row)}
-    assert successive == pairs(wanted)
-
-
-# the table alone
-
-
-def test_the_table_by_itself() -> None:
-    """What holds for every row, and so for every sequence."""
-    for (state, stimulus), (after, effect) in TABLE.items():
-        if after is WatchdogState.TRIPPED is not state:
-            assert (state, stimulus) == (WatchdogState.RUNNING, Stimulus.EXPIRED)
-            assert effect is Effect.REACT
-        if state is WatchdogState.TRIPPED is not after:
-            assert stimulus in (Stimulus.ACKNOWLEDGED, Stimulus.STARTED)
-        if stimulus is Stimulus.INVALID:
-            assert (after, effect) == (state, Effect.REFUSE)
-        if effect is Effect.FORWARD:
-            assert stimulus is Stimulus.TELEGRAM
-            assert state is not WatchdogState.TRIPPED
-        assert (state is WatchdogState.OFF) == (after is WatchdogState.OFF)
-
-
-def test_every_pair_of_rows_leads_where_the_table_says() -> None:
-    for (state, stimulus), second in product(TABLE, Stimulus):
-        watchdog = Watchdog(0 if state is WatchdogState.OFF else 200)
-        watchdog.state = state
-        after, effect = TABLE[state, stimulus]
-        assert (watchdog.apply(stimulus, 1.0), watchdog.state) == (effect, after)
-        after_both, second_effect = TABLE[after, second]
-        assert (watchdog.apply(second, 1.1), watchdog.state) == (second_effect, after_both)
-        if second in (Stimulus.TELEGRAM, Stimulus.ACKNOWLEDGED):
-            is_off = after_both is WatchdogState.OFF
-            assert watchdog.next_deadline() == (None if is_off else pytest.approx(1.3))
+@pytest.mark.parametrize("profile", _WATCHED + _OFF)
+def test_whatever_happens_to_a_watchdog_and_without_one(profile: str) -> None:
+    explored(_PROFILES[profile])

@@ -205,12 +205,12 @@ def test_what_is_older_than_the_bound_is_refused_and_restarts_nothing(source: So
         request = Request(who, "conveyor/fu1", TakeControl(ttl_ms=60_000))
         rig.channel.handle(request, rig.now, lambda _: None)
     assert ask(rig, Action.KEEP_ALIVE, bound_s - 0.001, who) is Code.OK
-    left = rig.channel.watchdog.left_ms(rig.now)
+    left = rig.channel.left_ms(rig.now)
     for action in (Action.KEEP_ALIVE, Action.RESET_FAULT, Action.START, Action.TAKE_CONTROL):
         assert ask(rig, action, bound_s + 0.001, who) is Code.STALE
     assert ask(rig, Action.WRITE, bound_s + 0.001, who, control_word=ENABLE) is Code.STALE
     assert ask(rig, Action.WRITE, bound_s + 0.001, who, setpoint_1=1) is Code.STALE
-    assert rig.channel.watchdog.left_ms(rig.now) == left
+    assert rig.channel.left_ms(rig.now) == left
 
 
 def test_the_timer_runs_from_when_a_telegram_came_and_not_from_when_it_is_read():
@@ -219,12 +219,12 @@ def test_the_timer_runs_from_when_a_telegram_came_and_not_from_when_it_is_read()
     for _ in range(5):
         rig.wait(0.02)
         assert ask(rig, Action.WRITE, 0.02, control_word=ENABLE, setpoint_1=HALF_SPEED) is Code.OK
-    assert rig.channel.watchdog.left_ms(rig.now) == 180
+    assert rig.channel.left_ms(rig.now) == 180
     rig.wait(0.09)
     # All that is read now came at one time: together they are worth no more than the newest.
     for _ in range(100):
         assert ask(rig, Action.WRITE, 0.09, control_word=ENABLE) is Code.OK
-    assert rig.channel.watchdog.left_ms(rig.now) == 110
+    assert rig.channel.left_ms(rig.now) == 110
     rig.wait(0.111)
     assert rig.watchdog == "tripped"
     assert not rig.enables
@@ -234,7 +234,7 @@ def test_an_older_telegram_takes_no_time_from_a_newer_one():
     rig = Rig()
     rig.run()
     assert ask(rig, Action.KEEP_ALIVE, 0.08) is Code.OK
-    assert rig.channel.watchdog.left_ms(rig.now) == 200
+    assert rig.channel.left_ms(rig.now) == 200
 
 
 def test_what_would_have_run_out_by_now_is_refused():
@@ -249,7 +249,7 @@ def test_no_stop_is_too_old(action: Action):
     rig.wait(0.1)
     assert ask(rig, action, 60.0) is Code.OK
     assert not rig.enables
-    assert rig.channel.watchdog.left_ms(rig.now) == 100
+    assert rig.channel.left_ms(rig.now) == 100
 
 
 def test_a_word_that_stops_is_never_too_old_but_for_anything_else():
@@ -259,7 +259,7 @@ def test_a_word_that_stops_is_never_too_old_but_for_anything_else():
     assert ask(rig, Action.WRITE, 60.0, control_word=SHUT_DOWN, setpoint_1=HALF_SPEED) is Code.OK
     assert not rig.enables
     assert not any(rig.sent_setpoints)
-    assert rig.channel.watchdog.left_ms(rig.now) == 100
+    assert rig.channel.left_ms(rig.now) == 100
     assert rig.channel.restart_interlock
     rig.wait(0.2)
     assert rig.watchdog == "tripped"

@@ -81,7 +81,7 @@ class DriveByChance(RuleBasedStateMachine):
 
     def _telegram(self, outcome: Outcome, identity: Identity) -> None:
         if outcome.ok and identity.is_same(self.channel.owner):
-            self.deadline = self.rig.now + self.channel.watchdog.timeout_ms / 1000
+            self.deadline = self.rig.now + self.channel.timeout_ms / 1000
 
     def _look(self) -> None:
         """Trips, losses and gaps close the way; what opens it is noted where it is done."""
@@ -144,9 +144,9 @@ class DriveByChance(RuleBasedStateMachine):
             channel.setpoints,
             channel.owner,
             channel.restart_interlock,
-            channel.watchdog.state,
-            channel.watchdog.next_deadline(),
-            channel.authority.next_deadline(),
+            channel.watchdog_state,
+            channel.leg.timer.deadline,
+            channel.leg.owner.lease_until,
             channel.status_word,
         )
 
@@ -174,9 +174,9 @@ class DriveByChance(RuleBasedStateMachine):
             self.needs_stop = False
 
     def _judged_tripped(self) -> bool:
-        deadline = self.channel.watchdog.next_deadline()
+        deadline = self.channel.leg.timer.deadline
         expired = deadline is not None and self.rig.now >= deadline
-        return self.channel.is_tripped or (expired and self.channel.watchdog.state.label == "running")
+        return self.channel.is_tripped or (expired and self.channel.watchdog_state.label == "running")
 
     @rule(action=st.sampled_from(_TELEGRAMS), identity=st.sampled_from(_IDENTITIES))
     def keep_alive_or_reset(self, action: Action, identity: Identity) -> None:
@@ -204,7 +204,7 @@ class DriveByChance(RuleBasedStateMachine):
         self.pending.append(outcomes)
         self._look()
         if not outcomes or outcomes[0].ok:
-            self.deadline = self.rig.now + self.channel.watchdog.timeout_ms / 1000
+            self.deadline = self.rig.now + self.channel.timeout_ms / 1000
             self.needs_stop = False  # Start is both: a word that does not enable, and a fresh enable
 
     @rule(identity=st.sampled_from(_IDENTITIES), ttl_ms=st.sampled_from((1000, 100, 0)))
@@ -222,7 +222,7 @@ class DriveByChance(RuleBasedStateMachine):
 
     @rule(timeout_ms=st.sampled_from((200, 300, 250)), identity=st.sampled_from(_IDENTITIES))
     def set_timeout(self, timeout_ms: int, identity: Identity) -> None:
-        before = self.channel.watchdog.timeout_ms
+        before = self.channel.timeout_ms
         outcome = self.rig.ask(Action.SET_TIMEOUT, identity, timeout_ms=timeout_ms)
         self._look()
         if outcome.ok and self.deadline is not None:

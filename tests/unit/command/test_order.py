@@ -1,58 +1,44 @@
-"""Which positions a gate with a handshake still hands over: none that a stop or a fault came after."""
+"""Which positions a drive with a handshake is still handed: none that a stop or a fault came after."""
 
 from __future__ import annotations
 
 import pytest
 
-from bridge.command.output import Gate
-from bridge.drive import ControlWords, DriveState, Handshake
+from bridge.command import Start
+from bridge.drive import DriveState
 from bridge.mapping import load_family
+from tests.support.leg import OPEN, SHUT, Leg, settings_of, told
 
-MODEL = load_family("cia402/profile-position").control_word
-WORDS = ControlWords(MODEL)
+FAMILY = "cia402/profile-position"
 SHUTDOWN, DISABLE, RUN = 0x0006, 0x0007, 0x002F
-NEW, TAKEN = 0x0010, 0x1000
-PLACE, OTHER = (5000, 0), (7000, 0)
+NEW, TAKEN = 0x0010, True
+PLACE, OTHER = 5000, 7000
 
 
-class Axis:
-    """A gate, and a drive that says whatever the test lets it say."""
+class Axis(Leg):
+    """A drive that says whatever the test lets it say."""
 
     def __init__(self) -> None:
-        assert MODEL.handshake is not None
-        self.gate = Gate(WORDS, 2, "stop", 0, handshake=Handshake(MODEL.handshake, (0, 1)))
-        self.now = 0.0
+        super().__init__(settings_of(FAMILY, on_expiry="stop"))
         self.says(DriveState.READY)
-        self.write(SHUTDOWN)
+        self.writes(SHUTDOWN)
 
-    def says(self, state: DriveState, bits: int = 0) -> None:
-        self.gate.on_status_word(bits)
-        self.gate.on_state(state)
-        self.settle()
-
-    def settle(self, *, may_enable: bool = True) -> None:
-        self.gate.compute(self.now, may_enable=may_enable)
-
-    def write(self, word: int | None = None, position: tuple[int, int] | None = None) -> None:
-        self.gate.take(word, position or self.gate.setpoints, may_enable=True, position=position is not None)
-        self.settle()
+    def write(self, word: int | None = None, position: int | None = None) -> None:
+        self.writes(word, **({} if position is None else {"position": position}))
 
     def enable(self) -> None:
-        self.write(RUN)
+        self.writes(RUN)
         self.says(DriveState.OPERATION_ENABLED)
-
-    def wait(self, seconds: float) -> None:
-        """Let the time pass, asked for as the master does."""
-        end = self.now + seconds
-        while (due := self.gate.next_deadline()) is not None and due <= end:
-            self.now = due
-            self.settle()
-        self.now = end
-        self.settle()
 
     @property
     def orders(self) -> bool:
-        return bool(self.gate.sent.words[0] & NEW)
+        return bool(self.sent & NEW)
+
+
+def test_the_bits_are_those_of_the_mapping() -> None:
+    model = load_family(FAMILY).control_word.handshake
+    assert model is not None
+    assert (1 << model.bit, 1 << model.acknowledge_bit) == (NEW, 0x1000)
 
 
 @pytest.fixture
@@ -77,7 +63,7 @@ def test_a_fault_before_the_drive_was_enabled_forgets_it(axis: Axis, state: Driv
 
 def test_a_fault_forgets_one_that_waits_for_the_acknowledge_bit_to_fall(axis: Axis):
     axis.write(RUN)
-    axis.says(DriveState.OPERATION_ENABLED, TAKEN)
+    axis.says(DriveState.OPERATION_ENABLED, is_taken=TAKEN)
     axis.write(position=PLACE)
     axis.says(DriveState.FAULT)
     axis.says(DriveState.READY)
@@ -88,7 +74,7 @@ def test_a_fault_forgets_one_that_waits_for_the_acknowledge_bit_to_fall(axis: Ax
 @pytest.mark.parametrize("word", [DISABLE, SHUTDOWN, 0x0002, 0x0000])
 def test_every_control_word_that_does_not_enable_forgets_it(axis: Axis, word: int):
     axis.write(RUN)
-    axis.says(DriveState.OPERATION_ENABLED, TAKEN)
+    axis.says(DriveState.OPERATION_ENABLED, is_taken=TAKEN)
     axis.write(position=PLACE)
     axis.write(word)
     axis.write(RUN)
@@ -112,12 +98,12 @@ def test_one_that_comes_to_a_drive_at_rest_does(axis: Axis):
     axis.write(SHUTDOWN, PLACE)
     axis.enable()
     assert axis.orders
-    assert axis.gate.sent.words[1:] == PLACE
+    assert axis.setpoints == (PLACE, 0)
 
 
 def test_leaving_operation_enabled_forgets_it(axis: Axis):
     axis.write(RUN)
-    axis.says(DriveState.OPERATION_ENABLED, TAKEN)
+    axis.says(DriveState.OPERATION_ENABLED, is_taken=TAKEN)
     axis.write(position=PLACE)
     axis.says(DriveState.QUICK_STOP_ACTIVE)
     axis.says(DriveState.OPERATION_ENABLED)
@@ -126,20 +112,17 @@ def test_leaving_operation_enabled_forgets_it(axis: Axis):
 
 def test_a_drive_that_may_not_be_enabled_forgets_it(axis: Axis):
     axis.write(position=PLACE)
-    axis.settle(may_enable=False)
-    axis.gate.interlocked = True
-    axis.gate.lead(SHUTDOWN)
-    axis.settle()
-    axis.gate.lead(RUN)
+    axis.happens(SHUT)
+    axis.happens(OPEN)
+    axis.asks(Start())
     axis.says(DriveState.OPERATION_ENABLED)
+    assert axis.enables
     assert not axis.orders
 
 
 def test_a_start_keeps_what_was_ordered_before(axis: Axis):
     axis.write(position=PLACE)
-    axis.gate.lead(SHUTDOWN)
-    axis.settle()
-    axis.gate.lead(RUN)
+    axis.asks(Start())
     axis.says(DriveState.OPERATION_ENABLED)
     assert axis.orders
 
@@ -147,14 +130,13 @@ def test_a_start_keeps_what_was_ordered_before(axis: Axis):
 def test_one_that_the_drive_does_not_take_ends_after_a_second_and_is_told_once(axis: Axis):
     axis.enable()
     axis.write(position=PLACE)
-    axis.wait(0.99)
+    assert not told(axis.waits(0.99))
     assert axis.orders
-    assert not axis.gate.take_untaken()
-    axis.wait(0.02)
+    assert told(axis.waits(0.02)) == [
+        "the drive has not taken the position that was written: no answer within 1 s"
+    ]
     assert not axis.orders
-    assert axis.gate.take_untaken()
-    assert not axis.gate.take_untaken()
-    axis.wait(5)
+    assert not told(axis.waits(5))
     assert not axis.orders
 
 
@@ -162,17 +144,17 @@ def test_the_next_one_has_an_edge_that_the_bus_sees(axis: Axis):
     axis.enable()
     axis.write(position=PLACE)
     axis.write(position=OTHER)
-    axis.wait(1.05)
+    axis.waits(1.05)
     assert not axis.orders, "low for longer than any cycle we send with"
-    axis.wait(0.1)
+    axis.waits(0.1)
     assert axis.orders
-    assert axis.gate.sent.words[1:] == OTHER
+    assert axis.setpoints == (OTHER, 0)
 
 
 def test_the_same_one_again_is_a_new_one_where_it_was_not_taken(axis: Axis):
     axis.enable()
     axis.write(position=PLACE)
-    axis.wait(2)
+    axis.waits(2)
     axis.write(position=PLACE)
     assert axis.orders
 
@@ -180,7 +162,6 @@ def test_the_same_one_again_is_a_new_one_where_it_was_not_taken(axis: Axis):
 def test_one_that_is_taken_in_time_is_not_told(axis: Axis):
     axis.enable()
     axis.write(position=PLACE)
-    axis.wait(0.5)
-    axis.says(DriveState.OPERATION_ENABLED, TAKEN)
-    axis.wait(5)
-    assert not axis.gate.take_untaken()
+    axis.waits(0.5)
+    axis.says(DriveState.OPERATION_ENABLED, is_taken=TAKEN)
+    assert not told(axis.waits(5))

@@ -202,7 +202,7 @@ class TestAnOwnerThatNobodyWatches:
         return rig
 
     def connected(self, rig: Rig, *, is_there: bool) -> None:
-        rig.channel.authority.on_connection(PLC, rig.now, is_there=is_there)
+        rig.channel.on_connection(PLC, rig.now, is_there=is_there)
 
     def may_take_over(self, rig: Rig) -> bool:
         taken = rig.write(SHUT_DOWN, identity=OTHER_PLC).ok
@@ -286,6 +286,6 @@ class TestAnOwnerThatNobodyWatches:
 
     def test_a_stranger_that_goes_says_nothing_of_the_owner(self):
         rig = self.rig()
-        rig.channel.authority.on_connection(OTHER_PLC, rig.now, is_there=False)
+        rig.channel.on_connection(OTHER_PLC, rig.now, is_there=False)
         rig.wait(20)
         assert not self.may_take_over(rig)

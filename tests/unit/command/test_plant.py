@@ -332,7 +332,7 @@ class TestTrip:
     def test_another_drive_of_the_node_is_untouched(self, running: Hall):
         running.at(100.3)
         infeed = running.plant.drives["conveyor/infeed"].channel
-        assert infeed.watchdog.state.label == "off"
+        assert infeed.watchdog_state.label == "off"
         assert infeed.current_fault == 0
 
 

@@ -120,10 +120,10 @@ def test_a_refused_telegram_changes_nothing(values: dict[str, Value]):
     if not outcome.ok:
         assert not outcome.forwarded
         assert before == (channel.output, channel.control_word, channel.setpoints, PLC)
-        assert channel.watchdog.left_ms(rig.now) == 100
+        assert channel.left_ms(rig.now) == 100
         assert channel.refused_writes == 1
     else:
-        assert channel.watchdog.left_ms(rig.now) == 200
+        assert channel.left_ms(rig.now) == 200
 
 
 def test_half_a_telegram_is_not_applied(rig: Rig):

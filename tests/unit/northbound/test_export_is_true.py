@@ -26,6 +26,7 @@ from bridge.command import (
     Write,
     WriteParameter,
 )
+from bridge.command.leg.state import Timer
 from bridge.command.rights import rights_of
 from bridge.config import load_site
 from bridge.image import Point
@@ -270,7 +271,10 @@ def test_after_a_trip_the_control_word_is_still_the_owners_and_the_setpoints_are
     client = Client(bench)
     command(bench, client)
     client.write(1, 0, ENABLE, 0x2000)
-    bench.plant.drives[FU1].channel.watchdog.set_timeout(100)
+    channel = bench.plant.drives[FU1].channel
+    heard_at = channel.leg.timer.heard_at
+    assert heard_at is not None
+    channel.leg = channel.leg._replace(timer=Timer(100, heard_at, heard_at + 0.1))
     bench.run(0.5)
     assert bench.value(f"{FU1}/supervision/trips") == 1
     assert client.read(1, 3, 0, 2) == [ENABLE, 0]

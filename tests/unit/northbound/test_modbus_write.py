@@ -127,9 +127,9 @@ def test_single_registers(rig: Rig):
 )
 def test_what_is_refused_changes_nothing(rig: Rig, start: int, words: list[int], code: int):
     channel = rig.fu1.channel
-    before = (channel.control_word, channel.setpoints, channel.owner, channel.watchdog.state, rig.sent)
+    before = (channel.control_word, channel.setpoints, channel.owner, channel.watchdog_state, rig.sent)
     assert rig.write(start, *words) == code
-    after = (channel.control_word, channel.setpoints, channel.owner, channel.watchdog.state, rig.sent)
+    after = (channel.control_word, channel.setpoints, channel.owner, channel.watchdog_state, rig.sent)
     assert (after == before) is (code != OK)
 
 
@@ -262,7 +262,7 @@ class TestStopForEverybody:
             rig = self.moving()
             rig.pass_time(0.1)
             rig.write(13, 1, caller=caller)
-            assert rig.fu1.channel.watchdog.left_ms(rig.now) == left_ms
+            assert rig.fu1.channel.left_ms(rig.now) == left_ms
 
     def test_is_refused_to_others_where_the_site_file_forbids_it(self):
         rig = Rig()

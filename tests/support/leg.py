@@ -1,0 +1,118 @@
+"""The leg of one drive by itself: its state, its clock, and what has come of what happened."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bridge.command import Action, Command, Do, Identity, Outcome, Request, Source, Write
+from bridge.command.leg.effect import Answer, Effect, Tell
+from bridge.command.leg.event import Event, NodeBack, Report, Time
+from bridge.command.leg.settings import LegSettings, leg_settings
+from bridge.command.leg.state import INTERLOCKED, Way
+from bridge.command.leg.step import initial, next_deadline, step
+from bridge.command.telegram import TelegramDecoder
+from bridge.config import DriveTable
+from bridge.drive import DriveState
+from bridge.image import Value
+from bridge.mapping import load_family
+
+PLC = Identity(Source.MODBUS, "192.168.1.10")
+OPEN = Way(is_open=True, why="", is_heard=True)
+SHUT = Way(is_open=False, why="the drive's node is lost", is_heard=True)
+
+
+def settings_of(mapping: str, **given: object) -> LegSettings:
+    """A drive of this family that is commanded by Modbus; nobody watches its controller."""
+    family = load_family(mapping)
+    keys = {"slot": family.slot[0].name, "control": "modbus", "fieldbus_timeout_ms": 0, **given}
+    table = DriveTable.model_validate(keys)
+    return leg_settings(family, table, TelegramDecoder("n/d", family, family.slot[0], {}, {}).decode)
+
+
+class Leg:
+    """Its node is operational, and the drive has been heard."""
+
+    def __init__(self, settings: LegSettings) -> None:
+        self.settings = settings
+        self.state = initial(settings)
+        self.now = 100.0
+        self.effects: list[Effect] = []
+        self.happens(OPEN)
+
+    def happens(self, event: Event) -> int:
+        """The control word that is sent after it."""
+        self.state, self.effects = step(self.settings, self.state, event, self.now)
+        return self.sent
+
+    # the drive and its node
+
+    def says(self, state: DriveState, after_s: float = 0.0, *, is_taken: bool = False) -> int:
+        self.now += after_s
+        return self.happens(Report(state, is_taken, "it says so"))
+
+    def restarts(self) -> int:
+        """The node has restarted: what the owner wants stays, behind the interlock."""
+        return self.happens(NodeBack())
+
+    # who commands it
+
+    def asks(self, command: Command | Action) -> int:
+        asked = Do(command) if isinstance(command, Action) else command
+        return self.happens(Request(PLC, "n/d", asked))
+
+    def writes(self, control_word: int | None = None, **values: Value) -> int:
+        words: dict[str, Value] = {} if control_word is None else {"control_word": control_word}
+        return self.asks(Write({**words, **values}))
+
+    @property
+    def outcome(self) -> Outcome:
+        """Of the last request."""
+        (outcome,) = (effect.outcome for effect in self.effects if isinstance(effect, Answer))
+        return outcome
+
+    # time
+
+    def waits(self, seconds: float) -> list[Effect]:
+        """Let the time pass, asked for as the master does; what has come of it."""
+        end = self.now + seconds
+        effects: list[Effect] = []
+        while (due := next_deadline(self.state)) is not None and due <= end:
+            self.now = due
+            self.happens(Time(self.state.way))
+            effects += self.effects
+        self.now = end
+        self.happens(Time(self.state.way))
+        return effects + self.effects
+
+    def trips(self) -> int:
+        """The owner is silent until its time is up."""
+        deadline = self.state.timer.deadline
+        assert deadline is not None
+        self.now = deadline
+        self.happens(Time(self.state.way))
+        assert self.state.stage.is_tripped
+        return self.sent
+
+    # what came of it
+
+    @property
+    def sent(self) -> int:
+        return self.state.sent.words[0]
+
+    @property
+    def setpoints(self) -> tuple[int, ...]:
+        """As they are sent."""
+        return self.state.sent.words[1:]
+
+    @property
+    def enables(self) -> bool:
+        return self.settings.words.enables(self.sent)
+
+    @property
+    def is_interlocked(self) -> bool:
+        return self.state.stage in INTERLOCKED
+
+
+def told(effects: list[Effect]) -> list[Any]:
+    """The sentences among them."""
+    return [effect.message for effect in effects if isinstance(effect, Tell)]

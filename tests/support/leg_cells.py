@@ -1,0 +1,58 @@
+"""The cells of the leg's table that cannot occur, each with the reason.
+
+The exploration fails where one of them occurs, and where another does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from bridge.command.leg.state import STARTING, TRIPPED, Stage
+from bridge.command.leg.table import Stimulus
+
+_S, _E = Stage, Stimulus
+_IDLE: Final = frozenset(Stage) - STARTING
+_LED: Final = frozenset((_S.SETTLING, _S.BRAKING, _S.LEAVING, _S.LEADING))
+_EXPIRED: Final = (_E.EXPIRED_DISABLE, _E.EXPIRED_QUICK_STOP, _E.EXPIRED_SILENCE, _E.EXPIRED_HOLD)
+_STARTS: Final = (_E.START, _E.START_STOPPING, _E.START_UNHEARD, _E.START_BRAKING)
+
+_REASONS: Final[tuple[tuple[str, Iterable[Stimulus], Iterable[Stage]], ...]] = (
+    ("a watchdog that has tripped does not trip again", _EXPIRED, TRIPPED),
+    (
+        "a start is refused while the way is closed or until a trip is acknowledged",
+        _STARTS,
+        {_S.CLOSED, *TRIPPED},
+    ),
+    ("a drive in fault is not started, and a fault ends a start", [_E.ACKNOWLEDGE_FAULT], STARTING),
+    ("an enabling word is on the bus, so no stop is on its way", [_E.START_STOPPING], [_S.ENABLED, _S.BLIND]),
+    ("the drive has been heard, and a node that is back ends the start", [_E.START_UNHEARD], _LED),
+    ("only a start has an end that can be overdue", [_E.START_OVERDUE], _IDLE),
+    ("a report is waited for in two stages only", [_E.REPORT_OVERDUE], {*Stage} - {_S.ASKING, _S.PREPARED}),
+    (
+        "a quick stop is waited for only until the drive is led on",
+        [_E.BRAKING_OVERDUE],
+        {*_IDLE, _S.PREPARED, _S.BLIND, _S.LEADING},
+    ),
+    ("without a start nobody waits for it", [_E.SAYS_ENABLED, _E.SAYS_BRAKING], _IDLE),
+    ("a ramp is waited for, and nothing else", [_E.SAYS_AT_REST], _IDLE - {_S.RAMPING}),
+    ("without a start nobody waits for it, and on a ramp a fault counts as rest", [_E.SAYS_FAULT], _IDLE),
+    (
+        "the next word follows from the report, and the stage stays",
+        [_E.SAYS_AT_REST, _E.SAYS_BRAKING],
+        [_S.LEADING],
+    ),
+    (
+        "a ramp has a limit only as the reaction, and only until the drive rests",
+        [_E.RAMP_OVERDUE],
+        {*Stage} - {_S.RAMPING, _S.SILENCED},
+    ),
+    ("silence follows a reaction that stops, once", [_E.SILENCE_DUE], {*Stage} - {_S.RAMPING, _S.TRIPPED}),
+)
+
+NEVER: Final = {
+    (stage, stimulus): reason
+    for reason, stimuli, stages in _REASONS
+    for stimulus in stimuli
+    for stage in stages
+}

@@ -1,0 +1,124 @@
+"""What must hold of the controller leg of one drive after each step, whatever has happened."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tests.support.leg_rules import Model
+from tests.support.leg_seen import Missing
+from tests.support.leg_words import STRENGTH
+
+TAKES_S: Final = 1.0
+"""A drive has so long to take a position."""
+PAUSE_S: Final = 0.1
+"""The handshake's bit is down for so long after a position that was not taken."""
+
+
+class Oracle(Model):
+    """Says what the leg does wrong."""
+
+    __slots__ = ()
+
+    def check(self, sent: tuple[int, ...], *, silent: bool) -> None:
+        rules, word, now = self.rules, sent[0], self.now
+        words = rules.words
+        is_mute = self.mute_at is not None and now >= self.mute_at
+        assert silent is (is_mute and self.watches), (
+            "nothing is sent where the site file says so, and only there"
+        )
+        assert word & words.valid == words.valid, "the drive takes what is sent"
+        enables = words.enabling.fit(word)
+        if enables and not self.sends:
+            self.followed = self.says == "enabled"
+        self.sends = enables
+        if enables:
+            self._check_enabling(word)
+        else:
+            must = self.missing is Missing.NOTHING and (not self.is_starting or self.is_plain)
+            assert not must and not self.is_held, "what may be enabled is enabled"
+        assert not (self.is_plain and self.says == "enabled" and self.missing is Missing.NOTHING), (
+            "a start ends when the drive is enabled"
+        )
+        if self.is_tripped and rules.reaction != "hold":
+            assert not any(sent[1:]), "setpoints go to zero"
+            self._check_reaction(word, is_mute=is_mute)
+        if words.handshake:
+            self._check_handshake(bool(word & words.handshake) and enables)
+
+    def _check_enabling(self, word: int) -> None:
+        rules, words = self.rules, self.rules.words
+        assert self.may_enable, "nothing enables a drive whose node is not there"
+        if self.timeout_s and not rules.ignores and rules.reaction != "hold":
+            assert self.deadline is not None, "nothing enables without a telegram of the owner"
+            assert self.now < self.deadline, "nothing enables after the deadline"
+        allowed = self.is_held or self.missing is Missing.NOTHING
+        assert allowed, f"still missing: {self.missing.name}"
+        if words.begin:
+            assert bool(word & words.begin) is self.has_begun, "it begins when the drive is enabled"
+
+    def _check_reaction(self, word: int, *, is_mute: bool) -> None:
+        """Tripped: the drive is stopped as the site file says, or more strongly, unless it stands."""
+        words = self.rules.words
+        assert not words.enabling.fit(word)
+        if self.coasts_at is not None and self.now >= self.coasts_at:
+            assert words.disable_voltage.fit(word), "a quick stop ends with disable voltage"
+        elif is_mute and not self.watches:
+            assert words.disable_voltage.fit(word), "where silence is no stop it is disable voltage"
+        elif self.stop_kind and self.says in ("enabled", "braking"):
+            self.check_stop(word, self.stop_kind)
+
+    def check_stop(self, word: int, kind: str) -> None:
+        assert any(stop.fit(word) for stop in self.rules.words.stops(kind)), f"{word:04X}h is no {kind}"
+
+    def check_told(self, action: str, word: int, *, forwarded: bool) -> None:
+        """What the owner is told of its telegram: a write that is kept from the drive says so."""
+        if action != "write":
+            return
+        if self.is_tripped:
+            assert self.is_held or self.rules.reaction == "hold" or not forwarded, (
+                "told as forwarded while tripped"
+            )
+        elif self.missing is Missing.NOTHING and not self.is_starting:
+            assert forwarded is self.rules.words.enabling.fit(word), "told as what was done"
+
+    def check_kernel(self, until: float | None, then: tuple[int, ...], *, silent: bool) -> None:
+        """What enables is on the bus until ``until``, whoever is alive then, and then ``then``."""
+        rules = self.rules
+        ends = [self.lease_until] if self.lease_until is not None else []
+        if (
+            self.deadline is not None
+            and not rules.ignores
+            and not self.is_tripped
+            and rules.reaction != "hold"
+        ):
+            ends.append(self.deadline)
+        assert until == min(ends, default=None), "the kernel keeps the bound"
+        if until is None:
+            return
+        assert not rules.words.enabling.fit(then[0]), "and sends a stop then"
+        assert not any(then[1:])
+        if until == self.deadline and rules.reaction in STRENGTH:
+            self.check_stop(then[0], rules.reaction)
+        assert silent is (until == self.deadline and rules.mutes_after_s == 0 and self.watches)
+
+    def _check_handshake(self, is_up: bool) -> None:
+        now, taken = self.now, self.is_taken
+        commanded = self.sends and self.says == "enabled"
+        if not self.may_enable:
+            self._forget()
+        if self.down_until is not None and now >= self.down_until:
+            self.down_until = None
+        if self.was_commanded and not commanded:
+            self._forget()
+        self.was_commanded = commanded
+        if self.is_up and taken:
+            self.is_up, self.up_until = False, None
+        elif self.is_up and self.up_until is not None and now >= self.up_until:
+            self.is_up, self.up_until, self.handed = False, None, None
+            self.down_until = now + PAUSE_S
+        elif commanded and not (self.is_up or taken or self.down_until) and self.ordered is not None:
+            self.is_up, self.up_until = True, now + TAKES_S
+            self.ordered, self.handed = None, self.ordered
+        should = self.was_up if self.is_held else self.is_up
+        assert is_up is should, "a position is handed over once, and only when it may be"
+        self.was_up = is_up

@@ -1,0 +1,275 @@
+"""The settings with which the leg is explored, and which events can tell their states apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from time import process_time
+from typing import Any, Final
+
+from bridge.command.leg.event import NodeBack, Report
+from bridge.command.leg.settings import leg_settings
+from bridge.command.leg.state import Stage, Way
+from bridge.command.leg.step import initial, step
+from bridge.command.leg.table import Stimulus
+from bridge.command.telegram import TelegramDecoder
+from bridge.config import DriveTable
+from bridge.drive import DriveState
+from bridge.mapping import load_family
+from tests.support.leg_seen import Rules
+from tests.support.leg_space import Cells, Space
+from tests.support.leg_time import NOW
+from tests.support.leg_words import ALL, HOMING, NORD_TU4, LegWords
+
+CYCLIC: Final = replace(HOMING, mapping="cia402/cyclic-position", begin=0, setpoint={"position": 70_000})
+"""Its setpoints follow the drive's own position."""
+FAMILIES: Final = (*ALL, CYCLIC)
+REACTIONS: Final = ("disable_voltage", "quick_stop", "stop", "silence", "hold")
+
+_WAY: Final = {"node lost", "node operational", "bus back", "bridge gap"}
+_BASE: Final = _WAY | {
+    "owner writes a stop",
+    "owner enables",
+    "owner acknowledges by an edge",
+    "owner resets the fault",
+    "owner releases",
+    "owner's stop comes late",
+    "rival enables",
+    "stranger stops the drive",
+    "drive follows",
+    "drive says: fault",
+    "everything is due",
+    "nothing is due",
+}
+_START: Final = _BASE - {"owner resets the fault", "node operational"} | {
+    "owner starts the drive",
+    "drive repeats",
+    "drive says: enabled",
+    "drive says: braking",
+    "drive says: inhibited",
+    "node operational, not heard",
+}
+_SHORT_START: Final = {
+    "owner writes a stop",
+    "owner writes a setpoint",
+    "owner's control data are not valid",
+    "owner starts the drive",
+    "drive follows",
+    "drive repeats",
+    "drive says: braking",
+    "node lost",
+    "node operational, not heard",
+}
+"""Enough for each stage of a start to be there when the time is up."""
+_NORDS: Final = {"owner writes a setpoint", "owner's control data are not valid"}
+_NO_WORDS: Final = {"owner's stop comes late", "rival enables", "bus back", "nothing is due"}
+"""Of these the words of another family make nothing else than NORD's."""
+_NOBODY: Final = {
+    "reader enables",
+    "reader stops the drive",
+    "stranger enables",
+    "rival starts the drive",
+    "rival writes a stop",
+    "rival sets a longer time-out",
+    "rival takes control",
+    "engineer resets the fault",
+    "engineer takes control",
+    "owner's control data are not valid",
+    "rival's control data are not valid",
+    "owner writes a value that is too large",
+    "owner's enable comes late",
+    "owner's start comes late",
+    "owner sets a longer time-out",
+    "owner takes control",
+}
+"""Little comes of these with a watchdog and no lease: one profile is enough."""
+_ACKNOWLEDGES: Final = {
+    "owner keeps alive",
+    "owner resets the fault by a register",
+    "owner acknowledges and enables in one word",
+}
+_STOPS: Final = {
+    "owner stops the drive",
+    "owner disables voltage",
+    "stranger stops the drive quickly",
+    "stranger disables voltage",
+}
+_WATCH: Final = {"drive's own watch is off", "drive's own watch is on"}
+_CONNECTION: Final = {"owner's connection ends", "owner is connected"}
+_LEAN: Final = _BASE - {
+    "owner acknowledges by an edge",
+    "owner's stop comes late",
+    "rival enables",
+    "bus back",
+}
+_LEASE: Final = _BASE - {"owner's stop comes late", "bus back", "rival enables"} | {
+    "owner takes control",
+    "rival takes control",
+    "engineer takes control",
+    "owner keeps alive",
+}
+
+_HANDSHAKE: Final = {
+    "owner writes a stop",
+    "owner enables",
+    "owner writes a setpoint",
+    "owner writes another setpoint",
+    "stranger stops the drive",
+    "owner disables voltage",
+    "drive takes the setpoint",
+    "drive follows",
+    "drive says: fault",
+    "node lost",
+    "node operational",
+    "everything is due",
+}
+
+
+def space(
+    words: LegWords = NORD_TU4, *, names: Any = _BASE, after_hang: Any = (), ttl_ms: int = 5000, **given: Any
+) -> Space:
+    family = load_family(words.mapping)
+    name = family.slot[0].name
+    settings = {"slot": name, "control": "modbus", "fieldbus_timeout_ms": 2000, **given}
+    table = DriveTable.model_validate(settings)
+    drive = leg_settings(family, table, TelegramDecoder(f"n/{name}", family, family.slot[0], {}, {}).decode)
+    leg = initial(drive)
+    for event in (NodeBack(), Way(True, "", "", True), Report(DriveState.READY)):
+        leg, _ = step(drive, leg, event, NOW)
+    reaction = table.on_expiry
+    rules = Rules(
+        words=words,
+        timeout_s=settings["fieldbus_timeout_ms"] / 1000,
+        ignores=table.telegram_downtime_s == -0.1,
+        reaction=reaction,
+        mutes_after_s=0.0 if reaction == "silence" else table.then_silence_ms / 1000 or None,
+        control=table.control,
+        stop_by_anyone=table.stop_by_anyone,
+        is_writable=table.fieldbus_timeout_writable,
+    )
+    return Space(drive, rules, leg, names, after_hang, ttl_ms)
+
+
+Profile = dict[str, Any]
+
+
+def family_profiles(words: LegWords) -> dict[str, Profile]:
+    """Every reaction, and starts, in the words of one family."""
+    names, started, more = _BASE | _NORDS, _START, set[str]()
+    if words is not NORD_TU4:
+        names = names - _NORDS - _NO_WORDS
+        started = started - _NO_WORDS - {"owner acknowledges by an edge", "owner releases"}
+    if words is CYCLIC or words.handshake:
+        names, started = names - {"owner resets the fault"}, started - {"drive says: inhibited"}
+        more = {"drive takes the setpoint"} if words.handshake else {"position not known", "position known"}
+    found: dict[str, Profile] = {
+        reaction: {"words": words, "names": names | more, "on_expiry": reaction} for reaction in REACTIONS
+    }
+    found["started"] = {"words": words, "names": started | more}
+    if words.handshake:
+        found["two positions"] = {"words": words, "names": _HANDSHAKE}
+    return found
+
+
+_SETTINGS: Final[dict[str, Profile]] = {
+    **{f"started, {reaction}": {"names": _SHORT_START, "on_expiry": reaction} for reaction in REACTIONS[1:]},
+    "refused": {
+        "names": _LEAN | _NOBODY,
+        "after_hang": {
+            "owner enables",
+            "owner writes a stop",
+            "owner resets the fault",
+            "rival enables",
+            "owner keeps alive",
+            "owner takes control",
+            "stranger stops the drive",
+            "owner releases",
+            "reader enables",
+        },
+    },
+    "acknowledges": {
+        "names": _BASE - {"rival enables", "bus back", "owner's stop comes late"} | _ACKNOWLEDGES
+    },
+    "every stop": {"names": _LEAN | _STOPS, "on_expiry": "stop"},
+    "stop, then silence": {"names": _LEAN | _WATCH, "on_expiry": "stop", "then_silence_ms": 300},
+    "quick_stop, then silence": {"names": _LEAN | _WATCH, "on_expiry": "quick_stop", "then_silence_ms": 300},
+    "silence, own watch off": {"names": _LEAN | _WATCH, "on_expiry": "silence"},
+    "lease": {"names": _LEASE, "control": "lease", "after_hang": {"owner keeps alive", "owner enables"}},
+    "lease, hold": {"names": _LEASE, "control": "lease", "on_expiry": "hold"},
+    "errors ignored": {"names": _BASE - {"node lost"}, "telegram_downtime_s": -0.1},
+    "errors ignored, started": {
+        "names": _SHORT_START - {"node lost"}
+        | {
+            "owner resets the fault",
+            "drive says: unknown",
+            "drive says: fault",
+        },
+        "telegram_downtime_s": -0.1,
+    },
+    "errors ignored, started unheard": {
+        "names": {
+            "owner starts the drive",
+            "drive repeats",
+            "drive says: braking",
+            "drive is heard, but not its state",
+            "node operational, not heard",
+        },
+        "telegram_downtime_s": -0.1,
+    },
+    "errors ignored, lease": {
+        "names": _LEASE - {"node lost"},
+        "telegram_downtime_s": -0.1,
+        "control": "lease",
+    },
+    "off": {"names": _BASE | _CONNECTION, "fieldbus_timeout_ms": 0},
+    "off, lease": {"names": _LEASE | _CONNECTION, "fieldbus_timeout_ms": 0, "control": "lease"},
+    "off, stopped by the owner only": {
+        "names": _LEAN | _CONNECTION,
+        "fieldbus_timeout_ms": 0,
+        "stop_by_anyone": False,
+    },
+    "stopped by the owner only": {"names": _LEAN | {"owner stops the drive"}, "stop_by_anyone": False},
+    "time-out writable": {
+        "names": _LEAN
+        | {"owner sets a longer time-out", "owner switches the time-out off", "rival sets a longer time-out"},
+        "fieldbus_timeout_writable": True,
+        "fieldbus_timeout_range_ms": [0, 3000],
+    },
+    "nobody": {"names": _BASE | _NOBODY, "control": "none"},
+}
+"""What else the site file can say, in NORD's words."""
+ROWS: Final[dict[str, dict[str, Profile]]] = {
+    **{words.mapping: family_profiles(words) for words in FAMILIES},
+    "nord/sk-tu4-cao, other settings": _SETTINGS,
+}
+MOST: Final = 20_000
+"""States of a profile: more are no exploration that anybody waits for."""
+
+
+@dataclass(slots=True)
+class Figures:
+    """Of the profiles of one row. ``seconds`` are those of the processor."""
+
+    profiles: int = 0
+    states: int = 0
+    steps: int = 0
+    seconds: float = 0.0
+    cells: Cells = field(default_factory=set[tuple[Stage, Stimulus]])
+
+
+def explored(row: str) -> Figures:
+    """Every profile of the row, each walked to its end."""
+    found = Figures()
+    begun = process_time()
+    for profile, given in ROWS[row].items():
+        try:
+            walked = space(**given).explore(MOST)
+        except AssertionError as error:
+            raise AssertionError(f"{row}, {profile}: {error}") from error
+        assert walked.states > 100 or given.get("control") == "none"
+        assert walked.enabled or given.get("control") == "none", "a drive that never moves proves nothing"
+        found.profiles += 1
+        found.states += walked.states
+        found.steps += walked.steps
+        found.cells |= walked.cells
+    found.seconds = process_time() - begun
+    return found

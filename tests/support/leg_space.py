@@ -1,0 +1,387 @@
+"""Everything that can happen to the leg of one drive, breadth first, each state visited once.
+
+A state is the leg's own with what the oracle remembers: two sequences that lead to the same one have the same
+future, so only the first goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field
+from typing import Any, Final
+from unittest.mock import patch
+
+from bridge.command import (
+    Action,
+    Code,
+    Request,
+    SetTimeout,
+    Start,
+    TakeControl,
+    Write,
+)
+from bridge.command.leg import turn
+from bridge.command.leg.effect import Answer, Effect, StartBegun, StartEnded
+from bridge.command.leg.event import BridgeGap, Connection, NodeBack, OwnWatch, Report, StartAnew, Time
+from bridge.command.leg.settings import LegSettings
+from bridge.command.leg.state import LegState, Stage, Way
+from bridge.command.leg.step import next_deadline, output_then, step, until
+from bridge.command.leg.table import Cell, Stimulus
+from bridge.command.request import STOP_ACTIONS
+from bridge.drive import DriveState
+from tests.support.leg_oracle import Oracle
+from tests.support.leg_requests import requests_of
+from tests.support.leg_seen import Rules, first
+from tests.support.leg_time import NOW, State, ahead, come, forgotten, timeless
+from tests.support.rig import PLC
+
+_OPEN: Final = Way(True, "", "", True)
+_UNHEARD: Final = Way(True, "", "", False)
+_SHUT: Final = Way(False, "the node is lost", "", False)
+_UNPLACED: Final = Way(True, "", "nobody knows where it is", True)
+_SAYS: Final = {
+    "ready": DriveState.READY,
+    "enabled": DriveState.OPERATION_ENABLED,
+    "braking": DriveState.QUICK_STOP_ACTIVE,
+    "inhibited": DriveState.SWITCH_ON_INHIBITED,
+    "fault": DriveState.FAULT,
+    "unknown": DriveState.UNKNOWN,
+}
+
+Cells = set[tuple[Stage, Stimulus]]
+
+
+class _RecordedTable(dict[tuple[Stage, Stimulus], Cell]):
+    """``seen`` has the cells that were looked up."""
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self.seen: Cells = set()
+
+    def __getitem__(self, key: tuple[Stage, Stimulus]) -> Cell:
+        self.seen.add(key)
+        return super().__getitem__(key)
+
+
+@dataclass(slots=True)
+class Walked:
+    """``steps``: state and event, each once."""
+
+    states: int = 0
+    steps: int = 0
+    enabled: int = 0
+    refused: int = 0
+    cells: Cells = field(default_factory=set[tuple[Stage, Stimulus]])
+
+
+class Space:
+    """``events`` are all that may happen to a state; each gives the next one, having checked what must hold.
+    ``names``: those of the profile. ``after_hang``: requests that are read after everything has come due."""
+
+    def __init__(
+        self,
+        settings: LegSettings,
+        rules: Rules,
+        leg: LegState,
+        names: Collection[str],
+        after_hang: Collection[str] = (),
+        ttl_ms: int = 5000,
+    ) -> None:
+        self.settings, self.rules = settings, rules
+        self.first = timeless(leg, first(rules))
+        self.walked = Walked()
+        self.states = [self.first]
+        every = self._every(requests_of(rules, ttl_ms))
+        unknown = {*names, *after_hang} - every.keys()
+        assert not unknown, unknown
+        self.events = {name: happen for name, happen in every.items() if name in names}
+        for name in after_hang:
+            self.events[f"{name}, after a hang"] = self._late(every[name])
+
+    def _every(self, requests: dict[str, Request]) -> dict[str, Callable[[State], State]]:
+        every: dict[str, Callable[[State], State]] = {
+            name: lambda state, request=request: self._request(state, request)
+            for name, request in requests.items()
+        }
+        for says in _SAYS:
+            every[f"drive says: {says}"] = lambda state, says=says: self._says(state, says)
+        return every | {
+            "drive follows": self._follows,
+            "drive repeats": self._repeats,
+            "drive takes the setpoint": lambda state: self._follows(state, is_taken=True),
+            "drive is heard, but not its state": self._is_heard,
+            "drive's own watch is off": lambda state: self._watches(state, watches=False),
+            "drive's own watch is on": lambda state: self._watches(state, watches=True),
+            "node lost": lambda state: self._way(state, _SHUT),
+            "node operational": lambda state: self._node_back(state, _OPEN),
+            "node operational, not heard": lambda state: self._node_back(state, _UNHEARD),
+            "position not known": lambda state: self._way(state, _UNPLACED),
+            "position known": lambda state: self._way(state, _OPEN),
+            "bus back": self._bus_back,
+            "bridge gap": self._gap,
+            "everything is due": lambda state: self._round(come(state, ahead(state))),
+            "nothing is due": self._round,
+            "owner's connection ends": lambda state: self._connection(state, is_there=False),
+            "owner is connected": lambda state: self._connection(state, is_there=True),
+        }
+
+    def _late(self, happen: Callable[[State], State]) -> Callable[[State], State]:
+        return lambda state: happen(come(state, ahead(state)))
+
+    # requests, between two rounds of the service: the leg has to see to its timers by itself
+
+    def _request(self, state: State, request: Request) -> State:
+        leg, seen = state
+        after, effects = step(self.settings, leg, request, NOW)
+        oracle = Oracle(self.rules, seen, NOW)
+        oracle.judge()
+        answer = next((effect for effect in effects if isinstance(effect, Answer)), None)
+        may = self._may(oracle, request)
+        if answer is not None and answer.is_refused:
+            assert not answer.outcome.forwarded
+            assert not may, f"refused: {answer.outcome.message}"
+            self.walked.refused += 1
+            if after is leg:
+                return state
+            alone, _ = step(self.settings, leg, Time(), NOW)
+            both, _ = step(self.settings, after, Time(), NOW)
+            assert both == alone, "a refused telegram changes nothing"
+        else:
+            assert may, f"{request.action} was taken"
+            self._tell(oracle, request)
+            if answer is not None and request.received_at is None:
+                oracle.check_told(request.action, after.sent.words[0], forwarded=answer.outcome.forwarded)
+            if request.action in STOP_ACTIONS and not after.sent.silent:
+                oracle.check_stop(after.sent.words[0], request.action)
+        return self._end(leg, after, oracle, effects)
+
+    def _may(self, oracle: Oracle, request: Request) -> bool:
+        """Whether it is to be taken."""
+        who, command, action = request.identity, request.command, request.action
+        is_late = request.received_at is not None
+        if action in STOP_ACTIONS:
+            return oracle.may_stop(who)
+        if not oracle.may(who, take=action is Action.TAKE_CONTROL):
+            return False
+        words = self.rules.words
+        match command:
+            case Write(values=values):
+                word = values.get("control_word", words.valid)
+                assert isinstance(word, int)
+                is_stop = "control_word" in values and not words.enabling.fit(word)
+                is_valid = word & words.valid == words.valid and values is not words.too_large
+                return is_valid and (not is_late or (is_stop and who == oracle.owner))
+            case Start():
+                return not (is_late or oracle.is_tripped or oracle.says == "fault") and oracle.is_open
+            case SetTimeout():
+                return self.rules.is_writable and who == oracle.owner
+            case _:
+                return not is_late
+
+    def _tell(self, oracle: Oracle, request: Request) -> None:
+        who, command, action = request.identity, request.command, request.action
+        is_late = request.received_at is not None
+        if request.pressed is False and who == oracle.pressed_by:
+            oracle.pressed_by = None
+        match command:
+            case Write() if is_late:
+                oracle.late_stop()
+            case Write(values=values):
+                word = values.get("control_word")
+                if isinstance(word, int):
+                    oracle.word(who, word)
+                else:
+                    oracle.telegram(who)
+                if "position" in values:
+                    oracle.order(values["position"])
+            case Start():
+                oracle.start(who)
+            case TakeControl(ttl_ms=ttl_ms):
+                oracle.take_control(who, ttl_ms / 1000)
+            case SetTimeout(timeout_ms=timeout_ms):
+                oracle.set_timeout(timeout_ms / 1000)
+            case _ if action in STOP_ACTIONS:
+                oracle.asked_to_stop(who, action, is_late=is_late)
+            case _ if action is Action.KEEP_ALIVE or (request.pressed and who == oracle.pressed_by):
+                oracle.telegram(who)
+            case _ if action is Action.RESET_FAULT:
+                oracle.pressed_by = who if request.pressed else oracle.pressed_by
+                oracle.acknowledge(who, is_reset=True)
+            case _:
+                if who == oracle.owner:
+                    oracle.leave()
+
+    # rounds of the service
+
+    def _round(self, state: State) -> State:
+        leg, seen = state
+        oracle = Oracle(self.rules, seen, NOW)
+        return self._time(leg, leg, oracle, [])
+
+    def _time(self, before: LegState, leg: LegState, oracle: Oracle, effects: list[Effect]) -> State:
+        oracle.round()
+        after, more = step(self.settings, leg, Time(), NOW)
+        return self._end(before, after, oracle, [*effects, *more])
+
+    # the drive
+
+    def _follows(self, state: State, *, is_taken: bool = False) -> State:
+        sent = state[0].sent
+        enables = self.rules.words.enabling.fit(sent.words[0]) and not sent.silent
+        return self._hear(state, "enabled" if enables else "ready", is_taken=is_taken)
+
+    def _repeats(self, state: State) -> State:
+        return self._hear(state, state[1].says, is_taken=state[1].is_taken)
+
+    def _says(self, state: State, says: str) -> State:
+        _, seen = state
+        if says == "enabled" and seen.followed and seen.says != "enabled":
+            return state  # nothing that was sent would have brought it there
+        return self._hear(state, says)
+
+    def _hear(self, state: State, says: str, *, is_taken: bool = False) -> State:
+        leg, seen = state
+        oracle = Oracle(self.rules, seen, NOW)
+        if not seen.is_there:
+            return state
+        heard = leg
+        if not leg.way.is_heard:
+            heard = leg._replace(way=leg.way._replace(is_heard=True))
+        after, effects = step(self.settings, heard, Report(_SAYS[says], is_taken, "a fault"), NOW)
+        oracle.hear(says, is_taken=is_taken)
+        self._check(after, oracle, leg, effects)
+        return self._time(after, after, oracle, [])
+
+    def _is_heard(self, state: State) -> State:
+        """A telegram without the status word."""
+        leg, seen = state
+        if leg.way.is_heard or not leg.way.is_open:
+            return state
+        return self._round((leg._replace(way=leg.way._replace(is_heard=True)), seen._replace(is_heard=True)))
+
+    def _watches(self, state: State, *, watches: bool) -> State:
+        leg, seen = state
+        oracle = Oracle(self.rules, seen, NOW)
+        after, effects = step(self.settings, leg, OwnWatch(watches), NOW)
+        oracle.watches = watches
+        return self._time(leg, after, oracle, effects)
+
+    # the way to it
+
+    def _way(self, state: State, way: Way) -> State:
+        leg, seen = state
+        way = way._replace(is_heard=leg.way.is_heard)
+        if leg.way == way or (way.is_open and not leg.way.is_open):
+            return state
+        oracle = Oracle(self.rules, seen, NOW)
+        after, effects = step(self.settings, leg, way, NOW)
+        oracle.way(is_there=way.is_open, is_placed=not way.why_unplaced, is_heard=way.is_heard)
+        return self._time(leg, after, oracle, effects)
+
+    def _node_back(self, state: State, way: Way) -> State:
+        leg, seen = state
+        if leg.way.is_open and not self.rules.ignores:
+            return state
+        oracle = Oracle(self.rules, seen, NOW)
+        back, effects = step(self.settings, leg, NodeBack(), NOW)
+        after, more = step(self.settings, back, way, NOW)
+        oracle.stop()
+        oracle.way(is_there=True, is_heard=way.is_heard)
+        return self._time(leg, after, oracle, [*effects, *more])
+
+    def _bus_back(self, state: State) -> State:
+        leg, seen = state
+        oracle = Oracle(self.rules, seen, NOW)
+        after, effects = step(self.settings, leg, StartAnew(), NOW)
+        oracle.stop()
+        oracle.followed = True
+        return self._time(leg, after, oracle, effects)
+
+    def _gap(self, state: State) -> State:
+        leg, seen = state
+        oracle = Oracle(self.rules, seen, NOW)
+        after, effects = step(self.settings, leg, BridgeGap(), NOW)
+        oracle.judge()
+        if oracle.is_tripped:
+            oracle.stop()
+        else:
+            oracle.leave()
+        return self._time(leg, after, oracle, effects)
+
+    def _connection(self, state: State, *, is_there: bool) -> State:
+        leg, seen = state
+        oracle = Oracle(self.rules, seen, NOW)
+        after, effects = step(self.settings, leg, Connection(PLC, is_there), NOW)
+        oracle.connection(PLC, is_there=is_there)
+        return self._end(leg, after, oracle, effects)
+
+    # what must hold
+
+    def _end(self, before: LegState, leg: LegState, oracle: Oracle, effects: list[Effect]) -> State:
+        self._check(leg, oracle, before, effects)
+        return timeless(forgotten(leg), oracle.end())
+
+    def _check(self, leg: LegState, oracle: Oracle, before: LegState, effects: list[Effect]) -> None:
+        ended = [effect.outcome for effect in effects if isinstance(effect, StartEnded)]
+        begun = sum(isinstance(effect, StartBegun) for effect in effects)
+        was, is_going_on = before.start is not None, leg.start is not None
+        assert was + begun == is_going_on + len(ended), "a start has one outcome"
+        for number, outcome in enumerate(ended):
+            if number >= was + begun - 1:
+                oracle.start_has_ended(is_done=outcome.code is Code.OK)
+        oracle.look_at_way()
+        assert oracle.is_starting is is_going_on, "a start goes on until something ends it"
+        assert leg.stage.is_tripped is oracle.is_tripped, "tripped exactly if the owner's time was up"
+        assert leg.owner.identity == oracle.owner
+        sent = leg.sent
+        oracle.check(sent.words, silent=sent.silent)
+        if oracle.sends:
+            self.walked.enabled += 1
+            then = output_then(self.settings, leg)
+            oracle.check_kernel(until(self.settings, leg), then.words, silent=then.silent)
+
+    # the walk
+
+    def explore(self, most: int, table: dict[tuple[Stage, Stimulus], Cell] | None = None) -> Walked:
+        """Every state there is; fails with the shortest sequence that breaks a rule."""
+        recorded = _RecordedTable(turn.TABLE if table is None else table)
+        with patch.object(turn, "TABLE", recorded):
+            self._explore(most)
+        self.walked.cells = recorded.seen
+        return self.walked
+
+    def _explore(self, most: int) -> None:
+        states = self.states
+        numbers: dict[State, int] = {self.first: 0}
+        ways: list[tuple[int, str]] = [(-1, "")]
+        events = tuple(self.events.items())
+        for number, state in enumerate(states):
+            assert len(states) <= most, f"more than {most} states"
+            instants = ahead(state)
+            due = tuple((f"due {at}", lambda state, at=at: self._round(come(state, [at]))) for at in instants)
+            for name, happen in events + due:
+                try:
+                    after = happen(state)
+                except AssertionError as error:
+                    raise AssertionError(f"{error}\nafter {_told(ways, number)}{name}") from error
+                self.walked.steps += 1
+                if after is not state and after not in numbers:
+                    numbers[after] = len(states)
+                    states.append(after)
+                    ways.append((number, name))
+            if not self._is_woken(state):
+                raise AssertionError(f"nobody wakes the leg in time\nafter {_told(ways, number)}")
+        self.walked.states = len(states)
+
+    def _is_woken(self, state: State) -> bool:
+        wakes, times = next_deadline(state[0]), state[1].times
+        due = [it for it in (times.deadline, times.lease_until, times.mute_at) if it is not None and it > NOW]
+        return not due or (wakes is not None and wakes <= min(due))
+
+
+def _told(ways: list[tuple[int, str]], number: int) -> str:
+    events = ""
+    while number:
+        number, name = ways[number]
+        events = f"{name}, {events}"
+    return events

@@ -1,0 +1,100 @@
+"""The time of an explored state, without clocks: each instant is now, or some time later.
+
+The leg compares times with the present and adds to it, and does nothing else with them. So of an instant
+that lies ahead it matters only with which others it coincides: any of them may be the next. That lets in
+orders that no clock makes, and leaves none out that one could.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.command.leg.state import REACTING, LegState
+from tests.support.leg_seen import Seen, Times
+
+NOW: Final = 1000.0
+_LATER: Final = 1e6
+"""The first instant that lies ahead; the next is one second after it, and so on."""
+
+State = tuple[LegState, Seen]
+Instants = tuple[float | None, ...]
+_NEVER: Final = (None,) * 4
+_ORACLES: Final = len(Times._fields)
+
+
+def _instants(leg: LegState, seen: Seen) -> Instants:
+    _, _, lease_until, absent_until, stopped_until = leg.owner
+    _, heard_at, deadline, _ = leg.timer
+    start = leg.start
+    started = _NEVER if start is None else (start.until, start.settles_at, start.believed_at, start.leaves_at)
+    order = leg.order
+    return (
+        lease_until,
+        absent_until,
+        stopped_until,
+        heard_at,
+        deadline,
+        *leg.trip,
+        order.deadline,
+        order.rises_at,
+        leg.pulse_until,
+        *started,
+        *seen.times,
+    )
+
+
+def _with(leg: LegState, seen: Seen, instants: Instants) -> State:
+    owner, timer, start, order = leg.owner, leg.timer, leg.start, leg.order
+    lease_until, absent_until, stopped_until, heard_at, deadline, *trip = instants[:7]
+    if start is not None:
+        start = start._replace(
+            until=instants[10] or NOW,
+            settles_at=instants[11],
+            believed_at=instants[12],
+            leaves_at=instants[13],
+        )
+    leg = leg._replace(
+        owner=type(owner)(owner.identity, owner.lease_s, lease_until, absent_until, stopped_until),
+        timer=type(timer)(timer.timeout_ms, heard_at, deadline, timer.is_silent),
+        trip=type(leg.trip)(*trip),
+        order=order._replace(deadline=instants[7], rises_at=instants[8]),
+        pulse_until=instants[9],
+        start=start,
+    )
+    return leg, seen._replace(times=Times(*instants[14:]))
+
+
+_timeless: dict[Instants, Instants] = {}
+
+
+def timeless(leg: LegState, seen: Seen) -> State:
+    """The same state as any other in which the same instants coincide."""
+    instants = _instants(leg, seen)
+    found = _timeless.get(instants)
+    if found is None:
+        places: dict[float, float] = {}
+        for instant in instants:
+            if instant is not None and instant > NOW:
+                places.setdefault(instant, _LATER + len(places))
+        found = tuple(None if it is None else places.get(it, NOW) for it in instants)
+        _timeless[instants] = found
+    return (leg, seen) if found == instants else _with(leg, seen, found)
+
+
+def forgotten(leg: LegState) -> LegState:
+    """The leg without what decides nothing any more: a reaction is made from what is sent, and what follows
+    it from the reaction. ``test_leg_space`` shows that nothing comes of the rest."""
+    if leg.stage not in REACTING:
+        return leg
+    return leg._replace(word=0, is_ours=True, is_asked=False, setpoints=leg.rest)
+
+
+def ahead(state: State) -> list[float]:
+    """The instants that lie ahead of a timeless state."""
+    return sorted({instant for instant in _instants(*state) if instant is not None and instant > NOW})
+
+
+def come(state: State, due: list[float]) -> State:
+    """These are now."""
+    instants = _instants(*state)
+    return _with(*state, tuple(NOW if instant in due else instant for instant in instants))

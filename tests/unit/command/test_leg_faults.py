@@ -1,0 +1,181 @@
+"""The exploration finds what is wrong: a leg with a fault in its table or in its deeds fails the oracle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import pytest
+
+from bridge.command.leg import order, requests, rules, start, step, turn, words
+from bridge.command.leg.effect import Heard
+from bridge.command.leg.state import Output, Stage
+from bridge.command.leg.table import TABLE, Cell, Deed, Stimulus
+from bridge.command.leg.turn import Turn
+from tests.support import leg_space
+from tests.support.leg_profiles import MOST, space
+from tests.support.leg_words import POSITION
+
+_TELEGRAMS: Final = {
+    "owner writes a stop",
+    "owner enables",
+    "owner resets the fault",
+    "owner releases",
+    "rival enables",
+    "stranger stops the drive",
+    "drive follows",
+    "everything is due",
+}
+_WAY: Final = _TELEGRAMS | {"node lost", "node operational", "bus back", "bridge gap"}
+_EDGES: Final = _TELEGRAMS | {"owner acknowledges by an edge"}
+_LATE: Final = _TELEGRAMS | {"owner's stop comes late", "owner's enable comes late"}
+_STARTS: Final = {
+    "owner starts the drive",
+    "owner writes a stop",
+    "drive follows",
+    "drive says: fault",
+    "drive repeats",
+    "everything is due",
+}
+_POSITIONS: Final = {
+    "owner writes a stop",
+    "owner enables",
+    "drive follows",
+    "drive takes the setpoint",
+    "stranger stops the drive",
+}
+PROFILES: Final[dict[str, dict[str, Any]]] = {
+    "telegrams": {"names": _TELEGRAMS},
+    "quick_stop": {"names": _TELEGRAMS, "on_expiry": "quick_stop"},
+    "silence": {"names": _TELEGRAMS, "on_expiry": "silence"},
+    "stop, then silence": {"names": _TELEGRAMS, "on_expiry": "stop", "then_silence_ms": 300},
+    "hold": {"names": _TELEGRAMS, "on_expiry": "hold"},
+    "lease": {"names": _TELEGRAMS | {"owner takes control"}, "control": "lease"},
+    "off": {"names": _TELEGRAMS, "fieldbus_timeout_ms": 0},
+    "way": {"names": _WAY},
+    "hold, way": {"names": _WAY - {"rival enables", "bus back"}, "on_expiry": "hold"},
+    "edges": {"names": _EDGES},
+    "late": {"names": _LATE},
+    "starts": {"names": _STARTS},
+    "positions": {"names": _POSITIONS, "words": POSITION},
+}
+"""As few events as each fault needs to show."""
+
+_S, _E, _D = Stage, Stimulus, Deed
+CELLS: Final[dict[str, tuple[str, Stage, Stimulus, Cell]]] = {
+    "an enabling word passes a trip": ("telegrams", _S.TRIPPED, _E.ENABLING_WORD, (_S.ENABLED, _D.FORWARD)),
+    "and the interlock": ("telegrams", _S.INTERLOCKED, _E.ENABLING_WORD, (_S.ENABLED, _D.FORWARD)),
+    "nothing is enabled": ("telegrams", _S.READY, _E.ENABLING_WORD, (_S.INTERLOCKED, _D.TAKE)),
+    "the timer does nothing": ("telegrams", _S.ENABLED, _E.EXPIRED_DISABLE, (_S.ENABLED, _D.NOTHING)),
+    "an acknowledge does nothing": ("telegrams", _S.TRIPPED, _E.ACKNOWLEDGE, (_S.TRIPPED, _D.CLEAR_STOP)),
+    "it ends the interlock, too": ("telegrams", _S.TRIPPED, _E.ACKNOWLEDGE, (_S.READY, _D.CLEAR_STOP)),
+    "a stop needs no stop word after it": ("telegrams", _S.ENABLED, _E.STOP, (_S.READY, _D.STOP)),
+    "nor does a change of owners": ("telegrams", _S.ENABLED, _E.LEFT, (_S.READY, _D.STOP)),
+    "nor a late stop": ("late", _S.ENABLED, _E.LATE_STOP, (_S.READY, _D.STOP)),
+    "nor a bus that was gone": ("way", _S.ENABLED, _E.ANEW, (_S.READY, _D.STOP)),
+    "nor a node that was gone": ("way", _S.CLOSED, _E.WAY_OPEN, (_S.READY, _D.NOTHING)),
+    "a lost node does nothing": ("way", _S.ENABLED, _E.WAY_CLOSED, (_S.ENABLED, _D.NOTHING)),
+    "silence does not come": (
+        "stop, then silence",
+        _S.TRIPPED,
+        _E.SILENCE_DUE,
+        (_S.TRIPPED, _D.NOTHING),
+    ),
+    "what is held outlasts its node": ("hold, way", _S.HELD, _E.WAY_CLOSED, (_S.HELD, _D.NOTHING)),
+    "and a stop word": ("hold", _S.HELD, _E.STOP_WORD, (_S.HELD, _D.TAKE)),
+    "nothing is held": ("hold", _S.ENABLED, _E.EXPIRED_HOLD, (_S.LET_GO, _D.REACT)),
+    "a start does not end": ("starts", _S.LEADING, _E.SAYS_ENABLED, (_S.LEADING, _D.NOTHING)),
+    "a start outlasts a fault": ("starts", _S.LEADING, _E.SAYS_FAULT, (_S.LEADING, _D.NOTHING)),
+    "and its time": ("starts", _S.LEADING, _E.START_OVERDUE, (_S.LEADING, _D.NOTHING)),
+    "a start outlasts a stop word": ("starts", _S.LEADING, _E.STOP_WORD, (_S.LEADING, _D.FORWARD)),
+}
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_without_a_fault_nothing_is_found(profile: str) -> None:
+    space(**PROFILES[profile]).explore(MOST)
+
+
+@pytest.mark.parametrize("fault", CELLS)
+def test_a_wrong_cell_is_found(fault: str) -> None:
+    profile, stage, stimulus, cell = CELLS[fault]
+    assert TABLE[stage, stimulus] != cell
+    with pytest.raises(AssertionError, match="\nafter "):
+        space(**PROFILES[profile]).explore(MOST, {**TABLE, (stage, stimulus): cell})
+
+
+def _before(function: Callable[..., Any], first: Callable[..., Any]) -> Callable[..., Any]:
+    def both(*given: Any, **more: Any) -> Any:
+        first(*given)
+        return function(*given, **more)
+
+    return both
+
+
+def _loses_its_lease(leg: Turn) -> None:
+    leg.owner = leg.owner._replace(lease_until=None)
+
+
+def _edge(leg: Turn, *_: Any) -> None:
+    leg.edges = leg.edges._replace(bit=False)
+
+
+def _counts(leg: Turn, *_: Any) -> None:
+    if leg.timer.deadline is not None:
+        leg.timer = leg.timer._replace(deadline=leg.now + 2.0)
+        leg.effects.append(Heard())
+
+
+def _speaks(leg: Turn, of: Callable[[Turn], Output] = words._reaction) -> Output:
+    return Output(of(leg).words)
+
+
+def _moves(leg: Turn, of: Callable[[Turn], Output] = words._reaction) -> Output:
+    word, *_ = of(leg).words
+    return Output((word, 1, *leg.rest[1:]), of(leg).silent)
+
+
+def _weak(settings: Any, state: Any, *, is_ramping: bool) -> int:
+    return settings.words.stop(state.sent.words[0])
+
+
+DEEDS: Final[dict[str, tuple[str, object, str, object]]] = {
+    "a stranger's telegram counts": ("telegrams", rules, "refusal", lambda *_, **__: ""),
+    "a refused telegram counts": (
+        "telegrams",
+        requests,
+        "_check_authority",
+        _before(requests._check_authority, _counts),
+    ),
+    "the owner is refused": ("telegrams", rules, "refusal", lambda *_, **__: "no"),
+    "a word lifts the interlock": ("telegrams", words, "at_rest", lambda words, word: words.run),
+    "a quick stop is a ramp": ("quick_stop", words, "_reaction_word", _weak),
+    "a quick stop has no end": ("quick_stop", turn, "_RAMP_LIMIT_S", 20.0),
+    "silence speaks": ("silence", words, "_reaction", _speaks),
+    "a reaction keeps setpoints": ("telegrams", words, "_reaction", _moves),
+    "a lease has no end": ("lease", Turn, "judge", _before(Turn.judge, _loses_its_lease)),
+    "an owner is never gone": ("off", rules, "GONE_S", 20.0),
+    "a gap is not noticed": ("way", step, "_gap", lambda leg: None),
+    "every acknowledge bit is an edge": ("edges", requests, "_write", _before(requests._write, _edge)),
+    "a late telegram counts": ("late", requests, "_is_stale", lambda leg, request: False),
+    "the kernel goes on": ("telegrams", leg_space, "until", lambda settings, leg: None),
+    "nobody wakes the leg": ("telegrams", leg_space, "next_deadline", lambda leg: None),
+    "a start does not wait for a stop": ("starts", start, "_may_be_old", lambda *_, **__: False),
+    "a start takes longer": ("starts", start, "_LIMIT_S", 5.0),
+    "a fault is no reason": ("starts", requests, "FAULTED", frozenset[Any]()),
+    "a position is handed over twice": (
+        "positions",
+        order,
+        "ordered",
+        lambda order, words: order._replace(is_waiting=True),
+    ),
+    "a stop forgets no position": ("positions", order, "dropped", lambda order: order),
+}
+
+
+@pytest.mark.parametrize("fault", DEEDS)
+def test_a_wrong_deed_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    profile, where, name, wrong = DEEDS[fault]
+    monkeypatch.setattr(where, name, wrong)
+    with pytest.raises(AssertionError, match="\nafter "):
+        space(**PROFILES[profile]).explore(MOST)

@@ -1,0 +1,78 @@
+"""The leg under every sequence of events, against rules written from the shared design (watchdog)."""
+
+from __future__ import annotations
+
+import re
+from inspect import getsource
+
+import pytest
+
+from bridge.command.leg.table import TABLE
+from tests.support import leg_oracle, leg_rules, leg_seen, leg_space
+from tests.support.leg_cells import NEVER
+from tests.support.leg_profiles import MOST, ROWS, explored, space
+from tests.support.leg_space import Cells
+from tests.support.leg_time import forgotten
+from tools import exploration
+
+# All of a CPU for up to half a minute each: with a fifth of one that takes its time.
+pytestmark = pytest.mark.timeout(400)
+
+_NORD = [row for row in ROWS if row.startswith("nord/sk-tu4-cao")]
+
+
+def is_as_printed(row: str) -> Cells:
+    found = explored(row)
+    shown = exploration.shown()[row]
+    expected = exploration.figures(found)
+    assert {name: shown[name] for name in expected} == expected, "print it anew: python -m tools.exploration"
+    return found.cells
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS if row not in _NORD])
+def test_whatever_happens_in_the_words_of_every_family(row: str) -> None:
+    assert not is_as_printed(row) & NEVER.keys()
+
+
+def test_whatever_happens_and_every_cell_that_can() -> None:
+    """In NORD's words with all settings. A cell that cannot occur is named with the reason."""
+    reached = {cell for row in _NORD for cell in is_as_printed(row)}
+    assert reached == TABLE.keys() - NEVER.keys()
+
+
+def test_every_row_is_printed() -> None:
+    assert list(exploration.shown()) == [*ROWS]
+
+
+def test_the_rules_take_nothing_from_the_bridge() -> None:
+    for module in (leg_seen, leg_rules, leg_oracle):
+        assert "bridge" not in re.findall(r"^(?:from|import) (\w+)", getsource(module), re.MULTILINE)
+
+
+def test_what_the_walk_forgets_decides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    explored_all = space(
+        names={
+            "owner writes a stop",
+            "owner enables",
+            "owner acknowledges by an edge",
+            "owner resets the fault",
+            "stranger stops the drive",
+            "drive follows",
+            "everything is due",
+        },
+        on_expiry="quick_stop",
+    )
+    with monkeypatch.context() as patch:
+        patch.setattr(leg_space, "forgotten", lambda leg: leg)
+        explored_all.explore(MOST)
+    compared = 0
+    for leg, seen in explored_all.states:
+        less = forgotten(leg)
+        if less == leg:
+            continue
+        compared += 1
+        for name, happen in explored_all.events.items():
+            after, seen_after = happen((leg, seen))
+            after_less, seen_after_less = happen((less, seen))
+            assert (forgotten(after), seen_after) == (forgotten(after_less), seen_after_less), name
+    assert compared > 100

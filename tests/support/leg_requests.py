@@ -2,21 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
-from bridge.command import Action, Do, Request, SetTimeout, Start, TakeControl, Write
-from tests.support.leg_events import writes_of
+from bridge.command import Action, Do, Identity, Request, SetTimeout, Start, TakeControl, Write
+from bridge.image import Value
 from tests.support.leg_seen import Rules
 from tests.support.leg_time import NOW
+from tests.support.leg_words import LegWords
 from tests.support.rig import ENGINEER, OBSERVER, OPERATOR, OTHER_PLC, PLC
 
 _LATE_S: Final = 1.0
 """What has waited for so long is no telegram any more."""
 
 
+_Telegram = tuple[Identity, Mapping[str, Value]]
+
+
+def _writes_of(words: LegWords) -> dict[str, _Telegram]:
+    """Telegrams of process data in the words of a family; those that it has."""
+    stop = {"control_word": words.shut_down}
+    enable = {"control_word": words.enable, **words.setpoint}
+    acknowledge = words.shut_down | words.acknowledge
+    writes: dict[str, _Telegram] = {
+        "owner writes a stop": (PLC, stop),
+        "owner enables": (PLC, enable),
+        "owner acknowledges by an edge": (PLC, {"control_word": acknowledge}),
+        "owner acknowledges and enables in one word": (
+            PLC,
+            {"control_word": words.enable | words.acknowledge},
+        ),
+        "owner writes a setpoint": (PLC, words.setpoint),
+        "owner writes another setpoint": (PLC, words.more),
+        "owner writes a value that is too large": (PLC, words.too_large),
+        "rival writes a stop": (OTHER_PLC, stop),
+        "rival enables": (OTHER_PLC, enable),
+        "stranger enables": (OPERATOR, enable),
+        "reader enables": (OBSERVER, {"control_word": words.enable}),
+    }
+    if words.valid:
+        invalid = {"control_word": words.enable & ~words.valid}
+        writes["owner's control data are not valid"] = (PLC, invalid)
+        writes["rival's control data are not valid"] = (OTHER_PLC, invalid)
+    return {name: (who, values) for name, (who, values) in writes.items() if values}
+
+
 def requests_of(rules: Rules, ttl_ms: int) -> dict[str, Request]:
     words = rules.words
-    found = {name: Request(who, "", Write(values)) for name, (who, values) in writes_of(words).items()}
+    found = {name: Request(who, "", Write(values)) for name, (who, values) in _writes_of(words).items()}
     stop, enable = Write({"control_word": words.shut_down}), Write({"control_word": words.enable})
     late = NOW - _LATE_S
     for name, who, command, received_at, pressed in (

@@ -232,11 +232,11 @@ class DriveChannel:
 
     def on_pdo(self, now: float) -> None:
         """A TPDO arrived; what it says comes after this."""
-        if self.link.on_pdo(now):
+        is_back = self.link.on_pdo(now)
+        if is_back:
             self._status.link_fault = 0.0
+        if is_back or not self.leg.way.is_heard:
             self._happen(self._way(now), now)
-        elif not self.leg.way.is_heard and self.link.is_heard:
-            self.leg = self.leg._replace(way=self.leg.way._replace(is_heard=True))
 
     def on_emcy(self, told: Told, now: float) -> None:
         """An emergency message about this drive."""

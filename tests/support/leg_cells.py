@@ -35,13 +35,8 @@ _REASONS: Final[tuple[tuple[str, Iterable[Stimulus], Iterable[Stage]], ...]] = (
         {*_IDLE, _S.PREPARED, _S.BLIND, _S.LEADING},
     ),
     ("without a start nobody waits for it", [_E.SAYS_ENABLED, _E.SAYS_BRAKING], _IDLE),
-    ("a ramp is waited for, and nothing else", [_E.SAYS_AT_REST], _IDLE - {_S.RAMPING}),
-    ("without a start nobody waits for it, and on a ramp a fault counts as rest", [_E.SAYS_FAULT], _IDLE),
-    (
-        "the next word follows from the report, and the stage stays",
-        [_E.SAYS_AT_REST, _E.SAYS_BRAKING],
-        [_S.LEADING],
-    ),
+    ("a ramp is waited for, and nothing else", [_E.SAYS_AT_REST, _E.SAYS_FAULT], _IDLE - {_S.RAMPING}),
+    ("a drive that is led is not waited for", [_E.SAYS_BRAKING], [_S.LEADING]),
     (
         "a ramp has a limit only as the reaction, and only until the drive rests",
         [_E.RAMP_OVERDUE],

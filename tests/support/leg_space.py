@@ -149,7 +149,7 @@ class Space:
         else:
             assert may, f"{request.action} was taken"
             self._tell(oracle, request)
-            if answer is not None and request.received_at is None:
+            if answer is not None:
                 oracle.check_told(request.action, after.sent.words[0], forwarded=answer.outcome.forwarded)
             if request.action in STOP_ACTIONS and not after.sent.silent:
                 oracle.check_stop(after.sent.words[0], request.action)
@@ -244,12 +244,10 @@ class Space:
         oracle = Oracle(self.rules, seen, NOW)
         if not seen.is_there:
             return state
-        heard = leg
-        if not leg.way.is_heard:
-            heard = leg._replace(way=leg.way._replace(is_heard=True))
-        after, effects = step(self.settings, heard, Report(_SAYS[says], is_taken, "a fault"), NOW)
+        heard, effects = step(self.settings, leg, leg.way._replace(is_heard=True), NOW)
+        after, more = step(self.settings, heard, Report(_SAYS[says], is_taken, "a fault"), NOW)
         oracle.hear(says, is_taken=is_taken)
-        self._check(after, oracle, leg, effects)
+        self._check(after, oracle, leg, [*effects, *more])
         return self._time(after, after, oracle, [])
 
     def _is_heard(self, state: State) -> State:
@@ -257,7 +255,9 @@ class Space:
         leg, seen = state
         if leg.way.is_heard or not leg.way.is_open:
             return state
-        return self._round((leg._replace(way=leg.way._replace(is_heard=True)), seen._replace(is_heard=True)))
+        heard, effects = step(self.settings, leg, leg.way._replace(is_heard=True), NOW)
+        oracle = Oracle(self.rules, seen._replace(is_heard=True), NOW)
+        return self._time(leg, heard, oracle, effects)
 
     def _watches(self, state: State, *, watches: bool) -> State:
         leg, seen = state

@@ -176,7 +176,8 @@ def _take_stale_stop(turn: Turn, word: int) -> Outcome:
     setpoints."""
     acknowledge = turn.settings.words.acknowledge_mask
     turn.stop(word & ~acknowledge | turn.word & acknowledge, is_asked=True)
-    turn.happens(Stimulus.LATE_STOP, _OVERWRITTEN)
+    if turn.happens(Stimulus.LATE_STOP, _OVERWRITTEN) is Deed.TAKE:
+        return Outcome(Code.OK, turn.why_blocked, forwarded=False)
     return Outcome(Code.OK, "came late, and counts as a stop only")
 
 

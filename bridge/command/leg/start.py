@@ -109,7 +109,7 @@ def _go_on(turn: Turn, state: DriveState) -> None:
         turn.lead(start.word | words.begin)
         turn.happens(Stimulus.SAYS_ENABLED, DONE)
         return
-    if turn.stage is not Stage.LEADING and state is not DriveState.QUICK_STOP_ACTIVE:
+    if state is not DriveState.QUICK_STOP_ACTIVE:
         turn.happens(Stimulus.SAYS_AT_REST)
         turn.start = Start(start.word, start.until)
     if state in _CAN_BE_ENABLED:

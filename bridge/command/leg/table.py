@@ -126,7 +126,7 @@ _ROWS: Final[dict[Stimulus, _Row]] = {
         (*_OPEN, *STARTING): (None, Deed.FORWARD),
     },
     Stimulus.INVALID: {tuple(Stage): (None, Deed.REFUSE)},
-    Stimulus.LATE_STOP: _stops(),
+    Stimulus.LATE_STOP: {**_stops(), _REACTING: (None, Deed.TAKE)},
     Stimulus.ACKNOWLEDGE: {
         _NOT_TRIPPED: (None, Deed.CLEAR),
         tuple(TRIPPED): (_S.INTERLOCKED, Deed.CLEAR_STOP),

@@ -244,7 +244,7 @@ class Turn:
                 self.motion = Motion.ENDED
         elif state is not DriveState.UNKNOWN:
             if self.stage is Stage.RAMPING:
-                self.happens(Stimulus.SAYS_AT_REST)
+                self.happens(Stimulus.SAYS_FAULT if state in FAULTED else Stimulus.SAYS_AT_REST)
             self.trip = self.trip._replace(ramps_until=None) if self.trip.ramps_until else self.trip
             if motion is Motion.SEEN:
                 self.motion = Motion.ENDED

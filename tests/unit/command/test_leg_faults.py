@@ -72,6 +72,7 @@ CELLS: Final[dict[str, tuple[str, Stage, Stimulus, Cell]]] = {
     "a stop needs no stop word after it": ("telegrams", _S.ENABLED, _E.STOP, (_S.READY, _D.STOP)),
     "nor does a change of owners": ("telegrams", _S.ENABLED, _E.LEFT, (_S.READY, _D.STOP)),
     "nor a late stop": ("late", _S.ENABLED, _E.LATE_STOP, (_S.READY, _D.STOP)),
+    "and is told as sent while tripped": ("late", _S.TRIPPED, _E.LATE_STOP, (_S.TRIPPED, _D.STOP)),
     "nor a bus that was gone": ("way", _S.ENABLED, _E.ANEW, (_S.READY, _D.STOP)),
     "nor a node that was gone": ("way", _S.CLOSED, _E.WAY_OPEN, (_S.READY, _D.NOTHING)),
     "a lost node does nothing": ("way", _S.ENABLED, _E.WAY_CLOSED, (_S.ENABLED, _D.NOTHING)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bridge.command.leg.state import MEANING, STARTING, TRIPPED, WAY, Stage
+from bridge.command.leg.state import MEANING, REACTING, STARTING, TRIPPED, WAY, Stage
 from bridge.command.leg.table import TABLE, Deed, Stimulus
 
 MAY_ENABLE = frozenset((Stage.ENABLED, Stage.BLIND, Stage.LEADING, Stage.HELD))
@@ -55,7 +55,8 @@ def test_a_stop_counts_in_every_stage() -> None:
     for stage in Stage:
         for stimulus in STOPS:
             after, deed = TABLE[stage, stimulus]
-            assert deed is Deed.STOP
+            is_late = stimulus is Stimulus.LATE_STOP and stage in REACTING
+            assert deed is (Deed.TAKE if is_late else Deed.STOP), "the reaction stops the drive already"
             assert after not in MAY_ENABLE | STARTING, "and needs a fresh order after it"
 
 

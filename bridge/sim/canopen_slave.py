@@ -17,6 +17,7 @@ from bridge.sim.pdo import Rpdo, Tpdo, pack, unpack
 from bridge.sim.sdo_server import SdoServer
 from bridge.sim.settings import CommunicationSettings, PdoSettings, SdoSettings
 from bridge.sim.store import Store
+from bridge.sim.ticks import earliest
 
 _ERROR_CONTROL: Final = 0x700
 _OUTBOX_MAX: Final = 256
@@ -79,7 +80,7 @@ class CanopenSlave:
 
     @property
     def master_is_lost(self) -> bool:
-        return self._error_control.master_lost
+        return self._error_control.life.tripped
 
     def boot(self) -> None:
         """Initialisation done: boot-up message, then Pre-Operational."""
@@ -115,7 +116,7 @@ class CanopenSlave:
         """Do what is due: life guarding, heartbeat, EMCY, event-driven TPDOs."""
         if self.state is NmtState.INITIALISING:
             return
-        if self._error_control.life_time_expired(now):
+        if self._error_control.life.expired(now):
             self._application.master_lost()
             # CiA 301 §7.5.2.32: a heartbeat or guarding event leads from Operational to Pre-Operational.
             if self.state is NmtState.OPERATIONAL:
@@ -138,7 +139,7 @@ class CanopenSlave:
         if self.state is NmtState.OPERATIONAL:
             for tpdo, settings in self._active_tpdos():
                 deadlines.append(tpdo.next_deadline(settings))
-        return min((deadline for deadline in deadlines if deadline is not None), default=None)
+        return earliest(*deadlines)
 
     def hears(self) -> frozenset[int]:
         """The identifiers that concern this node with its present settings."""
@@ -154,7 +155,7 @@ class CanopenSlave:
         return frames
 
     def _on_guard_request(self, now: float) -> None:
-        was_lost = self._error_control.master_lost
+        was_lost = self._error_control.life.tripped
         answer = self._error_control.on_guard_request(self.state, now)
         if answer is None:
             return

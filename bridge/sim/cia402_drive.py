@@ -10,7 +10,6 @@ from bridge.sim.cia402_axis import Cia402Axis
 from bridge.sim.cia402_objects import Cia402Objects
 from bridge.sim.cia402_settings import RULES, Cia402Settings, factory_communication
 from bridge.sim.cia402_states import State
-from bridge.sim.cia402_supervision import HeartbeatConsumer
 from bridge.sim.communication_objects import Memory
 from bridge.sim.device import SimulatedDevice
 from bridge.sim.dictionary import Dictionary
@@ -19,6 +18,7 @@ from bridge.sim.nmt_slave import NmtCommand, NmtState
 from bridge.sim.pdo_objects import PdoObjects
 from bridge.sim.sdo_server import SdoServer
 from bridge.sim.store import Store
+from bridge.sim.supervision import HeartbeatConsumer
 
 _HEARTBEAT: Final = 0x700
 _MASTER_LOST: Final = 0x8130
@@ -38,7 +38,10 @@ class Cia402Drive(SimulatedDevice):
         self._communication = Store(lambda: factory_communication(node_id))
         self._emcy = EmcyProducer(self._communication, RULES)
         self.axis = Cia402Axis(lambda: self._settings.current, self._report)
-        self._consumer = HeartbeatConsumer(lambda: self._settings.current.heartbeat_consumer)
+        self._consumer = HeartbeatConsumer(
+            lambda: self._settings.current.heartbeat_consumer >> 16,
+            lambda: self._settings.current.heartbeat_consumer & 0xFFFF,
+        )
         self.objects = Dictionary()
         pdos = PdoObjects(
             self.objects, self._communication, RULES, lambda: self.slave.state is NmtState.PRE_OPERATIONAL
@@ -81,7 +84,7 @@ class Cia402Drive(SimulatedDevice):
         if command is NmtCommand.RESET_NODE:
             self._restart()
             return
-        self._consumer.reset()
+        self._consumer.stop()
         if self.axis.state is State.ENABLED:
             self.axis.abort_connection(_MASTER_LOST)
 
@@ -132,7 +135,7 @@ class Cia402Drive(SimulatedDevice):
     def _restart(self) -> None:
         self._settings.power_on()
         self._emcy.error_register = 0
-        self._consumer.reset()
+        self._consumer.stop()
         self.axis.power_on(self._now)
 
     def _report(self, code: int) -> None:

@@ -9,7 +9,6 @@ from bridge.sim.abort import AbortCode, SdoAbort
 from bridge.sim.cia402_axis import Cia402Axis
 from bridge.sim.cia402_homing import METHODS
 from bridge.sim.cia402_settings import INCREMENTS, SUPPORTED_MODES, Cia402Settings, Mode
-from bridge.sim.cia402_supervision import is_consumer_entry
 from bridge.sim.communication_objects import (
     DeviceIdentity,
     Memory,
@@ -64,6 +63,7 @@ _ARRAYS: Final = {
 }
 _LEAST: Final = {0x6080: 1, 0x6083: 1, 0x6084: 1, 0x6085: 1, 0x609A: 1}
 """A ramp of 0 would never end."""
+_NODE_MAX: Final = 127
 _POWER: Final = (-6, 0)
 """60C2:02."""
 
@@ -98,7 +98,7 @@ class Cia402Objects:
 
     def _add_consumer(self, dictionary: Dictionary) -> None:
         def write(value: int) -> None:
-            if not is_consumer_entry(value):
+            if value >> 16 > _NODE_MAX:
                 raise SdoAbort(AbortCode.VALUE_RANGE)
             self._settings.heartbeat_consumer = value
 

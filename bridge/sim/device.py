@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from bridge.canopen.frame import ERROR, EXTENDED, STANDARD_MASK, Frame
 from bridge.sim.canopen_slave import CanopenSlave
 from bridge.sim.nmt_slave import NmtCommand, NmtState
+from bridge.sim.ticks import earliest
 
 
 class SimulatedDevice(ABC):
@@ -104,8 +105,7 @@ class SimulatedDevice(ABC):
             return self._now
         if not self.powered:
             return None
-        deadlines = (self.slave.next_deadline(), *self._deadlines())
-        return min((deadline for deadline in deadlines if deadline is not None), default=None)
+        return earliest(self.slave.next_deadline(), *self._deadlines())
 
     def take_frames(self) -> list[Frame]:
         return self.slave.take_frames()

@@ -13,12 +13,13 @@ from bridge.sim.lenze_codes import BusDisplay, CodeParts, add_codes
 from bridge.sim.lenze_drive import LenzeDrive, Reaction
 from bridge.sim.lenze_objects import LenzeObjects
 from bridge.sim.lenze_settings import PDOS, PORT_IN, PORT_OUT, PORT_WORDS, RULES, LenzeCodes, communication
-from bridge.sim.lenze_traffic import QuasiMaster, SyncProducer, counters_of
+from bridge.sim.lenze_traffic import QuasiMaster, counters_of
 from bridge.sim.lenze_watch import BUS_OFF, BusWatch
 from bridge.sim.nmt_slave import NmtCommand, NmtState
 from bridge.sim.pdo import pack
 from bridge.sim.sdo_server import SdoServer
 from bridge.sim.store import Store
+from bridge.sim.supervision import Cycle
 
 _HEARTBEAT: Final = 0x700
 
@@ -42,7 +43,8 @@ class LenzeMotec(SimulatedDevice):
         self._own: list[Frame] = []
         emcy = EmcyProducer(self._stack, RULES)
         self._watch = BusWatch(lambda: self.codes, self.drive, emcy)
-        self._sync = SyncProducer(lambda: self.codes)
+        # 1005h, bit 30, and C00369.
+        self._sync = Cycle(lambda: self.codes.sync_ms / 1000 if self.codes.sync_producer else 0.0)
         self._master = QuasiMaster(lambda: self.codes)
         self.objects = Dictionary()
         self._process = self._ports()

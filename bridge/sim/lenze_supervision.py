@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from enum import IntEnum
 from typing import Final
 
 from bridge.sim.emcy_producer import EmcyProducer
-from bridge.sim.lenze_settings import heartbeat_step
 
 SUPPLY_FAILED: Final = 0x3100
 CAN_WARNING: Final = 0x8100
@@ -16,10 +15,6 @@ COB_ID_COLLISION: Final = 0x8150
 PDO_TOO_SHORT: Final = 0x8210
 PDO_TOO_LONG: Final = 0x8220
 DEVICE_ERROR: Final = 0xF000
-
-FAILED: Final = 250
-NO_RESPONSE: Final = 255
-"""C00347."""
 
 
 class Watched(IntEnum):
@@ -36,69 +31,6 @@ class Watched(IntEnum):
     CAN_WARNING = 0x007F_0113
     COMMUNICATION_STOPPED = 0x007F_0114
     HEARTBEAT = 0x007F_0115
-
-
-class RpdoMonitor:
-    """C00357: while the node is operational, the next RPDO must come within this time (§10.1)."""
-
-    def __init__(self, time_ms: Callable[[], int]) -> None:
-        self._time_ms = time_ms
-        self._since: float | None = None
-        self.late = False
-
-    def start(self, now: float) -> None:
-        """Operational, or an RPDO has come."""
-        self._since, self.late = now, False
-
-    def stop(self) -> None:
-        self._since = None
-
-    def expired(self, now: float) -> bool:
-        """True once when the time has run out."""
-        deadline = self.next_deadline()
-        if deadline is None or now < deadline:
-            return False
-        self._since, self.late = None, True
-        return True
-
-    def next_deadline(self) -> float | None:
-        time_ms = self._time_ms()
-        return None if self._since is None or not time_ms else self._since + time_ms / 1000
-
-
-class HeartbeatConsumer:
-    """1016h: one producer is watched, from its first heartbeat or boot-up on (§10.3.2)."""
-
-    def __init__(self, node: Callable[[], int], time_ms: Callable[[], int]) -> None:
-        self._node = node
-        self._time_ms = time_ms
-        self._heard_at: float | None = None
-        self.status = NO_RESPONSE
-
-    @property
-    def node(self) -> int:
-        """The watched node, 0 for none."""
-        return self._node() if heartbeat_step(self._time_ms()) else 0
-
-    def reset(self) -> None:
-        self._heard_at, self.status = None, NO_RESPONSE
-
-    def on_heartbeat(self, data: bytes, now: float) -> None:
-        if len(data) == 1:
-            self._heard_at, self.status = now, data[0] & 0x7F
-
-    def expired(self, now: float) -> bool:
-        """True once when the producer has been silent for too long."""
-        deadline = self.next_deadline()
-        if deadline is None or now < deadline:
-            return False
-        self._heard_at, self.status = None, FAILED
-        return True
-
-    def next_deadline(self) -> float | None:
-        if self._heard_at is None or not self.node:
-            return None
-        return self._heard_at + heartbeat_step(self._time_ms()) / 1000
 
 
 class ErrorReporter:

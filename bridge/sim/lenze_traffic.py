@@ -30,36 +30,6 @@ class QuasiMaster:
         return self._at
 
 
-class SyncProducer:
-    """1005h, bit 30, and C00369: a SYNC every so many milliseconds."""
-
-    def __init__(self, codes: Callable[[], LenzeCodes]) -> None:
-        self._codes = codes
-        self._period_ms = 0
-        self._at = 0.0
-
-    def reset(self) -> None:
-        self._period_ms = 0
-
-    def due(self, now: float) -> bool:
-        """Whether a SYNC is to be sent now. After a pause there is one; missed ones are skipped."""
-        codes = self._codes()
-        period_ms = codes.sync_ms if codes.sync_producer else 0
-        if period_ms != self._period_ms:  # just written: the new period begins now
-            self._period_ms = period_ms
-            self._at = now + period_ms / 1000
-            return False
-        if not period_ms or now < self._at:
-            return False
-        self._at += period_ms / 1000
-        if self._at <= now:
-            self._at = now + period_ms / 1000
-        return True
-
-    def next_deadline(self) -> float | None:
-        return self._at if self._period_ms else None
-
-
 def counters_of(cob_id: int, settings: CommunicationSettings, *, sent: bool) -> tuple[int, ...]:
     """The sub-codes of C00360 that count this frame: its direction's and its channel's."""
     if sent:

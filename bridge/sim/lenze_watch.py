@@ -7,7 +7,7 @@ from typing import Final
 
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.lenze_drive import LenzeDrive, Reaction
-from bridge.sim.lenze_settings import PDOS, LenzeCodes
+from bridge.sim.lenze_settings import PDOS, LenzeCodes, heartbeat_step
 from bridge.sim.lenze_supervision import (
     CAN_WARNING,
     COB_ID_COLLISION,
@@ -16,12 +16,12 @@ from bridge.sim.lenze_supervision import (
     PDO_TOO_SHORT,
     SUPPLY_FAILED,
     ErrorReporter,
-    HeartbeatConsumer,
-    RpdoMonitor,
     Watched,
 )
 from bridge.sim.nmt_slave import NmtState
 from bridge.sim.settings import CommunicationSettings
+from bridge.sim.supervision import HeartbeatConsumer, Watch
+from bridge.sim.ticks import earliest
 
 _LATE: Final = (Watched.RPDO1_LATE, Watched.RPDO2_LATE)
 BUS_OFF: Final = 3
@@ -36,7 +36,9 @@ class BusWatch:
         self._drive = drive
         self._reporter = ErrorReporter(emcy)
         self._monitors = [self._monitor(number) for number in range(PDOS)]
-        self._consumer = HeartbeatConsumer(lambda: codes().watched_node, lambda: codes().watched_ms)
+        self._consumer = HeartbeatConsumer(
+            lambda: codes().watched_node, lambda: heartbeat_step(codes().watched_ms)
+        )
 
     @property
     def node(self) -> int:
@@ -51,7 +53,7 @@ class BusWatch:
     def reset(self) -> None:
         for monitor in self._monitors:
             monitor.stop()
-        self._consumer.reset()
+        self._consumer.stop()
         self._reporter.reset()
 
     def nmt_changed(self, state: NmtState, now: float) -> None:
@@ -110,11 +112,11 @@ class BusWatch:
         self._reporter.device_errors(self._drive.errors)
 
     def next_deadline(self) -> float | None:
-        deadlines = [self._consumer.next_deadline(), *(one.next_deadline() for one in self._monitors)]
-        return min((deadline for deadline in deadlines if deadline is not None), default=None)
+        return earliest(self._consumer.next_deadline(), *(one.next_deadline() for one in self._monitors))
 
-    def _monitor(self, number: int) -> RpdoMonitor:
-        return RpdoMonitor(lambda: self._codes().rpdo_time_ms[number])
+    def _monitor(self, number: int) -> Watch:
+        """C00357: while the node is operational, the next RPDO must come within this time (§10.1)."""
+        return Watch(lambda: self._codes().rpdo_time_ms[number] / 1000)
 
     def _watch(self, number: Watched, present: bool, reaction: int, code: int = 0) -> None:
         """Something supervised has come or gone: ``reaction`` of C00592, and EMCY ``code``."""

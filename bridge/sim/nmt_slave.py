@@ -6,6 +6,8 @@ from enum import IntEnum
 
 from bridge.sim.settings import CommunicationSettings
 from bridge.sim.store import Store
+from bridge.sim.supervision import Cycle, Watch
+from bridge.sim.ticks import earliest
 
 
 class NmtState(IntEnum):
@@ -50,17 +52,16 @@ class ErrorControl:
     def __init__(self, store: Store[CommunicationSettings]) -> None:
         self._store = store
         self._toggle = 0
-        self._guarded_at: float | None = None
-        self._heartbeat_ms = 0
-        self._heartbeat_at = 0.0
-        self.master_lost = False
+        self._heartbeat = Cycle(lambda: store.current.heartbeat_ms / 1000)
+        # BU 2500 §7.1.2 says of P167 = 0 both "off" and "watchdog time = guard time"; CiA 301 says off.
+        self.life = Watch(lambda: store.current.guard_time_ms * store.current.life_time_factor / 1000)
+        """The master's guard requests, from the first one on."""
 
     def boot(self) -> None:
         """After the boot-up message, which counts as the first heartbeat."""
         self._toggle = 0
-        self._guarded_at = None
-        self._heartbeat_ms = 0
-        self.master_lost = False
+        self._heartbeat.reset()
+        self.life.stop()
 
     def on_guard_request(self, state: NmtState, now: float) -> bytes | None:
         """The answer to a remote frame on 700h + id: state, with bit 7 toggling from 0.
@@ -70,45 +71,13 @@ class ErrorControl:
         """
         if self._store.current.heartbeat_ms:
             return None
-        self._guarded_at = now
-        self.master_lost = False
+        self.life.start(now)
         answer = bytes([state | self._toggle])
         self._toggle ^= 0x80
         return answer
 
-    def life_time_expired(self, now: float) -> bool:
-        """True once, when the master has been silent for the life time after its first guard request."""
-        deadline = self._life_deadline()
-        if deadline is None or now < deadline:
-            return False
-        self._guarded_at = None
-        self.master_lost = True
-        return True
-
     def heartbeat_due(self, now: float) -> bool:
-        """Whether a heartbeat is to be sent now. After a pause there is one; missed ones are skipped."""
-        heartbeat_ms = self._store.current.heartbeat_ms
-        if heartbeat_ms != self._heartbeat_ms:  # just written: the new period begins now
-            self._heartbeat_ms = heartbeat_ms
-            self._heartbeat_at = now + heartbeat_ms / 1000
-            return False
-        if not heartbeat_ms or now < self._heartbeat_at:
-            return False
-        self._heartbeat_at += heartbeat_ms / 1000
-        if self._heartbeat_at <= now:
-            self._heartbeat_at = now + heartbeat_ms / 1000
-        return True
+        return self._heartbeat.due(now)
 
     def next_deadline(self) -> float | None:
-        life = self._life_deadline()
-        if not self._heartbeat_ms:
-            return life
-        return self._heartbeat_at if life is None else min(life, self._heartbeat_at)
-
-    def _life_deadline(self) -> float | None:
-        settings = self._store.current
-        # BU 2500 §7.1.2 says of P167 = 0 both "off" and "watchdog time = guard time"; CiA 301 says off.
-        life_ms = settings.guard_time_ms * settings.life_time_factor
-        if self._guarded_at is None or not life_ms:
-            return None
-        return self._guarded_at + life_ms / 1000
+        return earliest(self.life.next_deadline(), self._heartbeat.next_deadline())

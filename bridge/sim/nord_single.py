@@ -29,7 +29,6 @@ from bridge.sim.sdo_server import SdoServer
 from bridge.sim.store import Store
 
 _P513: Final = 513
-_P513_UNIT_MS: Final = 100
 _P746: Final = 0x2000 + 746
 _INTERFACE_ID: Final = 0x0C00
 """The high byte of P746 (§7.2)."""
@@ -63,7 +62,7 @@ class NordSingle(NordNode):
             node_id,
             [self.drive],
             Store(lambda: factory_settings(node_id, variant)),
-            TelegramWatch(self._p513_ms),
+            TelegramWatch(self._p513_s),
         )
         self._build()
 
@@ -168,9 +167,9 @@ class NordSingle(NordNode):
             Type.INTEGER32, lambda: round(self.drive.position_increments), write, in_rpdo=True, in_tpdo=True
         )
 
-    def _p513_ms(self) -> int:
+    def _p513_s(self) -> float:
         """P513; at -0.1 s the drive ignores it."""
-        return max(0, self.drive.parameters.raw(_P513)) * _P513_UNIT_MS
+        return max(0.0, self.drive.parameters.value(_P513))
 
     def _module_state(self) -> int:
         """P746 (§7.2): ready, operational, fault, time-out; 0Ch in the high byte. 1002h shows it too."""
@@ -181,7 +180,7 @@ class NordSingle(NordNode):
     def _power_on(self) -> None:
         self._control, self._setpoints = 0, [0] * self.variant.values
         self._written.clear()
-        self._watch.disarm()
+        self._watch.stop()
         self._reporter.reset()
 
     def _words_by_sdo(self) -> None:

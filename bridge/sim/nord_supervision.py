@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from enum import IntEnum
 
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.nmt_slave import NmtState
 from bridge.sim.nord_faults import emcy_code, register_bits
+from bridge.sim.supervision import Watch
 
 
 class Presence(IntEnum):
@@ -31,36 +32,16 @@ def module_state(nmt: NmtState, master_lost: bool, p151_tripped: bool, drives: S
     return state
 
 
-class TelegramWatch:
+class TelegramWatch(Watch):
     """P151, or P513 without an interface that has parameters (§8.1): from the first valid telegram on, the
-    next must come within this time. 0 ms is off."""
-
-    def __init__(self, time_ms: Callable[[], int]) -> None:
-        self._time_ms = time_ms
-        self._telegram_at: float | None = None
-        self.tripped = False
-
-    def disarm(self) -> None:
-        self._telegram_at, self.tripped = None, False
+    next must come within this time."""
 
     def on_telegram(self, now: float) -> None:
-        """A valid telegram for any drive; it also ends a trip. With a time of 0 nothing is watched."""
-        self._telegram_at = now if self._time_ms() else None
-        self.tripped = False
-
-    def expired(self, now: float) -> bool:
-        """True once when the time has run out."""
-        deadline = self.next_deadline()
-        if deadline is None or now < deadline:
-            return False
-        self._telegram_at, self.tripped = None, True
-        return True
-
-    def next_deadline(self) -> float | None:
-        time_ms = self._time_ms()
-        if self._telegram_at is None or not time_ms:
-            return None
-        return self._telegram_at + time_ms / 1000
+        """A valid telegram for any drive. If the time is set later, the watch begins with the next one."""
+        if self._time_s():
+            self.start(now)
+        else:
+            self.stop()
 
 
 class FaultDisplay:

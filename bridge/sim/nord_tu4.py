@@ -63,7 +63,7 @@ class NordTu4(NordNode):
             node_id,
             drives,
             Store(lambda: factory_communication(node_id, layout)),
-            TelegramWatch(lambda: self._interface.current.p151_ms),
+            TelegramWatch(lambda: self._interface.current.p151_ms / 1000),
         )
         self.presence = [Presence.ONLINE if slot in fitted else Presence.OFFLINE for slot in ALL_SLOTS]
         self.faults = FaultDisplay()
@@ -195,7 +195,7 @@ class NordTu4(NordNode):
         self.image.clear()
         self.profile.clear()
         self.faults.power_off()
-        self._watch.disarm()
+        self._watch.stop()
         self._reporter.reset()
 
     def _words_by_sdo(self) -> None:

@@ -9,6 +9,7 @@ from typing import Final
 from bridge.can.interface import Bus
 from bridge.canopen.frame import STANDARD_MASK
 from bridge.sim.node import SimulatedNode
+from bridge.sim.ticks import earliest
 
 _SEND_WITHIN_S: Final = 0.1
 
@@ -75,5 +76,4 @@ class Simulation:
             self._due[node] = node.next_deadline()
 
     def _next_deadline(self) -> float | None:
-        deadlines = [self._bus.next_deadline(), *self._due.values()]
-        return min((deadline for deadline in deadlines if deadline is not None), default=None)
+        return earliest(self._bus.next_deadline(), *self._due.values())

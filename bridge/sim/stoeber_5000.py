@@ -18,8 +18,9 @@ from bridge.sim.stoeber_objects import CommunicationObjects, identity
 from bridge.sim.stoeber_parameters import add_axis, add_device
 from bridge.sim.stoeber_pdo_objects import StoeberPdoObjects
 from bridge.sim.stoeber_settings import CHANNELS, RULES, factory_communication, factory_settings
-from bridge.sim.stoeber_slave import StoeberSlave, SyncWatch
+from bridge.sim.stoeber_slave import StoeberSlave
 from bridge.sim.store import Store
+from bridge.sim.supervision import Watch
 
 
 class Stoeber5000(SimulatedDevice):
@@ -131,7 +132,7 @@ class Stoeber5000(SimulatedDevice):
             [SdoServer(view, RULES.sdo_block_segments) for view in reached],
             self._emcy,
             self,
-            SyncWatch(lambda: self._settings.current.sync_timeout_us),
+            Watch(lambda: self._settings.current.sync_timeout_us / 1e6),
             partial(self.device.trip, COMMUNICATION, SYNC_MISSING),
         )
 

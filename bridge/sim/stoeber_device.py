@@ -9,6 +9,7 @@ from bridge.sim.stoeber_axis import AxisParameters, AxisState, StoeberAxis
 from bridge.sim.stoeber_events import CODES, NO_EVENT, brakes
 from bridge.sim.stoeber_settings import StoeberSettings
 from bridge.sim.store import Store
+from bridge.sim.ticks import earliest
 
 
 class StoeberDevice:
@@ -83,8 +84,7 @@ class StoeberDevice:
                 axis.settle()
 
     def next_deadline(self) -> float | None:
-        deadlines = (axis.next_deadline() for axis in self.axes)
-        return min((deadline for deadline in deadlines if deadline is not None), default=None)
+        return earliest(*(axis.next_deadline() for axis in self.axes))
 
     def _is_free_for(self, number: int) -> bool:
         """One axis at a time: the POSISwitch changes over when no other axis is on or turns."""

@@ -15,6 +15,8 @@ from bridge.sim.sdo_server import SdoServer
 from bridge.sim.settings import CommunicationSettings, PdoSettings, SdoSettings
 from bridge.sim.stoeber_settings import ANSWERED, StoeberPdo
 from bridge.sim.store import Store
+from bridge.sim.supervision import Watch
+from bridge.sim.ticks import earliest
 
 _FRESH: Final = (NmtState.INITIALISING, NmtState.STOPPED)
 
@@ -55,32 +57,6 @@ class StoeberTpdo(Tpdo):
         return max(free_at, self._event_at(settings, self._sent_at)) if settings.event_timer_ms else None
 
 
-class SyncWatch:
-    """1006h: from the first SYNC on, the next must come within this time (§6, red LED)."""
-
-    def __init__(self, timeout_us: Callable[[], int]) -> None:
-        self._timeout_us = timeout_us
-        self._seen_at: float | None = None
-
-    def reset(self) -> None:
-        self._seen_at = None
-
-    def on_sync(self, now: float) -> None:
-        self._seen_at = now
-
-    def expired(self, now: float) -> bool:
-        """True once."""
-        deadline = self.next_deadline()
-        if deadline is None or now < deadline:
-            return False
-        self._seen_at = None
-        return True
-
-    def next_deadline(self) -> float | None:
-        timeout_us = self._timeout_us()
-        return self._seen_at + timeout_us / 1e6 if self._seen_at is not None and timeout_us else None
-
-
 class StoeberSlave(CanopenSlave):
     """``views`` are the objects as each PDO channel sees them: channel n maps parameters of axis n.
 
@@ -96,9 +72,10 @@ class StoeberSlave(CanopenSlave):
         servers: Sequence[SdoServer],
         emcy: EmcyProducer,
         application: Application,
-        sync: SyncWatch,
+        sync: Watch,
         sync_lost: Callable[[], None],
     ) -> None:
+        """``sync``, from the first one on, is watched by 1006h (§6, red LED)."""
         super().__init__(node_id, store, views[0], servers, emcy, application)
         self._views = tuple(views)
         self._answers = tuple(StoeberTpdo() for _ in store.current.tpdo)
@@ -121,7 +98,7 @@ class StoeberSlave(CanopenSlave):
             deadlines.append(self.emcy.next_deadline())
         if self.state is NmtState.OPERATIONAL:
             deadlines.append(self._sync.next_deadline())
-        return min((deadline for deadline in deadlines if deadline is not None), default=None)
+        return earliest(*deadlines)
 
     def _on_nmt(self, data: bytes) -> None:
         if nmt_command_for(self.node_id, data) is NmtCommand.RESET_COMMUNICATION:
@@ -133,7 +110,7 @@ class StoeberSlave(CanopenSlave):
     def _enter(self, state: NmtState) -> None:
         if state is NmtState.PRE_OPERATIONAL and self.state in _FRESH:
             self._open_sdo = copy.deepcopy(self._store.current.sdo)
-        self._sync.reset()
+        self._sync.stop()
         super()._enter(state)
 
     @property
@@ -144,7 +121,7 @@ class StoeberSlave(CanopenSlave):
         return True
 
     def _on_sync(self, now: float) -> None:
-        self._sync.on_sync(now)
+        self._sync.start(now)
         super()._on_sync(now)
 
     def _apply(self, number: int, pdo: PdoSettings, data: bytes) -> None:

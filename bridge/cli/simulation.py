@@ -8,14 +8,14 @@ from bridge.can import Bus
 from bridge.config import BusTable
 from bridge.mapping.loader import lineage, mapping_folders
 from bridge.sim.catalogue import SIMULATED, simulate_node
-from bridge.sim.node import SimulatedNode
+from bridge.sim.device import SimulatedDevice
 from bridge.sim.shell import Simulation
 
 
 def simulation(bus: Bus, table: BusTable, site: Path) -> Simulation:
     """All nodes of one bus, with the parameters that the site file gives their drives. A mapping that has
     no simulation of its own is played by the nearest that it extends."""
-    nodes: list[SimulatedNode] = []
+    nodes: list[SimulatedDevice] = []
     folders = mapping_folders(site)
     for node in table.node:
         parameters: dict[str, float] = {}

@@ -5,9 +5,10 @@ A device is built from one of these, an object dictionary and an ``Application``
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
-from typing import Final, Protocol
+from typing import Final
 
 from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
 from bridge.sim.dictionary import Dictionary
@@ -24,32 +25,34 @@ _OUTBOX_MAX: Final = 256
 """A real controller's queue is shorter; this bounds the memory if nobody fetches the frames."""
 
 
-class Application(Protocol):
+class Application(ABC):
     """How the device reacts to its communication."""
 
+    @abstractmethod
     def nmt_changed(self, state: NmtState) -> None:
         """The NMT state has changed."""
-        ...
 
+    @abstractmethod
     def restarted(self, command: NmtCommand) -> None:
         """Reset node or reset communication, before the boot-up message; settings are as at power-on."""
-        ...
 
     def accepts_rpdo(self, number: int, length: int) -> bool:
-        """Whether an RPDO (numbered from 0) of ``length`` bytes is evaluated at all."""
-        ...
+        """Whether an RPDO (numbered from 0) of ``length`` bytes is evaluated at all. Too short ones do not
+        get here; of a longer one the mapped bytes are used."""
+        del number, length
+        return True
 
     def rpdo_applied(self, number: int) -> None:
         """The objects mapped in this RPDO have their new values."""
-        ...
+        del number
 
+    @abstractmethod
     def master_lost(self) -> None:
         """The life time of node guarding has run out."""
-        ...
 
+    @abstractmethod
     def master_back(self) -> None:
         """The first guard request after that has come."""
-        ...
 
 
 class CanopenSlave:
@@ -125,7 +128,7 @@ class CanopenSlave:
             self._send(_ERROR_CONTROL + self.node_id, bytes([self.state]))
         if self.state is not NmtState.STOPPED:
             for data in self.emcy.due(now):
-                self._send(self._store.current.emcy_cob_id, data)
+                self._send(self._store.current.emcy.cob_id, data)
         if self.state is NmtState.OPERATIONAL:
             self._send_due_tpdos(now)
 
@@ -145,7 +148,7 @@ class CanopenSlave:
         """The identifiers that concern this node with its present settings."""
         settings = self._store.current
         own = {0, _ERROR_CONTROL + self.node_id, settings.sync_cob_id}
-        own.update(channel.receive_cob_id for channel in self._sdo_channels)
+        own.update(channel.receive.cob_id for channel in self._sdo_channels)
         own.update(pdo.cob_id for pdo in settings.rpdo)
         return frozenset(own)
 
@@ -183,9 +186,9 @@ class CanopenSlave:
     def _on_object(self, cob_id: int, data: bytes, now: float) -> None:
         settings = self._store.current
         for server, channel in zip(self._servers, self._sdo_channels, strict=True):
-            if channel.enabled and cob_id == channel.receive_cob_id:
+            if channel.enabled and cob_id == channel.receive.cob_id:
                 for answer in server.on_request(data):
-                    self._send(channel.send_cob_id, answer)
+                    self._send(channel.send.cob_id, answer)
                 return
         if self.state is not NmtState.OPERATIONAL:
             return

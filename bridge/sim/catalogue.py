@@ -7,15 +7,15 @@ from typing import Final
 
 from bridge.errors import OperationFailed
 from bridge.sim.cia402_catalogue import MAPPINGS, cia402
+from bridge.sim.device import SimulatedDevice
 from bridge.sim.lenze_catalogue import lenze_8400_motec
-from bridge.sim.node import SimulatedNode
 from bridge.sim.nord_catalogue import NORD
 from bridge.sim.stoeber_catalogue import stoeber_5000, stoeber_5000_four_axes
 
-Factory = Callable[[int, Mapping[str, float]], SimulatedNode]
+Factory = Callable[[int, Mapping[str, float]], SimulatedDevice]
 
 
-def simulate_node(mapping: str, node_id: int, parameters: dict[str, float]) -> SimulatedNode:
+def simulate_node(mapping: str, node_id: int, parameters: dict[str, float]) -> SimulatedDevice:
     """A simulated node of the family ``mapping``, with parameters in engineering units.
 
     NORD: ``P105`` sets all drives of a node, ``fu2/P105`` one, ``P151`` (ms) the interface, and without an

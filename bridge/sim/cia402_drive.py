@@ -10,7 +10,6 @@ from bridge.sim.cia402_axis import Cia402Axis
 from bridge.sim.cia402_objects import Cia402Objects
 from bridge.sim.cia402_settings import RULES, Cia402Settings, factory_communication
 from bridge.sim.cia402_states import State
-from bridge.sim.communication_objects import Memory
 from bridge.sim.device import SimulatedDevice
 from bridge.sim.dictionary import Dictionary
 from bridge.sim.emcy_producer import EmcyProducer
@@ -47,7 +46,7 @@ class Cia402Drive(SimulatedDevice):
             self.objects, self._communication, RULES, lambda: self.slave.state is NmtState.PRE_OPERATIONAL
         )
         objects = Cia402Objects(self.axis, self._settings, self._communication)
-        objects.add_to(self.objects, self._emcy, pdos, Memory(self._save, self._load))
+        objects.add_to(self.objects, self._emcy, pdos)
         servers = [SdoServer(self.objects, RULES.sdo_block_segments)]
         self.slave = CanopenSlave(node_id, self._communication, self.objects, servers, self._emcy, self)
         self.heard = self._hears()
@@ -123,14 +122,6 @@ class Cia402Drive(SimulatedDevice):
     def _hears(self) -> frozenset[int]:
         watched = {_HEARTBEAT + self._consumer.node} if self._consumer.node else set[int]()
         return self.slave.hears() | watched
-
-    def _save(self) -> None:
-        self._settings.save()
-        self._communication.save()
-
-    def _load(self) -> None:
-        self._settings.forget()
-        self._communication.forget()
 
     def _restart(self) -> None:
         self._settings.power_on()

@@ -9,17 +9,9 @@ from bridge.sim.abort import AbortCode, SdoAbort
 from bridge.sim.cia402_axis import Cia402Axis
 from bridge.sim.cia402_homing import METHODS
 from bridge.sim.cia402_settings import INCREMENTS, SUPPORTED_MODES, Cia402Settings, Mode
-from bridge.sim.communication_objects import (
-    DeviceIdentity,
-    Memory,
-    add_errors,
-    add_identity,
-    add_memory,
-    add_protocols,
-    add_sdo_servers,
-)
+from bridge.sim.communication_objects import DeviceIdentity, add_communication
 from bridge.sim.dictionary import DataType as Type
-from bridge.sim.dictionary import Dictionary, Number, constant
+from bridge.sim.dictionary import Dictionary, Number, constant, item, variable
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.pdo_objects import PdoObjects
 from bridge.sim.settings import CommunicationSettings
@@ -82,12 +74,9 @@ class Cia402Objects:
     def _settings(self) -> Cia402Settings:
         return self._store.current
 
-    def add_to(self, dictionary: Dictionary, emcy: EmcyProducer, pdos: PdoObjects, memory: Memory) -> None:
-        add_identity(dictionary, IDENTITY, lambda: self._axis.status_word)
-        add_errors(dictionary, emcy)
-        add_memory(dictionary, memory)
-        add_protocols(dictionary, self._communication)
-        add_sdo_servers(dictionary, self._communication)
+    def add_to(self, dictionary: Dictionary, emcy: EmcyProducer, pdos: PdoObjects) -> None:
+        stores = (self._communication, self._store)
+        add_communication(dictionary, IDENTITY, lambda: self._axis.status_word, emcy, *stores)
         self._add_consumer(dictionary)
         pdos.add()
         self._add_control(dictionary)
@@ -126,45 +115,32 @@ class Cia402Objects:
         dictionary.add(0x6502, 0, constant(Type.UNSIGNED32, SUPPORTED_MODES))
 
     def _add_options(self, dictionary: Dictionary) -> None:
-        def option(index: int, low: int, high: int) -> Number:
-            def write(value: int) -> None:
-                self._settings.options[index] = value
-
-            return Number(Type.INTEGER16, lambda: self._settings.options[index], write, low, high)
-
         for index, (low, high) in _OPTIONS.items():
-            dictionary.add(index, 0, option(index, low, high))
+            option = item(Type.INTEGER16, lambda: self._settings.options, index, low, high)
+            dictionary.add(index, 0, option)
         dictionary.add(0x6007, 0, self._number(Type.INTEGER16, "abort_connection", 0, 3))
 
     def _add_process_data(self, dictionary: Dictionary) -> None:
         axis, targets, motor = self._axis, self._axis.targets, self._axis.motor
 
-        def set_vl(value: int) -> None:
-            targets.vl_velocity = value
-
         def set_position(value: int) -> None:
             targets.position = value
             axis.on_target_position()
-
-        def set_velocity(value: int) -> None:
-            targets.velocity = value
-
-        def target(index: int, kind: Type, read: Callable[[], int], write: Callable[[int], None]) -> None:
-            dictionary.add(index, 0, Number(kind, read, write, in_rpdo=True, in_tpdo=True))
 
         def actual(index: int, kind: Type, read: Callable[[], int]) -> None:
             dictionary.add(index, 0, Number(kind, read, in_tpdo=True))
 
         i16, i32 = Type.INTEGER16, Type.INTEGER32
-        target(0x6042, i16, lambda: targets.vl_velocity, set_vl)
+        dictionary.add(0x6042, 0, variable(i16, lambda: targets, "vl_velocity", in_pdos=True))
         actual(0x6043, i16, lambda: axis.demand_rpm)
         actual(0x6044, i16, lambda: axis.actual_rpm)
         actual(0x6062, i32, lambda: round(motor.position))
         actual(0x6064, i32, lambda: round(motor.position))
         actual(0x606B, i32, lambda: axis.demand_velocity)
         actual(0x606C, i32, lambda: round(motor.velocity))
-        target(0x607A, i32, lambda: targets.position, set_position)
-        target(0x60FF, i32, lambda: targets.velocity, set_velocity)
+        position = Number(i32, lambda: targets.position, set_position, in_rpdo=True, in_tpdo=True)
+        dictionary.add(0x607A, 0, position)
+        dictionary.add(0x60FF, 0, variable(i32, lambda: targets, "velocity", in_pdos=True))
 
     def _add_numbers(self, dictionary: Dictionary) -> None:
         for index, (kind, name) in _NUMBERS.items():
@@ -185,20 +161,9 @@ class Cia402Objects:
         return Number(Type.INTEGER8, lambda: self._settings.homing_method, write)
 
     def _number(self, kind: Type, name: str, low: int | None = None, high: int | None = None) -> Number:
-        def read() -> int:
-            value: int = getattr(self._settings, name)
-            return value
-
-        return Number(kind, read, lambda value: setattr(self._settings, name, value), low, high)
+        return variable(kind, lambda: self._settings, name, low, high)
 
     def _element(
         self, kind: Type, name: str, place: int, low: int | None = None, high: int | None = None
     ) -> Number:
-        def values() -> list[int]:
-            found: list[int] = getattr(self._settings, name)
-            return found
-
-        def write(value: int) -> None:
-            values()[place] = value
-
-        return Number(kind, lambda: values()[place], write, low, high)
+        return item(kind, lambda: getattr(self._settings, name), place, low, high)

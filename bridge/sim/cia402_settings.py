@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Final
 
-from bridge.sim.settings import CommunicationSettings, PdoSettings, SdoSettings, SlaveRules
+from bridge.sim.settings import CobId, CommunicationSettings, PdoSettings, SdoSettings, SlaveRules
 
 RULES: Final = SlaveRules(sdo_block_segments=127)
 PDOS: Final = 4
@@ -99,8 +99,8 @@ _TPDO_ENTRIES: Final = (
 def factory_communication(node_id: int) -> CommunicationSettings:
     """PDO1 is on, the others are there and off."""
     return CommunicationSettings(
-        emcy_cob_id=0x80 + node_id,
-        sdo=[SdoSettings(0x600 + node_id, 0x580 + node_id)],
+        emcy=CobId(0x80 + node_id),
+        sdo=[SdoSettings.at(0x600 + node_id, 0x580 + node_id)],
         rpdo=[
             _pdo(base + node_id, entries) for base, entries in zip(_RPDO_BASES, _RPDO_ENTRIES, strict=True)
         ],

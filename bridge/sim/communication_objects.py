@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 from bridge.sim.abort import AbortCode, SdoAbort
-from bridge.sim.dictionary import DataType, Dictionary, Number, Text, constant
+from bridge.sim.dictionary import DataType, Dictionary, Number, Text, constant, variable
 from bridge.sim.emcy_producer import EmcyProducer
-from bridge.sim.settings import COB_ID_MASK, DISABLED, CommunicationSettings, SdoSettings
+from bridge.sim.settings import COB_ID_MASK, CommunicationSettings
 from bridge.sim.store import Store
 
-_SAVE: Final = int.from_bytes(b"save", "little")
+SAVE: Final = int.from_bytes(b"save", "little")
 _LOAD: Final = int.from_bytes(b"load", "little")
 
 
@@ -30,12 +30,30 @@ class DeviceIdentity:
     software_version: str
 
 
-@dataclass(frozen=True, slots=True)
-class Memory:
-    """How "save" and "load" work on this node."""
+def add_communication(
+    dictionary: Dictionary,
+    identity: DeviceIdentity,
+    status: Callable[[], int],
+    emcy: EmcyProducer,
+    store: Store[CommunicationSettings],
+    *others: Store[Any],
+) -> None:
+    """All of them. "Save" and "load" are for ``others`` too."""
 
-    save: Callable[[], None]
-    load: Callable[[], None]
+    def save() -> None:
+        for one in (store, *others):
+            one.save()
+
+    def load() -> None:
+        for one in (store, *others):
+            one.forget()
+
+    add_identity(dictionary, identity, status)
+    add_errors(dictionary, emcy)
+    dictionary.add_array(0x1010, [by_signature(SAVE, save)])
+    dictionary.add_array(0x1011, [by_signature(_LOAD, load)])
+    add_protocols(dictionary, store)
+    add_sdo_servers(dictionary, store)
 
 
 def add_identity(dictionary: Dictionary, identity: DeviceIdentity, status: Callable[[], int]) -> None:
@@ -72,87 +90,44 @@ def add_errors(dictionary: Dictionary, emcy: EmcyProducer) -> None:
         dictionary.add(0x1003, place + 1, error(place))
 
 
-def add_memory(dictionary: Dictionary, memory: Memory) -> None:
-    """1010h and 1011h: a command in the form of a signature."""
+def by_signature(signature: int, action: Callable[[], None]) -> Number:
+    """An element of 1010h or 1011h: it acts on command, not by itself."""
 
-    def command(signature: int, action: Callable[[], None]) -> Number:
-        def write(value: int) -> None:
-            if value != signature:
-                raise SdoAbort(AbortCode.CANNOT_STORE)
-            action()
+    def write(value: int) -> None:
+        if value != signature:
+            raise SdoAbort(AbortCode.CANNOT_STORE)
+        action()
 
-        return Number(DataType.UNSIGNED32, lambda: 1, write)  # 1: on command, not by itself
-
-    dictionary.add_array(0x1010, [command(_SAVE, memory.save)])
-    dictionary.add_array(0x1011, [command(_LOAD, memory.load)])
+    return Number(DataType.UNSIGNED32, lambda: 1, write)
 
 
 def add_protocols(dictionary: Dictionary, store: Store[CommunicationSettings]) -> None:
     """SYNC, EMCY, guarding and heartbeat: 1005h, 100Ch, 100Dh, 1014h, 1015h, 1017h."""
 
+    def settings() -> CommunicationSettings:
+        return store.current
+
     def set_sync(value: int) -> None:
         store.current.sync_cob_id = value & COB_ID_MASK
 
-    def set_emcy(value: int) -> None:
-        store.current.emcy_cob_id = value & COB_ID_MASK
-        store.current.emcy_on = not value & DISABLED
-
-    def set_emcy_inhibit(value: int) -> None:
-        store.current.emcy_inhibit = value
-
-    def emcy() -> int:
-        return store.current.emcy_cob_id | (0 if store.current.emcy_on else DISABLED)
-
-    u16, u32 = DataType.UNSIGNED16, DataType.UNSIGNED32
+    u8, u16, u32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
     dictionary.add(0x1005, 0, Number(u32, lambda: store.current.sync_cob_id, set_sync))
-    dictionary.add(0x1014, 0, Number(u32, emcy, set_emcy))
-    dictionary.add(0x1015, 0, Number(u16, lambda: store.current.emcy_inhibit, set_emcy_inhibit))
-    _add_error_control(dictionary, store)
-
-
-def _add_error_control(dictionary: Dictionary, store: Store[CommunicationSettings]) -> None:
-    def set_guard_time(value: int) -> None:
-        store.current.guard_time_ms = value
-
-    def set_life_time_factor(value: int) -> None:
-        store.current.life_time_factor = value
-
-    def set_heartbeat(value: int) -> None:
-        store.current.heartbeat_ms = value
-
-    u8, u16 = DataType.UNSIGNED8, DataType.UNSIGNED16
-    dictionary.add(0x100C, 0, Number(u16, lambda: store.current.guard_time_ms, set_guard_time))
-    dictionary.add(0x100D, 0, Number(u8, lambda: store.current.life_time_factor, set_life_time_factor))
-    dictionary.add(0x1017, 0, Number(u16, lambda: store.current.heartbeat_ms, set_heartbeat))
+    dictionary.add(0x100C, 0, variable(u16, settings, "guard_time_ms"))
+    dictionary.add(0x100D, 0, variable(u8, settings, "life_time_factor"))
+    dictionary.add(0x1014, 0, variable(u32, lambda: store.current.emcy, "word"))
+    dictionary.add(0x1015, 0, variable(u16, settings, "emcy_inhibit"))
+    dictionary.add(0x1017, 0, variable(u16, settings, "heartbeat_ms"))
 
 
 def add_sdo_servers(dictionary: Dictionary, store: Store[CommunicationSettings]) -> None:
     """1200h is fixed; the further channels can be moved and switched on by clearing bit 31 in both halves."""
+
+    def half(number: int, name: str) -> Number:
+        def cob_id() -> object:
+            return getattr(store.current.sdo[number], name)
+
+        entry = variable(DataType.UNSIGNED32, cob_id, "word")
+        return entry if number else replace(entry, write=None)
+
     for number in range(len(store.current.sdo)):
-        _add_sdo_server(dictionary, store, number)
-
-
-def _add_sdo_server(dictionary: Dictionary, store: Store[CommunicationSettings], number: int) -> None:
-    def channel() -> SdoSettings:
-        return store.current.sdo[number]
-
-    def receive() -> int:
-        return channel().receive_cob_id | (0 if channel().receive_on else DISABLED)
-
-    def send() -> int:
-        return channel().send_cob_id | (0 if channel().send_on else DISABLED)
-
-    def set_receive(value: int) -> None:
-        channel().receive_cob_id, channel().receive_on = value & COB_ID_MASK, not value & DISABLED
-
-    def set_send(value: int) -> None:
-        channel().send_cob_id, channel().send_on = value & COB_ID_MASK, not value & DISABLED
-
-    fixed = number == 0
-    dictionary.add_array(
-        0x1200 + number,
-        [
-            Number(DataType.UNSIGNED32, receive, None if fixed else set_receive),
-            Number(DataType.UNSIGNED32, send, None if fixed else set_send),
-        ],
-    )
+        dictionary.add_array(0x1200 + number, [half(number, "receive"), half(number, "send")])

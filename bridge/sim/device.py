@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterable
 
 from bridge.canopen.frame import ERROR, EXTENDED, STANDARD_MASK, Frame
-from bridge.sim.canopen_slave import CanopenSlave
-from bridge.sim.nmt_slave import NmtCommand, NmtState
+from bridge.sim.canopen_slave import Application, CanopenSlave
 from bridge.sim.ticks import earliest
 
 
-class SimulatedDevice(ABC):
+class SimulatedDevice(Application):
     """The node as the CAN bus sees it, and the application of its CANopen slave. Times are seconds of the
     caller's monotonic clock.
 
@@ -24,6 +23,7 @@ class SimulatedDevice(ABC):
         self.node_id = node_id
         self.powered = False
         self.heard: frozenset[int] = frozenset()
+        """The identifiers that ``on_frame`` evaluates at present."""
         self._now = 0.0
         self._injected: list[Callable[[], None]] = []
 
@@ -52,29 +52,6 @@ class SimulatedDevice(ABC):
     def _hears(self) -> frozenset[int]:
         return self.slave.hears()
 
-    # The application of the CANopen slave.
-
-    @abstractmethod
-    def nmt_changed(self, state: NmtState) -> None: ...
-
-    @abstractmethod
-    def restarted(self, command: NmtCommand) -> None: ...
-
-    def accepts_rpdo(self, number: int, length: int) -> bool:
-        """Too short ones do not get here; of a longer one the mapped bytes are used."""
-        del number, length
-        return True
-
-    def rpdo_applied(self, number: int) -> None:
-        """Nothing to do: the objects took effect when they were written."""
-        del number
-
-    @abstractmethod
-    def master_lost(self) -> None: ...
-
-    @abstractmethod
-    def master_back(self) -> None: ...
-
     # The core: frames and time in, frames out.
 
     def start(self, now: float) -> None:
@@ -101,6 +78,7 @@ class SimulatedDevice(ABC):
             self._finish()
 
     def next_deadline(self) -> float | None:
+        """When ``on_time`` has to be called next, or None."""
         if self._injected:
             return self._now
         if not self.powered:
@@ -108,6 +86,7 @@ class SimulatedDevice(ABC):
         return earliest(self.slave.next_deadline(), *self._deadlines())
 
     def take_frames(self) -> list[Frame]:
+        """What the node has to send, oldest first."""
         return self.slave.take_frames()
 
     def _advance(self, now: float) -> None:

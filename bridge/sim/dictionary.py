@@ -191,6 +191,42 @@ class Dictionary:
         return entry
 
 
+def variable(
+    data_type: DataType,
+    holder: Callable[[], object],
+    name: str,
+    low: int | None = None,
+    high: int | None = None,
+    *,
+    in_pdos: bool = False,
+) -> Number:
+    """The attribute ``name`` of what ``holder`` returns at each access."""
+
+    def read() -> int:
+        value: int = getattr(holder(), name)
+        return value
+
+    def write(value: int) -> None:
+        setattr(holder(), name, value)
+
+    return Number(data_type, read, write, low, high, in_rpdo=in_pdos, in_tpdo=in_pdos)
+
+
+def item(
+    data_type: DataType,
+    values: Callable[[], list[int] | dict[int, int]],
+    place: int,
+    low: int | None = None,
+    high: int | None = None,
+) -> Number:
+    """One of the numbers that ``values`` returns at each access."""
+
+    def write(value: int) -> None:
+        values()[place] = value
+
+    return Number(data_type, lambda: values()[place], write, low, high)
+
+
 def constant(data_type: DataType, value: int) -> Number:
     """A read-only number that never changes."""
     return Number(data_type, lambda: value)

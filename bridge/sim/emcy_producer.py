@@ -44,7 +44,7 @@ class EmcyProducer:
         self.error_register = register
         if code:
             self._history.appendleft(code | (specific[0] if specific else 0) << 16)
-        if self._store.current.emcy_on:
+        if self._store.current.emcy.enabled:
             self._waiting.append(code.to_bytes(2, "little") + bytes([register]) + specific.ljust(5, b"\0"))
 
     def due(self, now: float) -> list[bytes]:

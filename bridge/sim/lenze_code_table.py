@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from dataclasses import replace
+from functools import partial
 
 from bridge.sim.abort import AbortCode, SdoAbort
-from bridge.sim.dictionary import DataType, Dictionary, Number, Text
-from bridge.sim.lenze_settings import CODE_BASE
+from bridge.sim.dictionary import DataType, Dictionary, Entry, Number, item, variable
+from bridge.sim.lenze_settings import CODE_BASE, LenzeCodes
+from bridge.sim.store import Store
 
 Values = Callable[[], list[int]]
 
@@ -14,11 +17,12 @@ Values = Callable[[], list[int]]
 class CodeTable:
     """Adds codes; ``number`` is that of the code; sub-code 0 means that it has none."""
 
-    def __init__(self, dictionary: Dictionary) -> None:
+    def __init__(self, dictionary: Dictionary, codes: Store[LenzeCodes]) -> None:
         self._dictionary = dictionary
+        self._codes = codes
 
-    def text(self, number: int, text: str) -> None:
-        self._dictionary.add(CODE_BASE - number, 0, Text(text))
+    def put(self, number: int, sub_code: int, entry: Entry) -> None:
+        self._dictionary.add(CODE_BASE - number, sub_code, entry)
 
     def count(self, number: int, sub_codes: int) -> None:
         """Sub-index 0 of a code with sub-codes. The manual does not describe it; CiA 301 wants it."""
@@ -34,24 +38,24 @@ class CodeTable:
         limits: tuple[int, int] | None = None,
     ) -> None:
         low, high = limits or (None, None)
-        self._dictionary.add(CODE_BASE - number, sub_code, Number(data_type, read, write, low, high))
+        self.put(number, sub_code, Number(data_type, read, write, low, high))
 
-    def choice(
-        self,
-        number: int,
-        sub_code: int,
-        read: Callable[[], int],
-        write: Callable[[int], None],
-        choices: Collection[int],
+    def setting(
+        self, number: int, sub_code: int, data_type: DataType, name: str, limits: tuple[int, int]
     ) -> None:
+        """A code that is just stored, under ``name`` in ``LenzeCodes``."""
+        self.put(number, sub_code, variable(data_type, lambda: self._codes.current, name, *limits))
+
+    def choice(self, number: int, sub_code: int, entry: Number, choices: Collection[int]) -> None:
         """A code with a list to choose from."""
+        write = entry.write
 
         def choose(value: int) -> None:
-            if value not in choices:
+            if value not in choices or write is None:
                 raise SdoAbort(AbortCode.VALUE_RANGE)
             write(value)
 
-        self.add(number, sub_code, DataType.UNSIGNED8, read, choose)
+        self.put(number, sub_code, replace(entry, write=choose))
 
     def displays(self, number: int, data_type: DataType, count: int, read: Callable[[int], int]) -> None:
         """Sub-codes 1…``count`` that can only be read; ``read`` counts from 0."""
@@ -70,17 +74,9 @@ class CodeTable:
         """Sub-codes from 1 on; ``write`` gets the place (from 0) and the value; without it the value is just
         stored."""
 
-        def keep(place: int, value: int) -> None:
-            values()[place] = value
-
-        change = write or keep
         self.count(number, len(values()))
         for place in range(len(values())):
-            self.add(
-                number,
-                place + 1,
-                data_type,
-                lambda place=place: values()[place],
-                lambda value, place=place: change(place, value),
-                limits,
-            )
+            entry = item(data_type, values, place, *limits)
+            if write is not None:
+                entry = replace(entry, write=partial(write, place))
+            self.put(number, place + 1, entry)

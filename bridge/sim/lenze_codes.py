@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Final
 
-from bridge.sim.dictionary import DataType, Dictionary
-from bridge.sim.lenze_code_table import CodeTable, Values
+from bridge.sim.dictionary import DataType, Dictionary, Text, item, variable
+from bridge.sim.lenze_code_table import CodeTable
 from bridge.sim.lenze_drive import LenzeDrive, Reaction
 from bridge.sim.lenze_objects import LenzeObjects
 from bridge.sim.lenze_settings import LenzeCodes
@@ -74,7 +75,7 @@ class CodeParts:
 
 def add_codes(dictionary: Dictionary, parts: CodeParts) -> None:
     """Put every code into ``dictionary``."""
-    table = CodeTable(dictionary)
+    table = CodeTable(dictionary, parts.codes)
     _add_device_commands(table, parts)
     _add_pdo_codes(table, parts)
     _add_communication_codes(table, parts)
@@ -115,32 +116,19 @@ def _add_pdo_codes(table: CodeTable, parts: CodeParts) -> None:
         pdos = stack.current.tpdo if place % 2 else stack.current.rpdo
         return pdos[place // 2].cob_id
 
-    types = (0, 255)
-    table.array(
-        322,
-        U8,
-        lambda: codes.current.tx_types,
-        types,
-        lambda place, value: objects.set_transmission_type(2 * place + 1, value),
-    )
-    table.array(
-        323,
-        U8,
-        lambda: codes.current.rx_types,
-        types,
-        lambda place, value: objects.set_transmission_type(2 * place, value),
-    )
+    def set_tx_type(place: int, value: int) -> None:
+        objects.set_transmission_type(2 * place + 1, value)
+
+    def set_rx_type(place: int, value: int) -> None:
+        objects.set_transmission_type(2 * place, value)
+
+    table.array(322, U8, lambda: codes.current.tx_types, (0, 255), set_tx_type)
+    table.array(323, U8, lambda: codes.current.rx_types, (0, 255), set_rx_type)
     table.array(324, U16, lambda: codes.current.inhibit_ms, (0, 6500), set_inhibit)
     table.array(353, U8, lambda: codes.current.cob_source, (0, 2))
     table.count(354, len(codes.current.cob_ids))
     for place in range(len(codes.current.cob_ids)):
-        table.add(
-            354,
-            place + 1,
-            U32,
-            lambda place=place: cob_id(place),
-            lambda value, place=place: set_cob_id(place, value),
-        )
+        table.add(354, place + 1, U32, partial(cob_id, place), partial(set_cob_id, place))
     table.displays(355, U16, len(codes.current.cob_ids), active_cob_id)
     table.array(389, U8, lambda: codes.current.pdo_off, (0, 1), objects.set_pdo_off)
     table.array(409, U16, lambda: codes.current.mapping, (0, 0xFFFF))
@@ -148,18 +136,6 @@ def _add_pdo_codes(table: CodeTable, parts: CodeParts) -> None:
 
 def _add_communication_codes(table: CodeTable, parts: CodeParts) -> None:
     codes, objects = parts.codes, parts.objects
-
-    def set_bit_rate(value: int) -> None:
-        codes.current.bit_rate = value
-
-    def set_master(value: int) -> None:
-        codes.current.master = value
-
-    def set_sync_tx(value: int) -> None:
-        codes.current.sync_tx = value
-
-    def set_sync_ms(value: int) -> None:
-        codes.current.sync_ms = value
 
     def set_time(place: int, value: int) -> None:
         match place:
@@ -174,37 +150,24 @@ def _add_communication_codes(table: CodeTable, parts: CodeParts) -> None:
         return int(not any(cob_id & DISABLED for cob_id in codes.current.sdo_cob_ids))
 
     table.add(350, 0, U8, lambda: codes.current.node_id, lambda value: codes.current.move_to(value), (1, 63))
-    table.choice(351, 0, lambda: codes.current.bit_rate, set_bit_rate, BIT_RATES)
-    table.choice(352, 0, lambda: codes.current.master, set_master, (0, 1))
+    table.choice(351, 0, variable(U8, lambda: codes.current, "bit_rate"), BIT_RATES)
+    table.setting(352, 0, U8, "master", (0, 1))
     table.array(356, U16, lambda: codes.current.times_ms, (0, 65000), set_time)
-    table.choice(366, 0, both_channels, objects.use_both_sdo_channels, (0, 1))
+    table.add(366, 0, U8, both_channels, objects.use_both_sdo_channels, (0, 1))
     table.add(367, 0, U16, lambda: codes.current.sync_rx, objects.set_sync_rx, (128, 255))
-    table.add(368, 0, U16, lambda: codes.current.sync_tx, set_sync_tx, (128, 255))
-    table.add(369, 0, U16, lambda: codes.current.sync_ms, set_sync_ms, (0, 65000))
+    table.setting(368, 0, U16, "sync_tx", (128, 255))
+    table.setting(369, 0, U16, "sync_ms", (0, 65000))
 
 
 def _add_supervision_codes(table: CodeTable, parts: CodeParts) -> None:
     codes = parts.codes
     reactions = tuple(Reaction)
-
-    def set_node(value: int) -> None:
-        codes.current.watched_node = value
-
-    def set_time(value: int) -> None:
-        codes.current.watched_ms = value
-
-    def reaction(values: Values, place: int) -> tuple[Callable[[], int], Callable[[int], None]]:
-        def write(value: int) -> None:
-            values()[place] = value
-
-        return lambda: values()[place], write
-
     table.array(357, U16, lambda: codes.current.rpdo_time_ms, (0, 65000))
     table.add(381, 0, U16, lambda: codes.current.heartbeat_ms, parts.objects.set_heartbeat_ms, (0, 65535))
     table.count(385, 1)
-    table.add(385, 1, U8, lambda: codes.current.watched_node, set_node, (0, 127))
+    table.setting(385, 1, U8, "watched_node", (0, 127))
     table.count(386, 1)
-    table.add(386, 1, U16, lambda: codes.current.watched_ms, set_time, (0, 60000))
+    table.setting(386, 1, U16, "watched_ms", (0, 60000))
     table.array(1503, U16, lambda: codes.current.mci_time_ms, (0, 1000))
     for number, values, choices in (
         (592, lambda: codes.current.bus_reactions, reactions),
@@ -213,7 +176,7 @@ def _add_supervision_codes(table: CodeTable, parts: CodeParts) -> None:
     ):
         table.count(number, len(values()))
         for place in range(len(values())):
-            table.choice(number, place + 1, *reaction(values, place), choices)
+            table.choice(number, place + 1, item(U8, values, place), choices)
 
 
 def _add_displays(table: CodeTable, parts: CodeParts) -> None:
@@ -230,29 +193,13 @@ def _add_displays(table: CodeTable, parts: CodeParts) -> None:
 
 def _add_drive_codes(table: CodeTable, parts: CodeParts) -> None:
     codes, drive = parts.codes, parts.drive
-
-    def set_mode(value: int) -> None:
-        codes.current.control_mode = value
-
-    def set_reference(value: int) -> None:
-        codes.current.reference_rpm = value
-
-    def set_current(value: int) -> None:
-        codes.current.motor_current_ca = value
-
-    def ramp(number: int, place: int) -> None:
-        def write(value: int) -> None:
-            codes.current.ramp_ms[place] = value
-
-        table.add(number, 0, U32, lambda: codes.current.ramp_ms[place], write, (0, 999_999))
-
-    table.add(7, 0, U16, lambda: codes.current.control_mode, set_mode, (10, 40))
-    table.add(11, 0, U16, lambda: codes.current.reference_rpm, set_reference, (50, 60_000))
+    table.setting(7, 0, U16, "control_mode", (10, 40))
+    table.setting(11, 0, U16, "reference_rpm", (50, 60_000))
     for place, number in enumerate((12, 13, 105)):
-        ramp(number, place)
+        table.put(number, 0, item(U32, lambda: codes.current.ramp_ms, place, 0, 999_999))
     table.array(39, I32, lambda: codes.current.fixed_setpoints, (-19_999, 19_999))
     table.add(61, 0, I32, lambda: drive.temperature_c)
     # Called U16 and U32 in the same example, and written with four bytes there (§9.3.2).
-    table.add(88, 0, U32, lambda: codes.current.motor_current_ca, set_current, (0, 60_000))
-    table.text(99, FIRMWARE)
+    table.setting(88, 0, U32, "motor_current_ca", (0, 60_000))
+    table.put(99, 0, Text(FIRMWARE))
     table.add(168, 0, U32, lambda: drive.error_number)

@@ -14,7 +14,7 @@ from bridge.sim.dictionary import Cell, DataType, Dictionary, Number, constant
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.lenze_settings import CYCLE_PLACES, PDOS, PORT_WORDS, RULES, LenzeCodes, heartbeat_step
 from bridge.sim.pdo_objects import PdoObjects
-from bridge.sim.settings import COB_ID_MASK, DISABLED, CommunicationSettings, PdoSettings
+from bridge.sim.settings import COB_ID_MASK, DISABLED, CobId, CommunicationSettings, PdoSettings, SdoSettings
 from bridge.sim.store import Store
 
 VENDOR_ID: Final = 0x3B
@@ -128,12 +128,12 @@ class LenzeObjects:
             codes.current.sync_ms = value_us // _CYCLE_STEP_US
 
         def set_emcy(value: int) -> None:
-            have, stack = codes.current.emcy_cob_id, self._stack.current
+            have = codes.current.emcy_cob_id
             moves = (value ^ have) & COB_ID_MASK
             if value & (_EXTENDED | _PRODUCER) or (moves and not (value | have) & DISABLED):
                 raise SdoAbort(AbortCode.VALUE_RANGE)
             codes.current.emcy_cob_id = value
-            stack.emcy_cob_id, stack.emcy_on = value & COB_ID_MASK, not value & DISABLED
+            self._stack.current.emcy = CobId.of(value)
 
         def watched() -> int:
             return codes.current.watched_node << 16 | codes.current.watched_ms
@@ -152,12 +152,8 @@ class LenzeObjects:
         dictionary.add(0x1017, 0, Number(U16, lambda: codes.current.heartbeat_ms, self.set_heartbeat_ms))
 
     def _add_sdo_servers(self, dictionary: Dictionary) -> None:
-        def fixed(sends: bool) -> Number:
-            def cob_id() -> int:
-                channel = self._stack.current.sdo[0]
-                return channel.send_cob_id if sends else channel.receive_cob_id
-
-            return Number(U32, cob_id)
+        def first() -> SdoSettings:
+            return self._stack.current.sdo[0]
 
         def second(place: int) -> Number:
             def set_cob_id(value: int) -> None:
@@ -170,16 +166,19 @@ class LenzeObjects:
 
             return Number(U32, lambda: self._codes.current.sdo_cob_ids[place], set_cob_id)
 
-        dictionary.add_array(0x1200, [fixed(False), fixed(True)])
+        dictionary.add_array(
+            0x1200,
+            [
+                Number(U32, lambda: first().receive.cob_id),
+                Number(U32, lambda: first().send.cob_id),
+            ],
+        )
         # Sub-index 0 is printed as 3, with two sub-indices described (§13): it counts those that there are.
         dictionary.add_array(0x1201, [second(0), second(1)])
 
     def _show_sdo(self, place: int, cob_id: int) -> None:
         channel = self._stack.current.sdo[1]
-        if place:
-            channel.send_cob_id, channel.send_on = cob_id & COB_ID_MASK, not cob_id & DISABLED
-        else:
-            channel.receive_cob_id, channel.receive_on = cob_id & COB_ID_MASK, not cob_id & DISABLED
+        (channel.send if place else channel.receive).word = cob_id
 
     def _add_pdo(self, dictionary: Dictionary, number: int, *, receives: bool) -> None:
         place = 2 * number + (not receives)
@@ -187,8 +186,7 @@ class LenzeObjects:
         fixed = _NO_REMOTE if receives else 0
 
         def cob_id() -> int:
-            pdo = self.pdo(place)
-            return pdo.cob_id | fixed | (0 if pdo.enabled else DISABLED)
+            return self.pdo(place).word | fixed
 
         def kind() -> int:
             return self.pdo(place).transmission_type

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from bridge.sim.settings import DISABLED, CommunicationSettings, PdoSettings, SdoSettings, SlaveRules
+from bridge.sim.settings import DISABLED, CobId, CommunicationSettings, PdoSettings, SdoSettings, SlaveRules
 
 CODE_BASE: Final = 0x5FFF
 """Index = 5FFFh − code (§9.2.2)."""
@@ -145,17 +145,11 @@ def communication(codes: LenzeCodes, words: tuple[int, int]) -> CommunicationSet
     first, second = _SDO[0]
     to_node, from_node = codes.sdo_cob_ids
     return CommunicationSettings(
-        emcy_cob_id=codes.emcy_cob_id & 0x7FF,
-        emcy_on=not codes.emcy_cob_id & DISABLED,
+        emcy=CobId.of(codes.emcy_cob_id),
         emcy_inhibit=codes.inhibit_ms[0],
         sdo=[
-            SdoSettings(first + codes.node_id, second + codes.node_id),
-            SdoSettings(
-                to_node & 0x7FF,
-                from_node & 0x7FF,
-                receive_on=not to_node & DISABLED,
-                send_on=not from_node & DISABLED,
-            ),
+            SdoSettings.at(first + codes.node_id, second + codes.node_id),
+            SdoSettings(CobId.of(to_node), CobId.of(from_node)),
         ],
         rpdo=rpdo,
         tpdo=tpdo,

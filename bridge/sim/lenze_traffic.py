@@ -33,9 +33,9 @@ class QuasiMaster:
 def counters_of(cob_id: int, settings: CommunicationSettings, *, sent: bool) -> tuple[int, ...]:
     """The sub-codes of C00360 that count this frame: its direction's and its channel's."""
     if sent:
-        channels = [pdo.cob_id for pdo in settings.tpdo] + [0] + [sdo.send_cob_id for sdo in settings.sdo]
+        channels = [pdo.cob_id for pdo in settings.tpdo] + [0] + [sdo.send.cob_id for sdo in settings.sdo]
     else:
-        channels = [pdo.cob_id for pdo in settings.rpdo] + [0] + [sdo.receive_cob_id for sdo in settings.sdo]
+        channels = [pdo.cob_id for pdo in settings.rpdo] + [0] + [sdo.receive.cob_id for sdo in settings.sdo]
     if not cob_id or cob_id not in channels:
         return ()
     return (1 if sent else 2), (3 if sent else 8) + channels.index(cob_id)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
-from bridge.sim.abort import AbortCode, SdoAbort
-from bridge.sim.dictionary import DataType, Dictionary, Number
+from bridge.sim.dictionary import DataType, Dictionary, Number, variable
 from bridge.sim.nord_image import add_parameter
 from bridge.sim.nord_settings import DRIVES, PDO_WORDS
 from bridge.sim.pdo_objects import PdoObjects, check_cob_id, check_length
-from bridge.sim.settings import CommunicationSettings, PdoSettings, SdoSettings
+from bridge.sim.settings import CobId, CommunicationSettings, PdoSettings, SdoSettings
 from bridge.sim.store import Store
 
 _RECEIVE: Final = 1
@@ -41,17 +41,18 @@ class CanParameters:
             dictionary,
             161,
             [
-                self._sync_cob_id(),
+                self._setting("sync_cob_id", 0x7FF),
                 *(self._sdo_cob_id(number, sends) for number in range(DRIVES) for sends in (True, False)),
                 *(self._pdo_cob_id(number, receives) for number, receives in both),
             ],
         )
         add_parameter(dictionary, 162, [self._transmission_type(*one) for one in both])
-        add_parameter(dictionary, 163, [self._inhibit(number) for number in numbers])
-        add_parameter(dictionary, 164, [self._event_timer(number) for number in numbers])
+        add_parameter(dictionary, 163, [self._time(number, "inhibit_100us") for number in numbers])
+        add_parameter(dictionary, 164, [self._time(number, "event_timer_ms") for number in numbers])
         add_parameter(dictionary, 165, self._mapping())
-        add_parameter(dictionary, 166, [self._guard_time(), self._heartbeat()])
-        add_parameter(dictionary, 167, [self._life_time_factor()])
+        times = [self._setting(name, 32767) for name in ("guard_time_ms", "heartbeat_ms")]
+        add_parameter(dictionary, 166, times)
+        add_parameter(dictionary, 167, [self._setting("life_time_factor", 255)])
 
     # P160 and P161.
 
@@ -63,15 +64,13 @@ class CanParameters:
 
     def _sdo_switch(self, number: int) -> Number:
         def read() -> int:
-            return _SEND * self._sdo(number).send_on | _RECEIVE * self._sdo(number).receive_on
+            return _SEND * self._sdo(number).send.enabled | _RECEIVE * self._sdo(number).receive.enabled
 
         def write(value: int) -> None:
-            if number == 0:
-                raise SdoAbort(AbortCode.READ_ONLY)  # P160 [-02] is read only
             channel = self._sdo(number)
-            channel.send_on, channel.receive_on = bool(value & _SEND), bool(value & _RECEIVE)
+            channel.send.enabled, channel.receive.enabled = bool(value & _SEND), bool(value & _RECEIVE)
 
-        return _word(read, write, high=3)
+        return _word(read, write if number else None, high=3)  # P160 [-02] is read only
 
     def _pdo_switch(self, number: int) -> Number:
         def read() -> int:
@@ -84,26 +83,12 @@ class CanParameters:
 
         return _word(read, write, high=3)
 
-    def _sync_cob_id(self) -> Number:
-        def write(value: int) -> None:
-            self._store.current.sync_cob_id = value
-
-        return _word(lambda: self._store.current.sync_cob_id, write, high=0x7FF)
-
     def _sdo_cob_id(self, number: int, sends: bool) -> Number:
-        def read() -> int:
-            channel = self._sdo(number)
-            return channel.send_cob_id if sends else channel.receive_cob_id
+        def half() -> CobId:
+            return self._sdo(number).send if sends else self._sdo(number).receive
 
-        def write(value: int) -> None:
-            if number == 0:
-                raise SdoAbort(AbortCode.READ_ONLY)  # P161 [-02] and [-03] are read only
-            if sends:
-                self._sdo(number).send_cob_id = value
-            else:
-                self._sdo(number).receive_cob_id = value
-
-        return _word(read, write, high=0x7FF)
+        entry = variable(DataType.UNSIGNED16, half, "cob_id", high=0x7FF)
+        return entry if number else replace(entry, write=None)  # P161 [-02] and [-03] are read only
 
     def _pdo_cob_id(self, number: int, receives: bool) -> Number:
         return _word(
@@ -123,18 +108,6 @@ class CanParameters:
             lambda value: self._pdos.set_transmission_type(pdo(), value),
             high=255,
         )
-
-    def _inhibit(self, number: int) -> Number:
-        def write(value: int) -> None:
-            self._tpdo(number).inhibit_100us = value
-
-        return _word(lambda: self._tpdo(number).inhibit_100us, write, high=32767)
-
-    def _event_timer(self, number: int) -> Number:
-        def write(value: int) -> None:
-            self._tpdo(number).event_timer_ms = value
-
-        return _word(lambda: self._tpdo(number).event_timer_ms, write, high=32767)
 
     def _mapping(self) -> list[Number]:
         # P165 calls the PDO with the control word "Tx": the master's view. By CiA 301 that is the drive's
@@ -162,25 +135,11 @@ class CanParameters:
             DataType.UNSIGNED32, lambda: self._pdos.pdo(number, receives=receives).entries[place], write
         )
 
-    # P166 and P167.
+    def _setting(self, name: str, high: int) -> Number:
+        return variable(DataType.UNSIGNED16, lambda: self._store.current, name, high=high)
 
-    def _guard_time(self) -> Number:
-        def write(value: int) -> None:
-            self._store.current.guard_time_ms = value
-
-        return _word(lambda: self._store.current.guard_time_ms, write, high=32767)
-
-    def _heartbeat(self) -> Number:
-        def write(value: int) -> None:
-            self._store.current.heartbeat_ms = value
-
-        return _word(lambda: self._store.current.heartbeat_ms, write, high=32767)
-
-    def _life_time_factor(self) -> Number:
-        def write(value: int) -> None:
-            self._store.current.life_time_factor = value
-
-        return _word(lambda: self._store.current.life_time_factor, write, high=255)
+    def _time(self, number: int, name: str) -> Number:
+        return variable(DataType.UNSIGNED16, lambda: self._tpdo(number), name, high=32767)
 
     def _sdo(self, number: int) -> SdoSettings:
         return self._store.current.sdo[number]
@@ -192,5 +151,5 @@ class CanParameters:
         return self._pdos.pdo(number, receives=True)
 
 
-def _word(read: Callable[[], int], write: Callable[[int], None], *, high: int) -> Number:
+def _word(read: Callable[[], int], write: Callable[[int], None] | None, *, high: int) -> Number:
     return Number(DataType.UNSIGNED16, read, write, low=0, high=high)

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Final
 
 from bridge.errors import OperationFailed
-from bridge.sim.node import SimulatedNode
+from bridge.sim.device import SimulatedDevice
 from bridge.sim.nord_drive import NordDrive
 from bridge.sim.nord_interface import Kind
 from bridge.sim.nord_parameters import DriveParameters
@@ -24,10 +24,10 @@ frequency."""
 _SLOTS: Final = ("fu1", "fu2", "fu3", "fu4")
 
 
-def _interface(kind: Kind) -> Callable[[int, Mapping[str, float]], SimulatedNode]:
+def _interface(kind: Kind) -> Callable[[int, Mapping[str, float]], SimulatedDevice]:
     """``P105`` sets all four drives, ``fu2/P105`` one, ``P151`` (ms) the interface."""
 
-    def make(node_id: int, parameters: Mapping[str, float]) -> SimulatedNode:
+    def make(node_id: int, parameters: Mapping[str, float]) -> SimulatedDevice:
         p151_ms = parameters.get("P151", 0)
         if not 0 <= p151_ms <= _P151_MOST_MS:
             raise OperationFailed(f"P151 = {p151_ms:g} is outside 0 … {_P151_MOST_MS} ms")
@@ -41,10 +41,10 @@ def _interface(kind: Kind) -> Callable[[int, Mapping[str, float]], SimulatedNode
 
 def _single(
     variant: Variant, preset: Mapping[str, float] = MappingProxyType({})
-) -> Callable[[int, Mapping[str, float]], SimulatedNode]:
+) -> Callable[[int, Mapping[str, float]], SimulatedDevice]:
     """``P105`` or ``drive/P105``; ``P513`` (s) is the drive's supervision of its master."""
 
-    def make(node_id: int, parameters: Mapping[str, float]) -> SimulatedNode:
+    def make(node_id: int, parameters: Mapping[str, float]) -> SimulatedDevice:
         node = NordSingle(node_id, variant)
         _commission(variant.device_name, {"drive": node.drive}, {**preset, **parameters})
         return node

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from bridge.sim.dictionary import DataType, Dictionary, Number, constant
+from bridge.sim.dictionary import DataType, Dictionary, Number, constant, variable
 from bridge.sim.nord_drive import NordDrive
 from bridge.sim.nord_settings import (
     ACTUAL_VALUES,
@@ -80,14 +80,8 @@ class ProcessImage:
         count = DRIVES * self._per_drive
         dictionary.add_array(SETPOINTS, [self._setpoint_entry(place) for place in range(count)])
         dictionary.add_array(ACTUAL_VALUES, [self._actual_entry(place) for place in range(count)])
-
-        def set_outputs(value: int) -> None:
-            self.outputs = value
-
         u16 = DataType.UNSIGNED16
-        dictionary.add(
-            DIGITAL_OUTPUTS, 0, Number(u16, lambda: self.outputs, set_outputs, in_rpdo=True, in_tpdo=True)
-        )
+        dictionary.add(DIGITAL_OUTPUTS, 0, variable(u16, lambda: self, "outputs", in_pdos=True))
         dictionary.add(DIGITAL_INPUTS, 0, Number(u16, lambda: self.inputs, in_tpdo=True))
 
     def control_entry(self, drive: int) -> Number:

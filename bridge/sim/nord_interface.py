@@ -8,17 +8,9 @@ from functools import partial
 from typing import Final, Literal
 
 from bridge.sim.abort import AbortCode, SdoAbort
-from bridge.sim.communication_objects import (
-    DeviceIdentity,
-    Memory,
-    add_errors,
-    add_identity,
-    add_memory,
-    add_protocols,
-    add_sdo_servers,
-)
+from bridge.sim.communication_objects import DeviceIdentity, add_communication
 from bridge.sim.dictionary import DataType as Type
-from bridge.sim.dictionary import Dictionary, Entry, Number, ObjectAccess
+from bridge.sim.dictionary import Dictionary, Entry, Number, ObjectAccess, item, variable
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.nord_can_parameters import CanParameters
 from bridge.sim.nord_drive import NordDrive
@@ -72,20 +64,8 @@ def identity(device_name: str) -> DeviceIdentity:
 
 def build_dictionary(dictionary: Dictionary, parts: InterfaceParts, pdos: PdoObjects) -> None:
     """Fill ``dictionary``, which ``pdos`` already uses to check mappings."""
-
-    def save() -> None:
-        parts.communication.save()
-        parts.interface.save()
-
-    def load() -> None:
-        parts.communication.forget()
-        parts.interface.forget()
-
-    add_identity(dictionary, identity(parts.kind), parts.module_state)
-    add_errors(dictionary, parts.emcy)
-    add_memory(dictionary, Memory(save, load))
-    add_protocols(dictionary, parts.communication)
-    add_sdo_servers(dictionary, parts.communication)
+    stores = (parts.communication, parts.interface)
+    add_communication(dictionary, identity(parts.kind), parts.module_state, parts.emcy, *stores)
     parts.image.add_to(dictionary)
     parts.profile.add_to(dictionary)
     pdos.add()
@@ -96,37 +76,29 @@ def build_dictionary(dictionary: Dictionary, parts: InterfaceParts, pdos: PdoObj
 
 def _add_standard_parameters(dictionary: Dictionary, parts: InterfaceParts) -> None:
     """P150…P154 and P168 (§7.1.1, §7.1.2)."""
-    store = parts.interface
-
-    def set_relays(value: int) -> None:
-        store.current.relays = value
-
-    def set_p151(value: int) -> None:
-        store.current.p151_ms = value
 
     def set_p152(value: int) -> None:
         if value:
             parts.to_factory()  # and P152 reads 0 again
 
-    def element(values: Callable[[], list[int]], place: int, high: int) -> Number:
-        def write(value: int) -> None:
-            values()[place] = value
+    def settings() -> InterfaceSettings:
+        return parts.interface.current
 
-        return Number(Type.UNSIGNED16, lambda: values()[place], write, low=0, high=high)
+    def elements(values: Callable[[], list[int]], places: range, high: int) -> list[Number]:
+        return [item(Type.UNSIGNED16, values, place, 0, high) for place in places]
 
     def set_profile(value: int) -> None:
         parts.set_profile(value != 0)
 
     u16 = Type.UNSIGNED16
     if parts.kind == "SK TU4-CAO":  # the SK CU4-CAO has no outputs
-        add_parameter(dictionary, 150, [Number(u16, lambda: store.current.relays, set_relays, 0, 4)])
-    add_parameter(dictionary, 151, [Number(u16, lambda: store.current.p151_ms, set_p151, 0, 32767)])
+        add_parameter(dictionary, 150, [variable(u16, settings, "relays", 0, 4)])
+    add_parameter(dictionary, 151, [variable(u16, settings, "p151_ms", 0, 32767)])
     add_parameter(dictionary, 152, [Number(u16, lambda: 0, set_p152, 0, 1)])
-    cycles = [element(lambda: store.current.system_bus_cycle_ms, place, 250) for place in range(2)]
-    add_parameter(dictionary, 153, cycles)
-    add_parameter(dictionary, 154, [element(lambda: store.current.io_access, place, 5) for place in range(2)])
-    switch = Number(u16, lambda: store.current.profile[0], set_profile, 0, 1)
-    ramps = [element(lambda: store.current.profile, place, 16383) for place in range(1, 17)]
+    add_parameter(dictionary, 153, elements(lambda: settings().system_bus_cycle_ms, range(2), 250))
+    add_parameter(dictionary, 154, elements(lambda: settings().io_access, range(2), 5))
+    switch = Number(u16, lambda: settings().profile[0], set_profile, 0, 1)
+    ramps = elements(lambda: settings().profile, range(1, 17), 16383)
     add_parameter(dictionary, 168, [switch, *ramps])
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from bridge.sim.dictionary import DataType as Type
-from bridge.sim.dictionary import Dictionary, Entry, Number
+from bridge.sim.dictionary import Dictionary, Entry, Number, item
 from bridge.sim.nord_drive import NordDrive
 from bridge.sim.nord_faults import emcy_code
 from bridge.sim.nord_image import ProcessImage
@@ -119,13 +119,13 @@ class VelocityMode:
         for index, entry in objects.items():
             dictionary.add(base + index, 0, entry)
         settings = self._store
-        low = _element(lambda: settings.current.velocity_min, place, u32, 0xFFFF_FFFF)
-        high = _element(lambda: settings.current.velocity_max, place, u32, 0xFFFF_FFFF)
+        low = item(u32, lambda: settings.current.velocity_min, place)
+        high = item(u32, lambda: settings.current.velocity_max, place)
         dictionary.add_array(base + 0x6046, [low, high])
         for index, first in ((0x6048, 0), (0x6049, 2)):
             at = 1 + _PER_DRIVE * place + first
-            speeds = _element(lambda: settings.current.profile, at, u32, _MOST_P168)
-            times = _element(lambda: settings.current.profile, at + 1, u16, _MOST_P168)
+            speeds = item(u32, lambda: settings.current.profile, at, 0, _MOST_P168)
+            times = item(u16, lambda: settings.current.profile, at + 1, 0, _MOST_P168)
             dictionary.add_array(base + index, [speeds, times])
 
     def _ramp_s(self, place: int, first: int) -> float | None:
@@ -135,10 +135,3 @@ class VelocityMode:
         if not delta_rpm:
             return None
         return self._drives[place].parameters.value(105) * _RPM_PER_HZ / delta_rpm * delta_s
-
-
-def _element(values: Callable[[], list[int]], place: int, kind: Type, high: int) -> Number:
-    def write(value: int) -> None:
-        values()[place] = value
-
-    return Number(kind, lambda: values()[place], write, low=0, high=high)

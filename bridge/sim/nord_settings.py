@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Final, Literal
 
 from bridge.sim.abort import AbortCode
-from bridge.sim.settings import CommunicationSettings, PdoSettings, SdoSettings, SlaveRules
+from bridge.sim.settings import CobId, CommunicationSettings, PdoSettings, SdoSettings, SlaveRules
 
 DRIVES: Final = 4
 ALL_SLOTS: Final = (1, 2, 3, 4)
@@ -64,9 +64,9 @@ def factory_communication(node_id: int, layout: Layout) -> CommunicationSettings
     for settings in rpdo:
         settings.inhibit_100us = settings.event_timer_ms = 0
     return CommunicationSettings(
-        emcy_cob_id=0x80 + node_id,
+        emcy=CobId(0x80 + node_id),
         sdo=[
-            SdoSettings(receive + node_id, send + node_id, receive_on=first, send_on=first)
+            SdoSettings.at(receive + node_id, send + node_id, enabled=first)
             for first, (receive, send) in zip((True, False, False, False), _SDO_BASES, strict=True)
         ],
         rpdo=rpdo,

@@ -5,14 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from bridge.sim.communication_objects import (
-    Memory,
-    add_errors,
-    add_identity,
-    add_memory,
-    add_protocols,
-    add_sdo_servers,
-)
+from bridge.sim.communication_objects import add_communication
 from bridge.sim.dictionary import DataType as Type
 from bridge.sim.dictionary import Dictionary, Number
 from bridge.sim.nmt_slave import NmtCommand, NmtState
@@ -95,10 +88,6 @@ class NordSingle(NordNode):
             self.drive.communication_lost(LINK_BROKEN if self.variant.has_interface else TELEGRAM_DOWNTIME)
             self.drive.cause_gone()
 
-    def accepts_rpdo(self, number: int, length: int) -> bool:
-        del number, length  # the rule of the four words is the SK xU4-CAO's (§6.4)
-        return True
-
     def rpdo_applied(self, number: int) -> None:
         del number  # the objects written tell which
         if 0 in self._written and self._control & VALID and self.linked:
@@ -116,11 +105,8 @@ class NordSingle(NordNode):
     # How it works inside.
 
     def _fill(self, dictionary: Dictionary, pdos: PdoObjects) -> Sequence[SdoServer]:
-        add_identity(dictionary, identity(self.variant.device_name), self._module_state)
-        add_errors(dictionary, self._emcy)
-        add_memory(dictionary, Memory(self._communication.save, self._communication.forget))
-        add_protocols(dictionary, self._communication)
-        add_sdo_servers(dictionary, self._communication)
+        who = identity(self.variant.device_name)
+        add_communication(dictionary, who, self._module_state, self._emcy, self._communication)
         self._add_words(dictionary)
         pdos.add()
         parameters = Dictionary()

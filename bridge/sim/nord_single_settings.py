@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.sim.nord_parameters import SK_5XXE, SK_54XE, Parameter
 from bridge.sim.nord_settings import ACTUAL_VALUES, CONTROL_WORDS, PDO_WORDS, SETPOINTS, STATUS_WORDS
-from bridge.sim.settings import CommunicationSettings, PdoSettings, SdoSettings
+from bridge.sim.settings import CobId, CommunicationSettings, PdoSettings, SdoSettings
 
 ENCODER: Final = 0x3006
 """The position of an absolute encoder, as an object of this simulation: §6.5.7 does not name NORD's."""
@@ -86,8 +86,8 @@ RJ45_54X: Final = Variant(
 def factory_settings(node_id: int, variant: Variant) -> CommunicationSettings:
     """As delivered: one SDO channel, the PDOs of §6.5.7."""
     return CommunicationSettings(
-        emcy_cob_id=0x80 + node_id,
-        sdo=[SdoSettings(0x600 + node_id, 0x580 + node_id)],
+        emcy=CobId(0x80 + node_id),
+        sdo=[SdoSettings.at(0x600 + node_id, 0x580 + node_id)],
         rpdo=[_settings(node_id, view) for view in variant.rpdo],
         tpdo=[_settings(node_id, view, _INHIBIT_100US, _EVENT_TIMER_MS) for view in variant.tpdo],
     )

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from bridge.sim.abort import AbortCode, SdoAbort
-from bridge.sim.dictionary import DUMMY_BITS, DataType, Dictionary, Number, constant
+from bridge.sim.dictionary import DUMMY_BITS, DataType, Dictionary, Number, constant, variable
 from bridge.sim.pdo import CYCLIC_MAX, EVENT_MIN
 from bridge.sim.settings import COB_ID_MASK, DISABLED, CommunicationSettings, PdoSettings, SlaveRules
 from bridge.sim.store import Store
@@ -68,7 +68,7 @@ class PdoObjects:
             raise SdoAbort(self._rules.wrong_state)
 
     def cob_id_object(self, pdo: PdoSettings) -> int:
-        return pdo.cob_id | self._rules.cob_id_fixed_bits | (0 if pdo.enabled else DISABLED)
+        return pdo.word | self._rules.cob_id_fixed_bits
 
     def set_cob_id_object(self, pdo: PdoSettings, value: int) -> None:
         self.require_pre_operational()
@@ -142,12 +142,6 @@ class PdoObjects:
         def pdo() -> PdoSettings:
             return self.pdo(number, receives=receives)
 
-        def set_inhibit(value: int) -> None:
-            pdo().inhibit_100us = value
-
-        def set_event_timer(value: int) -> None:
-            pdo().event_timer_ms = value
-
         add = self._dictionary.add
         index = (0x1400 if receives else 0x1800) + number
         # An RPDO has no inhibit time and no event timer (BU 2500 §6.7.4: "not used").
@@ -171,8 +165,8 @@ class PdoObjects:
             ),
         )
         if not receives:
-            add(index, 3, Number(DataType.UNSIGNED16, lambda: pdo().inhibit_100us, set_inhibit))
-            add(index, 5, Number(DataType.UNSIGNED16, lambda: pdo().event_timer_ms, set_event_timer))
+            add(index, 3, variable(DataType.UNSIGNED16, pdo, "inhibit_100us"))
+            add(index, 5, variable(DataType.UNSIGNED16, pdo, "event_timer_ms"))
         self._add_mapping((0x1600 if receives else 0x1A00) + number, pdo, receives=receives)
 
     def _add_mapping(self, index: int, pdo: Callable[[], PdoSettings], *, receives: bool) -> None:

@@ -33,11 +33,30 @@ class SlaveRules:
 
 
 @dataclass(slots=True)
-class PdoSettings:
-    """One PDO, either direction. ``entries`` are mapping words ``IIIISSLLh``."""
+class CobId:
+    """A COB-ID that bit 31 of its object switches off."""
 
     cob_id: int
     enabled: bool = True
+
+    @classmethod
+    def of(cls, word: int) -> CobId:
+        """From the value of its object."""
+        return CobId(word & COB_ID_MASK, not word & DISABLED)
+
+    @property
+    def word(self) -> int:
+        return self.cob_id | (0 if self.enabled else DISABLED)
+
+    @word.setter
+    def word(self, value: int) -> None:
+        self.cob_id, self.enabled = value & COB_ID_MASK, not value & DISABLED
+
+
+@dataclass(slots=True)
+class PdoSettings(CobId):
+    """One PDO, either direction. ``entries`` are mapping words ``IIIISSLLh``."""
+
     transmission_type: int = 255
     inhibit_100us: int = 0
     event_timer_ms: int = 0
@@ -57,27 +76,28 @@ class PdoSettings:
 class SdoSettings:
     """One SDO server channel, named as the device sees it: it receives requests and sends answers."""
 
-    receive_cob_id: int
-    send_cob_id: int
-    receive_on: bool = True
-    send_on: bool = True
+    receive: CobId
+    send: CobId
+
+    @classmethod
+    def at(cls, receive: int, send: int, *, enabled: bool = True) -> SdoSettings:
+        return cls(CobId(receive, enabled), CobId(send, enabled))
 
     @property
     def enabled(self) -> bool:
-        return self.receive_on and self.send_on
+        return self.receive.enabled and self.send.enabled
 
 
 @dataclass(slots=True)
 class CommunicationSettings:
     """Objects 1005h…1A1Fh of one node."""
 
-    emcy_cob_id: int
+    emcy: CobId
     sdo: list[SdoSettings]
     rpdo: list[PdoSettings] = field(default_factory=list[PdoSettings])
     tpdo: list[PdoSettings] = field(default_factory=list[PdoSettings])
     sync_cob_id: int = 0x80
     sync_on: bool = True
-    emcy_on: bool = True
     emcy_inhibit: int = 0
     guard_time_ms: int = 0
     life_time_factor: int = 0

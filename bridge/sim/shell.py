@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.can.interface import Bus
 from bridge.canopen.frame import STANDARD_MASK
-from bridge.sim.node import SimulatedNode
+from bridge.sim.device import SimulatedDevice
 from bridge.sim.ticks import earliest
 
 _SEND_WITHIN_S: Final = 0.1
@@ -17,12 +17,12 @@ _SEND_WITHIN_S: Final = 0.1
 class Simulation:
     """Any number of nodes on one end of one bus."""
 
-    def __init__(self, bus: Bus, nodes: Sequence[SimulatedNode]) -> None:
+    def __init__(self, bus: Bus, nodes: Sequence[SimulatedDevice]) -> None:
         self._bus = bus
         self._nodes = tuple(nodes)
         self._work = asyncio.Event()
         self._is_open = False
-        self._due: dict[SimulatedNode, float | None] = {}
+        self._due: dict[SimulatedDevice, float | None] = {}
         """When each node is due; one that is missing here is due now. Asking all of them for every frame of a
         busy bus would cost more than simulating them."""
 

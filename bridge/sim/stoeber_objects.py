@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from bridge.sim.abort import AbortCode, SdoAbort
-from bridge.sim.communication_objects import DeviceIdentity, add_identity, add_protocols, add_sdo_servers
+from bridge.sim.communication_objects import (
+    SAVE,
+    DeviceIdentity,
+    add_identity,
+    add_protocols,
+    add_sdo_servers,
+    by_signature,
+)
 from bridge.sim.dictionary import DataType as Type
-from bridge.sim.dictionary import Dictionary, Number, constant
-from bridge.sim.settings import COB_ID_MASK, DISABLED, CommunicationSettings, SdoSettings
+from bridge.sim.dictionary import Dictionary, Number, constant, item, variable
+from bridge.sim.settings import COB_ID_MASK, DISABLED, CobId, CommunicationSettings
 from bridge.sim.stoeber_pdo_objects import StoeberPdoObjects, resolved
 from bridge.sim.stoeber_settings import CHANNELS, MAP_ENTRIES, SDO_BASES, StoeberSettings, coordinate
 from bridge.sim.store import Store
 
-_SAVE: Final = int.from_bytes(b"save", "little")
 _SYNC_MOST_US: Final = 32_000_000
 _SYNC_MOST: Final = 0x7FF
 
@@ -86,101 +91,57 @@ class CommunicationObjects:
 
     def _add_ranges(self, dictionary: Dictionary) -> None:
         """Where §11.1 says more than CiA 301: SYNC 1…2047, 1015h as U32, 1006h."""
-        current = self._communication
-
-        def set_sync(value: int) -> None:
-            current.current.sync_cob_id = value
-
-        def set_inhibit(value: int) -> None:
-            current.current.emcy_inhibit = value
-
-        def set_timeout(value: int) -> None:
-            self._settings.current.sync_timeout_us = value
-
-        u32 = Type.UNSIGNED32
-        dictionary.add(0x1005, 0, Number(u32, lambda: current.current.sync_cob_id, set_sync, 1, _SYNC_MOST))
-        dictionary.add(0x1015, 0, Number(u32, lambda: current.current.emcy_inhibit, set_inhibit))
-        timeout = Number(
-            u32, lambda: self._settings.current.sync_timeout_us, set_timeout, low=0, high=_SYNC_MOST_US
-        )
-        dictionary.add(0x1006, 0, timeout)
+        communication, u32 = self._communication, Type.UNSIGNED32
 
         def set_emcy(value: int) -> None:
-            current.current.emcy_cob_id = resolved(value & COB_ID_MASK, (0x80,), self._node_id)
-            current.current.emcy_on = not value & DISABLED and self._node_id != 0
+            cob_id = resolved(value & COB_ID_MASK, 0x80, self._node_id)
+            communication.current.emcy = CobId(cob_id, not value & DISABLED and self._node_id != 0)
 
-        def emcy() -> int:
-            return current.current.emcy_cob_id | (0 if current.current.emcy_on else DISABLED)
-
-        dictionary.add(0x1014, 0, Number(u32, emcy, set_emcy))
+        sync = variable(u32, lambda: communication.current, "sync_cob_id", 1, _SYNC_MOST)
+        dictionary.add(0x1005, 0, sync)
+        timeout = variable(u32, lambda: self._settings.current, "sync_timeout_us", 0, _SYNC_MOST_US)
+        dictionary.add(0x1006, 0, timeout)
+        dictionary.add(0x1014, 0, Number(u32, lambda: communication.current.emcy.word, set_emcy))
+        dictionary.add(0x1015, 0, variable(u32, lambda: communication.current, "emcy_inhibit"))
 
     def _add_memory(self, dictionary: Dictionary) -> None:
         """1010h and the action A00: start, progress, result."""
-
-        def by_signature(value: int) -> None:
-            if value != _SAVE:
-                raise SdoAbort(AbortCode.CANNOT_STORE)
-            self._save()
 
         def by_action(value: int) -> None:
             if value:
                 self._save()
 
-        dictionary.add_array(0x1010, [Number(Type.UNSIGNED32, lambda: 1, by_signature)])
+        dictionary.add_array(0x1010, [by_signature(SAVE, self._save)])
         dictionary.add(coordinate("A00"), 0, Number(Type.UNSIGNED8, lambda: 0, by_action, low=0, high=1))
         progress = Number(Type.UNSIGNED8, lambda: 100 if self.saves else 0)
         dictionary.add(coordinate("A00"), 1, progress)
         dictionary.add(coordinate("A00"), 2, constant(Type.UNSIGNED8, 0))
 
     def _add_configuration(self, dictionary: Dictionary) -> None:
-        def set_date(value: int) -> None:
-            self._settings.current.configuration_date = value
-
-        def set_time(value: int) -> None:
-            self._settings.current.configuration_time = value
-
-        u32 = Type.UNSIGNED32
-        dictionary.add_array(
-            0x1020,
-            [
-                Number(u32, lambda: self._settings.current.configuration_date, set_date),
-                Number(u32, lambda: self._settings.current.configuration_time, set_time),
-            ],
-        )
+        names = ("configuration_date", "configuration_time")
+        numbers = [variable(Type.UNSIGNED32, lambda: self._settings.current, name) for name in names]
+        dictionary.add_array(0x1020, numbers)
 
     def _add_sdo_server(self, dictionary: Dictionary, number: int) -> None:
         """Bit 31 closes a channel, as in CiA 301. The example of §7.3.2 opens one with bit 31 set: that is
         ``bit_31_opens``."""
 
-        def channel() -> SdoSettings:
-            return self._communication.current.sdo[number]
+        flip = DISABLED if self._bit_31_opens else 0
 
-        def shown(cob_id: int, is_on: bool) -> int:
-            return cob_id | (DISABLED if is_on is self._bit_31_opens else 0)
+        def half(name: str, function_code: int) -> Number:
+            def cob_id() -> CobId:
+                found: CobId = getattr(self._communication.current.sdo[number], name)
+                return found
 
-        def is_on(value: int) -> bool:
-            return bool(value & DISABLED) is self._bit_31_opens
+            def write(value: int) -> None:
+                cob_id().word = value ^ flip
+                cob_id().cob_id = resolved(cob_id().cob_id, function_code, self._node_id)
 
-        def set_receive(value: int) -> None:
-            cob_id = resolved(value & COB_ID_MASK, (SDO_BASES[number][0],), self._node_id)
-            channel().receive_cob_id, channel().receive_on = cob_id, is_on(value)
+            return Number(Type.UNSIGNED32, lambda: cob_id().word ^ flip, write)
 
-        def set_send(value: int) -> None:
-            cob_id = resolved(value & COB_ID_MASK, (SDO_BASES[number][1],), self._node_id)
-            channel().send_cob_id, channel().send_on = cob_id, is_on(value)
-
-        def set_client(value: int) -> None:
-            self._settings.current.sdo_client[number] = value
-
-        u32 = Type.UNSIGNED32
-        dictionary.add_array(
-            0x1200 + number,
-            [
-                Number(u32, lambda: shown(channel().receive_cob_id, channel().receive_on), set_receive),
-                Number(u32, lambda: shown(channel().send_cob_id, channel().send_on), set_send),
-                Number(u32, lambda: self._settings.current.sdo_client[number], set_client),
-            ],
-        )
+        receive, send = SDO_BASES[number]
+        client = item(Type.UNSIGNED32, lambda: self._settings.current.sdo_client, number)
+        dictionary.add_array(0x1200 + number, [half("receive", receive), half("send", send), client])
 
     def _add_coordinates(self, dictionary: Dictionary) -> None:
         """The same objects by the names POSITool has for them."""

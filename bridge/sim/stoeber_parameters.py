@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.sim.dictionary import DataType as Type
-from bridge.sim.dictionary import Dictionary, Number, constant
-from bridge.sim.stoeber_axis import ACKNOWLEDGE, StoeberAxis
+from bridge.sim.dictionary import Dictionary, Number, constant, item, variable
+from bridge.sim.stoeber_axis import ACKNOWLEDGE, AxisParameters, StoeberAxis
 from bridge.sim.stoeber_device import StoeberDevice
 from bridge.sim.stoeber_settings import CHANNELS, StoeberSettings, coordinate
 from bridge.sim.store import Store
@@ -18,7 +18,9 @@ def add_device(dictionary: Dictionary, device: StoeberDevice, settings: Store[St
     """Parameters of the device, and A180 and D230 if there is only one axis."""
     u8, i16 = Type.UNSIGNED8, Type.INTEGER16
     for channel in range(CHANNELS + 1):
-        dictionary.add(coordinate("A11"), channel, _edited_axis(settings, channel, len(device.axes)))
+        # The axis that an SDO channel (0: the display) works on.
+        edited = item(u8, lambda: settings.current.edited_axis, channel, 0, len(device.axes) - 1)
+        dictionary.add(coordinate("A11"), channel, edited)
     _put(dictionary, "A82", constant(u8, _BAUD_250))
     _put(dictionary, "E00", Number(i16, lambda: round(10 * device.shown.current_a), in_tpdo=True))
     _put(dictionary, "E08", Number(i16, lambda: round(device.shown.speed_rpm), in_tpdo=True))
@@ -36,16 +38,11 @@ def add_axis(dictionary: Dictionary, device: StoeberDevice, number: int) -> None
     axis = device.axes[number]
     u8, i16 = Type.UNSIGNED8, Type.INTEGER16
 
-    def set_c01(value: int) -> None:
-        device.parameters(number).c01_rpm = value
+    def parameters() -> AxisParameters:
+        return device.parameters(number)
 
-    def set_c230(value: int) -> None:
-        device.parameters(number).c230_percent = value
-
-    c01 = Number(i16, lambda: device.parameters(number).c01_rpm, set_c01, low=1, high=32767)
-    c230 = Number(i16, lambda: device.parameters(number).c230_percent, set_c230, low=0, high=200)
-    _put(dictionary, "C01", c01)
-    _put(dictionary, "C230", c230)
+    _put(dictionary, "C01", variable(i16, parameters, "c01_rpm", 1, 32767))
+    _put(dictionary, "C230", variable(i16, parameters, "c230_percent", 0, 200))
     if len(device.axes) > 1:
         _add_command(dictionary, device, axis, "Q00", "Q01")
         _put(dictionary, "Q02", Number(u8, lambda: axis.state, in_tpdo=True))
@@ -58,15 +55,6 @@ def _put(dictionary: Dictionary, name: str, entry: Number) -> None:
     dictionary.add(coordinate(name), 0, entry)
 
 
-def _edited_axis(settings: Store[StoeberSettings], channel: int, axes: int) -> Number:
-    """One element of A11: the axis that an SDO channel (0: the display) works on."""
-
-    def write(value: int) -> None:
-        settings.current.edited_axis[channel] = value
-
-    return Number(Type.UNSIGNED8, lambda: settings.current.edited_axis[channel], write, 0, axes - 1)
-
-
 def _add_command(
     dictionary: Dictionary, device: StoeberDevice, axis: StoeberAxis, control: str, setpoint: str
 ) -> None:
@@ -76,10 +64,6 @@ def _add_command(
         if rising & ACKNOWLEDGE:
             device.acknowledge()
 
-    def set_setpoint(value: int) -> None:
-        axis.setpoint = value
-
     command = Number(Type.UNSIGNED8, lambda: axis.control, set_control, in_rpdo=True, in_tpdo=True)
     _put(dictionary, control, command)
-    speed = Number(Type.INTEGER16, lambda: axis.setpoint, set_setpoint, in_rpdo=True, in_tpdo=True)
-    _put(dictionary, setpoint, speed)
+    _put(dictionary, setpoint, variable(Type.INTEGER16, lambda: axis, "setpoint", in_pdos=True))

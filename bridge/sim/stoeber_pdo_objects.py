@@ -16,9 +16,9 @@ from bridge.sim.store import Store
 _FIRST_OBJECT: Final = 0x1000
 
 
-def resolved(cob_id: int, function_codes: tuple[int, ...], node_id: int) -> int:
+def resolved(cob_id: int, function_code: int, node_id: int) -> int:
     """§7.3: the bare function code of this object means that the drive adds its address."""
-    return cob_id + node_id if cob_id in function_codes else cob_id
+    return cob_id + node_id if cob_id == function_code else cob_id
 
 
 class StoeberPdoObjects(PdoObjects):
@@ -41,7 +41,7 @@ class StoeberPdoObjects(PdoObjects):
             base = RPDO_BASES[receives]
         else:
             base = TPDO_BASES[next(n for n, one in enumerate(current.tpdo) if one is pdo)]
-        cob_id = resolved(value & COB_ID_MASK, (base,), self._node_id)
+        cob_id = resolved(value & COB_ID_MASK, base, self._node_id)
         super().set_cob_id_object(pdo, value & ~COB_ID_MASK | cob_id)
 
     def set_transmission_type(self, pdo: PdoSettings, value: int) -> None:

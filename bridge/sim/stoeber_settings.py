@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from bridge.sim.settings import CommunicationSettings, PdoSettings, SdoSettings, SlaveRules
+from bridge.sim.settings import CobId, CommunicationSettings, PdoSettings, SdoSettings, SlaveRules
 from bridge.sim.stoeber_axis import AxisParameters
 
 CHANNELS: Final = 4
@@ -81,10 +81,9 @@ def factory_communication(node_id: int, axes: int, *, mapped: bool) -> Communica
         )
 
     return CommunicationSettings(
-        emcy_cob_id=0x80 + node_id,
-        emcy_on=node_id != 0,  # §9.3: 80h would be the SYNC
+        emcy=CobId(0x80 + node_id, enabled=node_id != 0),  # §9.3: 80h would be the SYNC
         sdo=[
-            SdoSettings(receive + node_id, send + node_id, receive_on=first, send_on=first)
+            SdoSettings.at(receive + node_id, send + node_id, enabled=first)
             for first, (receive, send) in zip((True, False, False, False), SDO_BASES, strict=True)
         ],
         rpdo=[pdo(base, channel, received) for channel, base in enumerate(RPDO_BASES)],

@@ -90,7 +90,7 @@ class StoeberSlave(CanopenSlave):
         super().poll(now)
         if self.state is NmtState.STOPPED:  # §7.1: emergency messages are sent in Stopped too
             for data in self.emcy.due(now):
-                self._send(self._store.current.emcy_cob_id, data)
+                self._send(self._store.current.emcy.cob_id, data)
 
     def next_deadline(self) -> float | None:
         deadlines = [super().next_deadline()]

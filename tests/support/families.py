@@ -20,8 +20,8 @@ from bridge.project import load_project
 from bridge.service import Service
 from bridge.sim.catalogue import simulate_node
 from bridge.sim.cia402_drive import Cia402Drive
+from bridge.sim.device import SimulatedDevice
 from bridge.sim.lenze_motec import LenzeMotec
-from bridge.sim.node import SimulatedNode
 from bridge.sim.nord_single import NordSingle
 from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
@@ -85,7 +85,7 @@ class FamilyBridge:
         self.log: list[Frame] = []
         self.records = False
         self._project = load_project(site.path)
-        self._nodes: dict[str, SimulatedNode] = {}
+        self._nodes: dict[str, SimulatedDevice] = {}
         self._wire = VirtualWire()
         self._wire.listeners.append(self._on_frame)
         self._simulation: Simulation | None = None

@@ -9,14 +9,14 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Final
+from typing import Final, TypeVar
 
 from bridge.command import Code, Event, Outcome, Rejection, Reply, Request
 from bridge.errors import OperationFailed
 from bridge.guard import Guard
 from bridge.image import Image, Quality
 from bridge.mirror import protocol
-from bridge.mirror.protocol import Changed, Counted, Delta, Malformed, RequestMessage, Snapshot
+from bridge.mirror.protocol import Changed, Counted, Delta, Malformed, Snapshot
 from bridge.mirror.rejections import Rejections
 from bridge.quietlog import about
 from bridge.zenohlink import Message, ZenohLink, zenoh_config
@@ -30,6 +30,8 @@ _SNAPSHOT_TIMEOUT_S: Final = 2.0
 _MOST_PENDING: Final = 2000
 """Deltas kept while a snapshot is on its way."""
 UNREACHABLE: Final = "bus process not reachable"
+
+_Told = TypeVar("_Told")
 
 
 class PointsChanged(OperationFailed):
@@ -108,16 +110,13 @@ class MirrorClient:
         if request.received_at is None:
             request = replace(request, received_at=self._clock())
         try:
-            payload = protocol.encode_request(RequestMessage(self._clock() + timeout_s, request))
+            payload = protocol.encode_request(request, self._clock() + timeout_s)
         except Malformed as error:
             return Outcome(Code.NOT_VALID, str(error), forwarded=False)
         answers = await self._link.get(protocol.REQUEST, payload, timeout_s=timeout_s)
         for answer in answers:
-            if answer.ok:
-                try:
-                    return protocol.decode_outcome(answer.message.payload)
-                except Malformed as error:
-                    self._count_malformed(error)
+            if answer.ok and (outcome := self._read(partial(protocol.decode, Outcome), answer.message)):
+                return outcome
         return Outcome(Code.TIMED_OUT, "the bus process did not answer", forwarded=False)
 
     def rejected(self, rejection: Rejection) -> None:
@@ -192,12 +191,8 @@ class MirrorClient:
 
     async def _take_snapshot(self) -> None:
         for answer in await self._link.get(protocol.SNAPSHOT, timeout_s=_SNAPSHOT_TIMEOUT_S):
-            if not answer.ok:
-                continue
-            try:
-                self._apply_snapshot(protocol.decode_snapshot(answer.message.payload))
-            except Malformed as error:
-                self._count_malformed(error)
+            if answer.ok and (snapshot := self._read(protocol.decode_snapshot, answer.message)):
+                self._apply_snapshot(snapshot)
 
     def _apply_snapshot(self, snapshot: Snapshot) -> None:
         if self._image is None:
@@ -219,14 +214,11 @@ class MirrorClient:
         count = 0 if self._image is None else len(self._image.points)
         if not count:
             return
-        try:
-            delta = protocol.decode_delta(message.payload, count)
-        except Malformed as error:
+        delta = self._read(partial(protocol.decode_delta, count=count), message)
+        if delta is None:
             # Also how another site's deltas look; the snapshot will tell.
-            self._count_malformed(error)
             self._in_step = False
-            return
-        if self._in_step:
+        elif self._in_step:
             self._follow(delta)
         elif len(self._pending) < _MOST_PENDING:
             self._pending.append(delta)
@@ -246,7 +238,7 @@ class MirrorClient:
     def _apply(self, readings: tuple[Changed, ...]) -> None:
         image = self.image
         for changed in readings:
-            image.set(changed.index, changed.value, changed.time_ns / 1e9, changed.quality, changed.reason)
+            image.set(changed.index, changed.value, changed.time, changed.quality, changed.reason)
 
     def _mark_dead(self) -> None:
         """The bus process is gone: no value may look current."""
@@ -264,15 +256,17 @@ class MirrorClient:
             self._mark_dead()
 
     def _on_event(self, message: Message) -> None:
-        try:
-            event = protocol.decode_event(message.payload)
-        except Malformed as error:
-            self._count_malformed(error)
+        event = self._read(partial(protocol.decode, Event), message)
+        if event is None:
             return
         for listener in self._listeners:
             with self._guard:
                 listener(event)
 
-    def _count_malformed(self, error: Malformed) -> None:
-        self.malformed += 1
-        _log.warning("mirror: a message that is none of ours: %s", error, extra=about("mirror"))
+    def _read(self, decode: Callable[[bytes], _Told], message: Message) -> _Told | None:
+        try:
+            return decode(message.payload)
+        except Malformed as error:
+            self.malformed += 1
+            _log.warning("mirror: a message that is none of ours: %s", error, extra=about("mirror"))
+            return None

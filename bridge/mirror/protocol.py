@@ -1,21 +1,20 @@
 """What goes over the link between the bus process and its fronts, in MessagePack. Pure.
 
-Times are ns since 1970 UTC (in an ``Outcome`` seconds), except those in ``RequestMessage``, ``Request`` and
-``Rejected``, which are in seconds of the monotonic clock: both ends run on one machine, and a stepped wall
-clock must not make a request old.
+Times are seconds since 1970 UTC, except those of a request and of ``Rejected``, which are of the monotonic
+clock: both ends run on one machine, and a stepped wall clock must not make a request old.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple, TypeVar, cast
+from typing import Any, Final, TypeVar, cast
 
 import msgspec
 
-from bridge.command import Action, Do, Event, Identity, Kind, Outcome, Rejection, Request
+from bridge.command import Action, Do, Event, Identity, Outcome, Rejection, Request
 from bridge.command.points import CONNECTION_COUNTS
 from bridge.command.request import COMMANDS
-from bridge.image import Point, Quality, Reading, Value
+from bridge.image import Point, Quality, Value
 
 SNAPSHOT: Final = "mirror/snapshot"
 DELTA: Final = "mirror/delta"
@@ -40,12 +39,8 @@ class Changed(msgspec.Struct, array_like=True, frozen=True):
     index: int
     value: Value
     quality: Quality
-    time_ns: int
+    time: float
     reason: str
-
-    @classmethod
-    def of(cls, index: int, reading: Reading, time_ns: int) -> Changed:
-        return cls(index, reading.value, reading.quality, time_ns, reading.reason)
 
 
 class Snapshot(msgspec.Struct, array_like=True, frozen=True):
@@ -66,33 +61,9 @@ class Delta(msgspec.Struct, array_like=True, frozen=True):
     readings: tuple[Changed, ...]
 
 
-class EventMessage(msgspec.Struct, array_like=True, frozen=True):
-    """An event."""
-
-    time_ns: int
-    kind: Kind
-    source: str
-    severity: int
-    message: str
-
-    @classmethod
-    def of(cls, event: Event, time_ns: int) -> EventMessage:
-        return cls(time_ns, event.kind, event.source, event.severity, event.message)
-
-    def event(self) -> Event:
-        """The event with its time in seconds since 1970 UTC."""
-        return Event(self.time_ns / 1e9, self.kind, self.source, self.severity, self.message)
-
-
-class RequestMessage(NamedTuple):
-    """A request that is valid until ``deadline_s`` of the monotonic clock."""
-
-    deadline_s: float
-    request: Request
-
-
-class _RequestFields(msgspec.Struct, array_like=True, frozen=True):
-    """The same as it goes over the link: what a command's fields are is told by its action."""
+class _Asked(msgspec.Struct, array_like=True, frozen=True):
+    """A request that is valid until ``deadline_s``; what the fields of its command are is told by its
+    action."""
 
     deadline_s: float
     identity: Identity
@@ -119,17 +90,13 @@ class Counted(msgspec.Struct, array_like=True, frozen=True):
 
 
 _encoder = msgspec.msgpack.Encoder()
-_snapshot = msgspec.msgpack.Decoder(Snapshot)
-_delta = msgspec.msgpack.Decoder(Delta)
-_told = msgspec.msgpack.Decoder(EventMessage)
-_asked = msgspec.msgpack.Decoder(_RequestFields)
-_commands = {action: msgspec.msgpack.Decoder(kind) for action, kind in COMMANDS.items()}
-_outcome = msgspec.msgpack.Decoder(Outcome)
-_rejected = msgspec.msgpack.Decoder(Rejected)
-_counted = msgspec.msgpack.Decoder(Counted)
+_decoders: dict[type, msgspec.msgpack.Decoder[Any]] = {
+    kind: msgspec.msgpack.Decoder(kind)
+    for kind in (Snapshot, Delta, Event, Rejected, Counted, Outcome, _Asked, *COMMANDS.values())
+}
 
 
-def encode(message: Snapshot | Delta | EventMessage | Rejected | Counted | Outcome) -> bytes:
+def encode(message: Snapshot | Delta | Event | Rejected | Counted | Outcome) -> bytes:
     """Raises nothing: a text that is not Unicode, or a number too long for MessagePack, is changed, because
     one bad value of a client must not cost the whole message."""
     try:
@@ -138,13 +105,12 @@ def encode(message: Snapshot | Delta | EventMessage | Rejected | Counted | Outco
         return _encoder.encode(_encodable(msgspec.to_builtins(message)))
 
 
-def encode_request(asked: RequestMessage) -> bytes:
+def encode_request(request: Request, deadline_s: float) -> bytes:
     """A request is never changed. Raises Malformed for one that cannot be encoded."""
-    request = asked.request
     try:
         command = msgspec.Raw(_encoder.encode(request.command))
         who, came = (request.identity, request.target), (request.received_at, request.pressed)
-        return _encoder.encode(_RequestFields(asked.deadline_s, *who, request.action, command, *came))
+        return _encoder.encode(_Asked(deadline_s, *who, request.action, command, *came))
     except (UnicodeError, OverflowError) as error:
         raise Malformed(f"cannot be passed on: {error}") from None
 
@@ -164,52 +130,40 @@ def _encodable(built: object) -> object:
             return built
 
 
-def decode_snapshot(data: bytes) -> Snapshot:
+def decode(kind: type[_Model], data: bytes) -> _Model:
     """Raises Malformed, as all of these do."""
-    snapshot = _decode(_snapshot, data)
+    try:
+        return _decoders[kind].decode(data)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        raise Malformed(str(error)) from None
+
+
+def decode_snapshot(data: bytes) -> Snapshot:
+    snapshot = decode(Snapshot, data)
     _check_indices(snapshot.readings, len(snapshot.points))
     return snapshot
 
 
 def decode_delta(data: bytes, count: int) -> Delta:
     """``count`` is the number of points there are."""
-    delta = _decode(_delta, data)
+    delta = decode(Delta, data)
     _check_indices(delta.readings, count)
     return delta
 
 
-def decode_event(data: bytes) -> Event:
-    return _decode(_told, data).event()
-
-
-def decode_request(data: bytes) -> RequestMessage:
-    asked = _decode(_asked, data)
-    decoder = _commands.get(asked.action)
-    command = Do(asked.action) if decoder is None else _decode(decoder, bytes(asked.command))
-    request = Request(asked.identity, asked.target, command, asked.received_at, asked.pressed)
-    return RequestMessage(asked.deadline_s, request)
-
-
-def decode_rejected(data: bytes) -> Rejected:
-    return _decode(_rejected, data)
+def decode_request(data: bytes) -> tuple[Request, float]:
+    """A request and its deadline."""
+    asked = decode(_Asked, data)
+    kind = COMMANDS.get(asked.action)
+    command = Do(asked.action) if kind is None else decode(kind, bytes(asked.command))
+    return Request(asked.identity, asked.target, command, asked.received_at, asked.pressed), asked.deadline_s
 
 
 def decode_counted(data: bytes) -> Counted:
-    counted = _decode(_counted, data)
+    counted = decode(Counted, data)
     if counted.leaf not in CONNECTION_COUNTS or counted.by < 1:
         raise Malformed(f"{counted.leaf} is nothing that a front counts")
     return counted
-
-
-def decode_outcome(data: bytes) -> Outcome:
-    return _decode(_outcome, data)
-
-
-def _decode(decoder: msgspec.msgpack.Decoder[_Model], data: bytes) -> _Model:
-    try:
-        return decoder.decode(data)
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        raise Malformed(str(error)) from None
 
 
 def _check_indices(readings: tuple[Changed, ...], count: int) -> None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 import random
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Final
+from functools import partial
+from typing import Final, TypeVar
 
 from bridge.command import Code, Event, Outcome, PlantView
 from bridge.command.freshness import NEVER
@@ -15,14 +15,14 @@ from bridge.command.request import STOP_ACTIONS
 from bridge.errors import Unavailable
 from bridge.mirror import protocol
 from bridge.mirror.endpoint import close_to_others, prepare_folder
-from bridge.mirror.protocol import Changed, Delta, EventMessage, Malformed, Snapshot
+from bridge.mirror.protocol import Changed, Delta, Malformed, Rejected, Snapshot
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
-
-_log = logging.getLogger(__name__)
 
 _POINTS_PER_DELTA: Final = 500
 _HEARTBEAT_S: Final = 0.25
 """Longest time without a delta."""
+
+_Told = TypeVar("_Told")
 
 
 class MirrorPublisher:
@@ -107,13 +107,13 @@ class MirrorPublisher:
 
     def _changed(self, index: int, at_zero_ns: int) -> Changed:
         """``at_zero_ns``: the wall clock at monotonic 0, which is read once for many points."""
-        reading = self._image[index]
-        return Changed.of(index, reading, at_zero_ns + round(reading.time * 1e9))
+        value, quality, time, reason = self._image[index]
+        return Changed(index, value, quality, (at_zero_ns + round(time * 1e9)) / 1e9, reason)
 
     def _on_event(self, event: Event) -> None:
-        self._send(protocol.EVENT, EventMessage.of(event, self._view.epoch_ns(event.time)))
+        self._send(protocol.EVENT, replace(event, time=self._view.epoch_ns(event.time) / 1e9))
 
-    def _send(self, key: str, message: Delta | EventMessage) -> None:
+    def _send(self, key: str, message: Delta | Event) -> None:
         self._link.send(Message(key, protocol.encode(message)))
 
     # in
@@ -141,20 +141,21 @@ class MirrorPublisher:
         asked.finish()
 
     def _on_rejected(self, message: Message) -> None:
-        try:
-            told = protocol.decode_rejected(message.payload)
-        except Malformed:
-            self.malformed += 1
-            return
-        self._view.rejected(told.rejection, told.time_s, told.count)
+        told = self._read(partial(protocol.decode, Rejected), message)
+        if told:
+            self._view.rejected(told.rejection, told.time_s, told.count)
 
     def _on_counted(self, message: Message) -> None:
+        told = self._read(protocol.decode_counted, message)
+        if told:
+            self._view.count(told.leaf, told.by)
+
+    def _read(self, decode: Callable[[bytes], _Told], message: Message) -> _Told | None:
         try:
-            told = protocol.decode_counted(message.payload)
+            return decode(message.payload)
         except Malformed:
             self.malformed += 1
-            return
-        self._view.count(told.leaf, told.by)
+            return None
 
     def _on_request(self, asked: Asked) -> None:
         def reply(outcome: Outcome) -> None:
@@ -164,15 +165,15 @@ class MirrorPublisher:
             asked.finish()
 
         try:
-            message = protocol.decode_request(asked.payload or b"")
+            request, deadline_s = protocol.decode_request(asked.payload or b"")
         except Malformed as error:
             self.malformed += 1
             asked.fail(str(error).encode(), "text/plain")
             return
-        request, now = message.request, self._clock()
+        now = self._clock()
         # While this process hung, the request waited and its client was told that it failed. Nothing
         # may start moving after that; stopping is right at any time.
-        if now > message.deadline_s and request.action not in STOP_ACTIONS:
+        if now > deadline_s and request.action not in STOP_ACTIONS:
             reply(Outcome(Code.TIMED_OUT, "the request came too late to be carried out", forwarded=False))
             return
         if request.received_at is None or request.received_at > now:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import Final
+from typing import Final, TypeVar
 from urllib.parse import unquote
 
 import msgspec
@@ -88,6 +88,8 @@ _telegram = msgspec.json.Decoder(dict[str, Value])
 _options = msgspec.json.Decoder(_Options)
 _controller = msgspec.json.Decoder(_Controller)
 
+_Model = TypeVar("_Model")
+
 
 def identity_of(attachment: bytes | None) -> Identity:
     """Who asks: ``{"controller": "<name>"}`` in the attachment. Raises BadCommand.
@@ -99,10 +101,7 @@ def identity_of(attachment: bytes | None) -> Identity:
     wanted = 'the attachment must be {"controller": "<name>"}'
     if len(attachment) > _LONGEST:
         raise BadCommand(MALFORMED, wanted)
-    try:
-        name = _controller.decode(attachment).controller
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise BadCommand(MALFORMED, f"{wanted}: {error}") from None
+    name = _decoded(_controller, attachment, wanted).controller
     if not NAME.fullmatch(name):
         raise BadCommand(MALFORMED, WANTED_NAME)
     return Identity(Source.ZENOH, name)
@@ -205,14 +204,9 @@ def _owners(points: Iterable[str], ending: str) -> frozenset[str]:
 
 def _decode_value(point: Point, payload: bytes) -> Value:
     bare = payload.strip()
-    try:
-        if point.data_type.is_integer and _HEXADECIMAL.fullmatch(bare.decode()):
-            return int(bare, 16)
-        decoded = _one_or_bare.decode(bare)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise BadCommand(
-            MALFORMED, f'{point.name} takes a number or {{"v": <number>}} in JSON: {error}'
-        ) from None
+    if point.data_type.is_integer and _HEXADECIMAL.fullmatch(bare.decode(errors="replace")):
+        return int(bare, 16)
+    decoded = _decoded(_one_or_bare, bare, f'{point.name} takes a number or {{"v": <number>}} in JSON')
     return _bounded(point.name, decoded.v if isinstance(decoded, _One) else decoded)
 
 
@@ -245,15 +239,18 @@ def _decode_parameter(name: str, payload: bytes) -> Value:
 
 
 def _decode_telegram(drive: str, payload: bytes) -> dict[str, Value]:
-    try:
-        values = _telegram.decode(payload)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise BadCommand(
-            MALFORMED, f'{drive}/command takes an object such as {{"control_word": 1151}}: {error}'
-        ) from None
+    wanted = f'{drive}/command takes an object such as {{"control_word": 1151}}'
+    values = _decoded(_telegram, payload, wanted)
     if not values:
         raise BadCommand(MALFORMED, f"the object for {drive}/command names no point")
     return {leaf: _bounded(leaf, value) for leaf, value in values.items()}
+
+
+def _decoded(decoder: msgspec.json.Decoder[_Model], payload: bytes, wanted: str) -> _Model:
+    try:
+        return decoder.decode(payload)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise BadCommand(MALFORMED, f"{wanted}: {error}") from None
 
 
 def _bounded(name: str, value: Value) -> Value:
@@ -267,10 +264,9 @@ def _call(identity: Identity, target: str, action: Action, payload: bytes) -> Re
     has_payload = bool(payload.strip())
     if not has_payload and action not in _WITHOUT_PAYLOAD:
         raise BadCommand(MALFORMED, f"{action} needs a payload, and got a plain get; {{}} is enough")
-    try:
-        options = _options.decode(payload) if has_payload else _Options()
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise BadCommand(MALFORMED, f"{action} takes an object of options: {error}") from None
+    options = _Options()
+    if has_payload:
+        options = _decoded(_options, payload, f"{action} takes an object of options")
     ttl_ms, direction = options.ttl_ms, options.direction
     if ttl_ms is not msgspec.UNSET and action is not Action.TAKE_CONTROL:
         raise BadCommand(MALFORMED, f"{action} takes no ttl_ms")

@@ -17,23 +17,23 @@ TEXT: Final = "text/plain"
 _encode = msgspec.json.Encoder().encode
 
 
-class _Shown(msgspec.Struct):
+class _Shown(msgspec.Struct, omit_defaults=True):
     """A reading. ``v`` is null where there is no value, ``t`` where there never was one."""
 
     v: Value | None
     q: str
     t: float | None
-    s: str | msgspec.UnsetType = msgspec.UNSET
-    r: str | msgspec.UnsetType = msgspec.UNSET
+    s: str = ""
+    r: str = ""
 
 
-class _Beside(msgspec.Struct):
+class _Beside(msgspec.Struct, omit_defaults=True):
     """What goes into the attachment of a bare value."""
 
     q: str
     t: float | None
-    s: str | msgspec.UnsetType = msgspec.UNSET
-    r: str | msgspec.UnsetType = msgspec.UNSET
+    s: str = ""
+    r: str = ""
 
 
 class _Told(msgspec.Struct):
@@ -44,18 +44,18 @@ class _Told(msgspec.Struct):
     message: str
 
 
-class _Done(msgspec.Struct):
+class _Done(msgspec.Struct, omit_defaults=True):
     ok: bool
     forwarded: bool
-    message: str | msgspec.UnsetType = msgspec.UNSET
-    v: Value | msgspec.UnsetType = msgspec.UNSET
+    message: str = ""
+    v: Value | None = None
 
 
-class _Refused(msgspec.Struct):
+class _Refused(msgspec.Struct, omit_defaults=True):
     ok: bool
     code: str
     message: str
-    abort_code: str | msgspec.UnsetType = msgspec.UNSET
+    abort_code: str = ""
 
 
 class KeySpace:
@@ -130,13 +130,13 @@ class KeySpace:
 
     def _circumstances(
         self, index: int, reading: Reading, epoch_ns: int
-    ) -> tuple[str, float | None, str | msgspec.UnsetType, str | msgspec.UnsetType]:
+    ) -> tuple[str, float | None, str, str]:
         quality = reading.quality
         time = None if quality is Quality.WAITING else seconds(epoch_ns)
-        state = None
+        state = ""
         if self._states[index] and quality.has_value and isinstance(reading.value, int):
-            state = self._states[index].get(reading.value)
-        return quality.label, time, state or msgspec.UNSET, reading.reason or msgspec.UNSET
+            state = self._states[index].get(reading.value, "")
+        return quality.label, time, state, reading.reason
 
 
 def _owner(tail: str) -> str:
@@ -158,13 +158,12 @@ def outcome_json(outcome: Outcome) -> bytes:
     """``{"ok": true, "forwarded": true}``, or ``{"ok": false, "code": …, "message": …}``. A parameter that
     was written brings ``v``, what the drive holds; one that the drive refused brings ``abort_code``."""
     if outcome.ok:
-        value = msgspec.UNSET if outcome.value is None else outcome.value
-        return _encode(_Done(True, outcome.forwarded, outcome.message or msgspec.UNSET, value))
+        return _encode(_Done(True, outcome.forwarded, outcome.message, outcome.value))
     return refusal_json(outcome.code, outcome.message, outcome.abort_code)
 
 
 def refusal_json(code: str, message: str, abort_code: int = 0) -> bytes:
-    return _encode(_Refused(False, code, message, f"{abort_code:08X}" if abort_code else msgspec.UNSET))
+    return _encode(_Refused(False, code, message, f"{abort_code:08X}" if abort_code else ""))
 
 
 def parameter_json(value: Value, epoch_ns: int) -> bytes:

@@ -17,8 +17,6 @@ _MOST_KINDS: Final = 200
 class RateLimit:
     """At most ``burst`` at once and one every ``every_s`` seconds after that."""
 
-    __slots__ = ("_burst", "_every_s", "_filled_at", "_tokens")
-
     def __init__(self, burst: int, every_s: float) -> None:
         self._burst = burst
         self._every_s = every_s
@@ -40,8 +38,6 @@ class RateLimit:
 class PerSecond:
     """At most ``most`` within a second, which begins with the first of them."""
 
-    __slots__ = ("_begin", "_count", "_most")
-
     def __init__(self, most: int) -> None:
         self._most = most
         self._begin = float("-inf")
@@ -56,8 +52,6 @@ class PerSecond:
 
 class Pauses:
     """Admits one of each key, and no other of that key for ``pause_s``."""
-
-    __slots__ = ("_pause_s", "_told")
 
     def __init__(self, pause_s: float = PAUSE_S) -> None:
         self._pause_s = pause_s

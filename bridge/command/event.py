@@ -43,8 +43,6 @@ class EventGate:
     """Keeps a client that is refused again and again, or a babbling node, from flooding the listeners. What
     is left out is still counted where it happens."""
 
-    __slots__ = ("_limits",)
-
     def __init__(self) -> None:
         self._limits: dict[tuple[str, Kind], PerSecond] = {}
 

@@ -102,28 +102,6 @@ class Verdict:
 class Follow:
     """One drive. Times are monotonic seconds; ``follows`` is kept while the drive is not heard."""
 
-    __slots__ = (
-        "_bounds",
-        "_disobeyed_at",
-        "_graced",
-        "_is_silenced",
-        "_is_there",
-        "_look_at",
-        "_off_since",
-        "_on_bus",
-        "_rested",
-        "_says",
-        "_sent",
-        "_since",
-        "_stopping_since",
-        "_until",
-        "_verdicts",
-        "_was_enabled",
-        "awaits_sending",
-        "follows",
-        "state",
-    )
-
     def __init__(self) -> None:
         self.state = LastStop.NONE
         self.follows = True

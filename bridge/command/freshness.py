@@ -96,17 +96,6 @@ class Inflow:
     hang may have waited somewhere, and cannot be told from what has not.
     """
 
-    __slots__ = (
-        "_calm_since",
-        "_came",
-        "_empty_at",
-        "_is_crowded",
-        "_is_hidden",
-        "_is_open",
-        "_open_since",
-        "_steady_since",
-    )
-
     def __init__(self, now: float, look: Look, *, is_hidden: bool = False) -> None:
         # What comes first may have waited in the listening socket.
         self._empty_at = look.at

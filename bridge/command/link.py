@@ -30,17 +30,6 @@ class Link:
     where the drive sends only changes.
     """
 
-    __slots__ = (
-        "_downtime_s",
-        "_expired_at",
-        "_hold_s",
-        "_judged_at",
-        "_since",
-        "last_pdo",
-        "node",
-        "pdo_deadline_s",
-    )
-
     def __init__(self, telegram_downtime_s: float, hold_ms: int) -> None:
         self._downtime_s = telegram_downtime_s
         self._hold_s = hold_ms / 1000

@@ -9,20 +9,6 @@ from bridge.mapping.model import Family
 class DriveStatus:
     """Last known status of one drive. Fault numbers are the family's own, 0 where there is none."""
 
-    __slots__ = (
-        "_drive_last",
-        "_emcy",
-        "_emcy_text",
-        "drive_fault",
-        "emcy_code",
-        "faults",
-        "last_fault",
-        "link_fault",
-        "state",
-        "word",
-        "words",
-    )
-
     def __init__(self, family: Family) -> None:
         self._emcy = family.emcy
         self.faults = family.faults

@@ -34,8 +34,6 @@ class Telegram:
 class _Setpoints:
     """What a write has set so far, by the word's place: which bits, and to what."""
 
-    __slots__ = ("_bits", "_masks")
-
     def __init__(self) -> None:
         self._masks: dict[int, int] = {}
         self._bits: dict[int, int] = {}

@@ -21,8 +21,6 @@ class Reading(NamedTuple):
 class Feed:
     """One consumer's set of changed points. Newest value wins: a slow consumer costs only itself."""
 
-    __slots__ = ("_dirty",)
-
     def __init__(self, count: int) -> None:
         self._dirty: dict[int, None] = dict.fromkeys(range(count))
 

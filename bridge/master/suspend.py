@@ -12,8 +12,6 @@ class SuspendWatch:
     """``look`` gives a lower and an upper bound, in seconds, of how long the machine has been suspended since
     it was booted: two clocks cannot be read at once, and the process may be delayed between them."""
 
-    __slots__ = ("_at_most", "_look")
-
     def __init__(self, look: Callable[[], tuple[float, float]]) -> None:
         self._look = look
         self._at_most = look()[1]

@@ -20,8 +20,6 @@ _MANY: Final = 3
 class BackOff:
     """Of one node. ``lost`` and ``failed`` give the seconds until it is booted again."""
 
-    __slots__ = ("_losses", "_pause_s", "_pauses", "_since", "pause_s", "steady_at")
-
     def __init__(self) -> None:
         self._since = float("-inf")
         self._pauses = Pauses()

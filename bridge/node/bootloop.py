@@ -16,8 +16,6 @@ _LAST_PAUSE_S: Final = 60.0
 class BootLoop:
     """Counts the boot-up messages of one node."""
 
-    __slots__ = ("_pause_s", "_pauses", "_since_told", "_times", "count")
-
     def __init__(self) -> None:
         self._times: deque[float] = deque(maxlen=_MANY)
         self._pause_s = 0.0

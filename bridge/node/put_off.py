@@ -26,8 +26,6 @@ _LATE_S: Final = 0.02
 class PutOff:
     """At most one command. Times are monotonic seconds."""
 
-    __slots__ = ("_at", "_is_last", "_wait_s", "command")
-
     def __init__(self) -> None:
         self.command: NmtCommand | None = None
         self._at = 0.0

@@ -57,21 +57,6 @@ class Tpdo:
     """Unpacks one TPDO of a drive into the drive's words. ``further`` is None for the one with the status
     word, by which the drive's freshness is judged."""
 
-    __slots__ = (
-        "_codec",
-        "_drive",
-        "_in_order",
-        "_last",
-        "_length",
-        "_map",
-        "_reject",
-        "_words",
-        "cob_id",
-        "further",
-        "plan",
-        "rtr_poll_s",
-    )
-
     def __init__(self, drive: Drive, plan: PdoPlan, further: FurtherTpdo | None, reject: Reject) -> None:
         self._drive = drive
         self._reject = reject
@@ -141,19 +126,6 @@ class Tpdo:
 class Rpdo:
     """Packs one RPDO of a drive from the channel's output."""
 
-    __slots__ = (
-        "_codec",
-        "_count",
-        "_has_control_word",
-        "_last",
-        "_last_words",
-        "_map",
-        "_packed",
-        "_words",
-        "cob_id",
-        "is_synchronous",
-    )
-
     def __init__(self, plan: PdoPlan, words: int) -> None:
         self.cob_id = plan.cob_id
         self.is_synchronous = plan.transmission_type <= LAST_SYNCHRONOUS
@@ -198,8 +170,6 @@ class Rpdo:
 class DrivePdos:
     """All PDOs of one drive. Of several the one with the status word is the first of ``tpdos``, and the
     one with the control word the last of ``rpdos``: setpoints are there when an enable comes."""
-
-    __slots__ = ("_drive", "_endings", "_held_s", "needs_sync", "rpdos", "tpdos")
 
     def __init__(
         self, drive: Drive, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan], reject: Reject

@@ -31,8 +31,6 @@ class WordMap:
     or with zeros, unless it shares the word with others.
     """
 
-    __slots__ = ("_count", "_parts", "_shared", "_whole", "is_in_order")
-
     def __init__(self, entries: Sequence[PdoEntry], places: Sequence[Place | None], words: int) -> None:
         """``words`` is how many the drive has; what lies beyond them is left out."""
         self._count = len(entries)

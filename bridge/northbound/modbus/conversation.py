@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
@@ -22,15 +23,13 @@ Handle = Callable[[int, bytes, Callable[[bytes], None], float], None]
 time is when the end of the request was received."""
 
 
+@dataclass(slots=True)
 class _Exchange:
     """One request, and its answer once there is one."""
 
-    __slots__ = ("answer", "transaction", "unit_id")
-
-    def __init__(self, transaction: int, unit_id: int) -> None:
-        self.transaction = transaction
-        self.unit_id = unit_id
-        self.answer: bytes | None = None
+    transaction: int
+    unit_id: int
+    answer: bytes | None = None
 
 
 class Conversation:
@@ -42,20 +41,6 @@ class Conversation:
     ``backlog``: more requests can be handled now. ``is_full``: none is handled until an answer comes.
     ``fault``: why the stream cannot be understood any more, or empty.
     """
-
-    __slots__ = (
-        "_buffer",
-        "_dropped",
-        "_earlier",
-        "_exchanges",
-        "_handle",
-        "_offset",
-        "_on_late_answer",
-        "_received_at",
-        "_working",
-        "backlog",
-        "fault",
-    )
 
     def __init__(self, handle: Handle, on_late_answer: Callable[[], None]) -> None:
         self._handle = handle

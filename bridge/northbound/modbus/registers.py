@@ -111,18 +111,6 @@ class DriveMap:
     ``timeout_range_ms`` what an owner may write to ``TIMEOUT``, None where that is nothing. ``texts`` is what
     device identification knows without asking the drive, by object id."""
 
-    __slots__ = (
-        "drive_name",
-        "inputs",
-        "parameters",
-        "rows",
-        "setpoints",
-        "texts",
-        "timeout_range_ms",
-        "unit_id",
-        "words",
-    )
-
     def __init__(self, drive: Drive, allows: Allows | None = None) -> None:
         """``allows`` is for the column of access: without it, what the drive's family has."""
         allows = allows or Allows()
@@ -349,8 +337,6 @@ class Words32:
 
     ABCD is the high word first, each with its high byte first; A is the highest byte.
     """
-
-    __slots__ = ("_swap_bytes", "_swap_words")
 
     def __init__(self, order: WordOrder) -> None:
         self._swap_words = order in ("CDAB", "DCBA")

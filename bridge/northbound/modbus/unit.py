@@ -61,8 +61,6 @@ def state_code(state: Value, watchdog_state: Value, quality: Quality) -> int:
 class BridgeUnit:
     """The bridge itself: input registers only, any other table is an illegal function."""
 
-    __slots__ = ("_drives", "_image", "_load", "_nodes", "_site", "_states", "_version", "_view")
-
     def __init__(self, units: Units, view: View) -> None:
         self._site = units.site
         self._view = view

@@ -17,6 +17,7 @@ import struct
 import traceback
 from collections.abc import Callable
 from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -37,13 +38,11 @@ _DECODERS: Final = frozenset((ua_binary.struct_from_binary.__code__, ua_binary.n
 _Decode = Callable[[Any], Any]
 
 
+@dataclass(slots=True)
 class _Budget:
     """What may still be decoded."""
 
-    __slots__ = ("left",)
-
-    def __init__(self, left: int) -> None:
-        self.left = left
+    left: int
 
 
 _budget: ContextVar[_Budget | None] = ContextVar("decoding_budget", default=None)

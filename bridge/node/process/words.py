@@ -48,8 +48,9 @@ class WordMap:
         self._parts = tuple(parts)
         self._shared = tuple(dict.fromkeys(word for word, *_ in parts))
         short = all(entry.bits <= WORD_BITS for entry in entries)
-        self.is_in_order = short and [item[:2] for item in whole] == [(n, n) for n in range(words)]
-        """The values are the words as they are, where they have no sign."""
+        in_order = [(n, n) for n in range(words)]
+        self.is_in_order = short and len(entries) == words and [item[:2] for item in whole] == in_order
+        """The values are the words as they are, and nothing else, where they have no sign."""
 
     def unpack(self, values: Sequence[int], words: list[int]) -> None:
         """Write the values into their places of ``words``."""

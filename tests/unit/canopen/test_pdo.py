@@ -130,6 +130,12 @@ def bench(tmp_path: Path) -> Bench:
     return Bench(write_site(tmp_path), present=False)
 
 
+def test_an_object_behind_the_words_is_left_out(bench: Bench) -> None:
+    words = Words(bench, plan(16, 16, 8, 8, 16, words=(0, 1, 2, 3, None)))
+    assert words.receive("31 0B 00 20 03 04 FF FF") == [0x0B31, 0x2000, 3, 4]
+    assert words.receive("37 0B 01 20 03 04 FF FF") == [0x0B37, 0x2001, 3, 4]
+
+
 def test_a_long_object_fills_several_words_the_low_one_first(bench: Bench) -> None:
     """BU 2500 §6.5.4: a position of 2800.758 rev is 002ABC76h."""
     words = Words(bench, plan(16, 32, words=(0, 1)))

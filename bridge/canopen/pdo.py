@@ -7,7 +7,7 @@ objects follow each other without gaps, the first at bit 0 of the first byte, li
 from __future__ import annotations
 
 import struct
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -50,7 +50,7 @@ class PdoCodec:
     """Packs and unpacks one PDO. Values are the integers of the entries in order, unsigned except for the
     objects in ``signed``, given as (index, sub)."""
 
-    __slots__ = ("_fields", "_masks", "_pack", "_unpack", "entries", "has_signed", "length")
+    __slots__ = ("_fields", "_masks", "_pack", "entries", "has_signed", "length", "unpack")
 
     def __init__(self, entries: tuple[PdoEntry, ...], signed: Collection[tuple[int, int]] = ()) -> None:
         """Raises MappingError if an entry does not have 1…64 bits or the sum exceeds eight bytes."""
@@ -68,12 +68,13 @@ class PdoCodec:
         self._fields: tuple[tuple[int, int, int], ...] = ()
         """Shift, mask and sign bit of each entry, if no Struct fits."""
         self._pack: struct.Struct | None = None
-        self._unpack: struct.Struct | None = None
+        self.unpack: Callable[[bytes], tuple[int, ...]] = self._split
+        """The values in data of exactly ``length`` bytes."""
         if all(entry.bits in _CODES for entry in entries):
             codes = [_CODES[entry.bits] for entry in entries]
             self._pack = struct.Struct("<" + "".join(codes))
             received = [c.lower() if sign else c for c, sign in zip(codes, signs, strict=True)]
-            self._unpack = struct.Struct("<" + "".join(received))
+            self.unpack = struct.Struct("<" + "".join(received)).unpack
         else:
             shift = 0
             fields: list[tuple[int, int, int]] = []
@@ -82,10 +83,7 @@ class PdoCodec:
                 shift += entry.bits
             self._fields = tuple(fields)
 
-    def unpack(self, data: bytes) -> tuple[int, ...]:
-        """The values in ``data``, which must be exactly ``length`` bytes long."""
-        if self._unpack:
-            return self._unpack.unpack(data)
+    def _split(self, data: bytes) -> tuple[int, ...]:
         number = int.from_bytes(data, "little")
         # (x ^ sign) - sign extends the sign, and is x for sign = 0.
         return tuple(((number >> shift & mask) ^ sign) - sign for shift, mask, sign in self._fields)

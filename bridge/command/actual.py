@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from bridge.command.channel import DriveChannel
+from bridge.command.following import Following
 from bridge.drive import LinearScale, ParameterSet, ValueCodec
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Family, Slot
@@ -72,9 +73,13 @@ class _Judged:
 class ActualData:
     """The process data of one drive. A PDO costs one comparison per value."""
 
-    def __init__(self, name: str, family: Family, slot: Slot, channel: DriveChannel) -> None:
+    def __init__(
+        self, name: str, family: Family, slot: Slot, channel: DriveChannel, following: Following
+    ) -> None:
         self._name = name
         self._channel = channel
+        self._following = following
+        self._has_followers = any(value.follows for value in family.values_of(slot))
         self._family = family
         self._process = family.process.tpdo
         self._set = ParameterSet(family.status_word.parameter_set_bits)
@@ -152,8 +157,10 @@ class ActualData:
                 pdo.quality = Quality.STALE
         self._shown = None
 
-    def on_further(self, pdo: FurtherTpdo, now: float) -> None:
-        """One of the further TPDOs has brought words."""
+    def on_further_data(self, pdo: FurtherTpdo, now: float) -> None:
+        """One of the further TPDOs; its words are in ``words`` already."""
+        if self._has_followers:
+            self._channel.on_actual_words(self.words, now)
         if pdo.on_data(now):
             self._shown = None
         self.refresh(now)
@@ -166,9 +173,12 @@ class ActualData:
         if not self._is_good(now):
             self.refresh(now)
 
-    def on_words(self, words: Sequence[int], now: float) -> None:
-        """The TPDO with the status word has brought these."""
+    def on_process_data(self, words: Sequence[int], now: float) -> None:
+        """The TPDO with the status word, changed; ``words`` are raw, in the order of ``process.tpdo``."""
         held, channel = self.words, self._channel
+        if self._has_followers:
+            channel.on_actual_words(words, now)
+        self._following.before_pdo(now)
         has_new_status = words[0] != held[0]
         if (words[0] ^ held[0]) & self._set.mask:
             self._shown = None
@@ -179,6 +189,15 @@ class ActualData:
             self.refresh(now)
         else:
             self._refresh_values(now)
+        self._following.after_pdo(now)
+
+    def on_unchanged_data(self, now: float) -> None:
+        """A TPDO that says what the last one said."""
+        self._following.before_pdo(now)
+        self._channel.on_unchanged(now)
+        self._following.after_pdo(now)
+        if self.quality is not Quality.GOOD:
+            self.refresh(now)
 
     def refresh(self, now: float) -> None:
         channel = self._channel

@@ -93,10 +93,13 @@ class Drive:
         self._setpoints = [
             (words.index(word), f"command/{word}") for word in family.carried(self.slot)[0][1:]
         ]
-        self._has_followers = any(value.follows for value in family.values_of(self.slot))
         for parameter, full in table.parameters.items():
             self._learn(parameter, full)
-        self._actual = ActualData(self.name, family, self.slot, self.channel)
+        self._actual = ActualData(self.name, family, self.slot, self.channel, self.following)
+        # What its node brings, which is not looked at here.
+        self.on_process_data = self._actual.on_process_data
+        self.on_unchanged_data = self._actual.on_unchanged_data
+        self.on_further_data = self._actual.on_further_data
         self.channel.look_up(self._actual.why_lacking)
         self.points: list[Point] = [
             *drive_points(
@@ -161,28 +164,6 @@ class Drive:
         return self.own.process_data_ms if self.channel.silence_stops else 0.0
 
     # fed by its node
-
-    def on_process_data(self, words: Sequence[int], now: float) -> None:
-        """The TPDO with the status word, changed; ``words`` are raw, in the order of ``process.tpdo``."""
-        if self._has_followers:
-            self.channel.on_actual_words(words, now)
-        self.following.before_pdo(now)
-        self._actual.on_words(words, now)
-        self.following.after_pdo(now)
-
-    def on_unchanged_data(self, now: float) -> None:
-        """A TPDO that says what the last one said."""
-        self.following.before_pdo(now)
-        self.channel.on_unchanged(now)
-        self.following.after_pdo(now)
-        if self._actual.quality is not Quality.GOOD:
-            self._actual.refresh(now)
-
-    def on_further_data(self, pdo: FurtherTpdo, now: float) -> None:
-        """Another TPDO; its words are in ``words`` already."""
-        if self._has_followers:
-            self.channel.on_actual_words(self._actual.words, now)
-        self._actual.on_further(pdo, now)
 
     def on_pdos(self, unserved: Mapping[str, str], further: Sequence[FurtherTpdo], now: float) -> None:
         """What the boot-up has found: ``unserved`` has the reason for each word that the node does not

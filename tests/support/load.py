@@ -53,7 +53,7 @@ class Load:
             seen.add(number)
             deliver(words, now)  # type: ignore[arg-type]
 
-        drive.on_process_data = count  # type: ignore[method-assign]
+        drive.on_process_data = count
         sent, begin = 0, time.monotonic()
         while (elapsed := time.monotonic() - begin) < seconds:
             for number in range(sent, round(elapsed * frames_per_s)):
@@ -62,7 +62,7 @@ class Load:
                 sent += 1
             await asyncio.sleep(0.002)
         await asyncio.sleep(0.2)
-        del drive.on_process_data
+        drive.on_process_data = deliver
         return sent, len(seen - {0})
 
     async def trip(self, times: int) -> None:

@@ -12,11 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from bridge.command.event import Event, Kind
-from bridge.command.leg import event, rules
+from bridge.command.leg import event, owners
 from bridge.command.leg.effect import Answer, Effect, Heard, Ignored, StartBegun, StartEnded, Tell, Tripped
+from bridge.command.leg.outlook import next_deadline, output_then, until, watchdog_state
 from bridge.command.leg.settings import leg_settings
 from bridge.command.leg.state import AWAITS_REPORT, INTERLOCKED, LegState, Output, WatchdogState, Way
-from bridge.command.leg.step import initial, next_deadline, output_then, step, until, watchdog_state
+from bridge.command.leg.step import initial, step
 from bridge.command.link import Link, NodeState
 from bridge.command.request import Identity, Outcome, Reply, Request
 from bridge.command.status import DriveStatus
@@ -192,7 +193,7 @@ class DriveChannel:
 
     def refusal(self, identity: Identity) -> str:
         """Why ``identity`` may not command the drive, whose owner is there; empty where it may."""
-        return rules.refusal(self.settings.control, self.leg.owner, identity, owner_is_silent=False)
+        return owners.refusal(self.settings.control, self.leg.owner, identity, owner_is_silent=False)
 
     # from the drive
 

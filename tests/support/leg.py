@@ -7,9 +7,10 @@ from typing import Any
 from bridge.command import Action, Command, Do, Identity, Outcome, Request, Source, Write
 from bridge.command.leg.effect import Answer, Effect, Tell
 from bridge.command.leg.event import Event, NodeBack, Report, Time
+from bridge.command.leg.outlook import next_deadline
 from bridge.command.leg.settings import LegSettings, leg_settings
 from bridge.command.leg.state import INTERLOCKED, Way
-from bridge.command.leg.step import initial, next_deadline, step
+from bridge.command.leg.step import initial, step
 from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
 from bridge.drive import DriveState

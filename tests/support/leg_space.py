@@ -23,9 +23,10 @@ from bridge.command import (
 from bridge.command.leg import turn
 from bridge.command.leg.effect import Answer, Effect, StartBegun, StartEnded
 from bridge.command.leg.event import BridgeGap, Connection, NodeBack, OwnWatch, Report, StartAnew, Time
+from bridge.command.leg.outlook import next_deadline, output_then, until
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import LegState, Stage, Way
-from bridge.command.leg.step import next_deadline, output_then, step, until
+from bridge.command.leg.step import step
 from bridge.command.leg.table import Cell, Stimulus
 from bridge.command.request import STOP_ACTIONS
 from bridge.drive import DriveState

@@ -5,8 +5,13 @@ Pure: times are monotonic seconds, given from outside. A state that is the same 
 
 from __future__ import annotations
 
-from bridge.command.leg import requests, rules, start
-from bridge.command.leg.effect import Effect
+from collections.abc import Mapping
+from typing import Final
+
+from bridge.command.event import Kind
+from bridge.command.freshness import arrival_of, is_stale, limit_ms_of
+from bridge.command.leg import order, owners, start
+from bridge.command.leg.effect import Answer, Effect
 from bridge.command.leg.event import (
     ActualWords,
     BridgeGap,
@@ -24,13 +29,30 @@ from bridge.command.leg.state import (
     Motion,
     Output,
     Timer,
-    WatchdogState,
     Way,
 )
-from bridge.command.leg.table import Stimulus
+from bridge.command.leg.table import Deed, Stimulus
 from bridge.command.leg.turn import Turn
-from bridge.command.leg.words import if_left, if_tripped
-from bridge.command.request import Code, Outcome, Request
+from bridge.command.request import (
+    DONE,
+    STOP_ACTIONS,
+    Action,
+    Code,
+    Do,
+    Outcome,
+    Request,
+    SetTimeout,
+    Start,
+    TakeControl,
+    Write,
+)
+from bridge.command.telegram import Refusal
+from bridge.drive import FAULTED, DriveState
+from bridge.image import Value
+
+_TAKEN_STALE: Final = STOP_ACTIONS | {Action.WRITE, Action.RELEASE_CONTROL}
+"""Nothing is too old to stop a drive; whether a write does so is seen when it has been decoded."""
+_OVERWRITTEN: Final = Outcome(Code.CANCELLED, "a control word was written meanwhile")
 
 
 def initial(settings: LegSettings) -> LegState:
@@ -48,7 +70,7 @@ def step(settings: LegSettings, state: LegState, event: Event, now: float) -> tu
     turn = Turn(settings, state, now)
     match event:
         case Request():
-            requests.handle(turn, event)
+            _handle(turn, event)
         case Time(way=way):
             turn.judge()
             if way is not None:
@@ -70,7 +92,7 @@ def step(settings: LegSettings, state: LegState, event: Event, now: float) -> tu
             turn.silence_stops = stops
         case Connection(identity=identity, is_there=is_there):
             if identity.is_same(turn.owner.identity):
-                absent_until = None if is_there else now + rules.GONE_S
+                absent_until = None if is_there else now + owners.GONE_S
                 turn.owner = turn.owner._replace(absent_until=absent_until)
             return turn.end(), turn.effects
     turn.settle()
@@ -114,51 +136,183 @@ def _gap(turn: Turn) -> None:
         turn.leave()
 
 
-# what others may see
+# what a request makes of the leg
 
 
-def watchdog_state(settings: LegSettings, state: LegState) -> WatchdogState:
-    if state.stage.is_tripped:
-        return WatchdogState.TRIPPED
-    if not state.timer.timeout_ms or settings.ignores_errors:
-        return WatchdogState.OFF
-    return WatchdogState.IDLE if state.timer.heard_at is None else WatchdogState.RUNNING
+def _handle(turn: Turn, request: Request) -> None:
+    """Do what ``request`` asks, or refuse it and change nothing."""
+    turn.judge()
+    try:
+        owners.check_authority(turn, request)
+        if request.action not in _TAKEN_STALE and _is_stale(turn, request):
+            raise _stale(turn, request)
+        if isinstance(request.command, Start):
+            _start(turn, request, request.command.direction)
+        else:
+            turn.effects.append(Answer(_carry_out(turn, request)))
+    except Refusal as refusal:
+        message = f"{request.action} by {request.identity} refused: {refusal.message}"
+        turn.tell(Kind.REFUSED, 300, message)
+        refused = Outcome(refusal.code, refusal.message, forwarded=False)
+        turn.effects.append(Answer(refused, is_refused=True))
 
 
-def trips_at(settings: LegSettings, state: LegState) -> float | None:
-    """When the drive is stopped unless its owner is heard; None where no time does that."""
-    return None if state.stage.is_tripped or settings.ignores_errors else state.timer.deadline
+def _is_stale(turn: Turn, request: Request) -> bool:
+    return is_stale(request, turn.now, turn.timer.timeout_ms)
 
 
-def until(settings: LegSettings, state: LegState) -> float | None:
-    """Until when what enables the drive may be on the bus, unless its owner is heard; None where no time ends
-    it, or where nothing enables it."""
-    if not settings.words.enables(state.sent.words[0]):
-        return None
-    trip = None if settings.reaction == "hold" else trips_at(settings, state)
-    lease = state.owner.lease_until
-    return lease if trip is None or (lease is not None and lease < trip) else trip
+def _stale(turn: Turn, request: Request) -> Refusal:
+    """Why it does not count that it can have waited for so long."""
+    limit_ms = limit_ms_of(request, turn.timer.timeout_ms)
+    return Refusal(Code.STALE, f"may have waited on its way for longer than {limit_ms} ms")
 
 
-def output_then(settings: LegSettings, state: LegState) -> Output:
-    """What is sent from ``until`` on."""
-    is_trip = until(settings, state) == trips_at(settings, state)
-    return (if_tripped(settings, state) if is_trip else None) or if_left(settings, state)
+def _carry_out(turn: Turn, request: Request) -> Outcome:
+    """What is done at once. Raises ``Refusal`` before anything has changed."""
+    match request.command:
+        case Write(values=values):
+            return _write(turn, request, values)
+        case Do(action=Action.KEEP_ALIVE):
+            owners.hear(turn, request)
+        case Do(action=Action.RESET_FAULT):
+            return _reset_fault(turn, request)
+        case Do(action=Action.STOP | Action.QUICK_STOP | Action.DISABLE_VOLTAGE):
+            _stop(turn, request)
+        case TakeControl(ttl_ms=ttl_ms):
+            owners.take_control(turn, request.identity, ttl_ms)
+        case Do(action=Action.RELEASE_CONTROL):
+            return owners.release(turn, request.identity)
+        case SetTimeout(timeout_ms=timeout_ms):
+            owners.set_timeout(turn, request.identity, timeout_ms)
+        case _:
+            raise Refusal(Code.UNKNOWN_POINT, f"a drive knows no {request.action}")
+    return DONE
 
 
-def next_deadline(state: LegState) -> float | None:
-    """When ``Time`` is to happen; None for never."""
-    times = (
-        state.timer.deadline,
-        state.owner.lease_until,
-        state.trip.ramps_until,
-        state.trip.silent_from,
-        state.pulse_until,
-        state.order.deadline,
-        state.order.rises_at,
-    )
-    earliest = None if state.start is None else start.next_deadline(state.start)
-    for time in times:
-        if time is not None and (earliest is None or time < earliest):
-            earliest = time
-    return earliest
+# telegrams
+
+
+def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome:
+    words = turn.settings.words
+    is_owner = request.identity.is_same(turn.owner.identity)
+    # A new owner inherits no setpoints.
+    kept = turn.setpoints if is_owner else turn.rest
+    telegram = turn.settings.decode(values, kept, turn.control_word)
+    word = telegram.control_word
+    if word is not None and not words.is_valid(word):
+        turn.happens(Stimulus.INVALID)
+        raise Refusal(Code.NOT_VALID, f"control word {word:04X}h: the bit 'control data valid' is 0")
+    if _is_stale(turn, request):
+        if word is None or not is_owner or words.enables(word):
+            raise _stale(turn, request)
+        return _take_stale_stop(turn, word)
+    owners.own(turn, request)
+    if word is not None:
+        mask = words.acknowledge_mask
+        is_set, was_set = bool(word & mask), turn.edges.bit
+        is_edge = is_set and was_set is False
+        if is_set is not was_set:
+            turn.edges = turn.edges._replace(bit=is_set)
+        if is_edge and turn.is_tripped:
+            _acknowledge(turn, request, pulse=False)
+            # The edge itself goes on to the drive; whatever else the word asks has to be asked anew.
+            turn.word |= mask
+            return Outcome(Code.OK, "acknowledged; the drive stays stopped", forwarded=False)
+        if not is_edge and not turn.word & mask:
+            word &= ~mask  # what was sent meanwhile would make an edge of a bit that never fell
+    turn.hear(arrival_of(request, turn.now))
+    if _take(turn, word, telegram.setpoints, values) is Deed.FORWARD:
+        return DONE
+    return Outcome(Code.OK, turn.why_blocked, forwarded=False)
+
+
+def _take(turn: Turn, word: int | None, setpoints: tuple[int, ...], values: Mapping[str, Value]) -> Deed:
+    """The words of a valid telegram. With one that does not enable, what was ordered before it is not gone to
+    any more, nor what comes with a stop of a running drive."""
+    turn.look_at_way()
+    turn.setpoints = setpoints
+    turn.keep_at_rest()
+    is_stop = word is not None and not turn.settings.words.enables(word)
+    handshake = turn.settings.handshake
+    if handshake is not None:
+        if is_stop:
+            turn.order = order.dropped(turn.order)
+        stops_it = is_stop and turn.drive is DriveState.OPERATION_ENABLED
+        if handshake.value in values and not stops_it:
+            position = tuple(turn.setpoints[place] for place in handshake.places)
+            turn.order = order.ordered(turn.order, position)
+    if word is None:
+        return turn.happens(Stimulus.SETPOINTS)
+    turn.word, turn.is_ours = word, False
+    return turn.happens(Stimulus.STOP_WORD if is_stop else Stimulus.ENABLING_WORD, _OVERWRITTEN)
+
+
+def _take_stale_stop(turn: Turn, word: int) -> Outcome:
+    """The owner's stop, however long it has waited. It is no sign of life, acknowledges nothing and brings no
+    setpoints."""
+    acknowledge = turn.settings.words.acknowledge_mask
+    turn.stop(word & ~acknowledge | turn.word & acknowledge, is_asked=True)
+    if turn.happens(Stimulus.LATE_STOP, _OVERWRITTEN) is Deed.TAKE:
+        return Outcome(Code.OK, turn.why_blocked, forwarded=False)
+    return Outcome(Code.OK, "came late, and counts as a stop only")
+
+
+# acknowledge, stop, start
+
+
+def _reset_fault(turn: Turn, request: Request) -> Outcome:
+    """A method is an order each time; a register acknowledges where the telegram before it did not."""
+    if request.pressed:
+        if request.identity.is_same(turn.edges.pressed_by):
+            owners.hear(turn, request)
+            return Outcome(Code.OK, "no edge: the telegram before it acknowledged, too", forwarded=False)
+        turn.edges = turn.edges._replace(pressed_by=request.identity)
+    owners.own(turn, request)
+    _acknowledge(turn, request, pulse=True)
+    return DONE
+
+
+def _acknowledge(turn: Turn, request: Request, *, pulse: bool) -> None:
+    was_tripped = turn.is_tripped
+    turn.hear(arrival_of(request, turn.now))
+    turn.clear(pulse=pulse)
+    if was_tripped:
+        by = turn.owner.identity
+        turn.tell(Kind.WATCHDOG, 200, f"acknowledged by {by}; the drive stays stopped")
+
+
+def _stop(turn: Turn, request: Request) -> None:
+    """Stop, by whoever asks. The owner's telegrams go on counting, its old enable does not."""
+    who, action, words = request.identity, request.action, turn.settings.words
+    if who.is_same(turn.owner.identity):
+        if not _is_stale(turn, request):
+            owners.hear(turn, request)
+    else:
+        turn.tell(Kind.OWNER, 400, f"{action} by {who}")
+        owner = turn.owner
+        if turn.timer.timeout_ms == 0 and owner.identity is not None and owner.stopped_until is None:
+            # Whoever is there answers to a stop of its drive.
+            turn.owner = owner._replace(stopped_until=turn.now + owners.GONE_S)
+    changes = {
+        Action.STOP: words.stop,
+        Action.QUICK_STOP: words.quick_stop,
+        Action.DISABLE_VOLTAGE: words.disable_voltage,
+    }
+    turn.happens(Stimulus.STOP, Outcome(Code.CANCELLED, f"{action} by {who}"))
+    turn.stop_as_asked(changes[action](turn.sent.words[0]))
+
+
+def _start(turn: Turn, request: Request, direction: int) -> None:
+    words = turn.settings.words
+    bits = {0: 0, 1: words.forward, -1: words.reverse}.get(direction)
+    if bits is None:
+        raise Refusal(Code.OUT_OF_RANGE, f"direction takes 1, -1 or 0, not {direction}")
+    if direction < 0 and not bits:
+        # Forward is what such a drive does with a positive setpoint: that needs no bit.
+        raise Refusal(Code.OUT_OF_RANGE, "direction -1: here the sign of the setpoint is the direction")
+    if turn.is_tripped or turn.drive in FAULTED:
+        raise Refusal(Code.ACKNOWLEDGE_FIRST, "acknowledge first")
+    if not turn.may_enable:
+        raise Refusal(Code.NOT_READY, turn.why_blocked)
+    owners.hear(turn, request)
+    start.begin(turn, words.run | bits)

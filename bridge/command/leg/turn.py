@@ -1,4 +1,4 @@
-"""One step of the leg while it is being made: the state, taken apart, and what has come of it so far."""
+"""One step of the leg while it is made: the state, taken apart, what has come of it, and what is sent."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ from operator import attrgetter
 from typing import Final
 
 from bridge.command.event import Kind
-from bridge.command.leg import order, words
+from bridge.command.leg import order
 from bridge.command.leg.effect import Effect, Heard, Ignored, StartEnded, Tell, Tripped
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import (
+    BLOCKED,
+    REACTING,
+    RESTS,
     STARTING,
     LegState,
     Motion,
@@ -22,7 +25,7 @@ from bridge.command.leg.state import (
 from bridge.command.leg.table import TABLE, Deed, Stimulus
 from bridge.command.request import Code, Outcome
 from bridge.config import Reaction
-from bridge.drive import FAULTED, MOVING, DriveState
+from bridge.drive import FAULTED, MOVING, ControlWords, DriveState
 
 _ACKNOWLEDGE_PULSE_S: Final = 0.1
 """How long a generated acknowledge edge stays on the bus: longer than any cycle we send with."""
@@ -121,7 +124,7 @@ class Turn:
     @property
     def word_at_rest(self) -> int:
         """What is sent if it is a stop of some kind: an acknowledge turns no ramp into coasting."""
-        return words.at_rest(self.settings.words, self.sent.words[0])
+        return at_rest(self.settings.words, self.sent.words[0])
 
     @property
     def control_word(self) -> int:
@@ -277,7 +280,7 @@ class Turn:
         if self.pulse_until is not None and now >= self.pulse_until:
             self.pulse_until = None
         was_enabling = self.is_enabling
-        words.send(self)
+        _send(self)
         handshake = self.settings.handshake
         if handshake is not None:
             self.order, is_untaken = order.went_on(
@@ -287,7 +290,7 @@ class Turn:
                 is_taken=self.is_taken,
                 commanded=self.is_commanded,
             )
-            words.send(self)
+            _send(self)
             if is_untaken:
                 why = "the drive has not taken the position that was written: no answer within 1 s"
                 self.tell(Kind.REFUSED, 500, why)
@@ -296,3 +299,61 @@ class Turn:
                 is_enabled = self.drive is DriveState.OPERATION_ENABLED
                 self.motion = Motion.SEEN if is_enabled else Motion.EXPECTED
             self.is_asked = False
+
+
+# What goes to the drive: the owner's words, or a stop in their place. Nothing that enables a drive gets past
+# this while the watchdog has tripped, the restart interlock is set or the way to the drive is closed. A stop
+# always does.
+
+
+def at_rest(words: ControlWords, word: int) -> int:
+    """``word`` if it is a stop of some kind, else a stop made from it."""
+    return words.stop(word) if words.enables(word) else word & ~words.acknowledge_mask
+
+
+def _send(turn: Turn) -> None:
+    """Make what the drive gets from now on."""
+    stage = turn.stage
+    if stage in REACTING:
+        turn.sent = _reaction(turn)
+    elif stage is not Stage.HELD:
+        turn.sent = _owners(turn)
+
+
+def _reaction(turn: Turn) -> Output:
+    settings = turn.settings
+    is_ramping = turn.trip.ramps_until is not None
+    word = reaction_word(settings, turn, is_ramping=is_ramping)
+    is_silent = turn.stage is Stage.SILENCED
+    if is_silent and not turn.silence_stops:
+        return Output((settings.words.disable_voltage(word), *turn.rest))
+    return Output((word, *turn.rest), is_silent)
+
+
+def reaction_word(settings: LegSettings, state: Turn | LegState, *, is_ramping: bool) -> int:
+    words, word = settings.words, state.sent.words[0]
+    if settings.reaction != "stop" and not is_ramping:
+        return words.disable_voltage(word)
+    stopped = words.stop(word) if settings.reaction == "stop" else words.quick_stop(word)
+    return words.withhold(stopped) if state.motion in RESTS else stopped
+
+
+def _owners(turn: Turn) -> Output:
+    words, word, is_ours = turn.settings.words, turn.word, turn.is_ours
+    acknowledge = words.acknowledge_mask
+    is_blocked = turn.stage in BLOCKED
+    if is_blocked and words.enables(word):
+        # The stop that is in force, by whomever: what the owner goes on writing does not weaken it.
+        word = at_rest(words, turn.sent.words[0]) | word & acknowledge
+        is_ours = True
+    if turn.drive is DriveState.FAULT and word & acknowledge:
+        # It ends with the fault: what was asked for then would hold the motor after it.
+        turn.is_asked = False
+    if is_ours and turn.motion in RESTS and not turn.is_asked:
+        word = words.withhold(word) | word & acknowledge
+    if turn.pulse_until is not None:
+        word |= acknowledge
+    handshake = turn.settings.handshake
+    if handshake is not None and turn.order.is_raised and words.enables(word):
+        word |= handshake.mask
+    return Output((word, *(turn.rest if is_blocked else turn.setpoints)))

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import pytest
 
-from bridge.command.leg import order, requests, rules, start, step, turn, words
+from bridge.command.leg import order, owners, start, step, turn
 from bridge.command.leg.effect import Heard
 from bridge.command.leg.state import Output, Stage
 from bridge.command.leg.table import TABLE, Cell, Deed, Stimulus
@@ -127,11 +127,11 @@ def _counts(leg: Turn, *_: Any) -> None:
         leg.effects.append(Heard())
 
 
-def _speaks(leg: Turn, of: Callable[[Turn], Output] = words._reaction) -> Output:
+def _speaks(leg: Turn, of: Callable[[Turn], Output] = turn._reaction) -> Output:
     return Output(of(leg).words)
 
 
-def _moves(leg: Turn, of: Callable[[Turn], Output] = words._reaction) -> Output:
+def _moves(leg: Turn, of: Callable[[Turn], Output] = turn._reaction) -> Output:
     word, *_ = of(leg).words
     return Output((word, 1, *leg.rest[1:]), of(leg).silent)
 
@@ -141,29 +141,29 @@ def _weak(settings: Any, state: Any, *, is_ramping: bool) -> int:
 
 
 DEEDS: Final[dict[str, tuple[str, object, str, object]]] = {
-    "a stranger's telegram counts": ("telegrams", rules, "refusal", lambda *_, **__: ""),
+    "a stranger's telegram counts": ("telegrams", owners, "refusal", lambda *_, **__: ""),
     "a refused telegram counts": (
         "telegrams",
-        requests,
-        "_check_authority",
-        _before(requests._check_authority, _counts),
+        owners,
+        "check_authority",
+        _before(owners.check_authority, _counts),
     ),
-    "the owner is refused": ("telegrams", rules, "refusal", lambda *_, **__: "no"),
-    "a word lifts the interlock": ("telegrams", words, "at_rest", lambda words, word: words.run),
-    "a quick stop is a ramp": ("quick_stop", words, "_reaction_word", _weak),
+    "the owner is refused": ("telegrams", owners, "refusal", lambda *_, **__: "no"),
+    "a word lifts the interlock": ("telegrams", turn, "at_rest", lambda words, word: words.run),
+    "a quick stop is a ramp": ("quick_stop", turn, "reaction_word", _weak),
     "a quick stop has no end": ("quick_stop", turn, "_RAMP_LIMIT_S", 20.0),
-    "silence speaks": ("silence", words, "_reaction", _speaks),
-    "a reaction keeps setpoints": ("telegrams", words, "_reaction", _moves),
+    "silence speaks": ("silence", turn, "_reaction", _speaks),
+    "a reaction keeps setpoints": ("telegrams", turn, "_reaction", _moves),
     "a lease has no end": ("lease", Turn, "judge", _before(Turn.judge, _loses_its_lease)),
-    "an owner is never gone": ("off", rules, "GONE_S", 20.0),
+    "an owner is never gone": ("off", owners, "GONE_S", 20.0),
     "a gap is not noticed": ("way", step, "_gap", lambda leg: None),
-    "every acknowledge bit is an edge": ("edges", requests, "_write", _before(requests._write, _edge)),
-    "a late telegram counts": ("late", requests, "_is_stale", lambda leg, request: False),
+    "every acknowledge bit is an edge": ("edges", step, "_write", _before(step._write, _edge)),
+    "a late telegram counts": ("late", step, "_is_stale", lambda leg, request: False),
     "the kernel goes on": ("telegrams", leg_space, "until", lambda settings, leg: None),
     "nobody wakes the leg": ("telegrams", leg_space, "next_deadline", lambda leg: None),
     "a start does not wait for a stop": ("starts", start, "_may_be_old", lambda *_, **__: False),
     "a start takes longer": ("starts", start, "_LIMIT_S", 5.0),
-    "a fault is no reason": ("starts", requests, "FAULTED", frozenset[Any]()),
+    "a fault is no reason": ("starts", step, "FAULTED", frozenset[Any]()),
     "a position is handed over twice": (
         "positions",
         order,

@@ -8,7 +8,7 @@ import pytest
 
 from bridge.command import Action, Start
 from bridge.command.leg.event import StartAnew
-from bridge.command.leg.step import next_deadline
+from bridge.command.leg.outlook import next_deadline
 from bridge.config import Reaction
 from bridge.drive import DriveState
 from tests.support.leg import OPEN, SHUT, Leg, settings_of

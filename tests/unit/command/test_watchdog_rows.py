@@ -11,7 +11,7 @@ import pytest
 
 from bridge.command import Action, Code, Do, Identity, Request, Role, Source, TakeControl
 from bridge.command.leg.event import BridgeGap
-from bridge.command.leg.step import watchdog_state
+from bridge.command.leg.outlook import watchdog_state
 from tests.support.leg import PLC, Leg, settings_of
 
 TIMEOUT_S: Final = 1.0

@@ -1,0 +1,159 @@
+"""Who may command a drive, and what becomes of it when another does: the twin of P509/P510 (BU 2500 §7.2).
+
+With ``control`` a protocol, the first identity of that protocol whose valid telegram arrives owns the drive
+until it releases it or falls silent. With ``"lease"`` any operator takes the drive for a time and keeps it by
+going on; with ``"none"`` nobody commands it.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from bridge.command.event import Kind
+from bridge.command.freshness import arrival_of
+from bridge.command.leg.state import Owner, Timer
+from bridge.command.leg.turn import Turn
+from bridge.command.request import DONE, STOP_ACTIONS, Action, Code, Identity, Outcome, Request, Role
+from bridge.command.telegram import Refusal
+
+_LEASE_MS: Final = (100, 600_000)
+GONE_S: Final = 10.0
+"""Without a watchdog: after this an owner that gives no sign holds nobody up any more. Long enough for one
+that connects anew for each telegram, and for a person who was stopped."""
+
+
+def refusal(control: str, owner: Owner, identity: Identity, *, owner_is_silent: bool) -> str:
+    """Why ``identity`` may not command the drive now, in one sentence; empty where it may."""
+    if identity.role < Role.OPERATOR:
+        return f"{identity} may only read"
+    if control == "none":
+        return "the site file gives nobody control of this drive"
+    if identity.is_same(owner.identity):
+        return ""
+    if control == "lease":
+        if owner.identity is None:
+            return "take control of the drive first"
+        return f"the drive is controlled by {owner.identity}"
+    if identity.source.label != control:
+        return f"the drive is controlled by {control}"
+    if owner.identity is None or owner_is_silent:
+        return ""
+    return f"the drive is controlled by {owner.identity}"
+
+
+def _take_refusal(control: str, owner: Owner, identity: Identity, *, owner_is_silent: bool) -> str:
+    """Why ``identity`` may not take control now, empty where it may. An engineer always may."""
+    if control != "lease":
+        may_break = identity.role >= Role.ENGINEER and identity.source.label == control
+        return "" if may_break else refusal(control, owner, identity, owner_is_silent=owner_is_silent)
+    if identity.role < Role.OPERATOR:
+        return f"{identity} may only read"
+    free = owner.identity is None or owner_is_silent or identity.is_same(owner.identity)
+    if free or identity.role >= Role.ENGINEER:
+        return ""
+    return f"the drive is controlled by {owner.identity}"
+
+
+def check_authority(turn: Turn, request: Request) -> None:
+    """Raises ``Refusal`` where somebody else controls the drive. Stopping it is every operator's, unless the
+    site file forbids it, and then where the owner is gone."""
+    identity, settings = request.identity, turn.settings
+    may_stop = settings.stop_by_anyone or _owner_is_gone(turn)
+    if request.action in STOP_ACTIONS and may_stop and identity.role >= Role.OPERATOR:
+        return
+    judge = _take_refusal if request.action is Action.TAKE_CONTROL else refusal
+    why = judge(settings.control, turn.owner, identity, owner_is_silent=_owner_is_silent(turn))
+    if why:
+        raise Refusal(Code.NOT_ALLOWED, why)
+
+
+def _owner_is_silent(turn: Turn) -> bool:
+    """Without a lease, an owner that has sent no telegram yet holds nobody up either."""
+    settings, timer = turn.settings, turn.timer
+    is_watched = timer.timeout_ms > 0 and not settings.ignores_errors and not turn.is_tripped
+    is_idle = is_watched and timer.heard_at is None and settings.control != "lease"
+    return timer.is_silent or is_idle or _owner_is_gone(turn)
+
+
+def _owner_is_gone(turn: Turn) -> bool:
+    """Where no watchdog says so: it has had no connection for ``GONE_S``, or not answered to a stop for so
+    long."""
+    if turn.timer.timeout_ms:
+        return False
+    times = turn.owner.absent_until, turn.owner.stopped_until
+    return any(time is not None and turn.now >= time for time in times)
+
+
+def own(turn: Turn, request: Request) -> None:
+    """A valid telegram: who sent it owns the drive from now on."""
+    identity = request.identity
+    if request.pressed is False and identity.is_same(turn.edges.pressed_by):
+        turn.edges = turn.edges._replace(pressed_by=None)
+    if not identity.is_same(turn.owner.identity):
+        _hand_over(turn, identity)
+    _renew(turn, arrival_of(request, turn.now))
+
+
+def hear(turn: Turn, request: Request) -> None:
+    """A valid telegram that says no more than that its sender is there."""
+    own(turn, request)
+    turn.hear(arrival_of(request, turn.now))
+
+
+def _renew(turn: Turn, at: float) -> None:
+    """The owner has shown that it is there: its lease runs anew."""
+    identity, lease_s, lease_until, absent_until, stopped_until = turn.owner
+    if turn.settings.control == "lease":
+        lease_until = at + lease_s
+    elif absent_until is None and stopped_until is None:
+        return
+    turn.owner = Owner(identity, lease_s, lease_until)
+
+
+def _hand_over(turn: Turn, identity: Identity, lease_s: float | None = None) -> None:
+    """Another owner, or a lease taken anew; the drive is stopped where the owner changes."""
+    before = turn.owner.identity
+    changes = not identity.is_same(before)
+    if changes and before is not None:
+        turn.leave()
+    if lease_s is None or turn.settings.control != "lease":
+        lease_s = turn.owner.lease_s
+    turn.owner = Owner(identity, lease_s)
+    _renew(turn, turn.now)
+    if changes:
+        turn.tell(Kind.OWNER, 200, f"controlled by {identity}")
+
+
+def take_control(turn: Turn, identity: Identity, ttl_ms: int) -> None:
+    low, high = _LEASE_MS
+    if turn.settings.control == "lease" and not low <= ttl_ms <= high:
+        raise Refusal(Code.OUT_OF_RANGE, f"ttl_ms takes {low}…{high}")
+    owner = turn.owner.identity
+    if owner is not None and not _owner_is_silent(turn) and not identity.is_same(owner):
+        turn.tell(Kind.OWNER, 500, f"{identity} takes control away from {owner}")
+    _hand_over(turn, identity, ttl_ms / 1000)
+
+
+def release(turn: Turn, identity: Identity) -> Outcome:
+    if not identity.is_same(turn.owner.identity):
+        return Outcome(Code.OK, "not in control")
+    turn.tell(Kind.OWNER, 200, f"released by {turn.owner.identity}")
+    turn.leave()
+    return DONE
+
+
+def set_timeout(turn: Turn, identity: Identity, timeout_ms: int) -> None:
+    """Another time for as long as the owner owns the drive, counted from its last telegram: setting it is
+    none. A trip stays a trip."""
+    settings, timer = turn.settings, turn.timer
+    if not settings.timeout_writable:
+        raise Refusal(Code.NOT_ALLOWED, "the site file does not allow to change fieldbus_timeout_ms")
+    if not identity.is_same(turn.owner.identity):
+        raise Refusal(Code.NOT_ALLOWED, "only who controls the drive may change fieldbus_timeout_ms")
+    low, high = settings.timeout_range_ms
+    if not low <= timeout_ms <= high:
+        raise Refusal(Code.OUT_OF_RANGE, f"fieldbus_timeout_ms takes {low}…{high} here")
+    runs = timeout_ms and timer.heard_at is not None and not timer.is_silent
+    deadline = (timer.heard_at or 0.0) + timeout_ms / 1000 if runs else None
+    turn.timer = Timer(timeout_ms, timer.heard_at, deadline, timer.is_silent)
+    turn.tell(Kind.CONFIGURATION, 400, f"fieldbus_timeout_ms = {timeout_ms}, by {identity}")

@@ -31,9 +31,11 @@ from bridge.mapping.model import Family
 class DriveChannel:
     """The command side of one drive.
 
-    ``report`` gets the events. After any call the caller compares ``output`` and sends it. ``settled`` is
+    After any call the caller compares ``output`` and sends it. ``report`` gets the events. ``settled`` is
     called when what others may see has changed beyond the status word, before outcomes are told: so a client
-    that reads after its outcome sees the new values.
+    that reads after its outcome sees the new values. ``tripped`` gets the deadline whenever the watchdog
+    trips. ``why_lacking`` says why actual words, by their places in ``process.tpdo``, are not known at a
+    time, and nothing where they are.
     """
 
     def __init__(
@@ -43,6 +45,10 @@ class DriveChannel:
         settings: DriveTable,
         hold_ms: int,
         report: Callable[[Event], None],
+        *,
+        settled: Callable[[float], None],
+        tripped: Callable[[float], None],
+        why_lacking: Callable[[frozenset[int], float], str],
     ) -> None:
         self.name = name
         self.family = family
@@ -56,9 +62,11 @@ class DriveChannel:
             scale = scale_of(value)
             if scale is not None:
                 self.scales[value.leaf] = scale
-        self.settled: Callable[[float], None] = lambda now: None
         self.link = Link(settings.telegram_downtime_s, hold_ms)
         self._report = report
+        self._settled = settled
+        self._tripped = tripped
+        self._why_lacking = why_lacking
         self._status = DriveStatus(family)
         decode = TelegramDecoder(
             name, family, family.slot_named(settings.slot), self.scales, self.unserved
@@ -68,22 +76,11 @@ class DriveChannel:
         self.leg = initial(self.leg_settings)
         """The state of the leg."""
         self._followed = frozenset(source for _, source in self.leg_settings.follows)
-        self._why_lacking: Callable[[frozenset[int], float], str] = lambda places, now: ""
-        self._tripped: Callable[[float], None] = lambda due: None
         self._start_reply: Reply | None = None
         self.trips = 0
         self.refused_writes = 0
         self.telegrams = 0
         """Number of the last valid telegram, modulo 2¹⁶: a witness outside sees by it that one came."""
-
-    def look_up(self, why_lacking: Callable[[frozenset[int], float], str]) -> None:
-        """Ask this why actual words, by their places in ``process.tpdo``, are not known at a time; it says
-        nothing where they are."""
-        self._why_lacking = why_lacking
-
-    def on_trip(self, tripped: Callable[[float], None]) -> None:
-        """Call this with the deadline whenever the watchdog trips."""
-        self._tripped = tripped
 
     # what others may see
 
@@ -244,12 +241,12 @@ class DriveChannel:
         self._status.on_emcy(told)
         severity = 100 if told.is_gone else 700
         self._tell(now, Kind.EMERGENCY, severity, f"emergency {told.code:04X}h: {told.text}")
-        self.settled(now)
+        self._settled(now)
 
     def on_drive_fault(self, current: float | None, last: float | None, now: float) -> None:
         """The drive has been asked for its present and its last fault; None for what it did not tell."""
         if self._status.on_drive_fault(current, last):
-            self.settled(now)
+            self._settled(now)
 
     def on_node(self, state: NodeState, now: float) -> None:
         """The node behind the drive is in another state now."""
@@ -322,7 +319,7 @@ class DriveChannel:
     def on_refused(self, now: float) -> None:
         """A request about this drive was refused elsewhere, and counts as one that is refused here."""
         self.refused_writes += 1
-        self.settled(now)
+        self._settled(now)
 
     # what comes of it
 
@@ -336,7 +333,7 @@ class DriveChannel:
         outcomes += self._take_in(*step(self.leg_settings, self.leg, what, now), now, reply)
         if is_lost:
             self._link_is_lost(self.family.faults.telegram_downtime, "no process data from the drive", now)
-        self.settled(now)
+        self._settled(now)
         for answer, outcome in outcomes:
             answer(outcome)
 

@@ -62,6 +62,8 @@ class Drive:
         family: Family,
         unit_id: int,
         report: Callable[[Event], None],
+        settled: Callable[[Drive, float], None],
+        tripped: Callable[[float], None],
     ) -> None:
         self.name = f"{node.name}/{family.leaf_of(table)}"
         self.node_name = node.name
@@ -69,7 +71,16 @@ class Drive:
         self.unit_id = unit_id
         self.family = family
         self.slot: Slot = family.slot_named(table.slot)
-        self.channel = DriveChannel(self.name, family, table, node.hold_ms, report)
+        self.channel = DriveChannel(
+            self.name,
+            family,
+            table,
+            node.hold_ms,
+            report,
+            settled=lambda now: settled(self, now),
+            tripped=tripped,
+            why_lacking=lambda places, now: self._actual.why_lacking(places, now),
+        )
         self.following = Following(self.channel)
         self.identification = Identification()
         self.own: OwnJudgement | None = None
@@ -100,7 +111,6 @@ class Drive:
         self.on_process_data = self._actual.on_process_data
         self.on_unchanged_data = self._actual.on_unchanged_data
         self.on_further_data = self._actual.on_further_data
-        self.channel.look_up(self._actual.why_lacking)
         self.points: list[Point] = [
             *drive_points(
                 self.name,
@@ -129,7 +139,6 @@ class Drive:
         self._stop_ms, self._bridge_ms = places("supervision", ("worst_case_stop_ms", "worst_case_bridge_ms"))
         self._identity = places("identity", _IDENTITY)
         self._actual.bind(image)
-        self.channel.settled = self.refresh
         image.set(self._abort_code, 0, now)
 
     @property

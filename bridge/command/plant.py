@@ -91,8 +91,7 @@ class Plant:
         self.by_unit: dict[int, Drive] = {}
         self.eeprom_writes = Ledger()
         """How often parameters were written; whoever keeps it across restarts fills it first."""
-        self.stop_due: float | None = None
-        """Since when a tripped drive's stop is to be on the bus; whoever hands it over takes this away."""
+        self._stop_due: float | None = None
         self.settled = 0
         """Counts up whenever what a drive is sent may have changed."""
         self.unsent: set[Drive] = set()
@@ -115,7 +114,10 @@ class Plant:
                 points += node_points(table, family.poll)
                 for position, drive_table in enumerate(table.drive):
                     unit_id = units[table.name, position]
-                    drive = Drive(table, bus, drive_table, family, unit_id, self.report)
+                    settled = partial(self._settled, node)
+                    drive = Drive(
+                        table, bus, drive_table, family, unit_id, self.report, settled, self._tripped
+                    )
                     node.drives.append(drive)
                     self.drives[drive.name] = drive
                     self.by_unit[unit_id] = drive
@@ -131,8 +133,6 @@ class Plant:
             self.image.set(self._node_points[node.name][2], 0.0, began)
             for drive in node.drives:
                 drive.bind(self.image, began)
-                drive.channel.settled = partial(self._settled, node, drive)
-                drive.channel.on_trip(self._tripped)
                 self._settled(node, drive, began)
         self._deadlines.look_every_s = len(self.drives) * _LOOK_PER_DRIVE_S
         self.set("bridge/version", version, began)
@@ -147,7 +147,13 @@ class Plant:
             drive.channel.on_bridge_gap(now)
 
     def _tripped(self, due: float) -> None:
-        self.stop_due = due if self.stop_due is None else min(due, self.stop_due)
+        self._stop_due = due if self._stop_due is None else min(due, self._stop_due)
+
+    def on_stops_handed_over(self) -> float | None:
+        """The stops of drives that had tripped have been handed to their buses: since when the first of them
+        was due, None where there was none."""
+        due, self._stop_due = self._stop_due, None
+        return due
 
     def on_event(self, listener: Callable[[Event], None]) -> None:
         self._listeners.append(listener)

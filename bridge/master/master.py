@@ -202,9 +202,9 @@ class Master:
             self._flush(line, now)
             if not self._stood_still(line, now):
                 line.bus.on_time(now)
-        if self._plant.stop_due is not None:
-            self._lateness.on_stop(self._plant.stop_due, self._clock())
-            self._plant.stop_due = None
+        stop_due = self._plant.on_stops_handed_over()
+        if stop_due is not None:
+            self._lateness.on_stop(stop_due, self._clock())
         self._last_round = now
         self._alive(now)
         self._arm(now)

@@ -57,7 +57,16 @@ class Rig:
         given = {"slot": slot, "control": "modbus", "fieldbus_timeout_ms": 200, **settings}
         self.events: list[Event] = []
         table = DriveTable.model_validate(given)
-        self.channel = DriveChannel(f"conveyor/{slot}", family, table, hold_ms, self.events.append)
+        self.channel = DriveChannel(
+            f"conveyor/{slot}",
+            family,
+            table,
+            hold_ms,
+            self.events.append,
+            settled=lambda now: None,
+            tripped=lambda due: None,
+            why_lacking=lambda places, now: "",
+        )
         self.channel.scales.setdefault("command/frequency", LinearScale(50.0, 16384, 2.0))
         self.channel.scales.setdefault("command/velocity", LinearScale(3000.0, 1000, 2.0))
         self.channel.link.pdo_deadline_s = pdo_deadline_s

@@ -14,7 +14,8 @@ from bridge.cli.bus import AsJson, print_table, tell
 from bridge.cli.parameter_drive import DriveArgument, Force, SiteArgument, Target, Yes, find
 from bridge.errors import OperationFailed
 from bridge.image import Value
-from bridge.parameter import Definition, ParameterError, backups
+from bridge.mapping.model import Parameter
+from bridge.parameter import ParameterError, backups
 from bridge.parameter.backup_file import BackupFile, read_backup
 from bridge.parameter.codec import shown
 
@@ -172,7 +173,7 @@ def _as_json(done: backups.Restored) -> dict[str, object]:
     }
 
 
-def _comment(definition: Definition | None) -> str:
+def _comment(definition: Parameter | None) -> str:
     if definition is None:
         return ""
     unit = f"{definition.unit}, " if definition.unit else ""

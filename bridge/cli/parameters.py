@@ -40,7 +40,7 @@ def list_(site: SiteArgument, drive: DriveArgument, as_json: AsJson = False) -> 
             "access": one.access,
             "elements": one.elements,
             "sets": one.sets,
-            "states": {str(code): text for code, text in one.states},
+            "states": {str(code): text for code, text in one.states.items()},
         }
         for one in definitions
     ]

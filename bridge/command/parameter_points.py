@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.image import DataType, Point
-from bridge.mapping.model import Family
-from bridge.parameter import Definition, Entry, Names
+from bridge.mapping.model import Family, Parameter
+from bridge.parameter import Entry, Names
 
 _MOST_STATES: Final = 256
 """An enumeration is shown as a list of texts from code 0 on (OPC UA Part 8 §5.3.3.3)."""
@@ -29,10 +29,10 @@ def _point(name: str, entry: Entry) -> Point:
         high=definition.high,
         writable=definition.writable,
         description=f"{entry.name} {definition.title}",
-        states=definition.states if _can_be_listed(definition) else (),
+        states=tuple(definition.states.items()) if _can_be_listed(definition) else (),
     )
 
 
-def _can_be_listed(definition: Definition) -> bool:
+def _can_be_listed(definition: Parameter) -> bool:
     is_integer = definition.value_type.is_integer
-    return is_integer and all(0 <= code < _MOST_STATES for code, _ in definition.states)
+    return is_integer and all(0 <= code < _MOST_STATES for code in definition.states)

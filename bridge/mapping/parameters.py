@@ -8,6 +8,7 @@ from typing import Annotated, Final, Literal
 from pydantic import AfterValidator, Field
 
 from bridge.canopen.datatypes import TypeName
+from bridge.image import DataType
 from bridge.mapping.fields import ObjectRef, Ref, States, Table
 
 GROUPS: Final = ("number", "letter", "element", "set")
@@ -15,6 +16,21 @@ GROUPS: Final = ("number", "letter", "element", "set")
 IndexRange = Annotated[str, Field(pattern=r"^[0-9A-F]{4}(-[0-9A-F]{4})?$")]
 Protection = Literal["command", "communication", "while_enabled"]
 _PUNCTUATION: Final = re.compile(r"[^a-z0-9]+")
+_VALUE_TYPES: Final = {
+    "bool": DataType.BOOL,
+    "int8": DataType.INT16,
+    "int16": DataType.INT16,
+    "int32": DataType.INT32,
+    "int64": DataType.FLOAT,
+    "uint8": DataType.UINT8,
+    "uint16": DataType.UINT16,
+    "uint32": DataType.UINT32,
+    "uint64": DataType.FLOAT,
+    "real32": DataType.FLOAT,
+    "real64": DataType.FLOAT,
+    "string": DataType.STRING,
+    "bytes": DataType.STRING,
+}
 
 
 def _name_pattern(text: str) -> str:
@@ -82,8 +98,27 @@ class Parameter(Table):
 
     @property
     def leaf(self) -> str:
-        """The name of its point: ``P102[2]`` is ``p102_2``."""
-        return _PUNCTUATION.sub("_", self.name.lower()).strip("_")
+        return leaf_of(self.name)
+
+    @property
+    def readable(self) -> bool:
+        return self.access != "wo"
+
+    @property
+    def writable(self) -> bool:
+        return self.access != "ro"
+
+    @property
+    def value_type(self) -> DataType:
+        """The type of the value as users see it."""
+        if self.factor != 1.0 and self.data_type not in ("string", "bytes", "bool"):
+            return DataType.FLOAT
+        return _VALUE_TYPES[self.data_type]
+
+
+def leaf_of(name: str) -> str:
+    """The name of a parameter's point: ``P102[2]`` is ``p102_2``."""
+    return _PUNCTUATION.sub("_", name.lower()).strip("_")
 
 
 class RamOnly(Table):

@@ -2,14 +2,13 @@
 them wears out, and backups of them. No bus in here."""
 
 from bridge.parameter.access import DriveParameters, Reading, Transfer, Written
-from bridge.parameter.definition import Address, Definition, Entry
+from bridge.parameter.definition import Address, Entry
 from bridge.parameter.error import ParameterError, TransferFailed, Why
 from bridge.parameter.ledger import Ledger
 from bridge.parameter.names import Names
 
 __all__ = [
     "Address",
-    "Definition",
     "DriveParameters",
     "Entry",
     "Ledger",

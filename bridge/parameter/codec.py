@@ -66,7 +66,7 @@ def encode_value(entry: Entry, value: Value, held: bytes | None) -> bytes:
         if definition.factor == 1.0 and raw != number:
             raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes whole numbers, not {value}")
         _check_range(entry, raw if definition.factor == 1.0 else round(raw * definition.factor, _DIGITS))
-        if definition.states and raw not in dict(definition.states):
+        if definition.states and raw not in definition.states:
             raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {_shown_states(entry)}")
         return datatypes.encode(kind, raw)
     except (ValueError, OverflowError) as error:
@@ -94,7 +94,7 @@ def parse(entry: Entry, text: str) -> Value:
     bare = text.strip()
     if kind == "bool" and bare.lower() in ("0", "1", "false", "true"):
         return bare.lower() in ("1", "true")
-    if definition and bare.lower() in (state.lower() for _, state in definition.states):
+    if definition and bare.lower() in (state.lower() for state in definition.states.values()):
         return bare
     for reader in (lambda: int(bare, 0), lambda: float(bare)):
         try:
@@ -113,7 +113,7 @@ def shown(entry: Entry, value: Value) -> str:
     if definition is None or isinstance(value, str | bool):
         return str(value)
     text = f"{value:.{_DIGITS + 1}g}" if isinstance(value, float) else str(value)
-    state = dict(definition.states).get(int(value)) if definition.states else None
+    state = definition.states.get(int(value))
     return f"{text} ({state})" if state else f"{text} {definition.unit}".rstrip()
 
 
@@ -143,7 +143,7 @@ def _number(entry: Entry, value: Value) -> int | float:
     """``value`` as a number; the text of a state is taken for its code."""
     definition = entry.definition
     if isinstance(value, str) and definition:
-        for code, state in definition.states:
+        for code, state in definition.states.items():
             if state.lower() == value.strip().lower():
                 return code
     if isinstance(value, bool | str):
@@ -166,5 +166,5 @@ def _check_range(entry: Entry, number: int | float) -> None:
 
 
 def _shown_states(entry: Entry) -> str:
-    states = entry.definition.states if entry.definition else ()
-    return ", ".join(f"{code} ({state})" for code, state in states)
+    states = entry.definition.states if entry.definition else {}
+    return ", ".join(f"{code} ({state})" for code, state in states.items())

@@ -13,7 +13,7 @@ from typing import Final
 
 from bridge.mapping.model import Family, Parameter
 from bridge.mapping.parameters import object_of
-from bridge.parameter.definition import Address, Definition, Entry, leaf_of
+from bridge.parameter.definition import Address, Entry
 from bridge.parameter.error import ParameterError, Why
 from bridge.parameter.protection import Protection
 
@@ -37,7 +37,7 @@ class Names:
         rule = self._rule = family.parameter_names
         self._pattern = re.compile(rule.pattern, re.IGNORECASE | re.ASCII) if rule else None
         self._first = rule.element_first if rule else 1
-        self.definitions = tuple(_definition(parameter) for parameter in family.parameter)
+        self.definitions = tuple(_as_read(parameter) for parameter in family.parameter)
         self._by_name = {definition.name.upper(): definition for definition in self.definitions}
         self._by_leaf: dict[str, Entry] = {}
         self._by_address: dict[Address, Entry] = {}
@@ -46,7 +46,7 @@ class Names:
             self._by_address.setdefault(entry.address, entry)
         for definition in self.definitions:
             # Without element and set it is the first of each.
-            self._by_leaf.setdefault(leaf_of(definition.name), self._entry(definition, None, None))
+            self._by_leaf.setdefault(definition.leaf, self._entry(definition, None, None))
 
         self.protection = Protection(
             family, [(self._entry(one, None, None).address.index, one) for one in self.definitions]
@@ -97,7 +97,7 @@ class Names:
         example = f"{name}.1"
         return f"; if it depends on the parameter set: {example}" if self._pattern.fullmatch(example) else ""
 
-    def _elements(self, definition: Definition) -> range | tuple[None]:
+    def _elements(self, definition: Parameter) -> range | tuple[None]:
         return range(self._first, self._first + definition.elements) if definition.elements else (None,)
 
     def _by_pattern(self, text: str) -> Entry | None:
@@ -120,7 +120,7 @@ class Names:
         listed = self._by_address.get(address)
         return Entry(text.upper(), address, listed.definition if listed else None)
 
-    def _check(self, definition: Definition, element: int | None, number: int | None) -> None:
+    def _check(self, definition: Parameter, element: int | None, number: int | None) -> None:
         """Raises ``ParameterError`` where the parameter has no such element or set."""
         for what, given, first, count in (
             ("element", element, self._first, definition.elements),
@@ -130,9 +130,9 @@ class Names:
                 has = f"{what}s {first}…{first + count - 1}" if count else f"no {what}s"
                 raise ParameterError(Why.UNKNOWN_NAME, f"{definition.name} has {has}, not {given}")
 
-    def _entry(self, definition: Definition, element: int | None, number: int | None) -> Entry:
+    def _entry(self, definition: Parameter, element: int | None, number: int | None) -> Entry:
         name = self._spelled(definition.name, element, number)
-        base = definition.base
+        base = definition.object
         if base is not None:
             place = self._first if element is None else element
             sub = base.sub + max(definition.sets, 1) * (place - self._first) + (number or 1) - 1
@@ -160,27 +160,6 @@ def _number(text: str | None) -> int | None:
     return None if text is None else int(text)
 
 
-def _definition(parameter: Parameter) -> Definition:
-    base = parameter.object
-    # What is not to be read as a scale holds something else than the unit says.
-    as_scaled = parameter.read
-    return Definition(
-        name=parameter.name,
-        title=parameter.title,
-        data_type=parameter.data_type,
-        factor=parameter.factor if as_scaled else 1.0,
-        unit=parameter.unit if as_scaled else "",
-        low=parameter.low,
-        high=parameter.high,
-        access=parameter.access,
-        elements=parameter.elements,
-        sets=parameter.sets,
-        states=tuple(parameter.states.items()),
-        base=Address(base.index, base.sub) if base else None,
-        point=parameter.point,
-        every_ms=parameter.every_ms,
-        volatile=parameter.volatile,
-        protected=parameter.protected or "",
-        backup=parameter.backup,
-        of_node=parameter.of_node,
-    )
+def _as_read(parameter: Parameter) -> Parameter:
+    """What is not to be read as a scale holds something else than the unit says."""
+    return parameter if parameter.read else parameter.model_copy(update={"factor": 1.0, "unit": ""})

@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from typing import Final
 
 from bridge.mapping.aliases import COMMUNICATION, Alias, aliases
-from bridge.mapping.model import Family, ObjectRef
+from bridge.mapping.model import Family, ObjectRef, Parameter
 from bridge.mapping.own_places import places
-from bridge.parameter.definition import Address, Definition, Entry
+from bridge.parameter.definition import Address, Entry
 
 NEVER: Final = "command"
 """Nobody writes it as a parameter."""
@@ -21,11 +21,11 @@ NEVER: Final = "command"
 class Protection:
     """``flagged`` has the definitions that are protected, with the index of their object."""
 
-    def __init__(self, family: Family, flagged: Iterable[tuple[int, Definition]]) -> None:
+    def __init__(self, family: Family, flagged: Iterable[tuple[int, Parameter]]) -> None:
         rule = family.parameter_names
         self._commands = [_span(one) for one in rule.protected] if rule else []
         self._own = {place.ref.index for place in places(family, link=True)}
-        self._flags = {index: one.protected for index, one in flagged if one.protected}
+        self._flags: dict[int, str] = {index: one.protected for index, one in flagged if one.protected}
         self._aliases: dict[int, list[Alias]] = {}
         for alias in aliases(family):
             self._aliases.setdefault(alias.ref.index, []).append(alias)
@@ -46,7 +46,7 @@ class Protection:
         return tuple(dict.fromkeys(ref for alias in exact or beside for ref in alias.objects))
 
     def level(self, address: Address) -> str:
-        """Who may write an object and when (``Definition.protected``); what stands beside a protected
+        """Who may write an object and when (``Parameter.protected``); what stands beside a protected
         parameter under the same index is protected like it, and so is what the drive watches the
         bridge by."""
         if self._commands_drive(address.index) or self._aliases.get(address.index):

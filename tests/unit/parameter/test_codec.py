@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from bridge.canopen.datatypes import INTEGERS
 from bridge.image import Value
-from bridge.parameter import Address, Definition, Entry, ParameterError, Why
+from bridge.mapping.model import Parameter
+from bridge.parameter import Address, Entry, ParameterError, Why
 from bridge.parameter.codec import decode, encode_value, matches, parse, shown
 
 WHERE = Address(0x2066, 1)
@@ -20,7 +21,8 @@ NUMBERS = [kind for kind in INTEGERS if kind != "bool"]
 
 
 def entry(data_type: str, **more: object) -> Entry:
-    return Entry("P1", WHERE, Definition("P1", "one", data_type, **more))  # pyright: ignore[reportArgumentType]
+    content = {"name": "P1", "title": "one", "data_type": data_type, **more}
+    return Entry("P1", WHERE, Parameter.model_validate(content))
 
 
 def limits(kind: str) -> tuple[int, int]:
@@ -81,7 +83,7 @@ def test_whatever_a_drive_sends_is_a_value_or_one_error(data: bytes, kind: str) 
 
 @given(st.one_of(st.booleans(), st.integers(), st.floats(), st.text()), st.binary(max_size=9))
 def test_whatever_a_client_sends_is_coded_or_one_error(value: Value, held: bytes) -> None:
-    states = entry("uint16", states=((0, "off"), (1, "on")))
+    states = entry("uint16", states={0: "off", 1: "on"})
     for one in (
         entry("int16", factor=0.1, low=-5.0, high=5.0),
         entry("real32"),
@@ -107,7 +109,7 @@ def test_a_range_is_that_of_the_value_the_drive_will_hold() -> None:
 
 
 def test_a_state_is_written_by_its_code_or_its_text() -> None:
-    one = entry("int16", states=((0, "RAM only"), (1, "EEPROM")))
+    one = entry("int16", states={0: "RAM only", 1: "EEPROM"})
     assert encode_value(one, "ram only", None) == encode_value(one, 0, None) == b"\0\0"
     assert shown(one, 1) == "1 (EEPROM)"
     with pytest.raises(ParameterError, match=r"takes 0 \(RAM only\), 1 \(EEPROM\)"):
@@ -131,7 +133,7 @@ def test_an_object_that_no_file_describes_takes_the_length_it_has() -> None:
     [
         (entry("int16"), "0x10", 16),
         (entry("int16", factor=0.1), " 2.5 ", 2.5),
-        (entry("int16", states=((0, "off"),)), "OFF", "OFF"),
+        (entry("int16", states={0: "off"}), "OFF", "OFF"),
         (entry("bool"), "true", True),
         (entry("string"), "12", "12"),
         (RAW, "12", 12),

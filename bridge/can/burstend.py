@@ -1,4 +1,4 @@
-"""A burst that turns into a stop by itself: its sender keeps the controller's deadline."""
+"""Bursts, and how one turns into a stop by itself: its sender keeps the controller's deadline."""
 
 from __future__ import annotations
 
@@ -21,6 +21,23 @@ class BurstEnd(NamedTuple):
     frame: Frame | None
 
 
+class Burst(NamedTuple):
+    """One of ``frames`` every ``period_s`` seconds, ``total`` times.
+
+    They have one identifier and take turns: a SYNC with its counter is a burst of n frames. A burst of one
+    frame may have an ``ending``: from then on that one's frame is sent instead, still ``total`` in all.
+    """
+
+    frames: tuple[Frame, ...]
+    period_s: float
+    total: int
+    ending: BurstEnd | None = None
+
+    @property
+    def can_id(self) -> int:
+        return self.frames[0].can_id
+
+
 class Sequence(NamedTuple):
     """What the broadcast manager is told: it sends ``frames`` in turn, ``total`` of them in all. The first
     ``head`` may enable the drive, where others follow them; 0 where all are the same."""
@@ -30,17 +47,18 @@ class Sequence(NamedTuple):
     head: int = 0
 
 
-def sequence(
-    frame: Frame, ending: BurstEnd | None, now: float, period_s: float, count: int, *, extra: int = 0
-) -> Sequence:
-    """A burst of ``count`` times ``frame`` that is handed over ``now`` and keeps to ``ending``.
+def sequence(burst: Burst, now: float, *, extra: int = 0) -> Sequence:
+    """A burst that is handed over ``now`` and keeps to its ``ending``.
 
     In a running burst the next frame may come at any time within a period. So the number of frames until the
     deadline is rounded up: the stop never comes before it, and at most two periods after it. ``extra`` is the
     number of frames that are sent at once, out of turn. The length of the sequence stays the same, because
     the manager lets none grow; one that is too long for it is cut at the deadline.
     """
-    length = min(count, MOST_FRAMES)
+    frames, period_s, count, ending = burst
+    if len(frames) != 1:
+        return Sequence(frames, count)
+    frame, length = frames[0], min(count, MOST_FRAMES)
     if ending is None:
         return Sequence((frame,) * length, count)
     left = ending.at - now

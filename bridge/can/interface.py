@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from bridge.can.burstend import BurstEnd
+from bridge.can.burstend import Burst
 from bridge.can.errorframe import ControllerState as ControllerState
 from bridge.can.errorframe import describe
 from bridge.canopen.frame import Frame
@@ -83,25 +83,13 @@ class Bus(Protocol):
         """Send ``frame`` now, or as soon as there is room, but never after ``deadline``."""
         ...
 
-    def burst(
-        self,
-        frames: tuple[Frame, ...],
-        now: float,
-        period_s: float,
-        count: int,
-        *,
-        at_once: bool = False,
-        ending: BurstEnd | None = None,
-    ) -> None:
-        """Send one of ``frames`` every ``period_s`` seconds, ``count`` more times.
-
-        They have one identifier and take turns: a SYNC with its counter is a burst of n frames. Where
-        the identifier is accepted, they come back by ``drain`` with the time at which they were sent.
+    def burst(self, burst: Burst, now: float, *, at_once: bool = False) -> None:
+        """Start or renew a burst. Where its identifier is accepted, its frames come back by ``drain`` with
+        the time at which they were sent.
 
         Calling it again for the same identifier replaces the data and refills the count without moving
         the phase; ``at_once`` sends the frame immediately as well. A burst ends unless it is renewed: that is
-        the dead-man's handle (``docs/explanation/dead-man-chain.md``). A burst of one frame may have an
-        ``ending``: from then on that one's frame is sent instead, still ``count`` in all.
+        the dead-man's handle (``docs/explanation/dead-man-chain.md``).
         """
         ...
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Final, NamedTuple, Protocol
 
 from bridge.can import bcm
-from bridge.can.burstend import SHORTEST, BurstEnd, Sequence, sequence
+from bridge.can.burstend import SHORTEST, Burst, sequence
 from bridge.can.softbursts import SoftBursts
 from bridge.canopen.frame import Frame
 
@@ -18,6 +18,7 @@ _PATIENCE_S: Final = 0.01
 _ON_ITS_WAY_S: Final = 0.001
 """A message that took longer than this to reach the kernel has too many frames before the deadline."""
 _ENDED: Final = float("-inf")
+_NOTHING: Final = Burst((), 0.0, 0)
 _LINK_IS_GONE: Final = (errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.ENOTCONN)
 
 
@@ -31,22 +32,11 @@ class Manager(Protocol):
 
 @dataclass(slots=True)
 class _Wish:
-    """What the kernel is to send. Without ``frames`` its burst is to end."""
+    """What the kernel is to send. Without frames the burst is to end."""
 
-    frames: tuple[Frame, ...]
-    period_s: float
-    count: int
+    burst: Burst
     at_once: bool
     since: float
-    ending: BurstEnd | None = None
-
-    def sequence(self, now: float, *, start: bool) -> Sequence:
-        """As the broadcast manager takes it."""
-        if len(self.frames) != 1:
-            return Sequence(self.frames, self.count)
-        frame = self.frames[0]
-        extra = int(self.at_once and not start)
-        return sequence(frame, self.ending, now, self.period_s, self.count, extra=extra)
 
 
 @dataclass(slots=True)
@@ -109,28 +99,18 @@ class KernelBursts:
             self._manager.close()
             self._manager = None
 
-    def start(
-        self,
-        frames: tuple[Frame, ...],
-        now: float,
-        period_s: float,
-        count: int,
-        *,
-        at_once: bool,
-        ending: BurstEnd | None = None,
-    ) -> Frame | None:
+    def start(self, burst: Burst, now: float, *, at_once: bool) -> Frame | None:
         """Start or renew a burst; returns the frame that the caller has to send now, if any."""
-        can_id = frames[0].can_id
         # The kernel counts the first frame of a burst, so one of a frame or two ends before it can be
         # renewed. What is that slow needs no kernel: a round sends it.
-        if self._manager is None or count < SHORTEST:
-            return self._soft.start(frames, now, period_s, count, at_once=at_once, ending=ending)
-        waiting = self._wishes.get(can_id)
-        wish = _Wish(frames, period_s, count, at_once, now, ending)
+        if self._manager is None or burst.total < SHORTEST:
+            return self._soft.start(burst, now, at_once=at_once)
+        waiting = self._wishes.get(burst.can_id)
+        wish = _Wish(burst, at_once, now)
         if waiting:
             wish.at_once, wish.since = at_once or waiting.at_once, waiting.since
-        if not self._try(can_id, wish, now) and can_id in self._soft:
-            return self._soft.start(frames, now, period_s, count, at_once=at_once, ending=ending)
+        if not self._try(burst.can_id, wish, now) and burst.can_id in self._soft:
+            return self._soft.start(burst, now, at_once=at_once)
         return None
 
     def end(self, can_id: int, now: float) -> None:
@@ -138,7 +118,7 @@ class KernelBursts:
         self._soft.end(can_id)
         waiting = self._wishes.get(can_id)
         if can_id in self._jobs or waiting:
-            self._try(can_id, _Wish((), 0.0, 0, False, waiting.since if waiting else now), now)
+            self._try(can_id, _Wish(_NOTHING, False, waiting.since if waiting else now), now)
 
     def end_all(self, now: float) -> None:
         self._soft.clear()
@@ -177,7 +157,7 @@ class KernelBursts:
         self._soft.end(can_id)
         if count:
             # The last frame of a burst comes up to a period before its count of periods is over.
-            self._jobs[can_id] = _Job(wish, now + (count - 2) * wish.period_s)
+            self._jobs[can_id] = _Job(wish, now + (count - 2) * wish.burst.period_s)
         else:
             self._jobs.pop(can_id, None)
         return True
@@ -191,13 +171,14 @@ class KernelBursts:
         would ever wake it.
         """
         job = self._jobs.get(can_id)
-        runs = job is not None and job.wish.period_s == wish.period_s and now < job.until
+        runs = job is not None and job.wish.burst.period_s == wish.burst.period_s and now < job.until
         until = job.until if job and runs else _ENDED
-        stale_at = now + wish.count * wish.period_s
-        asked, at = wish, max(now, self._clock()) if wish.ending else now
+        ending = wish.burst.ending
+        stale_at = now + wish.burst.total * wish.burst.period_s
+        asked, at = wish, max(now, self._clock()) if ending else now
         while True:
             count, until, is_fresh = self._send(can_id, asked, at, until)
-            if not count or not (runs or wish.ending):
+            if not count or not (runs or ending):
                 return count
             after = self._clock()
             if after >= stale_at:
@@ -205,7 +186,7 @@ class KernelBursts:
                 return self._end(can_id)
             if after >= until and not is_fresh:
                 asked = wish
-            elif wish.ending and after - at > _ON_ITS_WAY_S:
+            elif ending and after - at > _ON_ITS_WAY_S:
                 asked = replace(wish, at_once=False)
             else:
                 return count
@@ -215,23 +196,24 @@ class KernelBursts:
         """Start the burst, or refill the one that surely runs until ``until``."""
         assert self._manager is not None
         start = until <= now
-        frames, count, head = wish.sequence(now, start=start)
+        frames, count, head = sequence(wish.burst, now, extra=int(wish.at_once and not start))
+        period_s = wish.burst.period_s
         if not count:
             return _Sent(self._end(can_id), _ENDED, is_fresh=False)
         if start:
             # What runs might send one of the new frames before it goes back to their beginning.
             self._end(can_id)
-            until = now + (count - 1) * wish.period_s
+            until = now + (count - 1) * period_s
         elif head:
             # The kernel takes the new frames before it goes back to their beginning, and may send one
             # between the two. So it goes back first, with frames that are all alike; with one more, so that
             # it cannot come to their end before the next message is there.
             alike = (frames[0],) * len(frames)
-            message = bcm.setup(alike, wish.period_s, head + 1, start=False, at_once=False, anew=True)
+            message = bcm.setup(alike, period_s, head + 1, start=False, at_once=False, anew=True)
             self._manager.send(message)
-            until = min(until, now + head * wish.period_s)
+            until = min(until, now + head * period_s)
         at_once, anew = wish.at_once, bool(head)
-        self._manager.send(bcm.setup(frames, wish.period_s, count, start=start, at_once=at_once, anew=anew))
+        self._manager.send(bcm.setup(frames, period_s, count, start=start, at_once=at_once, anew=anew))
         self._held.add(can_id)
         return _Sent(count, until, is_fresh=start)
 
@@ -248,8 +230,6 @@ class KernelBursts:
         self._forget_manager()
         self.refusal = error.strerror or str(error)
         for wish in going.values():
-            if wish.frames:
-                first = self._soft.start(
-                    wish.frames, now, wish.period_s, wish.count, at_once=True, ending=wish.ending
-                )
+            if wish.burst.frames:
+                first = self._soft.start(wish.burst, now, at_once=True)
                 self._first += [first] if first else []

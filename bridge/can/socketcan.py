@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import Final
 
 from bridge.can import bcm
-from bridge.can.burstend import BurstEnd
+from bridge.can.burstend import Burst
 from bridge.can.cansockets import CanSockets
 from bridge.can.errorframe import judge
 from bridge.can.explain import WrongBitrate, explain
@@ -249,21 +249,13 @@ class SocketCanBus:
     def _drop_waiting(self) -> None:
         self._status.frames_expired += self._outbox.clear()
 
-    def burst(
-        self,
-        frames: tuple[Frame, ...],
-        now: float,
-        period_s: float,
-        count: int,
-        *,
-        at_once: bool = False,
-        ending: BurstEnd | None = None,
-    ) -> None:
-        if frames[0].can_id in self._foreign:
+    def burst(self, burst: Burst, now: float, *, at_once: bool = False) -> None:
+        frames, ending = burst.frames, burst.ending
+        if burst.can_id in self._foreign:
             last = (ending.frame,) if ending and ending.frame else ()
-            self._foreign.own.told((*frames, *last), now, period_s, at_once=at_once)
+            self._foreign.own.told((*frames, *last), now, burst.period_s, at_once=at_once)
         try:
-            first = self._bursts.start(frames, now, period_s, count, at_once=at_once, ending=ending)
+            first = self._bursts.start(burst, now, at_once=at_once)
         except OSError as error:
             self._break_down(error, now)
             return

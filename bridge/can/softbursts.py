@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.can.burstend import BurstEnd
+from bridge.can.burstend import Burst
 from bridge.canopen.frame import Frame
 
 _SYNC: Final = 0x080
@@ -13,19 +13,18 @@ _SYNC: Final = 0x080
 
 @dataclass(slots=True)
 class _Job:
-    frames: tuple[Frame, ...]
-    period_s: float
+    burst: Burst
     left: int
     due: float
-    ending: BurstEnd | None
     place: int = 0
 
     def take(self, now: float) -> Frame | None:
         """The next frame; None where the burst has ended."""
-        if self.ending is not None and now >= self.ending.at:
-            return self.ending.frame
-        frame = self.frames[self.place]
-        self.place = (self.place + 1) % len(self.frames)
+        frames, ending = self.burst.frames, self.burst.ending
+        if ending is not None and now >= ending.at:
+            return ending.frame
+        frame = frames[self.place]
+        self.place = (self.place + 1) % len(frames)
         return frame
 
 
@@ -35,26 +34,15 @@ class SoftBursts:
     def __init__(self) -> None:
         self._jobs: dict[int, _Job] = {}
 
-    def start(
-        self,
-        frames: tuple[Frame, ...],
-        now: float,
-        period_s: float,
-        count: int,
-        *,
-        at_once: bool,
-        ending: BurstEnd | None = None,
-    ) -> Frame | None:
+    def start(self, burst: Burst, now: float, *, at_once: bool) -> Frame | None:
         """Start or renew; gives the frame that is to be sent right now."""
-        job = self._jobs.get(frames[0].can_id)
-        if job is None or job.period_s != period_s:
-            job = self._jobs[frames[0].can_id] = _Job(frames, period_s, count - 1, now + period_s, ending)
+        job = self._jobs.get(burst.can_id)
+        if job is None or job.burst.period_s != burst.period_s:
+            job = self._jobs[burst.can_id] = _Job(burst, burst.total - 1, now + burst.period_s)
             return job.take(now)
-        if len(frames) != len(job.frames):
+        if len(burst.frames) != len(job.burst.frames):
             job.place = 0
-        job.frames = frames
-        job.left = count
-        job.ending = ending
+        job.burst, job.left = burst, burst.total
         return job.take(now) if at_once else None
 
     def __contains__(self, can_id: int) -> bool:
@@ -84,9 +72,10 @@ class SoftBursts:
                 continue
             frames.append(frame)
             job.left -= 1
-            missed = int((now - job.due) / job.period_s)
+            period_s = job.burst.period_s
+            missed = int((now - job.due) / period_s)
             job.left -= missed
-            job.due += (missed + 1) * job.period_s
+            job.due += (missed + 1) * period_s
         # SYNC last: an RPDO that is due with it is taken over by it and not by the next one.
         frames.sort(key=lambda frame: frame.can_id == _SYNC)
         return frames

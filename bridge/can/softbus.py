@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Final
 
-from bridge.can.burstend import BurstEnd
+from bridge.can.burstend import Burst
 from bridge.can.interface import BusStatus
 from bridge.can.softbursts import SoftBursts
 from bridge.can.wirebits import WireBits
@@ -53,19 +53,10 @@ class SoftBus(ABC):
     def _give(self, frame: Frame, now: float) -> None:
         """A frame for ``drain``."""
 
-    def burst(
-        self,
-        frames: tuple[Frame, ...],
-        now: float,
-        period_s: float,
-        count: int,
-        *,
-        at_once: bool = False,
-        ending: BurstEnd | None = None,
-    ) -> None:
-        frame = self._bursts.start(frames, now, period_s, count, at_once=at_once, ending=ending)
+    def burst(self, burst: Burst, now: float, *, at_once: bool = False) -> None:
+        frame = self._bursts.start(burst, now, at_once=at_once)
         if frame is not None:
-            self._send_of_burst(frame, now, period_s)
+            self._send_of_burst(frame, now, burst.period_s)
 
     def end_burst(self, can_id: int) -> None:
         self._bursts.end(can_id)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bridge.can.burstend import BurstEnd
+from bridge.can.burstend import Burst
 from bridge.can.interface import Bus, BusStatus
 from bridge.canopen.frame import Frame
 
@@ -71,23 +71,13 @@ class MutableBus:
             default=float("-inf"),
         )
 
-    def burst(
-        self,
-        frames: tuple[Frame, ...],
-        now: float,
-        period_s: float,
-        count: int,
-        *,
-        at_once: bool = False,
-        ending: BurstEnd | None = None,
-    ) -> None:
-        can_id = frames[0].can_id
-        if self._mutes(can_id):
+    def burst(self, burst: Burst, now: float, *, at_once: bool = False) -> None:
+        if self._mutes(burst.can_id):
             return
-        if can_id not in self._bursting:
-            self._bursting.add(can_id)
+        if burst.can_id not in self._bursting:
+            self._bursting.add(burst.can_id)
             self.accept(self._accepted)
-        self._bus.burst(frames, now, period_s, count, at_once=at_once, ending=ending)
+        self._bus.burst(burst, now, at_once=at_once)
 
     def end_burst(self, can_id: int) -> None:
         self._bus.end_burst(can_id)

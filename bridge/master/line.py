@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Final
 
-from bridge.can.burstend import MOST_FRAMES, BurstEnd
+from bridge.can.burstend import MOST_FRAMES, Burst, BurstEnd
 from bridge.can.interface import Bus, ControllerState
 from bridge.canopen.frame import Frame
 from bridge.canopen.sync import burst_length
@@ -74,6 +74,6 @@ class Line:
         if beat.until is not None and beat.until < now + 2 * self.burst_s + beat.period_s:
             ending = BurstEnd(beat.until, beat.then())
         count = burst_length(beat.period_s, self.network.bus.deadman_ms)
-        self.bus.burst(beat.frames, now, beat.period_s, count, at_once=at_once, ending=ending)
+        self.bus.burst(Burst(beat.frames, beat.period_s, count, ending), now, at_once=at_once)
         ends = now + self.burst_s + beat.period_s
         self.beating[beat.frames[0].can_id] = Told(beat.frames, beat.until, ends, now)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.can.burstend import BurstEnd
+from bridge.can.burstend import Burst, BurstEnd
 from bridge.can.socketcan import SocketCanBus
 from bridge.canopen.frame import Frame
 from bridge.canopen.sync import burst_length
@@ -49,12 +49,12 @@ async def test_a_renewal_that_was_held_up_on_its_way_ends_no_burst_for_good() ->
         bus.open(lambda: None)
         bus.accept([])
         try:
-            bus.burst((RPDO,), time.monotonic(), period_s, count)
+            bus.burst(Burst((RPDO,), period_s, count), time.monotonic())
             await asyncio.sleep(0.2)
             decided_at = time.monotonic()
             await asyncio.sleep(0.35)
             late = time.time()
-            bus.burst((RPDO,), decided_at, period_s, count)
+            bus.burst(Burst((RPDO,), period_s, count), decided_at)
             await asyncio.sleep(0.1)
         finally:
             bus.close()
@@ -82,7 +82,7 @@ async def test_a_burst_that_nobody_renews_any_more_stops_at_its_deadline(
             deadline = time.time() + 0.2
             while time.monotonic() < at - 0.05:
                 ending = BurstEnd(at, stop)
-                bus.burst((RPDO,), time.monotonic(), period_s, count, ending=ending)
+                bus.burst(Burst((RPDO,), period_s, count, ending), time.monotonic())
                 await asyncio.sleep(DEADMAN_MS / 3000)
             renewed = time.time()
             await asyncio.sleep(0.4)
@@ -109,7 +109,7 @@ async def test_a_deadline_that_moves_moves_the_stop() -> None:
             end = time.monotonic() + 1.0
             begin = time.time()
             while (now := time.monotonic()) < end:
-                bus.burst((RPDO,), now, 0.01, 10, ending=BurstEnd(now + 0.08, STOP))
+                bus.burst(Burst((RPDO,), 0.01, 10, BurstEnd(now + 0.08, STOP)), now)
                 await asyncio.sleep(0.01)
         finally:
             bus.close()
@@ -124,7 +124,7 @@ async def renew(bus: SocketCanBus, period_s: float, count: int, seconds: float) 
     renew_at = 0.0
     while (now := time.monotonic()) < end:
         if now >= renew_at:
-            bus.burst((RPDO,), now, period_s, count)
+            bus.burst(Burst((RPDO,), period_s, count), now)
             renew_at = now + DEADMAN_MS / 3000
         bus.on_time(now)
         await asyncio.sleep(0.003)

@@ -16,6 +16,7 @@ from collections.abc import AsyncIterator, Callable
 import pytest
 
 from bridge.can import netlink
+from bridge.can.burstend import Burst
 from bridge.can.interface import ControllerState
 from bridge.can.socketcan import SocketCanBus
 from bridge.canopen.frame import ERROR, Frame
@@ -68,7 +69,7 @@ class Loop:
         self.bus.send(frame, now, now + 0.1)
 
     def beat(self, *frames: Frame, period_s: float = 0.01, count: int = 10, at_once: bool = False) -> None:
-        self.bus.burst(frames, time.monotonic(), period_s, count, at_once=at_once)
+        self.bus.burst(Burst(frames, period_s, count), time.monotonic(), at_once=at_once)
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bridge.can.burstend import BurstEnd
+from bridge.can.burstend import Burst
 from bridge.can.interface import BusStatus, ControllerState
 from bridge.can.softbursts import SoftBursts
 from bridge.canopen.frame import Frame
@@ -77,17 +77,8 @@ class ClockBus:
         if self.status.state is not ControllerState.DOWN:
             self._deliver(frame._replace(time=now))
 
-    def burst(
-        self,
-        frames: tuple[Frame, ...],
-        now: float,
-        period_s: float,
-        count: int,
-        *,
-        at_once: bool = False,
-        ending: BurstEnd | None = None,
-    ) -> None:
-        frame = self._bursts.start(frames, now, period_s, count, at_once=at_once, ending=ending)
+    def burst(self, burst: Burst, now: float, *, at_once: bool = False) -> None:
+        frame = self._bursts.start(burst, now, at_once=at_once)
         if frame is not None:
             self._send_of_burst(frame, now)
 

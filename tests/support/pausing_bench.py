@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
-from bridge.can.burstend import BurstEnd
+from bridge.can.burstend import Burst
 from bridge.can.interface import ControllerState
 from bridge.can.kernelbursts import KernelBursts
 from bridge.canopen.frame import Frame
@@ -49,17 +49,8 @@ class KernelBus(ClockBus):
         self.bursts = KernelBursts(bench.clock)
         self.bursts.open(self.kernel)
 
-    def burst(
-        self,
-        frames: tuple[Frame, ...],
-        now: float,
-        period_s: float,
-        count: int,
-        *,
-        at_once: bool = False,
-        ending: BurstEnd | None = None,
-    ) -> None:
-        frame = self.bursts.start(frames, now, period_s, count, at_once=at_once, ending=ending)
+    def burst(self, burst: Burst, now: float, *, at_once: bool = False) -> None:
+        frame = self.bursts.start(burst, now, at_once=at_once)
         if frame is not None and self.status.state is not ControllerState.DOWN:
             self.send(frame, now, now)
 

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import time
 
+from bridge.can.burstend import Burst
 from bridge.can.socketcan import SocketCanBus
 from bridge.canopen.frame import Frame
 from tests.bench.figures import show
@@ -34,7 +35,7 @@ async def cpu_us(*, watched: bool) -> float:
             if now >= renew_at:
                 renew_at = now + 0.033
                 for frame in RPDOS:
-                    bus.burst((frame,), now, PERIOD_S, 10)
+                    bus.burst(Burst((frame,), PERIOD_S, 10), now)
             assert bus.take_foreign(now) == []
             bus.on_time(now)
             await asyncio.sleep(0.01)

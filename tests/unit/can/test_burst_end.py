@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.can.burstend import MOST_FRAMES, BurstEnd, sequence
+from bridge.can.burstend import MOST_FRAMES, Burst, BurstEnd, sequence
 from bridge.can.kernelbursts import KernelBursts
 from bridge.can.softbursts import SoftBursts
 from bridge.canopen.frame import Frame
@@ -54,7 +54,7 @@ class Bench:
     def beat(
         self, frame: Frame = RUN, *, ending: BurstEnd | None, at_once: bool = False, count: int = 10
     ) -> None:
-        self.beats.start((frame,), self.now, PERIOD_S, count, at_once=at_once, ending=ending)
+        self.beats.start(Burst((frame,), PERIOD_S, count, ending), self.now, at_once=at_once)
 
     def run(self, seconds: float) -> None:
         end = self.now + seconds
@@ -73,7 +73,7 @@ class Bench:
 def test_a_sequence_never_stops_before_the_deadline_and_enables_a_period_after_it_at_most(
     left_s: float, period_s: float, count: int
 ) -> None:
-    found = sequence(RUN, BurstEnd(left_s, STOP), 0.0, period_s, count)
+    found = sequence(Burst((RUN,), period_s, count, BurstEnd(left_s, STOP)), 0.0)
     assert len(found.frames) == min(count, MOST_FRAMES)
     sent = [found.frames[n % len(found.frames)] for n in range(found.total)]
     going = sent.count(RUN)
@@ -186,12 +186,12 @@ def test_who_renews_a_burst_has_it_on_the_bus_wherever_the_bridge_stood_still(
 def test_a_timer_of_ours_keeps_it_as_well() -> None:
     soft = SoftBursts()
     ending = BurstEnd(0.045, STOP)
-    sent = [soft.start((RUN,), 0.0, PERIOD_S, 10, at_once=False, ending=ending)]
+    sent = [soft.start(Burst((RUN,), PERIOD_S, 10, ending), 0.0, at_once=False)]
     for ms in range(1, 200):
         sent += soft.due(ms / 1000)
     assert sent == [RUN] * 5 + [STOP] * 5
     silent = SoftBursts()
-    silent.start((RUN,), 0.0, PERIOD_S, 10, at_once=False, ending=BurstEnd(0.045, None))
+    silent.start(Burst((RUN,), PERIOD_S, 10, BurstEnd(0.045, None)), 0.0, at_once=False)
     assert len([frame for ms in range(1, 200) for frame in silent.due(ms / 1000)]) == math.floor(4.5)
     assert 0x205 not in silent
 

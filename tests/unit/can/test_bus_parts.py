@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.can import bcm, netlink
+from bridge.can.burstend import Burst
 from bridge.can.errorframe import ControllerState, describe, judge
 from bridge.can.explain import WrongBitrate, explain
 from bridge.can.outbox import Outbox
@@ -163,12 +164,12 @@ def test_the_outbox_is_bounded_and_may_be_cleared_while_it_sends() -> None:
 def test_a_burst_of_several_frames_takes_turns_and_keeps_its_place_when_renewed() -> None:
     beats = SoftBursts()
     frames = tuple(Frame(0x80, bytes((number,))) for number in range(1, 5))
-    first = beats.start(frames, 0.0, 0.01, 10, at_once=False)
+    first = beats.start(Burst(frames, 0.01, 10), 0.0, at_once=False)
     sent = [first.data[0]] if first else []
     for step in range(1, 25):
         now = step * 0.01 + 1e-6
         if step % 4 == 0:
-            assert beats.start(frames, now - 0.005, 0.01, 10, at_once=False) is None
+            assert beats.start(Burst(frames, 0.01, 10), now - 0.005, at_once=False) is None
         sent += [frame.data[0] for frame in beats.due(now)]
     assert sent == [number % 4 + 1 for number in range(len(sent))]
     assert len(sent) == 25

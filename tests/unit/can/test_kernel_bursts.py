@@ -8,6 +8,7 @@ import struct
 
 import pytest
 
+from bridge.can.burstend import Burst
 from bridge.can.kernelbursts import KernelBursts
 from bridge.canopen.frame import Frame
 
@@ -54,8 +55,8 @@ def kernel() -> Kernel:
 def beats(kernel: Kernel) -> KernelBursts:
     beats = KernelBursts(lambda: kernel.now)
     beats.open(kernel)
-    assert beats.start((RUN,), 0.0, PERIOD_S, 10, at_once=True) is None
-    assert beats.start((OTHER,), 0.0, PERIOD_S, 10, at_once=True) is None
+    assert beats.start(Burst((RUN,), PERIOD_S, 10), 0.0, at_once=True) is None
+    assert beats.start(Burst((OTHER,), PERIOD_S, 10), 0.0, at_once=True) is None
     return beats
 
 
@@ -68,7 +69,7 @@ def test_a_stop_that_the_kernel_refuses_is_tried_again_a_millisecond_later(
     kernel: Kernel, beats: KernelBursts, number: int
 ) -> None:
     kernel.refuses = number
-    assert beats.start((STOP,), 0.02, PERIOD_S, 10, at_once=True) is None
+    assert beats.start(Burst((STOP,), PERIOD_S, 10), 0.02, at_once=True) is None
     assert control_word(kernel) == RUN.data
     assert beats.next_deadline() == pytest.approx(0.021)
     kernel.refuses = None
@@ -80,8 +81,8 @@ def test_a_stop_that_the_kernel_refuses_is_tried_again_a_millisecond_later(
 
 def test_the_newest_words_are_those_that_are_tried_again(kernel: Kernel, beats: KernelBursts) -> None:
     kernel.refuses = errno.ENOBUFS
-    beats.start((RUN._replace(data=b"\xff\x04"),), 0.02, PERIOD_S, 10, at_once=True)
-    beats.start((STOP,), 0.0205, PERIOD_S, 10, at_once=False)
+    beats.start(Burst((RUN._replace(data=b"\xff\x04"),), PERIOD_S, 10), 0.02, at_once=True)
+    beats.start(Burst((STOP,), PERIOD_S, 10), 0.0205, at_once=False)
     kernel.refuses = None
     beats.on_time(0.022)
     assert control_word(kernel) == STOP.data
@@ -92,7 +93,7 @@ def test_a_burst_that_the_kernel_never_took_is_started_not_refilled(kernel: Kern
     beats = KernelBursts(lambda: kernel.now)
     beats.open(kernel)
     kernel.refuses = errno.ENOMEM
-    beats.start((RUN,), 0.0, PERIOD_S, 10, at_once=True)
+    beats.start(Burst((RUN,), PERIOD_S, 10), 0.0, at_once=True)
     kernel.refuses = None
     beats.on_time(0.001)
     assert control_word(kernel) == RUN.data
@@ -102,10 +103,10 @@ def test_a_burst_that_may_have_ended_while_its_renewal_was_on_its_way_is_started
     kernel: Kernel, beats: KernelBursts
 ) -> None:
     kernel.now = 0.0799
-    beats.start((STOP,), 0.079, PERIOD_S, 10, at_once=True)
+    beats.start(Burst((STOP,), PERIOD_S, 10), 0.079, at_once=True)
     assert kernel.said[-1] == (SETUP, 1 | 8, 0x205), "it runs: its phase is kept"
     kernel.now = 0.081
-    beats.start((OTHER,), 0.079, PERIOD_S, 10, at_once=False)
+    beats.start(Burst((OTHER,), PERIOD_S, 10), 0.079, at_once=False)
     assert kernel.said[-3:] == [(SETUP, 1, 0x305), (DELETE, 0, 0x305), (SETUP, 1 | START, 0x305)]
 
 
@@ -113,9 +114,9 @@ def test_a_renewal_that_was_on_its_way_for_longer_than_its_burst_wakes_none(
     kernel: Kernel, beats: KernelBursts
 ) -> None:
     kernel.now = 0.02 + 10 * PERIOD_S
-    beats.start((RUN,), 0.02, PERIOD_S, 10, at_once=True)
+    beats.start(Burst((RUN,), PERIOD_S, 10), 0.02, at_once=True)
     assert kernel.said[-1] == (DELETE, 0, 0x205)
-    beats.start((RUN,), kernel.now, PERIOD_S, 10, at_once=False)
+    beats.start(Burst((RUN,), PERIOD_S, 10), kernel.now, at_once=False)
     assert kernel.said[-1] == (SETUP, 1 | START, 0x205), "the next one does"
 
 
@@ -123,7 +124,7 @@ def test_a_kernel_that_goes_on_refusing_loses_every_burst_and_we_send_them(
     kernel: Kernel, beats: KernelBursts
 ) -> None:
     kernel.refuses = errno.ENOMEM
-    beats.start((STOP,), 0.02, PERIOD_S, 10, at_once=True)
+    beats.start(Burst((STOP,), PERIOD_S, 10), 0.02, at_once=True)
     now, sent = 0.02, list[Frame]()
     while not beats.refusal:
         deadline = beats.next_deadline()
@@ -136,21 +137,21 @@ def test_a_kernel_that_goes_on_refusing_loses_every_burst_and_we_send_them(
     assert sorted(frame.data for frame in sent) == sorted([STOP.data, OTHER.data]), "the new word, at once"
     assert beats.refusal == "Cannot allocate memory"
     assert sorted(f.can_id for f in beats.on_time(now + PERIOD_S)) == [0x205, 0x305]
-    assert beats.start((RUN,), now + 0.012, PERIOD_S, 10, at_once=True) == RUN, "we send what changes"
+    assert beats.start(Burst((RUN,), PERIOD_S, 10), now + 0.012, at_once=True) == RUN, "we send what changes"
 
 
 def test_a_kernel_that_takes_bursts_again_gets_them_back_without_a_gap(
     kernel: Kernel, beats: KernelBursts
 ) -> None:
     kernel.refuses = errno.ENOMEM
-    beats.start((STOP,), 0.02, PERIOD_S, 10, at_once=True)
+    beats.start(Burst((STOP,), PERIOD_S, 10), 0.02, at_once=True)
     for ms in range(21, 33):
         beats.on_time(ms / 1000)
     assert beats.refusal
     again = Kernel()
     beats.open(again)
     again.refuses = errno.ENOMEM
-    beats.start((STOP,), 0.035, PERIOD_S, 10, at_once=False)
+    beats.start(Burst((STOP,), PERIOD_S, 10), 0.035, at_once=False)
     assert 0x205 in {frame.can_id for frame in beats.on_time(0.042)}, "until it takes it, we go on"
     again.refuses = None
     beats.on_time(0.0435)
@@ -162,7 +163,7 @@ def test_a_burst_that_is_silenced_while_its_renewal_waits_is_deleted(
     kernel: Kernel, beats: KernelBursts
 ) -> None:
     kernel.refuses = errno.ENOBUFS
-    beats.start((STOP,), 0.02, PERIOD_S, 10, at_once=True)
+    beats.start(Burst((STOP,), PERIOD_S, 10), 0.02, at_once=True)
     beats.end(0x205, 0.0205)
     kernel.refuses = None
     beats.on_time(0.022)
@@ -174,7 +175,7 @@ def test_an_outage_ends_what_the_kernel_holds_even_after_a_refusal(
     kernel: Kernel, beats: KernelBursts
 ) -> None:
     kernel.refuses = errno.EAGAIN
-    beats.start((STOP,), 0.02, PERIOD_S, 10, at_once=True)
+    beats.start(Burst((STOP,), PERIOD_S, 10), 0.02, at_once=True)
     kernel.refuses = None
     beats.end_all(0.0205)
     assert not kernel.holds
@@ -195,5 +196,5 @@ def test_a_deletion_that_is_refused_for_long_ends_the_bursts_by_closing(
 def test_an_interface_that_is_gone_is_told(kernel: Kernel, beats: KernelBursts, number: int) -> None:
     kernel.refuses = number
     with pytest.raises(OSError):
-        beats.start((STOP,), 0.02, PERIOD_S, 10, at_once=True)
+        beats.start(Burst((STOP,), PERIOD_S, 10), 0.02, at_once=True)
     assert not beats.refusal

@@ -7,6 +7,7 @@ import time
 from collections.abc import Collection
 
 from bridge.can.bcm import frame_bytes
+from bridge.can.burstend import Burst
 from bridge.can.foreignwatch import LOOK_S
 from bridge.can.socketcan import SocketCanBus
 from bridge.canopen.frame import Frame
@@ -23,8 +24,8 @@ async def test_our_own_sync_comes_back_where_the_bridge_itself_sends_it() -> Non
         try:
             bus.accept([0x080, 0x185])
             now = time.monotonic()
-            bus.burst((HEARTBEAT,), now, 0.2, 1)
-            bus.burst((SYNC,), now, 0.2, 1)
+            bus.burst(Burst((HEARTBEAT,), 0.2, 1), now)
+            bus.burst(Burst((SYNC,), 0.2, 1), now)
             assert [far.recv(64) for _ in range(2)] == [frame_bytes(HEARTBEAT), frame_bytes(SYNC)]
             far.send(frame_bytes(Frame(0x185, b"\x31\x0b")))
             frames = bus.drain(now)
@@ -43,7 +44,7 @@ async def test_a_later_one_of_a_burst_does_so_too() -> None:
         try:
             bus.accept([0x080])
             now = time.monotonic()
-            bus.burst((SYNC,), now, 0.2, 3)
+            bus.burst(Burst((SYNC,), 0.2, 3), now)
             bus.drain(now)
             bus.on_time(now + 0.2)
             assert [frame.can_id for frame in bus.drain(now + 0.2)] == [0x080]
@@ -75,7 +76,7 @@ async def test_what_comes_back_without_any_mark_is_told_from_anothers_by_what_it
             now = time.monotonic()
             own, boot_up = Frame(0x205, bytes(8)), Frame(0x77F, b"\0")
             bus.send(boot_up, now, now + 0.1)
-            bus.burst((own,), now, 0.01, 10, at_once=True)
+            bus.burst(Burst((own,), 0.01, 10), now, at_once=True)
             stranger, elsewhere = Frame(0x205, b"\x7f\x04" + bytes(6)), Frame(0x185, bytes(8))
             for frame in (boot_up, own, stranger, own, elsewhere):
                 sockets.back.send(frame_bytes(frame))

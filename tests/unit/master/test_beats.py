@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-from bridge.canopen.frame import Frame
+from bridge.can.burstend import Burst
 from bridge.command import Action, Outcome, Request, Write
 from bridge.command.link import NodeState
 from bridge.config import load_site
@@ -79,11 +78,11 @@ def test_a_setpoint_is_there_before_the_enable_and_renewed_after_the_control_wor
     bench = PausingBench(load_site(sites.write(tmp_path, sites.bus(node), sites.modbus(), name="bench")))
     bench.run(3.0)
     told: list[tuple[int, bool]] = []
-    burst = bench.bus.burst
+    begin = bench.bus.burst
 
-    def note(frames: tuple[Frame, ...], now: float, period_s: float, count: int, **options: Any) -> None:
-        told.append((frames[0].can_id, options["at_once"]))
-        burst(frames, now, period_s, count, **options)
+    def note(burst: Burst, now: float, *, at_once: bool = False) -> None:
+        told.append((burst.can_id, at_once))
+        begin(burst, now, at_once=at_once)
 
     bench.bus.burst = note
     for word in (0x047E, 0x047F):

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from bridge.can.burstend import Burst
 from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtState
@@ -229,9 +230,9 @@ def test_a_process_stopped_while_it_sends_sends_nothing_that_was_right_before(
     running(bench)
     send = bench.bus.burst
 
-    def stand_still_after(frames: tuple[Frame, ...], now: float, period_s: float, count: int, **more: bool):
-        send(frames, now, period_s, count, **more)
-        if frames[0].can_id == HEARTBEAT:
+    def stand_still_after(burst: Burst, now: float, **more: bool) -> None:
+        send(burst, now, **more)
+        if burst.can_id == HEARTBEAT:
             bench.now += 1.0
 
     # A telegram that comes when the heartbeat's burst begins, which is told before the RPDO's.

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge.can.burstend import Burst
 from bridge.can.softbursts import SoftBursts
 from bridge.canopen import emcy, nmt
 from bridge.canopen.frame import REMOTE, Frame
@@ -102,7 +103,9 @@ RPDO = Frame(0x205, bytes(8))
 
 def test_a_burst_nobody_renews_ends_by_itself() -> None:
     beats = SoftBursts()
-    assert beats.start((RPDO,), 0.0, 0.01, 10, at_once=False) == RPDO, "the first frame goes out at once"
+    assert beats.start(Burst((RPDO,), 0.01, 10), 0.0, at_once=False) == RPDO, (
+        "the first frame goes out at once"
+    )
     times = []
     now = 0.0
     while (due := beats.next_deadline()) is not None and now < 10:
@@ -114,8 +117,8 @@ def test_a_burst_nobody_renews_ends_by_itself() -> None:
 
 def test_a_renewed_burst_keeps_its_phase_and_takes_the_new_data() -> None:
     beats = SoftBursts()
-    beats.start((RPDO,), 0.0, 0.01, 10, at_once=False)
-    assert not beats.start((RPDO._replace(data=b"x"),), 0.0149, 0.01, 10, at_once=False)
+    beats.start(Burst((RPDO,), 0.01, 10), 0.0, at_once=False)
+    assert not beats.start(Burst((RPDO._replace(data=b"x"),), 0.01, 10), 0.0149, at_once=False)
     assert beats.next_deadline() == 0.01
     assert beats.due(0.015) == [RPDO._replace(data=b"x")]
     assert beats.next_deadline() == 0.02
@@ -124,7 +127,7 @@ def test_a_renewed_burst_keeps_its_phase_and_takes_the_new_data() -> None:
 @given(st.lists(st.floats(0.0, 0.5), min_size=1, max_size=50), st.integers(1, 20))
 def test_a_late_timer_sends_no_bunch_and_no_more_than_was_asked(pauses: list[float], count: int) -> None:
     beats = SoftBursts()
-    now, sent = 0.0, int(beats.start((RPDO,), 0.0, 0.01, count, at_once=False) is not None)
+    now, sent = 0.0, int(beats.start(Burst((RPDO,), 0.01, count), 0.0, at_once=False) is not None)
     for pause in pauses:
         now += pause
         frames = beats.due(now)

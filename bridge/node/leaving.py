@@ -32,7 +32,7 @@ class Leaving:
     @property
     def is_due(self) -> bool:
         """A command waits for stopped words to be taken over."""
-        return self._wire.put_off is not None
+        return self._wire.put_off.command is not None
 
     @property
     def is_stopped_by_nmt(self) -> bool:
@@ -58,7 +58,7 @@ class Leaving:
         ``at_once``: it has had them for long."""
         wait_s = 0.0 if at_once else self.takeover_s
         if wait_s or self.is_due:
-            self._wire.put_nmt_off(command, now, wait_s)
+            self._wire.put_off.begin(command, now, wait_s)
         else:
             self._wire.send_nmt(command)
 
@@ -88,12 +88,12 @@ class Leaving:
 
     def forget(self) -> None:
         self._owed = None
-        self._wire.drop_put_off()
+        self._wire.put_off.clear()
 
     def on_bus_gone(self, *, stays_stopped: bool) -> None:
         """``stays_stopped``: the node is not booted again by itself when the bus is back."""
         if stays_stopped:
-            self._owed = self._wire.put_off or self._owed
+            self._owed = self._wire.put_off.command or self._owed
 
     def on_bus_back(self, now: float) -> None:
         command, self._owed = self._owed, None

@@ -60,7 +60,8 @@ class NodeWire:
         self.routes: dict[int, Handler] = self._basic_routes()
         self.routes_changed = True
         self._frames: list[Frame] = []
-        self._put_off = PutOff()
+        self.put_off = PutOff()
+        """The NMT command that waits for stopped words to be taken over; stopped words go on until then."""
 
     def _basic_routes(self) -> dict[int, Handler]:
         routes: dict[int, Handler] = {
@@ -82,24 +83,11 @@ class NodeWire:
     def clear(self) -> None:
         """Send nothing that waits: the bus is gone."""
         self._frames.clear()
-        self._put_off.clear()
-
-    @property
-    def put_off(self) -> NmtCommand | None:
-        """The NMT command that waits for stopped words to be taken over; stopped words go on until then."""
-        return self._put_off.command
-
-    def put_nmt_off(self, command: NmtCommand, now: float, wait_s: float) -> None:
-        """Send it when the stopped words that go before it have been taken over. Takes the place of another
-        one that waits, and goes at the time of that."""
-        self._put_off.begin(command, now, wait_s)
-
-    def drop_put_off(self) -> None:
-        self._put_off.clear()
+        self.put_off.clear()
 
     def send_nmt(self, command: NmtCommand) -> None:
         """Now, and nothing that waits after it."""
-        self._put_off.clear()
+        self.put_off.clear()
         self._frames.append(nmt.command(command, self._node.table.id))
 
     def carry_out(self, action: boot.Action) -> None:
@@ -149,7 +137,7 @@ class NodeWire:
         self._emergencies.on_time(now)
         self.faults.on_time(now)
         self.sdo.on_time(now)
-        command = self._put_off.on_time(now)
+        command = self.put_off.on_time(now)
         if command is not None:
             self.send_nmt(command)
 
@@ -160,7 +148,7 @@ class NodeWire:
             self.polling.next_deadline(),
             self._emergencies.next_deadline(),
             self.faults.next_deadline(),
-            self._put_off.next_deadline(),
+            self.put_off.next_deadline(),
         )
         return min((time for time in times if time is not None), default=None)
 

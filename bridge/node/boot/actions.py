@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.canopen.dialogue import Read, Write
 from bridge.canopen.nmt import NmtCommand, NmtState
+from bridge.canopen.sdo import SdoError
 from bridge.command import Identification
 from bridge.drive import OwnJudgement
 from bridge.node.boot.memory import BootMemory
@@ -151,6 +153,17 @@ class BootResult:
 
 Boot = Generator[Action, bytes | None, BootResult]
 Do = Generator[Action, bytes | None, None]
+
+
+@contextmanager
+def told_as(error: Callable[[SdoError], Exception]) -> Generator[None]:
+    """Around steps that the node must not refuse: raises ``error`` where it does. Silence remains silence."""
+    try:
+        yield
+    except SdoError as refusal:
+        if not refusal.by_server:
+            raise
+        raise error(refusal) from None
 
 
 _LONGEST_NUMBER: Final = 8

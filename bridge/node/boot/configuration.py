@@ -14,7 +14,7 @@ from typing import Final
 from bridge.canopen.dialogue import Read, Write, optional
 from bridge.canopen.sdo import SdoError
 from bridge.config.download import Download
-from bridge.node.boot.actions import Action, BootResult, Do, Step, number, same
+from bridge.node.boot.actions import Action, BootResult, Do, Step, number, same, told_as
 from bridge.node.boot.memory import NOT_AGAIN, BootMemory
 from bridge.node.boot.pdo_downloads import download_pdo, is_pdo, pdo_parameter
 from bridge.node.boot.status import BootError
@@ -147,24 +147,18 @@ def _not_kept(download: Download, read: bytes | None) -> BootError:
 
 
 def _read_back(download: Download, memory: BootMemory) -> Generator[Action, bytes | None, bytes | None]:
-    try:
-        return (yield Read(download.index, download.sub))
-    except SdoError as error:
-        if not error.by_server:
-            raise
+    def unreadable(error: SdoError) -> BootError:
         memory.note_not_kept(download.index, download.sub, download.data)
-        raise BootError(
-            "J", f"{error}; {_shown(download.data)} was written and cannot be read back; {NOT_AGAIN}"
-        ) from None
+        what = f"{_shown(download.data)} was written and cannot be read back"
+        return BootError("J", f"{error}; {what}; {NOT_AGAIN}")
+
+    with told_as(unreadable):
+        return (yield Read(download.index, download.sub))
 
 
 def _write(download: Download) -> Do:
-    try:
+    with told_as(lambda error: BootError("J", f"{error}; it was to become {_shown(download.data)}")):
         yield Write(download.index, download.sub, download.data)
-    except SdoError as error:
-        if not error.by_server:
-            raise
-        raise BootError("J", f"{error}; it was to become {_shown(download.data)}") from None
 
 
 def _shown(data: bytes | None) -> str:

@@ -6,9 +6,8 @@ import struct
 from typing import Final
 
 from bridge.canopen.dialogue import Write, optional
-from bridge.canopen.sdo import SdoError
 from bridge.config import NodeTable
-from bridge.node.boot.actions import BootResult, Do, Step, number, same
+from bridge.node.boot.actions import BootResult, Do, Step, number, same, told_as
 from bridge.node.boot.memory import NOT_AGAIN
 from bridge.node.boot.status import BootError
 
@@ -67,9 +66,5 @@ def _set_period(table: NodeTable, data: bytes, have: bytes | None, result: BootR
 
 
 def _write(table: NodeTable, index: int, data: bytes) -> Do:
-    try:
+    with told_as(lambda error: BootError("J", f"{table.supervision} is not possible: {error}")):
         yield Write(index, 0, data)
-    except SdoError as error:
-        if not error.by_server:
-            raise
-        raise BootError("J", f"{table.supervision} is not possible: {error}") from None

@@ -12,7 +12,7 @@ from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_supervision import judge
 from bridge.mapping.model import Family
 from bridge.mapping.own_places import OwnPlace, OwnWant, places, wanted
-from bridge.node.boot.actions import BootResult, Do, Step
+from bridge.node.boot.actions import BootResult, Do, Step, told_as
 from bridge.node.boot.memory import NOT_AGAIN
 from bridge.node.boot.status import BootError
 from bridge.node.sdo_channels import FIRST, channel_of
@@ -93,13 +93,13 @@ def _bring(node: Node, want: OwnWant, raw: Raws, channel: int, owner: str, resul
         except ParameterError as error:
             raise BootError("J", f"{owner}: {error}") from None
         result.notes += [warning] if warning else []
-    try:
-        yield Write(place.ref.index, place.ref.sub, data, channel)
-    except SdoError as error:
-        if not error.by_server:
-            raise
+
+    def refused(error: SdoError) -> BootError:
         memory.note_not_kept(tried, place.ref.sub, data)
-        raise BootError("J", f"{owner}: {place.name} was to become {want.value}: {error}") from None
+        return BootError("J", f"{owner}: {place.name} was to become {want.value}: {error}")
+
+    with told_as(refused):
+        yield Write(place.ref.index, place.ref.sub, data, channel)
     read = yield from optional(place.ref.index, place.ref.sub, channel)
     kept = None if read is None else place.number.decode(read)
     if kept != want.value:

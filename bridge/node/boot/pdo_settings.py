@@ -13,11 +13,10 @@ from typing import Final
 from bridge.canopen import cobid
 from bridge.canopen.dialogue import Write, optional
 from bridge.canopen.pdo import MappingError, PdoEntry
-from bridge.canopen.sdo import SdoError
 from bridge.config import PdoTable
 from bridge.config.model import MappedObject
 from bridge.mapping.model import Pdo
-from bridge.node.boot.actions import Action, BootResult, Do, number
+from bridge.node.boot.actions import Action, BootResult, Do, number, told_as
 from bridge.node.boot.memory import NOT_AGAIN, BootMemory
 
 FIXED_BITS: Final = 0x6000_0000
@@ -151,12 +150,8 @@ def write_pdo(
 
 
 def _write_one(change: Change) -> Do:
-    try:
+    with told_as(lambda error: MappingError(f"J: {error}; it was to become {change.value:X}h")):
         yield Write(change.index, change.sub, change.data)
-    except SdoError as error:
-        if not error.by_server:
-            raise
-        raise MappingError(f"J: {error}; it was to become {change.value:X}h") from None
 
 
 def _verify(change: Change, memory: BootMemory) -> Do:

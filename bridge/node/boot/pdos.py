@@ -14,13 +14,22 @@ from typing import Final
 from bridge.canopen import cobid
 from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.pdo import MappingError, PdoCodec, PdoEntry
-from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
 from bridge.command.plant import Node
 from bridge.config import PdoTable
 from bridge.image import DataType
 from bridge.mapping.model import Pdo
-from bridge.node.boot.actions import Action, BootResult, Do, DrivePlan, NodePdoPlan, PdoPlan, Step, number
+from bridge.node.boot.actions import (
+    Action,
+    BootResult,
+    Do,
+    DrivePlan,
+    NodePdoPlan,
+    PdoPlan,
+    Step,
+    number,
+    told_as,
+)
 from bridge.node.boot.layout import Layouts, differences, factory_entries, layouts, match_words
 from bridge.node.boot.pdo_settings import MOST_ENTRIES, PdoObjects, set_pdo, table_for
 from bridge.node.boot.start import write_start
@@ -229,12 +238,8 @@ def read_entries(mapping: int, count: int) -> Generator[Action, bytes | None, tu
         raise MappingError(f"{mapping:04X}h:00 is {count}, at most {MOST_ENTRIES} objects can be mapped")
     entries: tuple[PdoEntry, ...] = ()
     for sub in range(1, count + 1):
-        try:
+        with told_as(lambda error: MappingError(str(error))):
             value = number((yield Read(mapping, sub)))
-        except SdoError as error:
-            if not error.by_server:
-                raise
-            raise MappingError(str(error)) from None
         if value:  # some nodes have a fixed count, and 0 in the places that they do not use
             entries = (*entries, PdoEntry.from_object(value))
     return entries

@@ -8,10 +8,9 @@ from typing import Final
 from bridge.canopen import cobid
 from bridge.canopen.dialogue import Read, Write, optional
 from bridge.canopen.nmt import NmtCommand
-from bridge.canopen.sdo import SdoError
 from bridge.command.plant import Node
 from bridge.mapping.model import SdoServer
-from bridge.node.boot.actions import Action, BootResult, Do, Nmt, Step, number
+from bridge.node.boot.actions import Action, BootResult, Do, Nmt, Step, number, told_as
 from bridge.node.boot.status import BootError
 from bridge.node.sdo_channels import opened_servers
 
@@ -28,13 +27,10 @@ def open_sdo_servers(node: Node, result: BootResult) -> Do:
     """
     must_stop = False
     for server in opened_servers(node):
-        yield Step(f"opening SDO channel {server.number}", "J")
-        try:
+        name = f"SDO channel {server.number}"
+        yield Step(f"opening {name}", "J")
+        with told_as(lambda error, name=name: BootError("J", f"{name} cannot be opened: {error}")):
             changed = yield from _open(server, node.table.id, result)
-        except SdoError as error:
-            if not error.by_server:
-                raise
-            raise BootError("J", f"SDO channel {server.number} cannot be opened: {error}") from None
         must_stop = must_stop or (changed and server.after_stop)
     if must_stop:
         yield Nmt(NmtCommand.STOP)

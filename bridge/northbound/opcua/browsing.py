@@ -150,8 +150,10 @@ class Browser:
             return {type_id}
         return self._subtypes.setdefault(type_id, subtypes(self._space, type_id))
 
-    async def translate(self, paths: Sequence[ua.BrowsePath]) -> list[ua.BrowsePathResult]:
-        return [await self._translate(path) for path in paths]
+    async def translate(
+        self, params: ua.TranslateBrowsePathsToNodeIdsParameters
+    ) -> list[ua.BrowsePathResult]:
+        return [await self._translate(path) for path in get(params, "BrowsePaths")]
 
     async def _translate(self, path: ua.BrowsePath) -> ua.BrowsePathResult:
         elements: list[ua.RelativePathElement] = get(get(path, "RelativePath"), "Elements") or []

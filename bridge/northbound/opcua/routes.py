@@ -1,44 +1,43 @@
-"""Services that asyncua's processor answers by itself, or not at all, and that are carried out here."""
+"""The services of a session: what each is given, how much of it at once, and who carries it out.
+
+To asyncua's processor channels, sessions and discovery are left: of the other services it does some too
+freely, or says Good and does less (``tests/wire/opcua/test_security.py`` and ``test_services.py``).
+"""
 
 # asyncua's decoder has no types:
 # pyright: reportUnknownVariableType=false
 
 from __future__ import annotations
 
+import inspect
 import logging
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from asyncua.common.utils import Buffer
 from asyncua.ua.ua_binary import struct_from_binary
 
-from bridge.northbound.opcua.library import (
-    ObjectIds,
-    ServiceError,
-    StatusCodes,
-    UaError,
-    change,
-    get,
-    make,
-    node_id,
-    status,
-    ua,
-)
-from bridge.northbound.opcua.monitoring import loop_time
+from bridge.northbound.opcua.browsing import Browser
+from bridge.northbound.opcua.encoding import Results
+from bridge.northbound.opcua.library import ServiceError, StatusCodes, UaError, change, get, make, status, ua
+from bridge.northbound.opcua.monitoring import MonitoredItems, loop_time
 from bridge.northbound.opcua.publishing import MOST_BYTES, PublishRequest
-from bridge.northbound.opcua.session import MOST_OPERATIONS, Session
+from bridge.northbound.opcua.services import request_type
+from bridge.northbound.opcua.session import Session
+from bridge.northbound.opcua.subscription import Subscription
+from bridge.northbound.opcua.subscriptions import Subscriptions
+
+MOST_OPERATIONS: Final = 10_000
+MOST_CALLS: Final = 100
 
 _log = logging.getLogger(__name__)
 
-_BROWSE_NEXT: Final = node_id(ObjectIds.BrowseNextRequest_Encoding_DefaultBinary)
-_REGISTER: Final = node_id(ObjectIds.RegisterNodesRequest_Encoding_DefaultBinary)
-_UNREGISTER: Final = node_id(ObjectIds.UnregisterNodesRequest_Encoding_DefaultBinary)
-_PUBLISH: Final = node_id(ObjectIds.PublishRequest_Encoding_DefaultBinary)
-ROUTES: Final = frozenset((_BROWSE_NEXT, _REGISTER, _UNREGISTER, _PUBLISH))
-
 _UNSENDABLE: Final = (UaError, ValueError, TypeError, AttributeError, struct.error)
+
+_Act = Callable[[Session, Any], Any]
+"""Given the session and the parameters of the request."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,27 +50,110 @@ class Request:
     is_open: Callable[[], bool]
 
 
-async def carry_out(session: Session, typeid: ua.NodeId, request: Request) -> None:
-    """Carry out one of ``ROUTES``. Raises ServiceError for what is to be answered as a fault."""
-    if typeid == _PUBLISH:
-        _publish(session, request)
-    elif typeid == _BROWSE_NEXT:
-        params = struct_from_binary(ua.BrowseNextParameters, request.body)
-        results = await session.browse_next(params)
-        request.send(make(ua.BrowseNextResponse, Parameters=make(ua.BrowseNextResult, Results=results)))
-    elif typeid == _REGISTER:
-        params = struct_from_binary(ua.RegisterNodesParameters, request.body)
-        nodes = await session.register_nodes(get(params, "NodesToRegister"))
-        told = make(ua.RegisterNodesResult, RegisteredNodeIds=nodes)
-        request.send(make(ua.RegisterNodesResponse, Parameters=told))
-    else:
-        params = struct_from_binary(ua.UnregisterNodesParameters, request.body)
-        await session.unregister_nodes(get(params, "NodesToUnregister"))
-        request.send(ua.UnregisterNodesResponse())
+@dataclass(frozen=True, slots=True)
+class Route:
+    """``operations`` is the field of the parameters that has them, ``most`` how many there may be. What
+    ``act`` returns is the field ``answer`` of the response. Without it a Publish request waits until there is
+    something to tell."""
+
+    name: str
+    act: _Act | None
+    operations: str = ""
+    answer: str = "Results"
+    most: int = MOST_OPERATIONS
+
+    async def carry_out(self, session: Session, request: Request) -> None:
+        """Raises ServiceError for what is to be answered as a fault."""
+        params = struct_from_binary(get(ua, f"{self.name}Parameters"), request.body)
+        if self.operations:
+            _limit(get(params, self.operations), self.most)
+        if self.act is None:
+            _publish(session, params, request)
+            return
+        result = self.act(session, params)
+        if inspect.isawaitable(result):
+            result = await result
+        response = get(ua, f"{self.name}Response")()
+        if self.answer:
+            *above, field = self.answer.split(".")
+            change(get(response, above[0]) if above else response, **{field: result})
+        request.send(response)
 
 
-def _publish(session: Session, request: Request) -> None:
-    params = struct_from_binary(ua.PublishParameters, request.body)
+async def _browse(session: Session, params: Any) -> Results:
+    results = session.answer = Results(session.most_bytes)
+    await session.browser.browse(params, results)
+    return results
+
+
+def _write(session: Session, params: Any) -> Any:
+    return session.services.writer.write(session.identity, get(params, "NodesToWrite"))
+
+
+def _call(session: Session, params: Any) -> Any:
+    return session.services.caller.call(session.identity, get(params, "MethodsToCall"))
+
+
+def _view(act: Callable[[Browser, Any], Any]) -> _Act:
+    return lambda session, params: act(session.browser, params)
+
+
+def _subscription(act: Callable[[Subscriptions, Session, Any], Any]) -> _Act:
+    return lambda session, params: act(session.subscriptions, session, params)
+
+
+def _items(act: Callable[[MonitoredItems, Subscription, Any], Any]) -> _Act:
+    def act_on(session: Session, params: Any) -> Any:
+        subscriptions = session.subscriptions
+        return act(subscriptions.items, subscriptions.own(session, get(params, "SubscriptionId")), params)
+
+    return act_on
+
+
+_RESULTS: Final = "Parameters.Results"
+
+ROUTES: Final[Mapping[ua.NodeId, Route]] = {
+    request_type(route.name): route
+    for route in (
+        Route("Browse", _browse, "NodesToBrowse"),
+        Route("BrowseNext", _view(Browser.browse_next), "ContinuationPoints", _RESULTS),
+        Route("TranslateBrowsePathsToNodeIds", _view(Browser.translate), "BrowsePaths"),
+        Route(
+            "RegisterNodes",
+            lambda session, params: get(params, "NodesToRegister"),
+            "NodesToRegister",
+            "Parameters.RegisteredNodeIds",
+        ),
+        Route("UnregisterNodes", lambda session, params: None, "NodesToUnregister", ""),
+        Route("Read", Session.read_attributes, "NodesToRead"),
+        Route("Write", _write, "NodesToWrite"),
+        Route("Call", _call, "MethodsToCall", most=MOST_CALLS),
+        Route("CreateSubscription", Session.subscribe, answer="Parameters"),
+        Route("ModifySubscription", _subscription(Subscriptions.modify), answer="Parameters"),
+        Route(
+            "SetPublishingMode", _subscription(Subscriptions.set_publishing_mode), "SubscriptionIds", _RESULTS
+        ),
+        Route("Publish", None),
+        Route("Republish", _subscription(Subscriptions.republish), answer="NotificationMessage"),
+        Route("TransferSubscriptions", _subscription(Subscriptions.transfer), "SubscriptionIds", _RESULTS),
+        Route("DeleteSubscriptions", _subscription(Subscriptions.delete), "SubscriptionIds"),
+        Route("CreateMonitoredItems", _subscription(Subscriptions.create_items), "ItemsToCreate"),
+        Route("ModifyMonitoredItems", _items(MonitoredItems.modify), "ItemsToModify"),
+        Route("SetMonitoringMode", _items(MonitoredItems.set_mode), "MonitoredItemIds", _RESULTS),
+        Route("DeleteMonitoredItems", _items(MonitoredItems.delete), "MonitoredItemIds"),
+    )
+}
+"""By the type of the requests."""
+
+
+def _limit(operations: Sequence[object] | None, most: int) -> None:
+    if not operations:
+        raise ServiceError(StatusCodes.BadNothingToDo)
+    if len(operations) > most:
+        raise ServiceError(StatusCodes.BadTooManyOperations)
+
+
+def _publish(session: Session, params: ua.PublishParameters, request: Request) -> None:
     acknowledged: list[ua.SubscriptionAcknowledgement] = get(params, "SubscriptionAcknowledgements") or []
     if len(acknowledged) > MOST_OPERATIONS:
         raise ServiceError(StatusCodes.BadTooManyOperations)

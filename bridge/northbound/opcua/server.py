@@ -37,8 +37,9 @@ from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.notices import tell
 from bridge.northbound.opcua.publisher import Publisher
+from bridge.northbound.opcua.routes import MOST_CALLS
 from bridge.northbound.opcua.security import CheckedPolicy, Users, security_policies
-from bridge.northbound.opcua.session import MOST_CALLS, Server, Services
+from bridge.northbound.opcua.session import Server, Services
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View

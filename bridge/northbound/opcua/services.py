@@ -20,10 +20,10 @@ class Service:
     how: str
     refused: int | None = None
 
-    @property
-    def request(self) -> ua.NodeId:
-        """The type of its requests as it is on the wire."""
-        return node_id(get(ObjectIds, f"{self.name}Request_Encoding_DefaultBinary"))
+
+def request_type(name: str) -> ua.NodeId:
+    """The type of a service's requests as it is on the wire."""
+    return node_id(get(ObjectIds, f"{name}Request_Encoding_DefaultBinary"))
 
 
 def _no(name: str, why: str) -> Service:
@@ -106,7 +106,7 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
 """By service set, in the order of Part 4 §5."""
 
 REFUSED: Final[Mapping[ua.NodeId, int]] = {
-    service.request: service.refused
+    request_type(service.name): service.refused
     for services in SERVICES.values()
     for service in services
     if service.refused is not None

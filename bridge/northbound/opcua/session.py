@@ -1,8 +1,7 @@
-"""A client's session: its identity, and the services that asyncua does too freely.
+"""A client's session: its identity, what it may see, and what it holds.
 
-Corrected here, each with a test in ``tests/wire/opcua/test_security.py``: sequential session tokens,
-writes of anything anywhere, methods that are not executable, reads of what is not readable, calls
-without end, subscriptions of others; and in ``test_services.py``: services that say Good and do less.
+Corrected here, each with a test in ``tests/wire/opcua/test_security.py``: sequential session tokens, and
+reads of what is not readable.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, cast
 
@@ -48,8 +47,6 @@ from bridge.northbound.opcua.structures import READ
 from bridge.northbound.opcua.subscriptions import Subscriptions
 from bridge.northbound.opcua.writes import Writer
 
-MOST_OPERATIONS: Final = 10_000
-MOST_CALLS: Final = 100
 _LONGEST_SESSION_MS: Final = 120_000.0
 
 _FOR_ENGINEERS: Final = tuple(
@@ -128,15 +125,18 @@ class Session(InternalSession):
         self.user = User(UserRole.User, admitted.user)
         return result
 
+    @property
+    def services(self) -> Services:
+        return self._server.services
+
     def leave(self, now: float) -> None:
         """Its connection has ended."""
         self.holder, self.left_at = None, now
 
     # services
 
-    async def read(self, params: ua.ReadParameters) -> Any:
+    async def read_attributes(self, params: ua.ReadParameters) -> Any:
         wanted: list[ua.ReadValueId] = get(params, "NodesToRead")
-        _limit(wanted, MOST_OPERATIONS)
         times = checked_times(params)
         # `not >=` refuses NaN, too.
         if not get(params, "MaxAge") >= 0:
@@ -178,90 +178,10 @@ class Session(InternalSession):
         for_engineers = "/parameter/" in name or name.endswith(_FOR_ENGINEERS)
         return self.identity.role >= (Role.ENGINEER if for_engineers else Role.OPERATOR)
 
-    async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
-        writes: list[ua.WriteValue] = get(params, "NodesToWrite")
-        _limit(writes, MOST_OPERATIONS)
-        return await self._server.services.writer.write(self.identity, writes)
-
-    async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
-        _limit(params, MOST_CALLS)
-        return await self._server.services.caller.call(self.identity, params)
-
-    async def browse(self, params: ua.BrowseParameters) -> Any:
-        _limit(get(params, "NodesToBrowse"), MOST_OPERATIONS)
-        results = self.answer = Results(self.most_bytes)
-        await self.browser.browse(params, results)
-        return results
-
-    async def browse_next(self, parameters: ua.BrowseNextParameters) -> list[ua.BrowseResult]:
-        _limit(get(parameters, "ContinuationPoints"), MOST_OPERATIONS)
-        return self.browser.browse_next(parameters)
-
-    async def translate_browsepaths_to_nodeids(
-        self, params: list[ua.BrowsePath]
-    ) -> list[ua.BrowsePathResult]:
-        _limit(params, MOST_OPERATIONS)
-        return await self.browser.translate(params)
-
-    async def register_nodes(self, nodes: list[ua.NodeId]) -> list[ua.NodeId]:
-        _limit(nodes, MOST_OPERATIONS)
-        return nodes
-
-    async def unregister_nodes(self, nodes: list[ua.NodeId]) -> None:
-        _limit(nodes, MOST_OPERATIONS)
-
-    # subscriptions, each its own session's
-
-    async def create_subscription(
-        self,
-        params: ua.CreateSubscriptionParameters,
-        callback: Callable[..., Any],
-        request_callback: Callable[..., Any] | None = None,
-    ) -> ua.CreateSubscriptionResult:
-        """Told through ``publishing``; asyncua's callbacks are not used."""
+    async def subscribe(self, params: ua.CreateSubscriptionParameters) -> ua.CreateSubscriptionResult:
         self.subscriptions.drop_left_behind()
         await make_room(self, self._server.sessions, self.subscription_service)
         return self.subscriptions.create(self, params)
-
-    def modify_subscription(self, params: ua.ModifySubscriptionParameters) -> ua.ModifySubscriptionResult:
-        return self.subscriptions.modify(self, params)
-
-    async def set_publishing_mode(self, params: ua.SetPublishingModeParameters) -> list[ua.StatusCode]:
-        _limit(get(params, "SubscriptionIds"), MOST_OPERATIONS)
-        return self.subscriptions.set_publishing_mode(self, params)
-
-    async def delete_subscriptions(self, ids: list[int]) -> list[ua.StatusCode]:
-        _limit(ids, MOST_OPERATIONS)
-        return self.subscriptions.delete(self, ids)
-
-    def republish(self, params: ua.RepublishParameters) -> ua.NotificationMessage:
-        return self.subscriptions.republish(self, params)
-
-    async def transfer_subscriptions(
-        self, params: ua.TransferSubscriptionsParameters, callback: Callable[..., Any]
-    ) -> list[ua.TransferResult]:
-        _limit(get(params, "SubscriptionIds"), MOST_OPERATIONS)
-        return self.subscriptions.transfer(self, params)
-
-    async def create_monitored_items(
-        self, params: ua.CreateMonitoredItemsParameters
-    ) -> list[ua.MonitoredItemCreateResult]:
-        _limit(get(params, "ItemsToCreate"), MOST_OPERATIONS)
-        return await self.subscriptions.create_items(self, params)
-
-    async def modify_monitored_items(
-        self, params: ua.ModifyMonitoredItemsParameters
-    ) -> list[ua.MonitoredItemModifyResult]:
-        _limit(get(params, "ItemsToModify"), MOST_OPERATIONS)
-        return self.subscriptions.modify_items(self, params)
-
-    async def delete_monitored_items(self, params: ua.DeleteMonitoredItemsParameters) -> list[ua.StatusCode]:
-        _limit(get(params, "MonitoredItemIds"), MOST_OPERATIONS)
-        return self.subscriptions.delete_items(self, params)
-
-    async def set_monitoring_mode(self, params: ua.SetMonitoringModeParameters) -> list[ua.StatusCode]:
-        _limit(get(params, "MonitoredItemIds"), MOST_OPERATIONS)
-        return self.subscriptions.set_monitoring_mode(self, params)
 
     async def close_session(self, delete_subs: bool = True) -> None:
         # asyncua closes it again when its connection ends, and would have the subscriptions deleted then.
@@ -322,10 +242,3 @@ class Server(InternalServer):
         for session in list(self._external_sessions.values()):
             await session.close_session()
         await super().stop()
-
-
-def _limit(operations: Sequence[object] | None, most: int) -> None:
-    if not operations:
-        raise ServiceError(StatusCodes.BadNothingToDo)
-    if len(operations) > most:
-        raise ServiceError(StatusCodes.BadTooManyOperations)

@@ -29,17 +29,17 @@ class Subscriptions:
     def __init__(self, space: AddressSpace) -> None:
         self.subscriptions: dict[int, Subscription] = {}
         self._numbers = count(1)
-        self._items = MonitoredItems(space)
+        self.items = MonitoredItems(space)
         self._timers: dict[int, asyncio.TimerHandle] = {}
 
     def prepare(self) -> None:
         """The address space is complete."""
-        self._items.event_types.look()
+        self.items.event_types.look()
 
     def of(self, owner: Owner) -> list[Subscription]:
         return [found for found in self.subscriptions.values() if found.owner is owner]
 
-    def _own(self, owner: Owner, number: int) -> Subscription:
+    def own(self, owner: Owner, number: int) -> Subscription:
         """Raises ServiceError where this subscription is another session's or nobody's."""
         found = self.subscriptions.get(number)
         if found is None or found.owner is not owner:
@@ -60,7 +60,7 @@ class Subscriptions:
         return change(_revised(ua.CreateSubscriptionResult(), made), SubscriptionId=made.number)
 
     def modify(self, owner: Owner, params: ua.ModifySubscriptionParameters) -> ua.ModifySubscriptionResult:
-        found = self._own(owner, get(params, "SubscriptionId"))
+        found = self.own(owner, get(params, "SubscriptionId"))
         before = found.terms.interval_ms
         found.modify(terms(params))
         if found.terms.interval_ms != before:
@@ -72,12 +72,15 @@ class Subscriptions:
         self, owner: Owner, params: ua.SetPublishingModeParameters
     ) -> list[ua.StatusCode]:
         def set_one(number: int) -> None:
-            self._own(owner, number).set_enabled(get(params, "PublishingEnabled"))
+            self.own(owner, number).set_enabled(get(params, "PublishingEnabled"))
 
         return [code_of(set_one, number) for number in get(params, "SubscriptionIds")]
 
-    def delete(self, owner: Owner, numbers: Sequence[int]) -> list[ua.StatusCode]:
-        results = [code_of(lambda one: self._close(self._own(owner, one)), number) for number in numbers]
+    def delete(self, owner: Owner, params: ua.DeleteSubscriptionsParameters) -> list[ua.StatusCode]:
+        results = [
+            code_of(lambda one: self._close(self.own(owner, one)), number)
+            for number in get(params, "SubscriptionIds")
+        ]
         self._release_requests(owner)
         return results
 
@@ -109,7 +112,7 @@ class Subscriptions:
         owner.publishing.put(request, subscriptions, loop_time())
 
     def republish(self, owner: Owner, params: ua.RepublishParameters) -> ua.NotificationMessage:
-        found = self._own(owner, get(params, "SubscriptionId"))
+        found = self.own(owner, get(params, "SubscriptionId"))
         return found.republish(get(params, "RetransmitSequenceNumber"))
 
     def transfer(self, owner: Owner, params: ua.TransferSubscriptionsParameters) -> list[ua.TransferResult]:
@@ -142,23 +145,8 @@ class Subscriptions:
         def room() -> int:
             return room_for_items(owner.address, self.subscriptions.values())
 
-        return await self._items.create(lambda: self._of_items(owner, params), params, room)
-
-    def modify_items(
-        self, owner: Owner, params: ua.ModifyMonitoredItemsParameters
-    ) -> list[ua.MonitoredItemModifyResult]:
-        return self._items.modify(self._of_items(owner, params), params)
-
-    def set_monitoring_mode(
-        self, owner: Owner, params: ua.SetMonitoringModeParameters
-    ) -> list[ua.StatusCode]:
-        return self._items.set_mode(self._of_items(owner, params), params)
-
-    def delete_items(self, owner: Owner, params: ua.DeleteMonitoredItemsParameters) -> list[ua.StatusCode]:
-        return self._items.delete(self._of_items(owner, params), params)
-
-    def _of_items(self, owner: Owner, params: object) -> Subscription:
-        return self._own(owner, get(params, "SubscriptionId"))
+        number: int = get(params, "SubscriptionId")
+        return await self.items.create(lambda: self.own(owner, number), params, room)
 
     # cycles and ends
 
@@ -181,7 +169,7 @@ class Subscriptions:
         self._timers.pop(subscription.number).cancel()
         subscription.owner.publishing.forget(subscription)
         for item in list(subscription.items.values()):
-            self._items.drop(subscription, item)
+            self.items.drop(subscription, item)
 
     def _release_requests(self, owner: Owner) -> None:
         """Nothing can come to a session without subscriptions: what it waits for is answered."""

@@ -15,7 +15,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import struct
-import time
 from collections import deque
 from typing import Any, Final
 
@@ -47,30 +46,18 @@ from bridge.northbound.opcua.library import (
     ua,
 )
 from bridge.northbound.opcua.notices import tell
-from bridge.northbound.opcua.routes import ROUTES, Request, carry_out
+from bridge.northbound.opcua.routes import ROUTES, Request, Route
 from bridge.northbound.opcua.security import read_password
-from bridge.northbound.opcua.services import REFUSED
+from bridge.northbound.opcua.services import REFUSED, request_type
 from bridge.northbound.opcua.session import Server, Session
 from bridge.northbound.opcua.writes import received_at
 from bridge.northbound.sources import source_of
 
-_CREATE: Final = node_id(ObjectIds.CreateSessionRequest_Encoding_DefaultBinary)
-_ACTIVATE: Final = node_id(ObjectIds.ActivateSessionRequest_Encoding_DefaultBinary)
-_CLOSE: Final = node_id(ObjectIds.CloseSessionRequest_Encoding_DefaultBinary)
-_CLOSE_CHANNEL: Final = node_id(ObjectIds.CloseSecureChannelRequest_Encoding_DefaultBinary)
-_DISCOVERY: Final = frozenset(
-    (
-        node_id(ObjectIds.GetEndpointsRequest_Encoding_DefaultBinary),
-        node_id(ObjectIds.FindServersRequest_Encoding_DefaultBinary),
-        _CLOSE_CHANNEL,
-    )
-)
-_SLOW: Final = frozenset(
-    (
-        node_id(ObjectIds.WriteRequest_Encoding_DefaultBinary),
-        node_id(ObjectIds.CallRequest_Encoding_DefaultBinary),
-    )
-)
+_CREATE: Final = request_type("CreateSession")
+_ACTIVATE: Final = request_type("ActivateSession")
+_CLOSE: Final = request_type("CloseSession")
+_DISCOVERY: Final = tuple(map(request_type, ("GetEndpoints", "FindServers", "CloseSecureChannel")))
+_SLOW: Final = (request_type("Write"), request_type("Call"))
 """Services that wait for the bus process."""
 
 _TIME_AND_HANDLE: Final = struct.Struct("<qI")
@@ -277,7 +264,7 @@ class Processor(UaProcessor):
                 raise
             self._begin()
         if typeid in ROUTES:
-            return await self._carry_out(typeid, requesthdr, seqhdr, body)
+            return await self._carry_out(ROUTES[typeid], requesthdr, seqhdr, body)
         try:
             answer = await super()._process_message(typeid, requesthdr, seqhdr, body)
         except InvalidSignature:
@@ -293,14 +280,12 @@ class Processor(UaProcessor):
         """Not needed: a session watches its own time-out, or ends with the connection it was made on.
         asyncua's loop would stay behind for each session that was closed."""
 
-    async def _carry_out(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> bool:
-        """A service that asyncua's processor does not leave to the session."""
+    async def _carry_out(self, route: Route, requesthdr: Any, seqhdr: Any, body: Buffer) -> bool:
         session = self.session
         if not isinstance(session, Session):
             raise ServiceError(StatusCodes.BadSessionIdInvalid)
         if not session.is_activated():
             raise ServiceError(StatusCodes.BadSessionNotActivated)
-        self.session_last_activity = time.monotonic()
         session.touch()
 
         def send(response: Any) -> None:
@@ -309,7 +294,7 @@ class Processor(UaProcessor):
         def is_open() -> bool:
             return session.holder is self and not self._transport.is_closing()
 
-        await carry_out(session, typeid, Request(requesthdr, body, send, is_open))
+        await route.carry_out(session, Request(requesthdr, body, send, is_open))
         return True
 
     async def close(self) -> None:

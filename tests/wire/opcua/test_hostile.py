@@ -270,7 +270,7 @@ async def test_requests_that_come_together_leave_others_their_turn(
 ) -> None:
     turn = 0
     turns: list[int] = []
-    read = Session.read
+    seen = Session.seen
 
     async def count_turns() -> None:
         nonlocal turn
@@ -278,12 +278,12 @@ async def test_requests_that_come_together_leave_others_their_turn(
             turn += 1
             await asyncio.sleep(0)
 
-    async def noted(self: Session, params: ua.ReadParameters) -> list[ua.DataValue]:
+    def noted(self: Session, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
         turns.append(turn)
-        return await read(self, params)
+        return seen(self, wanted, value)
 
     async with connected(served[0]) as client:
-        monkeypatch.setattr(Session, "read", noted)
+        monkeypatch.setattr(Session, "seen", noted)
         counting = asyncio.create_task(count_turns())
         await asyncio.gather(*(client.nodes.server_state.read_value() for _ in range(30)))
         counting.cancel()

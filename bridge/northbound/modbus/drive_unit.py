@@ -43,7 +43,7 @@ from bridge.northbound.modbus.registers import (
     Table,
     Words32,
 )
-from bridge.northbound.modbus.unit import refuse_quality, state_code
+from bridge.northbound.modbus.unit import Unit, refuse_quality, state_code
 from bridge.northbound.view import View
 
 _WORD_BITS: Final = 16
@@ -65,7 +65,7 @@ _SOURCES: Final = {source.label: source for source in Source}
 _STOPS: Final = {1: Action.STOP, 2: Action.QUICK_STOP, 3: Action.DISABLE_VOLTAGE}
 
 
-class DriveUnit:
+class DriveUnit(Unit):
     """One drive's unit id."""
 
     def __init__(self, drive_map: DriveMap, view: View, words32: Words32) -> None:

@@ -48,6 +48,9 @@ ABORT_CODE: Final = "supervision/sdo_abort_code"
 """The point behind the register ``sdo_abort_code``."""
 
 
+_REGISTERS: Final = struct.Struct(">HH")
+
+
 class Table(StrEnum):
     COIL = "coil"
     DISCRETE_INPUT = "discrete input"
@@ -339,15 +342,11 @@ class Words32:
     """
 
     def __init__(self, order: WordOrder) -> None:
-        self._swap_words = order in ("CDAB", "DCBA")
-        self._swap_bytes = order in ("BADC", "DCBA")
+        self._places = tuple(map("ABCD".index, order))
 
     def from_int(self, value: int) -> tuple[int, int]:
         """Two registers of an integer; a negative one as its two's complement."""
-        high, low = value >> 16 & 0xFFFF, value & 0xFFFF
-        if self._swap_bytes:
-            high, low = _swapped(high), _swapped(low)
-        return (low, high) if self._swap_words else (high, low)
+        return _REGISTERS.unpack(self._ordered((value & 0xFFFF_FFFF).to_bytes(4, "big")))
 
     def from_float(self, value: float) -> tuple[int, int]:
         """Two registers of an IEEE 754 single; what is too large for one is infinite."""
@@ -355,20 +354,14 @@ class Words32:
             packed = struct.pack(">f", value)
         except OverflowError:
             packed = struct.pack(">f", math.copysign(math.inf, value))
-        return self.from_int(int.from_bytes(packed, "big"))
+        return _REGISTERS.unpack(self._ordered(packed))
 
     def to_float(self, first: int, second: int) -> float:
-        return struct.unpack(">f", self._bytes(first, second))[0]
+        return struct.unpack(">f", self._ordered(_REGISTERS.pack(first, second)))[0]
 
     def to_int(self, first: int, second: int, *, signed: bool) -> int:
-        return int.from_bytes(self._bytes(first, second), "big", signed=signed)
+        return int.from_bytes(self._ordered(_REGISTERS.pack(first, second)), "big", signed=signed)
 
-    def _bytes(self, first: int, second: int) -> bytes:
-        high, low = (second, first) if self._swap_words else (first, second)
-        if self._swap_bytes:
-            high, low = _swapped(high), _swapped(low)
-        return struct.pack(">HH", high, low)
-
-
-def _swapped(word: int) -> int:
-    return (word & 0xFF) << 8 | word >> 8
+    def _ordered(self, data: bytes) -> bytes:
+        """Each order is its own inverse."""
+        return bytes(data[place] for place in self._places)

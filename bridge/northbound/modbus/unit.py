@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final, Protocol
+from typing import Final
 
 from bridge.command import Identity, Request
 from bridge.command.leg.state import WatchdogState
@@ -23,26 +23,32 @@ _STARTING: Final = tuple(
 )
 
 
-class Unit(Protocol):
-    """One unit id. Every method raises ``Refused`` and then has changed nothing.
+class Unit:
+    """One unit id. Every method may raise ``Refused`` and then has changed nothing; here all do, for what a
+    unit does not have.
 
     The ``plan`` methods make the requests that a write stands for, in the order in which they are to be
     submitted; all but the first can only fail if the first one does.
     """
 
-    def read_bits(self, table: Table, start: int, count: int) -> Sequence[bool]: ...
+    def read_bits(self, table: Table, start: int, count: int) -> Sequence[bool]:
+        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
 
-    def read_words(self, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]: ...
+    def read_words(self, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]:
+        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
 
-    def plan_bits(self, start: int, bits: Sequence[bool], caller: Identity) -> list[Request]: ...
+    def plan_bits(self, start: int, bits: Sequence[bool], caller: Identity) -> list[Request]:
+        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
 
-    def plan_words(self, start: int, words: Sequence[int], caller: Identity) -> list[Request]: ...
+    def plan_words(self, start: int, words: Sequence[int], caller: Identity) -> list[Request]:
+        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
 
-    def plan_mask(self, write: MaskWrite, caller: Identity) -> list[Request]: ...
+    def plan_mask(self, write: MaskWrite, caller: Identity) -> list[Request]:
+        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
 
     def identify(self) -> Mapping[int, str]:
         """Texts for device identification by object id, in rising order."""
-        ...
+        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
 
 
 def refuse_quality(quality: Quality) -> None:
@@ -58,7 +64,7 @@ def state_code(state: Value, watchdog_state: Value, quality: Quality) -> int:
     return int(state) if is_known else DriveState.UNKNOWN
 
 
-class BridgeUnit:
+class BridgeUnit(Unit):
     """The bridge itself: input registers only, any other table is an illegal function."""
 
     def __init__(self, units: Units, view: View) -> None:
@@ -113,18 +119,6 @@ class BridgeUnit:
         warning = bus_state in (_BUS_WARNING, _BUS_PASSIVE)
         bits = (starting, operational, _LOST in states, tripped, warning, bus_state == _BUS_OFF)
         return sum(bit << position for position, bit in enumerate(bits))
-
-    def read_bits(self, table: Table, start: int, count: int) -> Sequence[bool]:
-        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
-
-    def plan_bits(self, start: int, bits: Sequence[bool], caller: Identity) -> list[Request]:
-        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
-
-    def plan_words(self, start: int, words: Sequence[int], caller: Identity) -> list[Request]:
-        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
-
-    def plan_mask(self, write: MaskWrite, caller: Identity) -> list[Request]:
-        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
 
     def identify(self) -> Mapping[int, str]:
         version = str(self._image[self._version].value)

@@ -9,39 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
-from asyncua import ua
-from asyncua.common.utils import ServiceError
+from asyncua import ua as ua
+from asyncua.common.utils import ServiceError as ServiceError
 from asyncua.crypto import uacrypto
-from asyncua.ua.attribute_ids import AttributeIds
-from asyncua.ua.object_ids import ObjectIds
-from asyncua.ua.status_codes import StatusCodes
-from asyncua.ua.uaerrors import UaError, UaStatusCodeError
+from asyncua.ua.attribute_ids import AttributeIds as AttributeIds
+from asyncua.ua.object_ids import ObjectIds as ObjectIds
+from asyncua.ua.status_codes import StatusCodes as StatusCodes
+from asyncua.ua.uaerrors import UaError as UaError
+from asyncua.ua.uaerrors import UaStatusCodeError as UaStatusCodeError
 
 # Not `ua.DataChangeFilter`, which is a subclass that nothing decoded is an instance of.
-from asyncua.ua.uaprotocol_auto import DataChangeFilter
+from asyncua.ua.uaprotocol_auto import DataChangeFilter as DataChangeFilter
 from cryptography import x509
-
-__all__ = [
-    "GOOD",
-    "AttributeIds",
-    "DataChangeFilter",
-    "InvalidSignature",
-    "ObjectIds",
-    "ServiceError",
-    "StatusCodes",
-    "UaError",
-    "UaStatusCodeError",
-    "change",
-    "data_value",
-    "first_certificate",
-    "get",
-    "make",
-    "node_id",
-    "status",
-    "text",
-    "ua",
-    "variant",
-]
 
 status: Callable[[int], ua.StatusCode] = ua.StatusCode  # pyright: ignore[reportAssignmentType]
 """A status code from its number."""

@@ -17,17 +17,8 @@ from bridge.northbound.opcua.certificates import TrustedCertificates, fingerprin
 from bridge.northbound.opcua.library import ServiceError, StatusCodes, first_certificate, get, ua
 from bridge.northbound.opcua.logins import PasswordChecks, Verify
 from bridge.northbound.opcua.notices import Tell, tell
-from bridge.northbound.opcua.passwords import ANONYMOUS, check_users, hash_password, verify_password
+from bridge.northbound.opcua.passwords import ANONYMOUS, check_users, verify_password
 from bridge.northbound.sources import source_of
-
-__all__ = [
-    "CheckedPolicy",
-    "Users",
-    "hash_password",
-    "read_password",
-    "security_policies",
-    "verify_password",
-]
 
 _log = logging.getLogger(__name__)
 

@@ -19,13 +19,8 @@ from bridge.command import Role
 from bridge.config import OpcUaTable, UserTable
 from bridge.errors import FileFaults, Unavailable
 from bridge.northbound.opcua.certificates import OwnCertificate, TrustedCertificates, load_own, own_or_new
-from bridge.northbound.opcua.security import (
-    Users,
-    hash_password,
-    read_password,
-    security_policies,
-    verify_password,
-)
+from bridge.northbound.opcua.passwords import hash_password, verify_password
+from bridge.northbound.opcua.security import Users, read_password, security_policies
 from bridge.northbound.opcua.transport import Processor
 
 URI = "urn:test:drivebridge"

@@ -25,7 +25,7 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from bridge.config import OpcUaTable, UserTable
-from bridge.northbound.opcua.security import hash_password
+from bridge.northbound.opcua.passwords import hash_password
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support.opcua_site import LocalView, break_off, connected, namespace, serving
 from tests.support.quiet import quiet_log

@@ -212,10 +212,10 @@ COMMANDS: Final = {
 """The commands that have fields, by their action."""
 
 
-def command_of(action: Action, **fields: Any) -> Command:
-    """The command for ``action``, which has these fields."""
+def command_of(action: Action, *values: Any, **fields: Any) -> Command:
+    """The command for ``action``, which has these fields, the first of them by their order."""
     kind = COMMANDS.get(action)
-    return Do(action) if kind is None else kind(**fields)
+    return Do(action) if kind is None else kind(*values, **fields)
 
 
 @dataclass(frozen=True, slots=True)

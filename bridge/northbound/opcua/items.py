@@ -9,7 +9,7 @@ import math
 import uuid
 from collections import deque
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Final
 
@@ -69,48 +69,23 @@ def event_settings(asked: ua.MonitoringParameters) -> Settings:
     return Settings(get(asked, "ClientHandle"), 0.0, size, get(asked, "DiscardOldest"))
 
 
+@dataclass(slots=True, eq=False)
 class ValueItem:
-    """Watches one attribute of ``target``."""
+    """Watches one attribute of ``target``. ``share`` is what it is counted as, ``handle`` that of asyncua's
+    callback for changes."""
 
-    __slots__ = (
-        "_due",
-        "_held",
-        "_last",
-        "filter",
-        "handle",
-        "mode",
-        "number",
-        "queue",
-        "settings",
-        "share",
-        "target",
-        "window",
-    )
-
-    def __init__(
-        self,
-        number: int,
-        target: ua.ReadValueId,
-        window: Window,
-        settings: Settings,
-        filter_: ChangeFilter,
-        mode: ua.MonitoringMode,
-        share: Hashable = None,
-    ) -> None:
-        self.number = number
-        self.target = target
-        self.window = window
-        self.settings = settings
-        self.filter = filter_
-        self.mode = mode
-        self.handle = 0
-        """Of asyncua's callback for changes."""
-        self.share = share
-        """What it is counted as."""
-        self.queue: deque[ua.DataValue] = deque()
-        self._last: ua.DataValue | None = None
-        self._held: ua.DataValue | None = None
-        self._due = -math.inf
+    number: int
+    target: ua.ReadValueId
+    window: Window
+    settings: Settings
+    filter: ChangeFilter
+    mode: ua.MonitoringMode
+    share: Hashable = None
+    handle: int = 0
+    queue: deque[ua.DataValue] = field(default_factory=deque["ua.DataValue"])
+    _last: ua.DataValue | None = None
+    _held: ua.DataValue | None = None
+    _due: float = -math.inf
 
     @property
     def has_something(self) -> bool:
@@ -194,30 +169,19 @@ def _overflown(value: ua.DataValue) -> ua.DataValue:
     return data_value(value.Value, code, value.SourceTimestamp, value.ServerTimestamp)
 
 
+@dataclass(slots=True, eq=False)
 class EventItem:
-    """Listens to the events of one node."""
+    """Listens to the events of one node. ``share`` is whom it is counted for."""
 
-    __slots__ = ("_loss", "filter", "mode", "node", "number", "queue", "settings", "share")
-
-    def __init__(
-        self,
-        number: int,
-        node: ua.NodeId,
-        settings: Settings,
-        filter_: EventFilter,
-        mode: ua.MonitoringMode,
-        share: str = "",
-    ) -> None:
-        self.number = number
-        self.node = node
-        self.settings = settings
-        self.filter = filter_
-        self.mode = mode
-        self.share = share
-        """Whom it is counted for."""
-        self.queue: deque[list[ua.Variant]] = deque()
-        self._loss: list[ua.Variant] | None = None
-        """The event that says that others were lost. It is kept in addition to the queue's size."""
+    number: int
+    node: ua.NodeId
+    settings: Settings
+    filter: EventFilter
+    mode: ua.MonitoringMode
+    share: str = ""
+    queue: deque[list[ua.Variant]] = field(default_factory=deque["list[ua.Variant]"])
+    _loss: list[ua.Variant] | None = None
+    """The event that says that others were lost. It is kept in addition to the queue's size."""
 
     @property
     def has_something(self) -> bool:
@@ -227,18 +191,18 @@ class EventItem:
         """Whether the event is queued."""
         if self.mode == Monitoring.Disabled or event.emitter != self.node or not self.filter.passes(event):
             return False
-        if len(self.queue) >= self.settings.queue_size:
+        self._shorten(self.settings.queue_size - 1)
+        self.queue.append(self.filter.fields(event))
+        return True
+
+    def _shorten(self, size: int) -> None:
+        while len(self.queue) > size:
             if self.settings.discard_oldest:
                 self.queue.popleft()
             else:
                 self.queue.pop()
-            self._lose()
-        self.queue.append(self.filter.fields(event))
-        return True
-
-    def _lose(self) -> None:
-        if self._loss is None:
-            self._loss = self.filter.fields(_loss(self.node))
+            if self._loss is None:
+                self._loss = self.filter.fields(_loss(self.node))
 
     def set_mode(self, mode: ua.MonitoringMode) -> None:
         if mode == Monitoring.Disabled:
@@ -248,12 +212,7 @@ class EventItem:
 
     def modify(self, settings: Settings, filter_: EventFilter) -> None:
         self.settings, self.filter = settings, filter_
-        while len(self.queue) > settings.queue_size:
-            if settings.discard_oldest:
-                self.queue.popleft()
-            else:
-                self.queue.pop()
-            self._lose()
+        self._shorten(settings.queue_size)
 
     def notification(self) -> ua.EventFieldList:
         """The next to tell. A loss comes before what was kept, or behind it where the newest had to go."""

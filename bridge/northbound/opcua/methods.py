@@ -4,26 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.command.request import (
-    PARAMETER_ACTIONS,
-    Action,
-    Code,
-    Command,
-    Do,
-    Identity,
-    ReadParameter,
-    Request,
-    Start,
-    TakeControl,
-    WriteParameter,
-)
+from bridge.command.request import PARAMETER_ACTIONS, Action, Code, Identity, Request, command_of
 from bridge.image import Value
-from bridge.northbound.opcua.library import AttributeIds, StatusCodes, get, make, status, ua
+from bridge.northbound.opcua.library import AttributeIds, ServiceError, StatusCodes, get, make, status, ua
 from bridge.northbound.opcua.nodes import Argument, ArgumentType, MethodNode
 from bridge.northbound.opcua.values import (
     INTEGER_TYPES,
@@ -38,13 +25,6 @@ from bridge.northbound.view import View
 _DIRECTIONS: Final = (-1, 0, 1)
 _AT_FAULT: Final = {Code.UNKNOWN_PARAMETER: 0, Code.READ_ONLY: 0, Code.WRITE_ONLY: 0, Code.OUT_OF_RANGE: 1}
 """Which argument of a method for parameters an outcome is about."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Fault:
-    """What is wrong with an argument, as a status code."""
-
-    code: int
 
 
 class Caller:
@@ -72,12 +52,16 @@ class Caller:
             few = len(given) < len(method.arguments)
             code = StatusCodes.BadArgumentsMissing if few else StatusCodes.BadTooManyArguments
             return self._rejected(identity, call, code)
-        checked = [_argument(method, *pair) for pair in zip(method.arguments, given, strict=True)]
-        faults = [one.code if isinstance(one, _Fault) else StatusCodes.Good for one in checked]
+        faults = [StatusCodes.Good] * len(given)
+        values: list[Value] = []
+        for place, (argument, one) in enumerate(zip(method.arguments, given, strict=True)):
+            try:
+                values.append(_argument(method, argument, one))
+            except ServiceError as error:
+                faults[place] = int(error.code)
         if any(faults):
             return self._rejected(identity, call, StatusCodes.BadInvalidArgument, faults)
-        values = [one for one in checked if not isinstance(one, _Fault)]
-        outcome = await ask(self._view, _request(identity, method, values))
+        outcome = await ask(self._view, Request(identity, method.target, command_of(method.action, *values)))
         place = _AT_FAULT.get(outcome.code) if method.action in PARAMETER_ACTIONS else None
         if place is not None and place < len(faults):
             faults[place] = outcome_status(outcome).value
@@ -115,39 +99,24 @@ class Caller:
         return None
 
 
-def _argument(method: MethodNode, argument: Argument, given: ua.Variant) -> Value | _Fault:
-    """The argument's value, or what is wrong with it. Any integer type is taken for an integer."""
+def _argument(method: MethodNode, argument: Argument, given: ua.Variant) -> Value:
+    """The argument's value. Any integer type is taken for an integer. Raises ServiceError."""
     kind = argument.type.value
     if not isinstance(kind, tuple):
         try:
             value = plain_value(given)
         except TypeError:
-            return _Fault(StatusCodes.BadTypeMismatch)
-        fits = argument.type is ArgumentType.ANY or isinstance(value, str)
-        return value if fits else _Fault(StatusCodes.BadTypeMismatch)
+            raise ServiceError(StatusCodes.BadTypeMismatch) from None
+        if argument.type is not ArgumentType.ANY and not isinstance(value, str):
+            raise ServiceError(StatusCodes.BadTypeMismatch)
+        return value
     if given.is_array or given.VariantType not in INTEGER_TYPES:
-        return _Fault(StatusCodes.BadTypeMismatch)
+        raise ServiceError(StatusCodes.BadTypeMismatch)
     low, high = kind
     in_range = low <= given.Value <= high
     if not in_range or (method.action is Action.START and given.Value not in _DIRECTIONS):
-        return _Fault(StatusCodes.BadOutOfRange)
+        raise ServiceError(StatusCodes.BadOutOfRange)
     return given.Value
-
-
-def _request(identity: Identity, method: MethodNode, values: Sequence[Value]) -> Request:
-    command: Command
-    match method.action:
-        case Action.START:
-            command = Start(int(values[0]))
-        case Action.TAKE_CONTROL:
-            command = TakeControl(int(values[0]))
-        case Action.READ_PARAMETER:
-            command = ReadParameter(str(values[0]))
-        case Action.WRITE_PARAMETER:
-            command = WriteParameter(str(values[0]), values[1])
-        case action:
-            command = Do(action)
-    return Request(identity, method.target, command)
 
 
 def _result(

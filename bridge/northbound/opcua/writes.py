@@ -12,13 +12,14 @@ import logging
 from collections.abc import Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Final
+from typing import Final
 
 from asyncua.server.address_space import AddressSpace
 
 from bridge.command.request import (
     Action,
     Code,
+    Command,
     Identity,
     Outcome,
     Request,
@@ -27,7 +28,7 @@ from bridge.command.request import (
     WriteParameter,
 )
 from bridge.image import Value
-from bridge.northbound.opcua.library import GOOD, AttributeIds, StatusCodes, get, status, ua
+from bridge.northbound.opcua.library import GOOD, AttributeIds, ServiceError, StatusCodes, get, status, ua
 from bridge.northbound.opcua.nodes import VariableNode
 from bridge.northbound.opcua.values import outcome_status, plain_value, point_value, rejection
 from bridge.northbound.view import View
@@ -43,46 +44,27 @@ received_at: ContextVar[float | None] = ContextVar("received_at", default=None)
 """When the message whose service is being carried out can have come at the earliest; None for just now."""
 
 
+_ALONE: Final = {"parameter": WriteParameter, "supervision": SetTimeout}
+"""Groups whose points are written one by one, and are no telegram."""
+
+
 @dataclass(slots=True)
 class _Telegram:
     """What one drive is told. ``places`` are the positions in the call that it answers."""
 
     target: str
-    action: ClassVar[Action] = Action.WRITE
+    kind: type[Write | WriteParameter | SetTimeout]
     values: dict[str, Value] = field(default_factory=dict[str, Value])
     places: list[int] = field(default_factory=list[int])
     fault: int = StatusCodes.Good
     misfits: dict[str, Value] = field(default_factory=dict[str, Value])
     """What was written that is the fault, as far as it is a value at all."""
 
-    def request(self, identity: Identity) -> Request:
-        return Request(identity, self.target, Write(self.values))
-
-
-@dataclass(slots=True)
-class _Parameter(_Telegram):
-    """One parameter that is written: a request of its own, which the drive answers."""
-
-    action: ClassVar[Action] = Action.WRITE_PARAMETER
-
-    def request(self, identity: Identity) -> Request:
+    def command(self) -> Command:
+        if self.kind is Write:
+            return Write(self.values)
         ((name, value),) = self.values.items()
-        return Request(identity, self.target, WriteParameter(name, value))
-
-
-@dataclass(slots=True)
-class _Timeout(_Telegram):
-    """The owner's ``supervision/fieldbus_timeout_ms``, which is no telegram."""
-
-    action: ClassVar[Action] = Action.SET_TIMEOUT
-
-    def request(self, identity: Identity) -> Request:
-        (value,) = self.values.values()
-        return Request(identity, self.target, SetTimeout(int(value)))
-
-
-_ALONE: Final[Mapping[str, type[_Telegram]]] = {"parameter": _Parameter, "supervision": _Timeout}
-"""Groups whose points are written one by one."""
+        return WriteParameter(name, value) if self.kind is WriteParameter else SetTimeout(int(value))
 
 
 async def ask(view: View, request: Request) -> Outcome:
@@ -132,19 +114,18 @@ class Writer:
             target, _, group = owner.rpartition("/")
             telegram = latest.get(target)
             if group in _ALONE:
-                telegram = _ALONE[group](target)
+                telegram = _Telegram(target, _ALONE[group])
                 telegrams.append(telegram)
             # The same point twice is two telegrams: the edge between the two values may matter.
             elif telegram is None or leaf in telegram.values:
-                telegram = latest[target] = _Telegram(target)
+                telegram = latest[target] = _Telegram(target, Write)
                 telegrams.append(telegram)
             telegram.places.append(place)
-            value = _value(node, write)
-            if isinstance(value, _Refusal):
-                telegram.fault = telegram.fault or value.code
+            try:
+                telegram.values[leaf] = _value(node, write)
+            except ServiceError as error:
+                telegram.fault = telegram.fault or int(error.code)
                 telegram.misfits |= _shown(leaf, write)
-            else:
-                telegram.values[leaf] = value
         by_drive: dict[str, list[_Telegram]] = {}
         for telegram in telegrams:
             by_drive.setdefault(telegram.target, []).append(telegram)
@@ -159,10 +140,11 @@ class Writer:
             # One bad value refuses the others, too: there is no half a telegram.
             code = status(telegram.fault)
             if code.is_good():
-                code = outcome_status(await ask(self._view, telegram.request(identity)))
+                request = Request(identity, telegram.target, telegram.command())
+                code = outcome_status(await ask(self._view, request))
             else:
                 values = telegram.values | telegram.misfits
-                told = rejection(identity, telegram.target, telegram.action, code.value, values)
+                told = rejection(identity, telegram.target, telegram.kind.action, code.value, values)
                 self._view.rejected(told)
             for place in telegram.places:
                 results[place] = code
@@ -194,28 +176,22 @@ def _shown(leaf: str, write: ua.WriteValue) -> dict[str, Value]:
         return {}
 
 
-@dataclass(frozen=True, slots=True)
-class _Refusal:
-    code: int
-
-
-def _value(node: VariableNode, write: ua.WriteValue) -> Value | _Refusal:
-    """The value to ask for.
+def _value(node: VariableNode, write: ua.WriteValue) -> Value:
+    """The value to ask for. Raises ServiceError.
 
     A client's source time is let go: it is not stored, and asyncua's own client sends one with every
     plain write. A status other than Good and a server time are refused (Part 4 §5.11.4).
     """
     written: ua.DataValue = get(write, "Value")
     code = written.StatusCode
-    if get(write, "IndexRange") or written.ServerTimestamp or written.ServerPicoseconds:
-        return _Refusal(StatusCodes.BadWriteNotSupported)
-    if code is not None and code.value != StatusCodes.Good:
-        return _Refusal(StatusCodes.BadWriteNotSupported)
+    is_timed = written.ServerTimestamp or written.ServerPicoseconds
+    if get(write, "IndexRange") or is_timed or (code is not None and code.value != StatusCodes.Good):
+        raise ServiceError(StatusCodes.BadWriteNotSupported)
     if written.Value is None:
-        return _Refusal(StatusCodes.BadTypeMismatch)
+        raise ServiceError(StatusCodes.BadTypeMismatch)
     try:
         return point_value(node.point, written.Value)
     except TypeError:
-        return _Refusal(StatusCodes.BadTypeMismatch)
+        raise ServiceError(StatusCodes.BadTypeMismatch) from None
     except ValueError:
-        return _Refusal(StatusCodes.BadOutOfRange)
+        raise ServiceError(StatusCodes.BadOutOfRange) from None

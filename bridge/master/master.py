@@ -10,7 +10,6 @@ import asyncio
 import logging
 from collections.abc import Callable
 from functools import partial
-from math import inf
 
 from bridge.can import open_all
 from bridge.can.interface import Bus, ControllerState
@@ -27,8 +26,6 @@ from bridge.master.timer import LoopTimer
 _log = logging.getLogger(__name__)
 
 _REFRESH_S = 0.1
-_SEND_LIMIT_S = 0.1
-"""A frame that could not be sent for this long is stale and is dropped."""
 _STOP_DRIVES_S = 0.1
 """How long stopped words are sent at least before the bursts end, when the service is stopped."""
 _DRIVES_FOLLOW_S = 5.0
@@ -61,11 +58,11 @@ class Master:
         alarm: Alarm | None = None,
         suspended: Callable[[], tuple[float, float]] = lambda: (0.0, 0.0),
     ) -> None:
-        self._lines = [Line(bus, network) for bus, network in lines]
+        self._alarm = alarm or Alarm()
+        self._lines = [Line(bus, network, plant, clock, self._alarm) for bus, network in lines]
         self._plant = plant
         self._clock = clock
         self._alive = alive
-        self._alarm = alarm or Alarm()
         self._suspend = SuspendWatch(suspended)
         self._lateness = Lateness(plant)
         self._due: float | None = None
@@ -159,7 +156,7 @@ class Master:
             _log.exception("not every drive could be stopped")
         for line in self._lines:
             try:
-                self._flush(line, now)
+                line.flush(now)
             except Exception:  # noqa: BLE001 - nor may it keep the next bus from it
                 _log.exception("bus %s: no stopped words could be sent", line.bus.name)
 
@@ -176,13 +173,7 @@ class Master:
             self._lateness.on_round(self._due, now)
             self._due = None
         for line in self._lines:
-            frames = line.bus.drain(now)
-            if frames:
-                line.network.on_frames(frames, now)
-                self._plant.on_readings()
-            foreign = line.bus.take_foreign(now)
-            if foreign:
-                line.network.on_foreign(foreign, now)
+            line.receive(now)
         self._plant.on_time(now, self._enforce)
         for line in self._lines:
             line.network.on_time(now)
@@ -199,8 +190,8 @@ class Master:
         self._check_gap(now)
         self._plant.on_time(now, self._enforce)
         for line in self._lines:
-            self._flush(line, now)
-            if not self._stood_still(line, now):
+            line.flush(now)
+            if not line.stood_still(now):
                 line.bus.on_time(now)
         stop_due = self._plant.on_stops_handed_over()
         if stop_due is not None:
@@ -214,11 +205,6 @@ class Master:
     def _enforce(self, node: str, action: Action, why: str, now: float) -> None:
         for line in self._lines:
             line.network.enforce(node, action, why, now)
-
-    def _stood_still(self, line: Line, since: float) -> bool:
-        """The process was stopped after ``since`` for longer than deadman_ms, so words computed before are
-        stale. The next round finds the gap."""
-        return (self._clock() - since) * 1000 > line.network.bus.deadman_ms
 
     def _check_gap(self, now: float) -> None:
         """After a pause longer than the dead-man time, or a suspended machine, all bursts have ended: nothing
@@ -288,41 +274,6 @@ class Master:
         if refusal:
             message = f"the kernel takes no bursts ({refusal}): the bridge sends them itself, less evenly"
         self._plant.report(Event(now, Kind.BUS, line.bus.name, 600 if refusal else 200, message))
-
-    def _flush(self, line: Line, now: float) -> None:
-        bus, network = line.bus, line.network
-        routes = network.take_routes()
-        if routes is not None:
-            bus.accept(routes)
-            bus.watch(network.ours)
-        renew = now >= line.renew_at
-        beats = network.beats(anew=renew)
-        frames = network.take_frames()
-        is_same = beats is line.beats and not frames
-        ended = set[int]() if is_same else line.ended(beats, frames)
-        # First: the kernel must not repeat an enabling word once more after a stopped one.
-        for can_id in ended:
-            bus.end_burst(can_id)
-            del line.beating[can_id]
-        for frame in frames:
-            bus.send(frame, now, now + _SEND_LIMIT_S)
-        if not line.was_up:
-            return
-        if renew:
-            line.renew_at = now + line.renew_s
-        if beats is line.beats and not (renew or ended) and now < line.hold_at:
-            return
-        line.beats = beats
-        self._alarm.set(line.burst_s)
-        for beat, changed in line.due(beats, now, renew=renew):
-            # In this order: the process may be stopped right after it has read the clock.
-            if self._stood_still(line, now) or self._alarm.rang:
-                line.beats = None
-                return
-            line.beat(beat, now, at_once=changed)
-        line.hold_at = min((at for beat in beats.values() for at in beat.hold_at if at > now), default=inf)
-        if self._plant.unsent:
-            network.on_handed_over(self._clock())
 
     def _arm(self, now: float) -> None:
         times = [self._refresh_at]

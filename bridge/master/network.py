@@ -1,6 +1,6 @@
 """One CANopen network: its nodes, its SYNC and TIME, our own heartbeat. Sans-IO.
 
-Says which frames are to be sent once and which are to be repeated; the holder of the bus sends them.
+Says which frames are to be sent once; what is repeated is made of its nodes (``line.py``).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from bridge.can.interface import BusStatus
 from bridge.canopen import cobid, nmt
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
-from bridge.canopen.sync import SyncWindow, sync_frames
+from bridge.canopen.sync import SyncWindow
 from bridge.canopen.time_stamp import TimeProducer
 from bridge.command import Action, Code, Event, Kind, Outcome, Plant, Reply, Request
 from bridge.command.request import NODE_ACTIONS
@@ -29,13 +29,9 @@ from bridge.master.watch import BusWatch
 from bridge.node import nmt_commands as node_commands
 from bridge.node.neighbours import Neighbour
 from bridge.node.node import NodeCore
-from bridge.node.process.process_data import Beat
 from bridge.node.wire import Handler
 
 NOTHING: Final[Mapping[str, Sequence[Download]]] = MappingProxyType({})
-
-Beats = dict[int, Beat]
-"""What is to be repeated, by COB-ID."""
 
 
 class Network:
@@ -74,10 +70,8 @@ class Network:
         self._nmt_for_all: Frame | None = None
         self._routes_changed = True
         self._routes: dict[int, Handler] = {}
-        self._routings = 0
-        self._beats: Beats = {}
-        self._beats_for: tuple[int, int, NmtState, bool] | None = None
-        self._sync = sync_frames(bus.sync_counter)
+        self.routings = 0
+        """How often ``take_routes`` has found other identifiers."""
         self._window = SyncWindow(bus.sync_window_us / 1e6) if bus.sync_window_us else None
         self._time = TimeProducer(bus.time_period_s, epoch_ns) if bus.time_period_s and epoch_ns else None
         self._frames: list[Frame] = []
@@ -275,7 +269,7 @@ class Network:
         if not self._routes_changed:
             return None
         self._routes_changed = False
-        self._routings += 1
+        self.routings += 1
         self._routes = self._watch.routes()
         for node in self.nodes:
             node.wire.routes_changed = False
@@ -302,43 +296,8 @@ class Network:
                 if tpdo.is_synchronous and tpdo.cob_id in self._routes:
                     self._routes[tpdo.cob_id] = judged(self._routes[tpdo.cob_id])
 
-    def beats(self, *, anew: bool = False) -> Beats:
-        """The frames to be repeated: the same object while they are the same.
-
-        A drive's settling, a node's new PDOs and our own state change them; asked ``anew``, every drive is
-        looked at.
-        """
-        made_for = self._plant.settled, self._routings, self.nmt_state, self.charge.acts()
-        if anew or made_for != self._beats_for:
-            self._beats_for = made_for
-            self._beats = self._make_beats()
-        return self._beats
-
-    def _make_beats(self) -> Beats:
-        beats: Beats = {}
-        if not self.charge.acts():
-            return beats
-        # The state before that is said once, by the boot-up message.
-        if self.bus.heartbeat_ms and self._has_booted:
-            frame = Frame(cobid.ERROR_CONTROL + self.bus.master_node_id, bytes((self.nmt_state,)))
-            beats[frame.can_id] = Beat((frame,), self.bus.heartbeat_ms / 1000)
-        period_s = self.bus.rpdo_period_s
-        hold_at: list[float] = []
-        for node in self.nodes:
-            if node.sends_process_data:
-                for pdos in node.wire.drives.values():
-                    if not pdos.is_silent:
-                        for beat in pdos.beats(period_s):
-                            beats[beat.frames[0].can_id] = beat
-                            if pdos.needs_sync:
-                                hold_at += beat.hold_at
-        # SYNC last: it makes effective what is sent together with it (CiA 301 §7.2.2.2).
-        if self.bus.sync_period_ms:
-            beats[cobid.SYNC] = Beat(self._sync, self.bus.sync_period_ms / 1000, hold_at=tuple(hold_at))
-        return beats
-
     def on_handed_over(self, now: float) -> None:
-        """What ``beats`` returned is on the bus: the bounds of stops begin (``command/follow.py``)."""
+        """What is to be repeated is on the bus: the bounds of stops begin (``command/follow.py``)."""
         unsent = self._plant.unsent
         for node in self.nodes:
             for drive in node.node.drives:

@@ -13,6 +13,7 @@ from bridge.canopen.nmt import NmtState
 from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Role, Source, command_of
 from bridge.config import Site, load_site
 from bridge.mapping import load_family
+from bridge.master.line import Repeated
 from bridge.master.listening import Listening
 from bridge.master.network import Network
 from bridge.node.node import NodeCore
@@ -140,6 +141,7 @@ class Quick:
         self.plant.on_event(self.events.append)
         # These tests begin where the bridge has listened already.
         self.network = Network(site.bus[0], self.plant, listening=Listening(0.0))
+        self.repeated = Repeated(self.network, self.plant)
         self.nodes = {table.id: QuickNode(table.id) for table in site.bus[0].node}
         self.lose: Callable[[Frame], bool] = lambda frame: False
         self.routes = frozenset(self.network.take_routes() or ())

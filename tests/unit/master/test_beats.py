@@ -26,27 +26,28 @@ def operational(folder: Path, nodes: int = 3) -> Quick:
 
 def kept_is_right(quick: Quick) -> bool:
     quick.network.take_routes()
-    kept = quick.network.beats()
-    return kept == quick.network.beats(anew=True)
+    kept = quick.repeated.beats()
+    return kept == quick.repeated.beats(anew=True)
 
 
 def test_heartbeats_do_not_make_it_anew(tmp_path: Path) -> None:
     quick = operational(tmp_path)
     quick.network.take_routes()
-    before = quick.network.beats()
+    before = quick.repeated.beats()
     quick.run(0.5)
-    assert quick.network.beats() is before
+    assert quick.repeated.beats() is before
 
 
 def test_a_changed_word_is_in_it_at_once(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path))
     bench.run(3.0)
-    before = bench.network.beats()[RPDO1 + 5]
+    (line,) = bench.master._lines
+    before = line.repeated.beats()[RPDO1 + 5]
     request = Request(PLC, "conveyor/fu1", Write({"control_word": 0x047E}))
     outcomes: list[Outcome] = []
     bench.view.submit(request, outcomes.append)
     assert outcomes[0].forwarded
-    assert bench.network.beats()[RPDO1 + 5] != before
+    assert line.repeated.beats()[RPDO1 + 5] != before
 
 
 def test_it_is_right_whatever_becomes_of_the_nodes(tmp_path: Path) -> None:
@@ -69,7 +70,7 @@ def test_it_is_right_whatever_becomes_of_the_nodes(tmp_path: Path) -> None:
             quick.run(0.1)
     quick.network.bus_is_gone(quick.now)
     assert kept_is_right(quick)
-    assert RPDO1 + 3 in quick.network.beats(), "stopped words go to a lost node as well"
+    assert RPDO1 + 3 in quick.repeated.beats(), "stopped words go to a lost node as well"
 
 
 def test_a_setpoint_is_there_before_the_enable_and_renewed_after_the_control_word(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -15,6 +14,7 @@ from bridge.command import Action, Code
 from bridge.command.plant import Enforce
 from bridge.image import Quality
 from bridge.mapping.model import IdentityRule
+from bridge.master.line import Line
 from bridge.master.standstill import Alarm
 from tests.support.bench import NORD, PLC, Bench, write_site
 
@@ -252,9 +252,9 @@ def test_a_process_stopped_at_the_end_of_its_last_look_at_the_clock_sends_nothin
 ) -> None:
     """The time that it has read is right, and a second old."""
     running(bench)
-    alarm, look = Alarm(), bench.master._stood_still
+    alarm, look = Alarm(), Line.stood_still
 
-    def stand_still_after(line: Any, since: float) -> bool:
+    def stand_still_after(line: Line, since: float) -> bool:
         found = look(line, since)
         if alarm_is_set and not alarm.rang:
             bench.now += 1.0
@@ -262,11 +262,12 @@ def test_a_process_stopped_at_the_end_of_its_last_look_at_the_clock_sends_nothin
         return found
 
     alarm_is_set: list[float] = []
+    (line,) = bench.master._lines
     bench.log.clear()
     with monkeypatch.context() as patched:
         patched.setattr(alarm, "set", alarm_is_set.append)
-        patched.setattr(bench.master, "_alarm", alarm)
-        patched.setattr(bench.master, "_stood_still", stand_still_after)
+        patched.setattr(line, "alarm", alarm)
+        patched.setattr(Line, "stood_still", stand_still_after)
         bench.write(control_word=0x047F, setpoint_1=0x2100)
     assert alarm_is_set == [0.1], "the dead-man time"
     bench.run(0.5)

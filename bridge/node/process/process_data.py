@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
@@ -67,7 +68,7 @@ class Tpdo:
         self._codec = plan.codec
         self._length = plan.codec.length
         self._map = WordMap(plan.codec.entries, plan.places, len(drive.words))
-        self._in_order = self._map.is_in_order and not plan.codec.has_signed
+        self._in_order = self._map.in_order == len(drive.words) and not plan.codec.has_signed
         """The codec's values are the words as they are."""
         self._words = list(drive.words)
         self._last: bytes | None = None
@@ -133,6 +134,9 @@ class Rpdo:
         self._has_control_word = any(place is not None and place.word == 0 for place in plan.places)
         self._codec = plan.codec
         self._map = WordMap(plan.codec.entries, plan.places, words)
+        first = self._map.in_order
+        self._in_order = struct.Struct(f"<{first}H") if first and plan.codec.length == 2 * first else None
+        """Packs the first words where the PDO is nothing else."""
         self._words: Sequence[int] = ()
         self._packed = (Frame(plan.cob_id),)
         self._last_words: Sequence[int] = ()
@@ -156,6 +160,9 @@ class Rpdo:
 
     def frame(self, words: Sequence[int]) -> Frame:
         """The frame that carries these words, the control word first; what is mapped beside them is 0."""
+        if self._in_order:
+            first = words[: self._in_order.size // 2]
+            return Frame(self.cob_id, self._in_order.pack(*[word & 0xFFFF for word in first]))
         return Frame(self.cob_id, self._codec.pack(self._map.pack(words)))
 
     def control_word(self, data: bytes) -> int | None:

@@ -48,9 +48,10 @@ class WordMap:
         self._parts = tuple(parts)
         self._shared = tuple(dict.fromkeys(word for word, *_ in parts))
         short = all(entry.bits <= WORD_BITS for entry in entries)
-        in_order = [(n, n) for n in range(words)]
-        self.is_in_order = short and len(entries) == words and [item[:2] for item in whole] == in_order
-        """The values are the words as they are, and nothing else, where they have no sign."""
+        in_order = [(number, number) for number in range(len(entries))]
+        self.in_order = len(entries) if short and [item[:2] for item in whole] == in_order else 0
+        """How many of the words the values are, from the first on as they are and without a sign; 0 where
+        they are anything else."""
 
     def unpack(self, values: Sequence[int], words: list[int]) -> None:
         """Write the values into their places of ``words``."""

@@ -136,6 +136,16 @@ def test_an_object_behind_the_words_is_left_out(bench: Bench) -> None:
     assert words.receive("37 0B 01 20 03 04 FF FF") == [0x0B37, 0x2001, 3, 4]
 
 
+def test_an_rpdo_of_the_first_words_leaves_the_others_out(bench: Bench) -> None:
+    words = Words(bench, plan(16, 16, words=(0, 1)))
+    assert words.sent(0x047F, 0x1_2000, 7, 8) == bytes.fromhex("7F040020")
+
+
+def test_an_rpdo_of_short_words_has_their_low_bits(bench: Bench) -> None:
+    words = Words(bench, plan(16, 8, words=(0, 1)))
+    assert words.sent(0x047F, 0x1234) == bytes.fromhex("7F0434")
+
+
 def test_a_long_object_fills_several_words_the_low_one_first(bench: Bench) -> None:
     """BU 2500 §6.5.4: a position of 2800.758 rev is 002ABC76h."""
     words = Words(bench, plan(16, 32, words=(0, 1)))

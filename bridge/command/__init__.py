@@ -7,6 +7,7 @@ from bridge.command.event import Event as Event
 from bridge.command.event import Kind as Kind
 from bridge.command.plant import Node as Node
 from bridge.command.plant import Plant as Plant
+from bridge.command.plant import PlantView as PlantView
 from bridge.command.request import Action as Action
 from bridge.command.request import Code as Code
 from bridge.command.request import Command as Command
@@ -24,4 +25,3 @@ from bridge.command.request import TakeControl as TakeControl
 from bridge.command.request import Write as Write
 from bridge.command.request import WriteParameter as WriteParameter
 from bridge.command.request import command_of as command_of
-from bridge.command.view import PlantView as PlantView

@@ -9,7 +9,7 @@ from itertools import pairwise
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.northbound.modbus.conversation import Conversation
+from bridge.northbound.modbus.session import Conversation
 from tests.support.modbus_site import PLC, READY, Rig
 
 

@@ -7,7 +7,8 @@ the loop in small portions. Every error of zenoh ends here: it is counted and lo
 It knows no key layout: both the zenoh server and the link between our processes use it.
 """
 
-from bridge.zenohlink.link import Asked, ZenohLink
+from bridge.zenohlink.asked import Asked
+from bridge.zenohlink.link import ZenohLink
 from bridge.zenohlink.message import Answer, Message
 from bridge.zenohlink.settings import zenoh_config
 

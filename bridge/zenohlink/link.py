@@ -8,8 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
 from functools import partial
 from itertools import islice
 from typing import Final, TypeVar
@@ -17,20 +16,10 @@ from typing import Final, TypeVar
 import zenoh
 
 from bridge.errors import OperationFailed, Unavailable
-from bridge.zenohlink.inbox import Inbox
+from bridge.zenohlink.asked import Asked
 from bridge.zenohlink.lane import LIMIT, Job, Lane
-from bridge.zenohlink.message import (
-    Answer,
-    Message,
-    publish,
-    reply,
-    reply_error,
-    sentence,
-    to_answer,
-    to_bytes,
-    to_message,
-)
-from bridge.zenohlink.worker import ZENOH_ERRORS, Worker
+from bridge.zenohlink.message import Answer, Message, sentence
+from bridge.zenohlink.worker import Inbox, Worker
 
 Result = TypeVar("Result")
 
@@ -45,60 +34,6 @@ Share = Callable[[str, bytes | None], str]
 
 def _one_for_all(key: str, payload: bytes | None) -> str:
     return ""
-
-
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """A query, to be answered from the loop: any number of ``send``, then ``finish`` or ``fail``.
-
-    If it is not finished, the client waits until its own time-out.
-    """
-
-    key: str
-    payload: bytes | None
-    attachment: bytes | None
-    parameters: str
-    """The selector's part after the ``?``."""
-    received_at: float
-    """When zenoh handed it over, in monotonic seconds; it may have waited for the loop since."""
-    _query: zenoh.Query
-    _link: ZenohLink
-    _lane: Lane
-    _is_apart: bool = False
-
-    def apart(self) -> Asked:
-        """The same, answered on a thread of its own, which ``finish`` ends. For long answers: replies wait
-        for a client that does not read."""
-        return replace(self, _lane=self._link.own_lane(self._lane), _is_apart=True)
-
-    def send(self, messages: Sequence[Message]) -> None:
-        """With the present time stamp: what is published later counts as newer, whenever this is sent."""
-        try:
-            stamp = self._lane.session.new_timestamp()
-        except ZENOH_ERRORS:
-            self._link.note_drop()
-            return
-        self._do(lambda _: reply(self._query, messages, stamp))
-
-    async def settle(self) -> None:
-        """Wait until the replies so far have been sent or given up."""
-        await self._link.settle(self._lane)
-
-    def finish(self) -> None:
-        """End the query: there are no more replies."""
-        self._do(lambda _: self._query.drop())
-        if self._is_apart:
-            self._lane.end()
-
-    def fail(self, payload: bytes, encoding: str) -> None:
-        """Answer with an error, and finish."""
-        self._do(lambda _: reply_error(self._query, payload, encoding))
-        if self._is_apart:
-            self._lane.end()
-
-    def _do(self, job: Job) -> None:
-        if not self._lane.do(job):
-            self._link.note_drop()
 
 
 class ZenohLink:
@@ -196,7 +131,7 @@ class ZenohLink:
 
     def send(self, message: Message) -> bool:
         """Publish each message in order. False: there was no room, the message is dropped."""
-        return self.submit(lambda session: publish(session, message))
+        return self.submit(lambda session: _publish(session, message))
 
     def submit(self, job: Job) -> bool:
         """Let the worker do ``job``. False: there was no room, or the worker has ended."""
@@ -227,7 +162,7 @@ class ZenohLink:
     def _put_batch(self, batch: list[Message], session: zenoh.Session) -> None:
         for message in batch:
             try:
-                publish(session, message)
+                _publish(session, message)
             except Exception as error:  # noqa: BLE001 - one bad value must not stop the others
                 self._worker.complain(error)
         self._inbox.tell(self._hand_over)
@@ -247,7 +182,7 @@ class ZenohLink:
         done: asyncio.Future[None] = self._loop.create_future()
 
         def on_reply(reply: zenoh.Reply) -> None:
-            answers.append(to_answer(reply))
+            answers.append(_to_answer(reply))
 
         def on_end() -> None:
             self._inbox.tell(_resolve, done, None)
@@ -285,7 +220,7 @@ class ZenohLink:
             prompt, other = self._worker.answers(session)
 
             def on_query(query: zenoh.Query) -> None:
-                payload, attachment = to_bytes(query.payload), to_bytes(query.attachment)
+                payload, attachment = _to_bytes(query.payload), _to_bytes(query.attachment)
                 parameters = str(query.parameters)
                 key, now = str(query.key_expr), time.monotonic()
                 lane = prompt if self._is_prompt(key) else other
@@ -313,7 +248,7 @@ class ZenohLink:
 
         def on_sample(sample: zenoh.Sample) -> None:
             if sample.kind == zenoh.SampleKind.PUT:
-                message = to_message(sample)
+                message = _to_message(sample)
                 self._inbox.take_in(partial(handler, message), share(message.key, message.payload))
 
         def declare(session: zenoh.Session) -> None:
@@ -372,3 +307,31 @@ class ZenohLink:
 def _resolve(future: asyncio.Future[Result], result: Result) -> None:
     if not future.done():
         future.set_result(result)
+
+
+def _publish(session: zenoh.Session, message: Message) -> None:
+    """Never waits for a peer that does not read: that peer loses the message."""
+    session.put(
+        message.key,
+        message.payload,
+        encoding=message.encoding or None,
+        attachment=message.attachment,
+        congestion_control=zenoh.CongestionControl.DROP,
+    )
+
+
+def _to_answer(reply: zenoh.Reply) -> Answer:
+    result = reply.result
+    if isinstance(result, zenoh.Sample):
+        return Answer(True, _to_message(result))
+    return Answer(False, Message("", result.payload.to_bytes(), str(result.encoding)))
+
+
+def _to_message(sample: zenoh.Sample) -> Message:
+    attachment = _to_bytes(sample.attachment)
+    payload, encoding = sample.payload.to_bytes(), str(sample.encoding)
+    return Message(str(sample.key_expr), payload, encoding, attachment, time.monotonic())
+
+
+def _to_bytes(data: zenoh.ZBytes | None) -> bytes | None:
+    return None if data is None else data.to_bytes()

@@ -1,17 +1,22 @@
-"""The thread that opens and closes one zenoh session, and declares and publishes with it."""
+"""The thread that opens and closes one zenoh session, and declares and publishes with it; and the way from
+zenoh's threads to the event loop.
+"""
 
 # pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false
 # zenoh's stubs leave out the return types of what returns nothing.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from itertools import islice
 from queue import Empty, SimpleQueue
-from typing import Final, Protocol
+from typing import Final, Protocol, TypeVarTuple
 
 import zenoh
 
@@ -23,11 +28,19 @@ from bridge.zenohlink.strangers import Strangers
 
 _log = logging.getLogger(__name__)
 
+Arguments = TypeVarTuple("Arguments")
+
 _LANES_END_S: Final = 1.0
 """How long the lanes of a closed session may take to end."""
 _LOOK_S: Final = 0.5
 """How often to look for connections that have not become a session: less than the time they have for that."""
 
+_LIMIT: Final = 1000
+"""Queries and samples of one share that may wait for the loop; further ones are refused."""
+_MOST_SHARES: Final = 64
+"""Shares beyond this number count as the first one."""
+_AT_ONCE: Final = 32
+"""Calls made before the loop gets its turn for other work."""
 ZENOH_ERRORS: Final = (zenoh.ZError, RuntimeError, ValueError, TypeError, AttributeError)
 """What zenoh's calls raise: ZError for failures, the others for objects that have been closed meanwhile."""
 
@@ -187,3 +200,58 @@ class Worker:
             call()
         except Exception as error:  # noqa: BLE001 - one bad job must not end all others
             self.complain(error)
+
+
+class Inbox:
+    """Calls that other threads hand over to be made in the loop. Belongs to the loop it is created in.
+
+    Calls of one share keep their order; shares take turns, so that a full one delays no other.
+    """
+
+    def __init__(self) -> None:
+        self.refused = 0
+        self.is_closed = False
+        self._loop = asyncio.get_running_loop()
+        self._shares: dict[str, deque[Callable[[], None]]] = {"": deque()}
+        self._next = 0
+        self._drain_is_due = False
+
+    def take_in(self, call: Callable[[], None], share: str = "") -> bool:
+        """From any thread. False: there is no room. One wake-up of the loop serves all waiting calls."""
+        if share not in self._shares and len(self._shares) >= _MOST_SHARES:
+            share = ""
+        waiting = self._shares.setdefault(share, deque())
+        if self.is_closed or len(waiting) >= _LIMIT:
+            self.refused += 1
+            return False
+        waiting.append(call)
+        if not self._drain_is_due:
+            self._drain_is_due = True
+            self.tell(self._drain)
+        return True
+
+    def tell(self, call: Callable[[*Arguments], object], *arguments: *Arguments) -> None:
+        """From any thread, without a limit: for the completion of what the loop itself has begun."""
+        try:
+            self._loop.call_soon_threadsafe(call, *arguments)
+        except RuntimeError:
+            _log.debug("the event loop has ended; nobody is left to be told")
+
+    def _drain(self) -> None:
+        # Cleared before the queues are read: an append after that wakes the loop again.
+        self._drain_is_due = False
+        try:
+            for call in islice(self._in_turn(), _AT_ONCE):
+                call()
+        finally:
+            if any(tuple(self._shares.values())) and not self._drain_is_due:
+                self._drain_is_due = True
+                self._loop.call_soon(self._drain)
+
+    def _in_turn(self) -> Iterator[Callable[[], None]]:
+        """One call of each share in turn, continuing where it stopped."""
+        while any(shares := tuple(self._shares.values())):
+            for place in (*range(self._next, len(shares)), *range(self._next)):
+                if shares[place]:
+                    self._next = place + 1
+                    yield shares[place].popleft()

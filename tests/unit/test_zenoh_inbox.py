@@ -6,7 +6,7 @@ import asyncio
 from functools import partial
 
 from bridge.northbound.zenoh.keys import KeySpace
-from bridge.zenohlink.inbox import Inbox
+from bridge.zenohlink.worker import Inbox
 
 FLOOD = 5000
 

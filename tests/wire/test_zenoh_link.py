@@ -241,7 +241,7 @@ async def test_a_job_that_raises_costs_nothing_but_itself(monkeypatch: pytest.Mo
         await client.settle()
         await asyncio.sleep(0.1)
         with monkeypatch.context() as patched:
-            patched.setattr(link_module, "publish", broken)
+            patched.setattr(link_module, "_publish", broken)
             server.put(Message("v/1", b"lost"))
             server.send(Message("v/1", b"lost too"))
             await until(lambda: server.errors == 2, "both are counted")

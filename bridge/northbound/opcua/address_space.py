@@ -31,7 +31,7 @@ from bridge.northbound.opcua.structures import (
     properties,
     property_attributes,
 )
-from bridge.northbound.opcua.values import VARIANT_TYPE, reading_value
+from bridge.northbound.opcua.values import VARIANT_TYPE, EpochNs, reader
 
 _SUBSCRIBE_TO_EVENTS: Final = 1
 
@@ -61,8 +61,6 @@ _SHARED: Final = frozenset(
         AttributeIds.ArrayDimensions,
     )
 )
-
-EpochNs = Callable[[float], int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,9 +163,9 @@ class Builder:
         )
         where = self._add(new, parent, ObjectIds.HasComponent)
         value = self._space[where].attributes[AttributeIds.Value]
-        read = self._reader(node.index, kind, node.bit)
+        read = reader(self._image, node.index, kind, self._epoch_ns, node.bit)
         value.value = None
-        value.value_callback = lambda _node, _attribute: read()
+        value.value_callback = read
         self.bindings.variables[node.index].append(Binding(value, read))
         if node.writable:
             self.bindings.writable[where] = node
@@ -175,15 +173,6 @@ class Builder:
             self._property(where, node.id, entry)
         for bit in node.bits:
             self._variable(bit, where)
-
-    def _reader(self, index: int, kind: ua.VariantType, bit: int | None) -> Callable[[], ua.DataValue]:
-        image, epoch_ns = self._image, self._epoch_ns
-
-        def read() -> ua.DataValue:
-            reading = image[index]
-            return reading_value(reading, kind, epoch_ns(reading.time), bit)
-
-        return read
 
     def _property(self, parent: ua.NodeId, parent_name: str, entry: Property) -> None:
         name, value, data_type = entry

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from typing import Final
 
 from bridge.command import Rejection
 from bridge.command.request import Code, Identity, Outcome
-from bridge.image import DataType, Point, Quality, Reading, Value
+from bridge.image import DataType, Image, Point, Quality, Reading, Value
 from bridge.northbound.opcua.library import GOOD, StatusCodes, data_value, status, ua, variant
+
+EpochNs = Callable[[float], int]
 
 # The contract's table. A Bad status has no value in OPC UA; the Uncertain ones keep the last one.
 QUALITY_STATUS: Final = {
@@ -143,6 +145,18 @@ def reading_value(
     # A point that has never had a value has no source time either.
     stamp = None if quality is Quality.WAITING else source_time(epoch_ns)
     return data_value(value, code, stamp, datetime.now(UTC))
+
+
+def reader(
+    image: Image, index: int, variant_type: ua.VariantType, epoch_ns: EpochNs, bit: int | None = None
+) -> Callable[..., ua.DataValue]:
+    """Gives the present reading of a point, whatever it is called with."""
+
+    def read(*_: object) -> ua.DataValue:
+        reading = image[index]
+        return reading_value(reading, variant_type, epoch_ns(reading.time), bit)
+
+    return read
 
 
 def point_value(point: Point, written: ua.Variant) -> Value:

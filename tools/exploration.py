@@ -13,6 +13,7 @@ from typing import Final
 
 from bridge.command.leg.table import TABLE
 from tests.support.leg_profiles import ROWS, Figures, explored
+from tools.marks import replaced
 from tools.state_table import PAGE
 
 BEGIN: Final = "<!-- printed by tools/exploration.py: begin -->"
@@ -55,9 +56,8 @@ def main() -> None:
         found[row] = explored(row)
         cells = len(found[row].cells)
         print(f"{row}: {found[row].steps:,} steps, {cells} of {len(TABLE)} cells, {found[row].seconds:.1f} s")
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    after = rest.partition(END)[2]
-    PAGE.write_text(f"{before}{BEGIN}\n\n{table(found)}\n\n{END}{after}", encoding="utf-8")
+    page = replaced(PAGE.read_text(encoding="utf-8"), BEGIN, END, table(found))
+    PAGE.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from typing import Final
 
 from bridge.command.leg.state import MEANING, STARTING, TRIPPED, WAY, Stage
 from bridge.command.leg.table import TABLE, Deed, Stimulus
+from tools.marks import replaced
 
 PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "dead-man-chain.md"
 BEGIN: Final = "<!-- drawn by tools/state_table.py: begin -->"
@@ -52,11 +53,7 @@ def _cell(stage: Stage, stimulus: Stimulus) -> str:
 
 def drawn(text: str) -> str:
     """``text`` of a page with the tables as they are now. Raises ValueError where the page has no marks."""
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise ValueError(f"the page has no line {BEGIN!r} with {END!r} after it")
-    return f"{before}{BEGIN}\n\n{tables()}\n\n{END}{after}"
+    return replaced(text, BEGIN, END, tables())
 
 
 if __name__ == "__main__":

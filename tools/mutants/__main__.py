@@ -1,104 +1,46 @@
 """Whether the unit tests notice small faults in the code: ``make mutants``.
 
-    python -m tools.mutants [--jobs N] [--every N] [FILE_OR_FOLDER ...]
+    python -m tools.mutants [--jobs N] [--every N] [--seconds S] [--tests FOLDER] [FILE_OR_FOLDER ...]
 
 Each mutant is the program with one small change: a comparison, an operator, a constant, a call left out. The
-unit tests of its room (``tests/unit/ROOM`` for ``bridge/ROOM``) run on it, the quickest file first, until one
-test fails. Mutants that no test notices are printed: either a test is missing, or the change makes no
-difference that anybody could see.
+unit tests that run the changed line run on it, those of its room (``tests/unit/ROOM`` for ``bridge/ROOM``)
+first and the quickest of them before the others, until one fails. Mutants that no test notices are printed:
+either a test is missing, or the change makes no difference that anybody could see.
 """
 
 from __future__ import annotations
 
 import argparse
+import multiprocessing
 import os
-import shutil
-import subprocess
 import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from itertools import islice
 from pathlib import Path
-from queue import Queue
 from typing import Final
 
 from tools.mutants.find import Mutant, find
+from tools.mutants.run import REPOSITORY, Recorded, has_survived, record
 
-REPOSITORY: Final = Path(__file__).resolve().parents[2]
 ROOMS: Final = ("bridge/command", "bridge/canopen")
-_COPIED: Final = ("bridge", "mappings", "tests", "tools", "docs", "deploy", "systemd", "pyproject.toml")
-_LONGER: Final = 5.0
-"""So many times as long as on the unchanged program may the tests take: more counts as noticed."""
-_LEAST_LIMIT_S: Final = 30.0
+_PARTS: Final = 4
+"""Of the tests, for each job: some are done sooner than others."""
+_SUITE = Recorded()
+"""Set before the processes are forked that use it."""
 
 
-class Tree:
-    """A copy of the repository, in which one mutant at a time is tried."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        for name in _COPIED:
-            source = REPOSITORY / name
-            if source.is_dir():
-                shutil.copytree(
-                    source, folder / name, ignore=shutil.ignore_patterns("__pycache__", "node_modules")
-                )
-            else:
-                shutil.copy(source, folder / name)
-        # By their content: a mutant is as long as the original now and then, and as old.
-        compiling = ("-m", "compileall", "-q", "--invalidation-mode", "checked-hash", "bridge", "tests")
-        subprocess.run([sys.executable, *compiling], cwd=folder, check=True)
-
-    def passes(self, tests: list[str], limit_s: float | None = None) -> bool:
-        """Raises ``TimeoutExpired`` where they take longer."""
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
-        environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "HYPOTHESIS_DATABASE": ""}
-        with subprocess.Popen(
-            command,
-            cwd=self._folder,
-            env=environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            process_group=0,
-        ) as process:
-            try:
-                return process.wait(limit_s) == 0
-            finally:
-                if process.poll() is None:
-                    os.killpg(process.pid, 9)
-
-    def survives(self, mutant: Mutant, tests: list[str], limit_s: float) -> bool:
-        path = self._folder / mutant.path
-        source = path.read_bytes()
-        path.write_bytes(mutant.applied(source))
-        try:
-            return self.passes(tests, limit_s)
-        except subprocess.TimeoutExpired:
-            return False
-        finally:
-            path.write_bytes(source)
-
-
-def tests_of(room: str, tree: Tree) -> tuple[list[str], float]:
-    """The test files of a room, the quickest first, and how long all of them take in seconds."""
-    took_s: dict[str, float] = {}
-    for path in sorted((REPOSITORY / "tests" / "unit" / room).rglob("test_*.py")):
-        name = str(path.relative_to(REPOSITORY))
-        begin = time.monotonic()
-        if not tree.passes([name]):
-            sys.exit(f"{name} fails on the program as it is")
-        took_s[name] = time.monotonic() - begin
-    return sorted(took_s, key=lambda name: took_s[name]), sum(took_s.values())
-
-
-def files(asked: list[str]) -> Iterator[Path]:
+def files(asked: list[str], pattern: str = "*.py") -> Iterator[Path]:
     for name in asked:
         path = (REPOSITORY / name).resolve()
-        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+        for file in sorted(path.rglob(pattern)) if path.is_dir() else [path]:
             yield file.relative_to(REPOSITORY)
+
+
+def _is_left(most_s: float, mutant: Mutant) -> bool:
+    return has_survived(mutant, _SUITE, most_s)
 
 
 def main() -> None:
@@ -108,37 +50,40 @@ def main() -> None:
     )
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="how many at a time")
     parser.add_argument("--every", type=int, default=1, help="only each so many-th mutant")
+    parser.add_argument("--seconds", type=float, default=20.0, help="tests of this long at most for each")
+    parser.add_argument("--tests", default="tests/unit", help="where they are (default: tests/unit)")
     asked = parser.parse_args()
-    jobs = max(1, asked.jobs)
     found = (one for path in files(asked.paths) for one in find(path, (REPOSITORY / path).read_text("utf-8")))
     chosen = list(islice(found, 0, None, asked.every))
-    with tempfile.TemporaryDirectory(prefix="mutants-") as folder, ThreadPoolExecutor(jobs) as pool:
-        trees: Queue[Tree] = Queue()
-        for n in range(jobs):
-            trees.put(Tree(Path(folder) / str(n)))
-        rooms = dict.fromkeys(mutant.path.parts[1] for mutant in chosen)
-        tests = {room: tests_of(room, trees.queue[0]) for room in rooms}
-        times = ", ".join(f"{room}: {seconds:.0f} s" for room, (_, seconds) in tests.items())
-        print(f"{len(chosen)} mutants; all tests of {times}", flush=True)
-
-        def survives(mutant: Mutant) -> bool:
-            names, seconds = tests[mutant.path.parts[1]]
-            tree = trees.get()
-            try:
-                return tree.survives(mutant, names, _LEAST_LIMIT_S + _LONGER * seconds)
-            finally:
-                trees.put(tree)
-
-        left = Counter[Path]()
-        for mutant, is_left in zip(chosen, pool.map(survives, chosen), strict=True):
-            if is_left:
-                left[mutant.path] += 1
-                print(mutant, flush=True)
+    # Examples that are found are of the mutants: they say nothing about the program.
+    with tempfile.TemporaryDirectory(prefix="mutants-") as examples:
+        os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = examples
+        left = _try(chosen, list(map(str, files([asked.tests], "test_*.py"))), asked.jobs, asked.seconds)
     for path, count in Counter(mutant.path for mutant in chosen).items():
         print(f"{path}: {left[path]} of {count} were not noticed")
-    print(
-        f"{left.total()} of {len(chosen)} were not noticed: {100 * left.total() / max(1, len(chosen)):.1f} %"
-    )
+    share = 100 * left.total() / max(1, len(chosen))
+    print(f"{left.total()} of {len(chosen)} were not noticed: {share:.1f} %")
+
+
+def _try(chosen: list[Mutant], tests: list[str], jobs: int, most_s: float) -> Counter[Path]:
+    """How many of each file are left."""
+    parts = [part for n in range(_PARTS * jobs) if (part := tests[n :: _PARTS * jobs])]
+    sources = tuple({str(REPOSITORY / mutant.path.parent) for mutant in chosen})
+    fork = multiprocessing.get_context("fork")
+    with fork.Pool(jobs) as pool:
+        for part in pool.imap_unordered(partial(record, sources), parts, chunksize=1):
+            _SUITE.add(part)
+    if _SUITE.failed:
+        sys.exit(f"these fail on the program as it is: {' '.join(_SUITE.failed)}")
+    seconds = sum(_SUITE.took_s.values())
+    print(f"{len(chosen)} mutants, {len(_SUITE.took_s)} tests of {seconds:.0f} s", flush=True)
+    left = Counter[Path]()
+    with fork.Pool(jobs) as pool:
+        for mutant, is_one in zip(chosen, pool.imap(partial(_is_left, most_s), chosen), strict=True):
+            if is_one:
+                left[mutant.path] += 1
+                print(mutant, flush=True)
+    return left
 
 
 if __name__ == "__main__":

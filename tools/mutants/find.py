@@ -37,9 +37,11 @@ _OPERATORS: Final[dict[type[ast.operator], str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    """``new`` in place of ``old`` at ``begin`` of a file (in bytes)."""
+    """``new`` in place of ``old`` at ``begin`` of a file (in bytes). ``statement``: the first line of the
+    statement that has it."""
 
     path: Path
+    statement: int
     line: int
     begin: int
     old: str
@@ -60,6 +62,7 @@ class _Finder(ast.NodeVisitor):
         self.found: list[Mutant] = []
         self._path = path
         self._source = source
+        self._statement = 0
         self._starts = [0]
         for text in source.encode().splitlines(keepends=True):
             self._starts.append(self._starts[-1] + len(text))
@@ -68,7 +71,12 @@ class _Finder(ast.NodeVisitor):
         old = ast.get_source_segment(self._source, node)
         assert old is not None
         begin = self._starts[node.lineno - 1] + node.col_offset
-        self.found.append(Mutant(self._path, node.lineno, begin, old, new))
+        self.found.append(Mutant(self._path, self._statement, node.lineno, begin, old, new))
+
+    def visit(self, node: ast.AST) -> None:
+        if isinstance(node, ast.stmt):
+            self._statement = node.lineno
+        super().visit(node)
 
     def visit_Compare(self, node: ast.Compare) -> None:
         for place, operator in enumerate(node.ops):

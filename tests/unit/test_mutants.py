@@ -1,0 +1,70 @@
+"""The tool that changes the code: what it changes, and whether it hears what tests say about it."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tools.mutants.find import Mutant, find
+from tools.mutants.run import REPOSITORY, Recorded
+
+PATH = Path("bridge/room/file.py")
+CHANGES = {
+    "a < b": "(a <= b)",
+    "a < b <= c": "(a <= b <= c)",
+    "a is None": "(a is not None)",
+    "a in b": "(a not in b)",
+    "a and b": "((a) or (b))",
+    "a + b": "((a) - (b))",
+    "a << b": "((a) >> (b))",
+    "not a": "(a)",
+    "a if b else c": "(c if b else a)",
+    "a += b": "a -= b",
+    "True": "False",
+    "7": "8",
+    "call()": "pass",
+}
+SAID = ["log.info('x')", "a: dict[str, 1]", "'a' 'b'", "f'{a + 1}'", "assert a < b"]
+
+
+@pytest.mark.parametrize(("old", "new"), CHANGES.items())
+def test_what_is_changed(old: str, new: str):
+    source = f"text = 'ä'\nif x:\n    {old}\n    done = y\n"
+    first, *_ = find(PATH, source)
+    assert (first.old, first.new, first.line, first.statement) == (old, new, 3, 3)
+    changed = first.applied(source.encode()).decode()
+    assert changed == source.replace(old, new)
+    ast.parse(changed)
+
+
+@pytest.mark.parametrize("source", SAID)
+def test_what_is_only_said_is_left_alone(source: str):
+    assert not find(PATH, source)
+
+
+def test_tests_are_asked_that_run_the_statement_those_of_the_room_first():
+    suite = Recorded(
+        took_s={"tests/unit/room/a": 2.0, "tests/unit/room/b": 1.0, "tests/unit/x": 0.1},
+        lines={str(PATH): {1: {""}, 5: {"tests/unit/room/a", "tests/unit/x"}, 6: {"tests/unit/room/b"}}},
+    )
+    assert suite.tests_of(Mutant(PATH, 5, 5, 0, "1", "2")) == ["tests/unit/room/a", "tests/unit/x"]
+    assert suite.tests_of(Mutant(PATH, 5, 7, 0, "1", "2"))[0] == "tests/unit/room/b"
+    assert len(suite.tests_of(Mutant(PATH, 1, 1, 0, "1", "2"))) == 3, "run by the import: all of them"
+    assert not suite.tests_of(Mutant(PATH, 9, 9, 0, "1", "2")), "run by none"
+
+
+def test_what_no_test_notices_is_told_and_the_rest_is_not():
+    options = ("--jobs", "1", "--tests", "tests/unit/command/test_event.py")
+    files = ("bridge/command/event.py", "bridge/canopen/abort.py")
+    command = (sys.executable, "-m", "tools.mutants", *options, *files)
+    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    head, *told, of_event, of_abort, _ = done.stdout.splitlines()
+    assert head.startswith(f"{len(told) + 3} mutants, ")
+    assert of_event == "bridge/command/event.py: 0 of 3 were not noticed"
+    assert of_abort == f"bridge/canopen/abort.py: {len(told)} of {len(told)} were not noticed"
+    assert all(line.startswith("bridge/canopen/abort.py:") for line in told)

@@ -7,7 +7,7 @@ import struct
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from types import CodeType, FrameType, FunctionType
@@ -23,22 +23,24 @@ _DEEPEST: Final = 5
 
 class Rest(NamedTuple):
     """Where the value waits for somebody, or leaves the bridge: a call of this function has it, made by the
-    one that ``by`` names, if it does."""
+    one that ``by`` names, if it does. With ``gives`` it leaves as what the call returns."""
 
     file: str
     function: str
     by: str = ""
+    gives: bool = False
 
 
 class Call:
-    """One call of a function of the bridge: since when it has had the value, counted in events, and whom it
-    has been given it by."""
+    """One call of a function of the bridge: since when it has had the value, counted in events, when it has
+    given it back, and who has given it to this one."""
 
-    __slots__ = ("file", "function", "given_by", "has_at", "parent")
+    __slots__ = ("file", "function", "gave_at", "given_by", "has_at", "parent")
 
     def __init__(self, file: str, function: str, parent: Call | None) -> None:
         self.file, self.function, self.parent = file, function, parent
         self.has_at: int | None = None
+        self.gave_at: int | None = None
         self.given_by: list[tuple[int, Call]] = []
 
     def had(self, at: int) -> bool:
@@ -55,7 +57,7 @@ class Trace:
         self._files: dict[CodeType, str] = {}
         self._running: dict[FrameType, Call] = {}
         self._calls: list[Call] = []
-        """Those that have had the word."""
+        """Those that have had the word, in the order in which it came to them."""
 
     def on_event(self, frame: FrameType, event: str, arg: object) -> None:
         if event not in ("call", "return") or not self._file(frame):
@@ -66,16 +68,19 @@ class Trace:
             given = (*frame.f_code.co_varnames[: _arguments(frame.f_code)], *frame.f_code.co_freevars)
             held = frame.f_locals
             if any(self._holds(held.get(name)) for name in given if name != "self"):
-                self._has(caller)
-                self._has(call)
+                self._have(caller, call)
             return
         del self._running[frame]
         # A function that is given back takes an outcome, whatever else it knows.
         if not callable(arg) and self._holds(arg):
-            self._has(call)
-            self._has(caller)
+            self._have(call, caller)
+            call.gave_at = self._count
             if caller:
                 caller.given_by.append((self._count, call))
+
+    def end(self) -> None:
+        """Let go of what is still running."""
+        self._running.clear()
 
     def _file(self, frame: FrameType) -> str:
         """The file of the bridge, empty where it is another's."""
@@ -95,11 +100,12 @@ class Trace:
             self._running[frame] = Call(self._file(frame), frame.f_code.co_qualname, parent)
         return self._running[frame]
 
-    def _has(self, call: Call | None) -> None:
+    def _have(self, *calls: Call | None) -> None:
         self._count += 1
-        if call and call.has_at is None:
-            call.has_at = self._count
-            self._calls.append(call)
+        for call in calls:
+            if call and call.has_at is None:
+                call.has_at = self._count
+                self._calls.append(call)
 
     def _holds(self, value: Any, depth: int = _DEEPEST) -> bool:
         if isinstance(value, bool | str | float) or value is None:
@@ -119,13 +125,16 @@ class Trace:
         since = 0
         for rest in rests:
             call = next((call for call in self._calls if _is(call, rest) and not call.had(since)), None)
-            if call is None or call.has_at is None:
+            at = None if call is None else call.gave_at if rest.gives else call.has_at
+            if call is None or at is None:
                 raise LookupError(f"the value was not seen in {rest}")
-            since = call.has_at
-            on_way |= _hands(call, since)
+            since = at
+            # Whom it is given to does not count any more.
+            on_way |= _hands(call, at - rest.gives)
         steps: dict[str, str] = {}
-        for call in sorted(on_way, key=lambda call: call.has_at or 0):
-            steps.setdefault(call.file, call.function)
+        for call in self._calls:
+            if call in on_way:
+                steps.setdefault(call.file, call.function)
         return steps
 
 
@@ -151,7 +160,7 @@ def _hands(call: Call, at: int) -> set[Call]:
         one = waiting.pop()
         if one not in found:
             found.add(one)
-            waiting += [giver for given_at, giver in one.given_by if given_at <= at + 1]
+            waiting += [giver for given_at, giver in one.given_by if given_at <= at]
     return found
 
 
@@ -164,13 +173,19 @@ def _parts(value: Any) -> Iterable[Any]:
         case partial():
             return value.args
         case FunctionType():
-            return [cell.cell_contents for cell in value.__closure__ or ()]
+            return _closed_over(value)
         case msgspec.Struct():
             return [getattr(value, name) for name in value.__struct_fields__]
         case _ if dataclasses.is_dataclass(value):
             return [getattr(value, field.name, None) for field in dataclasses.fields(value)]
         case _:
             return ()
+
+
+def _closed_over(function: FunctionType) -> Iterator[Any]:
+    for cell in function.__closure__ or ():
+        with suppress(ValueError):  # a name that is set later
+            yield cell.cell_contents
 
 
 class Threads:
@@ -191,8 +206,10 @@ class Threads:
         def profiled(handler: Callable[..., object]) -> Callable[..., None]:
             def handle(*given: object) -> None:
                 sys.setprofile(self._on_event)
-                handler(*given)
-                sys.setprofile(None)
+                try:
+                    handler(*given)
+                finally:
+                    sys.setprofile(None)
 
             return handle
 
@@ -213,3 +230,4 @@ class Threads:
         finally:
             sys.setprofile(None)
             self._trace = None
+            trace.end()

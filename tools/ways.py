@@ -102,7 +102,7 @@ WAYS: Final = {
             Rest(_LINK, "_publish", "ZenohLink.send"),
             Rest(_WORKER, "Inbox.take_in"),
             Rest("image/image.py", "Image.set"),
-            Rest("northbound/opcua/values.py", "reader.<locals>.read"),
+            Rest("northbound/opcua/values.py", "reader.<locals>.read", gives=True),
         ),
     ),
     "A TPDO to a zenoh key": Way(

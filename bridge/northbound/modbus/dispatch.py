@@ -62,7 +62,7 @@ EXCEPTIONS: Final = {
     Code.TOO_OFTEN: ExceptionCode.ILLEGAL_FUNCTION,
     Code.REFUSED_BY_DRIVE: ExceptionCode.DEVICE_FAILURE,
 }
-"""How a request that did not succeed is told."""
+"""The exception for a request that did not succeed."""
 
 _CODES: Final = {
     ExceptionCode.ILLEGAL_FUNCTION: Code.NOT_ALLOWED,
@@ -71,7 +71,7 @@ _CODES: Final = {
     ExceptionCode.PATH_UNAVAILABLE: Code.UNKNOWN_TARGET,
     ExceptionCode.NOT_RESPONDING: Code.NOT_READY,
 }
-"""What an exception that is found here means."""
+"""The outcome for an exception that is raised here."""
 _WRITES: Final = (
     Function.WRITE_COIL,
     Function.WRITE_REGISTER,
@@ -102,9 +102,9 @@ class Dispatcher:
     def handle(
         self, unit_id: int, pdu: bytes, caller: Identity, answer: Answer, received_at: float = math.inf
     ) -> None:
-        """Do what ``pdu`` (at least one byte) asks. ``answer`` is called exactly once, now or later.
+        """Carry out ``pdu`` (at least one byte). ``answer`` is called exactly once, now or later.
 
-        ``received_at`` is when it can have come at the earliest.
+        ``received_at`` is the earliest time at which it can have arrived.
         """
         try:
             unit = self._units.get(unit_id)
@@ -186,7 +186,8 @@ class Dispatcher:
         return words_answer(Function.READ_WRITE, words)
 
     def _submit(self, plan: Sequence[Request], conclude: Callable[[Outcome], None]) -> None:
-        """Submit one request after the other; the first that fails, or the last, is the outcome."""
+        """Submit one request after the other; the outcome is that of the first one that fails, or of the
+        last."""
         first, *rest = plan
 
         def on_outcome(outcome: Outcome) -> None:

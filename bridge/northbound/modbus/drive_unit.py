@@ -145,8 +145,8 @@ class DriveUnit(Unit):
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
 
     def _check_words(self, table: Table, start: int, end: int) -> None:
-        """A range of nothing but words that the drive does not have, that its node does not carry, or that
-        never came."""
+        """Refuse a range that has only words which the drive does not have, its node does not carry, or never
+        came."""
         if not start or end > PROCESS_WORDS + 1:
             return
         words = self._words[table]
@@ -157,7 +157,7 @@ class DriveUnit(Unit):
             refuse_quality(qualities[0])
 
     def _input_words(self, start: int, end: int, quality: Quality) -> list[int]:
-        """Those of input registers 0 … 31 that are in the range."""
+        """Those of the input registers 0 … 31 that are in the range."""
         words: list[int] = []
         if start < DIAGNOSTICS:
             refuse_quality(quality)
@@ -177,7 +177,7 @@ class DriveUnit(Unit):
         return words
 
     def _diagnostic_words(self, quality: Quality, end: int) -> list[int]:
-        """Input registers 10 … 31; what takes longer only as far as ``end``."""
+        """Input registers 10 … 31; the expensive ones only up to ``end``."""
         from_int = self._words32.from_int
         values = self._image.values(self._diagnostics)
         state, emcy, fault, watchdog, left_ms, age_ms, abort_code, owner, telegrams = values
@@ -249,13 +249,13 @@ class DriveUnit(Unit):
         return self.plan_words(write.address, (word,), caller)
 
     def plan_words(self, start: int, words: Sequence[int], caller: Identity) -> list[Request]:
-        """One WRITE for all process words or setpoints, then acknowledge, time, keep-alive or release.
+        """One WRITE for all process words or setpoints, then acknowledge, time-out, keep-alive or release.
 
-        Who may not command the drive is refused at the first request. Beyond that only the WRITE can be
-        refused for what it holds, so it goes first; a time that will be refused is submitted alone: its
-        refusal is the answer, and is counted, and nothing else is done. Values written together with a
-        release (keep-alive 0) are taken first, then the drive is stopped and free. A stop is everybody's,
-        and all that is done.
+        A client that may not command the drive is refused at the first request. Apart from that only the
+        WRITE can be refused for its content, so it goes first. A time-out that will be refused is submitted
+        alone: its refusal is counted and is the answer, and nothing else happens. Values written together
+        with a release (keep-alive 0) are accepted first; then the drive is stopped and released. A stop is
+        open to everybody, and nothing else in its write is carried out.
         """
         end = start + len(words)
         self._check_range(Table.HOLDING_REGISTER, start, end)
@@ -275,7 +275,7 @@ class DriveUnit(Unit):
     def _values_of(
         self, start: int, words: Sequence[int], block: dict[int, int]
     ) -> Mapping[str, Value] | None:
-        """The values of the command group in a write, or None where it reaches none."""
+        """The values of the command group in a write, or None if it contains none."""
         if start <= PROCESS_WORDS:
             return self._process_values(block)
         return self._setpoint_values(start, words) if start >= VALUES else None
@@ -297,7 +297,7 @@ class DriveUnit(Unit):
         if KEEP_ALIVE in block:
             action = Action.KEEP_ALIVE if block[KEEP_ALIVE] else Action.RELEASE_CONTROL
             requests.append(Request(caller, target, Do(action)))
-        # A 0 written to the acknowledge register alone: nothing to do, and still a telegram.
+        # Only a 0 in the acknowledge register: nothing to do, but a telegram all the same.
         requests = requests or [Request(caller, target, Do(Action.KEEP_ALIVE))]
         return requests if is_pressed else _unpressed(requests)
 
@@ -336,13 +336,13 @@ class DriveUnit(Unit):
         }
 
     def _value(self, row: Row, pair: Sequence[int]) -> Value:
-        """What two registers that are written say, by the type of their value."""
+        """The value of two written registers, by its type."""
         if row.type == "float32":
             return self._words32.to_float(*pair)
         return self._words32.to_int(*pair, signed=row.type == "int32")
 
     def _parameter(self, start: int, words: Sequence[int], caller: Identity) -> Request:
-        """One parameter; more in one write could end half done."""
+        """One parameter only: a write of several could be carried out in part."""
         if len(words) != 2:
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
         row = self._map.parameters[(start - PARAMETERS) // 2]
@@ -356,7 +356,7 @@ class DriveUnit(Unit):
     # identification
 
     def identify(self) -> Mapping[int, str]:
-        """The drive's family, and from 80h on the numbers of 1018h as the node gives them."""
+        """The drive's family, and from 80h on the numbers in 1018h of the node."""
         vendor, product, revision, serial, device_name = self._image.values(self._identity)
         number, texts = int(revision), self._map.texts
         return {

@@ -1,7 +1,7 @@
-"""The register map: what stands at which address of which unit.
+"""The register map: what each address of each unit means.
 
-Pure layout, used by the server and by ``drivebridge export modbus``. Addresses are 0-based PDU
-addresses. Reference for users: ``docs/reference/modbus.md``.
+Only the layout, used by the server and by ``drivebridge export modbus``. Addresses are 0-based PDU addresses.
+Reference for users: ``docs/reference/modbus.md``.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ KEEP_ALIVE: Final = 10
 ACKNOWLEDGE: Final = 11
 TIMEOUT: Final = 12
 STOP: Final = 13
-# Input registers of a drive: 0 … 9 are the drive's data, 10 … 31 what the bridge knows about it.
+# Input registers of a drive: 0 … 9 are the drive's data, 10 … 31 the bridge's own knowledge.
 DIAGNOSTICS: Final = 10
 WORDS_NOT_GOOD: Final = 21
 VALUES_NOT_GOOD: Final = 22
@@ -70,8 +70,8 @@ _REFERENCE: Final = {
 class Row:
     """One value: a bit, a register, or two registers for 32 bits.
 
-    ``type`` is bool, uint16, uint32, int32 or float32; ``access`` r, w or rw; ``name`` the point's name
-    below its drive where there is one.
+    ``type`` is bool, uint16, uint32, int32 or float32; ``access`` r, w or rw; ``name`` the point's name below
+    its drive if it is a point.
     """
 
     table: Table
@@ -88,7 +88,7 @@ class Row:
 
     @property
     def reference(self) -> str:
-        """The 1-based number of the older manuals, such as 30033 or 40001."""
+        """The 1-based number used in older manuals, such as 30033 or 40001."""
         return f"{_REFERENCE[self.table]}{self.address + 1:04d}"
 
 
@@ -115,7 +115,7 @@ class DriveMap:
     device identification knows without asking the drive, by object id."""
 
     def __init__(self, drive: Drive, allows: Allows | None = None) -> None:
-        """``allows`` is for the column of access: without it, what the drive's family has."""
+        """``allows`` is for the access column; without it, the access is what the drive's family offers."""
         allows = allows or Allows()
         self.drive_name = drive.name
         self.unit_id = drive.unit_id
@@ -169,7 +169,7 @@ class DriveMap:
         return VALUES + 2 * len(self.inputs if table is Table.INPUT_REGISTER else self.setpoints)
 
     def second_halves(self, table: Table) -> frozenset[int]:
-        """Addresses at which no read and no write may begin or end, lest a value be torn."""
+        """Addresses at which no read or write may begin or end, because it would split a value."""
         return frozenset(row.address + 1 for row in self.rows if row.table is table and row.size == 2)
 
 
@@ -291,7 +291,7 @@ def _holding_rows(setpoints: Mapping[int, str], allows: Allows, *, may_set: bool
 def _value_rows(
     table: Table, leaves: Iterable[str], points: dict[str, Point], allows: Allows, first: int = VALUES
 ) -> tuple[Row, ...]:
-    """Two registers for each of ``leaves``; an integer stays one, so that no digit of it is lost."""
+    """Two registers for each of ``leaves``; integers are not turned into floats, so that no digit is lost."""
     rows: list[Row] = []
     for position, leaf in enumerate(leaves):
         point = points[leaf]
@@ -327,7 +327,7 @@ def _bit_rows(family: Family, allows: Allows) -> list[Row]:
 
 
 def _padded(names: Sequence[str]) -> list[str]:
-    """A name for each bit of a word, empty where the family has none."""
+    """A name for each bit of a word, empty if the family has none."""
     return [*names, *[""] * 16][:16]
 
 
@@ -345,11 +345,11 @@ class Words32:
         self._places = tuple(map("ABCD".index, order))
 
     def from_int(self, value: int) -> tuple[int, int]:
-        """Two registers of an integer; a negative one as its two's complement."""
+        """Two registers of an integer, in two's complement."""
         return _REGISTERS.unpack(self._ordered((value & 0xFFFF_FFFF).to_bytes(4, "big")))
 
     def from_float(self, value: float) -> tuple[int, int]:
-        """Two registers of an IEEE 754 single; what is too large for one is infinite."""
+        """Two registers of an IEEE 754 single; too large a number becomes infinite."""
         try:
             packed = struct.pack(">f", value)
         except OverflowError:

@@ -24,7 +24,8 @@ from bridge.quietlog import about
 _log = logging.getLogger(__name__)
 
 _WINDOW: Final = 4 * READ_MOST
-"""Bytes that may wait in the kernel: more than are read at once, so that who fills it is noticed."""
+"""Bytes that may wait in the kernel: more than are read at once, so that a client that fills it is
+noticed."""
 
 IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
@@ -48,7 +49,7 @@ class ModbusServer:
 
     @property
     def port(self) -> int:
-        """The port that is listened on. Raises RuntimeError before ``start``."""
+        """The port on which it listens. Raises RuntimeError before ``start``."""
         if self._server is None:
             raise RuntimeError("the server is not started")
         return self._server.sockets[0].getsockname()[1]
@@ -58,14 +59,14 @@ class ModbusServer:
         return len(self._sessions)
 
     async def start(self) -> None:
-        """Listen, also again after ``failed``. Raises ``Unavailable`` with the sentence that helps."""
+        """Listen, or listen again after ``failed``. Raises ``Unavailable`` with advice."""
         is_first = self._server is None
         if self._server:
-            # Only who listens has ended: the connections that there are go on.
+            # Only the listening socket has ended: existing connections go on.
             self._server.close()
         sock = self._socket = listen(self._settings.listen, "modbus.listen")
         loop = asyncio.get_running_loop()
-        # Connections inherit it; set later, it would not narrow the window that they begin with.
+        # Connections inherit it; set later, it would not reduce the window that they begin with.
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WINDOW)
         if is_first:
             self._pulse.start()
@@ -75,7 +76,7 @@ class ModbusServer:
         _log.info("Modbus TCP on %s", self._settings.listen)
 
     async def failed(self) -> None:
-        """Wait for ever, or raise ``OperationFailed`` when nobody can connect any more."""
+        """Wait until nobody can connect any more, then raise ``OperationFailed``."""
         if self._socket:
             await until_deaf(self._socket, "modbus.listen")
 
@@ -93,7 +94,7 @@ class ModbusServer:
     # what sessions ask and tell
 
     def admit(self, session: Session, host: str, port: int) -> Identity | None:
-        """The identity of a client, or None where its address may not connect."""
+        """The identity of a client, or None if its address may not connect."""
         address = _normalised(host)
         if not any(address in network for network in self._allowed):
             self._view.count("modbus_refused_connections")
@@ -123,15 +124,15 @@ class ModbusServer:
         _log.warning("connection of %s closed: %s", session.address, fault, extra=about(session.source))
 
     def _make_room(self, newcomer: str) -> None:
-        """End the connection that is missed least: one of the address that has the most, so that a crowd
-        pushes out itself; of them one that has said nothing yet, or the one that is idle the longest."""
+        """End the connection that matters least: one of the address that has the most, so that a crowd pushes
+        out itself; of these, one that has sent nothing yet, else the one that has been idle longest."""
         owners = self._view.image.values(self._owners)
         crowds = Counter(session.source for session in self._sessions)
         crowds[newcomer] += 1
 
         def is_missed(session: Session) -> tuple[bool, int, bool, float]:
             identity, crowd = session.identity, crowds[session.source]
-            # An owner's address has its share before all others, but no more than that.
+            # Addresses of owners come last, but only for their share of the connections.
             owns = identity is not None and str(identity) in owners
             has_share = crowd <= max(1, self._settings.max_connections // 2)
             return owns and has_share, -crowd, session.has_spoken, session.heard_at
@@ -149,7 +150,7 @@ class ModbusServer:
 
 
 def _normalised(host: str) -> IpAddress:
-    """An IPv4 client of an IPv6 socket is the IPv4 client it is."""
+    """An IPv4 client on an IPv6 socket is known by its IPv4 address."""
     address = ipaddress.ip_address(host)
     if isinstance(address, ipaddress.IPv6Address) and address.ipv4_mapped:
         return address.ipv4_mapped

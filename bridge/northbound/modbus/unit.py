@@ -1,4 +1,4 @@
-"""What one unit id answers: the interface, and the bridge's own unit."""
+"""The units behind the unit ids: their interface, and the bridge's own unit."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class Unit:
     """One unit id. Every method may raise ``Refused`` and then has changed nothing; here all do, for what a
     unit does not have.
 
-    The ``plan`` methods make the requests that a write stands for, in the order in which they are to be
-    submitted; all but the first can only fail if the first one does.
+    The ``plan`` methods return the requests that a write stands for, in the order in which they have to be
+    submitted; the others can fail only if the first one does.
     """
 
     def read_bits(self, table: Table, start: int, count: int) -> Sequence[bool]:
@@ -47,19 +47,19 @@ class Unit:
         raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
 
     def identify(self) -> Mapping[int, str]:
-        """Texts for device identification by object id, in rising order."""
+        """Texts for device identification by object id, in ascending order."""
         raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
 
 
 def refuse_quality(quality: Quality) -> None:
-    """Raise ``Refused`` where a value of this quality is not served."""
+    """Raise ``Refused`` if a value of this quality is not served."""
     if not quality.has_value:
         configured = quality is not Quality.CONFIG_ERROR
         raise Refused(ExceptionCode.NOT_RESPONDING if configured else ExceptionCode.PATH_UNAVAILABLE)
 
 
 def state_code(state: Value, watchdog_state: Value, quality: Quality) -> int:
-    """The state as served; what a drive was doing when it was last heard of is not its state."""
+    """The state as served: the last known state of a drive that is not heard any more does not count."""
     is_known = quality.has_value or watchdog_state == WatchdogState.TRIPPED
     return int(state) if is_known else DriveState.UNKNOWN
 
@@ -107,12 +107,13 @@ class BridgeUnit(Unit):
         return words[start : start + count]
 
     def _bus_state(self) -> int:
-        """The worst controller state of all buses; a bus that was not opened yet is down."""
+        """The worst CAN controller state of all buses; a bus that has not been opened yet is down."""
         readings = [self._image[index] for index in self._states]
         return max(int(reading.value) if reading.quality.has_value else _BUS_DOWN for reading in readings)
 
     def _module_state(self, bus_state: int, *, tripped: bool) -> int:
-        """The bits of P173 (BU 2500 §7.1.3). Bits 8 … 15 are about drives and have a register each here."""
+        """The bits of P173 (BU 2500 §7.1.3). Its bits 8 … 15 are about drives; here each drive has a
+        register."""
         states = self._image.values(self._nodes)
         operational = all(state == _OPERATIONAL for state in states)
         starting = any(state in _STARTING for state in states)

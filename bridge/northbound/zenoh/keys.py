@@ -1,4 +1,4 @@
-"""Which zenoh key stands for what, and how values, events and outcomes are written under it. Pure."""
+"""The zenoh keys, and how values, events and outcomes are written under them. Sans-IO."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _encode = msgspec.json.Encoder().encode
 
 
 class _Shown(msgspec.Struct, omit_defaults=True):
-    """A reading. ``v`` is null where there is no value, ``t`` where there never was one."""
+    """A reading. ``v`` is null if there is no value, ``t`` if there never was one."""
 
     v: Value | None
     q: str
@@ -28,7 +28,7 @@ class _Shown(msgspec.Struct, omit_defaults=True):
 
 
 class _Beside(msgspec.Struct, omit_defaults=True):
-    """What goes into the attachment of a bare value."""
+    """The attachment of a bare value."""
 
     q: str
     t: float | None
@@ -61,8 +61,8 @@ class _Refused(msgspec.Struct, omit_defaults=True):
 class KeySpace:
     """The keys of one site: ``<prefix>/<site>/<point name>``.
 
-    Chunks that begin with ``@`` are not found by ``*`` and ``**``: who asks for all values gets values
-    only.
+    Chunks that begin with ``@`` are not matched by ``*`` and ``**``: a client that asks for all values gets
+    only values.
     """
 
     def __init__(self, prefix: str, site: str, points: Sequence[Point]) -> None:
@@ -76,8 +76,8 @@ class KeySpace:
         self.own_commands = f"{self.top}/@/controller/*/*/*/command/**"
         self._owners = frozenset(_owner(point.name) for point in points)
         self.prompt = (*(f"{self.top}/{owner}/**" for owner in sorted(self._owners)), self.controllers)
-        """What is about one drive, one node, one bus or the bridge: few points, so that its answer finds room
-        on the way to whoever reads at all."""
+        """The keys of one drive, node, bus or the bridge: so few points that the answer fits into the queue
+        to any client that reads at all."""
         self.bridge_token = f"{self.top}/@/bridge"
         self._states = tuple(dict(point.states) for point in points)
 
@@ -92,8 +92,8 @@ class KeySpace:
         return _owner(tail) in self._owners or (own != tail and own[:1] in ("", "/"))
 
     def share(self, key: str, payload: bytes | None) -> str:
-        """Whose turn a query or put takes while others wait. zenoh does not tell who asks, but a user has
-        keys of his own; and who reads is not to crowd out who commands."""
+        """In whose queue a query or put waits. zenoh does not tell who sent it, but each user has command
+        keys of its own; and readers must not crowd out commands."""
         words = self.tail(key).split("/")
         if words[:2] == ["@", "controller"]:
             return "/".join(words[:3])
@@ -113,12 +113,12 @@ class KeySpace:
         return key[len(self.top) + 1 :]
 
     def as_json(self, index: int, reading: Reading, epoch_ns: int) -> bytes:
-        """``{"v": …, "q": "good", "t": seconds since 1970}``; ``s`` names the state of an enumeration,
-        ``r`` the reason of a quality that is not good."""
+        """``{"v": …, "q": "good", "t": seconds since 1970}``; ``s`` is the name of an enumeration's value,
+        ``r`` the reason for a quality that is not good."""
         return _encode(_Shown(_value(reading), *self._circumstances(index, reading, epoch_ns)))
 
     def as_bare(self, index: int, reading: Reading, epoch_ns: int) -> tuple[bytes, bytes]:
-        """The value as text, and the attachment with everything else. No value is no text."""
+        """The value as text, empty if there is none, and the attachment with everything else."""
         value = _value(reading)
         if value is None:
             text = b""
@@ -146,7 +146,7 @@ def _owner(tail: str) -> str:
 
 
 def seconds(epoch_ns: int) -> float:
-    """Seconds since 1970 UTC with six digits behind the point."""
+    """Seconds since 1970 UTC with six decimals."""
     return round(epoch_ns / 1e9, 6)
 
 
@@ -155,8 +155,8 @@ def event_json(event: Event, epoch_ns: int) -> bytes:
 
 
 def outcome_json(outcome: Outcome) -> bytes:
-    """``{"ok": true, "forwarded": true}``, or ``{"ok": false, "code": …, "message": …}``. A parameter that
-    was written brings ``v``, what the drive holds; one that the drive refused brings ``abort_code``."""
+    """``{"ok": true, "forwarded": true}``, or ``{"ok": false, "code": …, "message": …}``. After a parameter
+    was written, ``v`` is what the drive holds; if the drive refused it, there is ``abort_code``."""
     if outcome.ok:
         return _encode(_Done(True, outcome.forwarded, outcome.message, outcome.value))
     return refusal_json(outcome.code, outcome.message, outcome.abort_code)
@@ -178,5 +178,5 @@ def parameter_bare(value: Value, epoch_ns: int) -> tuple[bytes, bytes]:
 
 
 def _value(reading: Reading) -> Value | None:
-    """A value that is gone is not shown: a reader that looks at nothing else must not take it."""
+    """A value that is not valid any more is left out, because some readers look at nothing else."""
     return reading.value if reading.quality.has_value else None

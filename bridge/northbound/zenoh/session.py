@@ -1,7 +1,8 @@
 """The zenoh server: values and events out, gets and commands in.
 
-With users a controller is whose keys it commands by (``users.py``). Without them it is who it says it is
-(the query's attachment), and whoever reaches the port may command: which is why it listens on loopback.
+With users, the command key tells who the controller is (``users.py``). Without them it is who it says it is
+in the query's attachment, and anybody who reaches the port may command: that is why the server listens on
+loopback by default.
 """
 
 from __future__ import annotations
@@ -42,9 +43,9 @@ _OPERATIONAL: Final = NODE_CODES[NodeState.OPERATIONAL]
 _POINTS_PER_TICK: Final = 500
 _REPLIES_AT_ONCE: Final = 200
 _GETS_AT_ONCE: Final = 16
-"""Gets with wildcards that are answered side by side."""
+"""Gets with wildcards that are answered at the same time."""
 _SLOW_GET_S: Final = 5.0
-"""After this time one of them makes room for another; until then further ones are told to come again."""
+"""After this time one of them makes room for another; until then further ones are told to try again."""
 
 
 class ZenohServer:
@@ -69,7 +70,7 @@ class ZenohServer:
         self._feed = self._image.feed()
         self._present: set[str] = set()
         self._gets: dict[asyncio.Task[None], float] = {}
-        """Since when they are answered, the oldest first."""
+        """When each was begun, the oldest first."""
         self._tick_timer: asyncio.TimerHandle | None = None
         self._was_started = False
 
@@ -104,7 +105,7 @@ class ZenohServer:
         self._tick()
 
     async def _start_anew(self) -> None:
-        """With a session that knows nothing of the one before."""
+        """Start with a new session that knows nothing of the one before."""
         await self.close()
         self._users = read_users(self._settings)
         self._link = self._new_link()
@@ -136,7 +137,7 @@ class ZenohServer:
             self._follow_node(node, self._image[index])
 
     def _follow_node(self, name: str, state: Reading) -> None:
-        """A node's token is there while the node is operational."""
+        """A node has a token while it is operational."""
         is_operational = state.quality is Quality.GOOD and state.value == _OPERATIONAL
         if is_operational and name not in self._present:
             self._present.add(name)
@@ -160,7 +161,7 @@ class ZenohServer:
         self._link.send(Message(self._keys.event_key(event), payload, keys.JSON))
 
     def _on_strangers(self, places: list[str]) -> None:
-        """Silent, or not what zenoh lets in."""
+        """Clients that stayed silent, or that zenoh does not let in."""
         self._view.count("zenoh_broken_connections", len(places))
         sources = Counter(source_of(place.rpartition(":")[0].strip("[]")) for place in places)
         for source, count in sources.items():
@@ -192,7 +193,7 @@ class ZenohServer:
             task.add_done_callback(lambda task: self._gets.pop(task, None))
 
     def _has_room_for_get(self) -> bool:
-        """Who reads slowly must not keep all others waiting."""
+        """A slow reader must not keep all others waiting."""
         if len(self._gets) < _GETS_AT_ONCE:
             return True
         oldest, since = next(iter(self._gets.items()))
@@ -204,7 +205,7 @@ class ZenohServer:
 
     async def _answer_get(self, asked: Asked) -> None:
         """The present values of all points that match, a portion at a time."""
-        # Part of them must not look like all.
+        # A part of the answer must not look like all of it.
         end = partial(_refuse, asked, BadCommand("busy", "others wait and this is read slowly; ask for less"))
         try:
             for portion in self._matching(zenoh.KeyExpr(asked.key)):
@@ -238,7 +239,7 @@ class ZenohServer:
         self._submit(request, asked.received_at, reply)
 
     def _request(self, owner: str, tail: str, payload: bytes, attachment: bytes | None) -> Request:
-        """Raises ``BadCommand``. A stop is taken from whoever it is."""
+        """Raises ``BadCommand``. A stop is accepted from anybody."""
         request = self._commands.request(tail, payload, self._identity(owner, attachment))
         if self._users.are_proved and not owner and request.action not in STOP_ACTIONS:
             own = f"{self._keys.top}/@/controller/<user>/{tail}"
@@ -260,7 +261,7 @@ class ZenohServer:
         return replace(identity, sets_parameters=self._settings.parameters == "write")
 
     def _read_parameter(self, asked: Asked, owner: str, tail: str) -> None:
-        """A get on the key of a parameter: asked of the drive, or with ``?cached`` as it was last read."""
+        """A get on the key of a parameter: read from the drive, or with ``?cached`` as last read."""
         drive, name = self._commands.parameter(tail)
         cached = "cached" in re.split("[;&=]", asked.parameters)
         if cached and asked.key in self._keys.index:
@@ -299,7 +300,7 @@ class ZenohServer:
         self._view.rejected(Rejection(identity, target, action, bad.code, bad.message))
 
     def _on_put(self, message: Message) -> None:
-        """A plain put on a command key, where the site takes them. Nobody is there to be told."""
+        """A plain put on a command key, if the site allows them. It has no answer."""
         owner, tail = self._users.owner(self._keys.tail(message.key))
         try:
             request = self._request(owner, tail, message.payload, message.attachment)

@@ -12,8 +12,8 @@ _AT_ONCE_S: Final = 0.001
 class Deadlines:
     """Keeps the earliest of some deadlines that ``look`` finds. Times are monotonic seconds.
 
-    ``on_change``: any timer may have become earlier. ``on_readings``: at most those have that begin with
-    a reading, and it is enough to know of them ``look_every_s`` later.
+    ``on_change``: any timer may have become earlier. ``on_readings``: only timers that received data restart
+    may have changed, and looking at them within ``look_every_s`` is enough.
     """
 
     def __init__(self, look: Callable[[float], float | None]) -> None:

@@ -122,7 +122,7 @@ def takeover_ms(bus: BusTable, transmission_type: int) -> int:
 
 def _before_the_bus(table: DriveTable, bus: BusTable, timeout_ms: int) -> Iterator[Term]:
     period_ms = 1000 * bus.rpdo_period_s
-    way = "how much older the owner's last telegram may be than it is taken for"
+    way = "how much older the owner's last telegram may be than the bridge assumes"
     yield Term("way_ms", way_ms(table.control), way)
     yield Term("timeout_ms", timeout_ms, "the owner's time-out, fieldbus_timeout_ms")
     yield Term("reaction_ms", REACTION_BOUND_MS, "the bridge's own lateness, or that of the kernel's timer")

@@ -14,7 +14,7 @@ from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
 from bridge.sim.dictionary import Dictionary
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.nmt_slave import COMMANDED_STATE, ErrorControl, NmtCommand, NmtState, nmt_command_for
-from bridge.sim.pdo import Rpdo, Tpdo, pack, unpack
+from bridge.sim.pdo import CYCLIC_MAX, EVENT_MIN, Rpdo, Tpdo, pack, unpack
 from bridge.sim.sdo_server import SdoServer
 from bridge.sim.settings import CommunicationSettings, PdoSettings, SdoSettings
 from bridge.sim.store import Store
@@ -213,6 +213,8 @@ class CanopenSlave:
     def _on_sync(self, now: float) -> None:
         # TPDOs are sampled before RPDOs act, because both refer to the moment of the SYNC (CiA 301 §7.2.2.2).
         for tpdo, settings in self._active_tpdos():
+            if settings.transmission_type > CYCLIC_MAX:
+                continue
             payload = self._payload(settings)
             if tpdo.on_sync(settings, payload):
                 self._send(settings.cob_id, payload)
@@ -245,6 +247,8 @@ class CanopenSlave:
 
     def _send_due_tpdos(self, now: float) -> None:
         for tpdo, settings in self._active_tpdos():
+            if settings.transmission_type < EVENT_MIN:
+                continue
             payload = self._payload(settings)
             if tpdo.is_due(settings, payload, now):
                 self._send(settings.cob_id, payload)

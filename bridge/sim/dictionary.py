@@ -27,13 +27,9 @@ class DataType(Enum):
     INTEGER16 = (2, True)
     INTEGER32 = (4, True)
 
-    @property
-    def size(self) -> int:
-        return self.value[0]
-
-    @property
-    def signed(self) -> bool:
-        return self.value[1]
+    def __init__(self, size: int, signed: bool) -> None:
+        self.size = size
+        self.signed = signed
 
     def encode(self, value: int) -> bytes:
         """``value`` as little-endian bytes; a value beyond the type wraps as it would in a register."""

@@ -93,9 +93,8 @@ class NordDrive:
 
     @property
     def actual_values(self) -> tuple[int, ...]:
-        """IW1…IW5 as raw words, by P543."""
-        meanings = (self.parameters.meaning(543, n, self._set) for n in range(1, SET_POINTS + 1))
-        return tuple(self._actual(meaning) for meaning in meanings)
+        """IW1…IW5 as raw words."""
+        return tuple(self.actual_value(n) for n in range(1, SET_POINTS + 1))
 
     @property
     def current_a(self) -> float:
@@ -273,10 +272,10 @@ class NordDrive:
         self._coast_hz, self._coast_at = self.motor_hz(now), now
         self.output_hz, self._accelerating, self._ripple_now = 0.0, False, 0.0
 
-    def _actual(self, meaning: int) -> int:
-        """One actual value by its P543 code: frequency, current, inputs, setpoint, fault number, position
+    def actual_value(self, number: int) -> int:
+        """One of them, from 1, by its P543 code: frequency, current, inputs, setpoint, fault number, position
         (low and high word, §5.4); others 0."""
-        match meaning:
+        match self.parameters.meaning(543, number, self._set):
             case 1:
                 return _word(self.output_hz / self._max_hz)
             case 3 | 4:

@@ -58,7 +58,7 @@ class ProcessImage:
         return self._drives[drive].status_word if self._online(drive) else 0
 
     def actual(self, drive: int, value: int) -> int:
-        return self._drives[drive].actual_values[value] if self._online(drive) else 0
+        return self._drives[drive].actual_value(value + 1) if self._online(drive) else 0
 
     def bus_in(self, element: int) -> int:
         """P176: outputs, then control word and three setpoints of each drive."""

@@ -37,7 +37,7 @@ class ProfileDictionary(Dictionary):
 
     def find(self, index: int, sub: int) -> Entry:
         """The entry, if the object exists at present."""
-        return super().find(index if self.has_object(index) else -1, sub)
+        return super().find(-1 if self._hides(index) else index, sub)
 
 
 class VelocityMode:

@@ -132,7 +132,7 @@ class NordSingle(NordNode):
             return Number(u16, lambda: self._setpoints[place], write, in_rpdo=True, in_tpdo=True)
 
         def actual(place: int) -> Number:
-            return Number(u16, lambda: drive.actual_values[place] if self.linked else 0, in_tpdo=True)
+            return Number(u16, lambda: drive.actual_value(place + 1) if self.linked else 0, in_tpdo=True)
 
         control = Number(u16, lambda: self._control, set_control, in_rpdo=True, in_tpdo=True)
         status = Number(u16, lambda: drive.status_word if self.linked else 0, in_tpdo=True)

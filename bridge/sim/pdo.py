@@ -30,8 +30,6 @@ class Tpdo:
 
     def on_sync(self, settings: PdoSettings, payload: bytes) -> bool:
         """Whether this SYNC sends the PDO: type 0 if its data has changed, n every n-th time."""
-        if settings.transmission_type > CYCLIC_MAX:
-            return False
         if settings.transmission_type == 0:
             return payload != self._last
         self._syncs += 1
@@ -42,9 +40,6 @@ class Tpdo:
 
     def is_due(self, settings: PdoSettings, payload: bytes, now: float) -> bool:
         """Whether an event-driven PDO is to be sent now: changed or event timer out, and not inhibited."""
-        if settings.transmission_type < EVENT_MIN:
-            self._waiting = False
-            return False
         self._waiting = payload != self._last
         if self._sent_at is None:
             return True

@@ -3,12 +3,15 @@ babbles."""
 
 from __future__ import annotations
 
+from functools import cache
+
 from bridge.can.wirebits import exact_bits
 from bridge.canopen.frame import Frame
 from bridge.config import Site
 from tests.support.bench import Bench, ClockBus
 
 _STEP_S = 1e-3
+_bits = cache(exact_bits)
 
 
 class _WiredBus(ClockBus):
@@ -34,6 +37,7 @@ class BusyBench(Bench):
         self.bits = 0
         self._bitrate = site.bus[0].bitrate
         self._on_wire: tuple[Frame, bool | None, float] | None = None
+        self._node_at: float | None = 0.0
         super().__init__(site)
 
     def make_bus(self) -> ClockBus:
@@ -65,7 +69,9 @@ class BusyBench(Bench):
         if self._on_wire and self._on_wire[2] <= until:
             self._arrive(*self._on_wire[:2])
             self._on_wire = None
-        self.node.on_time(until)
+        if self._node_at is not None and self._node_at <= until:
+            self.node.on_time(until)
+            self._node_at = self.node.next_deadline()
         if self._wake_at <= until or self.bus.inbox:
             self.master.pump()
         self._from_node()
@@ -77,6 +83,7 @@ class BusyBench(Bench):
         self.log.append(frame)
         if from_master is not False and self.powered:
             self.node.on_frame(frame, self.now)
+            self._node_at = self.now
         if not from_master:
             self.receive(frame)
 
@@ -94,6 +101,6 @@ class BusyBench(Bench):
         _, frame, origin = min(offers, key=lambda offer: offer[0])
         if origin is not None:
             self.waiting = [item for item in kept if item[0] is not frame]
-        bits = exact_bits(frame)
+        bits = _bits(frame)
         self.bits += bits
         self._on_wire = frame, origin, now + bits / self._bitrate

@@ -19,6 +19,7 @@ from bridge.drive import OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, sca
 from bridge.drive.own_supervision import why_silence_does_not_stop
 from bridge.image import Image, Point, Quality, Value
 from bridge.mapping.model import Family, Slot
+from bridge.parameter import Names
 
 _ASYNCHRONOUS: Final = 255
 _IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
@@ -60,6 +61,7 @@ class Drive:
         bus: BusTable,
         table: DriveTable,
         family: Family,
+        names: Names,
         unit_id: int,
         report: Callable[[Event], None],
         settled: Callable[[Drive, float], None],
@@ -119,7 +121,7 @@ class Drive:
                 self.channel.scales,
                 timeout_writable=table.fieldbus_timeout_writable,
             ),
-            *parameter_points(self.name, family),
+            *parameter_points(self.name, names),
         ]
 
     def bind(self, image: Image, now: float) -> None:

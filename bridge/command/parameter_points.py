@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.image import DataType, Point
-from bridge.mapping.model import Family, Parameter
+from bridge.mapping.model import Parameter
 from bridge.parameter import Entry, Names
 
 _MOST_STATES: Final = 256
 """An enumeration is shown as a list of texts from code 0 on (OPC UA Part 8 §5.3.3.3)."""
 
 
-def parameter_points(name: str, family: Family) -> list[Point]:
+def parameter_points(name: str, names: Names) -> list[Point]:
     """The points of the drive called ``<node>/<drive>``, in the order of the mapping file."""
-    return [_point(f"{name}/parameter/{entry.leaf}", entry) for entry in Names(family).points()]
+    return [_point(f"{name}/parameter/{entry.leaf}", entry) for entry in names.points()]
 
 
 def _point(name: str, entry: Entry) -> Point:

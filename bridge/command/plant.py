@@ -34,7 +34,7 @@ from bridge.errors import Fault, FileFaults
 from bridge.guard import Guard
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Family
-from bridge.parameter import Ledger
+from bridge.parameter import Ledger, Names
 
 _LOOK_PER_DRIVE_S: Final = 50e-6
 """Readings alone make us look at all timers this often at most, so that looking takes a tenth of the CPU."""
@@ -59,6 +59,7 @@ class Node:
     bus: BusTable
     table: NodeTable
     family: Family
+    names: Names
     drives: list[Drive] = field(default_factory=list[Drive])
 
     @property
@@ -106,17 +107,19 @@ class Plant:
         self._buses = frozenset(f"bus/{bus.name}" for bus in site.bus)
         points = bridge_points()
         units = _unit_ids(site)
+        every_name = {mapping: Names(family) for mapping, family in families.items()}
         for bus in site.bus:
             points += bus_points(bus)
             for table in bus.node:
                 family = families[table.mapping]
-                node = self.nodes[table.name] = Node(bus, table, family)
+                names = every_name[table.mapping]
+                node = self.nodes[table.name] = Node(bus, table, family, names)
                 points += node_points(table, family.poll)
                 for position, drive_table in enumerate(table.drive):
                     unit_id = units[table.name, position]
                     settled = partial(self._settled, node)
                     drive = Drive(
-                        table, bus, drive_table, family, unit_id, self.report, settled, self._tripped
+                        table, bus, drive_table, family, names, unit_id, self.report, settled, self._tripped
                     )
                     node.drives.append(drive)
                     self.drives[drive.name] = drive

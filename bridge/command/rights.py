@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 from bridge.command.drive import Drive
 from bridge.command.plant import Plant
 from bridge.command.request import Source
 from bridge.image import Point
-from bridge.mapping.model import Family
-from bridge.parameter import Names
 
 _TAKES_LEASES: Final = (Source.OPCUA, Source.ZENOH)
 
@@ -22,8 +20,6 @@ class Rights:
     source: Source
     has_engineers: bool = False
     sets_parameters: bool = False
-    _names: dict[int, Names] = field(default_factory=dict[int, Names])
-    """By family, which takes its time."""
 
     def may_write(self, plant: Plant, point: Point) -> bool:
         """Whether a write of this point is ever carried out."""
@@ -45,7 +41,7 @@ class Rights:
 
     def _may_set(self, plant: Plant, drive: Drive, leaf: str) -> bool:
         node = plant.nodes[drive.node_name]
-        names = self._names_of(drive.family)
+        names = node.names
         entry = next((entry for entry in names.points() if entry.leaf == leaf), None)
         if entry is None or drive.family.sdo_channel(drive.slot, node.table.sdo_channels) is None:
             return False
@@ -55,11 +51,6 @@ class Rights:
             return True
         is_open = names.protection.level(entry.address) != "communication"
         return is_open and self.sets_parameters and self.may_command(drive)
-
-    def _names_of(self, family: Family) -> Names:
-        if id(family) not in self._names:
-            self._names[id(family)] = Names(family)
-        return self._names[id(family)]
 
 
 def rights_of(plant: Plant, source: Source) -> Rights:

@@ -39,7 +39,6 @@ from bridge.parameter import (
     Address,
     DriveParameters,
     Entry,
-    Names,
     ParameterError,
     Reading,
     Transfer,
@@ -72,7 +71,7 @@ class NodeParameters:
         self._sdo = sdo
         self._now = plant.began
         self._state = NodeState.ABSENT
-        names = self._names = Names(node.family)
+        names = self._names = node.names
         self._drives = {
             drive.name: DriveParameters(
                 drive.name,

@@ -179,7 +179,7 @@ class Bench:
         while True:
             node_at = self.node.next_deadline() if self.powered else None
             self.now = min(end, max(self.now, min(self._wake_at, node_at if node_at is not None else end)))
-            if self.powered:
+            if node_at is not None and node_at <= self.now:
                 self.node.on_time(self.now)
             self.master.pump()
             while self._from_node():

@@ -17,7 +17,7 @@ from bridge.canopen.sync import burst_length, sync_frames
 from bridge.command import Plant
 from bridge.master.network import Network
 from bridge.master.standstill import Alarm
-from bridge.node.process.process_data import Beat, Told
+from bridge.node.process.process_data import Repetition, RunningBurst
 from bridge.ratelimit import RateLimit
 
 RENEWALS: Final = 3
@@ -27,7 +27,7 @@ _BUS_EVENT_EVERY_S: Final = 5.0
 _SEND_LIMIT_S: Final = 0.1
 """A frame that could not be sent for this long is stale and is dropped."""
 
-Beats = dict[int, Beat]
+Repetitions = dict[int, Repetition]
 """What is to be repeated, by COB-ID."""
 
 
@@ -38,10 +38,10 @@ class Repeated:
         self._network = network
         self._plant = plant
         self._sync = sync_frames(network.bus.sync_counter)
-        self._beats: Beats = {}
+        self._repetitions: Repetitions = {}
         self._made_for: tuple[int, int, NmtState, bool] | None = None
 
-    def beats(self, *, anew: bool = False) -> Beats:
+    def repetitions(self, *, anew: bool = False) -> Repetitions:
         """The frames to be repeated: the same object while they are the same.
 
         A drive's settling, a node's new PDOs and our own state change them; asked ``anew``, every drive is
@@ -51,29 +51,31 @@ class Repeated:
         made_for = self._plant.settled, network.routings, network.nmt_state, network.charge.acts()
         if anew or made_for != self._made_for:
             self._made_for = made_for
-            self._beats = self._make() if network.charge.acts() else {}
-        return self._beats
+            self._repetitions = self._make() if network.charge.acts() else {}
+        return self._repetitions
 
-    def _make(self) -> Beats:
-        beats: Beats = {}
+    def _make(self) -> Repetitions:
+        repetitions: Repetitions = {}
         bus, state = self._network.bus, self._network.nmt_state
         # Initialising is said once, by the boot-up message.
         if bus.heartbeat_ms and state is not NmtState.INITIALISING:
             frame = Frame(cobid.ERROR_CONTROL + bus.master_node_id, bytes((state,)))
-            beats[frame.can_id] = Beat((frame,), bus.heartbeat_ms / 1000)
+            repetitions[frame.can_id] = Repetition((frame,), bus.heartbeat_ms / 1000)
         hold_at: list[float] = []
         for node in self._network.nodes:
             if node.sends_process_data:
                 for pdos in node.wire.drives.values():
                     if not pdos.is_silent:
-                        for beat in pdos.beats(bus.rpdo_period_s):
-                            beats[beat.frames[0].can_id] = beat
+                        for wanted in pdos.repetitions(bus.rpdo_period_s):
+                            repetitions[wanted.frames[0].can_id] = wanted
                             if pdos.needs_sync:
-                                hold_at += beat.hold_at
+                                hold_at += wanted.hold_at
         # SYNC last: it makes effective what is sent together with it (CiA 301 §7.2.2.2).
         if bus.sync_period_ms:
-            beats[cobid.SYNC] = Beat(self._sync, bus.sync_period_ms / 1000, hold_at=tuple(hold_at))
-        return beats
+            repetitions[cobid.SYNC] = Repetition(
+                self._sync, bus.sync_period_ms / 1000, hold_at=tuple(hold_at)
+            )
+        return repetitions
 
 
 @dataclass(slots=True)
@@ -86,8 +88,8 @@ class Line:
     clock: Callable[[], float]
     alarm: Alarm
     repeated: Repeated = field(init=False)
-    beating: dict[int, Told] = field(default_factory=dict[int, Told])
-    beats: Beats | None = None
+    running: dict[int, RunningBurst] = field(default_factory=dict[int, RunningBurst])
+    repetitions: Repetitions | None = None
     renew_at: float = 0.0
     hold_at: float = inf
     """When bursts have to be renewed so that they last as long as a drive needs them."""
@@ -123,31 +125,33 @@ class Line:
             bus.accept(routes)
             bus.watch(network.ours)
         renew = now >= self.renew_at
-        beats = self.repeated.beats(anew=renew)
+        repetitions = self.repeated.repetitions(anew=renew)
         frames = network.take_frames()
-        is_same = beats is self.beats and not frames
-        ended = set[int]() if is_same else self._ended(beats, frames)
+        is_same = repetitions is self.repetitions and not frames
+        ended = set[int]() if is_same else self._ended(repetitions, frames)
         # First: the kernel must not repeat an enabling word once more after a stopped one.
         for can_id in ended:
             bus.end_burst(can_id)
-            del self.beating[can_id]
+            del self.running[can_id]
         for frame in frames:
             bus.send(frame, now, now + _SEND_LIMIT_S)
         if not self.was_up:
             return
         if renew:
             self.renew_at = now + self.renew_s
-        if beats is self.beats and not (renew or ended) and now < self.hold_at:
+        if repetitions is self.repetitions and not (renew or ended) and now < self.hold_at:
             return
-        self.beats = beats
+        self.repetitions = repetitions
         self.alarm.set(self.burst_s)
-        for beat, changed in self._due(beats, now, renew=renew):
+        for wanted, changed in self._due(repetitions, now, renew=renew):
             # In this order: the process may be stopped right after it has read the clock.
             if self.stood_still(now) or self.alarm.rang:
-                self.beats = None
+                self.repetitions = None
                 return
-            self._beat(beat, now, at_once=changed)
-        self.hold_at = min((at for beat in beats.values() for at in beat.hold_at if at > now), default=inf)
+            self._burst(wanted, now, at_once=changed)
+        self.hold_at = min(
+            (at for wanted in repetitions.values() for at in wanted.hold_at if at > now), default=inf
+        )
         if self.plant.unsent:
             network.on_handed_over(self.clock())
 
@@ -162,32 +166,32 @@ class Line:
         that the kernel takes."""
         return min(self.burst_s, MOST_FRAMES * self.network.bus.rpdo_period_s) / RENEWALS
 
-    def _ended(self, beats: Beats, frames: list[Frame]) -> set[int]:
+    def _ended(self, repetitions: Repetitions, frames: list[Frame]) -> set[int]:
         """The bursts that end: what is sent once takes their place, too."""
-        return self.beating.keys() - (beats.keys() - {frame.can_id for frame in frames})
+        return self.running.keys() - (repetitions.keys() - {frame.can_id for frame in frames})
 
-    def _due(self, beats: Beats, now: float, *, renew: bool) -> list[tuple[Beat, bool]]:
+    def _due(self, repetitions: Repetitions, now: float, *, renew: bool) -> list[tuple[Repetition, bool]]:
         """What to hand to the bus, and whether it is new: setpoints before the enabling word.
 
         Mere renewals go in reverse order: what is handed over later has no more frames left until the
         deadline than what went before it, so setpoints end before the stop comes.
         """
-        new, kept = list[tuple[Beat, bool]](), list[tuple[Beat, bool]]()
-        for can_id, beat in beats.items():
-            told = self.beating.get(can_id)
-            if told is None or told.frames != beat.frames:
-                new.append((beat, True))
-            elif renew or not told.ends_as(beat, now):
-                kept.append((beat, False))
+        new, kept = list[tuple[Repetition, bool]](), list[tuple[Repetition, bool]]()
+        for can_id, wanted in repetitions.items():
+            told = self.running.get(can_id)
+            if told is None or told.frames != wanted.frames:
+                new.append((wanted, True))
+            elif renew or not told.ends_as(wanted, now):
+                kept.append((wanted, False))
         return [*new, *reversed(kept)]
 
-    def _beat(self, beat: Beat, now: float, *, at_once: bool) -> None:
+    def _burst(self, wanted: Repetition, now: float, *, at_once: bool) -> None:
         """Make the bus repeat this for the dead-man time, then what follows if its own time ends earlier."""
         ending = None
         # A deadline further ahead does not concern this burst, however long the hand-over takes.
-        if beat.until is not None and beat.until < now + 2 * self.burst_s + beat.period_s:
-            ending = BurstEnd(beat.until, beat.then())
-        count = burst_length(beat.period_s, self.network.bus.deadman_ms)
-        self.bus.burst(Burst(beat.frames, beat.period_s, count, ending), now, at_once=at_once)
-        ends = now + self.burst_s + beat.period_s
-        self.beating[beat.frames[0].can_id] = Told(beat.frames, beat.until, ends, now)
+        if wanted.until is not None and wanted.until < now + 2 * self.burst_s + wanted.period_s:
+            ending = BurstEnd(wanted.until, wanted.then())
+        count = burst_length(wanted.period_s, self.network.bus.deadman_ms)
+        self.bus.burst(Burst(wanted.frames, wanted.period_s, count, ending), now, at_once=at_once)
+        ends = now + self.burst_s + wanted.period_s
+        self.running[wanted.frames[0].can_id] = RunningBurst(wanted.frames, wanted.until, ends, now)

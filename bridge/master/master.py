@@ -119,7 +119,7 @@ class Master:
         if self._timer:
             self._timer.close()
         for line in self._lines:
-            for can_id in line.beating:
+            for can_id in line.running:
                 line.bus.end_burst(can_id)
         self._close_buses()
 
@@ -237,14 +237,14 @@ class Master:
             line.outages = status.outages
             if is_up and line.was_up:
                 # An outage came and went between two rounds: the bursts are gone anyway.
-                line.beating.clear()
+                line.running.clear()
                 line.renew_at = now
                 line.network.bus_is_gone(now)
                 line.network.bus_is_back(now)
         if is_up == line.was_up:
             return
         line.was_up = is_up
-        line.beating.clear()
+        line.running.clear()
         line.renew_at = now
         if is_up:
             line.network.bus_is_back(now)

@@ -34,7 +34,7 @@ def test_127_nodes_with_100_ms_heartbeats(tmp_path: Path) -> None:
                     network.on_time(now)
                     network.take_routes()
                     network.take_frames()
-                    quick.repeated.beats()
+                    quick.repeated.repetitions()
                     network.next_deadline()
                     plant.next_deadline(now)
         quick.now = now

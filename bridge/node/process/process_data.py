@@ -23,7 +23,7 @@ from bridge.node.process.words import WordMap
 Reject = Callable[[Frame, str], None]
 
 
-class Beat(NamedTuple):
+class Repetition(NamedTuple):
     """One identifier: the frames to be repeated in turn, and how often. They may be on the bus no longer than
     ``until``; ``then`` gives the frame that follows, None for silence.
 
@@ -37,7 +37,7 @@ class Beat(NamedTuple):
     hold_at: tuple[float, ...] = ()
 
 
-class Told(NamedTuple):
+class RunningBurst(NamedTuple):
     """What a bus repeats at present: ``frames`` until then, ``ends`` at the latest if nobody renews it, as it
     has been told ``at`` that time."""
 
@@ -46,12 +46,12 @@ class Told(NamedTuple):
     ends: float
     at: float
 
-    def ends_as(self, beat: Beat, now: float) -> bool:
+    def ends_as(self, wanted: Repetition, now: float) -> bool:
         """Whether it does so at the right time without being told again."""
-        if any(self.at < at <= now for at in beat.hold_at):
+        if any(self.at < at <= now for at in wanted.hold_at):
             return False
-        earliest = min((time for time in (self.until, beat.until) if time is not None), default=self.ends)
-        return self.until == beat.until or earliest >= self.ends
+        earliest = min((time for time in (self.until, wanted.until) if time is not None), default=self.ends)
+        return self.until == wanted.until or earliest >= self.ends
 
 
 class Tpdo:
@@ -209,12 +209,14 @@ class DrivePdos:
     def is_silent(self) -> bool:
         return self._drive.channel.output.silent
 
-    def beats(self, period_s: float) -> list[Beat]:
+    def repetitions(self, period_s: float) -> list[Repetition]:
         """The frames that belong on the bus now, those of each identifier together."""
         channel = self._drive.channel
         words, until = channel.output.words, channel.until
         hold_at = (until - self._held_s,) if until is not None and self._held_s else ()
-        return [Beat(one.frames(words), period_s, until, self._endings[one], hold_at) for one in self.rpdos]
+        return [
+            Repetition(one.frames(words), period_s, until, self._endings[one], hold_at) for one in self.rpdos
+        ]
 
     def frames_with(self, words: Sequence[int]) -> list[Frame]:
         """The frames that carry these words."""

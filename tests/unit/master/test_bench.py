@@ -237,7 +237,7 @@ def test_a_process_stopped_while_it_sends_sends_nothing_that_was_right_before(
 
     # A telegram that comes when the heartbeat's burst begins, which is told before the RPDO's.
     (line,) = bench.master._lines
-    del line.beating[HEARTBEAT]
+    del line.running[HEARTBEAT]
     bench.log.clear()
     with monkeypatch.context() as patched:
         patched.setattr(bench.bus, "burst", stand_still_after)

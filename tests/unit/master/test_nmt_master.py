@@ -115,11 +115,11 @@ def test_the_bridge_says_that_it_has_started_and_in_which_state_it_is(tmp_path: 
     quick.nodes[1].present = False
     quick.run(1.0)
     assert [frame.data for frame in quick.log if frame.can_id == 0x77F] == [b"\0"]
-    frames = quick.repeated.beats()[0x77F].frames
+    frames = quick.repeated.repetitions()[0x77F].frames
     assert frames == (Frame(0x77F, b"\x7f"),)
     quick.nodes[1].present = True
     quick.run(3.0)
-    frames = quick.repeated.beats()[0x77F].frames
+    frames = quick.repeated.repetitions()[0x77F].frames
     assert frames == (Frame(0x77F, b"\x05"),)
 
 

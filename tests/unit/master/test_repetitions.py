@@ -26,28 +26,28 @@ def operational(folder: Path, nodes: int = 3) -> Quick:
 
 def kept_is_right(quick: Quick) -> bool:
     quick.network.take_routes()
-    kept = quick.repeated.beats()
-    return kept == quick.repeated.beats(anew=True)
+    kept = quick.repeated.repetitions()
+    return kept == quick.repeated.repetitions(anew=True)
 
 
 def test_heartbeats_do_not_make_it_anew(tmp_path: Path) -> None:
     quick = operational(tmp_path)
     quick.network.take_routes()
-    before = quick.repeated.beats()
+    before = quick.repeated.repetitions()
     quick.run(0.5)
-    assert quick.repeated.beats() is before
+    assert quick.repeated.repetitions() is before
 
 
 def test_a_changed_word_is_in_it_at_once(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path))
     bench.run(3.0)
     (line,) = bench.master._lines
-    before = line.repeated.beats()[RPDO1 + 5]
+    before = line.repeated.repetitions()[RPDO1 + 5]
     request = Request(PLC, "conveyor/fu1", Write({"control_word": 0x047E}))
     outcomes: list[Outcome] = []
     bench.view.submit(request, outcomes.append)
     assert outcomes[0].forwarded
-    assert line.repeated.beats()[RPDO1 + 5] != before
+    assert line.repeated.repetitions()[RPDO1 + 5] != before
 
 
 def test_it_is_right_whatever_becomes_of_the_nodes(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_it_is_right_whatever_becomes_of_the_nodes(tmp_path: Path) -> None:
             quick.run(0.1)
     quick.network.bus_is_gone(quick.now)
     assert kept_is_right(quick)
-    assert RPDO1 + 3 in quick.repeated.beats(), "stopped words go to a lost node as well"
+    assert RPDO1 + 3 in quick.repeated.repetitions(), "stopped words go to a lost node as well"
 
 
 def test_a_setpoint_is_there_before_the_enable_and_renewed_after_the_control_word(tmp_path: Path) -> None:

@@ -2,38 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from asyncua.server.address_space import AddressSpace
-
 from bridge.northbound.opcua.filters import is_none
-from bridge.northbound.opcua.hierarchy import related, subtypes, supertypes
+from bridge.northbound.opcua.hierarchy import EventTypes
 from bridge.northbound.opcua.library import (
-    AttributeIds,
     DataChangeFilter,
-    ObjectIds,
     ServiceError,
     StatusCodes,
     get,
     make,
-    node_id,
     status,
     ua,
     variant,
 )
 from bridge.northbound.opcua.where import Where, field_name, where_clause
 
-BASE_EVENT: Final = node_id(ObjectIds.BaseEventType)
-_NULL: Final = node_id(ObjectIds.Null)
 _NO_FIELD: Final = variant(None, ua.VariantType.Null)
 _MOST_FIELDS: Final = 500
-_LONGEST_PATH: Final = 10
-_PARTS: Final = (ObjectIds.HasProperty, ObjectIds.HasComponent)
-
-_Path = tuple[tuple[int, str | None], ...]
-"""BrowseNames, each with its namespace."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,61 +89,3 @@ def _result(codes: Sequence[int], elements: list[ua.ContentFilterElementResult])
         SelectClauseResults=[status(code) for code in codes],
         WhereClauseResult=make(ua.ContentFilterResult, ElementResults=elements),
     )
-
-
-class EventTypes:
-    """The event types of the address space and the fields that they declare, looked up once."""
-
-    def __init__(self, space: AddressSpace) -> None:
-        self._space = space
-        self._above: dict[ua.NodeId, list[ua.NodeId]] = {}
-        self._declared: dict[ua.NodeId, set[_Path]] = {}
-        self._all: set[_Path] = set()
-
-    def look(self) -> None:
-        """Look at the types; no others may be added later."""
-        for kind in subtypes(self._space, BASE_EVENT):
-            self._above[kind] = supertypes(self._space, kind)
-            self._declared[kind] = set(self._paths(kind, ()))
-            self._all |= self._declared[kind]
-
-    def _paths(self, owner: ua.NodeId, above: _Path) -> Iterator[_Path]:
-        for kind in _PARTS if len(above) < _LONGEST_PATH else ():
-            for found in related(self._space, owner, kind):
-                name: ua.QualifiedName = get(found, "BrowseName")
-                path = (*above, (name.NamespaceIndex, name.Name))
-                yield path
-                yield from self._paths(get(found, "NodeId"), path)
-
-    def __contains__(self, kind: object) -> bool:
-        # A literal of a client may be anything, a list included.
-        return isinstance(kind, ua.NodeId) and kind in self._above
-
-    def is_of(self, kind: object, wanted: ua.NodeId) -> bool:
-        """Whether the event type ``kind`` is ``wanted`` or below it."""
-        return isinstance(kind, ua.NodeId) and wanted in self._above.get(kind, ())
-
-    def fault(self, operand: object) -> int:
-        """What is wrong with an operand that names a field; Good for nothing."""
-        type_id: ua.NodeId = get(operand, "TypeDefinitionId")
-        names: list[ua.QualifiedName] = get(operand, "BrowsePath") or []
-        attribute: int = get(operand, "AttributeId")
-        if type_id == _NULL:
-            type_id = BASE_EVENT
-        if type_id not in self:
-            return StatusCodes.BadTypeDefinitionInvalid
-        if not names:
-            # Part 9 §5.5.2: the NodeId of a condition is asked for in this way.
-            is_node_id = attribute == AttributeIds.NodeId
-            return StatusCodes.Good if is_node_id else StatusCodes.BadNodeIdUnknown
-        if len(names) > _LONGEST_PATH or not all(name.Name for name in names):
-            return StatusCodes.BadBrowseNameInvalid
-        path = tuple((name.NamespaceIndex, name.Name) for name in names)
-        # With BaseEventType the path counts, whatever the type.
-        owners = self._above[type_id]
-        declared = type_id == BASE_EVENT and path in self._all
-        if not declared and not any(path in self._declared.get(owner, ()) for owner in owners):
-            return StatusCodes.BadNodeIdUnknown
-        if attribute not in (AttributeIds.Value, AttributeIds.NodeId):
-            return StatusCodes.BadAttributeIdInvalid
-        return StatusCodes.BadIndexRangeNoData if get(operand, "IndexRange") else StatusCodes.Good

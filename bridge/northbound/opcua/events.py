@@ -6,7 +6,6 @@ import asyncio
 import uuid
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final
 
@@ -31,12 +30,6 @@ def type_name(kind: Kind) -> str:
     return f"{pascal_case(kind.value)}EventType"
 
 
-@dataclass(frozen=True, slots=True)
-class _Told:
-    event: Event
-    held_back: int
-
-
 class EventSender:
     """Takes events from the plant at any time and sends them when the publisher has its turn."""
 
@@ -54,23 +47,22 @@ class EventSender:
         self._guard = Guard("OPC UA events")
         self._limits: dict[Kind, RateLimit] = {}
         self._held_back = Counter[Kind]()
-        self._queue: deque[_Told] = deque(maxlen=_WAITING)
+        self._queue: deque[tuple[Event, int]] = deque(maxlen=_WAITING)
 
     def on_event(self, event: Event) -> None:
         if self._limits.setdefault(event.kind, RateLimit(_BURST, _EVERY_S)).allows(event.time):
-            self._queue.append(_Told(event, self._held_back.pop(event.kind, 0)))
+            self._queue.append((event, self._held_back.pop(event.kind, 0)))
         else:
             self._held_back[event.kind] += 1
 
     async def send_waiting(self) -> None:
         while self._queue:
-            told = self._queue.popleft()
+            event, held_back = self._queue.popleft()
             if self._subscriptions.subscriptions:
-                await self._send(told)
+                await self._send(event, held_back)
 
-    async def _send(self, told: _Told) -> None:
-        event = told.event
-        more = f" ({told.held_back} more like it before were left out)" if told.held_back else ""
+    async def _send(self, event: Event, held_back: int) -> None:
+        more = f" ({held_back} more like it before were left out)" if held_back else ""
         kinds = ua.VariantType
         fields = {
             "EventId": variant(uuid.uuid4().bytes, kinds.ByteString),

@@ -11,8 +11,9 @@ from typing import Final, TypeVar
 from asyncua.server.address_space import AddressSpace, NodeData
 
 from bridge.northbound.opcua import ranges
-from bridge.northbound.opcua.eventfilter import EventFilterFault, EventTypes, event_filter
+from bridge.northbound.opcua.eventfilter import EventFilterFault, event_filter
 from bridge.northbound.opcua.filters import change_filter
+from bridge.northbound.opcua.hierarchy import EventTypes
 from bridge.northbound.opcua.items import EventItem, Item, ValueItem, event_settings, value_settings
 from bridge.northbound.opcua.library import (
     GOOD,

@@ -72,7 +72,7 @@ class VariableNode:
         return self.bit is None and self.point.writable
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class ObjectNode:
     """A folder or an object. ``notifier`` is true where events are sent from it."""
 
@@ -80,9 +80,22 @@ class ObjectNode:
     browse_name: str
     folder: bool = True
     notifier: bool = False
-    objects: tuple[ObjectNode, ...] = ()
-    variables: tuple[VariableNode, ...] = ()
     methods: tuple[MethodNode, ...] = ()
+    variables: list[VariableNode] = field(default_factory=list[VariableNode])
+    _below: dict[str, ObjectNode] = field(default_factory=dict[str, "ObjectNode"])
+
+    @property
+    def objects(self) -> tuple[ObjectNode, ...]:
+        return tuple(self._below.values())
+
+    def below(self, name: str, make: Callable[[], ObjectNode]) -> ObjectNode:
+        """The object of this name, which is made where there is none."""
+        if name not in self._below:
+            self._below[name] = make()
+        return self._below[name]
+
+    def folder_below(self, name: str) -> ObjectNode:
+        return self.below(name, lambda: ObjectNode(f"{self.id}/{name}", pascal_case(name)))
 
 
 _DIRECTION: Final = Argument("direction", ArgumentType.INT32, "1 forward, -1 reverse, 0 as the drive is set")
@@ -131,93 +144,49 @@ def pascal_case(name: str) -> str:
     return "".join(word[:1].upper() + word[1:] for word in name.split("_"))
 
 
-@dataclass(slots=True)
-class _Branch:
-    """One object while the tree grows."""
-
-    id: str
-    browse_name: str
-    folder: bool = True
-    notifier: bool = False
-    branches: dict[str, _Branch] = field(default_factory=dict[str, "_Branch"])
-    variables: list[VariableNode] = field(default_factory=list[VariableNode])
-    methods: tuple[MethodNode, ...] = ()
-
-    def branch(self, name: str, make: Callable[[], _Branch]) -> _Branch:
-        found = self.branches.get(name)
-        if found is None:
-            found = self.branches[name] = make()
-        return found
-
-    def folder_below(self, name: str) -> _Branch:
-        return self.branch(name, lambda: _Branch(f"{self.id}/{name}", pascal_case(name)))
-
-    def finish(self) -> ObjectNode:
-        return ObjectNode(
-            self.id,
-            self.browse_name,
-            self.folder,
-            self.notifier,
-            tuple(branch.finish() for branch in self.branches.values()),
-            tuple(self.variables),
-            self.methods,
-        )
-
-
 def layout(points: Sequence[Point]) -> tuple[ObjectNode, ObjectNode, ObjectNode]:
     """The folders ``Drives``, ``Buses`` and the object ``Bridge`` with everything below them.
 
     Nodes, drives and buses are called as the site file calls them; all other BrowseNames are
     PascalCase. Raises ValueError for a point that has no place here.
     """
-    drives = _Branch("Drives", "Drives")
-    buses = _Branch("Buses", "Buses")
-    bridge = _Branch("bridge", "Bridge", folder=False, notifier=True)
+    drives = ObjectNode("Drives", "Drives")
+    buses = ObjectNode("Buses", "Buses")
+    bridge = ObjectNode("bridge", "Bridge", folder=False, notifier=True)
+
+    def node(name: str) -> ObjectNode:
+        return _owner(drives, name, name, _NODE_METHODS, ("node",))
+
     for index, point in enumerate(points):
         match point.path:
             case ("bridge", *rest) if rest:
                 home = bridge
             case ("bus", name, *rest) if rest:
-                home = _bus(buses, name)
+                home = _owner(buses, f"bus/{name}", name, _BUS_METHODS)
             case (name, "node", *rest) if rest:
-                home = _node(drives, name).folder_below("node")
+                home = node(name).folder_below("node")
             case (name, drive, *rest) if len(rest) > 1 and rest[0] in GROUPS:
-                home = _drive(_node(drives, name), drive)
+                home = _owner(node(name), f"{name}/{drive}", drive, _DRIVE_METHODS, GROUPS)
             case _:
                 raise ValueError(f"the point {point.name!r} has no place in the address space")
         for name in rest[:-1]:
             home = home.folder_below(name)
         home.variables.append(_variable(point, index))
-    return drives.finish(), buses.finish(), bridge.finish()
+    return drives, buses, bridge
 
 
-def _bus(buses: _Branch, name: str) -> _Branch:
-    full = f"bus/{name}"
-    return buses.branch(
-        name,
-        lambda: _Branch(full, name, folder=False, notifier=True, methods=_methods(full, _BUS_METHODS)),
-    )
+def _owner(
+    above: ObjectNode, id_: str, name: str, methods: _Methods, folders: Sequence[str] = ()
+) -> ObjectNode:
+    """A drive, a node or a bus, with the folders that it has in any case."""
 
+    def make() -> ObjectNode:
+        made = ObjectNode(id_, name, folder=False, notifier=True, methods=_methods(id_, methods))
+        for folder in folders:
+            made.folder_below(folder)
+        return made
 
-def _node(drives: _Branch, name: str) -> _Branch:
-    def make() -> _Branch:
-        node = _Branch(name, name, folder=False, notifier=True, methods=_methods(name, _NODE_METHODS))
-        node.folder_below("node")
-        return node
-
-    return drives.branch(name, make)
-
-
-def _drive(node: _Branch, name: str) -> _Branch:
-    full = f"{node.id}/{name}"
-
-    def make() -> _Branch:
-        drive = _Branch(full, name, folder=False, notifier=True, methods=_methods(full, _DRIVE_METHODS))
-        for group in GROUPS:
-            drive.folder_below(group)
-        return drive
-
-    return node.branch(name, make)
+    return above.below(name, make)
 
 
 def _methods(target: str, table: _Methods) -> tuple[MethodNode, ...]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import logging
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from cryptography.hazmat.primitives.asymmetric.padding import MGF1, OAEP
@@ -15,12 +14,10 @@ from bridge.command.request import Identity, Role, Source
 from bridge.config import OpcUaTable
 from bridge.northbound.opcua.certificates import TrustedCertificates, fingerprint
 from bridge.northbound.opcua.library import ServiceError, StatusCodes, first_certificate, get, ua
-from bridge.northbound.opcua.logins import PasswordChecks, Verify
-from bridge.northbound.opcua.notices import Tell, tell
-from bridge.northbound.opcua.passwords import ANONYMOUS, check_users, verify_password
+from bridge.northbound.opcua.logins import PasswordChecks
+from bridge.northbound.opcua.notices import tell
+from bridge.northbound.opcua.passwords import ANONYMOUS, check_users
 from bridge.northbound.sources import source_of
-
-_log = logging.getLogger(__name__)
 
 _LONGEST_NAME: Final = 64
 _LONGEST_PASSWORD: Final = 1024
@@ -41,24 +38,21 @@ def security_policies(settings: OpcUaTable) -> list[ua.SecurityPolicyType]:
     return policies
 
 
+@dataclass(frozen=True, slots=True)
 class CheckedPolicy:
     """A security policy of asyncua that opens no channel to a certificate without trust.
 
     asyncua looks at the certificate in CreateSession, which anyone can copy; here it is the one
-    whose key the client proves to have. ``tell`` is given a kind, a source and a detail for the log.
+    whose key the client proves to have.
     """
 
-    def __init__(
-        self, policy: Any, trusted: TrustedCertificates | None, tell: Tell = tell, source: str = ""
-    ) -> None:
-        self._policy = policy
-        self._tell = tell
-        self._trusted = trusted
-        self._source = source
+    _policy: Any
+    _trusted: TrustedCertificates | None
+    _source: str = ""
 
     def of(self, source: str) -> CheckedPolicy:
         """The same for connections of ``source``. What the log counts by must not be made up by a client."""
-        return CheckedPolicy(self._policy, self._trusted, self._tell, source)
+        return replace(self, _source=source)
 
     def matches(self, uri: str, mode: ua.MessageSecurityMode | None = None) -> bool:
         return self._policy.matches(uri, mode)
@@ -80,7 +74,7 @@ class CheckedPolicy:
         if why:
             name = certificate.subject.rfc4514_string()
             whose = f"SHA-256 {fingerprint(certificate)}, {name[:_LONGEST_NAME]}"
-            self._tell("refused certificates", self._source, f"{whose}: {why}")
+            tell("refused certificates", self._source, f"{whose}: {why}")
             # Part 4 §6.1.3: the client is not told more than this.
             raise ServiceError(StatusCodes.BadSecurityChecksFailed)
 
@@ -130,29 +124,17 @@ def _decrypt(content: bytes, key: RSAPrivateKey, digest: SHA1 | SHA256) -> bytes
         raise ServiceError(StatusCodes.BadIdentityTokenInvalid) from None
 
 
-@dataclass(frozen=True, slots=True)
-class _Account:
-    role: Role
-    password_hash: str
-
-
 _ROLES: Final = {"observer": Role.OBSERVER, "operator": Role.OPERATOR, "engineer": Role.ENGINEER}
 
 
 class Users:
-    """The users of the site file. Nobody is an administrator: the address space is the site's.
+    """The users of the site file. Nobody is an administrator: the address space is the site's."""
 
-    ``tell`` is given a kind, a source and a detail for the log.
-    """
-
-    def __init__(self, settings: OpcUaTable, tell: Tell = tell, verify: Verify = verify_password) -> None:
-        self._tell = tell
+    def __init__(self, settings: OpcUaTable) -> None:
         check_users(settings.user)
-        self._accounts = {
-            user.name: _Account(_ROLES[user.role], user.password_hash) for user in settings.user
-        }
+        self._accounts = {user.name: user for user in settings.user}
         self._anonymous = _ROLES.get(settings.anonymous)
-        self._checks = PasswordChecks(verify)
+        self._checks = PasswordChecks()
 
     def close(self) -> None:
         self._checks.close()
@@ -179,6 +161,6 @@ class Users:
             known, password, source_of(address)
         )
         if account is None or not is_right:
-            self._tell("refused logins", source_of(address), f"user {name[:_LONGEST_NAME]!r}")
+            tell("refused logins", source_of(address), f"user {name[:_LONGEST_NAME]!r}")
             raise ServiceError(StatusCodes.BadUserAccessDenied)
-        return Identity(Source.OPCUA, name, account.role, address)
+        return Identity(Source.OPCUA, name, _ROLES[account.role], address)

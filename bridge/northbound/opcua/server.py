@@ -35,7 +35,6 @@ from bridge.northbound.opcua.librarylog import quieten
 from bridge.northbound.opcua.listener import WINDOW, Listener
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
-from bridge.northbound.opcua.notices import tell
 from bridge.northbound.opcua.publisher import Publisher
 from bridge.northbound.opcua.routes import MOST_CALLS
 from bridge.northbound.opcua.security import CheckedPolicy, Users, security_policies
@@ -80,7 +79,7 @@ class _Outer(LibraryServer):
 
     async def start(self) -> None:
         await self._setup_server_nodes()
-        policies = [CheckedPolicy(policy, self._trusted, tell) for policy in self._policies]
+        policies = [CheckedPolicy(policy, self._trusted) for policy in self._policies]
         await self._inner.start()
         self.bserver = Listener(self._inner, self._bound, self.limits, self._pulse)
         self.bserver.set_policies(policies)
@@ -113,17 +112,13 @@ class OpcUaServer:
         self._publisher: asyncio.Task[None] | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
-        self._port = int(port)
-
-    @property
-    def port(self) -> int:
+        self.port = int(port)
         """The port that is listened on; after ``start`` never 0."""
-        return self._port
 
     @property
     def endpoint_url(self) -> str:
         host = socket.gethostname() if self._host in ("0.0.0.0", "::") else self._host
-        return f"opc.tcp://{f'[{host}]' if ':' in host else host}:{self._port}/drivebridge"
+        return f"opc.tcp://{f'[{host}]' if ':' in host else host}:{self.port}/drivebridge"
 
     async def start(self) -> None:
         """Open the endpoints.
@@ -131,7 +126,7 @@ class OpcUaServer:
         Raises ``FileFaults`` for a user, certificate or key that cannot be used, and ``Unavailable``
         where the port cannot be opened or the folder not be written.
         """
-        self._users = Users(self._settings, tell)
+        self._users = Users(self._settings)
         uri = application_uri()
         own = await asyncio.to_thread(configured_or_own, self._settings, self._folder, uri)
         trusted_dir = self._settings.trusted_dir
@@ -140,7 +135,7 @@ class OpcUaServer:
         bound.setblocking(False)
         # Connections inherit it: who fills their buffers is noticed.
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WINDOW)
-        self._port = bound.getsockname()[1]
+        self.port = bound.getsockname()[1]
         self._pulse.start()
         try:
             await self._serve(bound, own, trusted, self._users)

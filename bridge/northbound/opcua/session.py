@@ -180,7 +180,7 @@ class Session(InternalSession):
 
     async def subscribe(self, params: ua.CreateSubscriptionParameters) -> ua.CreateSubscriptionResult:
         self.subscriptions.drop_left_behind()
-        await make_room(self, self._server.sessions, self.subscription_service)
+        await make_room(self, self._server.sessions, self.subscriptions.subscriptions)
         return self.subscriptions.create(self, params)
 
     async def close_session(self, delete_subs: bool = True) -> None:

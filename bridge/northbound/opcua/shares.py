@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from typing import Final, Protocol
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final
 
-from asyncua.server.subscription_service import SubscriptionService
-
-from bridge.northbound.opcua.library import ServiceError, StatusCodes, ua
-from bridge.northbound.opcua.subscription import Subscription
+from bridge.northbound.opcua.library import ServiceError, StatusCodes
+from bridge.northbound.opcua.subscription import Owner, Subscription
 from bridge.northbound.sources import source_of
 
 MOST_SUBSCRIPTIONS: Final = 200
@@ -25,24 +23,15 @@ MOST_LISTENERS: Final = 1_000
 MOST_LISTENERS_OF_ADDRESS: Final = 500
 
 
-class Holder(Protocol):
-    """A session. ``holder`` is None while it has no connection, which ended at ``left_at``."""
-
-    session_id: ua.NodeId
-    address: str
-    holder: object | None
-    left_at: float
-
-    async def close_session(self, delete_subs: bool = True) -> None: ...
-
-
-async def make_room(session: Holder, sessions: Sequence[Holder], subscriptions: SubscriptionService) -> None:
+async def make_room(
+    session: Owner, sessions: Sequence[Owner], subscriptions: Mapping[int, Subscription]
+) -> None:
     """See that ``session`` can have one more subscription: sessions without a connection, which a client that
     was started anew has left behind, end first. Raises ServiceError."""
     left = sorted((one for one in sessions if one.holder is None), key=lambda one: one.left_at)
     same = [one for one in sessions if source_of(one.address) == source_of(session.address)]
     while True:
-        owners = [one.session_id for one in subscriptions.subscriptions.values()]
+        owners = [one.session_id for one in subscriptions.values()]
         of_address = sum(owners.count(one.session_id) for one in same)
         if owners.count(session.session_id) >= MOST_OF_SESSION:
             break

@@ -58,13 +58,16 @@ def terms(params: object) -> Terms:
 
 
 class Owner(Protocol):
-    """The session that a subscription is told to."""
+    """The session that a subscription is told to. ``holder`` is None while it has no connection; the last one
+    ended at ``left_at``."""
 
     session_id: ua.NodeId
     address: str
     identity: Identity
     channel_certificate: bytes | None
     publishing: PublishQueue
+    holder: object | None
+    left_at: float
 
     @property
     def is_gone(self) -> bool:
@@ -74,6 +77,8 @@ class Owner(Protocol):
     def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
         """``value`` as this user may see it."""
         ...
+
+    async def close_session(self, delete_subs: bool = True) -> None: ...
 
 
 class Subscription:

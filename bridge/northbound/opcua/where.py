@@ -9,8 +9,9 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
+from bridge.northbound.opcua.hierarchy import EventTypes
 from bridge.northbound.opcua.library import AttributeIds, StatusCodes, get, make, status, ua
 
 Operator = ua.FilterOperator
@@ -107,22 +108,8 @@ class Where:
         return values[0] is True if values else True
 
 
-class Types(Protocol):
-    """The event types that there are."""
-
-    def fault(self, operand: object) -> int:
-        """What is wrong with an operand that names a field; Good for nothing."""
-        ...
-
-    def is_of(self, kind: object, wanted: ua.NodeId) -> bool:
-        """Whether the event type ``kind`` is ``wanted`` or below it."""
-        ...
-
-    def __contains__(self, kind: object) -> bool: ...
-
-
 def where_clause(
-    asked: ua.ContentFilter, types: Types
+    asked: ua.ContentFilter, types: EventTypes
 ) -> tuple[Where | None, list[ua.ContentFilterElementResult]]:
     """The clause, None for one with a fault, and what is to be said of each of its elements."""
     asked_elements: list[ua.ContentFilterElement] = get(asked, "Elements") or []
@@ -142,7 +129,7 @@ def where_clause(
 
 
 def _element_fault(
-    wanted: ua.FilterOperator, operands: Sequence[object], codes: Sequence[int], types: Types
+    wanted: ua.FilterOperator, operands: Sequence[object], codes: Sequence[int], types: EventTypes
 ) -> int:
     if wanted == Operator.OfType:
         low, high = 1, 1
@@ -159,7 +146,7 @@ def _element_fault(
     return StatusCodes.Good
 
 
-def _operand_fault(operand: object, place: int, count: int, types: Types) -> int:
+def _operand_fault(operand: object, place: int, count: int, types: EventTypes) -> int:
     if isinstance(operand, ua.SimpleAttributeOperand):
         return types.fault(operand)
     if isinstance(operand, ua.ElementOperand):
@@ -177,7 +164,7 @@ def _told(code: int, codes: Sequence[int]) -> ua.ContentFilterElementResult:
     )
 
 
-def _element(wanted: ua.FilterOperator, operands: Sequence[object], types: Types) -> _Element:
+def _element(wanted: ua.FilterOperator, operands: Sequence[object], types: EventTypes) -> _Element:
     if wanted == Operator.OfType:
         kind: ua.NodeId = _literal(operands[0])
         return _Element(partial(types.is_of, wanted=kind), [_event_type])

@@ -12,8 +12,9 @@ from asyncua.server.standard_address_space import standard_address_space
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.northbound.opcua.eventfilter import EventFilterFault, EventTypes, Occurrence, event_filter
+from bridge.northbound.opcua.eventfilter import EventFilterFault, Occurrence, event_filter
 from bridge.northbound.opcua.filters import change_filter
+from bridge.northbound.opcua.hierarchy import EventTypes
 from bridge.northbound.opcua.library import DataChangeFilter, ServiceError
 
 Codes, Ids, Kind, Op = ua.StatusCodes, ua.ObjectIds, ua.VariantType, ua.FilterOperator

@@ -270,7 +270,7 @@ async def test_an_owner_that_is_gone_and_not_watched_holds_nobody_up():
                 later = 3600.0
                 assert (await other.write_register(0, 0x047E, device_id=1)).exception_code == 1
             for _ in range(500):
-                if server.sessions == 1:
+                if len(server._sessions) == 1:
                     break
                 await asyncio.sleep(0.01)
             assert (await other.write_register(0, 0x047E, device_id=1)).exception_code == 1
@@ -334,7 +334,7 @@ async def test_a_wrong_protocol_id_ends_the_connection(plant: Plant, server: Mod
     assert (await one_answer(reader))[0] == 1
     assert await asyncio.wait_for(reader.read(), 5) == b""
     assert plant.image.read("bridge/modbus_broken_connections").value == 1
-    assert server.sessions == 0
+    assert len(server._sessions) == 0
     writer.close()
 
 
@@ -363,7 +363,7 @@ async def test_idle_connections_make_room_and_the_owner_goes_last(
                 assert not (await reader.read_holding_registers(0, count=1, device_id=1)).isError()
                 idle.append(await asyncio.open_connection(HOST, server.port, local_addr=("127.0.0.3", 0)))
                 assert await closed_by_the_other_side(idle[-2][0]), "who does nothing makes room"
-                assert server.sessions == 3
+                assert len(server._sessions) == 3
             assert not (await reader.read_holding_registers(0, count=1, device_id=1)).isError()
         for _ in range(5):
             idle += [await asyncio.open_connection(HOST, server.port, local_addr=("127.0.0.3", 0))]
@@ -381,7 +381,7 @@ async def test_where_all_own_a_drive_the_idlest_makes_room(plant: Plant):
         async with pymodbus(server) as third:
             assert not (await third.write_registers(0, [0x047E, 0], device_id=1)).isError()
             assert not (await new.write_registers(0, [0x047E, 0], device_id=1)).isError()
-            assert server.sessions == 2
+            assert len(server._sessions) == 2
 
 
 def source_of(record: logging.LogRecord) -> object:
@@ -405,7 +405,7 @@ async def test_a_client_that_reads_nothing_is_dropped_and_harms_no_other(
     flood = asyncio.create_task(pour(writer, request))
     async with pymodbus(server) as client:
         slowest = 0.0
-        while server.sessions == 2:
+        while len(server._sessions) == 2:
             begin = time.monotonic()
             assert not (await client.read_holding_registers(0, count=1, device_id=1)).isError()
             slowest = max(slowest, time.monotonic() - begin)
@@ -459,11 +459,11 @@ async def test_close_ends_every_session(plant: Plant):
         reader, writer = await asyncio.open_connection(HOST, server.port)
         writer.write(adu(1, 1, bytes.fromhex("03 0000 0001")))
         await one_answer(reader)
-        assert server.sessions == 1
+        assert len(server._sessions) == 1
         await server.close()
         assert await closed_by_the_other_side(reader)
         writer.close()
-    assert server.sessions == 0
+    assert len(server._sessions) == 0
 
 
 # words that are not good

@@ -18,8 +18,7 @@ from bridge.northbound.modbus.pdu import (
     Identify,
     Loopback,
     MaskWrite,
-    ReadBits,
-    ReadWords,
+    Read,
     ReadWrite,
     Refused,
     WriteBits,
@@ -128,15 +127,13 @@ class Dispatcher:
         ending = _CODES.get(code, Code.NOT_READY)
         self._view.rejected(Rejection(caller, target, Action.WRITE, ending, message))
 
-    def _read(
-        self, unit: Unit, request: ReadWords | ReadBits | Identify | Loopback, caller: Identity
-    ) -> bytes:
+    def _read(self, unit: Unit, request: Read | Identify | Loopback, caller: Identity) -> bytes:
         match request:
-            case ReadWords(function, start, count):
-                words = unit.read_words(_TABLES[function], start, count, caller)
-                return words_answer(function, words)
-            case ReadBits(function, start, count):
-                return bits_answer(function, unit.read_bits(_TABLES[function], start, count))
+            case Read(function, start, count):
+                table = _TABLES[function]
+                if table in (Table.COIL, Table.DISCRETE_INPUT):
+                    return bits_answer(function, unit.read_bits(table, start, count))
+                return words_answer(function, unit.read_words(table, start, count, caller))
             case Identify():
                 objects = {number: _ascii(text) for number, text in unit.identify().items()}
                 return identification_answer(request, objects)

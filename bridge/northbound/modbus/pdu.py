@@ -11,6 +11,7 @@ import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import partial
 from typing import Final
 
 PDU_MOST: Final = 253
@@ -55,14 +56,9 @@ class Refused(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class ReadBits:
-    function: Function
-    start: int
-    count: int
+class Read:
+    """FC1 … FC4."""
 
-
-@dataclass(frozen=True, slots=True)
-class ReadWords:
     function: Function
     start: int
     count: int
@@ -121,7 +117,7 @@ class Identify:
     object_id: int
 
 
-PduRequest = ReadBits | ReadWords | WriteBits | WriteWords | MaskWrite | ReadWrite | Loopback | Identify
+PduRequest = Read | WriteBits | WriteWords | MaskWrite | ReadWrite | Loopback | Identify
 
 _TWO: Final = struct.Struct(">HH")
 _THREE: Final = struct.Struct(">HHH")
@@ -152,16 +148,10 @@ def _demand(condition: bool) -> None:
         raise Refused(ExceptionCode.ILLEGAL_VALUE)
 
 
-def _read_bits(pdu: bytes) -> ReadBits:
+def _read(most: int, pdu: bytes) -> Read:
     start, count = _TWO.unpack(pdu[1:])
-    _demand(1 <= count <= 2000)
-    return ReadBits(Function(pdu[0]), start, count)
-
-
-def _read_words(pdu: bytes) -> ReadWords:
-    start, count = _TWO.unpack(pdu[1:])
-    _demand(1 <= count <= 125)
-    return ReadWords(Function(pdu[0]), start, count)
+    _demand(1 <= count <= most)
+    return Read(Function(pdu[0]), start, count)
 
 
 def _write_coil(pdu: bytes) -> WriteBits:
@@ -216,10 +206,10 @@ def _encapsulated(pdu: bytes) -> Identify:
 
 
 _PARSERS: Final[dict[int, Callable[[bytes], PduRequest]]] = {
-    Function.READ_COILS: _read_bits,
-    Function.READ_DISCRETE_INPUTS: _read_bits,
-    Function.READ_HOLDING_REGISTERS: _read_words,
-    Function.READ_INPUT_REGISTERS: _read_words,
+    Function.READ_COILS: partial(_read, 2000),
+    Function.READ_DISCRETE_INPUTS: partial(_read, 2000),
+    Function.READ_HOLDING_REGISTERS: partial(_read, 125),
+    Function.READ_INPUT_REGISTERS: partial(_read, 125),
     Function.WRITE_COIL: _write_coil,
     Function.WRITE_REGISTER: _write_register,
     Function.DIAGNOSTICS: _diagnostics,

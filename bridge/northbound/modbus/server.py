@@ -54,10 +54,6 @@ class ModbusServer:
             raise RuntimeError("the server is not started")
         return self._server.sockets[0].getsockname()[1]
 
-    @property
-    def sessions(self) -> int:
-        return len(self._sessions)
-
     async def start(self) -> None:
         """Listen, or listen again after ``failed``. Raises ``Unavailable`` with advice."""
         is_first = self._server is None
@@ -120,6 +116,7 @@ class ModbusServer:
             self._view.on_connection(identity, is_there=False)
 
     def on_fault(self, session: Session, fault: str) -> None:
+        """The session is closed for this reason."""
         self._view.count("modbus_broken_connections")
         _log.warning("connection of %s closed: %s", session.address, fault, extra=about(session.source))
 

@@ -13,13 +13,16 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final, Protocol, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 from bridge.command import Identity
 from bridge.command.freshness import Inflow
 from bridge.northbound.modbus.dispatch import Answer, Dispatcher
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.sources import source_of
+
+if TYPE_CHECKING:
+    from bridge.northbound.modbus.server import ModbusServer
 
 TURN: Final = 16
 """Requests of one connection that are handled before all others get their turn: about 0.3 ms."""
@@ -152,20 +155,6 @@ class Conversation:
             self._on_late_answer()
 
 
-class Hall(Protocol):
-    """The owner of the list of sessions."""
-
-    def admit(self, session: Session, host: str, port: int) -> Identity | None:
-        """The identity of a client from this address, or None if it may not connect."""
-        ...
-
-    def leave(self, session: Session) -> None: ...
-
-    def on_fault(self, session: Session, fault: str) -> None:
-        """We close the session for this reason."""
-        ...
-
-
 class Session(asyncio.BufferedProtocol):
     """Pumps bytes between a socket and a ``Conversation``. ``clock`` is the plant's.
 
@@ -173,16 +162,18 @@ class Session(asyncio.BufferedProtocol):
     One that floods is handled ``TURN`` requests at a time, and its writes do not count as fresh.
     """
 
-    def __init__(self, dispatcher: Dispatcher, hall: Hall, clock: Callable[[], float], pulse: Pulse) -> None:
+    def __init__(
+        self, dispatcher: Dispatcher, server: ModbusServer, clock: Callable[[], float], pulse: Pulse
+    ) -> None:
         self._dispatcher = dispatcher
-        self._hall = hall
+        self._server = server
         self._clock = clock
         self._pulse = pulse
         self._inflow = Inflow(clock(), pulse.look)
         self._room = bytearray(READ_MOST)
         self._conversation = Conversation(self._handle, self._go_on)
         self.identity: Identity | None = None
-        """The identity given by the hall; None until the client is admitted."""
+        """The identity given by the server; None until the client is admitted."""
         self.heard_at = float("-inf")
         """When the client last sent something, or connected; in the plant's time."""
         self.has_spoken = False
@@ -216,7 +207,7 @@ class Session(asyncio.BufferedProtocol):
         self._transport = stream
         self.heard_at = self._clock()
         peer: Any = stream.get_extra_info("peername")
-        self.identity = self._hall.admit(self, peer[0], peer[1]) if peer else None
+        self.identity = self._server.admit(self, peer[0], peer[1]) if peer else None
         if self.identity is None:
             stream.abort()
             return
@@ -248,7 +239,7 @@ class Session(asyncio.BufferedProtocol):
             self._stalled.cancel()
             self._stalled = None
         if self.identity is not None:
-            self._hall.leave(self)
+            self._server.leave(self)
 
     # work
 
@@ -276,7 +267,7 @@ class Session(asyncio.BufferedProtocol):
         if answers:
             transport.write(answers)  # may call pause_writing
         if conversation.fault:
-            self._hall.on_fault(self, conversation.fault)
+            self._server.on_fault(self, conversation.fault)
             self.close()
             return
         self._read_on(transport)
@@ -298,7 +289,7 @@ class Session(asyncio.BufferedProtocol):
     def _drop_stalled(self) -> None:
         self._stalled = None
         if self._transport is not None:
-            self._hall.on_fault(self, "does not read its answers")
+            self._server.on_fault(self, "does not read its answers")
             self._transport.abort()
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import zenoh
 
-from bridge.zenohlink.lane import Job, Lane
+from bridge.zenohlink.lane import Lane
 from bridge.zenohlink.message import Message
 from bridge.zenohlink.worker import ZENOH_ERRORS
 
@@ -47,10 +47,9 @@ class Asked:
         """With the present time stamp: what is published later counts as newer, whenever this is sent."""
         try:
             stamp = self._lane.session.new_timestamp()
-        except ZENOH_ERRORS:
-            self._link.note_drop()
+        except ZENOH_ERRORS:  # the session has been closed
             return
-        self._do(lambda _: _reply(self._query, messages, stamp))
+        self._lane.do(lambda _: _reply(self._query, messages, stamp))
 
     async def settle(self) -> None:
         """Wait until the replies so far have been sent or given up."""
@@ -58,19 +57,15 @@ class Asked:
 
     def finish(self) -> None:
         """End the query: there are no more replies."""
-        self._do(lambda _: self._query.drop())
+        self._lane.do(lambda _: self._query.drop())
         if self._is_apart:
             self._lane.end()
 
     def fail(self, payload: bytes, encoding: str) -> None:
         """Answer with an error, and finish."""
-        self._do(lambda _: _reply_error(self._query, payload, encoding))
+        self._lane.do(lambda _: _reply_error(self._query, payload, encoding))
         if self._is_apart:
             self._lane.end()
-
-    def _do(self, job: Job) -> None:
-        if not self._lane.do(job):
-            self._link.note_drop()
 
 
 def _reply(query: zenoh.Query, messages: Sequence[Message], stamp: zenoh.Timestamp) -> None:

@@ -52,7 +52,6 @@ class ZenohLink:
     ) -> None:
         self.name = name
         self._is_prompt = is_prompt or (lambda _: True)
-        self._dropped = 0
         self._worker = Worker(
             config, name, self._on_opened, self._on_closed, is_for_strangers=is_prompt is not None
         )
@@ -63,11 +62,6 @@ class ZenohLink:
     def errors(self) -> int:
         """Calls that zenoh refused."""
         return self._worker.errors
-
-    @property
-    def dropped(self) -> int:
-        """Messages, queries and samples for which there was no room."""
-        return self._dropped + self._inbox.refused
 
     # life
 
@@ -122,7 +116,6 @@ class ZenohLink:
         if self._worker.is_stopping or not self._worker.is_alive:
             return
         if len(self._latest) >= LIMIT and message.key not in self._latest:
-            self._dropped += 1
             return
         self._latest[message.key] = message
         if not self._batch_is_out:
@@ -136,7 +129,6 @@ class ZenohLink:
     def submit(self, job: Job) -> bool:
         """Let the worker do ``job``. False: there was no room, or the worker has ended."""
         if self._worker.is_stopping or not self._worker.is_alive or self._worker.waiting >= LIMIT:
-            self._dropped += 1
             return False
         self._worker.do(job)
         return True
@@ -149,9 +141,6 @@ class ZenohLink:
 
     def own_lane(self, like: Lane) -> Lane:
         return self._worker.lane(like.session)
-
-    def note_drop(self) -> None:
-        self._dropped += 1
 
     def _hand_over(self) -> None:
         batch = [self._latest.pop(key) for key in list(islice(self._latest, _PUTS_AT_ONCE))]

@@ -209,7 +209,6 @@ class Inbox:
     """
 
     def __init__(self) -> None:
-        self.refused = 0
         self.is_closed = False
         self._loop = asyncio.get_running_loop()
         self._shares: dict[str, deque[Callable[[], None]]] = {"": deque()}
@@ -222,7 +221,6 @@ class Inbox:
             share = ""
         waiting = self._shares.setdefault(share, deque())
         if self.is_closed or len(waiting) >= _LIMIT:
-            self.refused += 1
             return False
         waiting.append(call)
         if not self._drain_is_due:

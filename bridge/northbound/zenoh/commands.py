@@ -21,7 +21,7 @@ from bridge.command import (
     WriteParameter,
     command_of,
 )
-from bridge.command.request import NMT_ACTIONS
+from bridge.command.request import NMT_ACTIONS, NODE_ACTIONS
 from bridge.image import Point, Value
 from bridge.northbound.zenoh.users import ANONYMOUS, NAME, WANTED_NAME
 
@@ -39,15 +39,7 @@ METHODS: Final = (
 _WITHOUT_PAYLOAD: Final = (Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE, Action.RELEASE_CONTROL)
 """These need no payload. Everything else does, so that reading a key with a plain get cannot start or
 acknowledge anything."""
-NODE_METHODS: Final = (
-    Action.RESET,
-    Action.RESET_COMMUNICATION,
-    Action.START_NODE,
-    Action.STOP_NODE,
-    Action.ENTER_PRE_OPERATIONAL,
-    Action.ENABLE,
-    Action.DISABLE,
-)
+NODE_METHODS: Final = tuple(action for action in Action if action in NODE_ACTIONS)
 BUS_METHODS: Final = tuple(action for action in NODE_METHODS if action in NMT_ACTIONS)
 
 MALFORMED: Final = "malformed"

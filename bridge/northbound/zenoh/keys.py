@@ -8,7 +8,7 @@ from typing import Final
 import msgspec
 
 from bridge.command import Event, Outcome
-from bridge.image import DataType, Point, Quality, Reading, Value
+from bridge.image import Point, Quality, Reading, Value
 from bridge.northbound.zenoh.users import own_keys
 
 JSON: Final = "application/json"
@@ -112,29 +112,29 @@ class KeySpace:
         """``key`` without prefix and site."""
         return key[len(self.top) + 1 :]
 
-    def as_json(self, index: int, reading: Reading, epoch_ns: int) -> bytes:
+    def as_json(self, index: int | None, reading: Reading, epoch_ns: int) -> bytes:
         """``{"v": …, "q": "good", "t": seconds since 1970}``; ``s`` is the name of an enumeration's value,
-        ``r`` the reason for a quality that is not good."""
+        ``r`` the reason for a quality that is not good. ``index`` is None for a parameter that was read."""
         return _encode(_Shown(_value(reading), *self._circumstances(index, reading, epoch_ns)))
 
-    def as_bare(self, index: int, reading: Reading, epoch_ns: int) -> tuple[bytes, bytes]:
+    def as_bare(self, index: int | None, reading: Reading, epoch_ns: int) -> tuple[bytes, bytes]:
         """The value as text, empty if there is none, and the attachment with everything else."""
         value = _value(reading)
         if value is None:
             text = b""
-        elif self.points[index].data_type is DataType.STRING:
-            text = str(value).encode()
+        elif isinstance(value, str):
+            text = value.encode()
         else:
             text = _encode(value)
         return text, _encode(_Beside(*self._circumstances(index, reading, epoch_ns)))
 
     def _circumstances(
-        self, index: int, reading: Reading, epoch_ns: int
+        self, index: int | None, reading: Reading, epoch_ns: int
     ) -> tuple[str, float | None, str, str]:
         quality = reading.quality
         time = None if quality is Quality.WAITING else seconds(epoch_ns)
         state = ""
-        if self._states[index] and quality.has_value and isinstance(reading.value, int):
+        if index is not None and self._states[index] and quality.has_value and isinstance(reading.value, int):
             state = self._states[index].get(reading.value, "")
         return quality.label, time, state, reading.reason
 
@@ -164,17 +164,6 @@ def outcome_json(outcome: Outcome) -> bytes:
 
 def refusal_json(code: str, message: str, abort_code: int = 0) -> bytes:
     return _encode(_Refused(False, code, message, f"{abort_code:08X}" if abort_code else ""))
-
-
-def parameter_json(value: Value, epoch_ns: int) -> bytes:
-    """A parameter that was read: ``{"v": …, "q": "good", "t": …}``, as ``as_json`` shows a point."""
-    return _encode(_Shown(value, Quality.GOOD.label, seconds(epoch_ns)))
-
-
-def parameter_bare(value: Value, epoch_ns: int) -> tuple[bytes, bytes]:
-    """The same as bare text and its attachment."""
-    text = value.encode() if isinstance(value, str) else _encode(value)
-    return text, _encode(_Beside(Quality.GOOD.label, seconds(epoch_ns)))
 
 
 def _value(reading: Reading) -> Value | None:

@@ -149,8 +149,9 @@ class ZenohServer:
     def _render(self, index: int, at_zero_ns: int) -> Message:
         """``at_zero_ns``: the wall clock at time 0, which is read once for many points."""
         reading = self._image[index]
-        key = self._keys.keys[index]
-        epoch_ns = at_zero_ns + round(reading.time * 1e9)
+        return self._message(self._keys.keys[index], index, reading, at_zero_ns + round(reading.time * 1e9))
+
+    def _message(self, key: str, index: int | None, reading: Reading, epoch_ns: int) -> Message:
         if self._settings.encoding == "json":
             return Message(key, self._keys.as_json(index, reading, epoch_ns), keys.JSON)
         value, attachment = self._keys.as_bare(index, reading, epoch_ns)
@@ -273,13 +274,8 @@ class ZenohServer:
             if not outcome.ok or outcome.value is None:
                 asked.fail(keys.outcome_json(outcome), keys.JSON)
                 return
-            epoch_ns = self._view.epoch_ns(outcome.time)
-            if self._settings.encoding == "json":
-                message = Message(asked.key, keys.parameter_json(outcome.value, epoch_ns), keys.JSON)
-            else:
-                text, attachment = keys.parameter_bare(outcome.value, epoch_ns)
-                message = Message(asked.key, text, keys.TEXT, attachment)
-            asked.send([message])
+            reading = Reading(outcome.value, Quality.GOOD, outcome.time, "")
+            asked.send([self._message(asked.key, None, reading, self._view.epoch_ns(outcome.time))])
             asked.finish()
 
         try:

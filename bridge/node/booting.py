@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from bridge.canopen.dialogue import Dialogue, ask
 from bridge.canopen.nmt import NmtState
@@ -12,24 +12,8 @@ from bridge.canopen.sdo import Priority, Result, SdoError
 from bridge.node import boot
 from bridge.node.sdo_channels import SdoChannels
 
-
-class Host(Protocol):
-    """The node that is booted."""
-
-    def carry_out(self, action: boot.Action, now: float) -> None:
-        """A step that needs no answer."""
-        ...
-
-    def begin_await(self, state: NmtState | None) -> bool:
-        """Whether there is anything to wait for: a node without supervision never says its state."""
-        ...
-
-    def may_start(self) -> bool:
-        """Whether start order and mandatory nodes let the node start now."""
-        ...
-
-    def boot_ended(self, result: boot.BootResult | boot.BootError, now: float) -> None: ...
-
+if TYPE_CHECKING:
+    from bridge.node.node import NodeCore
 
 _Dialogue = Dialogue[boot.Action, bytes | None, boot.BootResult, SdoError | boot.BootError]
 
@@ -44,8 +28,8 @@ class Booting:
     """One boot-up at a time. Answers are kept until ``pump``: the generator never runs inside the
     channel's own bookkeeping."""
 
-    def __init__(self, host: Host, make: Callable[[], boot.Boot], sdo: SdoChannels) -> None:
-        self._host = host
+    def __init__(self, node: NodeCore, make: Callable[[], boot.Boot], sdo: SdoChannels) -> None:
+        self._node = node
         self._make = make
         self._sdo = sdo
         self._dialogue: _Dialogue | None = None
@@ -78,7 +62,7 @@ class Booting:
         """Give the boot-up the answers that have come since the last call."""
         while self._answers:
             self._go_on(self._answers.pop(0), now)
-        if self.is_held and self._host.may_start():
+        if self.is_held and self._node.may_start():
             self.is_held = False
             self._go_on(None, now)
 
@@ -116,29 +100,29 @@ class Booting:
                 ask(action, self._sdo[action.channel], now, self._answers.append, Priority.BOOT)
                 return True
             case boot.Await(state, timeout_s):
-                if not self._host.begin_await(state):
-                    return False
+                if not self._node.begin_await(state):
+                    return False  # without supervision it never says its state
                 self._awaited = _Awaited(state, now + timeout_s)
                 return True
             case boot.Pause(seconds):
                 self._goes_on_at = now + seconds
                 return True
             case boot.AwaitRelease():
-                self.is_held = not self._host.may_start()
+                self.is_held = not self._node.may_start()
                 return self.is_held
             case boot.Step():
                 self._step = action
-                self._host.carry_out(action, now)
+                self._node.carry_out(action, now)
                 return False
             case _:
-                self._host.carry_out(action, now)
+                self._node.carry_out(action, now)
                 return False
 
     def _end(self, result: boot.BootResult | boot.BootError | SdoError, now: float) -> None:
         self._dialogue = None
         if isinstance(result, SdoError):
             result = _failure(result, self._step.letter)
-        self._host.boot_ended(result, now)
+        self._node.boot_ended(result, now)
 
 
 def _failure(error: SdoError, letter: str) -> boot.BootError:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 from bridge.canopen.nmt import NmtCommand
 from bridge.command import Action, Code, Drive, Event, Kind, Outcome, Plant, Reply, Request, Role
 from bridge.command.link import NodeState
-from bridge.command.plant import Node
-from bridge.node.leaving import Leaving
 from bridge.node.put_off import CANCELS_WORDS
-from bridge.node.wire import NodeWire
+
+if TYPE_CHECKING:
+    from bridge.node.node import NodeCore
 
 NMT: Final = {
     Action.RESET: NmtCommand.RESET_NODE,
@@ -24,38 +24,8 @@ _AFTER_RESET_S: Final = 1.0
 """A node that resets is asked again after this time if its boot-up message was not heard."""
 
 
-class Commanded(Protocol):
-    """The node as a command sees it."""
-
-    @property
-    def state(self) -> NodeState: ...
-
-    @property
-    def wire(self) -> NodeWire: ...
-
-    leaving: Leaving
-    boot_at: float | None
-    told_to_stop: bool
-
-    def stop_drives(self, now: float) -> None: ...
-    def leave_operation(self, now: float) -> None: ...
-    def set_state(self, state: NodeState, now: float) -> None: ...
-    def say(self, text: str, now: float) -> None: ...
-
-
-class Commandable(Protocol):
-    """A node that takes commands."""
-
-    @property
-    def node(self) -> Node: ...
-
-    leaving: Leaving
-
-    def carry_out_command(self, action: Action, who: str, now: float, *, send: bool = True) -> None: ...
-
-
 def answer(
-    request: Request, name: str, nodes: Sequence[Commandable], plant: Plant, now: float, reply: Reply
+    request: Request, name: str, nodes: Sequence[NodeCore], plant: Plant, now: float, reply: Reply
 ) -> bool:
     """A request for these nodes, ``name`` in the log; True where it was carried out and one frame is to be
     sent to them all.
@@ -99,7 +69,7 @@ def refusal(request: Request, drives: Sequence[Drive]) -> str | None:
 
 
 def carry_out(
-    node: Commanded, action: Action, who: str, now: float, *, send: bool = True, at_once: bool = False
+    node: NodeCore, action: Action, who: str, now: float, *, send: bool = True, at_once: bool = False
 ) -> None:
     """Do what ``action`` asks of a node. ``send`` is false where one frame tells all nodes; ``at_once``: its
     drives have had their stopped words for long."""
@@ -116,7 +86,7 @@ def carry_out(
         node.boot_at = now
 
 
-def _nmt(node: Commanded, command: NmtCommand, who: str, now: float, *, send: bool, at_once: bool) -> None:
+def _nmt(node: NodeCore, command: NmtCommand, who: str, now: float, *, send: bool, at_once: bool) -> None:
     """NMT on a node that is switched off goes on the bus and changes nothing here."""
     if command is NmtCommand.START and node.state is not NodeState.OPERATIONAL:
         # It is booted first, and started at the end of that: an unchecked node gets no process data.

@@ -23,45 +23,30 @@ _LONGEST_TEXT: Final = 300
 _encode = msgspec.json.Encoder().encode
 
 
-class _Line(msgspec.Struct, omit_defaults=True):
-    t: str
-    mono: float
-    source: str
-    user: str
-    role: str
-    target: str
-    action: str
-    code: str
-    forwarded: bool
-    address: str = ""
-    old: dict[str, Value] = {}
-    new: dict[str, Value] = {}
-    message: str = ""
-    count: int = 1
-
-
 def as_line(entry: AuditEntry, epoch_ns: int) -> bytes:
     """One line with its line break, ASCII except for names that clients give themselves."""
     who, ending = entry.identity, entry.ending
     seconds, ns = divmod(epoch_ns, 1_000_000_000)
     at = datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%dT%H:%M:%S")
-    line = _Line(
-        t=f"{at}.{ns // 1000:06d}Z",
-        mono=round(entry.time, 6),
-        source=who.source.label,
-        user=_cut(who.user),
-        role=who.role.name.lower(),
-        target=_cut(entry.target),
-        action=_cut(entry.action),
-        code=ending.code,
-        forwarded=ending.forwarded,
-        address=_cut(who.address),
-        old={_cut(leaf): _shown(value) for leaf, value in entry.old.items()},
-        new={_cut(leaf): _shown(value) for leaf, value in entry.new.items()},
-        message=_cut(ending.message),
-        count=entry.count,
-    )
-    return _encode(line) + b"\n"
+    line: dict[str, object] = {
+        "t": f"{at}.{ns // 1000:06d}Z",
+        "mono": round(entry.time, 6),
+        "source": who.source.label,
+        "user": _cut(who.user),
+        "role": who.role.name.lower(),
+        "target": _cut(entry.target),
+        "action": _cut(entry.action),
+        "code": ending.code,
+        "forwarded": ending.forwarded,
+    }
+    where_known: dict[str, object] = {
+        "address": _cut(who.address),
+        "old": {_cut(leaf): _shown(value) for leaf, value in entry.old.items()},
+        "new": {_cut(leaf): _shown(value) for leaf, value in entry.new.items()},
+        "message": _cut(ending.message),
+        "count": entry.count if entry.count != 1 else None,
+    }
+    return _encode(line | {key: value for key, value in where_known.items() if value}) + b"\n"
 
 
 def _cut(text: str) -> str:

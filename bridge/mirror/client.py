@@ -74,11 +74,6 @@ class MirrorClient:
             raise RuntimeError("there is no image before the first snapshot")
         return self._image
 
-    @property
-    def is_connected(self) -> bool:
-        """The image follows the bus process."""
-        return self._in_step and not self._is_dead
-
     def epoch_ns(self, time: float) -> int:
         """``Reading.time`` is already wall clock here; a double is good for a quarter of a µs."""
         return round(time * 1e9)

@@ -28,7 +28,8 @@ class BackOff:
     def reset(self) -> None:
         """The node has started, or an operator wants it now."""
         self.pause_s = _FIRST_S
-        self._pause_s = BETWEEN_BOOTS_S
+        self.between_boots_s = BETWEEN_BOOTS_S
+        """The least time from one boot-up to the next, where the node is heard again meanwhile."""
         self._losses = 0
         self.steady_at: float | None = None
         """When a node that was lost again and again is believed to stay."""
@@ -43,7 +44,7 @@ class BackOff:
         self._losses += 1
         pause_s = self._take(_LAST_S)
         if self._losses > 1:
-            self._pause_s = pause_s
+            self.between_boots_s = pause_s
         self.steady_at = None
         return pause_s
 
@@ -55,11 +56,6 @@ class BackOff:
         pause_s = min(self.pause_s, most_s)
         self.pause_s = min(2 * pause_s, most_s)
         return pause_s
-
-    @property
-    def between_boots_s(self) -> float:
-        """The least time from one boot-up to the next, where the node is heard again meanwhile."""
-        return self._pause_s
 
     @property
     def is_flapping(self) -> bool:

@@ -21,7 +21,6 @@ class BootLoop:
         self._pause_s = 0.0
         self._pauses = Pauses()
         self._since_told = 0
-        self.count = 0
 
     def on_boot_up(self, now: float) -> float:
         """A boot-up message; returns the seconds to wait before the node is booted, 0 if all is well."""
@@ -29,7 +28,6 @@ class BootLoop:
             self._pause_s = 0.0
             self._times.clear()
         self._times.append(now)
-        self.count += 1
         self._since_told += 1
         if len(self._times) < _MANY or now - self._times[0] > max(_WITHIN_S, _MANY * self._pause_s):
             return self._pause_s

@@ -32,10 +32,6 @@ class PutOff:
         self._wait_s = 0.0
         self._is_last = False
 
-    @property
-    def is_waiting(self) -> bool:
-        return self.command is not None
-
     def begin(self, command: NmtCommand, now: float, wait_s: float) -> None:
         """``command`` in ``wait_s``, or when the one that waits already would have gone out: who asks
         again and again does not put it off for ever."""

@@ -55,7 +55,9 @@ class SdoChannels:
         }
         self._all = tuple(self._channels.values())
         same = (server.number for server in opened_servers(node) if server.slot is None)
-        self._for_polls = self._channels[next(same, FIRST)]
+        self.for_polls = self._channels[next(same, FIRST)]
+        """One that keeps polls out of the way of boot-up and commands, where there is one that reaches the
+        same objects as the first."""
 
     def __getitem__(self, number: int) -> SdoChannel:
         """Raises KeyError where this channel is not open."""
@@ -63,16 +65,6 @@ class SdoChannels:
 
     def __iter__(self) -> Iterator[SdoChannel]:
         return iter(self._all)
-
-    @property
-    def first(self) -> SdoChannel:
-        return self._all[0]
-
-    @property
-    def for_polls(self) -> SdoChannel:
-        """One that keeps polls out of the way of boot-up and commands, where there is one that reaches the
-        same objects as the first."""
-        return self._for_polls
 
     @property
     def unmatched(self) -> int:

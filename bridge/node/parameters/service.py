@@ -245,7 +245,6 @@ class NodeParameters:
         self._show(drive, entry, reading)
         if result.changed:
             self._own_watch.forget(drive, entry, "was changed", self._now)
-        if result.changed:
             was = "" if result.before is None else f" (was {shown(entry, result.before)})"
             self._tell(drive.name, 400, f"{reading}{was}, by {request.identity}")
         self._warn(drive.name, result.warning)

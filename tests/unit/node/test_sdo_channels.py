@@ -132,7 +132,7 @@ def test_retries_are_those_of_the_site_file(tmp_path: Path) -> None:
     results: list[Result] = []
     bench.cut = True
     before = len(bench.sent(0x605))
-    bench.network.nodes[0].sdo.first.read(0x2069, 1, bench.now, results.append)
+    bench.network.nodes[0].sdo[1].read(0x2069, 1, bench.now, results.append)
     bench.run(0.2)
     asked = [frame for frame in bench.sent(0x605)[before:] if frame.data[:4].hex() == "40692001"]
     assert len(asked) == 3

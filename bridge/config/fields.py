@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import ipaddress
 import re
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, cast
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 
 OnLoss = Literal["restart", "stop_node", "stop_all", "nothing"]
 OnFailedStart = Literal["reset_communication", "report"]
@@ -108,6 +108,17 @@ def _controller(text: str) -> str:
     return text
 
 
+def _plain(value: object) -> object:
+    if not isinstance(value, bool | int | float | str):
+        raise ValueError("must be a number, true or false, or a text in quotes")
+    return value
+
+
+def listed(value: object) -> object:
+    """A single table counts as a list of one."""
+    return [cast("object", value)] if isinstance(value, dict | BaseModel) else value
+
+
 def _object(text: str) -> str:
     if not _OBJECT.fullmatch(text):
         raise ValueError('must be an object as "2097:01", index and sub-index in hexadecimal')
@@ -116,6 +127,7 @@ def _object(text: str) -> str:
 
 Name = Annotated[str, AfterValidator(_name)]
 RegularExpression = Annotated[str, AfterValidator(_regular_expression)]
+PlainValue = Annotated[bool | int | float | str, BeforeValidator(_plain)]
 ObjectName = Annotated[str, AfterValidator(_object)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Network = Annotated[str, AfterValidator(_network)]

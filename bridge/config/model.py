@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Final, Literal, cast
+from typing import Annotated, Final, Literal
 
 from pydantic import (
     AfterValidator,
@@ -16,6 +16,7 @@ from pydantic import (
 )
 
 from bridge.canopen.datatypes import TypeName, encode
+from bridge.canopen.pdo import MOST_BITS, PdoEntry
 from bridge.config.download import Download
 from bridge.config.fields import (
     LONGEST_TIMEOUT_MS,
@@ -34,6 +35,7 @@ from bridge.config.fields import (
     OnIntruder,
     OnLoss,
     ParameterRights,
+    PlainValue,
     Prefix,
     Reaction,
     Reason,
@@ -41,14 +43,14 @@ from bridge.config.fields import (
     SyncCounter,
     TimeoutRange,
     WordOrder,
+    listed,
 )
 
 _MAPPED: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})/([0-9]{1,2})")
-_PDO_BITS: Final = 64
 
 
 class Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, populate_by_name=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
 class SiteTable(Table):
@@ -57,37 +59,23 @@ class SiteTable(Table):
     runtime_dir: str = Field("/run/drivebridge", description="folder for the socket between our processes")
 
 
-class MappedObject(Table):
-    """An object in a PDO: index, sub-index, length in bits."""
-
-    index: int
-    sub: int
-    bits: int
-
-
 def _mapped(text: object) -> object:
-    if isinstance(text, MappedObject):
+    if isinstance(text, PdoEntry):
         return text
     match = _MAPPED.fullmatch(text) if isinstance(text, str) else None
-    if not match or not 1 <= int(match[3]) <= _PDO_BITS:
+    if not match or not 1 <= int(match[3]) <= MOST_BITS:
         raise ValueError('must be an object and its length in bits as "3000:01/16"')
-    return MappedObject(index=int(match[1], 16), sub=int(match[2], 16), bits=int(match[3]))
+    return PdoEntry(int(match[1], 16), int(match[2], 16), int(match[3]))
 
 
-def _plain(value: object) -> object:
-    if not isinstance(value, bool | int | float | str):
-        raise ValueError("must be a number, true or false, or a text in quotes")
-    return value
-
-
-def _fits(objects: list[MappedObject]) -> list[MappedObject]:
+def _fits(objects: list[PdoEntry]) -> list[PdoEntry]:
     bits = sum(mapped.bits for mapped in objects)
-    if bits > _PDO_BITS:
-        raise ValueError(f"has {bits} bits, a PDO has {_PDO_BITS}")
+    if bits > MOST_BITS:
+        raise ValueError(f"has {bits} bits, a PDO has {MOST_BITS}")
     return objects
 
 
-Mapped = Annotated[MappedObject, BeforeValidator(_mapped)]
+Mapped = Annotated[PdoEntry, BeforeValidator(_mapped)]
 
 
 class PdoTable(Table):
@@ -99,15 +87,10 @@ class PdoTable(Table):
     transmission_type: int | None = Field(None, ge=0, le=255, description="0…255, as the device allows")
     inhibit_ms: float | None = Field(None, ge=0, le=6553.5, description="0…6553.5 ms, in steps of 0.1")
     event_ms: int | None = Field(None, ge=0, le=65535, description="0…65535 ms")
-    mapping: Annotated[list[Mapped], AfterValidator(_fits)] = Field(default_factory=list[MappedObject])
+    mapping: Annotated[list[Mapped], AfterValidator(_fits)] = Field(default_factory=list[PdoEntry])
 
 
-def _listed(value: object) -> object:
-    """A single table counts as a list of one."""
-    return [cast("object", value)] if isinstance(value, dict | PdoTable) else value
-
-
-PdoTables = Annotated[list[PdoTable], BeforeValidator(_listed)]
+PdoTables = Annotated[list[PdoTable], BeforeValidator(listed)]
 
 
 class AcceptsTable(Table):
@@ -190,7 +173,7 @@ class ConfigureTable(Table):
 
     object: ObjectName = Field(description='an object as "2097:01", index and sub-index in hexadecimal')
     type: TypeName = Field(description="the object's data type, such as uint16")
-    value: Annotated[bool | int | float | str, BeforeValidator(_plain)]
+    value: PlainValue
     read_back: bool = Field(True, description="false writes it blindly, as a command")
 
     @field_validator("value")

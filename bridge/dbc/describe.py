@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from bridge.canopen.pdo import PdoEntry
 from bridge.config import NodeTable, PdoTable
 from bridge.dbc.fields import lay_out
 from bridge.dbc.model import BRIDGE, BusDescription, Message
@@ -77,7 +76,7 @@ def _message(
     asked = _asked(drive, view, pdos[0].number)
     entries = factory_entries(pdo)
     if asked is not None and asked.mapping:
-        entries = tuple(PdoEntry(one.index, one.sub, one.bits) for one in asked.mapping)
+        entries = tuple(asked.mapping)
     names = [(family.rpdo_words if view.receives else family.tpdo_words)(one) for one in pdos]
     places = match_words(entries, layouts(pdos, names, process))
     signed = frozenset((ref.index, ref.sub) for one in pdos for ref in one.signed)

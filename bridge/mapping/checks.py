@@ -7,9 +7,9 @@ from typing import Final
 from bridge.image import DataType
 from bridge.mapping.checks_aliases import check_aliases
 from bridge.mapping.checks_own import check_own_supervision
-from bridge.mapping.checks_process import check_cob_id, check_process, check_slots, twice
+from bridge.mapping.checks_process import check_cob_id, check_parameter, check_process, check_slots, twice
 from bridge.mapping.checks_values import check_values
-from bridge.mapping.merge import Noted
+from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import ControlWord, Family, pattern_bits
 from bridge.tomlfile import Key
 
@@ -28,7 +28,7 @@ _NODE_POINTS: Final = (
 """What every node has beside what is polled."""
 
 
-def check(family: Family, file: Noted) -> None:
+def check(family: Family, file: MergedFile) -> None:
     """Note in ``file`` what does not go together."""
     facts = family.family
     if facts.node_id_low > facts.node_id_high:
@@ -49,7 +49,7 @@ def check(family: Family, file: Noted) -> None:
     check_own_supervision(family, file)
 
 
-def _check_sdo(family: Family, file: Noted) -> None:
+def _check_sdo(family: Family, file: MergedFile) -> None:
     slots = [slot.name for slot in family.slot]
     twice(((f"{sdo.number}", ("sdo", s, "number")) for s, sdo in enumerate(family.sdo)), "SDO server", file)
     for s, sdo in enumerate(family.sdo):
@@ -60,7 +60,7 @@ def _check_sdo(family: Family, file: Noted) -> None:
             check_cob_id(cob_id, family, ("sdo", s, name), file)
 
 
-def _check_parameters(family: Family, file: Noted) -> None:
+def _check_parameters(family: Family, file: MergedFile) -> None:
     names = [(parameter.name, ("parameter", p, "name")) for p, parameter in enumerate(family.parameter)]
     twice(names, "parameter", file)
     points = [(one.leaf, ("parameter", p, "name")) for p, one in enumerate(family.parameter) if one.point]
@@ -85,20 +85,13 @@ def _check_parameters(family: Family, file: Noted) -> None:
             file.fault((*key, "data_type"), "a text has neither factor nor states")
 
 
-def _check_eeprom(family: Family, file: Noted) -> None:
+def _check_eeprom(family: Family, file: MergedFile) -> None:
     ram_only = family.eeprom.ram_only if family.eeprom else None
     if ram_only is not None:
         check_parameter(ram_only.parameter, family, ("eeprom", "ram_only", "parameter"), file)
 
 
-def check_parameter(name: str, family: Family, key: Key, file: Noted) -> None:
-    """``name`` must be a parameter that is listed."""
-    known = sorted(parameter.name for parameter in family.parameter)
-    if name not in known:
-        file.fault(key, f"there is no parameter {name!r}", f"known: {', '.join(known)}")
-
-
-def _check_polls(family: Family, file: Noted) -> None:
+def _check_polls(family: Family, file: MergedFile) -> None:
     twice(((poll.name, ("poll", p, "name")) for p, poll in enumerate(family.poll)), "poll", file)
     for p, poll in enumerate(family.poll):
         if poll.name in _NODE_POINTS:
@@ -106,7 +99,7 @@ def _check_polls(family: Family, file: Noted) -> None:
         _check_integer(poll.data_type, ("poll", p, "data_type"), file)
 
 
-def _check_bits(family: Family, file: Noted) -> None:
+def _check_bits(family: Family, file: MergedFile) -> None:
     """Each bit is shown under its name, beside the others of its word."""
     named: list[tuple[list[str], Key]] = [
         (family.control_word.bits, ("control_word", "bits")),
@@ -118,12 +111,12 @@ def _check_bits(family: Family, file: Noted) -> None:
         twice(((name, (*key, place)) for place, name in enumerate(bits) if name), "bit", file)
 
 
-def _check_integer(data_type: DataType, key: Key, file: Noted) -> None:
+def _check_integer(data_type: DataType, key: Key, file: MergedFile) -> None:
     if not data_type.is_integer:
         file.fault(key, "must be an integer type", "uint8, uint16, uint32, int16 or int32")
 
 
-def _check_control_word(control: ControlWord, file: Noted) -> None:
+def _check_control_word(control: ControlWord, file: MergedFile) -> None:
     enabling = control.enabling
     acknowledge = 1 << control.acknowledge_bit
     commands = {"stop": control.stop, "quick_stop": control.quick_stop}
@@ -149,7 +142,7 @@ def _check_control_word(control: ControlWord, file: Noted) -> None:
             file.fault(("control_word", name), "has bits of enabling or of the acknowledge")
 
 
-def _check_handshake(family: Family, file: Noted) -> None:
+def _check_handshake(family: Family, file: MergedFile) -> None:
     handshake = family.control_word.handshake
     if handshake is None:
         return
@@ -163,7 +156,7 @@ def _check_handshake(family: Family, file: Noted) -> None:
         file.fault((*key, "bit"), "is a bit of enabling or of the acknowledge")
 
 
-def _check_states(family: Family, file: Noted) -> None:
+def _check_states(family: Family, file: MergedFile) -> None:
     """The word that is served while tripped must decode as *fault*, and every state be told at all."""
     states = family.status_word.state
     if not any(state.name == "operation_enabled" for state in states):
@@ -185,7 +178,7 @@ def _check_states(family: Family, file: Noted) -> None:
             )
 
 
-def _check_shadows(family: Family, told: list[int], file: Noted) -> None:
+def _check_shadows(family: Family, told: list[int], file: MergedFile) -> None:
     """A pattern all of whose words match an earlier one is never told. ``told`` are checked already."""
     states = family.status_word.state
     bits = [pattern_bits(state.pattern) for state in states]
@@ -202,7 +195,7 @@ def _check_shadows(family: Family, told: list[int], file: Noted) -> None:
                 break
 
 
-def _check_faults(family: Family, file: Noted) -> None:
+def _check_faults(family: Family, file: MergedFile) -> None:
     emcy = family.emcy
     if emcy.events and emcy.event is None and emcy.number is None:
         file.fault(("emcy", "events"), "has no meaning without emcy.event or emcy.number")

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from bridge.mapping.aliases import COMMUNICATION, aliases, place_of
-from bridge.mapping.merge import Noted
+from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family
 
 
-def check_aliases(family: Family, file: Noted) -> None:
+def check_aliases(family: Family, file: MergedFile) -> None:
     if _are_known(family, file):
         _check_starts(family, file)
 
 
-def _are_known(family: Family, file: Noted) -> bool:
+def _are_known(family: Family, file: MergedFile) -> bool:
     fine = True
     for kind, table in (("same", family.aliases.same), ("related", family.aliases.related)):
         for name, targets in table.items():
@@ -28,7 +28,7 @@ def _are_known(family: Family, file: Noted) -> bool:
     return fine
 
 
-def _check_starts(family: Family, file: Noted) -> None:
+def _check_starts(family: Family, file: MergedFile) -> None:
     """What the boot-up sets by itself is not written beside it (PDOs, error control, identifiers)."""
     known = {(one.ref.index, one.ref.sub): one for one in aliases(family)}
     for s, slot in enumerate(family.slot):

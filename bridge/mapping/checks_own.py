@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from bridge.canopen.datatypes import INTEGERS
-from bridge.mapping.checks_process import twice
-from bridge.mapping.merge import Noted
+from bridge.mapping.checks_process import check_parameter, twice
+from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family, OwnObject
 from bridge.tomlfile import Key
 
 
-def check_own_supervision(family: Family, file: Noted) -> None:
+def check_own_supervision(family: Family, file: MergedFile) -> None:
     entries = family.own_supervision
     named = [(one.name, ("own_supervision", n, "name")) for n, one in enumerate(entries)]
     twice(named, "own supervision", file)
@@ -27,17 +27,14 @@ def check_own_supervision(family: Family, file: Noted) -> None:
             file.fault((*key, "reaction", "stop"), "is one of those with which the drive runs on")
 
 
-def _check_object(one: OwnObject, family: Family, key: Key, file: Noted) -> None:
+def _check_object(one: OwnObject, family: Family, key: Key, file: MergedFile) -> None:
     if (one.parameter is None) is (one.object is None):
         file.fault(key, "has a parameter or an object, one of the two")
         return
     data_type, where = one.data_type, "data_type"
     if one.parameter is not None:
-        known = {parameter.name: parameter.data_type for parameter in family.parameter}
-        if one.parameter not in known:
-            message = f"there is no parameter {one.parameter!r}"
-            file.fault((*key, "parameter"), message, f"known: {', '.join(sorted(known))}")
+        if not check_parameter(one.parameter, family, (*key, "parameter"), file):
             return
-        data_type, where = known[one.parameter], "parameter"
+        data_type, where = family.parameter_named(one.parameter).data_type, "parameter"
     if data_type not in INTEGERS:
         file.fault((*key, where), f"is a {data_type}, no whole number")

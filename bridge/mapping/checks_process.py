@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from bridge.mapping.merge import Noted
+from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family, ObjectRef, Pdo
 from bridge.tomlfile import Key
 
@@ -13,7 +13,7 @@ _STANDARD_ID_MOST: Final = 0x7FF
 _PDO_BITS: Final = 64
 
 
-def twice(names: Iterable[tuple[str, Key]], what: str, file: Noted) -> None:
+def twice(names: Iterable[tuple[str, Key]], what: str, file: MergedFile) -> None:
     seen: dict[str, Key] = {}
     for name, key in names:
         if name in seen:
@@ -22,7 +22,15 @@ def twice(names: Iterable[tuple[str, Key]], what: str, file: Noted) -> None:
             seen[name] = key
 
 
-def check_process(family: Family, file: Noted) -> None:
+def check_parameter(name: str, family: Family, key: Key, file: MergedFile) -> bool:
+    """``name`` must be a parameter that is listed."""
+    known = sorted(parameter.name for parameter in family.parameter)
+    if name not in known:
+        file.fault(key, f"there is no parameter {name!r}", f"known: {', '.join(known)}")
+    return name in known
+
+
+def check_process(family: Family, file: MergedFile) -> None:
     for name, words, first in (
         ("rpdo", family.process.rpdo, "control_word"),
         ("tpdo", family.process.tpdo, "status_word"),
@@ -32,7 +40,7 @@ def check_process(family: Family, file: Noted) -> None:
         twice(((word, ("process", name, place)) for place, word in enumerate(words)), "word", file)
 
 
-def check_slots(family: Family, file: Noted) -> None:
+def check_slots(family: Family, file: MergedFile) -> None:
     twice(((slot.name, ("slot", s, "name")) for s, slot in enumerate(family.slot)), "slot", file)
     for s, slot in enumerate(family.slot):
         for name, pdos, words in (
@@ -44,7 +52,7 @@ def check_slots(family: Family, file: Noted) -> None:
             file.fault(("slot", s, "emcy_drive"), "has no meaning without emcy.drive_byte")
 
 
-def _check_direction(family: Family, pdos: list[Pdo], process: list[str], key: Key, file: Noted) -> None:
+def _check_direction(family: Family, pdos: list[Pdo], process: list[str], key: Key, file: MergedFile) -> None:
     """All PDOs of one direction of a slot."""
     keys = [file.item(key, p) for p in range(len(pdos))]
     named = list(zip(pdos, keys, strict=True))
@@ -60,7 +68,7 @@ def _check_direction(family: Family, pdos: list[Pdo], process: list[str], key: K
         file.fault(key, f"none of them carries the {first}", "one that is not optional must")
 
 
-def _check_pdo(family: Family, pdo: Pdo, process: list[str], key: Key, file: Noted) -> None:
+def _check_pdo(family: Family, pdo: Pdo, process: list[str], key: Key, file: MergedFile) -> None:
     for w, word in enumerate(pdo.words):
         if word not in process:
             hint = f"known: {', '.join(process)}"
@@ -86,7 +94,7 @@ def _check_pdo(family: Family, pdo: Pdo, process: list[str], key: Key, file: Not
             file.fault((*key, name), "has no effect without write = true")
 
 
-def _check_neighbours(pdo: Pdo, words: list[str], process: list[str], key: Key, file: Noted) -> None:
+def _check_neighbours(pdo: Pdo, words: list[str], process: list[str], key: Key, file: MergedFile) -> None:
     """An object that fills several words fills them from one on, low words first."""
     places = [process.index(word) if word in process else None for word in words]
     for w in range(1, min(len(places), len(pdo.objects))):
@@ -116,7 +124,7 @@ def _run(pdo: Pdo, word: int, layout: int) -> int:
     return run
 
 
-def check_cob_id(cob_id: int, family: Family, key: Key, file: Noted) -> None:
+def check_cob_id(cob_id: int, family: Family, key: Key, file: MergedFile) -> None:
     most = _STANDARD_ID_MOST - family.family.node_id_high
     if cob_id > most:
         file.fault(key, f"{cob_id:X}h leaves no room for the node id", f"at most {most:X}h")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from bridge.mapping.merge import Noted
+from bridge.mapping.checks_process import check_parameter
+from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family, ProcessValue
 from bridge.tomlfile import Key
 
 
-def check_values(family: Family, file: Noted) -> None:
+def check_values(family: Family, file: MergedFile) -> None:
     """Note in ``file`` what does not go together."""
     process = family.process
     seen: dict[str, Key] = {
@@ -26,7 +27,7 @@ def check_values(family: Family, file: Noted) -> None:
             file.fault((*key, "name"), message, f"first in line {file.line(first)}")
 
 
-def _check_words(family: Family, value: ProcessValue, key: Key, file: Noted) -> None:
+def _check_words(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
     process = family.process
     if (value.word is None) is not bool(value.words):
         file.fault(key, f"{value.name} needs either word or words")
@@ -50,7 +51,7 @@ def _check_words(family: Family, value: ProcessValue, key: Key, file: Noted) -> 
             file.fault(at, f"the words of {value.name} are in two PDOs of {slot.name}", "they must be in one")
 
 
-def _check_kind(value: ProcessValue, key: Key, file: Noted) -> None:
+def _check_kind(value: ProcessValue, key: Key, file: MergedFile) -> None:
     """One meaning, and a type that goes with it."""
     kinds = {
         "scale": value.scale is not None,
@@ -86,7 +87,7 @@ def _check_kind(value: ProcessValue, key: Key, file: Noted) -> None:
         file.fault((*key, "low"), f"is above high, {value.high:g}")
 
 
-def _check_follows(family: Family, value: ProcessValue, key: Key, file: Noted) -> None:
+def _check_follows(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
     if value.follows is None:
         return
     if value.group != "command":
@@ -105,7 +106,7 @@ def _check_follows(family: Family, value: ProcessValue, key: Key, file: Noted) -
         file.fault((*key, "follows"), f"{value.follows} has other words or another scale")
 
 
-def _check_scale(family: Family, value: ProcessValue, key: Key, file: Noted) -> None:
+def _check_scale(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
     scale = value.scale
     if scale is None:
         return
@@ -122,9 +123,6 @@ def _check_scale(family: Family, value: ProcessValue, key: Key, file: Noted) -> 
     for name in ("factor", "offset"):
         if name in scale.model_fields_set:
             file.fault((*at, name), "has no meaning with full", "value = word × full / at")
-    known = sorted(parameter.name for parameter in family.parameter)
-    if scale.full not in known:
-        message = f"there is no parameter {scale.full!r}"
-        file.fault((*at, "full"), message, f"known: {', '.join(known)}")
-    elif family.parameter_named(scale.full).data_type in ("string", "bytes"):
+    is_known = check_parameter(scale.full, family, (*at, "full"), file)
+    if is_known and family.parameter_named(scale.full).data_type in ("string", "bytes"):
         file.fault((*at, "full"), f"{scale.full} is a text")

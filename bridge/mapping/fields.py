@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from typing import Annotated, Final
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from bridge.config.fields import Name
+from bridge.config.model import Table
 from bridge.image import DataType
 
 __all__ = [
@@ -40,10 +41,6 @@ _CODE: Final = re.compile(r"[0-9A-F]{4}|[0-9A-F]{2}xx")
 _NUMBER: Final = re.compile(r"\d+\.\d")
 _DECIMAL: Final = re.compile(r"\d{1,10}")
 _STATE: Final = re.compile(r"-?\d{1,10}")
-
-
-class Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
 class ObjectRef(Table):

@@ -9,16 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final, Protocol, TypeVar, cast
-
-from pydantic import BaseModel, ValidationError
+from typing import Any, Final, cast
 
 from bridge.errors import Fault, FileFaults
 from bridge.tomlfile import Key, TomlFile
-from bridge.tomlfile.file import dotted, real_key
-from bridge.tomlfile.messages import explain
-
-Model = TypeVar("Model", bound=BaseModel)
+from bridge.tomlfile.file import Model, dotted, validated
 
 _BY_NAME: Final = {
     "value": ("name", "group"),
@@ -26,17 +21,6 @@ _BY_NAME: Final = {
 }
 _PDOS: Final = ("rpdo", "tpdo")
 _Place = tuple[TomlFile, Key]
-
-
-class Noted(Protocol):
-    """A file in which faults are noted by the key where they are."""
-
-    def line(self, key: Sequence[int | str]) -> int: ...
-    def item(self, key: Key, place: int) -> Key:
-        """The key of one of several that may be written as one table."""
-        ...
-
-    def fault(self, key: Sequence[int | str], message: str, hint: str = "") -> None: ...
 
 
 class MergedFile:
@@ -183,6 +167,7 @@ class MergedFile:
         return self._last, tuple(key)
 
     def item(self, key: Key, place: int) -> Key:
+        """The key of one of several that may be written as one table."""
         return (*key, place) if (*key, place) in self._places else key
 
     def line(self, key: Sequence[int | str]) -> int:
@@ -195,12 +180,7 @@ class MergedFile:
 
     def validate(self, model: type[Model]) -> Model | None:
         """The content as ``model``, or None with every fault noted."""
-        try:
-            return model.model_validate(self.data)
-        except ValidationError as error:
-            for detail in error.errors(include_url=False):
-                self.fault(real_key(self.data, detail["loc"]), *explain(model, detail))
-            return None
+        return validated(self.data, model, self.fault)
 
     def finish(self) -> None:
         """Raise ``FileFaults`` if any fault was noted, those of the last file first."""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal, cast
+from typing import Annotated, Final, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
 from bridge.canopen.datatypes import INTEGERS, TypeName, encode
 from bridge.config.download import Download
+from bridge.config.fields import PlainValue, listed
 from bridge.image import DataType
 from bridge.mapping.fields import Bit, Mapped, Name, ObjectRef, Ref, States, Table
 
@@ -66,12 +67,6 @@ SYNC_PERIOD: Final = "sync_period_ms"
 """Stands in a start write for what the bus of the site has under this name."""
 
 
-def _plain(value: object) -> object:
-    if not isinstance(value, bool | int | float | str):
-        raise ValueError("must be a number, true or false, or a text in quotes")
-    return value
-
-
 def _is_sync_period(kind: str, value: object) -> bool:
     return value == SYNC_PERIOD and kind in INTEGERS and kind != "bool"
 
@@ -81,9 +76,7 @@ class StartWrite(Table):
 
     object: Ref
     type: TypeName = Field(description="the object's data type, such as int8")
-    value: Annotated[bool | int | float | str, BeforeValidator(_plain)] = Field(
-        description='"sync_period_ms" with an integer type: what the bus has, in ms'
-    )
+    value: PlainValue = Field(description='"sync_period_ms" with an integer type: what the bus has, in ms')
     read_back: bool = Field(True, description="false writes it blindly, as a command")
 
     @field_validator("value")
@@ -110,15 +103,10 @@ class StartWrite(Table):
         return Download(self.object.index, self.object.sub, data, self.read_back)
 
 
-def _listed(value: object) -> object:
-    """One table stands for a list of one."""
-    return [cast("object", value)] if isinstance(value, dict | Pdo) else value
-
-
 Pdos = Annotated[
     list[Pdo],
     Field(min_length=1),
-    BeforeValidator(_listed, json_schema_input_type=Pdo | Annotated[list[Pdo], Field(min_length=1)]),
+    BeforeValidator(listed, json_schema_input_type=Pdo | Annotated[list[Pdo], Field(min_length=1)]),
 ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -111,12 +111,7 @@ class TomlFile:
 
     def validate(self, model: type[Model]) -> Model | None:
         """The file's content as ``model``, or None with every fault noted."""
-        try:
-            return model.model_validate(self.data)
-        except ValidationError as error:
-            for detail in error.errors(include_url=False):
-                self.fault(real_key(self.data, detail["loc"]), *explain(model, detail))
-            return None
+        return validated(self.data, model, self.fault)
 
     def finish(self) -> None:
         """Raise ``FileFaults`` if any fault was noted."""
@@ -132,7 +127,19 @@ def dotted(key: Sequence[int | str]) -> str:
     return text
 
 
-def real_key(data: Any, location: Sequence[int | str]) -> Key:
+def validated(
+    data: dict[str, Any], model: type[Model], fault: Callable[[Key, str, str], None]
+) -> Model | None:
+    """``data`` as ``model``, or None with every ``fault`` noted."""
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        for detail in error.errors(include_url=False):
+            fault(_real_key(data, detail["loc"]), *explain(model, detail))
+        return None
+
+
+def _real_key(data: Any, location: Sequence[int | str]) -> Key:
     """``location`` without the tags that pydantic adds for unions: only what is in the file."""
     key: list[int | str] = []
     here = data

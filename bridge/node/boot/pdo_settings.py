@@ -14,7 +14,6 @@ from bridge.canopen import cobid
 from bridge.canopen.dialogue import Write, optional
 from bridge.canopen.pdo import MappingError, PdoEntry
 from bridge.config import PdoTable
-from bridge.config.model import MappedObject
 from bridge.mapping.model import Pdo
 from bridge.node.boot.actions import Action, BootResult, Do, number, told_as
 from bridge.node.boot.memory import NOT_AGAIN, BootMemory
@@ -53,12 +52,11 @@ def table_for(pdo: Pdo, factory: Sequence[PdoEntry], asked: PdoTable | None) -> 
     says ``write``, what that has. None where nothing is to be written."""
     if not pdo.write:
         return asked
-    mapping = [MappedObject(index=entry.index, sub=entry.sub, bits=entry.bits) for entry in factory]
     own: dict[str, object] = {
         "transmission_type": pdo.transmission_type,
         "inhibit_ms": pdo.inhibit_ms,
         "event_ms": pdo.event_ms,
-        "mapping": mapping,
+        "mapping": list(factory),
     }
     given = {name: getattr(asked, name) for name in asked.model_fields_set} if asked else {}
     return PdoTable.model_validate({**own, **given})
@@ -77,7 +75,7 @@ def set_pdo(objects: PdoObjects, wanted: PdoTable, result: BootResult) -> Do:
     ):
         if value is not None and number((yield from optional(objects.parameter, sub)), -1) != value:
             changes.append(Change(objects.parameter, sub, size, value))
-    entries = [PdoEntry(ref.index, ref.sub, ref.bits) for ref in wanted.mapping]
+    entries = wanted.mapping
     maps = False
     if entries:
         have = yield from _mapping(objects.mapping)

@@ -82,7 +82,7 @@ def _known(node: Node, drive: Drive, downloads: Sequence[Download]) -> Iterator[
             yield rpdo_plan(drive.family, drive.slot, pdo, *configured)
         asked = _asked(drive, pdo)
         if asked is not None and asked.enable:
-            entries = [PdoEntry(ref.index, ref.sub, ref.bits) for ref in asked.mapping]
+            entries = asked.mapping
             yield rpdo_plan(drive.family, drive.slot, pdo, asked.cob_id or factory_id, entries)
 
 

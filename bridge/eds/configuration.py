@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.config.download import Download
+from bridge.config.download import COMMANDS, Download
 from bridge.eds.model import Description, Entry, Report
 from bridge.eds.values import BadValue, encode
 
-_COMMANDS: Final = (0x1010, 0x1011)
-"""Store and restore: writing them is a command, not a setting."""
 _COMMUNICATION: Final = range(0x1000, 0x2000)
 _MAPPINGS: Final = (range(0x1600, 0x1800), range(0x1A00, 0x1C00))
 
@@ -44,7 +42,7 @@ def _data(entry: Entry, node_id: int | None, report: Report) -> bytes | None:
     value = entry.parameter_value
     if value is None or value == entry.default or not entry.access.writable:
         return None
-    if entry.refuses_download or entry.index in _COMMANDS:
+    if entry.refuses_download or entry.index in COMMANDS:
         return None
     where = f"{entry.index:04X}h:{entry.sub:02X}"
     plain = value.at(node_id)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Callable
+from typing import Final, TypeVar
 
 from bridge.eds.ini import Section, Text, shown
 from bridge.eds.model import Access, DataType, Report, Value
 from bridge.eds.values import BadValue, integer, value
+
+T = TypeVar("T")
 
 _ACCESS: Final = {
     "readonly": Access.RO,
@@ -39,14 +42,7 @@ class Fields:
         return number
 
     def whole(self, found: Text, name: str) -> int | None:
-        try:
-            number, note = integer(found.text)
-        except BadValue as error:
-            self._report.error(found.line, f"{name}: {error}: left out")
-            return None
-        if note:
-            self._report.warning(found.line, f"{name}: {note}")
-        return number
+        return self._read(found, name, lambda: integer(found.text))
 
     def flag(self, section: Section, name: str) -> bool:
         """0 or 1; any other number that is not 0 is taken as 1."""
@@ -66,8 +62,12 @@ class Fields:
         return None if found is None else self.value_of(found, name, data_type)
 
     def value_of(self, found: Text, name: str, data_type: DataType | None) -> Value | None:
+        return self._read(found, name, lambda: value(found.text, data_type))
+
+    def _read(self, found: Text, name: str, read: Callable[[], tuple[T, str]]) -> T | None:
+        """What ``read`` gives, with a warning of its note; None where it raises BadValue."""
         try:
-            one, note = value(found.text, data_type)
+            one, note = read()
         except BadValue as error:
             self._report.error(found.line, f"{name}: {error}: left out")
             return None

@@ -143,6 +143,12 @@ class Entry:
         return self.default if self.parameter_value is None else self.parameter_value
 
 
+def count_entry(index: int, highest: int, line: int, access: Access = Access.RO) -> Entry:
+    """Sub-index 0."""
+    name = "Highest sub-index supported"
+    return Entry(index, 0, name, DataType.UNSIGNED8, access, default=Value(highest), line=line)
+
+
 @dataclass(frozen=True, slots=True)
 class Object:
     """All entries of one index, by sub-index."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 from bridge.eds.fields import Fields
 from bridge.eds.ini import Section, Text
-from bridge.eds.model import Access, DataType, Entry, Object, ObjectType, Report, Value
+from bridge.eds.model import Access, DataType, Entry, Object, ObjectType, Report, count_entry
 
 _MOST_SUBS: Final = 254
 _REFUSES_DOWNLOAD: Final = 1
@@ -36,10 +37,7 @@ class ObjectReader:
     def read(self, index: int) -> Object:
         root = self._roots[index]
         subs = self._subs.get(index, {})
-        name = root.text("ParameterName")
-        if not name:
-            self._report.warning(root.line, f"{index:04X}h has no ParameterName")
-            name = f"{index:04X}h"
+        name = self._name(root, f"{index:04X}h")
         compact = self._fields.number(root, "CompactSubObj", 0, _MOST_SUBS) or 0
         if compact > self._compact_left:
             self._report.error(root.line, f"{index:04X}h: too many compact sub-indices in one file: left out")
@@ -62,8 +60,14 @@ class ObjectReader:
             self._report.error(root.line, f"{index:04X}h has no sub-indices")
         elif 0 not in entries:
             self._report.warning(root.line, f"{index:04X}h has no sub-index 0: made from the highest one")
-            entries[0] = _count_entry(index, max(entries), root.line)
+            entries[0] = count_entry(index, max(entries), root.line)
         return Object(index, name, kind, tuple(entries[sub] for sub in sorted(entries)))
+
+    def _name(self, section: Section, number: str) -> str:
+        name = section.text("ParameterName")
+        if not name:
+            self._report.warning(section.line, f"{number} has no ParameterName")
+        return name or number
 
     def _object_type(self, index: int, root: Section, has_subs: bool) -> ObjectType:
         """VAR if it is missing (CiA 306 §4.6.3.2), unless there are sub-indices."""
@@ -91,12 +95,8 @@ class ObjectReader:
         return root.get("DataType") or (subs[1].get("DataType") if 1 in subs else None)
 
     def _sub(self, index: int, sub: int, section: Section, fallback: Text | None) -> Entry:
-        name = section.text("ParameterName")
-        if not name:
-            self._report.warning(section.line, f"{index:04X}h:{sub:02X} has no ParameterName")
-            name = f"{index:04X}h:{sub:02X}"
-        access = Access.RW if sub else Access.RO
-        return self._entry(section, index, sub, name, access, fallback)
+        name = self._name(section, f"{index:04X}h:{sub:02X}")
+        return self._entry(section, index, sub, name, Access.RW if sub else Access.RO, fallback)
 
     def _entry(
         self,
@@ -164,7 +164,7 @@ class ObjectReader:
         """Sub-indices that are not written out (CiA 306 §4.6.3.3), with their names and values."""
         names, values = self._tables.get((index, "name")), self._tables.get((index, "value"))
         element = self._entry(root, index, 1, name, Access.RW)
-        entries = {0: _count_entry(index, count, root.line)}
+        entries = {0: count_entry(index, count, root.line)}
         named = dict(names.numbered()) if names else {}
         given = dict(values.numbered()) if values else {}
         for table, kind in ((named, "Name"), (given, "Value")):
@@ -179,30 +179,10 @@ class ObjectReader:
                 if sub in given
                 else None
             )
-            entries[sub] = Entry(
-                index,
-                sub,
-                named[sub].text if sub in named else f"{name}{sub}",
-                element.data_type,
-                element.access,
-                default=element.default,
+            entries[sub] = replace(
+                element,
+                sub=sub,
+                name=named[sub].text if sub in named else f"{name}{sub}",
                 parameter_value=own or element.parameter_value,
-                low=element.low,
-                high=element.high,
-                pdo_mappable=element.pdo_mappable,
-                refuses_download=element.refuses_download,
-                line=root.line,
             )
         return entries
-
-
-def _count_entry(index: int, highest: int, line: int) -> Entry:
-    return Entry(
-        index,
-        0,
-        "Highest sub-index supported",
-        DataType.UNSIGNED8,
-        Access.RO,
-        default=Value(highest),
-        line=line,
-    )

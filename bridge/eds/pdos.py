@@ -8,7 +8,17 @@ from typing import Final
 
 from bridge.eds.fields import Fields
 from bridge.eds.ini import Section
-from bridge.eds.model import Access, DataType, Description, Entry, Object, ObjectType, Report, Value
+from bridge.eds.model import (
+    Access,
+    DataType,
+    Description,
+    Entry,
+    Object,
+    ObjectType,
+    Report,
+    Value,
+    count_entry,
+)
 
 _MOST_PDOS: Final = 512
 _MOST_MAPPED: Final = 64
@@ -56,7 +66,7 @@ def _communication(kind: str, number: int, mask: int, line: int) -> Object:
     defaults = {1: cob_id, 2: Value(0xFF)}
     index = _BASES[kind][0] + number
     subs = [sub for sub in range(1, len(_SUBS) + 1) if mask >> (sub - 1) & 1]
-    entries = [_count(index, max(subs, default=0), Access.RO, line)]
+    entries = [count_entry(index, max(subs, default=0), line)]
     for sub in subs:
         name, data_type = _SUBS[sub - 1]
         default = defaults.get(sub, Value(0))
@@ -67,16 +77,11 @@ def _communication(kind: str, number: int, mask: int, line: int) -> Object:
 
 def _mapping(kind: str, number: int, line: int) -> Object:
     index = _BASES[kind][1] + number
-    entries = [_count(index, 0, Access.RW, line)]
+    entries = [count_entry(index, 0, line, Access.RW)]
     for sub in range(1, _MOST_MAPPED + 1):
         name = f"Mapped object {sub}"
         entries.append(Entry(index, sub, name, DataType.UNSIGNED32, Access.RW, default=Value(0), line=line))
     return Object(index, f"{kind.upper()} mapping parameter", ObjectType.RECORD, tuple(entries))
-
-
-def _count(index: int, highest: int, access: Access, line: int) -> Entry:
-    name = "Highest sub-index supported"
-    return Entry(index, 0, name, DataType.UNSIGNED8, access, default=Value(highest), line=line)
 
 
 @dataclass(frozen=True, slots=True)

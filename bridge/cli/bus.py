@@ -9,17 +9,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, Protocol, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
 
 from bridge import clock
 from bridge.can import Bus, open_bus
 from bridge.can.interface import ControllerState
-from bridge.canopen.frame import Frame
 from bridge.cli.stopping import until_stopped
 from bridge.cli.terminal import printable
 from bridge.config import BusTable
+from bridge.errands.errand import Errand
 from bridge.mapping import Family
 from bridge.mapping.model import SdoServer
 from bridge.node.sdo_channels import FIRST
@@ -130,7 +130,7 @@ def choose_line(site: Path | None, which: BusChoice) -> Line:
             raise typer.BadParameter("which bus? Give SITE, or --interface and --channel")
         content = {"name": "bus", "interface": which.interface, "channel": which.channel}
         table = BusTable.model_validate(content | ({"bitrate": which.bitrate} if which.bitrate else {}))
-        return Line(_not_virtual(table), {}, is_of_site=False, states_bitrate=which.bitrate is not None)
+        return Line(not_virtual(table), {}, is_of_site=False, states_bitrate=which.bitrate is not None)
     if which != BusChoice(bus):
         raise typer.BadParameter("SITE says interface, channel and bit rate: leave the options out")
     project = load_project(site)
@@ -139,10 +139,11 @@ def choose_line(site: Path | None, which: BusChoice) -> Line:
         bus = next(iter(tables))
     if bus not in tables:
         raise typer.BadParameter(f"which bus? Give --bus, one of {', '.join(tables)}")
-    return Line(_not_virtual(tables[bus]), project.families, is_of_site=True)
+    return Line(not_virtual(tables[bus]), project.families, is_of_site=True)
 
 
-def _not_virtual(table: BusTable) -> BusTable:
+def not_virtual(table: BusTable) -> BusTable:
+    """The bus, if another process can use it. Raises ``BadParameter``."""
     if table.interface == "virtual":
         raise typer.BadParameter("a virtual bus exists only inside the process that serves it")
     return table
@@ -155,20 +156,6 @@ def split_site(words: list[str], count: int, usage: str) -> tuple[Path | None, l
     if len(words) == count + 1:
         return Path(words[0]), words[1:]
     raise typer.BadParameter(f"usage: {usage}")
-
-
-class Errand(Protocol):
-    """Something to be done on a bus: frames and time in, frames out."""
-
-    def is_finished(self, now: float) -> bool: ...
-
-    def on_frame(self, frame: Frame) -> None: ...
-
-    def on_time(self, now: float) -> None: ...
-
-    def next_deadline(self) -> float | None: ...
-
-    def take_frames(self) -> list[Frame]: ...
 
 
 _E = TypeVar("_E", bound=Errand)

@@ -15,7 +15,7 @@ import typer
 
 from bridge import __version__, clock
 from bridge.cli import drop_report
-from bridge.cli.bus import AsJson, Line, carry_out, tell
+from bridge.cli.bus import AsJson, Line, carry_out, not_virtual, tell
 from bridge.cli.stopping import until_stopped
 from bridge.command import Plant
 from bridge.config import BusTable, NodeTable, Site
@@ -76,8 +76,7 @@ def _find(project: Project, name: str) -> tuple[BusTable, NodeTable]:
     if name not in nodes:
         raise typer.BadParameter(f"{name!r} is no node: {', '.join(nodes)}")
     bus, node = nodes[name]
-    if bus.interface == "virtual":
-        raise typer.BadParameter("a virtual bus exists only inside the process that serves it")
+    not_virtual(bus)
     if not node.enabled:
         raise typer.BadParameter(f"{name} is not enabled in the site file")
     return bus, node

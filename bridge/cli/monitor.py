@@ -16,13 +16,14 @@ from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_line, print_table, takes_bus, tell
 from bridge.cli.terminal import printable
 from bridge.errands.decode import Decoder, Kind, Meaning
+from bridge.errands.errand import Errand
 from bridge.errands.statistics import Statistics
 from bridge.errors import OperationFailed
 
 _IDENTIFIER = 0x1FFF_FFFF
 
 
-class _Listener:
+class _Listener(Errand):
     """An errand that only listens: decodes, filters, shows, and knows when it is enough."""
 
     def __init__(
@@ -34,6 +35,7 @@ class _Listener:
         count: int | None,
         seconds: float | None,
     ) -> None:
+        super().__init__()
         self.started = now
         self.last = now
         self._decoder = decoder
@@ -55,14 +57,8 @@ class _Listener:
         if self._left is not None:
             self._left -= 1
 
-    def on_time(self, now: float) -> None:
-        """Nothing is due: the bus itself wakes us."""
-
     def next_deadline(self) -> float | None:
         return self._until
-
-    def take_frames(self) -> list[Frame]:
-        return []
 
 
 @takes_bus

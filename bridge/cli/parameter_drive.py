@@ -10,7 +10,7 @@ from typing import Annotated, Final, TypeVar
 import typer
 
 from bridge import clock
-from bridge.cli.bus import Line, carry_out, tell
+from bridge.cli.bus import Line, carry_out, not_virtual, tell
 from bridge.cli.terminal import progress
 from bridge.config import BusTable, NodeTable
 from bridge.errands.bystander import Bystander, Standstill
@@ -65,7 +65,7 @@ class Target:
     def alone(self, *, force: bool = False) -> Standstill:
         """Listen, and return what is known of the drive's state. Raises ``OperationFailed`` if another master
         commands this bus."""
-        table = self._real()
+        table = not_virtual(self.line.table)
         listen_s = max(_LISTEN_S, 3 * table.heartbeat_ms / 1000)
         heard = carry_out(
             self.line,
@@ -77,17 +77,12 @@ class Target:
             )
         return Standstill(self.access.names, self.family, self.slot, heard.status, force=force)
 
-    def _real(self) -> BusTable:
-        if self.line.table.interface == "virtual":
-            raise typer.BadParameter("a virtual bus exists only inside the process that serves it")
-        return self.line.table
-
     def run(self, make: Callable[[float], Procedure[T]], *, writes: bool = False) -> T:
         """Run a procedure on the bus. Raises ``OperationFailed`` with the reason.
 
         Where it ``writes``, nothing is begun unless writes can be counted.
         """
-        self._real()
+        not_virtual(self.line.table)
         if writes:
             self.count()
         try:

@@ -20,6 +20,7 @@ from bridge.canopen.nmt import NmtState
 from bridge.command import Drive, Event, Kind, Plant
 from bridge.command.plant import Node
 from bridge.drive import FAULTED, MOVING, DriveState, OwnJudgement
+from bridge.errands.errand import Errand
 from bridge.errands.muted_bus import MutableBus
 from bridge.master.network import Network
 
@@ -256,13 +257,14 @@ _COMES: Final = 700
 """Severity of an emergency message that comes; one that goes has less."""
 
 
-class ForeignMaster:
+class ForeignMaster(Errand):
     """Listens for whoever commands this bus already: then no test must be made. ``found`` says what it was.
 
     ``commands`` are the identifiers of the node's RPDOs.
     """
 
     def __init__(self, own_id: int, commands: frozenset[int], now: float, listen_s: float) -> None:
+        super().__init__()
         self.found = ""
         self._own_id = own_id
         self._commands = commands
@@ -284,11 +286,5 @@ class ForeignMaster:
         elif frame.can_id & REMOTE and identifier > cobid.ERROR_CONTROL:
             self.found = f"guarding of node {identifier - cobid.ERROR_CONTROL}"
 
-    def on_time(self, now: float) -> None:
-        """Nothing is ever late: silence is what is hoped for."""
-
     def next_deadline(self) -> float | None:
         return self._until
-
-    def take_frames(self) -> list[Frame]:
-        return []

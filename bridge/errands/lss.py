@@ -8,6 +8,7 @@ from bridge.canopen import lss
 from bridge.canopen.dialogue import Dialogue
 from bridge.canopen.frame import Frame
 from bridge.canopen.lss import LssAddress, LssError, LssExchange, Service
+from bridge.errands.errand import Errand
 
 _PAUSE_S: Final = 0.02
 """After a request that nobody answers: the devices have to act on it."""
@@ -19,7 +20,7 @@ _SAFETY: Final = 4
 _R = TypeVar("_R")
 
 
-class LssErrand(Generic[_R]):
+class LssErrand(Errand, Generic[_R]):
     """Carries a service's requests to the bus and the replies back.
 
     ``error`` says why it failed; ``steps`` and ``step`` tell how far it is. Times are monotonic seconds.
@@ -29,6 +30,7 @@ class LssErrand(Generic[_R]):
     """
 
     def __init__(self, service: Service[_R], now: float, timeout_s: float) -> None:
+        super().__init__()
         self.error: LssError | None = None
         self.steps = 0
         self.step = ""
@@ -41,7 +43,6 @@ class LssErrand(Generic[_R]):
         self._deadline: float | None = None
         self._asked = now
         self._slowest_s = 0.0
-        self._frames: list[Frame] = []
         self._result: list[_R] = []
         self._finished = False
         self._dialogue.go_on(None, now)
@@ -80,10 +81,6 @@ class LssErrand(Generic[_R]):
 
     def next_deadline(self) -> float | None:
         return self._deadline
-
-    def take_frames(self) -> list[Frame]:
-        frames, self._frames = self._frames, []
-        return frames
 
     def _advance(self, reply: bytes | None, now: float) -> None:
         self._reply = None

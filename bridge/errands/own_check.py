@@ -6,11 +6,11 @@ from collections.abc import Generator, Sequence
 
 from bridge.canopen import dialogue
 from bridge.canopen.dialogue import Dialogue, Read
-from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoError
 from bridge.command.plant import Node
 from bridge.drive import OwnJudgement
 from bridge.drive.own_supervision import judge
+from bridge.errands.errand import SdoErrands
 from bridge.node.boot import BootError
 from bridge.node.boot.own_supervision import read_places
 from bridge.node.sdo_channels import SdoChannels
@@ -29,18 +29,17 @@ def ask(node: Node) -> Generator[Read, bytes | None, Judgements]:
     return found
 
 
-class OwnCheck:
+class OwnCheck(SdoErrands):
     """All nodes side by side. ``found`` has what was read, by drive; ``failed`` why a node could not be
     asked, by node."""
 
     def __init__(self, nodes: Sequence[Node], now: float) -> None:
+        of_nodes = [SdoChannels(node) for node in nodes]
+        super().__init__((channel for sdo in of_nodes for channel in sdo), now)
         self.found: Judgements = {}
         self.failed: dict[str, str] = {}
-        self._now = now
         self._left = len(nodes)
-        self._sdo = [SdoChannels(node) for node in nodes]
-        self._channels = {channel.reply_id: channel for sdo in self._sdo for channel in sdo}
-        for node, sdo in zip(nodes, self._sdo, strict=True):
+        for node, sdo in zip(nodes, of_nodes, strict=True):
             self._begin(node, sdo)
 
     def _begin(self, node: Node, sdo: SdoChannels) -> None:
@@ -62,21 +61,3 @@ class OwnCheck:
 
     def is_finished(self, now: float) -> bool:
         return not self._left
-
-    def on_frame(self, frame: Frame) -> None:
-        self._now = max(self._now, frame.time)
-        channel = self._channels.get(frame.can_id)
-        if channel is not None:
-            channel.on_frame(frame)
-
-    def on_time(self, now: float) -> None:
-        self._now = max(self._now, now)
-        for sdo in self._sdo:
-            sdo.on_time(now)
-
-    def next_deadline(self) -> float | None:
-        times = (sdo.next_deadline() for sdo in self._sdo)
-        return min((time for time in times if time is not None), default=None)
-
-    def take_frames(self) -> list[Frame]:
-        return [frame for sdo in self._sdo for frame in sdo.take_frames()]

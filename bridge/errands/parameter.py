@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from bridge.canopen import cobid
-from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoChannel
 from bridge.config import NodeTable
+from bridge.errands.errand import SdoErrands
 from bridge.mapping.model import Family, Slot
 from bridge.node.parameters.run import Procedure, run
 from bridge.parameter import ParameterError, Transfer
@@ -16,7 +16,7 @@ from bridge.parameter import ParameterError, Transfer
 T = TypeVar("T")
 
 
-class ParameterErrand(Generic[T]):
+class ParameterErrand(SdoErrands, Generic[T]):
     """``make`` gives the procedure, of now. ``result`` is None until it has ended."""
 
     def __init__(
@@ -24,7 +24,6 @@ class ParameterErrand(Generic[T]):
     ) -> None:
         self.result: T | ParameterError | None = None
         self.is_done = False
-        self._now = now
 
         def channel(request: int, reply: int) -> SdoChannel:
             return SdoChannel(
@@ -36,6 +35,7 @@ class ParameterErrand(Generic[T]):
             server = next((server for server in family.sdo if server.slot == slot.name), None)
             if server is not None:
                 self._of_drive = channel(server.request, server.reply)
+        super().__init__((self._first, self._of_drive), now)
         run(make(now), self._channel_for, lambda: self._now, self._done)
 
     def _channel_for(self, transfer: Transfer) -> SdoChannel:
@@ -45,27 +45,5 @@ class ParameterErrand(Generic[T]):
         self.result = result
         self.is_done = True
 
-    @property
-    def _channels(self) -> tuple[SdoChannel, ...]:
-        return (self._first,) if self._of_drive is self._first else (self._first, self._of_drive)
-
     def is_finished(self, now: float) -> bool:
         return self.is_done
-
-    def on_frame(self, frame: Frame) -> None:
-        self._now = max(self._now, frame.time)
-        for channel in self._channels:
-            if frame.can_id == channel.reply_id:
-                channel.on_frame(frame)
-
-    def on_time(self, now: float) -> None:
-        self._now = max(self._now, now)
-        for channel in self._channels:
-            channel.on_time(now)
-
-    def next_deadline(self) -> float | None:
-        times = (channel.next_deadline() for channel in self._channels)
-        return min((time for time in times if time is not None), default=None)
-
-    def take_frames(self) -> list[Frame]:
-        return [frame for channel in self._channels for frame in channel.take_frames()]

@@ -18,6 +18,7 @@ from bridge.canopen.dialogue import Dialogue, Read, ask, attempt
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.nmt import NmtState
 from bridge.canopen.sdo import Result, SdoChannel, SdoError
+from bridge.errands.errand import Errand
 
 _IDS: Final = range(1, 128)
 _OTHER_CHANNELS: Final = range(0x1201, 0x1204)
@@ -105,7 +106,7 @@ def _interview(node: FoundNode) -> Interview:
         yield Guard()
 
 
-class Scanner:
+class Scanner(Errand):
     """One scan of one bus. ``on_frame`` gets everything that is received; times are monotonic seconds.
 
     ``passive`` sends nothing and lists who is heard within ``listen_s``.
@@ -122,12 +123,12 @@ class Scanner:
         own_id: int | None = None,
     ) -> None:
         """``own_id`` is the bridge's own: a heartbeat with it is no node, an SDO answer is."""
+        super().__init__()
         self._nodes = {node_id: FoundNode(node_id) for node_id in _IDS}
         self._channels: dict[int, SdoChannel] = {}
         self._interviews: dict[int, Dialogue[Read | Guard, bytes | None, None, SdoError]] = {}
         self._now = now
         self._guarding: dict[int, float] = {}
-        self._frames: list[Frame] = []
         self._timeout_s = timeout_s
         self._own_id = own_id
         self._until = now + listen_s
@@ -178,7 +179,7 @@ class Scanner:
         return min(times, default=self._until)
 
     def take_frames(self) -> list[Frame]:
-        frames, self._frames = self._frames, []
+        frames = super().take_frames()
         for channel in self._channels.values():
             frames += channel.take_frames()
         return frames

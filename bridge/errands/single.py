@@ -9,6 +9,7 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.canopen.sdo import Result, SdoChannel
 from bridge.canopen.sdo_transfer import MUX, SEGMENT, U32
+from bridge.errands.errand import Errand, SdoErrands
 from bridge.mapping.model import SdoServer
 
 _SDO_BYTES: Final = 8
@@ -22,7 +23,7 @@ _EXPECTED: Final = {
 }
 
 
-class SdoErrand:
+class SdoErrand(SdoErrands):
     """One transfer with an SDO server of a node; ``result`` is None until it has ended.
 
     ``data`` None reads, bytes are written. ``server`` None is the first. Times are monotonic seconds.
@@ -48,11 +49,12 @@ class SdoErrand:
         self._mux = MUX.pack(index, sub)
         self._writes = data is not None
         request, reply = (server.request, server.reply) if server else (cobid.SDO_REQUEST, cobid.SDO_REPLY)
-        self._channel = SdoChannel(request + node_id, reply + node_id, timeout_s, retries=retries)
+        channel = SdoChannel(request + node_id, reply + node_id, timeout_s, retries=retries)
+        super().__init__([channel], now)
         if data is None:
-            self._channel.read(index, sub, now, self._done)
+            channel.read(index, sub, now, self._done)
         else:
-            self._channel.write(index, sub, data, now, self._done)
+            channel.write(index, sub, data, now, self._done)
 
     def _done(self, result: Result) -> None:
         self.result = result
@@ -61,18 +63,12 @@ class SdoErrand:
         return self.result is not None
 
     def on_frame(self, frame: Frame) -> None:
-        if frame.can_id == self._channel.reply_id:
+        if frame.can_id in self._channels:
             self._count(frame.data)
-            self._channel.on_frame(frame)
-
-    def on_time(self, now: float) -> None:
-        self._channel.on_time(now)
-
-    def next_deadline(self) -> float | None:
-        return self._channel.next_deadline()
+        super().on_frame(frame)
 
     def take_frames(self) -> list[Frame]:
-        frames = self._channel.take_frames()
+        frames = super().take_frames()
         if self._writes:
             self._add(sum(frame.data[1:4] != self._mux for frame in frames))
         return frames
@@ -92,13 +88,14 @@ class SdoErrand:
             self.done_bytes = min(self.done_bytes, self.total_bytes)
 
 
-class NmtErrand:
+class NmtErrand(Errand):
     """One NMT command to a node, or to all with ``node_id`` 0, and what the nodes say afterwards.
 
     One node is waited for until it is where it should be, all of them for the whole of ``wait_s``.
     """
 
     def __init__(self, command: NmtCommand, node_id: int, now: float, wait_s: float) -> None:
+        super().__init__()
         self.states: dict[int, NmtState] = {}
         """Last state that each node has reported since the command."""
         self.reached: set[int] = set()
@@ -122,12 +119,5 @@ class NmtErrand:
             self.reached.add(node_id)
         self.states[node_id] = NmtState.PRE_OPERATIONAL if state is NmtState.INITIALISING else state
 
-    def on_time(self, now: float) -> None:
-        """Nothing is ever late: silence is an answer, too."""
-
     def next_deadline(self) -> float | None:
         return self._until
-
-    def take_frames(self) -> list[Frame]:
-        frames, self._frames = self._frames, []
-        return frames

@@ -1,0 +1,59 @@
+"""What a single command does on a bus: frames and time in, frames out. Sans-IO."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+
+from bridge.canopen.frame import Frame
+from bridge.canopen.sdo import SdoChannel
+
+
+class Errand(ABC):
+    """Times are monotonic seconds. What is to be sent is put into ``_frames``."""
+
+    def __init__(self) -> None:
+        self._frames: list[Frame] = []
+
+    @abstractmethod
+    def is_finished(self, now: float) -> bool: ...
+
+    @abstractmethod
+    def on_frame(self, frame: Frame) -> None: ...
+
+    def on_time(self, now: float) -> None:
+        """Nothing is ever late: silence is an answer, too."""
+        del now
+
+    @abstractmethod
+    def next_deadline(self) -> float | None: ...
+
+    def take_frames(self) -> list[Frame]:
+        frames, self._frames = self._frames, []
+        return frames
+
+
+class SdoErrands(Errand):
+    """What is done over SDO channels side by side. ``_now`` is the latest time that is known."""
+
+    def __init__(self, channels: Iterable[SdoChannel], now: float) -> None:
+        super().__init__()
+        self._now = now
+        self._channels = {channel.reply_id: channel for channel in channels}
+
+    def on_frame(self, frame: Frame) -> None:
+        self._now = max(self._now, frame.time)
+        if frame.can_id in self._channels:
+            self._channels[frame.can_id].on_frame(frame)
+
+    def on_time(self, now: float) -> None:
+        self._now = max(self._now, now)
+        for channel in self._channels.values():
+            channel.on_time(now)
+
+    def next_deadline(self) -> float | None:
+        times = (channel.next_deadline() for channel in self._channels.values())
+        return min((time for time in times if time is not None), default=None)
+
+    def take_frames(self) -> list[Frame]:
+        return [frame for channel in self._channels.values() for frame in channel.take_frames()]

@@ -3,40 +3,17 @@
 Reference for users: ``docs/reference/site-file.md``.
 """
 
-from bridge.config.fields import IGNORE_ALL_S, Control, Reaction, WordOrder
-from bridge.config.load import load_site, read_site
-from bridge.config.model import (
-    BusTable,
-    ConfigureTable,
-    DriveTable,
-    IdentityTable,
-    ModbusTable,
-    NodeTable,
-    OpcUaTable,
-    PdoTable,
-    Site,
-    SiteTable,
-    UserTable,
-    ZenohTable,
-)
-
-__all__ = [
-    "IGNORE_ALL_S",
-    "BusTable",
-    "ConfigureTable",
-    "Control",
-    "DriveTable",
-    "IdentityTable",
-    "ModbusTable",
-    "NodeTable",
-    "OpcUaTable",
-    "PdoTable",
-    "Reaction",
-    "Site",
-    "SiteTable",
-    "UserTable",
-    "WordOrder",
-    "ZenohTable",
-    "load_site",
-    "read_site",
-]
+from bridge.config.fields import IGNORE_ALL_S as IGNORE_ALL_S
+from bridge.config.fields import Reaction as Reaction
+from bridge.config.fields import WordOrder as WordOrder
+from bridge.config.load import load_site as load_site
+from bridge.config.load import read_site as read_site
+from bridge.config.model import BusTable as BusTable
+from bridge.config.model import DriveTable as DriveTable
+from bridge.config.model import ModbusTable as ModbusTable
+from bridge.config.model import NodeTable as NodeTable
+from bridge.config.model import OpcUaTable as OpcUaTable
+from bridge.config.model import PdoTable as PdoTable
+from bridge.config.model import Site as Site
+from bridge.config.model import UserTable as UserTable
+from bridge.config.model import ZenohTable as ZenohTable

@@ -1,26 +1,17 @@
 """Drive logic without vendor names: words, states, values, emergencies."""
 
-from bridge.drive.emergency import EmergencyReader, Told
-from bridge.drive.own_supervision import OwnJudgement, OwnVerdict
-from bridge.drive.parameter_set import ParameterSet
-from bridge.drive.scaling import LinearScale, scale_of
-from bridge.drive.values import ValueCodec, Written
-from bridge.drive.words import FAULTED, MOVING, STATES, ControlWords, DriveState, StatusWords
-
-__all__ = [
-    "FAULTED",
-    "MOVING",
-    "STATES",
-    "ControlWords",
-    "DriveState",
-    "EmergencyReader",
-    "LinearScale",
-    "OwnJudgement",
-    "OwnVerdict",
-    "ParameterSet",
-    "StatusWords",
-    "Told",
-    "ValueCodec",
-    "Written",
-    "scale_of",
-]
+from bridge.drive.emergency import EmergencyReader as EmergencyReader
+from bridge.drive.emergency import Told as Told
+from bridge.drive.own_supervision import OwnJudgement as OwnJudgement
+from bridge.drive.own_supervision import OwnVerdict as OwnVerdict
+from bridge.drive.parameter_set import ParameterSet as ParameterSet
+from bridge.drive.scaling import LinearScale as LinearScale
+from bridge.drive.scaling import scale_of as scale_of
+from bridge.drive.values import ValueCodec as ValueCodec
+from bridge.drive.values import Written as Written
+from bridge.drive.words import FAULTED as FAULTED
+from bridge.drive.words import MOVING as MOVING
+from bridge.drive.words import STATES as STATES
+from bridge.drive.words import ControlWords as ControlWords
+from bridge.drive.words import DriveState as DriveState
+from bridge.drive.words import StatusWords as StatusWords

@@ -4,24 +4,15 @@ The readers accept files as they are found in the field, not only as the standar
 oddity with its line. They raise ``FileFaults`` and nothing else.
 """
 
-from bridge.eds.configuration import configuration
-from bridge.eds.load import read_configuration, read_device, read_device_file
-from bridge.eds.model import Access, DataType, Description, Device, Entry, Finding, Object, Severity, Value
-from bridge.eds.site import read_configurations
-
-__all__ = [
-    "Access",
-    "DataType",
-    "Description",
-    "Device",
-    "Entry",
-    "Finding",
-    "Object",
-    "Severity",
-    "Value",
-    "configuration",
-    "read_configuration",
-    "read_configurations",
-    "read_device",
-    "read_device_file",
-]
+from bridge.eds.configuration import configuration as configuration
+from bridge.eds.load import read_configuration as read_configuration
+from bridge.eds.load import read_device as read_device
+from bridge.eds.load import read_device_file as read_device_file
+from bridge.eds.model import Access as Access
+from bridge.eds.model import DataType as DataType
+from bridge.eds.model import Description as Description
+from bridge.eds.model import Entry as Entry
+from bridge.eds.model import Finding as Finding
+from bridge.eds.model import Severity as Severity
+from bridge.eds.model import Value as Value
+from bridge.eds.site import read_configurations as read_configurations

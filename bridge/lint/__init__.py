@@ -4,17 +4,8 @@ A site file is checked by ``bridge.config`` key by key; here it is seen together
 uses which COB-ID, how full the bus gets, which times cannot work together.
 """
 
-from bridge.lint.lint import Verdict, family_dictionaries, lint
-from bridge.lint.load import BusLoad
-from bridge.lint.own import WorstCase
-from bridge.lint.report import LintFinding, Severity
-
-__all__ = [
-    "BusLoad",
-    "LintFinding",
-    "Severity",
-    "Verdict",
-    "WorstCase",
-    "family_dictionaries",
-    "lint",
-]
+from bridge.lint.lint import Verdict as Verdict
+from bridge.lint.lint import family_dictionaries as family_dictionaries
+from bridge.lint.lint import lint as lint
+from bridge.lint.own import WorstCase as WorstCase
+from bridge.lint.report import Severity as Severity

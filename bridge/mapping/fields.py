@@ -7,28 +7,9 @@ from typing import Annotated, Final
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
-from bridge.config.fields import Name
-from bridge.config.model import Table
+from bridge.config.fields import Name as Name
+from bridge.config.model import Table as Table
 from bridge.image import DataType
-
-__all__ = [
-    "Bit",
-    "Bits",
-    "Decimal",
-    "EmcyCode",
-    "FaultNumber",
-    "Kind",
-    "Mapped",
-    "MappedObject",
-    "Name",
-    "ObjectRef",
-    "Pattern",
-    "Ref",
-    "States",
-    "Table",
-    "Word",
-    "pattern_bits",
-]
 
 WORD_BITS: Final = 16
 _MOST_BITS: Final = 64

@@ -14,69 +14,16 @@ from pydantic import Field
 from bridge.config import DriveTable
 from bridge.config.fields import RegularExpression
 from bridge.mapping.aliases import Aliases
-from bridge.mapping.faults import EmcyEvent, EmcyNumber, EmcyTable, FaultNumbers, FaultParameter
-from bridge.mapping.fields import (
-    Bit,
-    Bits,
-    Kind,
-    MappedObject,
-    Name,
-    ObjectRef,
-    Pattern,
-    Ref,
-    Table,
-    Word,
-    pattern_bits,
-)
-from bridge.mapping.own_supervision import OwnObject, OwnReaction, OwnSupervision
-from bridge.mapping.parameters import Eeprom, Parameter, ParameterNames, RamOnly, object_of
-from bridge.mapping.process import (
-    NodeTpdo,
-    Pdo,
-    Process,
-    ProcessValue,
-    Scale,
-    SdoServer,
-    Slot,
-    StartWrite,
-)
-
-__all__ = [
-    "Aliases",
-    "Command",
-    "ControlWord",
-    "Eeprom",
-    "EmcyEvent",
-    "EmcyNumber",
-    "EmcyTable",
-    "Family",
-    "FamilyTable",
-    "FaultNumbers",
-    "FaultParameter",
-    "Handshake",
-    "IdentityRule",
-    "MappedObject",
-    "NodeTpdo",
-    "ObjectRef",
-    "OwnObject",
-    "OwnReaction",
-    "OwnSupervision",
-    "Parameter",
-    "ParameterNames",
-    "Pdo",
-    "Poll",
-    "Process",
-    "ProcessValue",
-    "RamOnly",
-    "Scale",
-    "SdoServer",
-    "Slot",
-    "StartWrite",
-    "State",
-    "StatusWord",
-    "Stopping",
-    "pattern_bits",
-]
+from bridge.mapping.faults import EmcyTable, FaultNumbers
+from bridge.mapping.faults import FaultParameter as FaultParameter
+from bridge.mapping.fields import Bit, Bits, Kind, Name, ObjectRef, Pattern, Ref, Table, Word
+from bridge.mapping.fields import MappedObject as MappedObject
+from bridge.mapping.fields import pattern_bits as pattern_bits
+from bridge.mapping.own_supervision import OwnObject as OwnObject
+from bridge.mapping.own_supervision import OwnReaction as OwnReaction
+from bridge.mapping.own_supervision import OwnSupervision
+from bridge.mapping.parameters import Eeprom, Parameter, ParameterNames, object_of
+from bridge.mapping.process import NodeTpdo, Pdo, Process, ProcessValue, SdoServer, Slot
 
 
 class FamilyTable(Table):

@@ -1,22 +1,14 @@
 """Parameters of drives by the vendor's own names: what they are called, how they are coded, what writing
 them wears out, and backups of them. No bus in here."""
 
-from bridge.parameter.access import DriveParameters, Reading, Transfer, Written
-from bridge.parameter.definition import Address, Entry
-from bridge.parameter.error import ParameterError, TransferFailed, Why
-from bridge.parameter.ledger import Ledger
-from bridge.parameter.names import Names
-
-__all__ = [
-    "Address",
-    "DriveParameters",
-    "Entry",
-    "Ledger",
-    "Names",
-    "ParameterError",
-    "Reading",
-    "Transfer",
-    "TransferFailed",
-    "Why",
-    "Written",
-]
+from bridge.parameter.access import DriveParameters as DriveParameters
+from bridge.parameter.access import Reading as Reading
+from bridge.parameter.access import Transfer as Transfer
+from bridge.parameter.access import Written as Written
+from bridge.parameter.definition import Address as Address
+from bridge.parameter.definition import Entry as Entry
+from bridge.parameter.error import ParameterError as ParameterError
+from bridge.parameter.error import TransferFailed as TransferFailed
+from bridge.parameter.error import Why as Why
+from bridge.parameter.ledger import Ledger as Ledger
+from bridge.parameter.names import Names as Names

@@ -1,6 +1,6 @@
 """TOML files that people write: every fault at once, with its line and what would be right."""
 
-from bridge.tomlfile.file import RawTable, TomlFile, dotted
-from bridge.tomlfile.lines import Key
-
-__all__ = ["Key", "RawTable", "TomlFile", "dotted"]
+from bridge.tomlfile.file import RawTable as RawTable
+from bridge.tomlfile.file import TomlFile as TomlFile
+from bridge.tomlfile.file import dotted as dotted
+from bridge.tomlfile.lines import Key as Key

@@ -11,14 +11,12 @@ from bridge.quietlog import A_FEW, about
 _log = logging.getLogger("bridge.events")
 
 
-class EventLog:
+def log_event(event: Event) -> None:
     """A listener for the plant's events. A trip and its acknowledgement are of one kind, but not of one
     severity, and hide each other as little as a worse one."""
-
-    def __call__(self, event: Event) -> None:
-        kind = event.kind, event.severity
-        extra = about(event.source, kind, first=1 if event.kind in REPEATING else A_FEW)
-        _log.log(_level(event.severity), "%s: %s", event.source, event.message, extra=extra)
+    kind = event.kind, event.severity
+    extra = about(event.source, kind, first=1 if event.kind in REPEATING else A_FEW)
+    _log.log(_level(event.severity), "%s: %s", event.source, event.message, extra=extra)
 
 
 def _level(severity: int) -> int:

@@ -79,11 +79,10 @@ class _Kept(Generic[Item]):
 
 
 class Repeats(Generic[Item]):
-    """Reports the first of each kind and source, then only their number: once every ``pause_s``, as long as
+    """Reports the first of each kind and source, then only their number: once every ``PAUSE_S``, as long as
     there are more."""
 
-    def __init__(self, pause_s: float = PAUSE_S) -> None:
-        self._pause_s = pause_s
+    def __init__(self) -> None:
         self._told: dict[Hashable, dict[Hashable, _Kept[Item]]] = {}
 
     def admits(self, kind: Hashable, source: Hashable, item: Item, now: float, first: int = 1) -> bool:
@@ -111,13 +110,13 @@ class Repeats(Generic[Item]):
         found: list[tuple[Item, int]] = []
         for sources in self._told.values():
             for source, told in sources.items():
-                if told.last is not None and now - told.at >= self._pause_s:
+                if told.last is not None and now - told.at >= PAUSE_S:
                     found.append((told.last, told.left_out))
                     sources[source] = _Kept(now)
         return found
 
     def _is_over(self, told: _Kept[Item], now: float) -> bool:
-        return told.last is None and now - told.at >= self._pause_s
+        return told.last is None and now - told.at >= PAUSE_S
 
     def _forget(self, now: float) -> None:
         """Forget those of which there were no more."""
@@ -131,4 +130,4 @@ class Repeats(Generic[Item]):
         """When the next report is due; None if nothing was left out."""
         waiting = (told.at for sources in self._told.values() for told in sources.values() if told.left_out)
         first = min(waiting, default=None)
-        return None if first is None else first + self._pause_s
+        return None if first is None else first + PAUSE_S

@@ -16,7 +16,7 @@ from bridge.can import Bus, open_bus
 from bridge.command import Plant, PlantView
 from bridge.config import BusTable
 from bridge.errors import BridgeError, OperationFailed
-from bridge.eventlog import EventLog
+from bridge.eventlog import log_event
 from bridge.front_process import Front
 from bridge.lint import Severity, lint
 from bridge.master.ending import Ending
@@ -70,7 +70,7 @@ class Service:
         self.project = project
         site = project.site
         self.plant = Plant(site, project.families, __version__, clock.now())
-        self.plant.on_event(EventLog())
+        self.plant.on_event(log_event)
         self.wear = WearKeeper(self.plant.eeprom_writes, Path(site.site.state_dir))
         self.audit = AuditLog(self.plant, site, clock.now, clock.epoch_ns)
         self.notifier = Notifier()
@@ -108,8 +108,8 @@ class Service:
         async with AsyncExitStack() as stack:
             stack.callback(self._say_end)
             check_files(self.project.site, self.project.path, opcua=self._opcua_port is not None)
-            self.wear.load()
-            stack.callback(self.wear.close)
+            self.wear.keep()
+            stack.callback(self.wear.keep)
             self.audit.start()
             stack.callback(self.audit.close)
             await self._open_ports(stack)

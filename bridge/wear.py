@@ -28,10 +28,6 @@ class WearKeeper:
         self._file = LedgerFile(state_dir)
         self._fault = ""
 
-    def load(self) -> None:
-        """Take over what is kept."""
-        self._store_now()
-
     async def run(self) -> None:
         """Until cancelled."""
         while True:
@@ -54,11 +50,8 @@ class WearKeeper:
             else:
                 self._ledger.restore(totals, epoch_s, clock.now())
 
-    def close(self) -> None:
-        """Keep what is not kept yet."""
-        self._store_now()
-
-    def _store_now(self) -> None:
+    def keep(self) -> None:
+        """Keep what is not kept yet, and take over what is."""
         try:
             self._file.add(self._ledger, _epoch_s(), clock.now())
         except OSError as error:

@@ -29,7 +29,6 @@ _INFO_KIND: Final = 1
 _INFO_DATA: Final = 2
 _CAN_BITTIMING: Final = 1
 _CAN_STATE: Final = 4
-_CAN_RESTART_MS: Final = 6
 _CAN_BERR_COUNTER: Final = 8
 _TYPE_MASK: Final = 0x3FFF  # without NLA_F_NESTED and NLA_F_NET_BYTEORDER
 _ANSWER: Final = 1 << 15
@@ -49,7 +48,6 @@ class Link:
     kind: str | None = None
     bitrate: int | None = None
     state: int | None = None
-    restart_ms: int | None = None
     tx_errors: int | None = None
     rx_errors: int | None = None
     frames: int = 0
@@ -127,7 +125,6 @@ def _link(is_up: bool, data: bytes) -> Link:
         kind,
         _u32(can.get(_CAN_BITTIMING)) or None,
         _u32(can.get(_CAN_STATE)),
-        _u32(can.get(_CAN_RESTART_MS)),
         tx_errors,
         rx_errors,
         rx_packets + tx_packets,

@@ -44,10 +44,10 @@ def ask(
         sdo.write(step.index, step.sub, step.data, now, answered, priority=priority)
 
 
-def attempt(index: int, sub: int = 0, channel: int = 1) -> Generator[Read, bytes | None, Result]:
+def attempt(index: int, sub: int = 0) -> Generator[Read, bytes | None, Result]:
     """The result of reading an object, which may be an error."""
     try:
-        return (yield Read(index, sub, channel)) or b""
+        return (yield Read(index, sub)) or b""
     except SdoError as error:
         return error
 

@@ -27,11 +27,9 @@ from bridge.canopen.sdo_transfer import (
     abort_request,
 )
 
-__all__ = ["Priority", "Result", "SdoChannel", "SdoError", "SdoJob"]
-
 SEGMENTS_AT_ONCE: Final = 8
 """This many frames of a block are sent at once: a block has up to 127, more than a driver's queue holds."""
-_COMMANDS: Final = frozenset((0x1010, 0x1011))
+COMMANDS: Final = frozenset((0x1010, 0x1011))
 """Writing them is a command (store and restore, CiA 301 §7.5.2.13–14): never repeated."""
 _COMMAND_S: Final = 10.0
 """A node may take this long for one: it saves all its parameters before it answers."""
@@ -129,7 +127,7 @@ class SdoChannel:
         def start(block: BlockUse) -> Transfer:
             return write_object(index, sub, data, block)
 
-        is_command = index in _COMMANDS
+        is_command = index in COMMANDS
         retries = self.retries if repeatable and not is_command else 0
         timeout_s = max(self.timeout_s, _COMMAND_S) if is_command else self.timeout_s
         return self._submit(SdoJob(index, sub, start, done, priority, retries, timeout_s, may_begin), now)

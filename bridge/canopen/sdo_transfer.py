@@ -172,14 +172,6 @@ def upload_segments(index: int, sub: int, announced: int | None) -> Transfer:
         toggle ^= _TOGGLE
 
 
-def upload(index: int, sub: int) -> Transfer:
-    """Read an object, expedited or segmented; returns its bytes."""
-    value, announced = yield from initiate_upload(index, sub)
-    if value is not None:
-        return value
-    return (yield from upload_segments(index, sub, announced))
-
-
 def download(index: int, sub: int, data: bytes) -> Transfer:
     """Write an object: expedited up to four bytes, else segmented. The result has no meaning."""
     mux = MUX.pack(index, sub)

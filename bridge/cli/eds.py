@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -100,26 +101,15 @@ def _as_json(
     findings: Sequence[Finding],
     node_id: int | None,
 ) -> dict[str, Any]:
-    device, commissioning = description.device, description.commissioning
     return {
         "format": description.format,
-        "device": {
-            "vendor": device.vendor,
-            "vendor_id": device.vendor_id,
-            "product": device.product,
-            "product_code": device.product_code,
-            "revision": device.revision,
-            "order_code": device.order_code,
-            "bitrates": list(device.bitrates),
-        },
+        "device": asdict(description.device),
         "node_id": node_id,
-        "node_name": commissioning.node_name,
+        "node_name": description.commissioning.node_name,
         "objects": [_entry_json(entry, node_id) for one in description.objects for entry in one.entries],
         "pdos": [_pdo_json(pdo) for pdo in pdos(description, node_id)],
         "downloads": [{"index": one.index, "sub": one.sub, "data": one.data.hex()} for one in downloads],
-        "findings": [
-            {"line": one.line, "severity": one.severity.value, "text": one.text} for one in findings
-        ],
+        "findings": [asdict(one) for one in findings],
     }
 
 
@@ -154,7 +144,5 @@ def _pdo_json(pdo: PdoSummary) -> dict[str, Any]:
         "transmission_type": pdo.transmission_type,
         "inhibit_ms": pdo.inhibit_100us / 10,
         "event_ms": pdo.event_timer_ms,
-        "mapped": [
-            {"index": one.index, "sub": one.sub, "bits": one.bits, "name": one.name} for one in pdo.mapped
-        ],
+        "mapped": [asdict(one) for one in pdo.mapped],
     }

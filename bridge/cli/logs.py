@@ -63,15 +63,13 @@ def write_counts(loop: asyncio.AbstractEventLoop) -> None:
     loop.call_later(_COUNTS_EVERY_S, write_counts, loop)
 
 
-class LoopFaults:
+def log_fault(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
     """An event loop's exception handler, for what nobody awaited or caught. The first from each place is
     logged with its traceback."""
-
-    def __call__(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        error: BaseException | None = context.get("exception")
-        place = _place(error) or str(context.get("message"))
-        message = f"unexpected: {context.get('message')}: {error!r}" if error else str(context.get("message"))
-        _log.error("%s", message, exc_info=error, extra=about("event loop", place))
+    error: BaseException | None = context.get("exception")
+    place = _place(error) or str(context.get("message"))
+    message = f"unexpected: {context.get('message')}: {error!r}" if error else str(context.get("message"))
+    _log.error("%s", message, exc_info=error, extra=about("event loop", place))
 
 
 def _place(error: BaseException | None) -> tuple[str, int] | None:

@@ -19,7 +19,7 @@ from bridge.cli.terminal import printable, progress
 from bridge.errands.single import SdoErrand
 from bridge.errors import OperationFailed
 from bridge.mapping.model import SdoServer
-from bridge.parameter import Address, Names
+from bridge.parameter import Names, ObjectRef
 
 app = typer.Typer(help="Read or write an object of a node.", no_args_is_help=True)
 
@@ -94,7 +94,7 @@ def write(
         data = encode(kind, text)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
-    why = "" if force else why_forced(line, node_id, Address(index, sub))
+    why = "" if force else why_forced(line, node_id, ObjectRef(index, sub))
     if why:
         raise typer.BadParameter(f"{why}. --force writes it: not beside a bridge whose drive runs")
     way = _way(line, node_id, sdo_channel, timeout_ms, retries)
@@ -109,7 +109,7 @@ def write(
     print(f"{where} written: {text}")
 
 
-def why_forced(line: Line, node_id: int, address: Address) -> str:
+def why_forced(line: Line, node_id: int, address: ObjectRef) -> str:
     """Why this object of a node is written with ``--force`` only. Without a site there is no bridge that
     supervises the node."""
     node = next((node for node in line.table.node if node.id == node_id), None)

@@ -36,7 +36,7 @@ def until_stopped(work: Coroutine[Any, Any, None], ending: Ending | None = None)
 
 async def _supervised(work: Coroutine[Any, Any, None], ending: Ending) -> None:
     loop = asyncio.get_running_loop()
-    loop.set_exception_handler(logs.LoopFaults())
+    loop.set_exception_handler(logs.log_fault)
     logs.write_counts(loop)
     stopped = False
 

@@ -6,10 +6,10 @@ import struct
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.canopen.sdo import COMMANDS
+
 _HEAD: Final = struct.Struct("<HBI")
 _COUNT: Final = struct.Struct("<I")
-
-COMMANDS: Final = frozenset((0x1010, 0x1011))
 
 
 @dataclass(frozen=True, slots=True)

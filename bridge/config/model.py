@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Annotated, Final, Literal
 
 from pydantic import (
@@ -91,6 +92,11 @@ class PdoTable(Table):
 
 
 PdoTables = Annotated[list[PdoTable], BeforeValidator(listed)]
+
+
+def pdo_table(tables: Sequence[PdoTable], number: int, first: int) -> PdoTable | None:
+    """What the site file asks of a drive's PDO; a table without a number is for the drive's ``first``."""
+    return next((table for table in tables if (table.number or first) == number), None)
 
 
 class AcceptsTable(Table):

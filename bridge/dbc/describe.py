@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
 from bridge.config import NodeTable, PdoTable
+from bridge.config.model import pdo_table
 from bridge.dbc.fields import lay_out
 from bridge.dbc.model import BRIDGE, BusDescription, Message
 from bridge.dbc.protocol import bus_messages, node_messages
 from bridge.dbc.signals import PdoSignals
-from bridge.drive import ValueCodec, scale_of
+from bridge.drive import codecs
 from bridge.errors import OperationFailed
 from bridge.lint.bus import BusView, DriveView, NodeView, PdoView
-from bridge.mapping.model import Family, Pdo, Slot
+from bridge.mapping.model import Pdo, Slot
 from bridge.node.boot import factory_entries, layouts, match_words
 
 _WARNING: Final = (
@@ -64,7 +65,7 @@ def _pdos(drive: DriveView, slot: Slot) -> Iterator[tuple[PdoView, Pdo]]:
 def _asked(drive: DriveView, view: PdoView, first: int) -> PdoTable | None:
     """What the site file says of this PDO; a table without a number is for the drive's first."""
     tables = drive.table.rpdo if view.receives else drive.table.tpdo
-    return next((table for table in tables if (table.number or first) == view.number), None)
+    return pdo_table(tables, view.number, first)
 
 
 def _message(
@@ -73,6 +74,7 @@ def _message(
     family = node.family
     pdos = slot.rpdo if view.receives else slot.tpdo
     process = family.process.rpdo if view.receives else family.process.tpdo
+    group = "command" if view.receives else "actual"
     asked = _asked(drive, view, pdos[0].number)
     entries = factory_entries(pdo)
     if asked is not None and asked.mapping:
@@ -84,7 +86,7 @@ def _message(
         lay_out(entries, places, signed),
         process,
         family.control_word.bits if view.receives else family.status_word.bits,
-        _codecs(family, slot, process, drive.table.parameters, is_command=view.receives),
+        codecs(family, slot, group, process, drive.table.parameters),
         drive.table.parameters,
     )
     signals = tuple(found.words() if words else found.values())
@@ -101,17 +103,6 @@ def _message(
         round(1000 * (period_s or 0)),
         {} if words else found.groups,
     )
-
-
-def _codecs(
-    family: Family, slot: Slot, process: Sequence[str], given: Mapping[str, float], *, is_command: bool
-) -> list[ValueCodec]:
-    group = "command" if is_command else "actual"
-    return [
-        ValueCodec(value, process, scale_of(value, given.get(value.full or "")))
-        for value in family.values_of(slot)
-        if value.group == group
-    ]
 
 
 def _comment(node: NodeTable, drive: DriveView, view: PdoView, pdo: Pdo, asked: PdoTable | None) -> str:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from bridge.canopen.datatypes import INTEGERS
-from bridge.drive.scaling import LinearScale
+from bridge.drive.scaling import LinearScale, scale_of
 from bridge.image import DataType
-from bridge.mapping.model import ProcessValue
+from bridge.mapping.model import Family, ProcessValue, Slot
 
 _WORD_BITS: Final = 16
 _WORD_MASK: Final = 0xFFFF
@@ -106,3 +106,14 @@ class ValueCodec:
             known = ", ".join(f"{state} {text}" for state, text in sorted(self._states.items()))
             raise ValueError(f"takes {known}, not {number}")
         return number
+
+
+def codecs(
+    family: Family, slot: Slot, group: str, words: Sequence[str], given: Mapping[str, float]
+) -> list[ValueCodec]:
+    """The commands or the actual values of a drive, scaled by the parameters that are ``given``."""
+    return [
+        ValueCodec(value, words, scale_of(value, given.get(value.full or "")))
+        for value in family.values_of(slot)
+        if value.group == group
+    ]

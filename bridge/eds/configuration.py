@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.config.download import COMMANDS, Download
+from bridge.canopen.sdo import COMMANDS
+from bridge.config.download import Download
 from bridge.eds.model import Description, Entry, Report
 from bridge.eds.values import BadValue, encode
 

@@ -9,7 +9,7 @@ from bridge.config import NodeTable
 from bridge.drive import MOVING, StatusWords
 from bridge.errands.drop_test import ForeignMaster
 from bridge.mapping.model import Family, Slot
-from bridge.parameter import Address, Entry, Names, ParameterError, Transfer, TransferFailed, Why
+from bridge.parameter import Entry, Names, ParameterError, Transfer, TransferFailed, Why
 
 _WORD_BYTES = 2
 _LEVELS = ("communication", "while_enabled")
@@ -69,7 +69,7 @@ class Standstill:
         word = b""
         for part in self._parts:
             try:
-                data, _ = yield Transfer(Address(part.index, part.sub))
+                data, _ = yield Transfer(part)
             except TransferFailed:
                 return self._heard
             word += data[:each].ljust(each, b"\0")

@@ -130,13 +130,11 @@ class Decoder:
             return Meaning(
                 Kind.HEARTBEAT, node_id, f"guarding {self.name(node_id)}", "asked for its NMT state"
             )
-        view = self._pdos.get(cob_id)
+        view, asked = self._pdos.get(cob_id), "asked for by remote frame"
         if view is not None:
-            return Meaning(Kind.PDO, view.node_id, view.label, "asked for by remote frame")
+            return Meaning(Kind.PDO, view.node_id, view.label, asked)
         if base in _PDOS and node_id:
-            return Meaning(
-                Kind.PDO, node_id, f"{_PDOS[base]} {self.name(node_id)}", "asked for by remote frame"
-            )
+            return Meaning(Kind.PDO, node_id, f"{_PDOS[base]} {self.name(node_id)}", asked)
         return Meaning(Kind.OTHER, 0, "remote frame", "asked for")
 
     def _nmt(self, data: bytes) -> Meaning:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
 from bridge.canopen.decode_sdo import Value
 from bridge.canopen.pdo import PdoCodec
 from bridge.config import NodeTable
-from bridge.drive import ParameterSet, StatusWords, ValueCodec, scale_of
+from bridge.drive import ParameterSet, StatusWords, ValueCodec, codecs
 from bridge.mapping.model import Family, Pdo, Slot
 from bridge.node.boot import factory_entries, layouts, match_words
 from bridge.node.process.words import WordMap
@@ -119,19 +119,8 @@ def _view(
         codec,
         WordMap(entries, places, len(process)),
         states,
-        _values(family, slot, group, process, scales),
+        # A monitor asks no drive for the parameters that scale the others.
+        tuple(one for one in codecs(family, slot, group, process, scales) if not one.is_unknown),
         ParameterSet((family.control_word if is_command else family.status_word).parameter_set_bits),
         frozenset(one.name for one in family.value if one.group == group and family.depends_on_set(one)),
     )
-
-
-def _values(
-    family: Family, slot: Slot, group: str, process: Sequence[str], scales: Mapping[str, float]
-) -> tuple[ValueCodec, ...]:
-    """The values whose scale is known; a monitor asks no drive for the others."""
-    codecs = [
-        ValueCodec(value, process, scale_of(value, scales.get(value.full or "")))
-        for value in family.values_of(slot)
-        if value.group == group
-    ]
-    return tuple(codec for codec in codecs if not codec.is_unknown)

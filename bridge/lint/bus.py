@@ -42,13 +42,13 @@ class PdoView:
     name: str
     key: Key
     receives: bool
-    enabled: bool
-    cob_id: int
-    length: int
-    transmission_type: int
-    inhibit_ms: float
-    event_ms: int
-    sent: bool
+    enabled: bool = False
+    cob_id: int = 0
+    length: int = 0
+    transmission_type: int = _FACTORY_TYPE
+    inhibit_ms: float = 0.0
+    event_ms: int = 0
+    sent: bool = False
     rtr_poll_ms: int = 0
     number: int = 0
     words: int = 0
@@ -205,7 +205,6 @@ def _slot_pdo(pdo: Pdo, receives: bool, summary: PdoSummary | None, node_id: int
         transmission_type=_either(pdo.transmission_type, _FACTORY_TYPE if kind is None else kind),
         inhibit_ms=inhibit_ms if pdo.inhibit_ms is None else pdo.inhibit_ms,
         event_ms=_either(pdo.event_ms, event_ms),
-        sent=False,
     )
 
 
@@ -281,11 +280,10 @@ def _other_pdo(summary: PdoSummary, key: Key) -> PdoView:
         _FACTORY_TYPE if summary.transmission_type is None else summary.transmission_type,
         summary.inhibit_100us / 10,
         summary.event_timer_ms,
-        sent=False,
     )
 
 
 def _unknown_pdo(receives: bool, number: int, key: Key) -> PdoView:
     """A PDO that only the configuration mentions."""
     name = f"{'RPDO' if receives else 'TPDO'}{number}"
-    return PdoView(name, key, receives, False, 0, 0, _FACTORY_TYPE, 0.0, 0, sent=False)
+    return PdoView(name, key, receives)

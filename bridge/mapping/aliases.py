@@ -64,7 +64,7 @@ def aliases(family: Family) -> Iterator[Alias]:
         for name, targets in table.items():
             first = place_of(family, name)
             for n, objects in enumerate(targets):
-                ref = ObjectRef(index=first.index, sub=first.sub + n)
+                ref = ObjectRef(first.index, first.sub + n)
                 yield Alias(name if not n else f"{name} …", ref, tuple(objects), is_same)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from typing import Annotated, Final
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
@@ -24,7 +25,8 @@ _DECIMAL: Final = re.compile(r"\d{1,10}")
 _STATE: Final = re.compile(r"-?\d{1,10}")
 
 
-class ObjectRef(Table):
+@dataclass(frozen=True, slots=True, order=True)
+class ObjectRef:
     """An entry of the object dictionary."""
 
     index: int
@@ -65,7 +67,7 @@ def _object(text: object) -> object:
     match = _OBJECT.fullmatch(text) if isinstance(text, str) else None
     if not match:
         raise ValueError('must be an object as "3002:01", index and sub-index in hexadecimal')
-    return ObjectRef(index=int(match[1], 16), sub=int(match[2], 16))
+    return ObjectRef(int(match[1], 16), int(match[2], 16))
 
 
 def _mapped(text: object) -> object:
@@ -80,7 +82,7 @@ def _mapped(text: object) -> object:
         )
     bits = tuple(int(match[3] or 0) for match in found)
     mapped = MappedObject(
-        parts=tuple(ObjectRef(index=int(match[1], 16), sub=int(match[2], 16)) for match in found), bits=bits
+        parts=tuple(ObjectRef(int(match[1], 16), int(match[2], 16)) for match in found), bits=bits
     )
     if any(match[3] and not 1 <= int(match[3]) <= _MOST_BITS for match in found):
         raise ValueError(f"must have 1…{_MOST_BITS} bits")

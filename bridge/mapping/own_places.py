@@ -48,7 +48,7 @@ class OwnPlace:
 def place_of(family: Family, one: OwnObject) -> OwnPlace:
     """Where a setting is. The mapping's checks have seen to it that there is one."""
     if one.parameter is None:
-        ref = one.object or ObjectRef(index=0, sub=0)
+        ref = one.object or ObjectRef(0, 0)
         number = INTEGERS[one.data_type]
         return OwnPlace(str(ref), ref, one.data_type, one.per_drive, number.low, number.high, {})
     parameter = family.parameter_named(one.parameter)
@@ -73,7 +73,7 @@ def places(family: Family, *, link: bool = False) -> list[OwnPlace]:
         one = place_of(family, entry)
         found.setdefault((one.key, one.per_drive), one)
         if entry.watches == "guarding":
-            ref = ObjectRef(index=LIFE_TIME_FACTOR[0], sub=LIFE_TIME_FACTOR[1])
+            ref = ObjectRef(*LIFE_TIME_FACTOR)
             factor = OwnPlace(str(ref), ref, "uint8", False, 0, 0xFF, {})
             found.setdefault((factor.key, False), factor)
         if entry.reaction is not None:

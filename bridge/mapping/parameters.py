@@ -170,4 +170,4 @@ def object_of(names: ParameterNames, name: str, sets: int = 0, elements: int = 0
             raise ValueError(f"{name!r}: its parameter sets are 1…{sets}")
     if not (0 <= index <= 0xFFFF and 0 <= sub <= 0xFF):
         raise ValueError(f"{name!r} would be the object {index:X}h:{sub:X}, which there cannot be")
-    return ObjectRef(index=index, sub=sub)
+    return ObjectRef(index, sub)

@@ -1,11 +1,11 @@
 """Parameters of drives by the vendor's own names: what they are called, how they are coded, what writing
 them wears out, and backups of them. No bus in here."""
 
+from bridge.mapping.model import ObjectRef as ObjectRef
 from bridge.parameter.access import DriveParameters as DriveParameters
 from bridge.parameter.access import Reading as Reading
 from bridge.parameter.access import Transfer as Transfer
 from bridge.parameter.access import Written as Written
-from bridge.parameter.definition import Address as Address
 from bridge.parameter.definition import Entry as Entry
 from bridge.parameter.error import ParameterError as ParameterError
 from bridge.parameter.error import TransferFailed as TransferFailed

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.image import Value
-from bridge.mapping.model import Family
+from bridge.mapping.model import Family, ObjectRef
 from bridge.parameter.codec import decode, encode_value, matches, shown
-from bridge.parameter.definition import Address, Entry
+from bridge.parameter.definition import Entry
 from bridge.parameter.error import ParameterError, TransferFailed, Why
 from bridge.parameter.ledger import Key, Ledger
 from bridge.parameter.names import Names
@@ -31,7 +31,7 @@ class Transfer:
     """Read an object (``data`` None) or write it. ``of_node``: over the node's first SDO channel. A write is
     not begun where ``why_not``, asked at that moment, has a reason."""
 
-    address: Address
+    address: ObjectRef
     data: bytes | None = None
     of_node: bool = False
     why_not: Callable[[], str] | None = None
@@ -90,7 +90,7 @@ class DriveParameters:
         self._node_name = node_name
         self._eeprom = family.eeprom
         self._ledger = ledger
-        self._cache: dict[Address, tuple[bytes, float]] = {}
+        self._cache: dict[ObjectRef, tuple[bytes, float]] = {}
 
     def forget(self) -> None:
         """The drive may have been switched off, or exchanged."""
@@ -205,7 +205,7 @@ class DriveParameters:
         eeprom = self._eeprom
         if eeprom is None or eeprom.save is None:
             raise ParameterError(Why.NOT_CONFIGURED, f"{self.name} has no command that saves its parameters")
-        entry = Entry("save", Address(eeprom.save.index, eeprom.save.sub))
+        entry = Entry("save", eeprom.save)
         key = (self._node_name, str(entry.address))
         self._check(key, entry.name, now)
         try:

@@ -6,18 +6,16 @@ parameter set. It is restored in the order of the mapping file, and only where t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 
 from bridge.image import Value
+from bridge.mapping.model import ObjectRef
 from bridge.parameter.access import MISSING, Asks, DriveParameters, Transfer, Written
 from bridge.parameter.codec import encode_value
-from bridge.parameter.definition import Address, Entry
+from bridge.parameter.definition import Entry
 from bridge.parameter.error import ParameterError, Why
 from bridge.parameter.names import Names
-
-Progress = Callable[[str], None]
-"""Is told what is being done."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +81,7 @@ def in_order(names: Names, values: Mapping[str, Value]) -> list[tuple[Entry, Val
     """
     places = {entry.address: place for place, entry in enumerate(settings(names))}
     found = [(names.resolve(name), value) for name, value in values.items()]
-    seen: dict[Address, str] = {}
+    seen: dict[ObjectRef, str] = {}
     for name, (entry, _) in zip(values, found, strict=True):
         if entry.address in seen:
             other = seen[entry.address]
@@ -100,10 +98,9 @@ def in_order(names: Names, values: Mapping[str, Value]) -> list[tuple[Entry, Val
     return sorted(found, key=lambda pair: places.get(pair[0].address, len(places)))
 
 
-def back_up(access: DriveParameters, into: Backup, now: float, tell: Progress = lambda _: None) -> Steps:
+def back_up(access: DriveParameters, into: Backup, now: float) -> Steps:
     """Read every setting into ``into``. Raises ``ParameterError`` where one cannot be read."""
     for entry in settings(access.names, on_first=access.on_first):
-        tell(entry.name)
         try:
             reading = yield from access.read(entry, now)
         except ParameterError as error:
@@ -120,11 +117,9 @@ def compare(
     values: Mapping[str, Value],
     into: Comparison,
     now: float,
-    tell: Progress = lambda _: None,
 ) -> Steps:
     """Compare a set with the drive. Raises ``ParameterError``."""
     for entry, value in in_order(access.names, values):
-        tell(entry.name)
         try:
             reading, same = yield from access.compare(entry, value, now)
         except ParameterError as error:
@@ -144,7 +139,6 @@ def restore(
     values: Mapping[str, Value],
     into: Restored,
     now: float,
-    tell: Progress = lambda _: None,
     before_it: Asks | None = None,
 ) -> Steps:
     """Write a set where the drive differs; every write is read back, and the first refusal ends it.
@@ -154,7 +148,6 @@ def restore(
     """
     wanted = _checked(access, values)
     for place, (entry, value) in enumerate(wanted):
-        tell(entry.name)
         try:
             written = yield from access.write(entry, value, now, before_it=before_it)
         except ParameterError as error:

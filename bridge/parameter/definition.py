@@ -4,19 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bridge.mapping.model import Parameter
+from bridge.mapping.model import ObjectRef, Parameter
 from bridge.mapping.parameters import leaf_of
-
-
-@dataclass(frozen=True, slots=True, order=True)
-class Address:
-    """Index and sub-index of an object."""
-
-    index: int
-    sub: int
-
-    def __str__(self) -> str:
-        return f"{self.index:04X}:{self.sub:02X}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +13,7 @@ class Entry:
     """One value of a drive: a parameter, one element of it, or an object that no file describes."""
 
     name: str
-    address: Address
+    address: ObjectRef
     definition: Parameter | None = None
 
     @property

@@ -11,9 +11,9 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
-from bridge.mapping.model import Family, Parameter
+from bridge.mapping.model import Family, ObjectRef, Parameter
 from bridge.mapping.parameters import object_of
-from bridge.parameter.definition import Address, Entry
+from bridge.parameter.definition import Entry
 from bridge.parameter.error import ParameterError, Why
 from bridge.parameter.protection import Protection
 
@@ -40,7 +40,7 @@ class Names:
         self.definitions = tuple(_as_read(parameter) for parameter in family.parameter)
         self._by_name = {definition.name.upper(): definition for definition in self.definitions}
         self._by_leaf: dict[str, Entry] = {}
-        self._by_address: dict[Address, Entry] = {}
+        self._by_address: dict[ObjectRef, Entry] = {}
         for entry in self.entries():
             self._by_leaf.setdefault(entry.leaf, entry)
             self._by_address.setdefault(entry.address, entry)
@@ -57,7 +57,7 @@ class Names:
         wanted = text.strip()
         match = _OBJECT.fullmatch(wanted)
         if match:
-            address = Address(int(match[1], 16), int(match[2], 16))
+            address = ObjectRef(int(match[1], 16), int(match[2], 16))
             return self._by_address.get(address) or Entry(str(address), address)
         definition = self._by_name.get(wanted.upper())
         if definition is not None:
@@ -116,9 +116,8 @@ class Names:
             found = object_of(self._rule, text.upper())
         except ValueError:
             return None
-        address = Address(found.index, found.sub)
-        listed = self._by_address.get(address)
-        return Entry(text.upper(), address, listed.definition if listed else None)
+        listed = self._by_address.get(found)
+        return Entry(text.upper(), found, listed.definition if listed else None)
 
     def _check(self, definition: Parameter, element: int | None, number: int | None) -> None:
         """Raises ``ParameterError`` where the parameter has no such element or set."""
@@ -136,11 +135,11 @@ class Names:
         if base is not None:
             place = self._first if element is None else element
             sub = base.sub + max(definition.sets, 1) * (place - self._first) + (number or 1) - 1
-            return Entry(name, Address(base.index, min(sub, _MOST_SUB)), definition)
+            return Entry(name, ObjectRef(base.index, min(sub, _MOST_SUB)), definition)
         if self._rule is None:
             raise ValueError(f"{definition.name} has no object")
         found = object_of(self._rule, name, definition.sets, definition.elements)
-        return Entry(name, Address(found.index, found.sub), definition)
+        return Entry(name, found, definition)
 
     def _spelled(self, name: str, element: int | None, number: int | None) -> str:
         """The name of one element in one set, as the family's pattern reads it."""

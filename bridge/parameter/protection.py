@@ -12,7 +12,7 @@ from typing import Final
 from bridge.mapping.aliases import COMMUNICATION, Alias, aliases
 from bridge.mapping.model import Family, ObjectRef, Parameter
 from bridge.mapping.own_places import places
-from bridge.parameter.definition import Address, Entry
+from bridge.parameter.definition import Entry
 
 NEVER: Final = "command"
 """Nobody writes it as a parameter."""
@@ -30,7 +30,7 @@ class Protection:
         for alias in aliases(family):
             self._aliases.setdefault(alias.ref.index, []).append(alias)
         self._process = {
-            Address(part.index, part.sub)
+            part
             for slot in family.slot
             for pdo in slot.rpdo
             for objects in pdo.objects
@@ -38,14 +38,14 @@ class Protection:
             for part in mapped.parts
         }
 
-    def stands_for(self, address: Address) -> tuple[ObjectRef, ...]:
+    def stands_for(self, address: ObjectRef) -> tuple[ObjectRef, ...]:
         """The communication objects that an object is another name of, or decides; what stands beside one
         under the same index is taken to be one, too."""
         beside = self._aliases.get(address.index, [])
         exact = [alias for alias in beside if alias.ref.sub == address.sub]
         return tuple(dict.fromkeys(ref for alias in exact or beside for ref in alias.objects))
 
-    def level(self, address: Address) -> str:
+    def level(self, address: ObjectRef) -> str:
         """Who may write an object and when (``Parameter.protected``); what stands beside a protected
         parameter under the same index is protected like it, and so is what the drive watches the
         bridge by."""
@@ -58,7 +58,7 @@ class Protection:
     def _commands_drive(self, index: int) -> bool:
         return self._flags.get(index) == NEVER or any(index in span for span in self._commands)
 
-    def tells_own_supervision(self, address: Address) -> bool:
+    def tells_own_supervision(self, address: ObjectRef) -> bool:
         """Whether an object says what the drive does when the bridge falls silent."""
         return any(one.index in self._own for one in (address, *self.stands_for(address)))
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from enum import Enum
 from typing import Final
 
-from bridge.sim.cia402_modes import BIT_4, BIT_12, BIT_13, TARGET_REACHED, Targets
+from bridge.sim.cia402_modes import BIT_4, BIT_12, BIT_13, TARGET_REACHED, Parts, Targets
 from bridge.sim.cia402_motion import Motor
 from bridge.sim.cia402_settings import INCREMENTS, Cia402Settings
 
@@ -25,14 +25,12 @@ class _Phase(Enum):
     FAILED = "failed"
 
 
-class Homing:
+class Homing(Parts):
     """hm: begins with bit 4 and ends when that falls. ``switches`` False: they are never found."""
 
     def __init__(self, motor: Motor, settings: Callable[[], Cia402Settings], targets: Targets) -> None:
-        del targets
+        super().__init__(motor, settings, targets)
         self.switches = True
-        self._motor = motor
-        self._settings = settings
         self._shift = 0.0
         """The machine's position is the drive's position plus this."""
         self._phase = _Phase.IDLE
@@ -49,8 +47,8 @@ class Homing:
             self._phase = _Phase.IDLE
 
     def _begin(self) -> None:
-        method, speeds = self._settings().homing_method, self._settings().homing_speeds
-        place = self._motor.position + self._shift
+        method, speeds = self.settings.homing_method, self.settings.homing_speeds
+        place = self.motor.position + self._shift
         self._phase = _Phase.RUNNING
         self._speed = float(speeds[0] if method in (17, 18) else speeds[1])
         match method:
@@ -67,17 +65,17 @@ class Homing:
 
     @property
     def demand(self) -> float:
-        return self._motor.velocity
+        return self.motor.velocity
 
     def advance(self, dt_s: float) -> None:
-        ramp = self._settings().homing_acceleration
+        ramp = self.settings.homing_acceleration
         if self._phase is not _Phase.RUNNING:
-            self._motor.ramp_to(0.0, 0.0, ramp, dt_s)
-        elif self._motor.go_to(self._goal, self._speed, ramp, ramp, dt_s):
+            self.motor.ramp_to(0.0, 0.0, ramp, dt_s)
+        elif self.motor.go_to(self._goal, self._speed, ramp, ramp, dt_s):
             self._arrived()
 
     def _arrived(self) -> None:
-        settings, motor = self._settings(), self._motor
+        settings, motor = self.settings, self.motor
         if settings.homing_method in (17, 18) and not self.switches:
             self._phase = _Phase.FAILED
             return
@@ -91,7 +89,7 @@ class Homing:
 
     @property
     def bits(self) -> int:
-        bits = TARGET_REACHED if self._motor.stands_still and self._phase is not _Phase.RUNNING else 0
+        bits = TARGET_REACHED if self.motor.stands_still and self._phase is not _Phase.RUNNING else 0
         if self._phase is _Phase.DONE:
             bits |= BIT_12
         return bits | (BIT_13 if self._phase is _Phase.FAILED else 0)

@@ -51,7 +51,7 @@ class OperationMode(Protocol):
         ...
 
 
-class _Parts:
+class Parts:
     """What all modes share."""
 
     def __init__(self, motor: Motor, settings: Callable[[], Cia402Settings], targets: Targets) -> None:
@@ -72,7 +72,7 @@ class _Parts:
         self._word = 0
 
 
-class Velocity(_Parts):
+class Velocity(Parts):
     """vl: 6042h in 1/min, 6046h, 6048h, 6049h."""
 
     @property
@@ -103,7 +103,7 @@ class Velocity(_Parts):
         return bits | (TARGET_REACHED if abs(self.motor.velocity - self.demand) < 1 else 0)
 
 
-class ProfileVelocity(_Parts):
+class ProfileVelocity(Parts):
     """pv: 60FFh, limited by 607Fh and 6080h, with 6083h and 6084h."""
 
     @property
@@ -122,7 +122,7 @@ class ProfileVelocity(_Parts):
         return bits | (BIT_12 if abs(velocity) <= settings.velocity_threshold else 0)
 
 
-class ProfilePosition(_Parts):
+class ProfilePosition(Parts):
     """pp: a new set-point with each edge of bit 4, of which one may wait; bit 5: take it at once; bit 6:
     relative."""
 
@@ -190,7 +190,7 @@ class ProfilePosition(_Parts):
         return bits | (TARGET_REACHED if self._reached else 0)
 
 
-class CyclicPosition(_Parts):
+class CyclicPosition(Parts):
     """csp: a new 607Ah with each SYNC; in between, the speed that reaches it within the time in 60C2h."""
 
     def __init__(self, motor: Motor, settings: Callable[[], Cia402Settings], targets: Targets) -> None:
@@ -231,7 +231,7 @@ class CyclicPosition(_Parts):
         return BIT_12 | (BIT_13 if self._late_s else 0)
 
 
-class CyclicVelocity(_Parts):
+class CyclicVelocity(Parts):
     """csv: a new 60FFh with each SYNC, without ramps."""
 
     @property
@@ -247,7 +247,7 @@ class CyclicVelocity(_Parts):
         return BIT_12 | (INTERNAL_LIMIT if self.demand != self.targets.velocity else 0)
 
 
-class NoMode(_Parts):
+class NoMode(Parts):
     """No mode assigned: the motor stands still."""
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 from bridge.sim.abort import AbortCode, SdoAbort
@@ -118,7 +119,7 @@ class Cia402Objects:
         for index, (low, high) in _OPTIONS.items():
             option = item(Type.INTEGER16, lambda: self._settings.options, index, low, high)
             dictionary.add(index, 0, option)
-        dictionary.add(0x6007, 0, self._number(Type.INTEGER16, "abort_connection", 0, 3))
+        dictionary.add(0x6007, 0, variable(Type.INTEGER16, lambda: self._settings, "abort_connection", 0, 3))
 
     def _add_process_data(self, dictionary: Dictionary) -> None:
         axis, targets, motor = self._axis, self._axis.targets, self._axis.motor
@@ -144,12 +145,12 @@ class Cia402Objects:
 
     def _add_numbers(self, dictionary: Dictionary) -> None:
         for index, (kind, name) in _NUMBERS.items():
-            dictionary.add(index, 0, self._number(kind, name, _LEAST.get(index)))
+            dictionary.add(index, 0, variable(kind, lambda: self._settings, name, _LEAST.get(index)))
         for index, (kinds, name) in _ARRAYS.items():
-            entries = [self._element(kind, name, place) for place, kind in enumerate(kinds)]
-            dictionary.add_array(index, entries)
-        low, high = _POWER
-        dictionary.add(0x60C2, 2, self._element(Type.INTEGER8, "interpolation", 1, low, high))
+            values = partial(self._values, name)
+            dictionary.add_array(index, [item(kind, values, n) for n, kind in enumerate(kinds)])
+        power = item(Type.INTEGER8, partial(self._values, "interpolation"), 1, *_POWER)
+        dictionary.add(0x60C2, 2, power)
         dictionary.add(0x6098, 0, self._method())
 
     def _method(self) -> Number:
@@ -160,10 +161,6 @@ class Cia402Objects:
 
         return Number(Type.INTEGER8, lambda: self._settings.homing_method, write)
 
-    def _number(self, kind: Type, name: str, low: int | None = None, high: int | None = None) -> Number:
-        return variable(kind, lambda: self._settings, name, low, high)
-
-    def _element(
-        self, kind: Type, name: str, place: int, low: int | None = None, high: int | None = None
-    ) -> Number:
-        return item(kind, lambda: getattr(self._settings, name), place, low, high)
+    def _values(self, name: str) -> list[int]:
+        found: list[int] = getattr(self._settings, name)
+        return found

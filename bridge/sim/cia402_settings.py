@@ -6,10 +6,17 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Final
 
-from bridge.sim.settings import CobId, CommunicationSettings, PdoSettings, SdoSettings, SlaveRules
+from bridge.sim.settings import (
+    RPDO_BASES,
+    TPDO_BASES,
+    CobId,
+    CommunicationSettings,
+    PdoSettings,
+    SdoSettings,
+    SlaveRules,
+)
 
 RULES: Final = SlaveRules(sdo_block_segments=127)
-PDOS: Final = 4
 MAP_ENTRIES: Final = 8
 INCREMENTS: Final = 10_000
 """608Fh: of the encoder for one revolution."""
@@ -79,8 +86,6 @@ class Cia402Settings:
 
 
 _FIRST: Final = (0x180 >> 7, 0x200 >> 7)
-_RPDO_BASES: Final = (0x200, 0x300, 0x400, 0x500)
-_TPDO_BASES: Final = (0x180, 0x280, 0x380, 0x480)
 # PDO1 … PDO4 as CiA 402 has them at delivery: control and status word alone, with the mode, for pp, for pv.
 _RPDO_ENTRIES: Final = (
     (0x60400010,),
@@ -101,12 +106,8 @@ def factory_communication(node_id: int) -> CommunicationSettings:
     return CommunicationSettings(
         emcy=CobId(0x80 + node_id),
         sdo=[SdoSettings.at(0x600 + node_id, 0x580 + node_id)],
-        rpdo=[
-            _pdo(base + node_id, entries) for base, entries in zip(_RPDO_BASES, _RPDO_ENTRIES, strict=True)
-        ],
-        tpdo=[
-            _pdo(base + node_id, entries) for base, entries in zip(_TPDO_BASES, _TPDO_ENTRIES, strict=True)
-        ],
+        rpdo=[_pdo(base + node_id, entries) for base, entries in zip(RPDO_BASES, _RPDO_ENTRIES, strict=True)],
+        tpdo=[_pdo(base + node_id, entries) for base, entries in zip(TPDO_BASES, _TPDO_ENTRIES, strict=True)],
     )
 
 

@@ -106,12 +106,6 @@ def _add_displays(dictionary: Dictionary, parts: InterfaceParts) -> None:
     """P170…P181 (§7.1.3, §7.1.4)."""
     image, faults = parts.image, parts.faults
 
-    def bus_in(element: int) -> Number:
-        return Number(Type.INTEGER16, lambda: image.bus_in(element))
-
-    def bus_out(element: int) -> Number:
-        return Number(Type.INTEGER16, lambda: image.bus_out(element))
-
     def relays() -> int:
         setting = parts.interface.current.relays
         return image.outputs & 3 if setting == 0 else setting - 1
@@ -124,8 +118,9 @@ def _add_displays(dictionary: Dictionary, parts: InterfaceParts) -> None:
     add_parameter(dictionary, 174, [display(lambda: image.inputs & 0x0F)])
     if parts.kind == "SK TU4-CAO":
         add_parameter(dictionary, 175, [display(relays)])
-    add_parameter(dictionary, 176, [bus_in(element) for element in elements])
-    add_parameter(dictionary, 177, [bus_out(element) for element in elements])
+    for number, word in ((176, image.bus_in), (177, image.bus_out)):
+        words = [Number(Type.INTEGER16, partial(word, element)) for element in elements]
+        add_parameter(dictionary, number, words)
     add_parameter(dictionary, 180, [fixed(parts.node_id)])
     add_parameter(dictionary, 181, [fixed(_BAUD_250)])
 

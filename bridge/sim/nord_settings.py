@@ -6,7 +6,15 @@ from dataclasses import dataclass, field
 from typing import Final, Literal
 
 from bridge.sim.abort import AbortCode
-from bridge.sim.settings import CobId, CommunicationSettings, PdoSettings, SdoSettings, SlaveRules
+from bridge.sim.settings import (
+    RPDO_BASES,
+    TPDO_BASES,
+    CobId,
+    CommunicationSettings,
+    PdoSettings,
+    SdoSettings,
+    SlaveRules,
+)
 
 DRIVES: Final = 4
 ALL_SLOTS: Final = (1, 2, 3, 4)
@@ -33,8 +41,8 @@ RULES: Final = SlaveRules(
     emcy_inhibit_unit_s=1e-3,  # §6.7.2 gives ms
 )
 
-_TPDO_BASES: Final = (0x180, 0x280, 0x380, 0x480, 0x1C0)
-_RPDO_BASES: Final = (0x200, 0x300, 0x400, 0x500, 0x240)
+_TPDO_BASES: Final = (*TPDO_BASES, 0x1C0)
+_RPDO_BASES: Final = (*RPDO_BASES, 0x240)
 _SDO_BASES: Final = ((0x600, 0x580), (0x340, 0x2C0), (0x440, 0x3C0), (0x540, 0x4C0))
 _INHIBIT_100US: Final = 100
 _EVENT_TIMER_MS: Final = 250

@@ -10,6 +10,9 @@ from bridge.sim.abort import AbortCode
 DISABLED: Final = 0x8000_0000
 """Bit 31 of a COB-ID object: this PDO or SDO does not exist."""
 COB_ID_MASK: Final = 0x7FF
+RPDO_BASES: Final = (0x200, 0x300, 0x400, 0x500)
+TPDO_BASES: Final = (0x180, 0x280, 0x380, 0x480)
+"""PDO1 … PDO4 of the pre-defined connection set (CiA 301 §7.3.3)."""
 
 
 @dataclass(frozen=True, slots=True)

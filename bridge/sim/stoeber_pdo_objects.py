@@ -9,8 +9,8 @@ from bridge.sim.abort import AbortCode, SdoAbort
 from bridge.sim.dictionary import DataType, Dictionary, Number, constant
 from bridge.sim.pdo import CYCLIC_MAX
 from bridge.sim.pdo_objects import PdoObjects, check_length
-from bridge.sim.settings import COB_ID_MASK, CommunicationSettings, PdoSettings
-from bridge.sim.stoeber_settings import ANSWERED, MAP_ENTRIES, RPDO_BASES, RULES, TPDO_BASES
+from bridge.sim.settings import COB_ID_MASK, RPDO_BASES, TPDO_BASES, CommunicationSettings, PdoSettings
+from bridge.sim.stoeber_settings import ANSWERED, MAP_ENTRIES, RULES
 from bridge.sim.store import Store
 
 _FIRST_OBJECT: Final = 0x1000

@@ -5,7 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from bridge.sim.settings import CobId, CommunicationSettings, PdoSettings, SdoSettings, SlaveRules
+from bridge.sim.settings import (
+    RPDO_BASES,
+    TPDO_BASES,
+    CobId,
+    CommunicationSettings,
+    PdoSettings,
+    SdoSettings,
+    SlaveRules,
+)
 from bridge.sim.stoeber_axis import AxisParameters
 
 CHANNELS: Final = 4
@@ -18,8 +26,6 @@ RULES: Final = SlaveRules(
     cob_id_change_needs_disabled=False,
 )
 
-RPDO_BASES: Final = (0x200, 0x300, 0x400, 0x500)
-TPDO_BASES: Final = (0x180, 0x280, 0x380, 0x480)
 SDO_BASES: Final = ((0x600, 0x580), (0x620, 0x5A0), (0x640, 0x5C0), (0x660, 0x5E0))
 
 

@@ -20,7 +20,7 @@ from bridge.cli.bus import BusChoice, choose_line, split_site
 from bridge.cli.sdo import ValueType, decode, encode, parse_object, why_forced
 from bridge.errands.single import NmtErrand, SdoErrand
 from bridge.image import DataType
-from bridge.parameter import Address
+from bridge.parameter import ObjectRef
 
 SITE = """
 [site]
@@ -270,5 +270,5 @@ def test_what_is_protected_is_written_with_force_only(site: Path, address: str, 
 
 def test_anything_else_is_written_without(site: Path) -> None:
     line = choose_line(site, BusChoice("north"))
-    assert not why_forced(line, 5, Address(0x2066, 1))
-    assert not why_forced(line, 6, Address(0x1017, 0)), "no node of the site"
+    assert not why_forced(line, 5, ObjectRef(0x2066, 1))
+    assert not why_forced(line, 6, ObjectRef(0x1017, 0)), "no node of the site"

@@ -17,7 +17,7 @@ from bridge.canopen.frame import Frame
 from bridge.command import Action, Identity, Plant, Rejection, Request, Source, command_of
 from bridge.command.link import NodeState
 from bridge.config import ModbusTable, ZenohTable
-from bridge.eventlog import EventLog
+from bridge.eventlog import log_event
 from bridge.mirror.client import MirrorClient
 from bridge.northbound.modbus.registers import units_of
 from bridge.northbound.modbus.server import ModbusServer
@@ -55,7 +55,7 @@ class Hall:
 
     def __init__(self, log: QuietLog) -> None:
         self.plant = sites.plant_of(SITE)
-        self.plant.on_event(EventLog())
+        self.plant.on_event(log_event)
         self.log = log
         self.node = self.plant.nodes["conveyor"]
         self.plant.on_node(self.node, NodeState.OPERATIONAL, self.now)
@@ -192,7 +192,7 @@ class Line:
         self.bench = Bench(write_site(folder))
         self.bench.run(2.0)
         self.log = log
-        self.bench.plant.on_event(EventLog())
+        self.bench.plant.on_event(log_event)
         self._began = self.bench.now
         self._log_began = log.now
 
@@ -358,7 +358,7 @@ class _Broken:
 
 async def test_a_part_that_fails_again_and_again(log: QuietLog, monkeypatch: pytest.MonkeyPatch) -> None:
     plant: Plant = sites.plant_of(SITE)
-    plant.on_event(EventLog())
+    plant.on_event(log_event)
     monkeypatch.setenv("NOTIFY_SOCKET", "")
     parts = Parts(plant, Notifier(), lambda: log.now, "")
     left = TIMES

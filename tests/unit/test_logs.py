@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from bridge.cli.logs import LoopFaults, write_counts
+from bridge.cli.logs import log_fault, write_counts
 from bridge.quietlog import A_FEW, about
 from bridge.ratelimit import PAUSE_S
 from tests.support.quiet import QuietLog, quiet_log
@@ -146,7 +146,7 @@ def other_fault() -> BaseException:
 def test_what_nobody_caught_is_told_with_its_traceback_once_for_each_place(
     loop: asyncio.AbstractEventLoop, log: QuietLog
 ) -> None:
-    faults = LoopFaults()
+    faults = log_fault
     for number in range(100):
         faults(loop, {"message": f"in callback {number}", "exception": fault(number)})
         faults(loop, {"message": f"in callback {number}", "exception": other_fault()})
@@ -156,7 +156,7 @@ def test_what_nobody_caught_is_told_with_its_traceback_once_for_each_place(
 
 
 def test_what_has_no_exception_is_told_too(loop: asyncio.AbstractEventLoop, log: QuietLog) -> None:
-    faults = LoopFaults()
+    faults = log_fault
     for _ in range(3):
         faults(loop, {"message": "Task was destroyed but it is pending!"})
     assert log.lines == ["Task was destroyed but it is pending!"]

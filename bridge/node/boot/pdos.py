@@ -17,6 +17,7 @@ from bridge.canopen.pdo import MappingError, PdoCodec, PdoEntry
 from bridge.command import Drive
 from bridge.command.plant import Node
 from bridge.config import PdoTable
+from bridge.config.model import pdo_table
 from bridge.image import DataType
 from bridge.mapping.model import Pdo
 from bridge.node.boot.actions import (
@@ -59,9 +60,7 @@ class _Direction:
 
     def asked(self, pdo: Pdo) -> PdoTable | None:
         """What the site file asks of this PDO."""
-        return next(
-            (table for table in self.tables if (table.number or self.pdos[0].number) == pdo.number), None
-        )
+        return pdo_table(self.tables, pdo.number, self.pdos[0].number)
 
 
 def plan_drive(node: Node, drive: Drive, result: BootResult) -> Generator[Action, bytes | None, DrivePlan]:

@@ -36,9 +36,9 @@ from bridge.node.parameters.run import Procedure, run
 from bridge.node.parameters.view import NO_CHANNEL, ParameterView
 from bridge.node.sdo_channels import FIRST, SdoChannels, channel_of
 from bridge.parameter import (
-    Address,
     DriveParameters,
     Entry,
+    ObjectRef,
     ParameterError,
     Reading,
     Transfer,
@@ -90,8 +90,8 @@ class NodeParameters:
         self._scaling = {value.full for value in node.family.value} & {
             parameter.name for parameter in node.family.parameter if parameter.read
         }
-        self._reading: dict[tuple[str, Address], Waiting] = {}
-        self._writing: set[tuple[str, Address]] = set()
+        self._reading: dict[tuple[str, ObjectRef], Waiting] = {}
+        self._writing: set[tuple[str, ObjectRef]] = set()
 
     # the node
 

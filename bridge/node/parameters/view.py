@@ -9,7 +9,7 @@ from bridge.command import Drive
 from bridge.command.link import NodeState
 from bridge.command.plant import Node
 from bridge.image import Image, Quality
-from bridge.parameter import Address, Entry, Names, ParameterError, Reading, Why
+from bridge.parameter import Entry, Names, ObjectRef, ParameterError, Reading, Why
 
 _FINAL_ABORTS: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0602_0000, 0x0609_0011))
 """Abort codes for what a drive does not have: asking again gives the same answer."""
@@ -24,7 +24,7 @@ class ParameterView:
     def __init__(self, node: Node, image: Image, names: Names) -> None:
         self._image = image
         self._hold_s = node.table.hold_ms / 1000
-        self._indices: dict[tuple[str, Address], int] = {
+        self._indices: dict[tuple[str, ObjectRef], int] = {
             (drive.name, entry.address): image.index[f"{drive.name}/parameter/{entry.leaf}"]
             for drive in node.drives
             for entry in names.points()

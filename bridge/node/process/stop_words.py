@@ -14,8 +14,8 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.pdo import PdoEntry
 from bridge.command import Drive
 from bridge.command.plant import Node
-from bridge.config import PdoTable
 from bridge.config.download import Download
+from bridge.config.model import pdo_table
 from bridge.mapping.model import Pdo
 from bridge.node.boot import MOST_ENTRIES, BootMemory, PdoPlan, rpdo_plan
 from bridge.node.process.process_data import DrivePdos, Rpdo
@@ -80,16 +80,10 @@ def _known(node: Node, drive: Drive, downloads: Sequence[Download]) -> Iterator[
         configured = _configured(pdo, downloads)
         if configured is not None:
             yield rpdo_plan(drive.family, drive.slot, pdo, *configured)
-        asked = _asked(drive, pdo)
+        asked = pdo_table(drive.table.rpdo, pdo.number, drive.slot.rpdo[0].number)
         if asked is not None and asked.enable:
             entries = asked.mapping
             yield rpdo_plan(drive.family, drive.slot, pdo, asked.cob_id or factory_id, entries)
-
-
-def _asked(drive: Drive, pdo: Pdo) -> PdoTable | None:
-    """What the site file asks of this PDO."""
-    first = drive.slot.rpdo[0].number
-    return next((table for table in drive.table.rpdo if (table.number or first) == pdo.number), None)
 
 
 def _configured(pdo: Pdo, downloads: Sequence[Download]) -> tuple[int, list[PdoEntry]] | None:

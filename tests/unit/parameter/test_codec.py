@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from bridge.canopen.datatypes import INTEGERS
 from bridge.image import Value
 from bridge.mapping.model import Parameter
-from bridge.parameter import Address, Entry, ParameterError, Why
+from bridge.parameter import Entry, ObjectRef, ParameterError, Why
 from bridge.parameter.codec import decode, encode_value, matches, parse, shown
 
-WHERE = Address(0x2066, 1)
+WHERE = ObjectRef(0x2066, 1)
 RAW = Entry("2066:01", WHERE)
 NUMBERS = [kind for kind in INTEGERS if kind != "bool"]
 

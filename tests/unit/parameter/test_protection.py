@@ -18,7 +18,7 @@ from bridge.drive import DriveState
 from bridge.mapping import load_family
 from bridge.mapping.aliases import COMMUNICATION, aliases
 from bridge.mapping.loader import family_names
-from bridge.parameter import Address, DriveParameters, Entry, Ledger, Names, ParameterError, backups
+from bridge.parameter import DriveParameters, Entry, Ledger, Names, ObjectRef, ParameterError, backups
 from bridge.parameter.definition import leaf_of
 from bridge.parameter.error import Why
 from bridge.sim.catalogue import simulate_node
@@ -170,7 +170,7 @@ def access_to(mapping: str) -> DriveParameters:
     return DriveParameters("n/d", "n", family, Names(family), Ledger())
 
 
-def refused(access: DriveParameters, text: str, address: Address) -> bool:
+def refused(access: DriveParameters, text: str, address: ObjectRef) -> bool:
     """Whether nothing is sent to a drive. A spelling that means another object, or none, is no case."""
     try:
         entry = access.names.resolve(text)

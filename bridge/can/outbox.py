@@ -15,8 +15,6 @@ _RETRY_S: Final = 0.001
 class Outbox:
     """Times are monotonic seconds. ``retry_at`` is when ``send`` is worth a try; None: nothing waits."""
 
-    __slots__ = ("_waiting", "retry_at")
-
     def __init__(self) -> None:
         self.retry_at: float | None = None
         self._waiting: deque[tuple[Frame, float]] = deque()

@@ -31,8 +31,6 @@ class _Count:
     What was sent within ``LINGER_S`` may come at once, after the bus was busy, also at a rate that is over.
     """
 
-    __slots__ = ("_at", "_before", "_beside", "_past_rate", "_past_until", "_since", "left", "rate")
-
     def __init__(self) -> None:
         self.rate = 0.0
         self.left = float(_SPARE)

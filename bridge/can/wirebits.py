@@ -69,8 +69,6 @@ def _stuff_bits(bits: int, length: int) -> int:
 class WireBits:
     """Adds up the bits of frames. ``stuffing`` is the share measured so far."""
 
-    __slots__ = ("_left", "_measured", "_stuff", "total")
-
     def __init__(self) -> None:
         self.total = 0.0
         self._left = 1

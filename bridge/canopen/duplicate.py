@@ -21,19 +21,6 @@ _FOREIGN_S: Final = 2.0
 class DuplicateCheck:
     """Watches one node id. Each method returns what is wrong, in words, or None."""
 
-    __slots__ = (
-        "_begin",
-        "_changes",
-        "_count",
-        "_extra",
-        "_extra_since",
-        "_foreign_at",
-        "_last_reply",
-        "_last_reply_at",
-        "_state",
-        "period_s",
-    )
-
     def __init__(self) -> None:
         self.period_s: float | None = None
         """The node's heartbeat period as the boot-up left it; None if it sends none."""

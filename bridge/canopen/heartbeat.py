@@ -13,8 +13,6 @@ from bridge.canopen.frame import REMOTE, Frame
 class HeartbeatConsumer:
     """Watches one producer. Supervision begins with its first heartbeat (CiA 301 §7.2.8.3.2.2)."""
 
-    __slots__ = ("_last", "timeout_s")
-
     def __init__(self, timeout_s: float) -> None:
         self.timeout_s = timeout_s
         self._last: float | None = None
@@ -52,8 +50,6 @@ class NodeGuard:
     The node counts as lost after ``life_time_factor`` guard times without a correct answer; its own life
     guarding watches us by the same frames (CiA 301 §7.2.8.3.2.1).
     """
-
-    __slots__ = ("_due", "_frames", "_id", "_last", "_toggle", "guard_time_s", "life_time_s", "toggle_errors")
 
     def __init__(self, node_id: int, guard_time_s: float, life_time_factor: int) -> None:
         self._id = cobid.ERROR_CONTROL + node_id

@@ -50,8 +50,6 @@ class PdoCodec:
     """Packs and unpacks one PDO. Values are the integers of the entries in order, unsigned except for the
     objects in ``signed``, given as (index, sub)."""
 
-    __slots__ = ("_fields", "_masks", "_pack", "entries", "has_signed", "length", "unpack")
-
     def __init__(self, entries: tuple[PdoEntry, ...], signed: Collection[tuple[int, int]] = ()) -> None:
         """Raises MappingError if an entry does not have 1…64 bits or the sum exceeds eight bytes."""
         for entry in entries:

@@ -30,8 +30,6 @@ class SyncWindow:
     Times are those of the frames, SYNC's included: the bus returns the frames of our bursts to us.
     """
 
-    __slots__ = ("_sync_at", "misses", "window_s")
-
     def __init__(self, window_s: float) -> None:
         self.window_s = window_s
         self.misses = 0

@@ -11,8 +11,6 @@ class ParameterSet:
     The bridge knows scaling parameters of set 1 alone: what they scale is not known in another one.
     """
 
-    __slots__ = ("_bits", "mask")
-
     def __init__(self, bits: Sequence[int]) -> None:
         self._bits = tuple(bits)
         self.mask = sum(1 << bit for bit in bits)

@@ -28,8 +28,6 @@ class ValueCodec:
     """One value of one drive. ``places`` says where its words stand, the low one first; ``scale`` is None
     for what has none, and where it is not known."""
 
-    __slots__ = ("_bit", "_high", "_low", "_number", "_states", "model", "places", "scale")
-
     def __init__(self, model: ProcessValue, words: Sequence[str], scale: LinearScale | None = None) -> None:
         self.model = model
         self.places = tuple(words.index(word) for word in model.word_names)

@@ -42,24 +42,6 @@ FAULTED: Final = frozenset((DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE))
 class ControlWords:
     """What a control word of this family means and how one is changed. Words are 16-bit integers."""
 
-    __slots__ = (
-        "_disable_voltage",
-        "_enable_mask",
-        "_enable_value",
-        "_quick_stop",
-        "_stop",
-        "_takes_voltage",
-        "_valid_mask",
-        "_withhold",
-        "acknowledge_mask",
-        "begin",
-        "forward",
-        "ready",
-        "reverse",
-        "run",
-        "stopped",
-    )
-
     def __init__(self, model: ControlWord) -> None:
         self._enable_mask = model.enabling.mask
         self._enable_value = model.enabling.value
@@ -121,8 +103,6 @@ class ControlWords:
 
 class StatusWords:
     """Decodes status words of this family."""
-
-    __slots__ = ("_decoded", "_fault_mask", "_fault_value", "_holding", "_relevant", "_states")
 
     def __init__(self, model: StatusWord) -> None:
         self._states = tuple(

@@ -101,7 +101,8 @@ class Inflow:
         self._empty_at = look.at
         self._open_since = now
         self._is_hidden = is_hidden
-        self._is_open = True
+        self.is_open = True
+        """Whether it is read from, as far as this was told."""
         self._is_crowded = False
         self._calm_since = now
         self._steady_since = look.steady_since
@@ -109,20 +110,15 @@ class Inflow:
         if is_hidden and now - look.steady_since < _AFTER_HANG_S:
             self._crowd(now)
 
-    @property
-    def is_open(self) -> bool:
-        """Whether it is read from, as far as this was told."""
-        return self._is_open
-
     def shut(self, now: float) -> None:
         """Nothing more is read for now, so buffers on the way may fill."""
-        if self._is_open:
-            self._is_open = False
+        if self.is_open:
+            self.is_open = False
             self._crowd(now)
 
     def reopen(self, now: float) -> None:
-        if not self._is_open:
-            self._is_open = True
+        if not self.is_open:
+            self.is_open = True
             self._open_since = now
             self._crowd(now)
 

@@ -107,7 +107,7 @@ class Booting:
             case boot.Pause(seconds):
                 self._goes_on_at = now + seconds
                 return True
-            case boot.AwaitRelease():
+            case boot.Signal.AWAIT_RELEASE:
                 self.is_held = not self._node.may_start()
                 return self.is_held
             case boot.Step():

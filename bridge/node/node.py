@@ -210,11 +210,11 @@ class NodeCore:
                 # Looking for a node that was never there is nothing to report every ten seconds.
                 if self.state is not NodeState.ABSENT:
                     self.say(text, now)
-            case boot.Found():
+            case boot.Signal.FOUND:
                 self.set_state(NodeState.BOOTING, now)
             case boot.DeviceErrors():
                 self._view.errors(action.text, now)
-            case boot.StartSupervision():
+            case boot.Signal.START_SUPERVISION:
                 self.error_control.expect(now)
             case _:
                 if isinstance(action, boot.ResetCommunication):

@@ -95,9 +95,9 @@ class NodeWire:
         match action:
             case boot.Nmt(command):
                 self.send_nmt(command)
-            case boot.SendStopped():
+            case boot.Signal.SEND_STOPPED:
                 self.send_stopped()
-            case boot.Wake():
+            case boot.Signal.WAKE:
                 self.send_stopped()
                 self.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
             case boot.ResetCommunication():

@@ -2,22 +2,18 @@
 
 from bridge.node.boot.actions import Action as Action
 from bridge.node.boot.actions import Await as Await
-from bridge.node.boot.actions import AwaitRelease as AwaitRelease
 from bridge.node.boot.actions import Boot as Boot
 from bridge.node.boot.actions import BootResult as BootResult
 from bridge.node.boot.actions import DeviceErrors as DeviceErrors
 from bridge.node.boot.actions import DrivePlan as DrivePlan
-from bridge.node.boot.actions import Found as Found
 from bridge.node.boot.actions import Nmt as Nmt
 from bridge.node.boot.actions import NodePdoPlan as NodePdoPlan
 from bridge.node.boot.actions import Pause as Pause
 from bridge.node.boot.actions import PdoPlan as PdoPlan
 from bridge.node.boot.actions import Read as Read
 from bridge.node.boot.actions import ResetCommunication as ResetCommunication
-from bridge.node.boot.actions import SendStopped as SendStopped
-from bridge.node.boot.actions import StartSupervision as StartSupervision
+from bridge.node.boot.actions import Signal as Signal
 from bridge.node.boot.actions import Step as Step
-from bridge.node.boot.actions import Wake as Wake
 from bridge.node.boot.actions import Write as Write
 from bridge.node.boot.error_control import heartbeat_period_ms as heartbeat_period_ms
 from bridge.node.boot.layout import factory_entries as factory_entries

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Final
 
 from bridge.canopen.dialogue import Read, Write
@@ -25,20 +26,23 @@ class Step:
     letter: str
 
 
+class Signal(Enum):
+    """Steps that need no more words."""
+
+    FOUND = "the node is there"
+    SEND_STOPPED = "stopped words"
+    """To every drive, by every identifier under which it may listen: the node may still be operational."""
+    WAKE = "enter pre-operational"
+    """For a node that does not answer, after a stopped word for every drive: it may be stopped, and does not
+    answer SDO then."""
+    START_SUPERVISION = "from now on the node is expected to be heard"
+    AWAIT_RELEASE = "wait until the network lets the node start"
+    """Start order and mandatory nodes decide. No time limit."""
+
+
 @dataclass(frozen=True, slots=True)
 class Nmt:
     command: NmtCommand
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """The node is there."""
-
-
-@dataclass(frozen=True, slots=True)
-class SendStopped:
-    """Send a stopped word to every drive, by every identifier under which it may listen: the node may still
-    be operational."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,17 +50,6 @@ class Pause:
     """Go on after this time, in seconds."""
 
     seconds: float
-
-
-@dataclass(frozen=True, slots=True)
-class Wake:
-    """Tell a node that does not answer to go pre-operational, after a stopped word for every drive: it
-    may be stopped, and answers no SDO then."""
-
-
-@dataclass(frozen=True, slots=True)
-class StartSupervision:
-    """From now on the node is expected to be heard."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,26 +83,7 @@ class ResetCommunication:
     why: str
 
 
-@dataclass(frozen=True, slots=True)
-class AwaitRelease:
-    """Wait until the network lets the node start (start order, mandatory nodes). No time limit."""
-
-
-Action = (
-    Step
-    | Read
-    | Write
-    | Nmt
-    | Found
-    | SendStopped
-    | Pause
-    | Wake
-    | DeviceErrors
-    | ResetCommunication
-    | StartSupervision
-    | Await
-    | AwaitRelease
-)
+Action = Step | Signal | Read | Write | Nmt | Pause | DeviceErrors | ResetCommunication | Await
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Identification
 from bridge.command.plant import Node
-from bridge.node.boot.actions import Action, BootResult, Do, Step, Wake, number
+from bridge.node.boot.actions import Action, BootResult, Do, Signal, Step, number
 from bridge.node.boot.status import BootError
 
 _ALL = 0xFFFF_FFFF
@@ -90,7 +90,7 @@ def look_for() -> Generator[Action, bytes | None, int]:
     except SdoError as error:
         if error.by_server:
             raise
-    yield Wake()
+    yield Signal.WAKE
     return number((yield Read(0x1000)))
 
 

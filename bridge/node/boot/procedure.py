@@ -12,15 +12,12 @@ from bridge.config import NodeTable
 from bridge.config.download import Download
 from bridge.node.boot.actions import (
     Await,
-    AwaitRelease,
     Boot,
     BootResult,
     Do,
-    Found,
     Nmt,
     Pause,
-    SendStopped,
-    StartSupervision,
+    Signal,
     Step,
 )
 from bridge.node.boot.configuration import configure
@@ -50,12 +47,12 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
     """
     result = BootResult(memory=memory or BootMemory())
     # Outside Operational it takes no RPDO: so first stop its drives, then do what may fail.
-    yield SendStopped()
+    yield Signal.SEND_STOPPED
     device_type = yield from look_for()
-    yield Found()
+    yield Signal.FOUND
     if result.memory.may_run:
         yield from find_rpdos(node, result)
-        yield SendStopped()
+        yield Signal.SEND_STOPPED
         if result.memory.waits_for_sync:
             needed_ms = [takeover_ms(node.bus, kind) for kind in result.memory.rpdo_types]
             yield Pause(max(_SYNCS * node.bus.sync_period_ms, *needed_ms) / 1000)
@@ -86,11 +83,11 @@ def _start(table: NodeTable, result: BootResult) -> Do:
     not come."""
     not_heard = "F" if table.supervision == "guarding" else "K"
     yield Step(f"waiting for {table.supervision}", not_heard)
-    yield StartSupervision()
+    yield Signal.START_SUPERVISION
     # It says its state when it is asked, or every so often.
     limit_s = max(_GOES_OPERATIONAL_S, 3 * table.supervision_ms / 1000)
     yield Await(None, limit_s)
-    yield AwaitRelease()
+    yield Signal.AWAIT_RELEASE
     yield Step("starting", "J")
     yield Nmt(NmtCommand.START)
     try:

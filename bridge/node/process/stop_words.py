@@ -35,12 +35,8 @@ class StopWords:
         self._node = node
         self._memory = memory
         self._known = {drive.name: list(_known(node, drive, downloads)) for drive in node.drives}
-        self._given_ids = frozenset(_given_ids(node, downloads))
-
-    @property
-    def given_ids(self) -> frozenset[int]:
+        self.given_ids = frozenset(_given_ids(node, downloads))
         """Identifiers of PDOs that the site's files give this node: no other node's stop goes there."""
-        return self._given_ids
 
     def plans(self, drive: Drive) -> dict[int, PdoPlan]:
         """The RPDOs under which this drive may listen, by their COB-IDs."""

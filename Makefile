@@ -47,11 +47,14 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 	@exec $(IN) -m bridge demo $(ARGS)
 
 ##@ Test
-test: unit wire fuzz-short lab ## all tests: unit, wire, a minute of fuzzing, lab
+# Wire and lab tests wait most of their time, which the others use.
+test: compiled packages clients ## all tests: unit, wire, a minute of fuzzing, lab
+	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab" "unit fuzz-short"
 
+# They know no time, and beside the others they get little of it.
 unit: $(VENV)/dev.stamp ## tests of the code alone
 	@echo "== unit tests"
-	@$(PYTEST) -n $(JOBS) tests/unit $(ARGS)
+	@$(PYTEST) -n $(JOBS) -o timeout=600 tests/unit $(ARGS)
 
 wire: compiled packages clients ## tests with real protocol clients on loopback
 	@echo "== wire tests"

@@ -1,0 +1,64 @@
+"""``make test`` runs two lanes of make targets side by side; they end together."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.support.process import REPOSITORY, until
+
+MAKEFILE = """
+quick:
+	@echo quick
+fails:
+	@until [ -s long.pid ]; do sleep 0.05; done; exit 3
+left long:
+	@echo $$$$ >$@.pid; exec sleep 600
+"""
+
+Lanes = Callable[[str, str], subprocess.Popen[str]]
+
+
+@pytest.fixture
+def lanes(tmp_path: Path) -> Lanes:
+    (tmp_path / "Makefile").write_text(MAKEFILE, encoding="ascii")
+    command = [sys.executable, str(REPOSITORY / "tools" / "side_by_side.py"), "make"]
+
+    def begin(first: str, second: str) -> subprocess.Popen[str]:
+        return subprocess.Popen([*command, first, second], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+
+    return begin
+
+
+def is_gone(pid_file: Path) -> bool:
+    return not Path("/proc", pid_file.read_text().strip()).exists()
+
+
+def test_both_pass(lanes: Lanes) -> None:
+    with lanes("quick", "quick") as both:
+        assert both.communicate()[0] == "quick\nquick\n"
+    assert both.returncode == 0
+
+
+@pytest.mark.parametrize("order", [("quick fails", "long"), ("long", "quick fails")])
+def test_one_that_fails_ends_the_other(lanes: Lanes, order: tuple[str, str], tmp_path: Path) -> None:
+    with lanes(*order) as both:
+        assert "quick" in both.communicate()[0]
+    assert both.returncode == 1
+    assert is_gone(tmp_path / "long.pid")
+
+
+@pytest.mark.parametrize(("told", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_whoever_ends_it_ends_both(lanes: Lanes, told: signal.Signals, status: int, tmp_path: Path) -> None:
+    pids = tmp_path / "long.pid", tmp_path / "left.pid"
+    with lanes("long", "left") as both:
+        until(lambda: all(pid.exists() and pid.read_text() for pid in pids), 20.0, "both run")
+        both.send_signal(told)
+        both.communicate()
+    assert both.returncode == status
+    assert all(is_gone(pid) for pid in pids)

@@ -66,6 +66,8 @@ def end(lanes: Sequence[subprocess.Popen[bytes]]) -> None:
 def main() -> int:
     make, first, second = sys.argv[1:]
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    # In the background a shell has it ignored, by all that is started from there.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     with tempfile.NamedTemporaryFile() as told, Path(told.name).open("rb") as kept:
         lanes = [begin(make, first), begin(make, second, told, behind=True)]
         try:

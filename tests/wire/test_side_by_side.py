@@ -5,7 +5,9 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -21,7 +23,7 @@ left long:
 	@echo $$$$ >$@.pid; exec sleep 600
 """
 
-Lanes = Callable[[str, str], subprocess.Popen[str]]
+Lanes = Callable[[str, str], AbstractContextManager[subprocess.Popen[str]]]
 
 
 @pytest.fixture
@@ -29,28 +31,45 @@ def lanes(tmp_path: Path) -> Lanes:
     (tmp_path / "Makefile").write_text(MAKEFILE, encoding="ascii")
     command = [sys.executable, str(REPOSITORY / "tools" / "side_by_side.py"), "make"]
 
-    def begin(first: str, second: str) -> subprocess.Popen[str]:
-        return subprocess.Popen([*command, first, second], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    @contextmanager
+    def running(first: str, second: str) -> Iterator[subprocess.Popen[str]]:
+        # As a shell starts what is to run in the background.
+        ignored = partial(signal.signal, signal.SIGINT, signal.SIG_IGN)
+        with subprocess.Popen(
+            [*command, first, second], cwd=tmp_path, stdout=subprocess.PIPE, text=True, preexec_fn=ignored
+        ) as both:
+            try:
+                yield both
+            finally:
+                both.terminate()
 
-    return begin
+    return running
 
 
 def is_gone(pid_file: Path) -> bool:
-    return not Path("/proc", pid_file.read_text().strip()).exists()
+    try:
+        return ") Z " in Path("/proc", pid_file.read_text().strip(), "stat").read_text()
+    except OSError:  # it is gone
+        return True
+
+
+def wait_gone(*pid_files: Path) -> None:
+    """A process that gives way does so at its end, too."""
+    until(lambda: all(map(is_gone, pid_files)), 20.0, "they are gone")
 
 
 def test_both_pass(lanes: Lanes) -> None:
     with lanes("quick", "quick") as both:
-        assert both.communicate()[0] == "quick\nquick\n"
+        assert both.communicate(timeout=20)[0] == "quick\nquick\n"
     assert both.returncode == 0
 
 
 @pytest.mark.parametrize("order", [("quick fails", "long"), ("long", "quick fails")])
 def test_one_that_fails_ends_the_other(lanes: Lanes, order: tuple[str, str], tmp_path: Path) -> None:
     with lanes(*order) as both:
-        assert "quick" in both.communicate()[0]
+        assert "quick" in both.communicate(timeout=20)[0]
     assert both.returncode == 1
-    assert is_gone(tmp_path / "long.pid")
+    wait_gone(tmp_path / "long.pid")
 
 
 @pytest.mark.parametrize(("told", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
@@ -59,6 +78,6 @@ def test_whoever_ends_it_ends_both(lanes: Lanes, told: signal.Signals, status: i
     with lanes("long", "left") as both:
         until(lambda: all(pid.exists() and pid.read_text() for pid in pids), 20.0, "both run")
         both.send_signal(told)
-        both.communicate()
+        both.communicate(timeout=20)
     assert both.returncode == status
-    assert all(is_gone(pid) for pid in pids)
+    wait_gone(*pids)

@@ -61,9 +61,11 @@ def drive_points(
     control_bits = tuple(family.control_word.bits)
     setpoints, actual_values = family.carried(slot)
     values = family.values_of(slot)
-    as_written, as_sent = "setpoint word as the owner wrote it", "actual value word as the drive sent it"
+    as_written = "the owner's setpoint word, until a stop replaces it"
+    as_sent = "actual value word as the drive sent it"
+    last = "the owner's control word, or the stop or start that has replaced it"
     return [
-        command("control_word", _U16, "control word as the owner wrote it", bits=control_bits, writable=True),
+        command("control_word", _U16, last, bits=control_bits, writable=True),
         *(command(word, _U16, as_written, writable=True) for word in setpoints[1:]),
         *(_value(name, value, scales) for value in values if value.group == "command"),
         *_status_points(name, family),
@@ -131,9 +133,7 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
         ),
         point("pdo_age_ms", _U32, "age of the last TPDO", unit="ms"),
         point("sent_control_word", _U16, "control word that the bridge sends to the drive"),
-        point(
-            "restart_interlock", _FLAG, "true until the owner has sent a control word that does not enable"
-        ),
+        point("restart_interlock", _FLAG, "true while a control word that enables is not forwarded"),
         point("refused_writes", _U32, "refused requests since start"),
         point(
             "worst_case_bridge_ms",
@@ -145,7 +145,7 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
             "follows", _FLAG, "false while the drive still reports enabled after the bound of its last stop"
         ),
         point("last_stop", _U8, "how the last stop ended", states=follow.STATES),
-        point("telegrams", _U16, "number of the owner's last valid telegram, modulo 65536"),
+        point("telegrams", _U16, "counts the owner's valid telegrams, modulo 65536"),
         point("sdo_abort_code", _U32, "why the drive last refused an SDO of a client; 0: never"),
     ]
 

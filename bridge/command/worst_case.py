@@ -16,7 +16,7 @@ from bridge.config import IGNORE_ALL_S, BusTable, DriveTable
 REACTION_BOUND_MS: Final = 20
 """How late the bridge may be itself, or the kernel's timer in its place."""
 _THREAD_QUEUE_MS: Final = 50.0
-"""How long a frame may wait for python-can's thread (``bus/pythoncan.py``)."""
+"""How long a frame may wait for python-can's thread (``bridge/can/pythoncan.py``)."""
 _KERNEL: Final = ("socketcan", "virtual")
 _LAST_SYNCHRONOUS: Final = 240
 _FOREIGN_SYNC_MS: Final = 100

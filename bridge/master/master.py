@@ -132,7 +132,7 @@ class Master:
         return any(line.network.carry_out(request, now, reply) for line in self._lines)
 
     def wake(self) -> None:
-        """One round, while running. Nothing in a round calls this: outcomes are delivered after it.
+        """One round, while running. An outcome may call this: it is told when the work of a round is done.
 
         A fault of our own ends it: no drive is left to a master that does half of its work. Each drive gets a
         last, stopped word if possible; the bursts end within the dead-man time, and ``failed`` says why."""

@@ -53,22 +53,22 @@ class Stage(StrEnum):
 
 
 MEANING: Final[dict[Stage, str]] = {
-    Stage.CLOSED: "the node is not there or not heard, or the drive's position is needed and not known",
-    Stage.INTERLOCKED: "a stop is in force until the owner sends a word that does not enable",
-    Stage.READY: "the owner's word does not enable; one that does goes to the drive",
+    Stage.CLOSED: "node not operational, process data overdue, or a needed position not known",
+    Stage.INTERLOCKED: "a stop is in force until the owner sends a word that does not enable, or a start",
+    Stage.READY: "the owner's word does not enable; the next one that does is forwarded",
     Stage.ENABLED: "the owner's enabling word is on the bus",
-    Stage.SETTLING: "a stop is on its way, and what the drive says may be from before it",
-    Stage.ASKING: "the drive has not reported since its node is operational: a report is waited for",
-    Stage.PREPARED: "it still has not, and gets READY",
-    Stage.BLIND: "nor since, and it gets the enabling word",
-    Stage.BRAKING: "the drive is in its quick stop, which may take a while",
-    Stage.LEAVING: "disable voltage is sent to leave a quick stop that does not end",
-    Stage.LEADING: "each report of the drive is answered with the next word",
-    Stage.RAMPING: "quick stop is sent until the drive is at rest",
-    Stage.TRIPPED: "the reaction is sent",
-    Stage.SILENCED: "nothing is sent",
-    Stage.HELD: "what was sent before goes on being sent",
-    Stage.LET_GO: "what was held has been stopped since",
+    Stage.SETTLING: "a stop was sent a moment ago: what the drive reports may be older than it",
+    Stage.ASKING: "the drive has not reported since its node became operational: the bridge waits for it",
+    Stage.PREPARED: "no report for 1 s: the drive gets READY, the word that makes it ready",
+    Stage.BLIND: "none for another second: it gets the enabling word, and has to report that it is enabled",
+    Stage.BRAKING: "the drive is in its quick stop, and gets 1 s to end it",
+    Stage.LEAVING: "the quick stop has not ended by itself: disable voltage ends it",
+    Stage.LEADING: "each report of the drive is answered with the next word on the way to enabled",
+    Stage.RAMPING: "quick stop is sent until the drive is at rest, for 10 s at most",
+    Stage.TRIPPED: "disable voltage is sent, or with `stop` the family's stop",
+    Stage.SILENCED: "nothing is sent; disable voltage where that would not stop the drive",
+    Stage.HELD: "what was sent before the trip is still sent",
+    Stage.LET_GO: "a stop has replaced what was held",
 }
 WAY: Final = (Stage.CLOSED, Stage.INTERLOCKED, Stage.READY, Stage.ENABLED)
 """Neither tripped nor in a start."""

@@ -23,7 +23,7 @@ class Stimulus(StrEnum):
     ENABLING_WORD = "owner's control word that enables"
     SETPOINTS = "owner's telegram without a control word"
     INVALID = "telegram that is not valid"
-    LATE_STOP = "owner's stop that has waited too long for a telegram"
+    LATE_STOP = "owner's control word that stops, but is too old for a telegram"
     ACKNOWLEDGE = "acknowledge"
     ACKNOWLEDGE_FAULT = "acknowledge of a fault of the drive"
     LEFT = "owner releases, loses its lease or is replaced; the bridge hung"
@@ -50,9 +50,9 @@ class Stimulus(StrEnum):
     SAYS_AT_REST = "drive says: not enabled"
     SAYS_FAULT = "drive says: fault"
     # the way to it
-    WAY_CLOSED = "node gone, drive not heard, position needed and not known"
-    WAY_OPEN = "way to the drive open"
-    NODE_BACK = "node operational anew"
+    WAY_CLOSED = "node gone, process data overdue, or needed position not known"
+    WAY_OPEN = "drive can be reached again"
+    NODE_BACK = "node operational again"
     ANEW = "bus back, or node told to stop"
 
 

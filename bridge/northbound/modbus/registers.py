@@ -269,7 +269,7 @@ def _input_rows(actual: Mapping[int, str]) -> list[Row]:
             "bit 0: actual value word 1 is not good, and so on",
         ),
         row(VALUES_NOT_GOOD, "values_not_good", "uint32", "", _VALUES_NOT_GOOD),
-        row(TELEGRAMS, "supervision/telegrams", "uint16", "", "number of the owner's last valid telegram"),
+        row(TELEGRAMS, "supervision/telegrams", "uint16", "", "counts the owner's valid telegrams"),
     ]
 
 

@@ -15,6 +15,7 @@ from bridge.command.leg.turn import Turn
 from tests.support import leg_space
 from tests.support.leg_profiles import MOST, space
 from tests.support.leg_words import POSITION
+from tools.state_table import PAGE
 
 _TELEGRAMS: Final = {
     "owner writes a stop",
@@ -180,3 +181,7 @@ def test_a_wrong_deed_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(where, name, wrong)
     with pytest.raises(AssertionError, match="\nafter "):
         space(**PROFILES[profile]).explore(MOST)
+
+
+def test_the_page_counts_the_faults() -> None:
+    assert f"with {len(CELLS) + len(DEEDS)} faults," in PAGE.read_text(encoding="utf-8")

@@ -159,6 +159,11 @@ _OUT: Final = {
     "can/softbus.py": "sends it, and repeats it",
 }
 """What each file does to the value. One that is on a way has to stand here."""
+ON_SOCKETCAN: Final = {
+    "can/virtual.py": ("can/socketcan.py", "can/receiver.py"),
+    "can/softbus.py": ("can/socketcan.py", "can/kernelbursts.py", "can/burstend.py", "can/bcm.py"),
+}
+"""What stands in the place of the virtual bus there."""
 
 
 class Bridge:
@@ -291,14 +296,23 @@ def drawing(ways: dict[str, dict[str, str]]) -> str:
     which nothing says what it does."""
     read = {name: list(steps.items()) for name, steps in ways.items() if WAYS[name].word == _READ}
     shared = [step for step in next(iter(read.values())) if all(step in steps for steps in read.values())]
-    parts = [_list(f"A TPDO into the image: {len(shared)} files", shared, _IN)]
+    parts = [_list(f"A TPDO into the image: {_counted(file for file, _ in shared)}", shared, _IN)]
     for name, steps in read.items():
         more = [step for step in steps if step not in shared]
-        parts.append(_list(f"{name}: {len(more)} more, {len(steps)} together", more, _IN))
+        parts.append(
+            _list(f"{name}: {len(more)} more, together {_counted(file for file, _ in steps)}", more, _IN)
+        )
     parts += [
-        _list(f"{name}: {len(ways[name])} files", ways[name].items(), _OUT) for name in ways.keys() - read
+        _list(f"{name}: {_counted(ways[name])}", ways[name].items(), _OUT) for name in ways.keys() - read
     ]
     return "\n\n".join(parts)
+
+
+def _counted(files: Iterable[str]) -> str:
+    """How many files that are, here and on SocketCAN."""
+    found = list(files)
+    real = sum(len(ON_SOCKETCAN.get(file, (file,))) for file in found)
+    return f"{len(found)} files, {real} on SocketCAN"
 
 
 def _list(heading: str, steps: Iterable[tuple[str, str]], does: dict[str, str]) -> str:

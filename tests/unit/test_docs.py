@@ -65,6 +65,15 @@ def test_what_is_not_run_says_why(page: Page) -> None:
             assert reason or page.is_not_run, f"{page}:{block.line}: commands that run are in console blocks"
 
 
+def test_the_layers_are_those_that_are_checked() -> None:
+    rules = configparser.ConfigParser()
+    rules.read(REPOSITORY / ".importlinter", encoding="utf-8")
+    layers = rules["importlinter:contract:layers"]["layers"].split("\n")
+    checked = [set(re.findall(r"\w+", layer)) for layer in layers]
+    shown = page("explanation/architecture.md").column("Layers", "folder or file in bridge/")
+    assert [set(cell.split(", ")) for cell in shown] == [one for one in checked if one - {"__main__"}]
+
+
 # snippets
 
 

@@ -19,5 +19,7 @@ async def test_the_page_draws_the_ways_that_values_take(tmp_path: Path) -> None:
         "zenohlink/worker.py",
         "can/softbus.py",
     ]
+    for files in ways.ON_SOCKETCAN.values():
+        assert all((ways.ROOT / "bridge" / file).is_file() for file in files)
     text = ways.PAGE.read_text(encoding="utf-8")
     assert text == ways.drawn(text, found), "draw it anew: python -m tools.ways"

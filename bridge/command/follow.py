@@ -69,7 +69,7 @@ class LastStop(IntEnum):
         return self.name.lower()
 
 
-STATES: Final = tuple((state.value, state.label) for state in LastStop)
+LAST_STOPS: Final = tuple((state.value, state.label) for state in LastStop)
 
 
 @dataclass(frozen=True, slots=True)

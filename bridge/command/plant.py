@@ -93,9 +93,9 @@ class Plant:
         self.eeprom_writes = Ledger()
         """How often parameters were written; whoever keeps it across restarts fills it first."""
         self._stop_due: float | None = None
-        self.settled = 0
+        self.changes = 0
         """Counts up whenever what a drive is sent may have changed."""
-        self.unsent: set[Drive] = set()
+        self.unsent_stops: set[Drive] = set()
         """Drives with a stop that has not been handed to the bus yet."""
         self._deadlines = Deadlines(self._next_of_drives)
         self._listeners: list[Callable[[Event], None]] = []
@@ -117,7 +117,7 @@ class Plant:
                 points += node_points(table, family.poll)
                 for position, drive_table in enumerate(table.drive):
                     unit_id = units[table.name, position]
-                    settled = partial(self._settled, node)
+                    settled = partial(self._on_settled, node)
                     drive = Drive(
                         table, bus, drive_table, family, names, unit_id, self.report, settled, self._tripped
                     )
@@ -136,7 +136,7 @@ class Plant:
             self.image.set(self._node_points[node.name][2], 0.0, began)
             for drive in node.drives:
                 drive.bind(self.image, began)
-                self._settled(node, drive, began)
+                self._on_settled(node, drive, began)
         self._deadlines.look_every_s = len(self.drives) * _LOOK_PER_DRIVE_S
         self.set("bridge/version", version, began)
         self.set("bridge/drives_configured", len(self.drives), began)
@@ -191,20 +191,20 @@ class Plant:
             return False
         self._deadlines.on_change()
         if request.action in NODE_ACTIONS:
-            reply = self._telling(request, now, reply)
+            reply = self._counting_refusals(request, now, reply)
             is_taken = carry_out(request, now, reply)
             if not is_taken:
                 reply(Outcome(Code.UNKNOWN_TARGET, f"there is no node {request.target!r}"))
             return is_taken
         drive = self.drives.get(request.target)
         if drive is None:
-            reply = self._telling(request, now, reply)
+            reply = self._counting_refusals(request, now, reply)
             reply(Outcome(Code.UNKNOWN_TARGET, f"there is no drive {request.target!r}"))
             return False
         if request.action in PARAMETER_ACTIONS:
             is_taken = carry_out(request, now, reply)
             if not is_taken:
-                reply = self._telling(request, now, reply)
+                reply = self._counting_refusals(request, now, reply)
                 reply(Outcome(Code.NOT_READY, f"{drive.name} is on no bus", forwarded=False))
             return is_taken
         before, until = drive.channel.output, drive.channel.until
@@ -213,13 +213,13 @@ class Plant:
         # The bus may have been told to stop the drive by itself: not any more, its owner is there.
         return is_changed or (until is not None and until < now + drive.burst_s)
 
-    def later(self, reply: Reply) -> Reply:
-        """A reply that waits for ``tell``: what an outcome causes does not happen in the midst of what has
-        brought it about."""
+    def reply_later(self, reply: Reply) -> Reply:
+        """A reply that waits for ``deliver_outcomes``: what an outcome causes does not happen in the midst of
+        what has brought it about."""
         return lambda outcome: self._outcomes.append((reply, outcome))
 
-    def tell(self) -> None:
-        """Tell the outcomes that wait, and those that come of it."""
+    def deliver_outcomes(self) -> None:
+        """Give each waiting outcome to whoever asked, and those that come of it."""
         while self._outcomes:
             reply, outcome = self._outcomes.popleft()
             reply(outcome)
@@ -234,11 +234,11 @@ class Plant:
         """What a protocol has refused by itself, ``count`` times: counted, told and written to the audit log
         as what a drive refuses."""
         self.audit.rejected(rejection, now, count)
-        self._tell_refusal(
+        self._report_refusal(
             rejection.action, rejection.identity, rejection.target, rejection.message, now, count
         )
 
-    def _tell_refusal(
+    def _report_refusal(
         self, what: str, identity: Identity, target: str, why: str, now: float, count: int = 1
     ) -> None:
         is_known = target in self.drives or target in self.nodes or target in self._buses
@@ -247,12 +247,12 @@ class Plant:
         self._refused_by_others += count
         self.report(Event(now, Kind.REFUSED, source, 300, f"{what} by {identity} refused: {why}"))
 
-    def _telling(self, request: Request, now: float, reply: Reply) -> Reply:
+    def _counting_refusals(self, request: Request, now: float, reply: Reply) -> Reply:
         """``reply`` for what no drive refuses by itself: a refusal is an event and counts as a drive's."""
 
         def conclude(outcome: Outcome) -> None:
             if not outcome.ok and request.action is not Action.READ_PARAMETER:
-                self._tell_refusal(request.action, request.identity, request.target, outcome.message, now)
+                self._report_refusal(request.action, request.identity, request.target, outcome.message, now)
             reply(outcome)
 
         return conclude
@@ -284,17 +284,17 @@ class Plant:
         refused = sum(drive.channel.refused_writes for drive in self.drives.values())
         self.set("bridge/refused_writes", refused + self._refused_by_others, now)
 
-    def _settled(self, node: Node, drive: Drive, now: float) -> None:
+    def _on_settled(self, node: Node, drive: Drive, now: float) -> None:
         """Something about a drive has changed: show it, and with it the node's 102.0.
 
         102.0 is there while a controller is silent; it clears by itself and is then the last fault, as
         P170 does.
         """
-        self.settled += 1
+        self.changes += 1
         self._deadlines.on_change()
         drive.refresh(now)
         if drive.following.awaits_sending:
-            self.unsent.add(drive)
+            self.unsent_stops.add(drive)
         silent = any(drive.channel.is_tripped and drive.channel.controller_is_silent for drive in node.drives)
         fault = node.family.faults.bridge_timeout if silent else 0.0
         state, current, last = self._node_points[node.name]
@@ -309,7 +309,7 @@ class Plant:
 
     def on_handed_over(self, drive: Drive, now: float) -> None:
         """What this drive is sent has been handed to the bus."""
-        self.unsent.discard(drive)
+        self.unsent_stops.discard(drive)
         drive.on_handed_over(now)
         self._deadlines.on_change()
 
@@ -362,10 +362,10 @@ class PlantView:
     def submit(self, request: Request, reply: Reply) -> None:
         is_changed = True
         try:
-            later = self._plant.later(reply)
+            later = self._plant.reply_later(reply)
             is_changed = self._plant.submit(request, self._clock(), later, self._carry_out)
             # Of one telegram that is several requests, the bus gets what the last of them has left.
-            self._plant.tell()
+            self._plant.deliver_outcomes()
         finally:
             if is_changed:
                 self._wake()

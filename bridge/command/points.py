@@ -10,7 +10,7 @@ from bridge.command import follow
 from bridge.command.leg.state import STATES as WATCHDOG_STATES
 from bridge.command.link import NodeState
 from bridge.config import BusTable, NodeTable
-from bridge.drive import STATES, LinearScale, ValueCodec
+from bridge.drive import DRIVE_STATES, LinearScale, ValueCodec
 from bridge.image import DataType, Point
 from bridge.mapping.model import Family, Poll, ProcessValue, Slot
 
@@ -82,7 +82,7 @@ def _status_points(name: str, family: Family) -> list[Point]:
     return [
         point("status_word", _U16, "status word; shows fault while the watchdog is tripped", bits=bits),
         point("drive_status_word", _U16, "status word as the drive sent it", bits=bits),
-        point("state", _U8, "drive state", states=STATES),
+        point("state", _U8, "drive state", states=DRIVE_STATES),
         point("fault_text", _TEXT, "present fault"),
         point("emcy_code", _U16, "code of the last emergency message, CiA 301 §7.2.7"),
     ]
@@ -144,7 +144,7 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
         point(
             "follows", _FLAG, "false while the drive still reports enabled after the bound of its last stop"
         ),
-        point("last_stop", _U8, "how the last stop ended", states=follow.STATES),
+        point("last_stop", _U8, "how the last stop ended", states=follow.LAST_STOPS),
         point("telegrams", _U16, "counts the owner's valid telegrams, modulo 65536"),
         point("sdo_abort_code", _U32, "why the drive last refused an SDO of a client; 0: never"),
     ]

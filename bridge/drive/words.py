@@ -31,7 +31,7 @@ class DriveState(IntEnum):
         return self.name.lower()
 
 
-STATES: Final = tuple((state.value, state.label) for state in DriveState)
+DRIVE_STATES: Final = tuple((state.value, state.label) for state in DriveState)
 
 MOVING: Final = frozenset(
     (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)

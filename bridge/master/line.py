@@ -48,7 +48,7 @@ class Repeated:
         looked at.
         """
         network = self._network
-        made_for = self._plant.settled, network.routings, network.nmt_state, network.charge.acts()
+        made_for = self._plant.changes, network.routings, network.nmt_state, network.charge.acts()
         if anew or made_for != self._made_for:
             self._made_for = made_for
             self._repetitions = self._make() if network.charge.acts() else {}
@@ -152,7 +152,7 @@ class Line:
         self.hold_at = min(
             (at for wanted in repetitions.values() for at in wanted.hold_at if at > now), default=inf
         )
-        if self.plant.unsent:
+        if self.plant.unsent_stops:
             network.on_handed_over(self.clock())
 
     @property

@@ -200,7 +200,7 @@ class Master:
         self._alive(now)
         self._arm(now)
         # What this causes is done in a round of its own: the present one is over.
-        self._plant.tell()
+        self._plant.deliver_outcomes()
 
     def _enforce(self, node: str, action: Action, why: str, now: float) -> None:
         for line in self._lines:

@@ -298,7 +298,7 @@ class Network:
 
     def on_handed_over(self, now: float) -> None:
         """What is to be repeated is on the bus: the bounds of stops begin (``command/follow.py``)."""
-        unsent = self._plant.unsent
+        unsent = self._plant.unsent_stops
         for node in self.nodes:
             for drive in node.node.drives:
                 is_sent = node.sends_process_data and drive.name in node.wire.drives

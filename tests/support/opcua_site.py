@@ -84,7 +84,7 @@ class LocalView(PlantView):
                 if self.answers:
                     drive.on_process_data(_answer(drive.channel.output.words), now)
             self.plant.on_time(now)
-            self.plant.tell()
+            self.plant.deliver_outcomes()
             await asyncio.sleep(0.005)
 
 

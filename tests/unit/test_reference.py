@@ -19,7 +19,7 @@ from bridge.command.leg.table import TABLE
 from bridge.command.points import CONTROLLER_STATES, NMT_STATES, NODE_STATES
 from bridge.command.request import Code
 from bridge.config import Reaction, Site
-from bridge.drive import STATES
+from bridge.drive import DRIVE_STATES
 from bridge.image import Point, Quality
 from bridge.mapping.model import Family, MappedObject, ObjectRef
 from bridge.node.boot.status import TEXTS as BOOT_TEXTS
@@ -110,7 +110,7 @@ def test_every_point_is_described(plant: Plant) -> None:
 @pytest.mark.parametrize(
     ("heading", "states"),
     [
-        ("Drive states", STATES),
+        ("Drive states", DRIVE_STATES),
         ("Watchdog states", WATCHDOG_STATES),
         ("NMT states", NMT_STATES),
         ("Node states", NODE_STATES),

@@ -182,7 +182,7 @@ async def test_a_start_that_takes_its_time_holds_up_no_other_request(endpoint: s
         assert time.monotonic() - begin < 3
         assert not start.done()
         drive_says(fu4, ENABLED)
-        plant.tell()
+        plant.deliver_outcomes()
         assert await start == Outcome(Code.OK)
 
 

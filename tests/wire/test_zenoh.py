@@ -71,7 +71,7 @@ async def test_methods() -> None:
         await until(lambda: r.on_the_bus[0] == 0x047F, "the enabling control word")
         assert not started.done()
         drive_says(r.fu3, ENABLED)
-        r.plant.tell()
+        r.plant.deliver_outcomes()
         assert await started == {"ok": True, "forwarded": True}
         assert (await r.peer.command(f"{FU3}/command/keep_alive", {}, controller="plc"))["ok"]
         assert (await r.peer.command(f"{FU3}/command/stop", "{}", controller="somebody"))["ok"]

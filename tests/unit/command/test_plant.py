@@ -410,7 +410,7 @@ class TestRequests:
         hall.pdo(READY)
         hall.pdo(ENABLED)
         assert not seen, "nothing is told in the midst of a round"
-        hall.plant.tell()
+        hall.plant.deliver_outcomes()
         assert seen == [4]
 
 

@@ -265,9 +265,9 @@ class Drive:
         """What the channel puts out has been handed to the bus."""
         self.following.on_handed_over(now, self.rpdo_period_ms, self.own)
 
-    def on_silenced(self, now: float) -> None:
+    def on_cut_off(self, now: float) -> None:
         """The bridge takes its node out of operation, with stopped words before it."""
-        self.following.on_silenced(now, self.rpdo_period_ms, self.own)
+        self.following.on_cut_off(now, self.rpdo_period_ms, self.own)
 
     # into the image
 

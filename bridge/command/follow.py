@@ -18,7 +18,7 @@ What follows an ignored stop may halt a plant, so nothing is called ignored that
   the short bound after the stop: the word that enabled it may still have been on its way.
 - Where the word leaves the voltage on, a drive may hold the motor, and may be enabled for a moment on its
   way there: it gets a bound for that, too.
-- A drive that the bridge itself silences, by an NMT stop of its node, is judged by its last report: if that
+- A drive that the bridge itself cuts off, by an NMT stop of its node, is judged by its last report: if that
   was *enabled* and the drive is not known to stop in that state, it ignores its stop when the bound has
   passed.
 - The ramp of a fault may come at any time, and has its bound from then.
@@ -95,7 +95,7 @@ class Verdict:
     since: float
     at: float
     again: bool = False
-    is_silenced: bool = False
+    is_cut_off: bool = False
     """The bridge had taken the drive's node out of operation, and it has said nothing else since."""
 
 
@@ -111,7 +111,7 @@ class Follow:
         self._sent = Sent.OFF
         self._on_bus = Sent.OFF
         self._is_there = False
-        self._is_silenced = False
+        self._is_cut_off = False
         """The bridge has taken the node out of operation, and the drive was not known to stop before."""
         self._was_enabled = False
         """The stop came after a word that enabled the drive."""
@@ -186,14 +186,14 @@ class Follow:
         if is_there is self._is_there:
             return
         self._is_there = is_there
-        if self._is_silenced and not is_there:
+        if self._is_cut_off and not is_there:
             return
         self._forget()
         self._says = Says.NOTHING
         if is_there and self._sent is not Sent.ENABLES:
             self._begin()
 
-    def on_silenced(self, now: float, bounds: Bounds) -> None:
+    def on_cut_off(self, now: float, bounds: Bounds) -> None:
         """The bridge takes the node out of operation, and its stop is on the bus: most drives will not say
         any more whether they follow. To be told before ``on_node``."""
         if not self._is_there or self._sent is Sent.ENABLES or self._says is Says.NOTHING:
@@ -201,7 +201,7 @@ class Follow:
         if self.state is LastStop.IGNORED or (self._obeys(now) and not self._may_be_enabled):
             return
         self.on_handed_over(now, bounds)
-        self._is_silenced = True
+        self._is_cut_off = True
         if self._says is Says.AT_REST:
             # It said so before it had the word that enabled it, or had taken that over.
             self._says = Says.ENABLED
@@ -216,13 +216,13 @@ class Follow:
     def on_node_stopped(self, now: float) -> None:
         """The node has said that it is in a state in which its drives do not run."""
         is_open = self.state is LastStop.FORWARDED or not self._obeys(now)
-        if self._is_silenced and is_open and self.state is not LastStop.IGNORED:
+        if self._is_cut_off and is_open and self.state is not LastStop.IGNORED:
             self._says = Says.AT_REST
             self._conclude(LastStop.FOLLOWED, now)
 
     def on_restart(self) -> None:
         """The node has started anew."""
-        if self._is_silenced:
+        if self._is_cut_off:
             self._forget()
 
     def _begin(self) -> None:
@@ -235,7 +235,7 @@ class Follow:
         self._since = None
         self._until = self._off_since = inf
         self._rested = self._graced = False
-        self._is_silenced = self._was_enabled = False
+        self._is_cut_off = self._was_enabled = False
         self._look_at = -inf
         self._verdicts.clear()
 
@@ -310,7 +310,7 @@ class Follow:
     def _conclude(self, outcome: LastStop, at: float) -> None:
         since = at if self._since is None else self._since
         again = not self.follows
-        self._verdicts.append(Verdict(outcome, self.state, since, at, again, self._is_silenced))
+        self._verdicts.append(Verdict(outcome, self.state, since, at, again, self._is_cut_off))
         self.state = outcome
         self.follows = outcome is LastStop.FOLLOWED
 
@@ -326,7 +326,7 @@ class Follow:
         if since is not None and self._says is not Says.NOTHING:
             # Of a drive that sends changes alone, what it said before the stop is true to the short bound.
             old = since + self._bounds.off_s if pause_s is None else since
-            at = now if pause_s is None or self._is_silenced else heard_at
+            at = now if pause_s is None or self._is_cut_off else heard_at
             if at is not None and at >= old:
                 self._judge(at)
             is_quiet = now >= self._disobeyed_at + self._bounds.off_s

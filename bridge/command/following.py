@@ -70,9 +70,9 @@ class Following:
         drive, ``own`` what the drive does when we fall silent."""
         self._follow.on_handed_over(now, self._bounds(rpdo_period_ms, own))
 
-    def on_silenced(self, now: float, rpdo_period_ms: int, own: OwnJudgement | None) -> None:
+    def on_cut_off(self, now: float, rpdo_period_ms: int, own: OwnJudgement | None) -> None:
         """The bridge takes the node out of operation: the drive will not be heard any more."""
-        self._follow.on_silenced(now, self._bounds(rpdo_period_ms, own))
+        self._follow.on_cut_off(now, self._bounds(rpdo_period_ms, own))
 
     def on_node_stopped(self, now: float) -> None:
         """The node has said that it is in a state in which its drives do not run."""

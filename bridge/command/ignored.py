@@ -37,8 +37,8 @@ def conclude(
             tell(Event(now, Kind.WATCHDOG, drive.name, 300, message))
         return
     action = _reaction(drive, verdict)
-    if verdict.is_silenced:
-        message = _silenced(node, drive, took_s)
+    if verdict.is_cut_off:
+        message = _cut_off(node, drive, took_s)
         audit.stop_ended(drive.name, verdict.outcome.label, message, now)
         tell(Event(now, Kind.WATCHDOG, drive.name, _WORST, message))
         # What can be done has been done: its node has been told to stop, and takes no more words.
@@ -64,7 +64,7 @@ def _reaction(drive: Drive, verdict: Verdict) -> Action | None:
             return Action.STOP_NODE
 
 
-def _silenced(node: Node, drive: Drive, took_s: float) -> str:
+def _cut_off(node: Node, drive: Drive, took_s: float) -> str:
     """The bridge has stopped the drive's node, and the drive has said nothing else since."""
     why = "an NMT stop does not stop it"
     if node.family.family.stopped_by == "stop_node":

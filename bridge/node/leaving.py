@@ -67,7 +67,7 @@ class Leaving:
         ``only_heard``: the node itself is silent, and so nothing is known of a drive that is."""
         for drive in self._node.drives:
             if not only_heard or drive.channel.link.is_fresh(now):
-                drive.on_silenced(now)
+                drive.on_cut_off(now)
 
     # what happens to the node
 

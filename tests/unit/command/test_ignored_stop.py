@@ -212,41 +212,41 @@ def test_still_enabled_after_the_reaction_is_said_to_be_so() -> None:
     assert [verdict.again for verdict in drive.verdicts] == [False, True]
 
 
-# silenced by the bridge itself
+# cut off by the bridge itself
 
 
-def silenced(drive: Judged, sent: Sent = Sent.OFF) -> Judged:
+def cut_off(drive: Judged, sent: Sent = Sent.OFF) -> Judged:
     """The bridge stops the drive's node in the same turn in which it stops the drive."""
     drive.follow.on_output(sent)
-    drive.follow.on_silenced(drive.now, BOUNDS)
+    drive.follow.on_cut_off(drive.now, BOUNDS)
     drive.follow.on_node(is_there=False)
     return drive
 
 
-def test_who_was_silenced_while_enabled_is_named_at_the_bound() -> None:
-    drive = silenced(judged())
+def test_who_was_cut_off_while_enabled_is_named_at_the_bound() -> None:
+    drive = cut_off(judged())
     assert not drive.follow.is_judged, "nobody need wait for what it says"
     drive.run(0.4, heard=False)
     assert not drive.verdicts
     drive.run(100, heard=False)
     (verdict,) = drive.verdicts
-    assert verdict.outcome is LastStop.IGNORED and verdict.is_silenced
+    assert verdict.outcome is LastStop.IGNORED and verdict.is_cut_off
     assert not drive.follow.follows
     assert drive.follow.next_deadline() is None
 
 
-def test_who_has_followed_before_it_is_silenced_is_not_named() -> None:
+def test_who_has_followed_before_it_is_cut_off_is_not_named() -> None:
     drive = judged()
     drive.send(Sent.OFF)
     drive.run(0.1)
     drive.says(Says.AT_REST)
     drive.run(0.1)
-    silenced(drive, Sent.RAMP).run(100, heard=False)
+    cut_off(drive, Sent.RAMP).run(100, heard=False)
     assert drive.outcomes == [LastStop.FOLLOWED]
 
 
 def test_who_says_so_before_its_node_leaves_is_not_named() -> None:
-    drive = silenced(judged())
+    drive = cut_off(judged())
     drive.run(0.05)
     drive.says(Says.AT_REST)
     drive.run(100, heard=False)
@@ -254,7 +254,7 @@ def test_who_says_so_before_its_node_leaves_is_not_named() -> None:
 
 
 def test_a_node_that_says_that_it_is_stopped_speaks_for_its_drive() -> None:
-    drive = silenced(judged())
+    drive = cut_off(judged())
     for _ in range(3):
         drive.run(0.1, heard=False)
         drive.follow.on_node_stopped(drive.now)
@@ -268,12 +268,12 @@ def test_what_it_was_told_just_before_may_have_enabled_it() -> None:
     drive.says(Says.AT_REST)
     drive.run(1.0)
     drive.send(Sent.ENABLES)
-    silenced(drive).run(1.0, heard=False)
+    cut_off(drive).run(1.0, heard=False)
     assert drive.outcomes == [LastStop.FOLLOWED, LastStop.IGNORED]
 
 
 def test_a_node_that_starts_anew_is_not_named() -> None:
-    drive = silenced(judged())
+    drive = cut_off(judged())
     drive.follow.on_restart()
     drive.run(100, heard=False)
     assert not drive.verdicts

@@ -18,6 +18,7 @@ from bridge.command.leg.outlook import next_deadline, output_then, until, watchd
 from bridge.command.leg.settings import leg_settings
 from bridge.command.leg.state import AWAITS_REPORT, INTERLOCKED, LegState, Output, WatchdogState, Way
 from bridge.command.leg.step import initial, step
+from bridge.command.leg.turn import control_word
 from bridge.command.link import Link, NodeState
 from bridge.command.request import Identity, Outcome, Reply, Request
 from bridge.command.status import DriveStatus
@@ -101,9 +102,8 @@ class DriveChannel:
 
     @property
     def control_word(self) -> int:
-        """The owner's control word, or what was led or stopped with since; the acknowledge bit is always as
-        the owner wrote it, so that whoever changes a bit beside it makes no edge of it."""
-        return self.leg.word | (self.words.acknowledge_mask if self.leg.edges.bit else 0)
+        """As if it were the owner's (``bridge.command.leg.turn``)."""
+        return control_word(self.words, self.leg)
 
     @property
     def setpoints(self) -> tuple[int, ...]:
@@ -211,6 +211,7 @@ class DriveChannel:
         is_taken = handshake is not None and bool(word & handshake.acknowledged)
         is_news = state is not leg.drive or (handshake is not None and word != status.word)
         status.word = word
+        is_news = is_news or not leg.way.is_heard
         if is_news or leg.stage in AWAITS_REPORT or leg.trip.ramps_until is not None:
             status.state = state
             text = self.fault_text if state in FAULTED else ""
@@ -219,8 +220,8 @@ class DriveChannel:
     def on_unchanged(self, now: float) -> None:
         """A TPDO arrived that says what the last one said."""
         self.on_pdo(now)
-        if self.leg.stage in AWAITS_REPORT:
-            self._happen(event.Report(self.leg.drive, self.leg.is_taken), now)
+        if self.leg.stage in AWAITS_REPORT or not self.leg.way.is_heard:
+            self.on_status_word(self._status.word, now)
 
     def on_actual_words(self, words: Sequence[int], now: float) -> None:
         """What TPDOs have brought, the status word first, in the order of ``process.tpdo``."""
@@ -230,10 +231,8 @@ class DriveChannel:
 
     def on_pdo(self, now: float) -> None:
         """A TPDO arrived; what it says comes after this."""
-        is_back = self.link.on_pdo(now)
-        if is_back:
+        if self.link.on_pdo(now):
             self._status.link_fault = 0.0
-        if is_back or not self.leg.way.is_heard:
             self._happen(self._way(now), now)
 
     def on_emcy(self, told: Told, now: float) -> None:
@@ -272,7 +271,9 @@ class DriveChannel:
             why = link.reason(Quality.LOST)
         elif not link.may_enable:
             why = f"the drive's node is {link.node.value}"
-        return Way(link.may_enable, why, self._why_unplaced(now), link.is_heard)
+        # It is heard when it has reported: until then what it said before would count.
+        is_heard = link.is_heard and self.leg.way.is_heard
+        return Way(link.may_enable, why, self._why_unplaced(now), is_heard)
 
     def _why_unplaced(self, now: float) -> str:
         if not self._followed:

@@ -25,7 +25,7 @@ from tests.support.process import running, until
 BRIDGE = """
 import pathlib, subprocess, sys, time
 folder = pathlib.Path(sys.argv[1])
-front = subprocess.Popen(["sleep", "600"])
+front = subprocess.Popen(["cat"], stdin=subprocess.PIPE)  # which ends with its parent
 print("ready", flush=True)
 while True:
     for order in sorted(folder.glob("do-*")):

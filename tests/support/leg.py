@@ -53,7 +53,8 @@ class Leg:
 
     def restarts(self) -> int:
         """The node has restarted: what the owner wants stays, behind the interlock."""
-        return self.happens(NodeBack())
+        self.happens(NodeBack())
+        return self.happens(self.state.way._replace(is_heard=False))
 
     # who commands it
 

@@ -29,7 +29,7 @@ class Oracle(Model):
         assert word & words.valid == words.valid, "the drive takes what is sent"
         enables = words.enabling.fit(word)
         if enables and not self.sends:
-            self.followed = self.says == "enabled"
+            self.followed = self.says == "enabled" and self.is_heard
         self.sends = enables
         if enables:
             self._check_enabling(word)
@@ -103,7 +103,7 @@ class Oracle(Model):
 
     def _check_handshake(self, is_up: bool) -> None:
         now, taken = self.now, self.is_taken
-        commanded = self.sends and self.says == "enabled"
+        commanded = self.sends and self.says == "enabled" and self.is_heard
         if not self.may_enable:
             self._forget()
         if self.down_until is not None and now >= self.down_until:

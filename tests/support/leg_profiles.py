@@ -120,6 +120,7 @@ _HANDSHAKE: Final = {
     "drive says: fault",
     "node lost",
     "node operational",
+    "node operational, not heard",
     "everything is due",
 }
 
@@ -210,7 +211,7 @@ _SETTINGS: Final[dict[str, Profile]] = {
             "owner starts the drive",
             "drive repeats",
             "drive says: braking",
-            "drive is heard, but not its state",
+            "drive says: unknown",
             "node operational, not heard",
         },
         "telegram_downtime_s": -0.1,

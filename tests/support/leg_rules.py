@@ -52,8 +52,7 @@ class Model(Memory):
         is_free = self.owner is None or self.is_silent or self.is_gone
         if rules.control == "lease":
             return is_owner or (take and (is_free or who.role >= 2))
-        never_spoke = self.heard_at is None and not self.is_tripped
-        is_free = is_free or (never_spoke and self.timeout_s > 0 and not rules.ignores)
+        is_free = is_free or (self.heard_at is None and self.timeout_s > 0)
         return who.source.label == rules.control and (is_owner or is_free or (take and who.role >= 2))
 
     def may_stop(self, who: Any) -> bool:
@@ -231,7 +230,7 @@ class Model(Memory):
     @property
     def is_open(self) -> bool:
         """A drive that is enabled needs no position any more."""
-        is_commanded = self.says == "enabled" and self.sends
+        is_commanded = self.says == "enabled" and self.is_heard and self.sends
         return self.is_there and (self.is_placed or is_commanded)
 
     def look_at_way(self) -> None:
@@ -242,12 +241,13 @@ class Model(Memory):
     def hear(self, says: str, *, is_taken: bool) -> None:
         """The drive says something."""
         before, self.says = self.says, says
+        was_enabled = before == "enabled" and self.is_heard
         self.is_taken = is_taken
-        self.is_heard = self.is_heard or says != "unknown"
+        self.is_heard = True
         self.followed |= says in ("enabled", "braking")
         if self.coasts_at is not None and says in RESTING:
             self.coasts_at = min(self.coasts_at, self.now)
-        if says == "fault" or (before == "enabled" and says != "enabled"):
+        if says == "fault" or (was_enabled and says != "enabled"):
             self._forget()
         if not self.is_starting:
             return
@@ -266,7 +266,9 @@ class Model(Memory):
     # the handshake of a position
 
     def order(self, position: object) -> None:
-        self.ordered = position if position != self.handed else None
+        """Tripped, nothing new goes to the drive, and before something does the owner has to stop it."""
+        if not self.is_tripped:
+            self.ordered = position if position != self.handed else None
 
     def _forget(self) -> None:
         self.ordered = self.handed = self.up_until = None

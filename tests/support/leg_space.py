@@ -22,14 +22,24 @@ from bridge.command import (
 )
 from bridge.command.leg import turn
 from bridge.command.leg.effect import Answer, Effect, StartBegun, StartEnded
-from bridge.command.leg.event import BridgeGap, Connection, NodeBack, OwnWatch, Report, StartAnew, Time
+from bridge.command.leg.event import (
+    BridgeGap,
+    Connection,
+    Event,
+    NodeBack,
+    OwnWatch,
+    Report,
+    StartAnew,
+    Time,
+)
 from bridge.command.leg.outlook import next_deadline, output_then, until
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import LegState, Stage, Way
 from bridge.command.leg.step import step
-from bridge.command.leg.table import Cell, Stimulus
+from bridge.command.leg.table import Cell, Deed, Stimulus
 from bridge.command.request import STOP_ACTIONS
 from bridge.drive import DriveState
+from tests.support.leg_deeds import HOLDS, Done
 from tests.support.leg_oracle import Oracle
 from tests.support.leg_requests import requests_of
 from tests.support.leg_seen import Rules, first
@@ -53,15 +63,19 @@ Cells = set[tuple[Stage, Stimulus]]
 
 
 class _RecordedTable(dict[tuple[Stage, Stimulus], Cell]):
-    """``seen`` has the cells that were looked up."""
+    """``seen`` has the cells that were looked up, ``last`` the last one that has a deed."""
 
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
         self.seen: Cells = set()
+        self.last: tuple[Stage, Deed] | None = None
 
     def __getitem__(self, key: tuple[Stage, Stimulus]) -> Cell:
         self.seen.add(key)
-        return super().__getitem__(key)
+        cell = super().__getitem__(key)
+        if cell[1] is not Deed.NOTHING:
+            self.last = key[0], cell[1]
+        return cell
 
 
 @dataclass(slots=True)
@@ -91,6 +105,7 @@ class Space:
         self.settings, self.rules = settings, rules
         self.first = timeless(leg, first(rules))
         self.walked = Walked()
+        self._table = _RecordedTable()
         self.states = [self.first]
         every = self._every(requests_of(rules, ttl_ms))
         unknown = {*names, *after_hang} - every.keys()
@@ -110,7 +125,6 @@ class Space:
             "drive follows": self._follows,
             "drive repeats": self._repeats,
             "drive takes the setpoint": lambda state: self._follows(state, is_taken=True),
-            "drive is heard, but not its state": self._is_heard,
             "drive's own watch is off": lambda state: self._watches(state, watches=False),
             "drive's own watch is on": lambda state: self._watches(state, watches=True),
             "node lost": lambda state: self._way(state, _SHUT),
@@ -129,11 +143,23 @@ class Space:
     def _late(self, happen: Callable[[State], State]) -> Callable[[State], State]:
         return lambda state: happen(come(state, ahead(state)))
 
+    def _step(self, leg: LegState, event: Event) -> tuple[LegState, list[Effect]]:
+        """A step that does what the table says."""
+        table = self._table
+        table.last = None
+        after, effects = step(self.settings, leg, event, NOW)
+        if table.last is not None:
+            stage, deed = table.last
+            enables = self.rules.words.enabling.fit(after.sent.words[0]) and not after.sent.silent
+            done = Done(event, stage, after, effects, enables)
+            assert HOLDS[deed](done), f"{stage}: {deed} is not what was done"
+        return after, effects
+
     # requests, between two rounds of the service: the leg has to see to its timers by itself
 
     def _request(self, state: State, request: Request) -> State:
         leg, seen = state
-        after, effects = step(self.settings, leg, request, NOW)
+        after, effects = self._step(leg, request)
         oracle = Oracle(self.rules, seen, NOW)
         oracle.judge()
         answer = next((effect for effect in effects if isinstance(effect, Answer)), None)
@@ -144,8 +170,8 @@ class Space:
             self.walked.refused += 1
             if after is leg:
                 return state
-            alone, _ = step(self.settings, leg, Time(), NOW)
-            both, _ = step(self.settings, after, Time(), NOW)
+            alone, _ = self._step(leg, Time())
+            both, _ = self._step(after, Time())
             assert both == alone, "a refused telegram changes nothing"
         else:
             assert may, f"{request.action} was taken"
@@ -221,7 +247,7 @@ class Space:
 
     def _time(self, before: LegState, leg: LegState, oracle: Oracle, effects: list[Effect]) -> State:
         oracle.round()
-        after, more = step(self.settings, leg, Time(), NOW)
+        after, more = self._step(leg, Time())
         return self._end(before, after, oracle, [*effects, *more])
 
     # the drive
@@ -245,25 +271,15 @@ class Space:
         oracle = Oracle(self.rules, seen, NOW)
         if not seen.is_there:
             return state
-        heard, effects = step(self.settings, leg, leg.way._replace(is_heard=True), NOW)
-        after, more = step(self.settings, heard, Report(_SAYS[says], is_taken, "a fault"), NOW)
+        after, effects = self._step(leg, Report(_SAYS[says], is_taken, "a fault"))
         oracle.hear(says, is_taken=is_taken)
-        self._check(after, oracle, leg, [*effects, *more])
+        self._check(after, oracle, leg, effects)
         return self._time(after, after, oracle, [])
-
-    def _is_heard(self, state: State) -> State:
-        """A telegram without the status word."""
-        leg, seen = state
-        if leg.way.is_heard or not leg.way.is_open:
-            return state
-        heard, effects = step(self.settings, leg, leg.way._replace(is_heard=True), NOW)
-        oracle = Oracle(self.rules, seen._replace(is_heard=True), NOW)
-        return self._time(leg, heard, oracle, effects)
 
     def _watches(self, state: State, *, watches: bool) -> State:
         leg, seen = state
         oracle = Oracle(self.rules, seen, NOW)
-        after, effects = step(self.settings, leg, OwnWatch(watches), NOW)
+        after, effects = self._step(leg, OwnWatch(watches))
         oracle.watches = watches
         return self._time(leg, after, oracle, effects)
 
@@ -275,7 +291,7 @@ class Space:
         if leg.way == way or (way.is_open and not leg.way.is_open):
             return state
         oracle = Oracle(self.rules, seen, NOW)
-        after, effects = step(self.settings, leg, way, NOW)
+        after, effects = self._step(leg, way)
         oracle.way(is_there=way.is_open, is_placed=not way.why_unplaced, is_heard=way.is_heard)
         return self._time(leg, after, oracle, effects)
 
@@ -284,8 +300,8 @@ class Space:
         if leg.way.is_open and not self.rules.ignores:
             return state
         oracle = Oracle(self.rules, seen, NOW)
-        back, effects = step(self.settings, leg, NodeBack(), NOW)
-        after, more = step(self.settings, back, way, NOW)
+        back, effects = self._step(leg, NodeBack())
+        after, more = self._step(back, way)
         oracle.stop()
         oracle.way(is_there=True, is_heard=way.is_heard)
         return self._time(leg, after, oracle, [*effects, *more])
@@ -293,7 +309,7 @@ class Space:
     def _bus_back(self, state: State) -> State:
         leg, seen = state
         oracle = Oracle(self.rules, seen, NOW)
-        after, effects = step(self.settings, leg, StartAnew(), NOW)
+        after, effects = self._step(leg, StartAnew())
         oracle.stop()
         oracle.followed = True
         return self._time(leg, after, oracle, effects)
@@ -301,7 +317,7 @@ class Space:
     def _gap(self, state: State) -> State:
         leg, seen = state
         oracle = Oracle(self.rules, seen, NOW)
-        after, effects = step(self.settings, leg, BridgeGap(), NOW)
+        after, effects = self._step(leg, BridgeGap())
         oracle.judge()
         if oracle.is_tripped:
             oracle.stop()
@@ -312,7 +328,7 @@ class Space:
     def _connection(self, state: State, *, is_there: bool) -> State:
         leg, seen = state
         oracle = Oracle(self.rules, seen, NOW)
-        after, effects = step(self.settings, leg, Connection(PLC, is_there), NOW)
+        after, effects = self._step(leg, Connection(PLC, is_there))
         oracle.connection(PLC, is_there=is_there)
         return self._end(leg, after, oracle, effects)
 
@@ -345,10 +361,10 @@ class Space:
 
     def explore(self, most: int, table: dict[tuple[Stage, Stimulus], Cell] | None = None) -> Walked:
         """Every state there is; fails with the shortest sequence that breaks a rule."""
-        recorded = _RecordedTable(turn.TABLE if table is None else table)
-        with patch.object(turn, "TABLE", recorded):
+        self._table = _RecordedTable(turn.TABLE if table is None else table)
+        with patch.object(turn, "TABLE", self._table):
             self._explore(most)
-        self.walked.cells = recorded.seen
+        self.walked.cells = self._table.seen
         return self.walked
 
     def _explore(self, most: int) -> None:

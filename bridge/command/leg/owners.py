@@ -68,10 +68,9 @@ def check_authority(turn: Turn, request: Request) -> None:
 
 
 def _owner_is_silent(turn: Turn) -> bool:
-    """Without a lease, an owner that has sent no telegram yet holds nobody up either."""
-    settings, timer = turn.settings, turn.timer
-    is_watched = timer.timeout_ms > 0 and not settings.ignores_errors and not turn.is_tripped
-    is_idle = is_watched and timer.heard_at is None and settings.control != "lease"
+    """Without a lease, an owner that has sent no telegram yet holds nobody up either: no time ends that."""
+    timer = turn.timer
+    is_idle = timer.timeout_ms > 0 and timer.heard_at is None and turn.settings.control != "lease"
     return timer.is_silent or is_idle or _owner_is_gone(turn)
 
 

@@ -153,10 +153,11 @@ def _believe_without_report(turn: Turn, start: Start) -> None:
         else:
             _believe(turn, start, turn.drive)
         return
-    if turn.happens(Stimulus.REPORT_OVERDUE) is Deed.READY:
+    deed = turn.happens(Stimulus.REPORT_OVERDUE)
+    if deed is Deed.READY:
         turn.start = start._replace(believed_at=turn.now + _BELIEVED_S, leaves_at=None)
         turn.lead(turn.settings.words.ready)
-    else:
+    elif deed is Deed.ENABLE:
         turn.start = start._replace(believed_at=None)
         turn.lead(start.word)
 

@@ -32,7 +32,7 @@ from bridge.command.leg.state import (
     Way,
 )
 from bridge.command.leg.table import Deed, Stimulus
-from bridge.command.leg.turn import Turn
+from bridge.command.leg.turn import Turn, control_word
 from bridge.command.request import (
     DONE,
     STOP_ACTIONS,
@@ -47,7 +47,7 @@ from bridge.command.request import (
     Write,
 )
 from bridge.command.telegram import Refusal
-from bridge.drive import FAULTED, DriveState
+from bridge.drive import FAULTED
 from bridge.image import Value
 
 _TAKEN_STALE: Final = STOP_ACTIONS | {Action.WRITE, Action.RELEASE_CONTROL}
@@ -110,6 +110,8 @@ def _report(turn: Turn, report: Report) -> None:
     is_news = report.state is not turn.drive
     turn.is_taken = report.is_taken
     turn.reported(report.state)
+    if not turn.way.is_heard:
+        turn.way = turn.way._replace(is_heard=True)
     start.on_report(turn, report, is_news=is_news)
 
 
@@ -197,7 +199,7 @@ def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome
     is_owner = request.identity.is_same(turn.owner.identity)
     # A new owner inherits no setpoints.
     kept = turn.setpoints if is_owner else turn.rest
-    telegram = turn.settings.decode(values, kept, turn.control_word)
+    telegram = turn.settings.decode(values, kept, control_word(words, turn))
     word = telegram.control_word
     if word is not None and not words.is_valid(word):
         turn.happens(Stimulus.INVALID)
@@ -237,8 +239,8 @@ def _take(turn: Turn, word: int | None, setpoints: tuple[int, ...], values: Mapp
     if handshake is not None:
         if is_stop:
             turn.order = order.dropped(turn.order)
-        stops_it = is_stop and turn.drive is DriveState.OPERATION_ENABLED
-        if handshake.value in values and not stops_it:
+        stops_it = is_stop and turn.is_enabled
+        if handshake.value in values and not stops_it and not turn.is_tripped:
             position = tuple(turn.setpoints[place] for place in handshake.places)
             turn.order = order.ordered(turn.order, position)
     if word is None:

@@ -100,9 +100,14 @@ class Turn:
         return self.settings.words.enables(self.sent.words[0])
 
     @property
+    def is_enabled(self) -> bool:
+        """The drive has said so. What it said before its node restarted does not count."""
+        return self.drive is DriveState.OPERATION_ENABLED and self.way.is_heard
+
+    @property
     def is_commanded(self) -> bool:
         """The drive is enabled, and what it gets does not stop it."""
-        return self.drive is DriveState.OPERATION_ENABLED and self.is_enabling
+        return self.is_enabled and self.is_enabling
 
     @property
     def may_enable(self) -> bool:
@@ -125,12 +130,6 @@ class Turn:
     def word_at_rest(self) -> int:
         """What is sent if it is a stop of some kind: an acknowledge turns no ramp into coasting."""
         return at_rest(self.settings.words, self.sent.words[0])
-
-    @property
-    def control_word(self) -> int:
-        """``word`` with the acknowledge bit as the owner wrote it, so that whoever changes a bit beside it
-        makes no edge of it."""
-        return self.word | (self.settings.words.acknowledge_mask if self.edges.bit else 0)
 
     # what is done
 
@@ -234,7 +233,7 @@ class Turn:
 
     def reported(self, state: DriveState) -> None:
         """The drive says that it is in this state."""
-        was_enabled = self.drive is DriveState.OPERATION_ENABLED
+        was_enabled = self.is_enabled
         self.drive = state
         if state in FAULTED or (was_enabled and state is not DriveState.OPERATION_ENABLED):
             self.order = order.dropped(self.order)
@@ -296,8 +295,7 @@ class Turn:
                 self.tell(Kind.REFUSED, 500, why)
         if self.is_enabling:
             if not was_enabling:
-                is_enabled = self.drive is DriveState.OPERATION_ENABLED
-                self.motion = Motion.SEEN if is_enabled else Motion.EXPECTED
+                self.motion = Motion.SEEN if self.is_enabled else Motion.EXPECTED
             self.is_asked = False
 
 
@@ -309,6 +307,12 @@ class Turn:
 def at_rest(words: ControlWords, word: int) -> int:
     """``word`` if it is a stop of some kind, else a stop made from it."""
     return words.stop(word) if words.enables(word) else word & ~words.acknowledge_mask
+
+
+def control_word(words: ControlWords, state: Turn | LegState) -> int:
+    """The owner's control word, or what was led or stopped with since; the acknowledge bit is always as the
+    owner wrote it, so that whoever changes a bit beside it makes no edge of it."""
+    return state.word | (words.acknowledge_mask if state.edges.bit else 0)
 
 
 def _send(turn: Turn) -> None:

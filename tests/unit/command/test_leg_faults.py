@@ -89,6 +89,14 @@ CELLS: Final[dict[str, tuple[str, Stage, Stimulus, Cell]]] = {
     "a start does not end": ("starts", _S.LEADING, _E.SAYS_ENABLED, (_S.LEADING, _D.NOTHING)),
     "a start outlasts a fault": ("starts", _S.LEADING, _E.SAYS_FAULT, (_S.LEADING, _D.NOTHING)),
     "and its time": ("starts", _S.LEADING, _E.START_OVERDUE, (_S.LEADING, _D.NOTHING)),
+    "another deed than what is done": ("telegrams", _S.ENABLED, _E.STOP, (_S.INTERLOCKED, _D.FORWARD)),
+    "a trip is shown as a wait": ("telegrams", _S.ENABLED, _E.EXPIRED_DISABLE, (_S.TRIPPED, _D.WAIT)),
+    "a start that is done as one that failed": (
+        "starts",
+        _S.LEADING,
+        _E.SAYS_ENABLED,
+        (_S.ENABLED, _D.GIVE_UP),
+    ),
     "a start outlasts a stop word": ("starts", _S.LEADING, _E.STOP_WORD, (_S.LEADING, _D.FORWARD)),
 }
 

@@ -165,3 +165,30 @@ def test_one_that_is_taken_in_time_is_not_told(axis: Axis):
     axis.waits(0.5)
     axis.says(DriveState.OPERATION_ENABLED, is_taken=TAKEN)
     assert not told(axis.waits(5))
+
+
+@pytest.mark.parametrize("with_word", [True, False])
+def test_what_was_said_before_the_node_restarted_raises_no_bit(axis: Axis, with_word: bool):
+    """The drive is not enabled any more, though it has not said so yet."""
+    axis.enable()
+    axis.restarts()
+    axis.write(SHUTDOWN, PLACE if with_word else None)
+    axis.write(RUN, None if with_word else PLACE)
+    assert not axis.orders
+    axis.says(DriveState.READY)
+    axis.says(DriveState.OPERATION_ENABLED)
+    assert axis.orders
+    assert axis.setpoints == (PLACE, 0)
+
+
+def test_what_is_held_after_a_trip_gets_no_new_position_and_nobody_is_told_that_it_was_not_taken() -> None:
+    leg = Leg(settings_of(FAMILY, on_expiry="hold", fieldbus_timeout_ms=1000))
+    leg.says(DriveState.READY)
+    leg.writes(SHUTDOWN)
+    leg.writes(RUN)
+    leg.says(DriveState.OPERATION_ENABLED)
+    leg.trips()
+    leg.writes(RUN, position=PLACE)
+    assert not leg.outcome.forwarded
+    assert not told(leg.waits(2.0))
+    assert not leg.sent & NEW

@@ -192,6 +192,20 @@ class TestStops:
         assert running.enables
 
 
+@pytest.mark.parametrize("given", [{}, {"telegram_downtime_s": -0.1}])
+@pytest.mark.parametrize("has_tripped", [True, False])
+def test_who_takes_control_and_never_sends_holds_nobody_up(given: dict[str, object], has_tripped: bool):
+    rig = Rig(**given)
+    rig.run()
+    if has_tripped:
+        rig.wait(1.0)
+    engineer = Identity(Source.MODBUS, "192.168.1.99", Role.ENGINEER)
+    assert rig.ask(Action.TAKE_CONTROL, engineer).ok
+    rig.wait(60.0)
+    assert rig.ask(Action.RESET_FAULT, OTHER_PLC).ok
+    assert rig.channel.owner == OTHER_PLC
+
+
 class TestAnOwnerThatNobodyWatches:
     """With ``fieldbus_timeout_ms = 0`` nothing says that the owner is silent; a dead one blocks no one for
     ever."""

@@ -47,9 +47,10 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 	@exec $(IN) -m bridge demo $(ARGS)
 
 ##@ Test
-# Wire and lab tests wait most of their time, which the others use.
+# Wire tests wait most of their time, which unit tests use. Fuzzing and the lab judge times: they run alone.
 test: compiled packages clients ## all tests: unit, wire, a minute of fuzzing, lab
-	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab" "unit fuzz-short"
+	@$(IN) -m tools.side_by_side "$(MAKE)" wire unit
+	@$(MAKE) --no-print-directory fuzz-short lab
 
 # They know no time, and beside the others they get little of it.
 unit: $(VENV)/dev.stamp ## tests of the code alone

@@ -98,14 +98,12 @@ class Drive:
         self.table = table
         self.given_parameters = table.parameters
         words = family.process.rpdo[1:]
-        self._commands = [
-            ValueCodec(value, words) for value in family.values_of(self.slot) if value.group == "command"
-        ]
+        values = family.values_of(self.slot)
+        self._commands = [ValueCodec(value, words) for value in values if value.group == "command"]
         self._shown_for: tuple[int, int, Wire, float | None] | None = None
         self._set = ParameterSet(family.control_word.parameter_set_bits)
-        self._setpoints = [
-            (words.index(word), f"command/{word}") for word in family.carried(self.slot)[0][1:]
-        ]
+        carried = family.carried(self.slot)[0][1:]
+        self._setpoints = [(words.index(word), f"command/{word}") for word in carried]
         for parameter, full in table.parameters.items():
             self._learn(parameter, full)
         self._actual = ActualData(self.name, family, self.slot, self.channel, self.following)
@@ -113,14 +111,9 @@ class Drive:
         self.on_process_data = self._actual.on_process_data
         self.on_unchanged_data = self._actual.on_unchanged_data
         self.on_further_data = self._actual.on_further_data
+        scales, is_writable = self.channel.scales, table.fieldbus_timeout_writable
         self.points: list[Point] = [
-            *drive_points(
-                self.name,
-                family,
-                self.slot,
-                self.channel.scales,
-                timeout_writable=table.fieldbus_timeout_writable,
-            ),
+            *drive_points(self.name, family, self.slot, scales, timeout_writable=is_writable),
             *parameter_points(self.name, names),
         ]
 

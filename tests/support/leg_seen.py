@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 from tests.support.leg_words import LegWords
@@ -98,6 +99,10 @@ def first(rules: Rules) -> Seen:
     return Seen(Times(), rules.timeout_s)
 
 
+_times = attrgetter(*Times._fields)
+_others = attrgetter(*Seen._fields[1:])
+
+
 class Memory:
     """What the rules remember, while one step is judged; the attributes are those of ``Seen`` and
     ``Times``."""
@@ -154,48 +159,4 @@ class Memory:
         ) = seen
 
     def end(self) -> Seen:
-        times = Times(
-            self.heard_at,
-            self.deadline,
-            self.lease_until,
-            self.absent_at,
-            self.gone_at,
-            self.mute_at,
-            self.coasts_at,
-            self.start_until,
-            self.news_from,
-            self.news_until,
-            self.up_until,
-            self.down_until,
-        )
-        return Seen(
-            times,
-            self.timeout_s,
-            self.owner,
-            self.lease_s,
-            self.is_silent,
-            self.is_tripped,
-            self.stop_kind,
-            self.watches,
-            self.is_held,
-            self.missing,
-            self.is_starting,
-            self.is_plain,
-            self.is_late,
-            self.has_begun,
-            self.bit,
-            self.pressed_by,
-            self.is_there,
-            self.is_placed,
-            self.is_heard,
-            self.may_enable,
-            self.sends,
-            self.says,
-            self.followed,
-            self.ordered,
-            self.handed,
-            self.is_up,
-            self.was_up,
-            self.is_taken,
-            self.was_commanded,
-        )
+        return Seen(Times._make(_times(self)), *_others(self))

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from bridge.command.request import Request
+from bridge.command.request import STOP_ACTIONS, Action, Request
 
 GRAIN_MS: Final = 25
 """A shorter wait cannot be told from none. A telegram can be this much older than assumed: it is the way
@@ -56,6 +56,8 @@ def way_ms(control: str) -> int:
 
 NEVER: Final = float("-inf")
 """The time of a telegram that may have waited for any time."""
+TAKEN_LATE: Final = STOP_ACTIONS | {Action.WRITE, Action.RELEASE_CONTROL}
+"""Nothing is too old to stop a drive; whether a write does so is seen when it has been decoded."""
 
 
 _AFTER_HANG_S: Final = 1.0

@@ -10,8 +10,7 @@ from functools import partial
 from typing import Final, TypeVar
 
 from bridge.command import Code, Event, Outcome, PlantView
-from bridge.command.freshness import NEVER
-from bridge.command.request import STOP_ACTIONS
+from bridge.command.freshness import NEVER, TAKEN_LATE
 from bridge.errors import Unavailable
 from bridge.mirror import protocol
 from bridge.mirror.endpoint import close_to_others, prepare_folder
@@ -172,11 +171,12 @@ class MirrorPublisher:
             return
         now = self._clock()
         # While this process hung, the request waited and its client was told that it failed. Nothing
-        # may start moving after that; stopping is right at any time.
-        if now > deadline_s and request.action not in STOP_ACTIONS:
+        # may start moving after that; stopping is right at any time, also by a word that does not enable.
+        is_late = now > deadline_s
+        if is_late and request.action not in TAKEN_LATE:
             reply(Outcome(Code.TIMED_OUT, "the request came too late to be carried out", forwarded=False))
             return
-        if request.received_at is None or request.received_at > now:
-            # No time, or one of another machine's clock: nobody knows how old it is.
+        if is_late or request.received_at is None or request.received_at > now:
+            # Too late, no time, or one of another machine's clock: nobody knows how old it is.
             request = replace(request, received_at=NEVER)
         self._view.submit(request, reply)

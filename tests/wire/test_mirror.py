@@ -19,6 +19,7 @@ import pytest
 from bridge.command import (
     Action,
     Code,
+    Command,
     Do,
     Event,
     Identity,
@@ -197,6 +198,32 @@ async def test_a_request_that_waited_too_long_moves_nothing_but_may_stop(endpoin
         outcome = await late.request(Request(SCADA, "conveyor/fu4", TakeControl(ttl_ms=5000)))
         assert outcome.code is Code.TIMED_OUT and fu4.channel.owner is None
         assert (await late.request(Request(SCADA, "conveyor/fu4", Do(Action.STOP)))).ok
+        await late.close()
+
+
+async def test_an_owner_stops_its_drive_however_late_it_comes(endpoint: str) -> None:
+    """Its control word that does not enable, and its release; one that enables comes too late."""
+    plant = make_plant()
+    node_is(plant, NodeState.OPERATIONAL)
+    fu4 = plant.drives["conveyor/fu4"]
+    drive_says(fu4, READY)
+
+    def asks(command: Command) -> Request:
+        return Request(SCADA, "conveyor/fu4", command)
+
+    stop, run = Write({"control_word": 0x047E}), Write({"control_word": 0x047F})
+    async with publishing(endpoint, plant), front(endpoint) as client:
+        late = MirrorClient(endpoint, clock=lambda: time.monotonic() - 60)
+        await late.open()
+        for command in (TakeControl(ttl_ms=5000), stop, run):
+            assert (await client.request(asks(command))).forwarded
+        assert fu4.channel.output.words[0] == 0x047F
+        assert (await late.request(asks(stop))).ok
+        assert fu4.channel.output.words[0] == 0x047E
+        assert not (await late.request(asks(run))).ok
+        assert fu4.channel.output.words[0] == 0x047E
+        assert (await late.request(asks(Do(Action.RELEASE_CONTROL)))).ok
+        assert fu4.channel.owner is None
         await late.close()
 
 

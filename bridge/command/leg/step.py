@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from bridge.command.event import Kind
-from bridge.command.freshness import arrival_of, is_stale, limit_ms_of
+from bridge.command.freshness import TAKEN_LATE, arrival_of, is_stale, limit_ms_of
 from bridge.command.leg import order, owners, start
 from bridge.command.leg.effect import Answer, Effect
 from bridge.command.leg.event import (
@@ -35,7 +35,6 @@ from bridge.command.leg.table import Deed, Stimulus
 from bridge.command.leg.turn import Turn, control_word
 from bridge.command.request import (
     DONE,
-    STOP_ACTIONS,
     Action,
     Code,
     Do,
@@ -50,8 +49,6 @@ from bridge.command.telegram import Refusal
 from bridge.drive import FAULTED
 from bridge.image import Value
 
-_TAKEN_STALE: Final = STOP_ACTIONS | {Action.WRITE, Action.RELEASE_CONTROL}
-"""Nothing is too old to stop a drive; whether a write does so is seen when it has been decoded."""
 _OVERWRITTEN: Final = Outcome(Code.CANCELLED, "a control word was written meanwhile")
 
 
@@ -146,7 +143,7 @@ def _handle(turn: Turn, request: Request) -> None:
     turn.judge()
     try:
         owners.check_authority(turn, request)
-        if request.action not in _TAKEN_STALE and _is_stale(turn, request):
+        if request.action not in TAKEN_LATE and _is_stale(turn, request):
             raise _stale(turn, request)
         if isinstance(request.command, Start):
             _start(turn, request, request.command.direction)

@@ -116,12 +116,10 @@ class AuditLog:
                 self._tell(file, fault, now)
 
     def _tell(self, file: AuditFile, fault: str, now: float) -> None:
+        severity, message = 300, f"the audit log is written again; {file.all_lost} lines are missing"
         if fault:
-            message = f"the audit log is not written: {file.path}: {fault}"
-            self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", 600, message))
-        else:
-            message = f"the audit log is written again; {file.all_lost} lines are missing"
-            self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", 300, message))
+            severity, message = 600, f"the audit log is not written: {file.path}: {fault}"
+        self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", severity, message))
 
     def _on_entry(self, entry: AuditEntry) -> None:
         file = self.refused if entry.is_refused else self.file

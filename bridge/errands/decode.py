@@ -191,11 +191,8 @@ class Decoder:
             return Meaning(
                 Kind.HEARTBEAT, node_id, f"boot-up {name}", "has started", (("nmt_state", "boot_up"),)
             )
-        text = (
-            state.label.replace("_", " ")
-            if state is not NmtState.UNKNOWN
-            else f"unknown state {data[0]:02X}h"
-        )
+        is_known = state is not NmtState.UNKNOWN
+        text = state.label.replace("_", " ") if is_known else f"unknown state {data[0]:02X}h"
         toggle = ", toggle bit 1" if data[0] & 0x80 else ""
         return Meaning(
             Kind.HEARTBEAT, node_id, f"heartbeat {name}", text + toggle, (("nmt_state", state.label),)

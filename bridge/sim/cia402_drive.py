@@ -92,10 +92,18 @@ class Cia402Drive(SimulatedDevice):
         self.axis.obey()
 
     def master_lost(self) -> None:
-        self._abort_connection()
+        """1016h or life guarding: the node goes to Pre-Operational (CiA 301), the drive follows 6007h (CiA
+        402)."""
+        if not self.axis.abort_connection(_MASTER_LOST):
+            self._emcy.report(_MASTER_LOST, _register(_MASTER_LOST))
+        if self.slave.state is NmtState.OPERATIONAL:
+            command = bytes([NmtCommand.ENTER_PRE_OPERATIONAL, self.node_id])
+            self.slave.on_frame(Frame(0, command), self._now)
 
     def master_back(self) -> None:
-        self._master_is_back()
+        """If it was no fault, there is nothing to reset: the error is gone."""
+        if self.axis.state not in (State.FAULT, State.FAULT_REACTION):
+            self._emcy.report(0, 0)
 
     # How it works inside.
 
@@ -106,7 +114,7 @@ class Cia402Drive(SimulatedDevice):
     def _pass_time(self) -> None:
         self.axis.advance(self._now)
         if self._consumer.expired(self._now):
-            self._abort_connection()
+            self.master_lost()
 
     def _receive(self, frame: Frame) -> None:
         is_heartbeat = self._consumer.node and frame.can_id == _HEARTBEAT + self._consumer.node
@@ -114,7 +122,7 @@ class Cia402Drive(SimulatedDevice):
             self.slave.on_frame(frame, self._now)
             self.axis.obey()  # a control word that came by SDO
         elif self._consumer.on_heartbeat(frame.data, self._now):
-            self._master_is_back()
+            self.master_back()
 
     def _deadlines(self) -> tuple[float | None, ...]:
         return self.axis.next_deadline(), self._consumer.next_deadline()
@@ -132,20 +140,6 @@ class Cia402Drive(SimulatedDevice):
     def _report(self, code: int) -> None:
         """EMCY for a fault of the drive, or for its reset."""
         self._emcy.report(code, _register(code) if code else 0)
-
-    def _abort_connection(self) -> None:
-        """1016h or life guarding: the node goes to Pre-Operational (CiA 301), the drive follows 6007h (CiA
-        402)."""
-        if not self.axis.abort_connection(_MASTER_LOST):
-            self._emcy.report(_MASTER_LOST, _register(_MASTER_LOST))
-        if self.slave.state is NmtState.OPERATIONAL:
-            command = bytes([NmtCommand.ENTER_PRE_OPERATIONAL, self.node_id])
-            self.slave.on_frame(Frame(0, command), self._now)
-
-    def _master_is_back(self) -> None:
-        """If it was no fault, there is nothing to reset: the error is gone."""
-        if self.axis.state not in (State.FAULT, State.FAULT_REACTION):
-            self._emcy.report(0, 0)
 
 
 def _register(code: int) -> int:

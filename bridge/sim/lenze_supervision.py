@@ -46,16 +46,12 @@ class ErrorReporter:
         self._device.clear()
         self._emcy.error_register = 0
 
-    def begin(self, code: int) -> None:
-        """A communication error or the supply; ``code`` is its EMCY code."""
-        if code not in self._communication:
-            self._communication.add(code)
-            self._emcy.report(code, self._register())
-
-    def end(self, code: int) -> None:
-        if code in self._communication:
-            self._communication.discard(code)
-            self._emcy.report(0, self._register())
+    def communication_error(self, code: int, *, is_there: bool) -> None:
+        """A communication error or the supply has come or gone; ``code`` is its EMCY code."""
+        if is_there is (code in self._communication):
+            return
+        self._communication ^= {code}
+        self._emcy.report(code if is_there else 0, self._register())
 
     def device_errors(self, numbers: Sequence[int]) -> bool:
         """The drive's present errors: F000h with the Lenze number in bytes 4…7. True if anything is new."""

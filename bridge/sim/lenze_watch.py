@@ -79,8 +79,7 @@ class BusWatch:
         """Of an RPDO, in bytes (§10.4)."""
         reaction = self._codes().bus_reactions[0]
         self._watch(Watched.FAULTY_TELEGRAM, length < expected, reaction, PDO_TOO_SHORT)
-        change = self._reporter.begin if length > expected else self._reporter.end
-        change(PDO_TOO_LONG)
+        self._reporter.communication_error(PDO_TOO_LONG, is_there=length > expected)
 
     def bus_error(self, state: int) -> None:
         """C00345 has changed."""
@@ -89,8 +88,7 @@ class BusWatch:
         self._watch(Watched.BUS_OFF, state == BUS_OFF, reactions[1])
 
     def supply(self, *, there: bool) -> None:
-        change = self._reporter.end if there else self._reporter.begin
-        change(SUPPLY_FAILED)
+        self._reporter.communication_error(SUPPLY_FAILED, is_there=not there)
 
     def expire(self, now: float) -> bool:
         """Apply the time-outs up to ``now``. True if the heartbeat is late: the node leaves Operational."""
@@ -107,8 +105,7 @@ class BusWatch:
         """Report identifiers received and sent (§10.4), and the drive's own errors."""
         received = {pdo.cob_id for pdo in stack.rpdo if pdo.enabled}
         sent = {pdo.cob_id for pdo in stack.tpdo if pdo.enabled}
-        change = self._reporter.begin if received & sent else self._reporter.end
-        change(COB_ID_COLLISION)
+        self._reporter.communication_error(COB_ID_COLLISION, is_there=bool(received & sent))
         self._reporter.device_errors(self._drive.errors)
 
     def next_deadline(self) -> float | None:
@@ -122,8 +119,7 @@ class BusWatch:
         """Something supervised has come or gone: ``reaction`` of C00592, and EMCY ``code``."""
         if present:
             self._drive.error(number, Reaction(reaction))
-            if code:
-                self._reporter.begin(code)
         else:
             self._drive.cause_gone(number)
-            self._reporter.end(code)
+        if code:
+            self._reporter.communication_error(code, is_there=present)

@@ -6,10 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from bridge.errors import OperationFailed
-from bridge.sim.cia402_catalogue import MAPPINGS, cia402
 from bridge.sim.device import SimulatedDevice
-from bridge.sim.lenze_catalogue import lenze_8400_motec
 from bridge.sim.nord_catalogue import NORD
+from bridge.sim.object_catalogue import MAPPINGS, cia402, lenze_8400_motec
 from bridge.sim.stoeber_catalogue import stoeber_5000, stoeber_5000_four_axes
 
 Factory = Callable[[int, Mapping[str, float]], SimulatedDevice]

@@ -81,20 +81,20 @@ class AuditLog:
         self.refused = AuditFile(refused, settings.max_bytes, settings.keep)
         self._files = (self.file, self.refused)
         self._faults = ["" for _ in self._files]
-        self._is_enabled = settings.enabled
-        plant.audit.every_telegram = settings.every_telegram
+        self._settings = settings
         plant.set("bridge/audit_lost", 0, plant.began)
 
     def start(self) -> None:
-        if self._is_enabled:
+        if self._settings.enabled:
             for file in self._files:
                 file.start()
-            self._plant.audit.tell = self._on_entry
+            every = self._settings.every_telegram
+            self._plant.audit.tell_to(self._on_entry, every_telegram=every)
 
     def close(self) -> None:
-        if self._is_enabled:
+        if self._settings.enabled:
             self._plant.audit.sum_up(self._clock())
-            self._plant.audit.tell = None
+            self._plant.audit.tell_to(None)
             for file in self._files:
                 file.close()
 

@@ -113,8 +113,7 @@ class ActualData:
 
     def compile(self, scales: Mapping[str, LinearScale], unserved: Mapping[str, str]) -> None:
         """Take over what the boot-up has found."""
-        for codec in self._codecs:
-            codec.scale = scales.get(codec.model.leaf)
+        self._codecs = [codec.scaled(scales.get(codec.model.leaf)) for codec in self._codecs]
         plain = [codec for codec in self._codecs if codec.is_plain]
         self._others = [codec for codec in self._codecs if not codec.is_plain]
         self._plain = [

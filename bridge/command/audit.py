@@ -139,14 +139,11 @@ class _Share:
 
 
 class AuditTrail:
-    """Follows requests. ``tell`` gets the entries; without it nothing is followed.
-
-    With ``every_telegram`` nothing is left out.
-    """
+    """Follows requests as soon as somebody wants to be told."""
 
     def __init__(self, image: Image) -> None:
-        self.tell: Callable[[AuditEntry], None] | None = None
-        self.every_telegram = False
+        self._listener: Callable[[AuditEntry], None] | None = None
+        self._every_telegram = False
         self._image = image
         self._telegrams: dict[str, _Telegrams] = {}
         self._shares: dict[tuple[str, ...], _Share] = {}
@@ -154,9 +151,14 @@ class AuditTrail:
         """What each client was refused."""
         self._summary_at = float("-inf")
 
+    def tell_to(self, listener: Callable[[AuditEntry], None] | None, *, every_telegram: bool = False) -> None:
+        """``listener`` gets the entries from now on; None: nothing is followed. With ``every_telegram``
+        nothing is left out."""
+        self._listener, self._every_telegram = listener, every_telegram
+
     def follow(self, request: Request, now: float, reply: Reply) -> Reply:
         """To be used in place of ``reply``: it notes the outcome first."""
-        if self.tell is None or request.action.startswith(_READS):
+        if self._listener is None or request.action.startswith(_READS):
             return reply
         old = self._held(request)
 
@@ -170,14 +172,14 @@ class AuditTrail:
 
     def rejected(self, rejection: Rejection, now: float, count: int = 1) -> None:
         """``count`` of this kind, the last of them ``now``."""
-        if self.tell is not None:
+        if self._listener is not None:
             who, ending = rejection.identity, Ending(rejection.code, rejection.message)
             new = rejection.values
             self._note(AuditEntry(now, who, rejection.target, rejection.action, ending, new=new, count=count))
 
     def stop_ended(self, target: str, outcome: str, message: str, now: float) -> None:
         """A stop that was forwarded has been followed or ignored."""
-        if self.tell is not None:
+        if self._listener is not None:
             ending = Ending(Code.OK if outcome == "followed" else outcome, message, forwarded=True)
             self._note_other(AuditEntry(now, _BRIDGE, target, "stop_ended", ending))
 
@@ -202,7 +204,7 @@ class AuditTrail:
     # what is told, and what is counted
 
     def _note(self, entry: AuditEntry) -> None:
-        if self.every_telegram:
+        if self._every_telegram:
             self._tell(entry)
         elif entry.ending.code == Code.OK and entry.action in (Action.WRITE, Action.KEEP_ALIVE):
             self._note_telegram(entry)
@@ -297,8 +299,8 @@ class AuditTrail:
             del self._limits[client]  # a minute has filled it
 
     def _tell(self, entry: AuditEntry) -> None:
-        if self.tell is not None:
-            self.tell(entry)
+        if self._listener is not None:
+            self._listener(entry)
 
 
 def client_of(identity: Identity) -> str:

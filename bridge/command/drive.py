@@ -90,7 +90,6 @@ class Drive:
         where that is not true any more."""
         self.bus = bus
         self.rpdo_type = _ASYNCHRONOUS
-        """Transmission type of the RPDO with the control word; read by the boot-up."""
         self.wire = Wire()
         self.sync_period_ms = bus.sync_period_ms
         self.burst_s = bus.deadman_ms / 1000 + bus.rpdo_period_s
@@ -98,20 +97,22 @@ class Drive:
         self.table = table
         self.given_parameters = table.parameters
         words = family.process.rpdo[1:]
-        values = family.values_of(self.slot)
-        self._commands = [ValueCodec(value, words) for value in values if value.group == "command"]
         self._shown_for: tuple[int, int, Wire, float | None] | None = None
         self._set = ParameterSet(family.control_word.parameter_set_bits)
         carried = family.carried(self.slot)[0][1:]
         self._setpoints = [(words.index(word), f"command/{word}") for word in carried]
         for parameter, full in table.parameters.items():
             self._learn(parameter, full)
+        values, scales = family.values_of(self.slot), self.channel.scales
+        self._commands = [
+            ValueCodec(value, words, scales.get(value.leaf)) for value in values if value.group == "command"
+        ]
         self._actual = ActualData(self.name, family, self.slot, self.channel, self.following)
         # What its node brings, which is not looked at here.
         self.on_process_data = self._actual.on_process_data
         self.on_unchanged_data = self._actual.on_unchanged_data
         self.on_further_data = self._actual.on_further_data
-        scales, is_writable = self.channel.scales, table.fieldbus_timeout_writable
+        is_writable = table.fieldbus_timeout_writable
         self.points: list[Point] = [
             *drive_points(self.name, family, self.slot, scales, timeout_writable=is_writable),
             *parameter_points(self.name, names),
@@ -169,10 +170,21 @@ class Drive:
 
     # fed by its node
 
-    def on_pdos(self, unserved: Mapping[str, str], further: Sequence[FurtherTpdo], now: float) -> None:
+    def on_pdos(
+        self,
+        unserved: Mapping[str, str],
+        further: Sequence[FurtherTpdo],
+        now: float,
+        *,
+        deadline_s: float | None,
+        rpdo_type: int,
+    ) -> None:
         """What the boot-up has found: ``unserved`` has the reason for each word that the node does not
         carry, by its leaf such as ``actual/value_2``; ``further`` are the TPDOs beside the one with the
-        status word."""
+        status word, which is late after ``deadline_s``. ``rpdo_type`` is the transmission type of the RPDO
+        with the control word."""
+        self.channel.link.pdo_deadline_s = deadline_s
+        self.rpdo_type = rpdo_type
         found = dict(unserved)
         for value in self.family.values_of(self.slot):
             why = [
@@ -202,7 +214,9 @@ class Drive:
                 self.channel.scales[value.leaf] = scale
 
     def _compile(self) -> None:
-        self._actual.compile(self.channel.scales, self.channel.unserved)
+        scales = self.channel.scales
+        self._commands = [codec.scaled(scales.get(codec.model.leaf)) for codec in self._commands]
+        self._actual.compile(scales, self.channel.unserved)
 
     def on_own_supervision(self, own: OwnJudgement, now: float) -> None:
         """What the drive does by itself when the bridge falls silent, as the boot-up has read it."""
@@ -289,7 +303,6 @@ class Drive:
             quality = Quality.CONFIG_ERROR if why else Quality.GOOD
             image.set(index, setpoints[place], now, quality, why)
         for index, codec in zip(self._value_indices, self._commands, strict=True):
-            codec.scale = channel.scales.get(codec.model.leaf)
             why = unserved.get(codec.model.leaf) or codec.why_unknown
             if not why and self.family.depends_on_set(codec.model):
                 why = self._set.why_unknown(channel.control_word, codec.model.full)

@@ -110,23 +110,25 @@ class TelegramDecoder:
         if place is None and codec is None:
             known = ", ".join(["control_word", *self._setpoints, *self._values])
             raise Refusal(Code.UNKNOWN_POINT, f"{self._name}/command has no {leaf!r}; it has {known}")
-        why = self._unserved.get(f"command/{leaf}")
+        point = f"command/{leaf}"
+        why = self._unserved.get(point)
         if why:
             raise Refusal(Code.NOT_CONFIGURED, f"{leaf}: {why}")
         if place is not None:
             return (Written(place, _WORD_MASK, _as_word(leaf, value)),)
-        return self._from_value(self._values[leaf], value)
+        codec = self._values[leaf] = self._values[leaf].scaled(self._scales.get(point))
+        return _from_value(codec, value)
 
-    def _from_value(self, codec: ValueCodec, value: Value) -> tuple[Written, ...]:
-        model = codec.model
-        codec.scale = self._scales.get(model.leaf)
-        if codec.is_unknown:
-            raise Refusal(Code.NOT_CONFIGURED, f"{model.name}: {model.full} is not known; see boot_status")
-        is_bit = model.bit is not None and isinstance(value, bool)
-        try:
-            return codec.to_words(int(value) if is_bit else _as_number(model.name, value))
-        except ValueError as error:
-            raise Refusal(Code.OUT_OF_RANGE, f"{model.name} {error} {model.unit}".rstrip()) from None
+
+def _from_value(codec: ValueCodec, value: Value) -> tuple[Written, ...]:
+    model = codec.model
+    if codec.is_unknown:
+        raise Refusal(Code.NOT_CONFIGURED, f"{model.name}: {model.full} is not known; see boot_status")
+    is_bit = model.bit is not None and isinstance(value, bool)
+    try:
+        return codec.to_words(int(value) if is_bit else _as_number(model.name, value))
+    except ValueError as error:
+        raise Refusal(Code.OUT_OF_RANGE, f"{model.name} {error} {model.unit}".rstrip()) from None
 
 
 def _as_number(leaf: str, value: object) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Final
 
@@ -38,6 +39,14 @@ class ValueCodec:
         low, high = model.raw_range
         self._low = low if model.low is None else max(low, model.low)
         self._high = high if model.high is None else min(high, model.high)
+
+    def scaled(self, scale: LinearScale | None) -> ValueCodec:
+        """The codec with this scale: another one where it is another scale."""
+        if scale is self.scale:
+            return self
+        other = copy(self)
+        other.scale = scale
+        return other
 
     @property
     def is_unknown(self) -> bool:

@@ -219,7 +219,7 @@ class Network:
         each = self._takes_over(self.nodes)
         for other in self.nodes:
             # The lost one included, if it still hears us.
-            other.told_to_stop = True
+            other.was_told(NmtCommand.STOP)
             if other is not node:
                 other.hold(why, now)
                 self._schedule.touch(other)
@@ -272,8 +272,7 @@ class Network:
         self.routings += 1
         self._routes = self._watch.routes()
         for node in self.nodes:
-            node.wire.routes_changed = False
-            self._routes.update(node.wire.routes)
+            self._routes.update(node.wire.take_routes())
         self.ours = self._intruders.watched(self._routes)
         self._routes |= self._intruders.routes(self._routes)
         if self._window:

@@ -100,7 +100,7 @@ class Booting:
                 ask(action, self._sdo[action.channel], now, self._answers.append, Priority.BOOT)
                 return True
             case boot.Await(state, timeout_s):
-                if not self._node.begin_await(state):
+                if not self._node.error_control.begin_await(state):
                     return False  # without supervision it never says its state
                 self._awaited = _Awaited(state, now + timeout_s)
                 return True

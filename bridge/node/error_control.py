@@ -45,11 +45,6 @@ class ErrorControl:
             self._supervisor = NodeGuard(table.id, table.supervision_ms / 1000, table.life_time_factor)
 
     @property
-    def supervises(self) -> bool:
-        """False for "none": such a node never says its state."""
-        return self._supervisor is not None
-
-    @property
     def loss(self) -> str:
         """How a loss is called: error status E or F of CiA 302-2."""
         if self._table.supervision != "guarding":
@@ -81,6 +76,23 @@ class ErrorControl:
             return Sign.SAME
         self.state = state
         return Sign.CHANGED
+
+    def begin_await(self, state: NmtState | None) -> bool:
+        """The node is to report this state, or any; False where it never says its state."""
+        if self._supervisor is None:
+            self.state = state or self.state
+            return False
+        # What was reported before the command does not count.
+        self.state = NmtState.UNKNOWN
+        return True
+
+    def assume(self, state: NmtState) -> None:
+        """The node is taken to be in this state until it says another one."""
+        self.state = state
+
+    def forget_boots(self) -> None:
+        """Whatever it is told now may make it start again."""
+        self.boot_loop = BootLoop()
 
     def on_foreign_request(self, frame: Frame) -> None:
         """Another SDO client asks this node: its answers are not for us."""

@@ -77,13 +77,13 @@ def carry_out(
         _nmt(node, NMT[action], who, now, send=send, at_once=at_once)
     elif action is Action.DISABLE:
         node.leave_operation(now)
-        node.boot_at = None
+        node.boot_next(None)
         node.say("switched off by an operator", now)
         node.set_state(NodeState.DISABLED, now)
     elif action is Action.ENABLE and node.state is NodeState.DISABLED:
         node.say("waiting", now)
         node.set_state(NodeState.ABSENT, now)
-        node.boot_at = now
+        node.boot_next(now)
 
 
 def _nmt(node: NodeCore, command: NmtCommand, who: str, now: float, *, send: bool, at_once: bool) -> None:
@@ -94,7 +94,7 @@ def _nmt(node: NodeCore, command: NmtCommand, who: str, now: float, *, send: boo
             return
         node.leave_operation(now)
         node.set_state(NodeState.BOOTING, now)
-        node.boot_at = now
+        node.boot_next(now)
         return
     if command is not NmtCommand.START:
         node.stop_drives(now)
@@ -108,12 +108,12 @@ def _nmt(node: NodeCore, command: NmtCommand, who: str, now: float, *, send: boo
     if command is NmtCommand.START or node.state is NodeState.DISABLED:
         return
     node.leave_operation(now)
-    node.told_to_stop = command is NmtCommand.STOP
+    node.was_told(command)
     if command in (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION):
         node.set_state(NodeState.LOST, now)
-        node.boot_at = now + _AFTER_RESET_S
+        node.boot_next(now + _AFTER_RESET_S)
     else:
-        node.boot_at = None
+        node.boot_next(None)
         verb = "stopped" if command is NmtCommand.STOP else "set to pre-operational"
         node.say(f"{verb} by {who}", now)
         node.set_state(NodeState.STOPPED, now)

@@ -15,7 +15,6 @@ from bridge.node import boot
 from bridge.node import nmt_commands as node_commands
 from bridge.node.backoff import BETWEEN_BOOTS_S, BackOff
 from bridge.node.booting import Booting
-from bridge.node.bootloop import BootLoop
 from bridge.node.error_control import Sign
 from bridge.node.leaving import Leaving
 from bridge.node.neighbours import Neighbours
@@ -60,7 +59,7 @@ class NodeCore:
         self.boot_at: float | None = 0.0
         self.has_concluded = False
         """Whether a boot-up has ended, well or not, since the bus is there."""
-        self.told_to_stop = False
+        self._told_to_stop = False
         """A stopped node answers no SDO: it has to be woken before it is asked."""
         self._reset_at = float("-inf")
         """When a boot-up has last reset the node, or its communication."""
@@ -92,7 +91,7 @@ class NodeCore:
 
     def _on_boot_up(self, now: float) -> None:
         """The node has started: whatever it was told before is forgotten."""
-        self.told_to_stop = False
+        self._told_to_stop = False
         self._memory.may_run = False
         self.leaving.on_restart()
         if now > self._reset_at + _OWN_RESET_S:
@@ -125,7 +124,7 @@ class NodeCore:
             and now > self._operational_since + _SETTLE_S
         ):
             self._lose(f"lost: the node went {seen.words} by itself", now)
-            self.error_control.state = seen
+            self.error_control.assume(seen)
             self._show(now)
             if self.boot_at is not None:
                 self.boot_at = self._soon(now)
@@ -151,6 +150,14 @@ class NodeCore:
         self._touch()
         return self.wire.sdo
 
+    def boot_next(self, at: float | None) -> None:
+        """Then, or at once when it is past; None: not until somebody asks for it."""
+        self.boot_at = at
+
+    def was_told(self, command: NmtCommand) -> None:
+        """This NMT command was the last one it got."""
+        self._told_to_stop = command is NmtCommand.STOP
+
     # time
 
     def on_time(self, now: float) -> None:
@@ -165,7 +172,7 @@ class NodeCore:
             self.boot_at = None
             self._last_boot = now
             self.leaving.forget()
-            if self.told_to_stop or self.error_control.state is NmtState.STOPPED:
+            if self._told_to_stop or self.error_control.state is NmtState.STOPPED:
                 self.wire.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
             self.booting.begin(now)
         self.wire.polling.on_time(now)
@@ -222,14 +229,6 @@ class NodeCore:
                     self._view.resets(action.why, now)
                 self.wire.carry_out(action)
 
-    def begin_await(self, state: NmtState | None) -> bool:
-        if not self.error_control.supervises:
-            self.error_control.state = state or self.error_control.state
-            return False
-        # What was reported before the command does not count.
-        self.error_control.state = NmtState.UNKNOWN
-        return True
-
     def boot_ended(self, result: boot.BootResult | boot.BootError, now: float) -> None:
         self.has_concluded = True
         if isinstance(result, boot.BootError):
@@ -240,12 +239,12 @@ class NodeCore:
         self._enter_operation("; ".join([", ".join(problems) or "ok", *result.notes]), now)
 
     def _enter_operation(self, text: str, now: float) -> None:
-        self.told_to_stop = False
+        self._told_to_stop = False
         self._operational_since = now
         self._back_off.entered_operation(now)
         # The guard may have run out between the start command and the node's answer.
         self.error_control.expect(now)
-        self.error_control.state = NmtState.OPERATIONAL
+        self.error_control.assume(NmtState.OPERATIONAL)
         self.boot_at = None
         self.set_state(NodeState.OPERATIONAL, now)
         self.wire.start_polling(now)
@@ -268,7 +267,7 @@ class NodeCore:
         it seems to be absent: it may hear all the same, and our heartbeat would keep it running."""
         self.stop_drives(now)
         self.wire.send_stopped()
-        self.told_to_stop = True
+        self._told_to_stop = True
         if self._memory.may_run and not self.leaving.is_stopped_by_nmt:
             self._reset_at = now
             self.wire.send_nmt(NmtCommand.RESET_NODE)
@@ -283,7 +282,7 @@ class NodeCore:
 
     def _lose(self, why: str, now: float) -> None:
         """The node is silent, or not in the state it was put in."""
-        self.error_control.state = NmtState.UNKNOWN
+        self.error_control.assume(NmtState.UNKNOWN)
         if not self.is_operational and not self.booting.is_held:
             self.error_control.stop(now, lost=self.state is NodeState.LOST)
             self._show(now)
@@ -302,7 +301,7 @@ class NodeCore:
         self.leave_operation(now)
         if reaction == "stop_node":
             self.leaving.send(NmtCommand.STOP, now)
-            self.told_to_stop = True
+            self._told_to_stop = True
         elif reaction != "nothing":
             self.boot_at = now + pause_s
         if stops_all:
@@ -338,7 +337,7 @@ class NodeCore:
 
     def bus_is_gone(self, now: float, why: str = "the bus is down") -> None:
         """The bus is down, or another's: everything on it is lost at once."""
-        self.error_control.state = NmtState.UNKNOWN
+        self.error_control.assume(NmtState.UNKNOWN)
         self.stop_drives(now)
         self.leaving.on_bus_gone(stays_stopped=self.state is NodeState.STOPPED)
         self.wire.clear()
@@ -396,7 +395,7 @@ class NodeCore:
         self, action: Action, who: str, now: float, *, send: bool = True, at_once: bool = False
     ) -> None:
         """A command that may be given; ``send`` is false where one frame has told all nodes."""
-        self.error_control.boot_loop = BootLoop()
+        self.error_control.forget_boots()
         self._back_off.reset()
         if action in (Action.RESET, Action.RESET_COMMUNICATION):
             self._memory.start_anew()

@@ -74,6 +74,11 @@ class NodeWire:
             routes[self._emcy_id] = self._on_emcy
         return routes
 
+    def take_routes(self) -> dict[int, Handler]:
+        """Who gets which identifier; no news any more until it changes."""
+        self.routes_changed = False
+        return self.routes
+
     def take_frames(self) -> list[Frame]:
         frames = self._frames + self.sdo.take_frames() + self.error_control.take_frames()
         frames += self.polling.take_frames()

@@ -43,17 +43,25 @@ class ZenohLink:
     their order, except that of several ``put`` on one key only the newest may be sent.
 
     Queries are answered in two further lanes: one for keys with ``is_prompt``, whose replies never wait
-    (``prompt`` of the session's settings), and one for all others. ``is_prompt`` is given if strangers
-    connect.
+    (``prompt`` of the session's settings), and one for all others. ``on_strangers`` gets the addresses of
+    connections that did not become a session. Both are given if strangers connect.
     """
 
     def __init__(
-        self, config: zenoh.Config, name: str, is_prompt: Callable[[str], bool] | None = None
+        self,
+        config: zenoh.Config,
+        name: str,
+        is_prompt: Callable[[str], bool] | None = None,
+        on_strangers: Callable[[list[str]], None] | None = None,
     ) -> None:
         self.name = name
         self._is_prompt = is_prompt or (lambda _: True)
         self._worker = Worker(
-            config, name, self._on_opened, self._on_closed, is_for_strangers=is_prompt is not None
+            config,
+            name,
+            self._on_opened,
+            self._on_closed,
+            on_strangers and (lambda places: self._inbox.take_in(partial(on_strangers, places))),
         )
         self._latest: dict[str, Message] = {}
         self._batch_is_out = False
@@ -270,10 +278,6 @@ class ZenohLink:
             self._worker.declared.append(session.info.declare_transport_events_listener(callback))
 
         self.submit(declare)
-
-    def follow_strangers(self, handler: Callable[[list[str]], None]) -> None:
-        """Call ``handler`` with the addresses of connections that did not become a session."""
-        self._worker.on_strangers = lambda places: self._inbox.take_in(partial(handler, places))
 
     def declare_token(self, key: str) -> None:
         """Hold a liveliness token until ``drop_token``."""

@@ -55,8 +55,9 @@ class Worker:
     ``opened`` (None, or the error) and ``closed`` are called on the worker's thread. The thread is a daemon:
     if zenoh never returns, the process can still end.
 
-    ``is_for_strangers``: peers may hang, and must not delay the others (``sockets.py``). Between our own
-    processes, the supervisor ends a front that hangs.
+    ``on_strangers``, given if strangers connect, is called on the worker's thread with the connections that
+    did not become a session. Strangers may hang, and must not delay the others (``sockets.py``). Between our
+    own processes, the supervisor ends a front that hangs.
     """
 
     def __init__(
@@ -65,8 +66,7 @@ class Worker:
         name: str,
         opened: Callable[[Exception | None], None],
         closed: Callable[[], None],
-        *,
-        is_for_strangers: bool = False,
+        on_strangers: Callable[[list[str]], object] | None = None,
     ) -> None:
         self.name = name
         self.errors = 0
@@ -74,10 +74,8 @@ class Worker:
         self.declared: list[Declared] = []
         """Undeclared before the session is closed; only jobs touch it."""
         self.tokens: dict[str, zenoh.LivelinessToken] = {}
-        self.on_strangers: Callable[[list[str]], object] = lambda _: None
-        """Called, on the worker's thread, with the connections that did not become a session."""
         self._config = config
-        self._is_for_strangers = is_for_strangers
+        self._on_strangers = on_strangers
         self._connections = Connections()
         self._strangers = Strangers()
         self._look_at = time.monotonic()
@@ -147,7 +145,7 @@ class Worker:
             self._opened(error)
             return
         self._opened(None)
-        if self._is_for_strangers:
+        if self._on_strangers:
             self._try(lambda: self._watch_links(session))
         try:
             while not self.is_stopping:
@@ -157,9 +155,9 @@ class Worker:
 
     def _do_next(self, session: zenoh.Session) -> None:
         with suppress(Empty):
-            job = self._jobs.get(timeout=_LOOK_S if self._is_for_strangers else None)
+            job = self._jobs.get(timeout=_LOOK_S if self._on_strangers else None)
             self._try(lambda: job(session))
-        if self._is_for_strangers and time.monotonic() >= self._look_at:
+        if self._on_strangers and time.monotonic() >= self._look_at:
             self._try(self._settle_sockets)
 
     def _watch_links(self, session: zenoh.Session) -> None:
@@ -179,8 +177,8 @@ class Worker:
         self._look_at = now + _LOOK_S
         self._strangers.on_connections(self._connections.settle(), now)
         strangers = self._strangers.take(now)
-        if strangers:
-            self.on_strangers(strangers)
+        if strangers and self._on_strangers:
+            self._on_strangers(strangers)
 
     def _close(self, session: zenoh.Session) -> None:
         with self._lanes_lock:

@@ -271,7 +271,7 @@ def test_what_is_refused_pushes_nothing_out_that_was_done(tmp_path: Path) -> Non
 def test_a_flood_of_refusals_leaves_room_for_what_is_done(tmp_path: Path) -> None:
     """Lines wait for the disk in a queue of their own: it may be full of refusals."""
     plant, log, _ = logged(tmp_path, "[audit]\nevery_telegram = true\n")
-    plant.audit.tell = log._on_entry
+    plant.audit.tell_to(log._on_entry, every_telegram=True)
     for number in range(11_000):
         request = Request(Identity(Source.MODBUS, "10.0.0.66"), f"attic/fu{number}", Do(Action.STOP))
         plant.submit(request, 100.0, lambda outcome: None)

@@ -476,7 +476,7 @@ class Lacking:
         self.plant = plant
         self.drive = plant.drives["conveyor/fu1"]
         self.further = FurtherTpdo("TPDO2", frozenset((3,)), 0.5)
-        self.drive.on_pdos({}, [self.further], time.monotonic())
+        self.drive.on_pdos({}, [self.further], time.monotonic(), deadline_s=None, rpdo_type=255)
         drive_says(plant, ENABLED, 0x2000, 0x1000, 7)
 
     def comes(self) -> None:

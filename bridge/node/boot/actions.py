@@ -106,6 +106,10 @@ class DrivePlan:
     problem: str = ""
     unserved: dict[str, str] = field(default_factory=dict[str, str])
 
+    def leave_out(self, why: str) -> None:
+        """It cannot be served; the first reason counts."""
+        self.problem = self.problem or why
+
 
 @dataclass(slots=True)
 class BootResult:

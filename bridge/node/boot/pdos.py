@@ -92,7 +92,7 @@ def plan_drive(node: Node, drive: Drive, result: BootResult) -> Generator[Action
             yield from _plan(node, drive, direction, found, plan, result)
         _require_followed(drive, plan)
     except MappingError as error:
-        plan.problem = str(error)
+        plan.leave_out(str(error))
         result.notes.append(f"{slot.name}: {error}")
     return plan
 
@@ -201,7 +201,7 @@ def refuse_doubles(result: BootResult) -> None:
             users.setdefault(pdo.cob_id, []).append(plan)
     for cob_id, plans in users.items():
         for plan in plans if len(plans) > 1 else ():
-            plan.problem = plan.problem or f"{cob_id:03X}h is the identifier of more than one PDO"
+            plan.leave_out(f"{cob_id:03X}h is the identifier of more than one PDO")
             if plan.problem not in result.notes:
                 result.notes.append(plan.problem)
 

@@ -260,21 +260,20 @@ def connect(
         if not plan.rpdos or not plan.tpdos or plan.problem:
             continue
         if any(is_taken(pdo.cob_id) for pdo in (*plan.rpdos, *plan.tpdos)):
-            plan.problem = "another node has its PDO on the same identifier"
+            plan.leave_out("another node has its PDO on the same identifier")
             result.notes.append(f"{drive.slot.name}: {plan.problem}")
             continue
         pdos = connected[drive.name] = DrivePdos(drive, plan.rpdos, plan.tpdos, reject)
-        _set_times(drive, plan.rpdos[0], plan.tpdos[0])
-        drive.on_pdos(plan.unserved, pdos.further, now)
+        drive.on_pdos(
+            plan.unserved,
+            pdos.further,
+            now,
+            deadline_s=_deadline_s(drive, plan.tpdos[0]),
+            rpdo_type=plan.rpdos[0].transmission_type,
+        )
         missing = _without_effect(node.bus, plan.rpdos, plan.tpdos)
         result.notes += [f"{drive.slot.name}: {why}" for why in missing]
     return connected
-
-
-def _set_times(drive: Drive, rpdo: PdoPlan, tpdo: PdoPlan) -> None:
-    """When the drive's TPDO is late, and what takes its RPDO over: those with status and control word."""
-    drive.channel.link.pdo_deadline_s = _deadline_s(drive, tpdo)
-    drive.rpdo_type = rpdo.transmission_type
 
 
 def _without_effect(bus: BusTable, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan]) -> list[str]:

@@ -76,7 +76,7 @@ class ZenohServer:
 
     def _new_link(self) -> ZenohLink:
         config = _config(self._settings, self._keys, self._users)
-        return ZenohLink(config, "zenoh", self._keys.is_prompt)
+        return ZenohLink(config, "zenoh", self._keys.is_prompt, self._on_strangers)
 
     async def start(self) -> None:
         """Open the session, also again after ``failed``. Raises Unavailable where zenoh cannot listen."""
@@ -100,7 +100,6 @@ class ZenohServer:
                 self._link.declare_subscriber(space.own_commands, self._on_put, share, from_others=True)
         self._link.declare_token(space.bridge_token)
         self._link.follow_endings(lambda: self._view.count("zenoh_broken_connections"))
-        self._link.follow_strangers(self._on_strangers)
         self._view.on_event(self._on_event)
         self._tick()
 

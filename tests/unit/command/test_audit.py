@@ -45,8 +45,7 @@ class Hall:
         self.entries: list[AuditEntry] = []
         self.events: list[Event] = []
         self.plant.on_event(self.events.append)
-        self.plant.audit.tell = self.entries.append
-        self.plant.audit.every_telegram = every_telegram
+        self.plant.audit.tell_to(self.entries.append, every_telegram=every_telegram)
         self.now = 100.0
         self.plant.on_node(self.plant.nodes["conveyor"], NodeState.OPERATIONAL, self.now)
         self.plant.audit.on_time(self.now)
@@ -179,7 +178,7 @@ def test_what_a_protocol_refuses_by_itself_is_told_as_an_event_and_counts(hall: 
 
 
 def test_without_a_listener_nothing_is_followed(hall: Hall) -> None:
-    hall.plant.audit.tell = None
+    hall.plant.audit.tell_to(None)
     hall.write(control_word=SHUT_DOWN)
     assert not hall.entries
 

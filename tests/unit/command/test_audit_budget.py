@@ -33,7 +33,7 @@ class Hall:
     def __init__(self) -> None:
         self.plant = sites.plant_of(SITE)
         self.entries: list[AuditEntry] = []
-        self.plant.audit.tell = self.entries.append
+        self.plant.audit.tell_to(self.entries.append)
         self.now = 100.0
         self.plant.on_node(self.plant.nodes["conveyor"], NodeState.OPERATIONAL, self.now)
         self.plant.audit.on_time(self.now)

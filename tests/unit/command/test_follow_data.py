@@ -31,7 +31,7 @@ class Axis:
 
     def boot(self) -> None:
         self.tpdo2 = FurtherTpdo("TPDO2", frozenset((1, 2)), 0.1)
-        self.drive.on_pdos({}, [self.tpdo2], self.now)
+        self.drive.on_pdos({}, [self.tpdo2], self.now, deadline_s=None, rpdo_type=255)
         node = self.plant.nodes["axis"]
         self.plant.on_node(node, NodeState.BOOTING, self.now)
         self.plant.on_node(node, NodeState.OPERATIONAL, self.now)

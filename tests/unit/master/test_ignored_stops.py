@@ -97,7 +97,7 @@ def test_a_deaf_drive_is_named_and_its_node_stopped(bench: DeafBench) -> None:
 @pytest.mark.parametrize(("deaf", "code"), [(False, "ok"), (True, "ignored")])
 def test_the_audit_log_has_the_end_of_a_stop(bench: DeafBench, deaf: bool, code: str) -> None:
     entries: list[AuditEntry] = []
-    bench.plant.audit.tell = entries.append
+    bench.plant.audit.tell_to(entries.append)
     if deaf:
         bench.node_is_deaf_to = frozenset({RPDO1})
     bench.ask(Action.DISABLE_VOLTAGE)

@@ -85,9 +85,8 @@ class Model:
             for n, deadline_s in enumerate(deadlines, 1)
         ]
         self.came: dict[int, float] = {}
-        self.drive.channel.link.pdo_deadline_s = DEADLINE_S
         self.plant.on_node(self.plant.nodes["conveyor"], NodeState.OPERATIONAL, self.now)
-        self.drive.on_pdos({}, self.further, self.now)
+        self.drive.on_pdos({}, self.further, self.now, deadline_s=DEADLINE_S, rpdo_type=255)
 
     @property
     def now(self) -> float:

@@ -370,7 +370,8 @@ def test_a_word_that_another_drive_of_the_family_has_is_no_address(rig: Rig):
 
 
 def test_a_word_that_the_node_does_not_carry_is_not_configured(rig: Rig):
-    rig.fu1.on_pdos({"command/setpoint_4": "RPDO5 is off"}, [], rig.now)
+    unserved = {"command/setpoint_4": "RPDO5 is off"}
+    rig.fu1.on_pdos(unserved, [], rig.now, deadline_s=None, rpdo_type=255)
     assert rig.write(4, 3) == NOT_CONFIGURED
     assert rig.read(3, 4, 1) == [-NOT_CONFIGURED]
     assert rig.write(0, 0x047E, 0, 0, 0, 3) == NOT_CONFIGURED

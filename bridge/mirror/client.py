@@ -41,8 +41,8 @@ class PointsChanged(OperationFailed):
 class MirrorClient:
     """The plant as a front sees it; satisfies ``bridge.northbound.view.View``.
 
-    Times in the image and in events are seconds since 1970 UTC; ``clock`` is the machine's monotonic
-    clock.
+    Times in the image and in events are seconds since 1970 UTC; ``clock`` is the machine's monotonic clock,
+    which is that of the bus process, too.
     """
 
     def __init__(self, endpoint: str, clock: Callable[[], float] = time.monotonic) -> None:
@@ -85,7 +85,8 @@ class MirrorClient:
         self._listeners.append(listener)
 
     def forget(self, listener: Callable[[Event], None]) -> None:
-        self._listeners.remove(listener)
+        if listener in self._listeners:
+            self._listeners.remove(listener)
 
     def submit(self, request: Request, reply: Reply) -> None:
         asking = asyncio.get_running_loop().create_task(self.request(request))
@@ -254,7 +255,7 @@ class MirrorClient:
         event = self._read(partial(protocol.decode, Event), message)
         if event is None:
             return
-        for listener in self._listeners:
+        for listener in tuple(self._listeners):
             with self._guard:
                 listener(event)
 

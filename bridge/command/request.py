@@ -223,9 +223,10 @@ class Request:
     """One command and who gives it.
 
     ``target`` is ``<node>/<drive>``, ``<node>`` or, for NMT, ``bus/<bus>``. ``received_at`` is when it can
-    have come at the earliest, in monotonic seconds of the bus process's machine; None for one that was made
-    in this process just now. ``pressed`` is what the telegram says of an acknowledge register, None where its
-    protocol has none or another request of the same telegram says it.
+    have come at the earliest, in monotonic seconds of the clock of whoever has it (the view between a server
+    and its plant sees to that); None for one that was made in this process just now. ``pressed`` is what the
+    telegram says of an acknowledge register, None where its protocol has none or another request of the same
+    telegram says it.
     """
 
     identity: Identity

@@ -1,7 +1,7 @@
 """What goes over the link between the bus process and its fronts, in MessagePack. Pure.
 
 Times are seconds since 1970 UTC, except those of a request and of ``Rejected``, which are of the monotonic
-clock: both ends run on one machine, and a stepped wall clock must not make a request old.
+clock that both ends have: they run on one machine. A stepped wall clock must not make a request old.
 """
 
 from __future__ import annotations

@@ -27,7 +27,10 @@ _Told = TypeVar("_Told")
 class MirrorPublisher:
     """Shows the plant to the fronts and takes their requests.
 
-    ``clock`` is the machine's monotonic clock in seconds: a front's requests carry deadlines in it.
+    ``clock`` is the machine's monotonic clock in seconds. It is that of the fronts, too, as the link is a
+    Unix socket. So a request's time and deadline are taken as they are, and what it has waited on the link
+    counts: an age would leave that out, and a delayed enabling word would look fresh. A front on another
+    machine would need its times translated.
     """
 
     def __init__(
@@ -177,6 +180,6 @@ class MirrorPublisher:
             reply(Outcome(Code.TIMED_OUT, "the request came too late to be carried out", forwarded=False))
             return
         if is_late or request.received_at is None or request.received_at > now:
-            # Too late, no time, or one of another machine's clock: nobody knows how old it is.
+            # Too late, no time, or one that is still to come: nobody knows how old it is.
             request = replace(request, received_at=NEVER)
         self._view.submit(request, reply)

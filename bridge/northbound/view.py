@@ -14,7 +14,8 @@ class View(Protocol):
 
     That may be a plant of this process, or a copy of one or of many that run elsewhere: the times of
     readings, events and outcomes are the view's own, and only ``epoch_ns`` says when they were. The time of a
-    request is monotonic and of the process that makes it.
+    request is of the clock of the process that makes it. A view that passes it to a plant with another clock
+    translates it, and makes it no later than it was: the way there counts as waiting.
     """
 
     @property

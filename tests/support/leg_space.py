@@ -388,12 +388,19 @@ class Space:
                     ways.append((number, name))
             if not self._is_woken(state):
                 raise AssertionError(f"nobody wakes the leg in time\nafter {_told(ways, number)}")
+            if not self._knows_what_comes(state[0]):
+                raise AssertionError(f"the kernel does not know what comes\nafter {_told(ways, number)}")
         self.walked.states = len(states)
 
     def _is_woken(self, state: State) -> bool:
         wakes, times = next_deadline(state[0]), state[1].times
         due = [it for it in (times.deadline, times.lease_until, times.mute_at) if it is not None and it > NOW]
         return not due or (wakes is not None and wakes <= min(due))
+
+    def _knows_what_comes(self, leg: LegState) -> bool:
+        """The kernel is told what the leg will send by itself."""
+        at = until(self.settings, leg)
+        return at is None or output_then(self.settings, leg) == step(self.settings, leg, Time(), at)[0].sent
 
 
 def _told(ways: list[tuple[int, str]], number: int) -> str:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from bridge.command.leg import start, turn
+from bridge.command.leg import start
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import LegState, Output, WatchdogState
+from bridge.command.leg.turn import Turn
 
 
 def watchdog_state(settings: LegSettings, state: LegState) -> WatchdogState:
@@ -31,9 +32,14 @@ def until(settings: LegSettings, state: LegState) -> float | None:
 
 
 def output_then(settings: LegSettings, state: LegState) -> Output:
-    """What is sent from ``until`` on."""
-    is_trip = until(settings, state) == trips_at(settings, state)
-    return (_if_tripped(settings, state) if is_trip else None) or _if_left(settings, state)
+    """What is sent from ``until`` on, made by the leg itself; what is sent now where ``until`` is None."""
+    at = until(settings, state)
+    if at is None:
+        return state.sent
+    then = Turn(settings, state, at)
+    then.judge()
+    then.settle()
+    return then.sent
 
 
 def next_deadline(state: LegState) -> float | None:
@@ -52,17 +58,3 @@ def next_deadline(state: LegState) -> float | None:
         if time is not None and (earliest is None or time < earliest):
             earliest = time
     return earliest
-
-
-def _if_tripped(settings: LegSettings, state: LegState) -> Output | None:
-    """What the drive would get if the watchdog tripped now; None where it goes on with what it has."""
-    reaction = settings.reaction
-    if reaction == "hold":
-        return None
-    word = turn.reaction_word(settings, state, is_ramping=reaction == "quick_stop")
-    return Output((word, *state.rest), silent=reaction == "silence" and state.silence_stops)
-
-
-def _if_left(settings: LegSettings, state: LegState) -> Output:
-    """What the drive would get if its owner went now."""
-    return Output((settings.words.stop(state.sent.words[0]), *state.rest))

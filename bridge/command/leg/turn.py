@@ -325,21 +325,19 @@ def _send(turn: Turn) -> None:
 
 
 def _reaction(turn: Turn) -> Output:
-    settings = turn.settings
-    is_ramping = turn.trip.ramps_until is not None
-    word = reaction_word(settings, turn, is_ramping=is_ramping)
+    word = _reaction_word(turn)
     is_silent = turn.stage is Stage.SILENCED
     if is_silent and not turn.silence_stops:
-        return Output((settings.words.disable_voltage(word), *turn.rest))
+        return Output((turn.settings.words.disable_voltage(word), *turn.rest))
     return Output((word, *turn.rest), is_silent)
 
 
-def reaction_word(settings: LegSettings, state: Turn | LegState, *, is_ramping: bool) -> int:
-    words, word = settings.words, state.sent.words[0]
-    if settings.reaction != "stop" and not is_ramping:
+def _reaction_word(turn: Turn) -> int:
+    reaction, words, word = turn.settings.reaction, turn.settings.words, turn.sent.words[0]
+    if reaction != "stop" and turn.trip.ramps_until is None:
         return words.disable_voltage(word)
-    stopped = words.stop(word) if settings.reaction == "stop" else words.quick_stop(word)
-    return words.withhold(stopped) if state.motion in RESTS else stopped
+    stopped = words.stop(word) if reaction == "stop" else words.quick_stop(word)
+    return words.withhold(stopped) if turn.motion in RESTS else stopped
 
 
 def _owners(turn: Turn) -> Output:

@@ -145,8 +145,8 @@ def _moves(leg: Turn, of: Callable[[Turn], Output] = turn._reaction) -> Output:
     return Output((word, 1, *leg.rest[1:]), of(leg).silent)
 
 
-def _weak(settings: Any, state: Any, *, is_ramping: bool) -> int:
-    return settings.words.stop(state.sent.words[0])
+def _weak(leg: Turn) -> int:
+    return leg.settings.words.stop(leg.sent.words[0])
 
 
 DEEDS: Final[dict[str, tuple[str, object, str, object]]] = {
@@ -159,7 +159,7 @@ DEEDS: Final[dict[str, tuple[str, object, str, object]]] = {
     ),
     "the owner is refused": ("telegrams", owners, "refusal", lambda *_, **__: "no"),
     "a word lifts the interlock": ("telegrams", turn, "at_rest", lambda words, word: words.run),
-    "a quick stop is a ramp": ("quick_stop", turn, "reaction_word", _weak),
+    "a quick stop is a ramp": ("quick_stop", turn, "_reaction_word", _weak),
     "a quick stop has no end": ("quick_stop", turn, "_RAMP_LIMIT_S", 20.0),
     "silence speaks": ("silence", turn, "_reaction", _speaks),
     "a reaction keeps setpoints": ("telegrams", turn, "_reaction", _moves),

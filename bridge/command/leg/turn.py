@@ -235,8 +235,9 @@ class Turn:
         """The drive says that it is in this state."""
         was_enabled = self.is_enabled
         self.drive = state
-        if state in FAULTED or (was_enabled and state is not DriveState.OPERATION_ENABLED):
+        if state in FAULTED or (was_enabled and not self.is_enabled):
             self.order = order.dropped(self.order)
+            self.keep_at_rest()
         motion = self.motion
         if state in MOVING:
             # Ignore a late "moving" report when the word being sent does not enable.

@@ -113,3 +113,11 @@ def test_without_followers_setpoints_at_rest_are_zero() -> None:
     assert axis.write(SHUTDOWN, 5, 6, 0) == (SHUTDOWN, 5, 6, 0)
     axis.asks(Action.STOP)
     assert axis.setpoints == (0, 0, 0)
+
+
+def test_a_drive_that_falls_out_of_operation_does_not_come_back_with_a_jump() -> None:
+    """It may stand where it was before, and be enabled anew by the word that is on the bus."""
+    axis = enabled(AT)
+    axis.write(None, 8, 0, 0)
+    axis.says(DriveState.READY)
+    assert axis.state.sent.words == (RUN, *AT, 0)

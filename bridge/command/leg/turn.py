@@ -11,6 +11,7 @@ from bridge.command.leg.effect import Effect, Heard, Ignored, StartEnded, Tell, 
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import (
     BLOCKED,
+    MAY_FOLLOW_LATE,
     REACTING,
     RESTS,
     STARTING,
@@ -239,6 +240,9 @@ class Turn:
             self.order = order.dropped(self.order)
             self.keep_at_rest()
         motion = self.motion
+        if state is DriveState.FAULT_REACTION_ACTIVE and motion in MAY_FOLLOW_LATE:
+            # The fault may have come before the word that enables.
+            return
         if state in MOVING:
             # Ignore a late "moving" report when the word being sent does not enable.
             if motion is Motion.EXPECTED or self.is_enabling:

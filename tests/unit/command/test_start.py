@@ -115,6 +115,19 @@ def test_right_after_disable_voltage_makes_the_drive_ready_that_is_about_to_be_i
     is_led_from_inhibited(rig, outcomes)
 
 
+@pytest.mark.parametrize("word", [FAULT, FAULT_REACTION])
+def test_waits_after_a_fault_that_may_have_come_before_the_last_one_enabled(rig: Rig, word: int):
+    rig.drive_says(READY)
+    rig.submit(Action.START)
+    rig.drive_says(word)
+    rig.drive_says(READY)
+    rig.submit(Action.START)
+    assert not rig.enables
+    rig.wait(0.2)
+    rig.drive_says(READY)
+    assert rig.enables
+
+
 @pytest.mark.parametrize("action", [Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE])
 def test_right_after_a_stop_of_a_running_drive_waits_for_what_becomes_of_it(running: Rig, action: Action):
     running.ask(action)

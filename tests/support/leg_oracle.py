@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from tests.support.leg_rules import Model
+from tests.support.leg_rules import MOVING, Model
 from tests.support.leg_seen import Missing
 from tests.support.leg_words import STRENGTH
 
@@ -27,12 +27,13 @@ class Oracle(Model):
             "nothing is sent where the site file says so, and only there"
         )
         assert word & words.valid == words.valid, "the drive takes what is sent"
+        setpoints = sent[1:]
         enables = words.enabling.fit(word)
         if enables and not self.sends:
             self.followed = self.says == "enabled" and self.is_heard
         self.sends = enables
         if enables:
-            self._check_enabling(word)
+            self._check_enabling(word, setpoints)
         else:
             must = self.missing is Missing.NOTHING and (not self.is_starting or self.is_plain)
             assert not must and not self.is_held, "what may be enabled is enabled"
@@ -40,12 +41,15 @@ class Oracle(Model):
             "a start ends when the drive is enabled"
         )
         if self.is_tripped and rules.reaction != "hold":
-            assert not any(sent[1:]), "setpoints go to zero"
+            assert self._are_at_rest(setpoints), "setpoints go to zero, or to where the drive is"
             self._check_reaction(word, is_mute=is_mute)
         if words.handshake:
             self._check_handshake(bool(word & words.handshake) and enables)
 
-    def _check_enabling(self, word: int) -> None:
+    def _are_at_rest(self, setpoints: tuple[int, ...]) -> bool:
+        return setpoints == self.at if self.at else not any(setpoints)
+
+    def _check_enabling(self, word: int, setpoints: tuple[int, ...]) -> None:
         rules, words = self.rules, self.rules.words
         assert self.may_enable, "nothing enables a drive whose node is not there"
         if self.timeout_s and not rules.ignores and rules.reaction != "hold":
@@ -53,6 +57,9 @@ class Oracle(Model):
             assert self.now < self.deadline, "nothing enables after the deadline"
         allowed = self.is_held or self.missing is Missing.NOTHING
         assert allowed, f"still missing: {self.missing.name}"
+        is_commanded = self.says == "enabled" and self.is_heard
+        if words.place and not (is_commanded or self.is_held):
+            assert self._are_at_rest(setpoints), "enabling moves nothing"
         if words.begin:
             assert bool(word & words.begin) is self.has_begun, "it begins when the drive is enabled"
 
@@ -64,7 +71,7 @@ class Oracle(Model):
             assert words.disable_voltage.fit(word), "a quick stop ends with disable voltage"
         elif is_mute and not self.watches:
             assert words.disable_voltage.fit(word), "where silence is no stop it is disable voltage"
-        elif self.stop_kind and self.says in ("enabled", "braking"):
+        elif self.stop_kind and self.says in MOVING:
             self.check_stop(word, self.stop_kind)
 
     def check_stop(self, word: int, kind: str) -> None:
@@ -96,7 +103,7 @@ class Oracle(Model):
         if until is None:
             return
         assert not rules.words.enabling.fit(then[0]), "and sends a stop then"
-        assert not any(then[1:])
+        assert self._are_at_rest(then[1:])
         if until == self.deadline and rules.reaction in STRENGTH:
             self.check_stop(then[0], rules.reaction)
         assert silent is (until == self.deadline and rules.mutes_after_s == 0 and self.watches)

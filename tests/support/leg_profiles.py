@@ -15,12 +15,19 @@ from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
 from bridge.drive import DriveState
 from bridge.mapping import load_family
+from tests.support.leg_recorded import Cells
 from tests.support.leg_seen import Rules
-from tests.support.leg_space import Cells, Space
+from tests.support.leg_space import Space
 from tests.support.leg_time import NOW
-from tests.support.leg_words import ALL, HOMING, NORD_TU4, LegWords
+from tests.support.leg_words import ALL, HOMING, LENZE, NORD_TU4, LegWords
 
-CYCLIC: Final = replace(HOMING, mapping="cia402/cyclic-position", begin=0, setpoint={"position": 70_000})
+CYCLIC: Final = replace(
+    HOMING,
+    mapping="cia402/cyclic-position",
+    begin=0,
+    setpoint={"position": 70_000},
+    place=(0x2222, 0x0002),
+)
 """Its setpoints follow the drive's own position."""
 FAMILIES: Final = (*ALL, CYCLIC)
 REACTIONS: Final = ("disable_voltage", "quick_stop", "stop", "silence", "hold")
@@ -108,6 +115,40 @@ _LEASE: Final = _BASE - {"owner's stop comes late", "bus back", "rival enables"}
     "owner keeps alive",
 }
 
+_STATES: Final = {
+    "drive says: ready",
+    "drive says: switched on",
+    "drive says: enabled",
+    "drive says: braking",
+    "drive says: inhibited",
+    "drive says: not ready",
+    "drive says: fault reaction",
+    "drive says: fault",
+    "drive says: unknown",
+    "drive repeats",
+    "owner writes a stop",
+    "owner enables",
+    "owner starts the drive",
+    "owner resets the fault",
+    "stranger stops the drive",
+    "node operational, not heard",
+    "everything is due",
+}
+_MOVES: Final = {
+    "drive is moved",
+    "drive follows",
+    "drive says: fault",
+    "owner writes a stop",
+    "owner enables",
+    "owner starts the drive",
+    "owner resets the fault",
+    "stranger stops the drive",
+    "node lost",
+    "node operational",
+    "position not known",
+    "position known",
+    "everything is due",
+}
 _HANDSHAKE: Final = {
     "owner writes a stop",
     "owner enables",
@@ -168,6 +209,14 @@ def family_profiles(words: LegWords) -> dict[str, Profile]:
     found["started"] = {"words": words, "names": started | more}
     if words.handshake:
         found["two positions"] = {"words": words, "names": _HANDSHAKE}
+    if words.place:
+        found |= {
+            f"moved, {reaction}": {"words": words, "names": _MOVES, "on_expiry": reaction}
+            for reaction in ("quick_stop", "hold")
+        }
+    if words in (NORD_TU4, LENZE):
+        for reaction in ("quick_stop", "stop"):
+            found[f"whatever it says, {reaction}"] = {"words": words, "names": _STATES, "on_expiry": reaction}
     return found
 
 

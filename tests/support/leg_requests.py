@@ -7,13 +7,29 @@ from typing import Final
 
 from bridge.command import Action, Do, Identity, Request, SetTimeout, Start, TakeControl, Write
 from bridge.image import Value
+from tests.support import rig
 from tests.support.leg_seen import Rules
 from tests.support.leg_time import NOW
 from tests.support.leg_words import LegWords
-from tests.support.rig import ENGINEER, OBSERVER, OPERATOR, OTHER_PLC, PLC
 
 _LATE_S: Final = 1.0
 """What has waited for so long is no telegram any more."""
+
+
+class _One(Identity):
+    """Told apart as an object: every state that is looked up has some of them."""
+
+    __slots__ = ()
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+
+def _one(who: Identity) -> Identity:
+    return _One(who.source, who.user, who.role)
+
+
+PLC, OTHER_PLC, OPERATOR = _one(rig.PLC), _one(rig.OTHER_PLC), _one(rig.OPERATOR)
+OBSERVER, ENGINEER = _one(rig.OBSERVER), _one(rig.ENGINEER)
 
 
 _Telegram = tuple[Identity, Mapping[str, Value]]

@@ -25,8 +25,12 @@ RAMP_S: Final = 10.0
 GONE_S: Final = 10.0
 """Without a time-out: an owner that gives no sign for so long is gone."""
 
-RESTING: Final = frozenset(("ready", "inhibited", "fault"))
+RESTING: Final = frozenset(("ready", "inhibited", "fault", "switched on", "not ready"))
 """What a drive says that is not enabled and does not brake."""
+LED: Final = frozenset(("ready", "switched on", "enabled"))
+"""From here the enabling word is the next one."""
+FAULTED: Final = frozenset(("fault", "fault reaction"))
+MOVING: Final = frozenset(("enabled", "braking", "fault reaction"))
 
 
 class Model(Memory):
@@ -152,7 +156,7 @@ class Model(Memory):
     def acknowledge(self, who: Any, *, is_reset: bool = False) -> None:
         """``is_reset``: the drive's own fault is reset, too."""
         self.telegram(who)
-        if self.is_tripped or (is_reset and self.says == "fault"):
+        if self.is_tripped or (is_reset and self.says in FAULTED):
             self.is_tripped = False
             self.mute_at = self.coasts_at = None
             self.stop_kind = ""
@@ -194,7 +198,7 @@ class Model(Memory):
         self._end_start()
         self.has_begun = False
         self.is_starting = True
-        self.is_plain = self.is_heard and self.says in ("ready", "enabled") and not has_waited
+        self.is_plain = self.is_heard and self.says in LED and not has_waited
         self.is_late = not self.followed
         self.start_until = self.now + START_S
         waits = not self.is_heard or (not self.sends and (self.says == "enabled" or not self.followed))
@@ -247,18 +251,18 @@ class Model(Memory):
         self.followed |= says in ("enabled", "braking")
         if self.coasts_at is not None and says in RESTING:
             self.coasts_at = min(self.coasts_at, self.now)
-        if says == "fault" or (was_enabled and says != "enabled"):
+        if says in FAULTED or (was_enabled and says != "enabled"):
             self._forget()
         if not self.is_starting:
             return
-        self.is_plain = self.is_plain and says in ("ready", "enabled")
-        if says == "fault":
+        self.is_plain = self.is_plain and says in LED
+        if says in FAULTED:
             self.stop()
         elif self.missing is Missing.ENABLE and says != "unknown":
             is_early = self.news_from is not None and self.now < self.news_from
             is_old = is_early
             if says != before:
-                is_old = says == "enabled" or (is_early and says == "ready" and self.is_late)
+                is_old = says == "enabled" or (is_early and says in LED and self.is_late)
                 self.is_plain = self.is_plain and says != "enabled"
             if not is_old:
                 self._no_news()

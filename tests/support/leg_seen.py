@@ -68,7 +68,7 @@ class Seen(NamedTuple):
     is_starting: bool = False
     """A start was taken and its end has not been told."""
     is_plain: bool = False
-    """It leads a drive that was heard and has said no more than "ready" and "enabled" since."""
+    """It leads a drive that was heard and has said nothing since that asks for another word than "enable"."""
     is_late: bool = False
     """When it began, the drive might still follow an enabling word from before a stop."""
     has_begun: bool = False
@@ -93,6 +93,8 @@ class Seen(NamedTuple):
     """What it was on the bus."""
     is_taken: bool = False
     was_commanded: bool = False
+    at: tuple[int, ...] = ()
+    """The setpoints of a drive that nobody commands, where they are not zero: its own position."""
 
 
 def first(rules: Rules) -> Seen:
@@ -156,6 +158,7 @@ class Memory:
             self.was_up,
             self.is_taken,
             self.was_commanded,
+            self.at,
         ) = seen
 
     def end(self) -> Seen:

@@ -7,8 +7,7 @@ future, so only the first goes on.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 from unittest.mock import patch
 
 from bridge.command import (
@@ -23,6 +22,7 @@ from bridge.command import (
 from bridge.command.leg import turn
 from bridge.command.leg.effect import Answer, Effect, StartBegun, StartEnded
 from bridge.command.leg.event import (
+    ActualWords,
     BridgeGap,
     Connection,
     Event,
@@ -36,15 +36,17 @@ from bridge.command.leg.outlook import next_deadline, output_then, until
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import LegState, Stage, Way
 from bridge.command.leg.step import step
-from bridge.command.leg.table import Cell, Deed, Stimulus
+from bridge.command.leg.table import Cell, Stimulus
 from bridge.command.request import STOP_ACTIONS
 from bridge.drive import DriveState
 from tests.support.leg_deeds import HOLDS, Done
+from tests.support.leg_forget import Forgetting
 from tests.support.leg_oracle import Oracle
-from tests.support.leg_requests import requests_of
-from tests.support.leg_seen import Rules, first
-from tests.support.leg_time import NOW, State, ahead, come, forgotten, timeless
-from tests.support.rig import PLC
+from tests.support.leg_recorded import RecordedTable, Walked
+from tests.support.leg_requests import PLC, requests_of
+from tests.support.leg_rules import FAULTED
+from tests.support.leg_seen import Rules, Seen, first
+from tests.support.leg_time import NOW, State, ahead, come, timeless
 
 _OPEN: Final = Way(True, "", "", True)
 _UNHEARD: Final = Way(True, "", "", False)
@@ -56,37 +58,11 @@ _SAYS: Final = {
     "braking": DriveState.QUICK_STOP_ACTIVE,
     "inhibited": DriveState.SWITCH_ON_INHIBITED,
     "fault": DriveState.FAULT,
+    "fault reaction": DriveState.FAULT_REACTION_ACTIVE,
+    "switched on": DriveState.SWITCHED_ON,
+    "not ready": DriveState.NOT_READY,
     "unknown": DriveState.UNKNOWN,
 }
-
-Cells = set[tuple[Stage, Stimulus]]
-
-
-class _RecordedTable(dict[tuple[Stage, Stimulus], Cell]):
-    """``seen`` has the cells that were looked up, ``last`` the last one that has a deed."""
-
-    def __init__(self, *args: Any) -> None:
-        super().__init__(*args)
-        self.seen: Cells = set()
-        self.last: tuple[Stage, Deed] | None = None
-
-    def __getitem__(self, key: tuple[Stage, Stimulus]) -> Cell:
-        self.seen.add(key)
-        cell = super().__getitem__(key)
-        if cell[1] is not Deed.NOTHING:
-            self.last = key[0], cell[1]
-        return cell
-
-
-@dataclass(slots=True)
-class Walked:
-    """``steps``: state and event, each once."""
-
-    states: int = 0
-    steps: int = 0
-    enabled: int = 0
-    refused: int = 0
-    cells: Cells = field(default_factory=set[tuple[Stage, Stimulus]])
 
 
 class Space:
@@ -103,9 +79,10 @@ class Space:
         ttl_ms: int = 5000,
     ) -> None:
         self.settings, self.rules = settings, rules
-        self.first = timeless(leg, first(rules))
+        self.forgets: Callable[[LegState, Seen], State] = Forgetting(settings.words, {*names, *after_hang})
+        self.first = timeless(*self.forgets(leg, first(rules)))
         self.walked = Walked()
-        self._table = _RecordedTable()
+        self._table = RecordedTable(turn.TABLE)
         self.states = [self.first]
         every = self._every(requests_of(rules, ttl_ms))
         unknown = {*names, *after_hang} - every.keys()
@@ -124,6 +101,7 @@ class Space:
         return every | {
             "drive follows": self._follows,
             "drive repeats": self._repeats,
+            "drive is moved": self._moved,
             "drive takes the setpoint": lambda state: self._follows(state, is_taken=True),
             "drive's own watch is off": lambda state: self._watches(state, watches=False),
             "drive's own watch is on": lambda state: self._watches(state, watches=True),
@@ -199,7 +177,7 @@ class Space:
                 is_valid = word & words.valid == words.valid and values is not words.too_large
                 return is_valid and (not is_late or (is_stop and who == oracle.owner))
             case Start():
-                return not (is_late or oracle.is_tripped or oracle.says == "fault") and oracle.is_open
+                return not (is_late or oracle.is_tripped or oracle.says in FAULTED) and oracle.is_open
             case SetTimeout():
                 return self.rules.is_writable and who == oracle.owner
             case _:
@@ -276,6 +254,18 @@ class Space:
         self._check(after, oracle, leg, effects)
         return self._time(after, after, oracle, [])
 
+    def _moved(self, state: State) -> State:
+        """There and back."""
+        leg, seen = state
+        if not seen.is_there:
+            return state
+        place = self.rules.words.place
+        oracle = Oracle(self.rules, seen, NOW)
+        oracle.at = () if seen.at else place
+        actual = oracle.at or (0,) * len(place)
+        after, effects = self._step(leg, ActualWords((self.rules.words.ready, *actual)))
+        return self._time(leg, after, oracle, effects)
+
     def _watches(self, state: State, *, watches: bool) -> State:
         leg, seen = state
         oracle = Oracle(self.rules, seen, NOW)
@@ -336,7 +326,7 @@ class Space:
 
     def _end(self, before: LegState, leg: LegState, oracle: Oracle, effects: list[Effect]) -> State:
         self._check(leg, oracle, before, effects)
-        return timeless(forgotten(leg), oracle.end())
+        return timeless(*self.forgets(leg, oracle.end()))
 
     def _check(self, leg: LegState, oracle: Oracle, before: LegState, effects: list[Effect]) -> None:
         ended = [effect.outcome for effect in effects if isinstance(effect, StartEnded)]
@@ -361,7 +351,7 @@ class Space:
 
     def explore(self, most: int, table: dict[tuple[Stage, Stimulus], Cell] | None = None) -> Walked:
         """Every state there is; fails with the shortest sequence that breaks a rule."""
-        self._table = _RecordedTable(turn.TABLE if table is None else table)
+        self._table = RecordedTable(turn.TABLE if table is None else table)
         with patch.object(turn, "TABLE", self._table):
             self._explore(most)
         self.walked.cells = self._table.seen

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.command.leg.state import REACTING, LegState
+from bridge.command.leg.state import LegState
 from tests.support.leg_seen import Seen, Times
 
 NOW: Final = 1000.0
@@ -79,14 +79,6 @@ def timeless(leg: LegState, seen: Seen) -> State:
         found = tuple(None if it is None else places.get(it, NOW) for it in instants)
         _timeless[instants] = found
     return (leg, seen) if found == instants else _with(leg, seen, found)
-
-
-def forgotten(leg: LegState) -> LegState:
-    """The leg without what decides nothing any more: a reaction is made from what is sent, and what follows
-    it from the reaction. ``test_leg_space`` shows that nothing comes of the rest."""
-    if leg.stage not in REACTING:
-        return leg
-    return leg._replace(word=0, is_ours=True, is_asked=False, setpoints=leg.rest)
 
 
 def ahead(state: State) -> list[float]:

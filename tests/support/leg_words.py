@@ -30,6 +30,9 @@ class LegWords:
     has the bits without which a drive takes no word, ``begin`` what a start raises once the drive is enabled,
     ``handshake`` the bit that hands over a position, and ``taken`` the drive's answer to it.
 
+    ``place``: where setpoints follow the drive's position, another one: as setpoints, and as the words after
+    its status word.
+
     ``setpoint`` is something to be moved to, ``more`` another one, ``too_large`` a telegram that is out of
     range.
     """
@@ -53,6 +56,7 @@ class LegWords:
     begin: int = 0
     handshake: int = 0
     taken: int = 0
+    place: tuple[int, ...] = ()
 
     def stops(self, kind: str) -> tuple[Bits, ...]:
         """How a stop of this kind may look: none that is in force already is lifted for a weaker one."""

@@ -13,7 +13,7 @@ from bridge.command.leg.state import Output, Stage
 from bridge.command.leg.table import TABLE, Cell, Deed, Stimulus
 from bridge.command.leg.turn import Turn
 from tests.support import leg_space
-from tests.support.leg_profiles import MOST, space
+from tests.support.leg_profiles import CYCLIC, MOST, space
 from tests.support.leg_words import POSITION
 from tools.state_table import PAGE
 
@@ -45,6 +45,13 @@ _POSITIONS: Final = {
     "drive takes the setpoint",
     "stranger stops the drive",
 }
+_MOVED: Final = {
+    "owner writes a stop",
+    "owner enables",
+    "drive follows",
+    "drive is moved",
+    "stranger stops the drive",
+}
 PROFILES: Final[dict[str, dict[str, Any]]] = {
     "telegrams": {"names": _TELEGRAMS},
     "quick_stop": {"names": _TELEGRAMS, "on_expiry": "quick_stop"},
@@ -59,6 +66,8 @@ PROFILES: Final[dict[str, dict[str, Any]]] = {
     "late": {"names": _LATE},
     "starts": {"names": _STARTS},
     "positions": {"names": _POSITIONS, "words": POSITION},
+    "moved": {"names": _MOVED, "words": CYCLIC},
+    "states": {"names": _STARTS | {"drive says: fault reaction", "drive says: ready"}},
 }
 """As few events as each fault needs to show."""
 
@@ -180,6 +189,8 @@ DEEDS: Final[dict[str, tuple[str, object, str, object]]] = {
         lambda order, words: order._replace(is_waiting=True),
     ),
     "a stop forgets no position": ("positions", order, "dropped", lambda order: order),
+    "an axis jumps when it is enabled": ("moved", Turn, "keep_at_rest", lambda leg: None),
+    "a fault reaction follows an enable": ("states", turn, "MAY_FOLLOW_LATE", frozenset[Any]()),
 }
 
 

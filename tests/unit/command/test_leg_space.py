@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import re
 from inspect import getsource
+from typing import Any, Final
 
 import pytest
 
 from bridge.command.leg.table import TABLE
-from tests.support import leg_oracle, leg_rules, leg_seen, leg_space
+from tests.support import leg_oracle, leg_rules, leg_seen
 from tests.support.leg_cells import NEVER
 from tests.support.leg_profiles import MOST, ROWS, explored, space
-from tests.support.leg_space import Cells
-from tests.support.leg_time import forgotten
+from tests.support.leg_recorded import Cells
+from tests.support.leg_words import LENZE, POSITION
 from tools import exploration
 
 # All of a CPU for up to half a minute each: with a fifth of one that takes its time.
@@ -49,9 +50,9 @@ def test_the_rules_take_nothing_from_the_bridge() -> None:
         assert "bridge" not in re.findall(r"^(?:from|import) (\w+)", getsource(module), re.MULTILINE)
 
 
-def test_what_the_walk_forgets_decides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    explored_all = space(
-        names={
+_FORGETFUL: Final[dict[str, dict[str, Any]]] = {
+    "edges": {
+        "names": {
             "owner writes a stop",
             "owner enables",
             "owner acknowledges by an edge",
@@ -60,19 +61,52 @@ def test_what_the_walk_forgets_decides_nothing(monkeypatch: pytest.MonkeyPatch) 
             "drive follows",
             "everything is due",
         },
-        on_expiry="quick_stop",
-    )
-    with monkeypatch.context() as patch:
-        patch.setattr(leg_space, "forgotten", lambda leg: leg)
-        explored_all.explore(MOST)
+        "on_expiry": "quick_stop",
+    },
+    "a stop that holds": {
+        "names": {
+            "owner writes a stop",
+            "owner enables",
+            "owner resets the fault",
+            "stranger stops the drive",
+            "drive follows",
+            "drive says: fault",
+            "node lost",
+            "node operational, not heard",
+            "everything is due",
+        },
+        "words": LENZE,
+        "on_expiry": "stop",
+    },
+    "starts and positions": {
+        "names": {
+            "owner writes a stop",
+            "owner enables",
+            "owner starts the drive",
+            "owner releases",
+            "drive follows",
+            "drive repeats",
+            "drive takes the setpoint",
+            "node lost",
+            "node operational",
+        },
+        "words": POSITION,
+        "on_expiry": "hold",
+    },
+}
+
+
+@pytest.mark.parametrize("profile", _FORGETFUL)
+def test_what_the_walk_forgets_decides_nothing(profile: str) -> None:
+    explored_all = space(**_FORGETFUL[profile])
+    forgets, explored_all.forgets = explored_all.forgets, lambda leg, seen: (leg, seen)
+    explored_all.explore(MOST)
     compared = 0
-    for leg, seen in explored_all.states:
-        less = forgotten(leg)
-        if less == leg:
+    for state in explored_all.states:
+        less = forgets(*state)
+        if less == state:
             continue
         compared += 1
         for name, happen in explored_all.events.items():
-            after, seen_after = happen((leg, seen))
-            after_less, seen_after_less = happen((less, seen))
-            assert (forgotten(after), seen_after) == (forgotten(after_less), seen_after_less), name
+            assert forgets(*happen(state)) == forgets(*happen(less)), name
     assert compared > 100

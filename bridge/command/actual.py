@@ -8,47 +8,13 @@ from typing import Final, NamedTuple
 
 from bridge.command.channel import DriveChannel
 from bridge.command.following import Following
-from bridge.drive import LinearScale, ParameterSet, ValueCodec
+from bridge.command.link import FurtherTpdo
+from bridge.drive import ParameterSet, ValueCodec, codecs
 from bridge.image import Image, Quality, Value
-from bridge.mapping.model import Family, Slot
+from bridge.mapping.model import Slot
 
 _GOOD: Final = (Quality.GOOD, "")
 _STATUS: Final = ("status_word", "drive_status_word", "state", "emcy_code")
-
-
-@dataclass(slots=True)
-class FurtherTpdo:
-    """A TPDO other than the one with the status word: its values have an age of their own.
-
-    ``places`` are those of its words in ``process.tpdo``; ``deadline_s`` is the longest regular pause
-    between two of them, None if it is sent on change only.
-    """
-
-    name: str
-    places: frozenset[int]
-    deadline_s: float | None
-    last: float | None = None
-    quality: Quality = Quality.WAITING
-
-    def on_data(self, now: float) -> bool:
-        """It has arrived; True if its values were not good before."""
-        self.last = now
-        was_good = self.quality is Quality.GOOD
-        self.quality = Quality.GOOD
-        return not was_good
-
-    def on_time(self, now: float) -> bool:
-        """True where it is late from now on."""
-        if self.quality is not Quality.GOOD or self.is_fresh(now):
-            return False
-        self.quality = Quality.STALE
-        return True
-
-    def is_fresh(self, now: float) -> bool:
-        """It has arrived since the boot-up, and is not late."""
-        if self.quality is not Quality.GOOD or self.last is None:
-            return False
-        return self.deadline_s is None or now < self.last + self.deadline_s
 
 
 class _Plain(NamedTuple):
@@ -73,10 +39,9 @@ class _Judged:
 class ActualData:
     """The process data of one drive. A PDO costs one comparison per value."""
 
-    def __init__(
-        self, name: str, family: Family, slot: Slot, channel: DriveChannel, following: Following
-    ) -> None:
-        self._name = name
+    def __init__(self, channel: DriveChannel, slot: Slot, following: Following, image: Image) -> None:
+        drive, family = channel.name, channel.family
+        self._image = image
         self._channel = channel
         self._following = following
         self._has_followers = any(value.follows for value in family.values_of(slot))
@@ -89,30 +54,23 @@ class ActualData:
         self._carried = family.carried(slot)[1][1:]
         self._places = [self._process.index(word) for word in self._carried]
         self._has_all = len(self._carried) == len(self._process) - 1
-        self._codecs = [
-            ValueCodec(value, self._process) for value in family.values_of(slot) if value.group == "actual"
-        ]
         # Those that most drives have go first: they are computed without a call.
-        self._codecs.sort(key=lambda codec: not codec.is_plain)
+        found = codecs(family, slot, "actual", self._process, {})
+        self._codecs = sorted(found, key=lambda codec: not codec.is_plain)
         self._plain: list[_Plain] = []
         self._others: list[ValueCodec] = []
-        self._further: list[FurtherTpdo] = []
         self._judged: list[_Judged] = []
-        self._status: list[int] = []
-        self._indices: list[int] = []
-        self._shown: tuple[Quality, str] | None = None
-        """Quality and reason as the image has them for the process data."""
-
-    def bind(self, image: Image) -> None:
-        self._image = image
-        self._status = [image.index[f"{self._name}/status/{leaf}"] for leaf in _STATUS]
+        self._status = [image.index[f"{drive}/status/{leaf}"] for leaf in _STATUS]
         leaves = [f"actual/{word}" for word in self._carried]
         leaves += [codec.model.leaf for codec in self._codecs]
-        self._indices = [image.index[f"{self._name}/{leaf}"] for leaf in leaves]
-        self.compile(self._channel.scales, self._channel.unserved)
+        self._indices = [image.index[f"{drive}/{leaf}"] for leaf in leaves]
+        self._shown: tuple[Quality, str] | None = None
+        """Quality and reason as the image has them for the process data."""
+        self.compile()
 
-    def compile(self, scales: Mapping[str, LinearScale], unserved: Mapping[str, str]) -> None:
+    def compile(self) -> None:
         """Take over what the boot-up has found."""
+        scales = self._channel.scales
         self._codecs = [codec.scaled(scales.get(codec.model.leaf)) for codec in self._codecs]
         plain = [codec for codec in self._codecs if codec.is_plain]
         self._others = [codec for codec in self._codecs if not codec.is_plain]
@@ -122,7 +80,7 @@ class ActualData:
             else _Plain(codec.places[0], 1, 1)
             for codec in plain
         ]
-        self._judged = list(self._to_judge(unserved))
+        self._judged = list(self._to_judge(self._channel.unserved))
         self._shown = None
 
     def _to_judge(self, unserved: Mapping[str, str]) -> Iterable[_Judged]:
@@ -137,21 +95,11 @@ class ActualData:
             yield _Judged(next(rest), why, self._further_of(codec.places), scaled_by or "")
 
     def _further_of(self, places: Sequence[int]) -> tuple[FurtherTpdo, ...]:
-        return tuple(pdo for pdo in self._further if not pdo.places.isdisjoint(places))
-
-    def set_further(self, further: Sequence[FurtherTpdo]) -> None:
-        """The TPDOs beside the one with the status word; ``compile`` follows."""
-        self._further = list(further)
-
-    def why_lacking(self, places: frozenset[int], now: float) -> str:
-        """Why these words, by their places in ``process.tpdo``, are not known; empty where they are. The
-        TPDO with the status word is the link's to judge."""
-        late = [pdo.name for pdo in self._further if not (pdo.places.isdisjoint(places) or pdo.is_fresh(now))]
-        return f"no {late[0]} from the drive" if late else ""
+        return tuple(pdo for pdo in self._channel.link.further if not pdo.places.isdisjoint(places))
 
     def on_heard_again(self) -> None:
         """The drive could not be heard for a while: the values of its further TPDOs may have changed."""
-        for pdo in self._further:
+        for pdo in self._channel.link.further:
             if pdo.quality is Quality.GOOD:
                 pdo.quality = Quality.STALE
         self._shown = None
@@ -167,7 +115,7 @@ class ActualData:
     def look(self, now: float) -> None:
         """Judge how good everything is at this moment: of a deadline that has passed the image learns
         otherwise when a timer runs."""
-        if [pdo for pdo in self._further if pdo.on_time(now)]:
+        if [pdo for pdo in self._channel.link.further if pdo.on_time(now)]:
             self._shown = None
         if not self._is_good(now):
             self.refresh(now)

@@ -24,7 +24,7 @@ from bridge.command.request import Identity, Outcome, Reply, Request
 from bridge.command.status import DriveStatus
 from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
-from bridge.drive import FAULTED, DriveState, LinearScale, Told, scale_of
+from bridge.drive import FAULTED, DriveState, Told, scales_of
 from bridge.image import Quality
 from bridge.mapping.model import Family
 
@@ -35,8 +35,7 @@ class DriveChannel:
     After any call the caller compares ``output`` and sends it. ``report`` gets the events. ``settled`` is
     called when what others may see has changed beyond the status word, before outcomes are told: so a client
     that reads after its outcome sees the new values. ``tripped`` gets the deadline whenever the watchdog
-    trips. ``why_lacking`` says why actual words, by their places in ``process.tpdo``, are not known at a
-    time, and nothing where they are.
+    trips.
     """
 
     def __init__(
@@ -49,25 +48,19 @@ class DriveChannel:
         *,
         settled: Callable[[float], None],
         tripped: Callable[[float], None],
-        why_lacking: Callable[[frozenset[int], float], str],
     ) -> None:
         self.name = name
         self.family = family
         self.settings = settings
-        self.scales: dict[str, LinearScale] = {}
+        self.scales = scales_of(family, settings.parameters)
         """Known scales by the value's leaf (``actual/frequency``); from the mapping and the site file, and
         at boot-up."""
         self.unserved: dict[str, str] = {}
         """Points that the node cannot serve, by their leaf, with the reason; known after boot-up."""
-        for value in family.value:
-            scale = scale_of(value)
-            if scale is not None:
-                self.scales[value.leaf] = scale
         self.link = Link(settings.telegram_downtime_s, hold_ms)
         self._report = report
         self._settled = settled
         self._tripped = tripped
-        self._why_lacking = why_lacking
         self._status = DriveStatus(family)
         decode = TelegramDecoder(
             name, family, family.slot_named(settings.slot), self.scales, self.unserved
@@ -281,7 +274,7 @@ class DriveChannel:
         quality = self.link.quality(now)
         why = self.link.reason(quality)
         if quality is Quality.GOOD:
-            why = self._why_lacking(self._followed, now)
+            why = self.link.why_lacking(self._followed, now)
         return f"the drive's own position is not known: {why}" if why else ""
 
     # time

@@ -6,20 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.command.actual import ActualData, FurtherTpdo
+from bridge.command.actual import ActualData
 from bridge.command.channel import DriveChannel
 from bridge.command.event import Event
 from bridge.command.follow import Verdict
 from bridge.command.following import Following
-from bridge.command.parameter_points import parameter_points
-from bridge.command.points import drive_points
+from bridge.command.link import FurtherTpdo
 from bridge.command.worst_case import StopTime, Wire, stop_time, sync_wait_ms, takeover_ms
 from bridge.config import BusTable, DriveTable, NodeTable
-from bridge.drive import OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, scale_of
+from bridge.drive import OwnJudgement, OwnVerdict, ParameterSet, codecs, scales_of
 from bridge.drive.own_supervision import why_silence_does_not_stop
 from bridge.image import Image, Point, Quality, Value
 from bridge.mapping.model import Family, Slot
-from bridge.parameter import Names
 
 _ASYNCHRONOUS: Final = 255
 _IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
@@ -61,8 +59,9 @@ class Drive:
         bus: BusTable,
         table: DriveTable,
         family: Family,
-        names: Names,
         unit_id: int,
+        image: Image,
+        points: Mapping[str, list[Point]],
         report: Callable[[Event], None],
         settled: Callable[[Drive, float], None],
         tripped: Callable[[float], None],
@@ -81,7 +80,6 @@ class Drive:
             report,
             settled=lambda now: settled(self, now),
             tripped=tripped,
-            why_lacking=lambda places, now: self._actual.why_lacking(places, now),
         )
         self.following = Following(self.channel)
         self.identification = Identification()
@@ -96,37 +94,28 @@ class Drive:
         """How far ahead the bus may have been told what to send."""
         self.table = table
         self.given_parameters = table.parameters
-        words = family.process.rpdo[1:]
         self._shown_for: tuple[int, int, Wire, float | None] | None = None
         self._set = ParameterSet(family.control_word.parameter_set_bits)
-        carried = family.carried(self.slot)[0][1:]
-        self._setpoints = [(words.index(word), f"command/{word}") for word in carried]
-        for parameter, full in table.parameters.items():
-            self._learn(parameter, full)
-        values, scales = family.values_of(self.slot), self.channel.scales
-        self._commands = [
-            ValueCodec(value, words, scales.get(value.leaf)) for value in values if value.group == "command"
-        ]
-        self._actual = ActualData(self.name, family, self.slot, self.channel, self.following)
+        self._actual = ActualData(self.channel, self.slot, self.following, image)
         # What its node brings, which is not looked at here.
         self.on_process_data = self._actual.on_process_data
         self.on_unchanged_data = self._actual.on_unchanged_data
         self.on_further_data = self._actual.on_further_data
-        is_writable = table.fieldbus_timeout_writable
-        self.points: list[Point] = [
-            *drive_points(self.name, family, self.slot, scales, timeout_writable=is_writable),
-            *parameter_points(self.name, names),
-        ]
-
-    def bind(self, image: Image, now: float) -> None:
-        """Find this drive's points in the image, and show in it from now on what happens to the drive."""
         self._image = image
+        self.points = points[self.name]
+        self._find_points()
+
+    def _find_points(self) -> None:
+        """Where its points stand in the image."""
+        family, words = self.family, self.family.process.rpdo[1:]
+        carried = family.carried(self.slot)[0][1:]
+        self._setpoints = [(words.index(word), f"command/{word}") for word in carried]
+        self._commands = codecs(family, self.slot, "command", words, self.table.parameters)
 
         def places(group: str, leaves: Sequence[str]) -> list[int]:
-            return [image.index[f"{self.name}/{group}/{leaf}"] for leaf in leaves]
+            return [self._image.index[f"{self.name}/{group}/{leaf}"] for leaf in leaves]
 
-        (self._control_word,) = places("command", ("control_word",))
-        self._setpoint_indices = [image.index[f"{self.name}/{leaf}"] for _, leaf in self._setpoints]
+        self._control_word, *self._setpoint_indices = places("command", ["control_word", *carried])
         self._value_indices = places("command", [codec.model.name for codec in self._commands])
         self._supervision = places("status", ("fault_text",)) + places("supervision", _SUPERVISION)
         self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms", "telegrams"))
@@ -134,8 +123,6 @@ class Drive:
         self._follows = places("supervision", ("follows", "last_stop"))
         self._stop_ms, self._bridge_ms = places("supervision", ("worst_case_stop_ms", "worst_case_bridge_ms"))
         self._identity = places("identity", _IDENTITY)
-        self._actual.bind(image)
-        image.set(self._abort_code, 0, now)
 
     @property
     def quality(self) -> Quality:
@@ -183,7 +170,7 @@ class Drive:
         carry, by its leaf such as ``actual/value_2``; ``further`` are the TPDOs beside the one with the
         status word, which is late after ``deadline_s``. ``rpdo_type`` is the transmission type of the RPDO
         with the control word."""
-        self.channel.link.pdo_deadline_s = deadline_s
+        self.channel.link.on_boot(deadline_s, further)
         self.rpdo_type = rpdo_type
         found = dict(unserved)
         for value in self.family.values_of(self.slot):
@@ -194,7 +181,6 @@ class Drive:
                 found[value.leaf] = why[0]
         self.channel.unserved.clear()
         self.channel.unserved.update(found)
-        self._actual.set_further(further)
         self._compile()
         self.refresh(now)
 
@@ -204,19 +190,13 @@ class Drive:
 
     def on_scale(self, parameter: str, full: float) -> None:
         """The drive's own value of a scaling parameter; it wins over the site file."""
-        self._learn(parameter, full)
+        self.channel.scales.update(scales_of(self.family, {parameter: full}))
         self._compile()
-
-    def _learn(self, parameter: str, full: float) -> None:
-        for value in self.family.value:
-            scale = scale_of(value, full) if value.full == parameter else None
-            if scale is not None:
-                self.channel.scales[value.leaf] = scale
 
     def _compile(self) -> None:
         scales = self.channel.scales
         self._commands = [codec.scaled(scales.get(codec.model.leaf)) for codec in self._commands]
-        self._actual.compile(scales, self.channel.unserved)
+        self._actual.compile()
 
     def on_own_supervision(self, own: OwnJudgement, now: float) -> None:
         """What the drive does by itself when the bridge falls silent, as the boot-up has read it."""

@@ -5,6 +5,8 @@ The twin of P513 (BU 2500 §8.1). Pure: told of PDOs and of the node's state, as
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import Enum
 
 from bridge.config import IGNORE_ALL_S
@@ -23,11 +25,46 @@ class NodeState(Enum):
     CONFIG_ERROR = "configuration error"
 
 
+@dataclass(slots=True)
+class FurtherTpdo:
+    """A TPDO other than the one with the status word: its values have an age of their own.
+
+    ``places`` are those of its words in ``process.tpdo``; ``deadline_s`` is the longest regular pause
+    between two of them, None if it is sent on change only.
+    """
+
+    name: str
+    places: frozenset[int]
+    deadline_s: float | None
+    last: float | None = None
+    quality: Quality = Quality.WAITING
+
+    def on_data(self, now: float) -> bool:
+        """It has arrived; True if its values were not good before."""
+        self.last = now
+        was_good = self.quality is Quality.GOOD
+        self.quality = Quality.GOOD
+        return not was_good
+
+    def on_time(self, now: float) -> bool:
+        """True where it is late from now on."""
+        if self.quality is not Quality.GOOD or self.is_fresh(now):
+            return False
+        self.quality = Quality.STALE
+        return True
+
+    def is_fresh(self, now: float) -> bool:
+        """It has arrived since the boot-up, and is not late."""
+        if self.quality is not Quality.GOOD or self.last is None:
+            return False
+        return self.deadline_s is None or now < self.last + self.deadline_s
+
+
 class Link:
     """Freshness of one drive's process data. Times are monotonic seconds.
 
-    ``pdo_deadline_s`` is the longest regular pause between two TPDOs, known after boot-up, or None
-    where the drive sends only changes.
+    ``pdo_deadline_s`` is the longest regular pause between two TPDOs with the status word, None before
+    boot-up and where the drive sends only changes. ``further`` are the TPDOs beside it.
     """
 
     def __init__(self, telegram_downtime_s: float, hold_ms: int) -> None:
@@ -35,6 +72,7 @@ class Link:
         self._hold_s = hold_ms / 1000
         self.node = NodeState.ABSENT
         self.pdo_deadline_s: float | None = None
+        self.further: Sequence[FurtherTpdo] = ()
         self.last_pdo: float | None = None
         self._since = float("-inf")  # since when TPDOs may be expected
         self._expired_at: float | None = None
@@ -60,6 +98,10 @@ class Link:
         if self.ignores_errors:
             return self.node in (NodeState.OPERATIONAL, NodeState.LOST)
         return self.node is NodeState.OPERATIONAL and self._expired_at is None
+
+    def on_boot(self, pdo_deadline_s: float | None, further: Sequence[FurtherTpdo]) -> None:
+        """What the boot-up has found."""
+        self.pdo_deadline_s, self.further = pdo_deadline_s, further
 
     def on_pdo(self, now: float) -> bool:
         """A TPDO arrived; True where that ends an expiry."""
@@ -131,6 +173,12 @@ class Link:
         if self._expired_at is not None:
             return Quality.DEAD if now >= self._expired_at + self._hold_s else Quality.LOST
         return Quality.STALE
+
+    def why_lacking(self, places: frozenset[int], now: float) -> str:
+        """Why these words, by their places in ``process.tpdo``, are not known; empty where they are. The TPDO
+        with the status word is judged by ``quality``."""
+        late = [pdo.name for pdo in self.further if not (pdo.places.isdisjoint(places) or pdo.is_fresh(now))]
+        return f"no {late[0]} from the drive" if late else ""
 
     def reason(self, quality: Quality) -> str:
         """Why the data have this quality, in a few words; empty where they are good."""

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from typing import Final
 
 from bridge.command.audit import AuditTrail, Rejection
@@ -17,7 +18,7 @@ from bridge.command.drive import Drive
 from bridge.command.event import Event, EventGate, Kind
 from bridge.command.ignored import conclude
 from bridge.command.link import NodeState
-from bridge.command.points import CONNECTION_COUNTS, NODE_CODES, bridge_points, bus_points, node_points
+from bridge.command.points import CONNECTION_COUNTS, NODE_CODES, site_points
 from bridge.command.request import (
     NODE_ACTIONS,
     PARAMETER_ACTIONS,
@@ -105,28 +106,22 @@ class Plant:
         self._refused_by_others = 0
         self._is_closing = False
         self._buses = frozenset(f"bus/{bus.name}" for bus in site.bus)
-        points = bridge_points()
+        names = {mapping: Names(family) for mapping, family in families.items()}
+        points = site_points(site, families, names)
+        self.image = Image(chain.from_iterable(points.values()))
+        self.audit = AuditTrail(self.image)
         units = _unit_ids(site)
-        every_name = {mapping: Names(family) for mapping, family in families.items()}
         for bus in site.bus:
-            points += bus_points(bus)
             for table in bus.node:
                 family = families[table.mapping]
-                names = every_name[table.mapping]
-                node = self.nodes[table.name] = Node(bus, table, family, names)
-                points += node_points(table, family.poll)
+                node = self.nodes[table.name] = Node(bus, table, family, names[table.mapping])
+                told = self.report, partial(self._on_settled, node), self._tripped
                 for position, drive_table in enumerate(table.drive):
                     unit_id = units[table.name, position]
-                    settled = partial(self._on_settled, node)
-                    drive = Drive(
-                        table, bus, drive_table, family, names, unit_id, self.report, settled, self._tripped
-                    )
+                    drive = Drive(table, bus, drive_table, family, unit_id, self.image, points, *told)
                     node.drives.append(drive)
                     self.drives[drive.name] = drive
                     self.by_unit[unit_id] = drive
-                    points += drive.points
-        self.image = Image(points)
-        self.audit = AuditTrail(self.image)
         index = self.image.index
         self._node_points = {
             name: [index[f"{name}/node/{leaf}"] for leaf in ("state", "current_fault", "last_fault")]
@@ -135,7 +130,7 @@ class Plant:
         for node in self.nodes.values():
             self.image.set(self._node_points[node.name][2], 0.0, began)
             for drive in node.drives:
-                drive.bind(self.image, began)
+                self.set(f"{drive.name}/supervision/sdo_abort_code", 0, began)
                 self._on_settled(node, drive, began)
         self._deadlines.look_every_s = len(self.drives) * _LOOK_PER_DRIVE_S
         self.set("bridge/version", version, began)

@@ -3,16 +3,19 @@ What each means: ``docs/reference/points.md``."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Any, Final
 
 from bridge.command import follow
 from bridge.command.leg.state import STATES as WATCHDOG_STATES
 from bridge.command.link import NodeState
-from bridge.config import BusTable, NodeTable
-from bridge.drive import DRIVE_STATES, LinearScale, ValueCodec
+from bridge.command.parameter_points import parameter_points
+from bridge.config import BusTable, DriveTable, NodeTable, Site
+from bridge.drive import DRIVE_STATES, LinearScale, ValueCodec, scales_of
 from bridge.image import DataType, Point
-from bridge.mapping.model import Family, Poll, ProcessValue, Slot
+from bridge.mapping.model import Family, Poll, ProcessValue
+from bridge.parameter import Names
 
 NMT_STATES: Final = (
     (0, "initialising"),
@@ -49,18 +52,32 @@ def _point(top: str, leaf: str, data_type: DataType, description: str, **nature:
     return Point(name=f"{top}/{leaf}", data_type=data_type, description=description, **nature)
 
 
-def drive_points(
-    name: str, family: Family, slot: Slot, scales: dict[str, LinearScale], *, timeout_writable: bool
-) -> list[Point]:
-    """The points of the drive called ``<node>/<drive>``, without those of words that its PDOs do not carry.
+def site_points(
+    site: Site, families: Mapping[str, Family], names: Mapping[str, Names]
+) -> dict[str, list[Point]]:
+    """Every point, by what has it: the bridge, a bus, a node, a drive. ``families`` and ``names`` are by the
+    node's mapping."""
+    points = {"bridge": _bridge_points()}
+    for bus in site.bus:
+        points[f"bus/{bus.name}"] = _bus_points(bus)
+        for node in bus.node:
+            family, shown = families[node.mapping], names[node.mapping]
+            points[node.name] = _node_points(node, family.poll)
+            for table in node.drive:
+                name = f"{node.name}/{family.leaf_of(table)}"
+                points[name] = _drive_points(name, family, table) + parameter_points(name, shown)
+    return points
 
-    ``scales``: those already known, by the value's leaf; they give the ranges.
-    ``timeout_writable``: the owner may change ``fieldbus_timeout_ms``.
-    """
+
+def _drive_points(name: str, family: Family, table: DriveTable) -> list[Point]:
+    """The points of the drive called ``<node>/<drive>``, without those of words that its PDOs do not carry.
+    Scales that are known already give the ranges."""
     command, actual = partial(_point, f"{name}/command"), partial(_point, f"{name}/actual")
     control_bits = tuple(family.control_word.bits)
+    slot = family.slot_named(table.slot)
     setpoints, actual_values = family.carried(slot)
     values = family.values_of(slot)
+    scales = scales_of(family, table.parameters)
     as_written = "the owner's setpoint word, until a stop replaces it"
     as_sent = "actual value word as the drive sent it"
     last = "the owner's control word, or the stop or start that has replaced it"
@@ -71,7 +88,7 @@ def drive_points(
         *_status_points(name, family),
         *(actual(word, _U16, as_sent) for word in actual_values[1:]),
         *(_value(name, value, scales) for value in values if value.group == "actual"),
-        *_supervision_points(name, timeout_writable),
+        *_supervision_points(name, table.fieldbus_timeout_writable),
         *_identity_points(name),
     ]
 
@@ -161,7 +178,7 @@ def _identity_points(name: str) -> list[Point]:
     ]
 
 
-def node_points(node: NodeTable, polls: list[Poll]) -> list[Point]:
+def _node_points(node: NodeTable, polls: list[Poll]) -> list[Point]:
     point = partial(_point, f"{node.name}/node")
     return [
         point("nmt_state", _U8, "NMT state as the node reports it", states=NMT_STATES),
@@ -181,7 +198,7 @@ def node_points(node: NodeTable, polls: list[Poll]) -> list[Point]:
     ]
 
 
-def bus_points(bus: BusTable) -> list[Point]:
+def _bus_points(bus: BusTable) -> list[Point]:
     point = partial(_point, f"bus/{bus.name}")
     return [
         point("state", _U8, "state of the CAN controller", states=CONTROLLER_STATES),
@@ -206,7 +223,7 @@ def bus_points(bus: BusTable) -> list[Point]:
     ]
 
 
-def bridge_points() -> list[Point]:
+def _bridge_points() -> list[Point]:
     point = partial(_point, "bridge")
     return [
         point("version", _TEXT, "version of drivebridge"),

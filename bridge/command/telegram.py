@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from bridge.command.request import Code
-from bridge.drive import LinearScale, ParameterSet, ValueCodec, Written
+from bridge.drive import LinearScale, ParameterSet, ValueCodec, Written, codecs
 from bridge.image import Value
 from bridge.mapping.model import Family, Slot
 
@@ -72,11 +72,7 @@ class TelegramDecoder:
         words = family.process.rpdo[1:]
         carried = family.carried(slot)[0]
         self._setpoints = {word: place for place, word in enumerate(words) if word in carried}
-        self._values = {
-            value.name: ValueCodec(value, words)
-            for value in family.values_of(slot)
-            if value.group == "command"
-        }
+        self._values = {codec.model.name: codec for codec in codecs(family, slot, "command", words, {})}
         self._set = ParameterSet(family.control_word.parameter_set_bits)
         self._set_values = {
             name for name, codec in self._values.items() if family.depends_on_set(codec.model)

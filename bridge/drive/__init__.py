@@ -10,6 +10,7 @@ from bridge.drive.scaling import scale_of as scale_of
 from bridge.drive.values import ValueCodec as ValueCodec
 from bridge.drive.values import Written as Written
 from bridge.drive.values import codecs as codecs
+from bridge.drive.values import scales_of as scales_of
 from bridge.drive.words import DRIVE_STATES as DRIVE_STATES
 from bridge.drive.words import FAULTED as FAULTED
 from bridge.drive.words import MOVING as MOVING

@@ -115,6 +115,12 @@ class ValueCodec:
         return number
 
 
+def scales_of(family: Family, given: Mapping[str, float]) -> dict[str, LinearScale]:
+    """The scales that are known with the parameters that are ``given``, by the value's leaf."""
+    found = {value.leaf: scale_of(value, given.get(value.full or "")) for value in family.value}
+    return {leaf: scale for leaf, scale in found.items() if scale is not None}
+
+
 def codecs(
     family: Family, slot: Slot, group: str, words: Sequence[str], given: Mapping[str, float]
 ) -> list[ValueCodec]:

@@ -65,7 +65,6 @@ class Rig:
             self.events.append,
             settled=lambda now: None,
             tripped=lambda due: None,
-            why_lacking=lambda places, now: "",
         )
         self.channel.scales.setdefault("command/frequency", LinearScale(50.0, 16384, 2.0))
         self.channel.scales.setdefault("command/velocity", LinearScale(3000.0, 1000, 2.0))

@@ -20,8 +20,7 @@ from pymodbus.client import AsyncModbusTcpClient
 
 from bridge.auditlog import AuditLog
 from bridge.command import Code, Identification, Outcome, Plant, PlantView, Reply, Request
-from bridge.command.actual import FurtherTpdo
-from bridge.command.link import NodeState
+from bridge.command.link import FurtherTpdo, NodeState
 from bridge.config import ModbusTable
 from bridge.config.model import AuditTable
 from bridge.errors import Unavailable

@@ -10,9 +10,9 @@ from typing import NamedTuple
 from bridge.canopen.frame import Frame
 from bridge.canopen.sync import LAST_SYNCHRONOUS, REMOTE_SYNCHRONOUS, REMOTE_TYPES, tpdo_deadline_s
 from bridge.command import Drive
-from bridge.command.actual import FurtherTpdo
 from bridge.command.channel import DriveChannel
 from bridge.command.leg.state import Output
+from bridge.command.link import FurtherTpdo
 from bridge.command.plant import Node
 from bridge.config import BusTable
 from bridge.image import Quality

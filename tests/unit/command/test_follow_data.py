@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.command import Action, Code, Outcome, Request, command_of
-from bridge.command.actual import FurtherTpdo
-from bridge.command.link import NodeState
+from bridge.command.link import FurtherTpdo, NodeState
 from bridge.image import Value
 from tests.support import sites
 from tests.support.rig import PLC

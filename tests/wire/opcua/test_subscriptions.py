@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncIterator
+from unittest.mock import patch
 
 import pytest
 import pytest_asyncio
@@ -13,7 +14,8 @@ from asyncua.common.subscription import Subscription
 
 from bridge.command import Event, Kind
 from bridge.command.link import NodeState
-from bridge.image import Image, Point, Quality
+from bridge.command.points import site_points
+from bridge.image import Point, Quality
 from bridge.image.point import DataType
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support.opcua_site import OPEN, LocalView, connected, make_plant, namespace, serving
@@ -27,12 +29,9 @@ LOAD = "bus/can0/load"
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def served(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[tuple[OpcUaServer, LocalView]]:
-    plant = make_plant()
     many = [Point(name=f"bus/can0/{n // 50}/{n}", data_type=DataType.UINT32) for n in range(MANY)]
-    plant.image = Image([*plant.image.points, *many])
-    for drive in plant.drives.values():
-        drive.bind(plant.image, time.monotonic())
-        drive.refresh(time.monotonic())
+    with patch("bridge.command.plant.site_points", lambda *site: site_points(*site) | {"many": many}):
+        plant = make_plant()
     async with serving(OPEN, tmp_path_factory.mktemp("state"), plant) as found:
         yield found
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
-from bridge.command.leg.state import MEANING, STARTING, TRIPPED, WAY, Stage
+from bridge.command.leg.state import ANY_TRIP, MEANING, NORMAL, STARTING, Stage
 from bridge.command.leg.table import TABLE, Deed, Stimulus
 from tools.marks import replaced
 
@@ -20,9 +20,9 @@ PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "de
 BEGIN: Final = "<!-- drawn by tools/state_table.py: begin -->"
 END: Final = "<!-- drawn by tools/state_table.py: end -->"
 PARTS: Final = {
-    "Neither tripped nor in a start": WAY,
+    "Neither tripped nor in a start": NORMAL,
     "While a start goes on": STARTING,
-    "While tripped": TRIPPED,
+    "While tripped": ANY_TRIP,
 }
 
 

@@ -16,7 +16,7 @@ from bridge.command.leg import event, owners
 from bridge.command.leg.effect import Answer, Effect, Heard, Ignored, StartBegun, StartEnded, Tell, Tripped
 from bridge.command.leg.outlook import next_deadline, output_then, until, watchdog_state
 from bridge.command.leg.settings import leg_settings
-from bridge.command.leg.state import AWAITS_REPORT, INTERLOCKED, LegState, Output, WatchdogState, Way
+from bridge.command.leg.state import AWAITS_REPORT, WANTS_STOP_WORD, LegState, Output, WatchdogState, Way
 from bridge.command.leg.step import initial, step
 from bridge.command.leg.turn import control_word
 from bridge.command.link import Link, NodeState
@@ -109,7 +109,7 @@ class DriveChannel:
 
     @property
     def restart_interlock(self) -> bool:
-        return self.leg.stage in INTERLOCKED
+        return self.leg.stage in WANTS_STOP_WORD
 
     @property
     def owner(self) -> Identity | None:
@@ -120,9 +120,9 @@ class DriveChannel:
         return watchdog_state(self.leg_settings, self.leg)
 
     @property
-    def controller_is_silent(self) -> bool:
+    def controller_is_overdue(self) -> bool:
         """No valid telegram for longer than the time-out, after there had been one."""
-        return self.leg.timer.is_silent
+        return self.leg.timer.is_overdue
 
     @property
     def timeout_ms(self) -> int:
@@ -183,7 +183,7 @@ class DriveChannel:
 
     def refusal(self, identity: Identity) -> str:
         """Why ``identity`` may not command the drive, whose owner is there; empty where it may."""
-        return owners.refusal(self.settings.control, self.leg.owner, identity, owner_is_silent=False)
+        return owners.refusal(self.settings.control, self.leg.owner, identity, is_replaceable=False)
 
     # from the drive
 

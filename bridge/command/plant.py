@@ -290,7 +290,9 @@ class Plant:
         drive.refresh(now)
         if drive.following.awaits_sending:
             self.unsent_stops.add(drive)
-        silent = any(drive.channel.is_tripped and drive.channel.controller_is_silent for drive in node.drives)
+        silent = any(
+            drive.channel.is_tripped and drive.channel.controller_is_overdue for drive in node.drives
+        )
         fault = node.family.faults.bridge_timeout if silent else 0.0
         state, current, last = self._node_points[node.name]
         self.image.set(state, NODE_CODES[node.drives[0].channel.link.node], now)

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, Final
 
 from bridge.command import follow
-from bridge.command.leg.state import STATES as WATCHDOG_STATES
+from bridge.command.leg.state import WATCHDOG_STATES
 from bridge.command.link import NodeState
 from bridge.command.parameter_points import parameter_points
 from bridge.config import BusTable, DriveTable, NodeTable, Site

@@ -9,7 +9,7 @@ from bridge.command.leg.effect import Answer, Effect, Tell
 from bridge.command.leg.event import Event, NodeBack, Report, Time
 from bridge.command.leg.outlook import next_deadline
 from bridge.command.leg.settings import LegSettings, leg_settings
-from bridge.command.leg.state import INTERLOCKED, Way
+from bridge.command.leg.state import WANTS_STOP_WORD, Way
 from bridge.command.leg.step import initial, step
 from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
@@ -112,7 +112,7 @@ class Leg:
 
     @property
     def is_interlocked(self) -> bool:
-        return self.state.stage in INTERLOCKED
+        return self.state.stage in WANTS_STOP_WORD
 
 
 def told(effects: list[Effect]) -> list[Any]:

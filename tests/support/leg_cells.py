@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from bridge.command.leg.state import STARTING, TRIPPED, UNHEARD, Stage
+from bridge.command.leg.state import ANY_TRIP, STARTING, UNHEARD, Stage
 from bridge.command.leg.table import Stimulus
 
 _S, _E = Stage, Stimulus
@@ -18,11 +18,11 @@ _EXPIRED: Final = (_E.EXPIRED_DISABLE, _E.EXPIRED_QUICK_STOP, _E.EXPIRED_SILENCE
 _STARTS: Final = (_E.START, _E.START_STOPPING, _E.START_UNHEARD, _E.START_BRAKING)
 
 _REASONS: Final[tuple[tuple[str, Iterable[Stimulus], Iterable[Stage]], ...]] = (
-    ("a watchdog that has tripped does not trip again", _EXPIRED, TRIPPED),
+    ("a watchdog that has tripped does not trip again", _EXPIRED, ANY_TRIP),
     (
         "a start is refused while the way is closed or until a trip is acknowledged",
         _STARTS,
-        {_S.CLOSED, *TRIPPED},
+        {_S.CLOSED, *ANY_TRIP},
     ),
     ("a drive in fault is not started, and a fault ends a start", [_E.ACKNOWLEDGE_FAULT], STARTING),
     ("an enabling word is on the bus, so no stop is on its way", [_E.START_STOPPING], [_S.ENABLED, _S.BLIND]),

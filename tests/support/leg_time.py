@@ -55,7 +55,7 @@ def _with(leg: LegState, seen: Seen, instants: Instants) -> State:
         )
     leg = leg._replace(
         owner=type(owner)(owner.identity, owner.lease_s, lease_until, absent_until, stopped_until),
-        timer=type(timer)(timer.timeout_ms, heard_at, deadline, timer.is_silent),
+        timer=type(timer)(timer.timeout_ms, heard_at, deadline, timer.is_overdue),
         trip=type(leg.trip)(*trip),
         order=order._replace(deadline=instants[7], rises_at=instants[8]),
         pulse_until=instants[9],

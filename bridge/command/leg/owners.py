@@ -22,7 +22,7 @@ GONE_S: Final = 10.0
 that connects anew for each telegram, and for a person who was stopped."""
 
 
-def refusal(control: str, owner: Owner, identity: Identity, *, owner_is_silent: bool) -> str:
+def refusal(control: str, owner: Owner, identity: Identity, *, is_replaceable: bool) -> str:
     """Why ``identity`` may not command the drive now, in one sentence; empty where it may."""
     if identity.role < Role.OPERATOR:
         return f"{identity} may only read"
@@ -36,19 +36,19 @@ def refusal(control: str, owner: Owner, identity: Identity, *, owner_is_silent: 
         return f"the drive is controlled by {owner.identity}"
     if identity.source.label != control:
         return f"the drive is controlled by {control}"
-    if owner.identity is None or owner_is_silent:
+    if owner.identity is None or is_replaceable:
         return ""
     return f"the drive is controlled by {owner.identity}"
 
 
-def _take_refusal(control: str, owner: Owner, identity: Identity, *, owner_is_silent: bool) -> str:
+def _take_refusal(control: str, owner: Owner, identity: Identity, *, is_replaceable: bool) -> str:
     """Why ``identity`` may not take control now, empty where it may. An engineer always may."""
     if control != "lease":
         may_break = identity.role >= Role.ENGINEER and identity.source.label == control
-        return "" if may_break else refusal(control, owner, identity, owner_is_silent=owner_is_silent)
+        return "" if may_break else refusal(control, owner, identity, is_replaceable=is_replaceable)
     if identity.role < Role.OPERATOR:
         return f"{identity} may only read"
-    free = owner.identity is None or owner_is_silent or identity.is_same(owner.identity)
+    free = owner.identity is None or is_replaceable or identity.is_same(owner.identity)
     if free or identity.role >= Role.ENGINEER:
         return ""
     return f"the drive is controlled by {owner.identity}"
@@ -62,16 +62,16 @@ def check_authority(turn: Turn, request: Request) -> None:
     if request.action in STOP_ACTIONS and may_stop and identity.role >= Role.OPERATOR:
         return
     judge = _take_refusal if request.action is Action.TAKE_CONTROL else refusal
-    why = judge(settings.control, turn.owner, identity, owner_is_silent=_owner_is_silent(turn))
+    why = judge(settings.control, turn.owner, identity, is_replaceable=_owner_is_replaceable(turn))
     if why:
         raise Refusal(Code.NOT_ALLOWED, why)
 
 
-def _owner_is_silent(turn: Turn) -> bool:
+def _owner_is_replaceable(turn: Turn) -> bool:
     """Without a lease, an owner that has sent no telegram yet holds nobody up either: no time ends that."""
     timer = turn.timer
     is_idle = timer.timeout_ms > 0 and timer.heard_at is None and turn.settings.control != "lease"
-    return timer.is_silent or is_idle or _owner_is_gone(turn)
+    return timer.is_overdue or is_idle or _owner_is_gone(turn)
 
 
 def _owner_is_gone(turn: Turn) -> bool:
@@ -128,7 +128,7 @@ def take_control(turn: Turn, identity: Identity, ttl_ms: int) -> None:
     if turn.settings.control == "lease" and not low <= ttl_ms <= high:
         raise Refusal(Code.OUT_OF_RANGE, f"ttl_ms takes {low}…{high}")
     owner = turn.owner.identity
-    if owner is not None and not _owner_is_silent(turn) and not identity.is_same(owner):
+    if owner is not None and not _owner_is_replaceable(turn) and not identity.is_same(owner):
         turn.tell(Kind.OWNER, 500, f"{identity} takes control away from {owner}")
     _hand_over(turn, identity, ttl_ms / 1000)
 
@@ -152,7 +152,7 @@ def set_timeout(turn: Turn, identity: Identity, timeout_ms: int) -> None:
     low, high = settings.timeout_range_ms
     if not low <= timeout_ms <= high:
         raise Refusal(Code.OUT_OF_RANGE, f"fieldbus_timeout_ms takes {low}…{high} here")
-    runs = timeout_ms and timer.heard_at is not None and not timer.is_silent
+    runs = timeout_ms and timer.heard_at is not None and not timer.is_overdue
     deadline = (timer.heard_at or 0.0) + timeout_ms / 1000 if runs else None
-    turn.timer = Timer(timeout_ms, timer.heard_at, deadline, timer.is_silent)
+    turn.timer = Timer(timeout_ms, timer.heard_at, deadline, timer.is_overdue)
     turn.tell(Kind.CONFIGURATION, 400, f"fieldbus_timeout_ms = {timeout_ms}, by {identity}")

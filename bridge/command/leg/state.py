@@ -22,7 +22,7 @@ class WatchdogState(IntEnum):
         return self.name.lower()
 
 
-STATES: Final = tuple((state.value, state.label) for state in WatchdogState)
+WATCHDOG_STATES: Final = tuple((state.value, state.label) for state in WatchdogState)
 
 
 class Stage(StrEnum):
@@ -49,7 +49,7 @@ class Stage(StrEnum):
 
     @property
     def is_tripped(self) -> bool:
-        return self in TRIPPED
+        return self in ANY_TRIP
 
 
 MEANING: Final[dict[Stage, str]] = {
@@ -70,7 +70,7 @@ MEANING: Final[dict[Stage, str]] = {
     Stage.HELD: "what was sent before the trip is still sent",
     Stage.LET_GO: "a stop has replaced what was held",
 }
-WAY: Final = (Stage.CLOSED, Stage.INTERLOCKED, Stage.READY, Stage.ENABLED)
+NORMAL: Final = (Stage.CLOSED, Stage.INTERLOCKED, Stage.READY, Stage.ENABLED)
 """Neither tripped nor in a start."""
 
 STARTING: Final = frozenset(
@@ -88,8 +88,8 @@ UNHEARD: Final = frozenset((Stage.ASKING, Stage.PREPARED, Stage.BLIND))
 AWAITS_REPORT: Final = UNHEARD | {Stage.SETTLING}
 """What the drive says next counts, also where it says nothing new."""
 REACTING: Final = frozenset((Stage.RAMPING, Stage.TRIPPED, Stage.SILENCED))
-TRIPPED: Final = REACTING | {Stage.HELD, Stage.LET_GO}
-INTERLOCKED: Final = TRIPPED | {Stage.CLOSED, Stage.INTERLOCKED}
+ANY_TRIP: Final = REACTING | {Stage.HELD, Stage.LET_GO}
+WANTS_STOP_WORD: Final = ANY_TRIP | {Stage.CLOSED, Stage.INTERLOCKED}
 """The owner has to send a word that does not enable before one that does goes to the drive."""
 BLOCKED: Final = frozenset((Stage.CLOSED, Stage.INTERLOCKED, Stage.LET_GO))
 """A word of the owner's that enables is replaced by the stop that is in force."""
@@ -119,13 +119,13 @@ class Output(NamedTuple):
 
 
 class Timer(NamedTuple):
-    """The watchdog's: ``timeout_ms`` 0 is off. ``is_silent``: the time-out has passed since the owner's last
+    """The watchdog's: ``timeout_ms`` 0 is off. ``is_overdue``: the time-out has passed since the owner's last
     telegram."""
 
     timeout_ms: int
     heard_at: float | None = None
     deadline: float | None = None
-    is_silent: bool = False
+    is_overdue: bool = False
 
 
 class Owner(NamedTuple):

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from typing import Final
 
-from bridge.command.leg.state import AWAITS_REPORT, STARTING, TRIPPED, Stage
+from bridge.command.leg.state import ANY_TRIP, AWAITS_REPORT, STARTING, Stage
 
 _S = Stage
 
@@ -102,7 +102,7 @@ def _starts(after: Stage, deed: Deed, kept: Iterable[Stage] = ()) -> _Row:
         _SHUT: (None, Deed.REFUSE),
         _FREE: (after, deed),
         tuple(kept): (None, deed),
-        tuple(TRIPPED): (None, Deed.REFUSE),
+        tuple(ANY_TRIP): (None, Deed.REFUSE),
     }
 
 
@@ -118,22 +118,22 @@ _ROWS: Final[dict[Stimulus, _Row]] = {
         _HOLDING: (_S.LET_GO, Deed.FORWARD),
     },
     Stimulus.ENABLING_WORD: {
-        (*_SHUT, *_LOCKED, *TRIPPED): (None, Deed.TAKE),
+        (*_SHUT, *_LOCKED, *ANY_TRIP): (None, Deed.TAKE),
         (*_OPEN, *STARTING): (_S.ENABLED, Deed.FORWARD),
     },
     Stimulus.SETPOINTS: {
-        (*_SHUT, *_LOCKED, *TRIPPED): (None, Deed.TAKE),
+        (*_SHUT, *_LOCKED, *ANY_TRIP): (None, Deed.TAKE),
         (*_OPEN, *STARTING): (None, Deed.FORWARD),
     },
     Stimulus.INVALID: {tuple(Stage): (None, Deed.REFUSE)},
     Stimulus.LATE_STOP: {**_stops(), _REACTING: (None, Deed.TAKE)},
     Stimulus.ACKNOWLEDGE: {
         _NOT_TRIPPED: (None, Deed.CLEAR),
-        tuple(TRIPPED): (_S.INTERLOCKED, Deed.CLEAR_STOP),
+        tuple(ANY_TRIP): (_S.INTERLOCKED, Deed.CLEAR_STOP),
     },
     Stimulus.ACKNOWLEDGE_FAULT: {
         _SHUT: (None, Deed.CLEAR_STOP),
-        (*_FREE, *TRIPPED): (_S.INTERLOCKED, Deed.CLEAR_STOP),
+        (*_FREE, *ANY_TRIP): (_S.INTERLOCKED, Deed.CLEAR_STOP),
     },
     Stimulus.LEFT: _stops(),
     Stimulus.STOP: _stops(),

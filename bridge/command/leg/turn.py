@@ -197,7 +197,7 @@ class Turn:
         """Is the controller still there?"""
         timer = self.timer
         if timer.deadline is not None and self.now >= timer.deadline:
-            self.timer = timer._replace(deadline=None, is_silent=True)
+            self.timer = timer._replace(deadline=None, is_overdue=True)
             if self.settings.ignores_errors:
                 self.effects.append(Ignored())
             elif not self.is_tripped:

@@ -243,7 +243,7 @@ class TestTripped:
         rig.write(SHUT_DOWN)
         rig.wait(10)
         assert rig.channel.trips == 1
-        assert rig.channel.controller_is_silent
+        assert rig.channel.controller_is_overdue
 
     def test_silence_after_the_acknowledge_is_a_second_trip(self):
         rig = tripped()

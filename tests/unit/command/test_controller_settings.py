@@ -135,7 +135,7 @@ class TestSetTimeout:
         for timeout_ms in (400, 0, 300):
             assert rig.ask(Action.SET_TIMEOUT, timeout_ms=timeout_ms).ok
             assert rig.channel.leg.timer.deadline is None
-        assert rig.channel.controller_is_silent
+        assert rig.channel.controller_is_overdue
         rig.wait(10)
         assert len(rig.told(Kind.WATCHDOG)) == told
         assert rig.channel.trips == (downtime_s > 0)

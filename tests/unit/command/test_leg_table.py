@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bridge.command.leg.state import MEANING, REACTING, STARTING, TRIPPED, WAY, Stage
+from bridge.command.leg.state import ANY_TRIP, MEANING, NORMAL, REACTING, STARTING, Stage
 from bridge.command.leg.table import TABLE, Deed, Stimulus
 
 MAY_ENABLE = frozenset((Stage.ENABLED, Stage.BLIND, Stage.LEADING, Stage.HELD))
@@ -22,7 +22,7 @@ STOPS = frozenset((Stimulus.STOP, Stimulus.LATE_STOP, Stimulus.LEFT, Stimulus.AN
 
 def test_every_stage_has_each_event_and_a_meaning() -> None:
     assert TABLE.keys() == {(stage, stimulus) for stage in Stage for stimulus in Stimulus}
-    assert MEANING.keys() == set(Stage) == {*WAY, *STARTING, *TRIPPED}
+    assert MEANING.keys() == set(Stage) == {*NORMAL, *STARTING, *ANY_TRIP}
 
 
 def test_only_an_order_leads_to_where_a_drive_is_enabled() -> None:
@@ -33,20 +33,20 @@ def test_only_an_order_leads_to_where_a_drive_is_enabled() -> None:
 
 
 def test_an_enabling_word_passes_no_interlock_no_closed_way_and_no_trip() -> None:
-    for stage in (Stage.CLOSED, Stage.INTERLOCKED, *TRIPPED):
+    for stage in (Stage.CLOSED, Stage.INTERLOCKED, *ANY_TRIP):
         assert TABLE[stage, Stimulus.ENABLING_WORD] == (stage, Deed.TAKE)
 
 
 def test_nothing_but_an_acknowledge_ends_a_trip() -> None:
     for (stage, stimulus), (after, _) in TABLE.items():
-        if stage in TRIPPED and after not in TRIPPED:
+        if stage in ANY_TRIP and after not in ANY_TRIP:
             assert stimulus in ACKNOWLEDGES
             assert after is Stage.INTERLOCKED
 
 
 def test_nothing_but_the_timer_trips() -> None:
     for (stage, stimulus), (after, deed) in TABLE.items():
-        if after in TRIPPED and stage not in TRIPPED:
+        if after in ANY_TRIP and stage not in ANY_TRIP:
             assert stimulus.name.startswith("EXPIRED")
             assert deed is Deed.REACT
 
@@ -63,7 +63,7 @@ def test_a_stop_counts_in_every_stage() -> None:
 def test_a_closed_way_lets_nothing_through_but_an_order_to_hold() -> None:
     for stage in Stage:
         after, _ = TABLE[stage, Stimulus.WAY_CLOSED]
-        assert after in {Stage.CLOSED, *TRIPPED} - {Stage.HELD}
+        assert after in {Stage.CLOSED, *ANY_TRIP} - {Stage.HELD}
 
 
 def test_what_is_not_valid_changes_nothing() -> None:

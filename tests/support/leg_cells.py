@@ -27,6 +27,7 @@ _REASONS: Final[tuple[tuple[str, Iterable[Stimulus], Iterable[Stage]], ...]] = (
     ("a drive in fault is not started, and a fault ends a start", [_E.ACKNOWLEDGE_FAULT], STARTING),
     ("an enabling word is on the bus, so no stop is on its way", [_E.START_STOPPING], [_S.ENABLED, _S.BLIND]),
     ("the drive has been heard, and a node that is back ends the start", [_E.START_UNHEARD], _LED),
+    ("what was held is let go as soon as its node is gone", [_E.NODE_BACK], [_S.HELD]),
     ("until it has reported nobody knows of its quick stop", [_E.START_BRAKING], UNHEARD),
     ("only a start has an end that can be overdue", [_E.START_OVERDUE], _IDLE),
     ("a report is waited for in two stages only", [_E.REPORT_OVERDUE], {*Stage} - {_S.ASKING, _S.PREPARED}),

@@ -266,8 +266,7 @@ class Turn:
         if self.may_enable:
             self.happens(Stimulus.WAY_OPEN)
             return
-        if self.stage is not Stage.HELD or self.is_enabling:
-            self.happens(Stimulus.WAY_CLOSED, Outcome(Code.NOT_READY, self.why_blocked))
+        self.happens(Stimulus.WAY_CLOSED, Outcome(Code.NOT_READY, self.why_blocked))
         self.order = order.dropped(self.order)
 
     def settle(self) -> None:

@@ -153,11 +153,11 @@ class DriveChannel:
     @property
     def state(self) -> DriveState:
         """The state as the drive reports it."""
-        return self._status.state
+        return self.leg.drive
 
     @property
     def served_state(self) -> DriveState:
-        return DriveState.FAULT if self.is_tripped else self._status.state
+        return DriveState.FAULT if self.is_tripped else self.leg.drive
 
     @property
     def emcy_code(self) -> int:
@@ -179,7 +179,7 @@ class DriveChannel:
 
     @property
     def fault_text(self) -> str:
-        return self._status.fault_text(self._bridge_fault)
+        return self._status.fault_text(self._bridge_fault, self.state)
 
     def refusal(self, identity: Identity) -> str:
         """Why ``identity`` may not command the drive, whose owner is there; empty where it may."""
@@ -206,8 +206,7 @@ class DriveChannel:
         status.word = word
         is_news = is_news or not leg.way.is_heard
         if is_news or leg.stage in AWAITS_REPORT or leg.trip.ramps_until is not None:
-            status.state = state
-            text = self.fault_text if state in FAULTED else ""
+            text = status.fault_text(self._bridge_fault, state) if state in FAULTED else ""
             self._happen(event.Report(state, is_taken, text), now)
 
     def on_unchanged(self, now: float) -> None:
@@ -369,7 +368,7 @@ class DriveChannel:
         if reaction == "silence" and not self.leg.silence_stops:
             reaction = "disable_voltage"
         silent = f"{tripped.who} was silent for {tripped.timeout_ms} ms"
-        message = f"{silent}: {reaction}, {self._status.fault_text(fault)}"
+        message = f"{silent}: {reaction}, {self._status.fault_text(fault, self.state)}"
         self._tell(now, Kind.WATCHDOG, 900, message)
         self._tripped(tripped.due)
 

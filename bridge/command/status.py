@@ -1,4 +1,4 @@
-"""What a drive says of itself: status word, state, emergency, faults."""
+"""What a drive says of itself: status word, emergency, faults."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ class DriveStatus:
         self.faults = family.faults
         self.words = StatusWords(family.status_word)
         self.word = 0
-        self.state = DriveState.UNKNOWN
         self.emcy_code = 0
         self._emcy_text = ""
         self.link_fault = 0.0
@@ -42,14 +41,14 @@ class DriveStatus:
             self._drive_last = last
         return (self.drive_fault, self.last_fault) != before
 
-    def fault_text(self, bridge_fault: float) -> str:
-        """The present fault in words, the bridge's own before the drive's; empty where there is none."""
+    def fault_text(self, bridge_fault: float, state: DriveState) -> str:
+        """The present fault, the bridge's own before the drive's; empty where there is none."""
         if bridge_fault:
             number = f"{bridge_fault:.1f}"
             return f"{self.faults.prefix}{number} {self.faults.texts.get(number, '')}".strip()
         if self.drive_fault:
             return self._drive_text(self.drive_fault)
-        if self.state in FAULTED:
+        if state in FAULTED:
             return self._emcy_text or "fault"
         return ""
 

@@ -213,8 +213,14 @@ class Plant:
         what has brought it about."""
         return lambda outcome: self._outcomes.append((reply, outcome))
 
+    @property
+    def has_outcomes(self) -> bool:
+        """Somebody waits for one."""
+        return bool(self._outcomes)
+
     def deliver_outcomes(self) -> None:
-        """Give each waiting outcome to whoever asked, and those that come of it."""
+        """Give each waiting outcome to whoever asked, and those that come of it. Raises what a reply raises:
+        the others are still there to be delivered."""
         while self._outcomes:
             reply, outcome = self._outcomes.popleft()
             reply(outcome)

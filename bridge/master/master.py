@@ -15,6 +15,7 @@ from bridge.can import open_all
 from bridge.can.interface import Bus, ControllerState
 from bridge.command import Action, Event, Kind, Plant, Reply, Request
 from bridge.errors import OperationFailed
+from bridge.guard import Guard
 from bridge.master.ending import Ending, end, waits_for
 from bridge.master.lateness import Lateness
 from bridge.master.line import RENEWALS, Line
@@ -65,6 +66,7 @@ class Master:
         self._alive = alive
         self._suspend = SuspendWatch(suspended)
         self._lateness = Lateness(plant)
+        self._replies = Guard("outcome")
         self._due: float | None = None
         self._timer: LoopTimer | None = None
         self._set_timer: Callable[[float], None] = lambda at: None
@@ -199,8 +201,11 @@ class Master:
         self._last_round = now
         self._alive(now)
         self._arm(now)
-        # What this causes is done in a round of its own: the present one is over.
-        self._plant.deliver_outcomes()
+        # What this causes is done in a round of its own: the present one is over. A reply is a server's code:
+        # one that fails ends neither the master nor keeps another from its outcome.
+        while self._plant.has_outcomes:
+            with self._replies:
+                self._plant.deliver_outcomes()
 
     def _enforce(self, node: str, action: Action, why: str, now: float) -> None:
         for line in self._lines:

@@ -10,7 +10,7 @@ from bridge.can.burstend import Burst
 from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtState
-from bridge.command import Action, Code
+from bridge.command import Action, Code, Outcome, ReadParameter, Request
 from bridge.command.plant import Enforce
 from bridge.image import Quality
 from bridge.mapping.model import IdentityRule
@@ -490,3 +490,16 @@ def test_bursts_that_the_kernel_no_longer_takes_are_told_once_and_so_is_their_re
         "the kernel takes no bursts (Cannot allocate memory): the bridge sends them itself, less evenly",
         "the kernel sends the bursts again",
     ]
+
+
+def test_a_server_whose_reply_fails_ends_nothing_and_keeps_no_other_waiting(bench: Bench) -> None:
+    def fails(outcome: Outcome) -> None:
+        told.append("failed")
+        raise RuntimeError("a fault of a server")
+
+    told: list[str] = []
+    for reply in (fails, lambda outcome: told.append(outcome.code), fails):
+        bench.view.submit(Request(PLC, "conveyor/fu1", ReadParameter("P102")), reply)
+    bench.run(1.0)
+    assert sorted(told) == ["failed", "failed", "ok"]
+    assert bench.write(control_word=0x047E).ok

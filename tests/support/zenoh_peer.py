@@ -64,6 +64,11 @@ class Peer:
         self._process.stdin.write(json.dumps(order).encode() + b"\n")
         return await asyncio.wait_for(future, 10)
 
+    async def subscribe(self, key: str) -> None:
+        """Subscribe; whoever this peer is connected to knows of it, because it has answered a later query."""
+        await self.do("subscribe", key)
+        await self.do("get", key)
+
     async def command(
         self, key: str, payload: object = None, controller: str | None = None, target: str | None = None
     ) -> dict[str, Any]:

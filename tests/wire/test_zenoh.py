@@ -28,7 +28,7 @@ from tests.support.zenoh_site import (
 
 async def test_section_6_8_of_the_manual_is_played_through_zenoh() -> None:
     async with rig() as r:
-        await r.peer.do("subscribe", f"{FU3}/**")
+        await r.peer.subscribe(f"{FU3}/**")
         node_is(r.plant, NodeState.OPERATIONAL)
         drive_says(r.fu3, SWITCH_ON_INHIBITED)
         await r.sees(f"{FU3}/status/state", v=1, s="switch_on_inhibited", q="good")
@@ -84,7 +84,7 @@ async def test_methods() -> None:
 
 async def test_who_does_not_own_the_drive_is_refused() -> None:
     async with rig() as r:
-        await r.peer.do("subscribe", f"{TOP}/@/event/**")
+        await r.peer.subscribe(f"{TOP}/@/event/**")
         answer = await r.peer.command(f"{TOP}/conveyor/fu1/command/control_word", 0x047E)
         assert answer == {"ok": False, "code": "not_allowed", "message": "the drive is controlled by modbus"}
         assert (await r.peer.command(f"{FU3}/command/control_word", 0x047E, "first"))["ok"]
@@ -120,7 +120,7 @@ async def test_what_is_no_command_is_answered_with_a_sentence(key: str, payload:
 
 async def test_what_is_no_command_is_told_as_an_event_of_the_drive_it_was_for() -> None:
     async with rig() as r:
-        await r.peer.do("subscribe", f"{TOP}/@/event/**")
+        await r.peer.subscribe(f"{TOP}/@/event/**")
         await r.peer.command(f"{FU3}/command/control_word", "on")
         await until(lambda: r.peer.latest(f"{TOP}/@/event/refused"), "the refusal as an event")
         event = r.peer.latest(f"{TOP}/@/event/refused") or {}
@@ -130,7 +130,7 @@ async def test_what_is_no_command_is_told_as_an_event_of_the_drive_it_was_for() 
 
 async def test_a_command_with_a_wildcard_is_told_as_an_event() -> None:
     async with rig() as r:
-        await r.peer.do("subscribe", f"{TOP}/@/event/**")
+        await r.peer.subscribe(f"{TOP}/@/event/**")
         await r.peer.command(f"{FU3}/command/*", "1")
         await until(lambda: r.peer.latest(f"{TOP}/@/event/refused"), "the refusal as an event")
         assert "without wildcards" in (r.peer.latest(f"{TOP}/@/event/refused") or {})["message"]
@@ -172,7 +172,7 @@ async def test_a_get_brings_present_values() -> None:
 
 async def test_bare_values_have_the_rest_in_the_attachment() -> None:
     async with rig(encoding="bare") as r:
-        await r.peer.do("subscribe", f"{FU3}/actual/*")
+        await r.peer.subscribe(f"{FU3}/actual/*")
         node_is(r.plant, NodeState.OPERATIONAL)
         drive_says(r.fu3, ENABLED, 0x2000)
         key = f"{FU3}/actual/frequency"
@@ -214,8 +214,8 @@ async def test_liveliness_follows_the_bridge_and_its_nodes() -> None:
 
 async def test_a_trip_is_seen_and_has_to_be_acknowledged() -> None:
     async with rig() as r:
-        await r.peer.do("subscribe", f"{TOP}/**")
-        await r.peer.do("subscribe", f"{TOP}/@/event/*")
+        await r.peer.subscribe(f"{TOP}/**")
+        await r.peer.subscribe(f"{TOP}/@/event/*")
         node_is(r.plant, NodeState.OPERATIONAL)
         drive_says(r.fu3, READY)
         assert (await r.peer.command(f"{FU3}/command/control_word", 0x047E))["ok"]
@@ -234,7 +234,7 @@ async def test_a_trip_is_seen_and_has_to_be_acknowledged() -> None:
 
 async def test_a_client_that_stalls_costs_the_loop_nothing() -> None:
     async with rig() as r:
-        await r.peer.do("subscribe", f"{TOP}/**")
+        await r.peer.subscribe(f"{TOP}/**")
         asking = [asyncio.create_task(r.peer.do("get", f"{TOP}/**")) for _ in range(4)]
         await asyncio.sleep(0.02)
         r.peer.stop()

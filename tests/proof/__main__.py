@@ -46,8 +46,9 @@ def say(text: str) -> None:
     print(f"{time.monotonic():8.1f}  {text}", flush=True)
 
 
-def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: float) -> int:
+def run(asked: argparse.Namespace) -> int:
     os.environ["PYTHONPATH"] = str(REPOSITORY)
+    names, cycles, out = _names(asked.faults), asked.cycles, asked.out
     faults = [fault for fault in FAULTS if not names or fault.name in names]
     possible = [fault for fault in faults if fault.possible()]
     began = time.monotonic()
@@ -89,11 +90,12 @@ def run(cycles: int, names: list[str], out: Path, limit_s: float, noise_ms: floa
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="proof-")))
         rig = Rig(folder, stack)
         try:
-            rig.noise_ms = noise_ms
+            rig.noise_ms = asked.noise
+            rig.hold_s = asked.hold
             rig.start()
             say("everything is there")
             rig.run_all()
-            while done < cycles and time.monotonic() - began < limit_s:
+            while done < cycles and time.monotonic() - began < asked.limit:
                 # Staggered: nodes that were lost are asked again sooner where half a minute has passed since.
                 due = [
                     fault for at, fault in enumerate(possible) if fault.is_due((done + at) % cycles, cycles)
@@ -213,6 +215,9 @@ def main() -> int:
     one.add_argument("--faults", default="")
     one.add_argument("--limit", type=float, default=2400.0, help="begin no cycle after so many seconds")
     one.add_argument("--noise", type=float, default=0.0, help="ms allowed on a machine that is busy")
+    one.add_argument(
+        "--hold", type=float, default=3.0, help='s of "run" after each fault, which moves nothing'
+    )
     other = commands.add_parser("report")
     other.add_argument("--least", type=int, default=24)
     third = commands.add_parser("hunt")
@@ -235,13 +240,7 @@ def main() -> int:
         report.put_between(asked.page, kill_table.BEGIN, kill_table.END, kill_table.markdown(found))
         return _tell(kill_table.failures(found))
     if asked.command == "run":
-        return run(
-            asked.cycles,
-            _names(asked.faults),
-            asked.out,
-            asked.limit,
-            asked.noise,
-        )
+        return run(asked)
     result = report.merge([report.load(part) for part in asked.parts])
     asked.out.write_text(json.dumps(result, indent=1), encoding="utf-8")
     report.put_into(asked.page, result)

@@ -119,6 +119,9 @@ class Rig:
         self.hours = -1
         """Which way the clock was stepped last."""
         self.noise_ms = 0.0
+        self.hold_s = 3.0
+        """How long the owners go on writing "run" after everything is back and their telegrams are taken:
+        nothing may start by that."""
         self.by_themselves = 0
         """Drives that stood still before a fault: what a slow machine has done."""
         self.stopped_in_vain: list[str] = []

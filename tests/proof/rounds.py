@@ -25,9 +25,6 @@ _LOOKS: Final = 5
 _LOOK_S: Final = 1.0
 _BEFORE_MS: Final = PLANT.rpdo_period_ms + REACTION_MS
 """The bridge, or the drive, has to begin its stop that long before its bound."""
-_HOLD_S: Final = 3.0
-"""How long the owners go on writing "run" after everything is back and their telegrams are taken: nothing may
-start by that."""
 _SURELY: Final = 0.8
 _WRITES_S: Final = 30.0
 
@@ -65,7 +62,7 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     fault.undo(rig)
     _wait_talking(rig, concerned)
     _wait_writing(rig, before)
-    time.sleep(_HOLD_S)
+    time.sleep(rig.hold_s)
     samples: list[Sample] = []
     for drive, times in stopped.items():
         if _was_stopped_before(rig, fault, drive, times[0], moment):

@@ -31,8 +31,9 @@ PIP := $(IN) -m pip --disable-pip-version-check
 PYTEST := $(IN) -m pytest
 QUIETLY := tools/quietly $(VENV)/install.log
 
-# Unit tests know no time. The others do: they run on two at the most, a module of them in one place.
+# Unit tests know no time. The others do: few of them run at a time, a module of them in one place.
 FEW_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 2)))
+WIRE_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 3)))
 
 # The lab runs on slow CPUs as root: it leaves no caches behind and gets a time limit.
 LAB_SECONDS := 1800
@@ -47,19 +48,18 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 	@exec $(IN) -m bridge demo $(ARGS)
 
 ##@ Test
-# Wire tests wait most of their time, which unit tests use. Fuzzing and the lab judge times: they run alone.
+# The first lane waits most of its time, and minds when it has to wait for a CPU; unit tests know no time.
 test: compiled packages clients ## all tests: unit, wire, a minute of fuzzing, lab
-	@$(IN) -m tools.side_by_side "$(MAKE)" wire unit
-	@$(MAKE) --no-print-directory fuzz-short lab
+	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab fuzz-short" unit
 
-# They know no time, and beside the others they get little of it.
+# Beside the others they get what these leave of the CPUs.
 unit: $(VENV)/dev.stamp ## tests of the code alone
 	@echo "== unit tests"
 	@$(PYTEST) -n $(JOBS) -o timeout=600 tests/unit $(ARGS)
 
 wire: compiled packages clients ## tests with real protocol clients on loopback
 	@echo "== wire tests"
-	@$(PYTEST) -n $(FEW_JOBS) --dist loadfile -rs tests/wire $(ARGS)
+	@$(PYTEST) -n $(WIRE_JOBS) --dist loadfile -rs tests/wire $(ARGS)
 
 ifeq ($(LAB),0)
 lab:

@@ -13,8 +13,7 @@ from asyncua.ua.status_codes import get_name_and_doc
 from bridge import __version__
 from bridge.cli.app import make_app
 from bridge.command import Kind, Plant
-from bridge.command.leg.state import STATES as WATCHDOG_STATES
-from bridge.command.leg.state import Stage
+from bridge.command.leg.state import WATCHDOG_STATES, Stage
 from bridge.command.leg.table import TABLE
 from bridge.command.points import CONTROLLER_STATES, NMT_STATES, NODE_STATES
 from bridge.command.request import Code

@@ -343,8 +343,8 @@ def test_only_an_engineer_sets_what_supervises_a_drive(parameters: Parameters, n
 
 
 def test_what_supervises_a_drive_is_not_set_while_it_is_enabled(parameters: Parameters) -> None:
-    drive = parameters.bench.plant.drives["conveyor/fu1"]
-    drive.channel._status.state = DriveState.OPERATION_ENABLED  # pyright: ignore[reportPrivateUsage]
+    channel = parameters.bench.plant.drives["conveyor/fu1"].channel
+    channel.leg = channel.leg._replace(drive=DriveState.OPERATION_ENABLED)
     drive_word = parameters.begin(WRITE, parameter="P513", value=2.5)
     assert drive_word[0].code is Code.NOT_ALLOWED
     assert "while the drive is enabled" in drive_word[0].message
@@ -358,7 +358,7 @@ def test_whether_it_is_enabled_is_judged_again_when_its_turn_has_come(
     channel = parameters.bench.plant.drives["conveyor/fu1"].channel
     outcomes = parameters.begin(WRITE, parameter=name, value=2)
     for _ in range(100):
-        channel._status.state = DriveState.OPERATION_ENABLED  # pyright: ignore[reportPrivateUsage]
+        channel.leg = channel.leg._replace(drive=DriveState.OPERATION_ENABLED)
         if outcomes:
             break
         parameters.bench.run(0.001)

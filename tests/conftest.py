@@ -1,5 +1,5 @@
-"""What holds for all tests: none leaves a task, a thread, a process or a socket behind. And two ways in which
-they save time."""
+"""What holds for all tests: none leaves a task, a thread, a process or a socket behind. And three ways in
+which they save time."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
+import bridge.command.plant
 import bridge.mapping
 import bridge.mapping.site
 from bridge.mapping import Family
 from bridge.mapping.loader import load_family, mappings_dir
+from bridge.parameter.names import Names
 from tests.support.leaks import leaves_nothing, module_leaves_nothing
 
 __all__ = ["leaves_nothing", "module_leaves_nothing"]
@@ -26,6 +28,19 @@ def _load_family(name: str, folders: Sequence[Path] = ()) -> Family:
 
 
 bridge.mapping.load_family = bridge.mapping.site.load_family = _load_family
+
+_names: dict[int, tuple[Family, Names]] = {}
+
+
+def _names_of(family: Family) -> Names:
+    """Nothing changes them either: one for each family, however many plants have it."""
+    kept = _names.get(id(family))
+    if kept is None or kept[0] is not family:
+        kept = _names[id(family)] = family, Names(family)
+    return kept[1]
+
+
+bridge.command.plant.Names = _names_of
 
 
 def pytest_collection_finish() -> None:

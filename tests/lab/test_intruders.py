@@ -12,6 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from pymodbus.client import ModbusTcpClient
 
 from tests.lab.sites import LabSite, lab_site, values
 from tests.support.process import Process, drivebridge, drivebridge_called, peer, until
@@ -99,11 +100,11 @@ def test_own_frames_are_never_an_intruders_however_the_words_change(make_lab) ->
     lab = make_lab()
     lab.run_drive()
     begin = time.time()
-    port = str(lab.site.modbus_port)
-    command = ["mbpoll", "-m", "tcp", "-p", port, "-a", "1", "-t", "4:hex", "-r", "1", "-q", "127.0.0.1"]
-    for n in range(30):
-        word = "0x047F" if n % 5 else "0x047E"
-        subprocess.run([*command, word, f"0x{100 * n:04X}"], capture_output=True, check=True)
+    with ModbusTcpClient("127.0.0.1", port=lab.site.modbus_port, timeout=10) as client:
+        for n in range(60):
+            word = 0x047F if n % 5 else 0x047E
+            assert not client.write_registers(0, [word, 100 * n], device_id=1).isError()
+            time.sleep(0.01)
     lab.bridge.signal(signal.SIGSTOP)
     time.sleep(0.5)
     lab.bridge.signal(signal.SIGCONT)

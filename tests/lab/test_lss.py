@@ -27,7 +27,7 @@ def lss(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_two_new_devices_are_found_named_and_stored(slaves: Process) -> None:
-    found = lss("scan", "--json", "--known", "38:10203:7:0")
+    found = lss("scan", "--json", "--known", "38:10203:7:0", "--timeout-ms", "50")
     assert found.returncode == 0, found.stderr
     assert {device["serial"] for device in json.loads(found.stdout)} == {0x0A01, 0x8000_0B02}
 

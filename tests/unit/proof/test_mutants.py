@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -21,6 +23,15 @@ def test_a_mutant_has_one_place_in_the_program_and_compiles(mutant: Mutant) -> N
         original = (REPOSITORY / "bridge" / file).read_text(encoding="utf-8")
         assert ast.dump(ast.parse(text)) != ast.dump(ast.parse(original)), f"{file} does what it did"
     assert mutant.first in {fault.name for fault in FAULTS}
+
+
+def test_no_mutant_uses_a_name_that_is_not_there() -> None:
+    """It would not even start, and nothing be proven by that."""
+    texts = [(mutant.name, file, text) for mutant in MUTANTS for file, text in files_of(mutant).items()]
+    for name, file, text in texts:
+        command = [sys.executable, "-m", "ruff", "check", "--select", "F821", "--stdin-filename", file, "-"]
+        done = subprocess.run(command, input=text, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, f"{name}: {done.stdout}{done.stderr}"
 
 
 def test_there_are_enough_of_them_and_each_is_another() -> None:

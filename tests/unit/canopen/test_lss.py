@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TypeVar
 
 import pytest
@@ -247,3 +248,70 @@ def test_a_selected_device_is_in_configuration_state() -> None:
     slave = LssSlave(NORD)
     LssBus(slave).run(lss.switch_selective(NORD))
     assert slave.state == CONFIGURATION
+
+
+def requests(service: Service[T], answer: bytes | None = None) -> list[str]:
+    """What a service sends if this is the answer to everything."""
+    sent: list[str] = []
+    with suppress(StopIteration):
+        exchange = next(service)
+        while True:
+            sent.append(exchange.request.hex(" ").upper())
+            exchange = service.send(answer)
+    return sent
+
+
+@pytest.mark.parametrize(
+    ("bit_rate", "index"),
+    [
+        (1_000_000, 0),
+        (800_000, 1),
+        (500_000, 2),
+        (250_000, 3),
+        (125_000, 4),
+        (50_000, 6),
+        (20_000, 7),
+        (10_000, 8),
+        (None, 9),
+    ],
+)
+def test_each_bit_rate_has_its_index_in_table_0(bit_rate: int | None, index: int) -> None:
+    """CiA 305 §6.4.3; 5 is reserved, 9 is the automatic detection."""
+    assert requests(lss.configure_bit_rate(bit_rate)) == [f"13 00 {index:02X} 00 00 00 00 00"]
+
+
+@pytest.mark.parametrize(
+    ("answer", "text"),
+    [
+        ("11 00 00", ""),
+        ("11 01 00", "a node id must be 1…127 or 255"),
+        ("13 01 00", "this bit rate is not supported"),
+        ("17 01 00", "the device cannot store"),
+        ("17 02 00", "access to its memory failed"),
+        ("17 03 00", "error 3"),
+        ("11 02 00", "error 2"),
+        ("11 FF 07", "its own error 7"),
+    ],
+)
+def test_errors_are_told_in_words(answer: str, text: str) -> None:
+    assert lss.error_text(bytes.fromhex(answer).ljust(8, b"\0")) == text
+
+
+def test_whoever_refuses_a_node_id_is_no_success() -> None:
+    slave = LssSlave(NORD, state=CONFIGURATION)
+    errand = LssBus(slave).run(lss.configure_node_id(200))
+    with pytest.raises(LssError, match="1…127 or 255"):
+        _ = errand.result
+    assert requests(lss.configure_node_id(lss.NO_NODE_ID)) == ["11 FF 00 00 00 00 00 00"]
+
+
+def test_who_answers_everything_is_asked_for_both_values_of_a_bit() -> None:
+    assert requests(lss.answers_everything(), bytes(8)) == [
+        "51 00 00 00 00 1F 03 03",
+        "51 00 00 00 80 1F 03 03",
+    ]
+    assert requests(lss.answers_everything()) == ["51 00 00 00 00 1F 03 03"]
+
+
+def test_the_delay_of_a_new_bit_rate_is_told_in_ms() -> None:
+    assert requests(lss.activate_bit_rate(0x0102)) == ["15 02 01 00 00 00 00 00"]

@@ -48,9 +48,10 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 	@exec $(IN) -m bridge demo $(ARGS)
 
 ##@ Test
-# The first lane waits most of its time, and minds when it has to wait for a CPU; unit tests know no time.
+# Wire tests and the lab wait most of their time, and mind when they have to wait for a CPU; unit tests know no
+# time. Fuzzing wants its share of the CPUs: it begins when these are done.
 test: compiled packages clients ## all tests: unit, wire, a minute of fuzzing, lab
-	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab fuzz-short" unit
+	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab" unit fuzz-short
 
 # Beside the others they get what these leave of the CPUs.
 unit: $(VENV)/dev.stamp ## tests of the code alone

@@ -1,4 +1,4 @@
-"""``make test`` runs two lanes of make targets side by side; they end together."""
+"""``make test`` runs lanes of make targets side by side; they end together."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ left long:
 	@echo $$$$ >$@.pid; exec sleep 600
 """
 
-Lanes = Callable[[str, str], AbstractContextManager[subprocess.Popen[str]]]
+Lanes = Callable[[str, str, str], AbstractContextManager[subprocess.Popen[str]]]
 
 
 @pytest.fixture
@@ -32,16 +32,16 @@ def lanes(tmp_path: Path) -> Lanes:
     command = [sys.executable, str(REPOSITORY / "tools" / "side_by_side.py"), "make"]
 
     @contextmanager
-    def running(first: str, second: str) -> Iterator[subprocess.Popen[str]]:
+    def running(*targets: str) -> Iterator[subprocess.Popen[str]]:
         # As a shell starts what is to run in the background.
         ignored = partial(signal.signal, signal.SIGINT, signal.SIG_IGN)
         with subprocess.Popen(
-            [*command, first, second], cwd=tmp_path, stdout=subprocess.PIPE, text=True, preexec_fn=ignored
-        ) as both:
+            [*command, *targets], cwd=tmp_path, stdout=subprocess.PIPE, text=True, preexec_fn=ignored
+        ) as lanes:
             try:
-                yield both
+                yield lanes
             finally:
-                both.terminate()
+                lanes.terminate()
 
     return running
 
@@ -58,26 +58,29 @@ def wait_gone(*pid_files: Path) -> None:
     until(lambda: all(map(is_gone, pid_files)), 20.0, "they are gone")
 
 
-def test_both_pass(lanes: Lanes) -> None:
-    with lanes("quick", "quick") as both:
-        assert both.communicate(timeout=20)[0] == "quick\nquick\n"
-    assert both.returncode == 0
+def test_all_pass(lanes: Lanes) -> None:
+    with lanes("quick", "quick", "quick") as them:
+        assert them.communicate(timeout=20)[0] == 3 * "quick\n"
+    assert them.returncode == 0
 
 
-@pytest.mark.parametrize("order", [("quick fails", "long"), ("long", "quick fails")])
-def test_one_that_fails_ends_the_other(lanes: Lanes, order: tuple[str, str], tmp_path: Path) -> None:
-    with lanes(*order) as both:
-        assert "quick" in both.communicate(timeout=20)[0]
-    assert both.returncode == 1
+@pytest.mark.parametrize(
+    "order",
+    [("quick fails", "long", "quick"), ("long", "quick fails", "quick"), ("long", "quick", "quick fails")],
+)
+def test_one_that_fails_ends_the_others(lanes: Lanes, order: tuple[str, str, str], tmp_path: Path) -> None:
+    with lanes(*order) as them:
+        assert "quick" in them.communicate(timeout=20)[0]
+    assert them.returncode == 1
     wait_gone(tmp_path / "long.pid")
 
 
 @pytest.mark.parametrize(("told", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_whoever_ends_it_ends_both(lanes: Lanes, told: signal.Signals, status: int, tmp_path: Path) -> None:
+def test_whoever_ends_it_ends_all(lanes: Lanes, told: signal.Signals, status: int, tmp_path: Path) -> None:
     pids = tmp_path / "long.pid", tmp_path / "left.pid"
-    with lanes("long", "left") as both:
+    with lanes("long", "left", "quick") as them:
         until(lambda: all(pid.exists() and pid.read_text() for pid in pids), 20.0, "both run")
-        both.send_signal(told)
-        both.communicate(timeout=20)
-    assert both.returncode == status
+        them.send_signal(told)
+        assert "quick" not in them.communicate(timeout=20)[0], "the third waits for the second"
+    assert them.returncode == status
     wait_gone(*pids)

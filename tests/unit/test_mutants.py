@@ -46,13 +46,13 @@ def test_what_is_only_said_is_left_alone(source: str):
     assert not find(PATH, source)
 
 
-def test_tests_are_asked_that_run_the_statement_those_of_the_room_first():
+def test_tests_are_asked_that_run_the_statement_those_that_are_about_the_file_first():
     suite = Recorded(
-        took_s={"tests/unit/room/a": 2.0, "tests/unit/room/b": 1.0, "tests/unit/x": 0.1},
-        lines={str(PATH): {1: {""}, 5: {"tests/unit/room/a", "tests/unit/x"}, 6: {"tests/unit/room/b"}}},
+        took_s={"short": 0.1, "thorough": 0.1, "long": 2.0},
+        lines={str(PATH): {1: {""}, 5: {"short", "long", "thorough"}, 6: {"thorough"}, 7: {"long"}}},
     )
-    assert suite.tests_of(Mutant(PATH, 5, 5, 0, "1", "2")) == ["tests/unit/room/a", "tests/unit/x"]
-    assert suite.tests_of(Mutant(PATH, 5, 7, 0, "1", "2"))[0] == "tests/unit/room/b"
+    assert suite.tests_of(Mutant(PATH, 5, 5, 0, "1", "2")) == ["thorough", "short", "long"]
+    assert suite.tests_of(Mutant(PATH, 6, 7, 0, "1", "2")) == ["thorough", "long"]
     assert len(suite.tests_of(Mutant(PATH, 1, 1, 0, "1", "2"))) == 3, "run by the import: all of them"
     assert not suite.tests_of(Mutant(PATH, 9, 9, 0, "1", "2")), "run by none"
 

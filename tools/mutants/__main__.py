@@ -3,9 +3,9 @@
     python -m tools.mutants [--jobs N] [--every N] [--seconds S] [--tests FOLDER] [FILE_OR_FOLDER ...]
 
 Each mutant is the program with one small change: a comparison, an operator, a constant, a call left out. The
-unit tests that run the changed line run on it, those of its room (``tests/unit/ROOM`` for ``bridge/ROOM``)
-first and the quickest of them before the others, until one fails. Mutants that no test notices are printed:
-either a test is missing, or the change makes no difference that anybody could see.
+unit tests that run the changed line run on it, until one fails; first those that run most of its file in the
+shortest time. Mutants that no test notices are printed: either a test is missing, or the change makes no
+difference that anybody could see.
 """
 
 from __future__ import annotations

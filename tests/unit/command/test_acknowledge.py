@@ -1,5 +1,5 @@
-"""An acknowledge is an edge of the owner's own words, whatever the gate has sent in between (shared design,
-"When a stop is not enough")."""
+"""An acknowledge is an edge of the owner's own words, whatever the bridge has sent in between
+(docs/explanation/dead-man-chain.md)."""
 
 from __future__ import annotations
 
@@ -225,3 +225,12 @@ class TestRegister:
             rig.wait(0.25)
             rig.ask(Action.RESET_FAULT)
             assert rig.watchdog == "running"
+
+
+def test_a_register_that_is_written_on_and_on_acknowledges_once_and_is_a_sign_of_life(running: Rig) -> None:
+    for _ in range(8):
+        running.ask(Action.RESET_FAULT, pressed=True)
+        running.wait(0.15)
+    assert not running.channel.is_tripped
+    running.wait(0.25)
+    assert running.channel.is_tripped

@@ -202,7 +202,7 @@ class Master:
         self._alive(now)
         self._arm(now)
         # What this causes is done in a round of its own: the present one is over. A reply is a server's code:
-        # one that fails ends neither the master nor keeps another from its outcome.
+        # one that fails neither ends the master nor keeps another from its outcome.
         while self._plant.has_outcomes:
             with self._replies:
                 self._plant.deliver_outcomes()

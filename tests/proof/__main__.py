@@ -34,7 +34,7 @@ from tests.proof.drives import DRIVES
 from tests.proof.faults import FAULTS, Fault
 from tests.proof.machine import is_user_mode
 from tests.proof.measure import Sample
-from tests.proof.rig import Rig, Stuck
+from tests.proof.rig import HOLD_S, Rig, Stuck
 from tests.proof.rounds import run_round
 from tests.proof.settings import PLANT
 from tests.support.process import REPOSITORY
@@ -216,7 +216,7 @@ def main() -> int:
     one.add_argument("--limit", type=float, default=2400.0, help="begin no cycle after so many seconds")
     one.add_argument("--noise", type=float, default=0.0, help="ms allowed on a machine that is busy")
     one.add_argument(
-        "--hold", type=float, default=3.0, help='s of "run" after each fault, which moves nothing'
+        "--hold", type=float, default=HOLD_S, help='s of "run" after each fault, which moves nothing'
     )
     other = commands.add_parser("report")
     other.add_argument("--least", type=int, default=24)

@@ -87,6 +87,11 @@ class Owner:
         self._nursery.wait()
 
 
+HOLD_S: Final = 3.0
+"""How long the owners go on writing "run" after everything is back and their telegrams are taken: nothing may
+start by that."""
+
+
 class Rig:
     """Everything that runs; ``folder`` is the proof's own. The bridge alone is of the source ``tree``."""
 
@@ -119,9 +124,7 @@ class Rig:
         self.hours = -1
         """Which way the clock was stepped last."""
         self.noise_ms = 0.0
-        self.hold_s = 3.0
-        """How long the owners go on writing "run" after everything is back and their telegrams are taken:
-        nothing may start by that."""
+        self.hold_s = HOLD_S
         self.by_themselves = 0
         """Drives that stood still before a fault: what a slow machine has done."""
         self.stopped_in_vain: list[str] = []

@@ -14,9 +14,10 @@ from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
 from bridge.sim.dictionary import Dictionary
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.nmt_slave import COMMANDED_STATE, ErrorControl, NmtCommand, NmtState, nmt_command_for
-from bridge.sim.pdo import CYCLIC_MAX, EVENT_MIN, Rpdo, Tpdo, pack, unpack
+from bridge.sim.pdo import CYCLIC_MAX, MappedRpdo, Rpdo, Tpdo, unpack
 from bridge.sim.sdo_server import SdoServer
-from bridge.sim.settings import CommunicationSettings, PdoSettings, SdoSettings
+from bridge.sim.settings import CommunicationSettings, SdoSettings
+from bridge.sim.slave_plan import SlavePlan
 from bridge.sim.store import Store
 from bridge.sim.ticks import earliest
 
@@ -36,10 +37,10 @@ class Application(ABC):
     def restarted(self, command: NmtCommand) -> None:
         """Reset node or reset communication, before the boot-up message; settings are as at power-on."""
 
-    def accepts_rpdo(self, number: int, length: int) -> bool:
+    def accepts_rpdo(self, number: int, length: int, mapped_bits: int) -> bool:
         """Whether an RPDO (numbered from 0) of ``length`` bytes is evaluated at all. Too short ones do not
         get here; of a longer one the mapped bytes are used."""
-        del number, length
+        del number, length, mapped_bits
         return True
 
     def rpdo_applied(self, number: int) -> None:
@@ -80,6 +81,22 @@ class CanopenSlave:
         self._tpdos = tuple(Tpdo() for _ in store.current.tpdo)
         self._rpdos = tuple(Rpdo() for _ in store.current.rpdo)
         self._outbox: deque[Frame] = deque()
+        self.news = emcy.news
+        self._present_plan: SlavePlan | None = None
+
+    @property
+    def _plan(self) -> SlavePlan:
+        """What the present settings make of the slave."""
+        if self._present_plan is None:
+            own = (0, _ERROR_CONTROL + self.node_id)
+            parts = (self._servers, self._sdo_channels, self._tpdos, self._objects_of)
+            self._present_plan = SlavePlan(self._store.current, own, *parts)
+        return self._present_plan
+
+    def touch(self) -> None:
+        """Settings may have been changed, or anything else."""
+        self._present_plan = None
+        self.news.is_there = True
 
     @property
     def master_is_lost(self) -> bool:
@@ -96,9 +113,11 @@ class CanopenSlave:
         self.state = NmtState.INITIALISING
         self._send(_ERROR_CONTROL + self.node_id, b"\0")
         self._enter(NmtState.PRE_OPERATIONAL)
+        self.touch()
 
     def power_off(self) -> None:
         self.state = NmtState.INITIALISING
+        self.touch()
         self._outbox.clear()
 
     def on_frame(self, frame: Frame, now: float) -> None:
@@ -112,6 +131,7 @@ class CanopenSlave:
                 self._on_guard_request(now)
         elif cob_id == 0:
             self._on_nmt(frame.data)
+            self.touch()
         elif self.state is not NmtState.STOPPED:
             self._on_object(cob_id, frame.data, now)
 
@@ -140,17 +160,12 @@ class CanopenSlave:
         if self.state is not NmtState.STOPPED:
             deadlines.append(self.emcy.next_deadline())
         if self.state is NmtState.OPERATIONAL:
-            for tpdo, settings in self._active_tpdos():
-                deadlines.append(tpdo.next_deadline(settings))
+            deadlines += [active.tpdo.next_deadline(active.settings) for active in self._plan.tpdos]
         return earliest(*deadlines)
 
     def hears(self) -> frozenset[int]:
         """The identifiers that concern this node with its present settings."""
-        settings = self._store.current
-        own = {0, _ERROR_CONTROL + self.node_id, settings.sync_cob_id}
-        own.update(channel.receive.cob_id for channel in self._sdo_channels)
-        own.update(pdo.cob_id for pdo in settings.rpdo)
-        return frozenset(own)
+        return self._plan.hears
 
     def take_frames(self) -> list[Frame]:
         frames = list(self._outbox)
@@ -158,6 +173,7 @@ class CanopenSlave:
         return frames
 
     def _on_guard_request(self, now: float) -> None:
+        self.news.is_there = True
         was_lost = self._error_control.life.tripped
         answer = self._error_control.on_guard_request(self.state, now)
         if answer is None:
@@ -183,50 +199,57 @@ class CanopenSlave:
         """Those that are in effect."""
         return self._store.current.sdo
 
+    def _objects_of(self, number: int) -> Dictionary:
+        """What PDO ``number`` (from 0), either direction, can map."""
+        del number
+        return self._dictionary
+
     def _on_object(self, cob_id: int, data: bytes, now: float) -> None:
-        settings = self._store.current
-        for server, channel in zip(self._servers, self._sdo_channels, strict=True):
-            if channel.enabled and cob_id == channel.receive.cob_id:
-                for answer in server.on_request(data):
-                    self._send(channel.send.cob_id, answer)
-                return
+        plan, settings = self._plan, self._store.current
+        if cob_id in plan.channels:
+            server, channel = plan.channels[cob_id]
+            for answer in server.on_request(data):
+                self._send(channel.send.cob_id, answer)
+            self.touch()
+            return
         if self.state is not NmtState.OPERATIONAL:
             return
         if settings.sync_on and cob_id == settings.sync_cob_id:
             self._on_sync(now)
             return
-        for number, pdo in enumerate(settings.rpdo):
-            if pdo.enabled and cob_id == pdo.cob_id:
-                self._on_rpdo(number, pdo, data)
+        for rpdo in plan.rpdos_by_cob_id.get(cob_id, ()):
+            self._on_rpdo(rpdo, data)
 
-    def _on_rpdo(self, number: int, pdo: PdoSettings, data: bytes) -> None:
-        if not pdo.count or not self._accepts(number, pdo, data):
+    def _on_rpdo(self, rpdo: MappedRpdo, data: bytes) -> None:
+        if not rpdo.settings.count or not self._accepts(rpdo, data):
             self.rpdos_ignored += 1
             return
-        effective = self._rpdos[number].on_data(pdo, data)
+        effective = self._rpdos[rpdo.number].on_data(rpdo.settings, data)
         if effective is not None:
-            self._apply(number, pdo, effective)
+            self._apply(rpdo, effective)
 
-    def _accepts(self, number: int, pdo: PdoSettings, data: bytes) -> bool:
-        return len(data) * 8 >= pdo.mapped_bits and self._application.accepts_rpdo(number, len(data))
+    def _accepts(self, rpdo: MappedRpdo, data: bytes) -> bool:
+        size, bits = len(data), rpdo.mapped_bits
+        return size * 8 >= bits and self._application.accepts_rpdo(rpdo.number, size, bits)
 
     def _on_sync(self, now: float) -> None:
         # TPDOs are sampled before RPDOs act, because both refer to the moment of the SYNC (CiA 301 §7.2.2.2).
-        for tpdo, settings in self._active_tpdos():
+        for active in self._plan.tpdos:
+            settings = active.settings
             if settings.transmission_type > CYCLIC_MAX:
                 continue
-            payload = self._payload(settings)
-            if tpdo.on_sync(settings, payload):
+            payload = active.payload()
+            if active.tpdo.on_sync(settings, payload):
                 self._send(settings.cob_id, payload)
-                tpdo.sent(payload, now)
+                active.tpdo.sent(payload, now)
         for number, rpdo in enumerate(self._rpdos):
             data = rpdo.on_sync()
             if data is not None:
-                self._apply(number, self._store.current.rpdo[number], data)
+                self._apply(self._plan.rpdos[number], data)
 
-    def _apply(self, number: int, pdo: PdoSettings, data: bytes) -> None:
-        self.rpdos_ignored += unpack(self._dictionary, pdo, data)
-        self._application.rpdo_applied(number)
+    def _apply(self, rpdo: MappedRpdo, data: bytes) -> None:
+        self.rpdos_ignored += unpack(rpdo.places, data)
+        self._application.rpdo_applied(rpdo.number)
 
     def _enter(self, state: NmtState) -> None:
         if state is self.state:
@@ -238,21 +261,12 @@ class CanopenSlave:
             tpdo.start()
         self._application.nmt_changed(state)
 
-    def _active_tpdos(self) -> list[tuple[Tpdo, PdoSettings]]:
-        pairs = zip(self._tpdos, self._store.current.tpdo, strict=True)
-        return [(tpdo, settings) for tpdo, settings in pairs if settings.enabled and settings.count]
-
-    def _payload(self, settings: PdoSettings) -> bytes:
-        return pack(self._dictionary, settings)
-
     def _send_due_tpdos(self, now: float) -> None:
-        for tpdo, settings in self._active_tpdos():
-            if settings.transmission_type < EVENT_MIN:
-                continue
-            payload = self._payload(settings)
-            if tpdo.is_due(settings, payload, now):
-                self._send(settings.cob_id, payload)
-                tpdo.sent(payload, now)
+        for active in self._plan.tpdos:
+            payload = active.tpdo.due(active.settings, active.payload, now)
+            if payload is not None:
+                self._send(active.settings.cob_id, payload)
+                active.tpdo.sent(payload, now)
 
     def _send(self, cob_id: int, data: bytes) -> None:
         if self.silent:

@@ -156,7 +156,8 @@ class Cia402Axis:
             self._on_control_word(self.automaton.control_word & ~_ABORT[option])
         return False
 
-    def advance(self, now: float) -> None:
+    def advance(self, now: float) -> bool:
+        """Let the time until ``now`` pass. True if any has."""
         dt_s, self._time = max(0.0, now - self._time), now
         if self.state is State.NOT_READY and now >= self._ready_at:
             self.automaton.initialised()
@@ -165,6 +166,7 @@ class Cia402Axis:
         for _ in range(steps):
             self._move(dt_s / steps)
             self._settle()
+        return steps > 0
 
     def next_deadline(self) -> float | None:
         if self.state is State.NOT_READY:

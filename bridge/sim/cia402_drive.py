@@ -89,6 +89,7 @@ class Cia402Drive(SimulatedDevice):
 
     def rpdo_applied(self, number: int) -> None:
         del number
+        self.slave.news.is_there = True
         self.axis.obey()
 
     def master_lost(self) -> None:
@@ -112,7 +113,8 @@ class Cia402Drive(SimulatedDevice):
         self._restart()
 
     def _pass_time(self) -> None:
-        self.axis.advance(self._now)
+        if self.axis.advance(self._now):
+            self.slave.news.is_there = True
         if self._consumer.expired(self._now):
             self.master_lost()
 

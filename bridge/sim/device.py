@@ -26,6 +26,12 @@ class SimulatedDevice(Application):
         """The identifiers that ``on_frame`` evaluates at present."""
         self._now = 0.0
         self._injected: list[Callable[[], None]] = []
+        self._due: float | None = None
+        """When ``_finish`` has something to do although there is no news."""
+        self._is_steady = False
+        """Nothing has changed since time was last passed: a frame of the same moment need not do it again."""
+        self._slave_hears: frozenset[int] | None = None
+        """What ``heard`` was made of."""
 
     # To be defined by the device.
 
@@ -52,6 +58,10 @@ class SimulatedDevice(Application):
     def _hears(self) -> frozenset[int]:
         return self.slave.hears()
 
+    def _finish_due(self) -> float | None:
+        """When ``_finish`` has something to do although there is no news."""
+        return self.slave.next_deadline()
+
     # The core: frames and time in, frames out.
 
     def start(self, now: float) -> None:
@@ -60,22 +70,26 @@ class SimulatedDevice(Application):
         self._switch_on()
         self.powered = True
         self.slave.boot()
-        self.heard = self._hears()
+        self._due = None
+        self._listen()
 
     def on_frame(self, frame: Frame, now: float) -> None:
         can_id = frame.can_id
         if not self.powered or can_id & STANDARD_MASK not in self.heard or can_id & (EXTENDED | ERROR):
             return
-        self._advance(now)
+        if now > self._now or not self._is_steady or self._injected:
+            self._advance(now)
         if self.powered:
             self._receive(frame)
-            self._finish()
-        self.heard = self._hears()
+            if self.slave.news.is_there or (self._due is not None and self._due <= self._now):
+                self._conclude()
+        if self.slave.hears() is not self._slave_hears:
+            self._listen()
 
     def on_time(self, now: float) -> None:
         self._advance(now)
         if self.powered:
-            self._finish()
+            self._conclude()
 
     def next_deadline(self) -> float | None:
         """When ``on_time`` has to be called next, or None."""
@@ -83,7 +97,7 @@ class SimulatedDevice(Application):
             return self._now
         if not self.powered:
             return None
-        return earliest(self.slave.next_deadline(), *self._deadlines())
+        return earliest(self._due, *self._deadlines())
 
     def take_frames(self) -> list[Frame]:
         """What the node has to send, oldest first."""
@@ -93,9 +107,22 @@ class SimulatedDevice(Application):
         self._now = max(self._now, now)  # stamps of frames may lie before the last timer
         if self.powered:
             self._pass_time()
-        injected, self._injected = self._injected, []
-        for action in injected:
-            action()
+            self._is_steady = True
+        if self._injected:
+            injected, self._injected = self._injected, []
+            for action in injected:
+                action()
+            self.slave.touch()
+
+    def _conclude(self) -> None:
+        self._finish()
+        self._is_steady = not self.slave.news.is_there
+        self.slave.news.is_there = False
+        self._due = self._finish_due()
+
+    def _listen(self) -> None:
+        self._slave_hears = self.slave.hears()
+        self.heard = self._hears()
 
     # What a test or a demonstration does to any node.
 

@@ -11,6 +11,7 @@ from enum import IntEnum
 from typing import Final
 
 from bridge.sim.lenze_settings import LenzeCodes
+from bridge.sim.news import News
 from bridge.sim.nord_ramp import step
 from bridge.sim.ticks import next_tick
 
@@ -55,6 +56,7 @@ class LenzeDrive:
 
     def __init__(self, codes: Callable[[], LenzeCodes]) -> None:
         self._codes = codes
+        self.news = News()
         self.state = DeviceState.INIT
         self.control_word = 0
         self.setpoint = 0
@@ -99,9 +101,13 @@ class LenzeDrive:
         self._causes.clear()
         self.speed_rpm = 0.0
         self.state, self._time, self._ready_at = DeviceState.INIT, now, now + INIT_S
+        self.news.is_there = True
 
     def on_words(self, words: Sequence[int]) -> None:
         """CAN1_IN: control word and speed setpoint; the other words are not connected."""
+        if self.control_word == words[0] and self.setpoint == words[1]:
+            return  # said again
+        self.news.is_there = True
         rising = words[0] & ~self.control_word
         self.control_word, self.setpoint = words[0], words[1]
         if rising & RESET_FAULT:
@@ -116,6 +122,7 @@ class LenzeDrive:
         if lasting or reaction is Reaction.TROUBLE:
             self._causes.add(number)
         self._errors[number] = reaction
+        self.news.is_there = True
         self._settle()
 
     def cause_gone(self, number: int) -> None:
@@ -123,13 +130,17 @@ class LenzeDrive:
         self._causes.discard(number)
         if self._errors.get(number) is Reaction.TROUBLE:
             del self._errors[number]
-        self._settle()
+            self.news.is_there = True
+            self._settle()
 
     def advance(self, now: float) -> None:
         """Let the time until ``now`` pass."""
         dt_s, self._time = max(0.0, now - self._time), now
+        before = self.state, self.speed_rpm
         self._ramp(dt_s)
         self._settle()
+        if before != (self.state, self.speed_rpm):
+            self.news.is_there = True
 
     def next_deadline(self) -> float | None:
         if self.state is DeviceState.INIT:

@@ -16,10 +16,11 @@ from bridge.sim.lenze_settings import PDOS, PORT_IN, PORT_OUT, PORT_WORDS, RULES
 from bridge.sim.lenze_traffic import QuasiMaster, counters_of
 from bridge.sim.lenze_watch import BUS_OFF, BusWatch
 from bridge.sim.nmt_slave import NmtCommand, NmtState
-from bridge.sim.pdo import pack
+from bridge.sim.pdo import entries_of
 from bridge.sim.sdo_server import SdoServer
 from bridge.sim.store import Store
 from bridge.sim.supervision import Cycle
+from bridge.sim.ticks import earliest
 
 _HEARTBEAT: Final = 0x700
 
@@ -50,6 +51,7 @@ class LenzeMotec(SimulatedDevice):
         self._process = self._ports()
         servers = [SdoServer(self.objects, RULES.sdo_block_segments) for _ in self._stack.current.sdo]
         self.slave = CanopenSlave(node_id, self._stack, self._process, servers, emcy, self)
+        self.drive.news = self.slave.news
         self._fill(emcy)
         self.heard = self._hears()
 
@@ -193,7 +195,8 @@ class LenzeMotec(SimulatedDevice):
         """A TPDO may be asked for (§8.4). A guard request gets no answer."""
         for pdo in self._stack.current.tpdo:
             if self.slave.state is NmtState.OPERATIONAL and pdo.enabled and pdo.cob_id == cob_id:
-                self._own.append(Frame(cob_id, pack(self._process, pdo)))
+                words = b"".join(entry.upload() for entry in entries_of(self._process, pdo))
+                self._own.append(Frame(cob_id, words))
 
     def _on_data(self, cob_id: int, frame: Frame) -> None:
         self.display.count(*counters_of(cob_id, self._stack.current, sent=False))
@@ -208,6 +211,9 @@ class LenzeMotec(SimulatedDevice):
 
     def _command_self(self, command: NmtCommand) -> None:
         self.slave.on_frame(Frame(0, bytes([command, self.slave.node_id])), self._now)
+
+    def _finish_due(self) -> float | None:
+        return earliest(super()._finish_due(), self._master.next_deadline(), self._sync.next_deadline())
 
     def _finish(self) -> None:
         if self._master.due(self._now):

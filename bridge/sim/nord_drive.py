@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from bridge.sim.dictionary import Dictionary
+from bridge.sim.news import News
 from bridge.sim.nord_faults import INTERFACE_MISSING
 from bridge.sim.nord_parameters import PARAMETERS, DriveParameters, Parameter, add_display
 from bridge.sim.nord_ramp import Demand, step, turned
@@ -28,6 +29,10 @@ ACKNOWLEDGE: Final = 1 << 7
 LEFT: Final = 1 << 12
 _BUS_SOURCES: Final = (3, 6)
 """P509: system bus, CANopen (§7.2)."""
+_POSITION: Final = (10, 15)
+"""P543: low and high word."""
+_AT_REST: Final = (State.SWITCH_ON_INHIBITED, State.READY, State.SWITCHED_ON, State.FAULT)
+"""Only a telegram leads out of these: time changes nothing."""
 _IGNORE: Final = -1
 """P513 = -0.1 s."""
 
@@ -57,11 +62,14 @@ class NordDrive:
         self.output_hz = 0.0
         self.position_increments = 0.0
         """Position of the motor's shaft; an absolute encoder may set it."""
+        self.has_encoder = False
+        """The position is an object of the node's own."""
         self.fault_tenths = 0
         self.warning_tenths = 0
         self.last_faults: deque[int] = deque([0] * 5, maxlen=5)
         self.digital_inputs = 0
         self.telegrams_ignored = 0
+        self.news = News()
         self._ripple = ripple
         self._random = random.Random(seed)
         self._ripple_now = 0.0
@@ -131,6 +139,7 @@ class NordDrive:
         self.fault_tenths, self._cause_present = 0, False
         self._output_off(now)
         self.state, self._until, self._time = State.NOT_READY, now + CHARGING_S, now
+        self.news.is_there = True
 
     def on_telegram(self, control_word: int, setpoints: Sequence[int]) -> bool:
         """Process data from the interface. Returns False for a telegram that is void by bit 10 (§6.5.1)."""
@@ -139,15 +148,26 @@ class NordDrive:
             return False
         if not self._bus_controls:
             return True  # local control: the telegram is valid, but somebody else commands
-        acknowledge = bool(control_word & ~self.control_word & ACKNOWLEDGE)
-        self.control_word = control_word
         if self.parameters.raw(510) in (0, *_BUS_SOURCES):
-            self.setpoints = tuple(setpoints[:SET_POINTS]) + (0,) * (SET_POINTS - len(setpoints))
+            words = tuple(setpoints[:SET_POINTS]) + (0,) * (SET_POINTS - len(setpoints))
+        else:
+            words = self.setpoints
+        if control_word == self.control_word and words == self.setpoints:
+            return True  # said again: the drive has taken every transition that this word asks for
+        self.news.is_there = True
+        acknowledge = bool(control_word & ~self.control_word & ACKNOWLEDGE)
+        self.control_word, self.setpoints = control_word, words
         if acknowledge and self.state is State.FAULT and not self._cause_present:
             self.fault_tenths = 0
             self.state = State.SWITCH_ON_INHIBITED  # transition 15
         self._settle()
         return True
+
+    def follow(self, demand: Demand | None) -> None:
+        """What the interface demands in the drive profile."""
+        if demand != self.demand:
+            self.demand = demand
+            self.news.is_there = True
 
     def trip(self, fault_tenths: int, *, lasting: bool = False) -> None:
         """Transition 13. A ``lasting`` cause blocks the acknowledge until ``cause_gone``."""
@@ -157,6 +177,7 @@ class NordDrive:
         self.last_faults.appendleft(fault_tenths)
         self._output_off(self._time)
         self.state, self._until = State.FAULT_REACTION, self._time + FAULT_REACTION_S
+        self.news.is_there = True
 
     def communication_lost(self, fault_tenths: int) -> None:
         """Field bus or system bus is lost: a fault, unless P513 (or for 10.9 also P120) lets the drive go
@@ -173,6 +194,9 @@ class NordDrive:
     def advance(self, now: float) -> None:
         """Let the time until ``now`` pass."""
         dt_s, self._time = max(0.0, now - self._time), now
+        if self.state in _AT_REST:
+            return
+        before = self.state
         if self.state is State.NOT_READY and now >= self._until:
             self.state = State.SWITCH_ON_INHIBITED  # transition 1
         elif self.state is State.FAULT_REACTION and now >= self._until:
@@ -180,6 +204,8 @@ class NordDrive:
         elif self.state in (State.ENABLED, State.QUICK_STOP):
             self._ramp(dt_s)
         self._settle()
+        if self.state is not before:
+            self.news.is_there = True
 
     def next_deadline(self) -> float | None:
         if self.state in (State.NOT_READY, State.FAULT_REACTION):
@@ -211,7 +237,7 @@ class NordDrive:
             return max(-self._max_hz, min(self._max_hz, self.demand.target_hz))
         share = 0.0
         for n, word in enumerate(self.setpoints, start=1):
-            if self.parameters.meaning(546, n, self._set) == 1:
+            if word and self.parameters.meaning(546, n, self._set) == 1:
                 share += ((word & 0xFFFF ^ 0x8000) - 0x8000) / HUNDRED_PERCENT
         share = max(-1.0, min(1.0, share))
         return self._max_hz * (-share if self.control_word & LEFT else share)
@@ -232,14 +258,27 @@ class NordDrive:
 
     def _ramp(self, dt_s: float) -> None:
         before_hz, target_hz = self.output_hz, self._ramp_target_hz()
+        if before_hz == target_hz and not self._accelerating and not self._ripple:
+            self._turn(before_hz, dt_s)
+            return
+        self.news.is_there = True
         if self.state is State.ENABLED and self.control_word & 0x11 == 0x01:
             self.output_hz = 0.0  # bit 4 = 0 sets the ramp generator to 0; the voltage stays on
         else:
             up_s, down_s = self._ramp_times_s()
             self.output_hz = step(before_hz, target_hz, up_s, down_s, self._max_hz, dt_s)
-        self.position_increments = turned(self.position_increments, before_hz, self.output_hz, dt_s)
+        self._turn(before_hz, dt_s)
         self._accelerating = abs(self.output_hz) > abs(before_hz) and self.output_hz != target_hz
         self._ripple_now = self._random.uniform(-self._ripple, self._ripple) if self.output_hz else 0.0
+
+    def _turn(self, before_hz: float, dt_s: float) -> None:
+        """The shaft turns on."""
+        before = self.position_increments
+        self.position_increments = turned(before, before_hz, self.output_hz, dt_s)
+        if self.position_increments != before:
+            codes = (self.parameters.meaning(543, n, self._set) for n in range(1, SET_POINTS + 1))
+            if self.has_encoder or any(code in _POSITION for code in codes):
+                self.news.is_there = True
 
     def _ramp_times_s(self) -> tuple[float, float]:
         """Up and down, between 0 and P105."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from bridge.sim.dictionary import DataType, Dictionary, Number, constant, variable
+from bridge.sim.dictionary import DataType, Dictionary, Number, constant
+from bridge.sim.news import News
 from bridge.sim.nord_drive import NordDrive
 from bridge.sim.nord_settings import (
     ACTUAL_VALUES,
@@ -34,12 +35,14 @@ class ProcessImage:
         self.setpoints = [0] * (DRIVES * self._per_drive)
         self.outputs = 0
         self.inputs = 0
+        self.news = News()
 
     def clear(self) -> None:
         self.control = [0] * DRIVES
         self.setpoints = [0] * (DRIVES * self._per_drive)
         self.outputs = 0
         self._touched.clear()
+        self.news.is_there = True
 
     def take_touched(self) -> list[int]:
         touched = sorted(self._touched)
@@ -49,6 +52,10 @@ class ProcessImage:
     def touch(self, drive: int) -> None:
         """A word for this drive has been written elsewhere."""
         self._touched.add(drive)
+
+    def set_outputs(self, value: int) -> None:
+        self.outputs = value
+        self.news.is_there = True
 
     def setpoints_of(self, drive: int) -> list[int]:
         return self.setpoints[drive * self._per_drive : (drive + 1) * self._per_drive]
@@ -81,15 +88,18 @@ class ProcessImage:
         dictionary.add_array(SETPOINTS, [self._setpoint_entry(place) for place in range(count)])
         dictionary.add_array(ACTUAL_VALUES, [self._actual_entry(place) for place in range(count)])
         u16 = DataType.UNSIGNED16
-        dictionary.add(DIGITAL_OUTPUTS, 0, variable(u16, lambda: self, "outputs", in_pdos=True))
+        outputs = Number(u16, lambda: self.outputs, self.set_outputs, in_rpdo=True, in_tpdo=True)
+        dictionary.add(DIGITAL_OUTPUTS, 0, outputs)
         dictionary.add(DIGITAL_INPUTS, 0, Number(u16, lambda: self.inputs, in_tpdo=True))
 
     def control_entry(self, drive: int) -> Number:
         """The control word of a drive, 3000h or 6040h."""
 
         def write(value: int) -> None:
-            self.control[drive] = value
             self._touched.add(drive)
+            if self.control[drive] != value:
+                self.control[drive] = value
+                self.news.is_there = True
 
         return Number(DataType.UNSIGNED16, lambda: self.control[drive], write, in_rpdo=True, in_tpdo=True)
 
@@ -99,8 +109,10 @@ class ProcessImage:
 
     def _setpoint_entry(self, place: int) -> Number:
         def write(value: int) -> None:
-            self.setpoints[place] = value
             self._touched.add(place // self._per_drive)
+            if self.setpoints[place] != value:
+                self.setpoints[place] = value
+                self.news.is_there = True
 
         # §6.5.8 maps a control word and a setpoint into 1A00h: an RW object can be mapped both ways.
         return Number(DataType.UNSIGNED16, lambda: self.setpoints[place], write, in_rpdo=True, in_tpdo=True)

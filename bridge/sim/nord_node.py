@@ -48,6 +48,8 @@ class NordNode(SimulatedDevice):
         self.slave = CanopenSlave(
             self.node_id, self._communication, dictionary, servers, emcy=self._emcy, application=self
         )
+        for drive in self.drives:
+            drive.news = self.slave.news
 
     # To be defined by the family.
 
@@ -110,8 +112,9 @@ class NordNode(SimulatedDevice):
 
     def _finish(self) -> None:
         self._report_faults()
+        was_lost = self.slave.master_is_lost
         self.slave.poll(self._now)
-        if self._report_faults():  # the life time may have run out in between
+        if self.slave.master_is_lost is not was_lost and self._report_faults():
             self.slave.poll(self._now)
 
     def _report_faults(self) -> bool:

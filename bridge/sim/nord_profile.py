@@ -82,7 +82,7 @@ class VelocityMode:
             self._add_drive(dictionary, place)
 
         def set_outputs(value: int) -> None:
-            self._image.outputs = value >> _IO_SHIFT
+            self._image.set_outputs(value >> _IO_SHIFT)
 
         u32 = Type.UNSIGNED32
         dictionary.add(0x60FD, 0, Number(u32, lambda: self._image.inputs << _IO_SHIFT, in_tpdo=True))
@@ -99,8 +99,10 @@ class VelocityMode:
             return round(drive.output_hz * _RPM_PER_HZ) if self._online(place) else 0
 
         def set_target(value: int) -> None:
-            self._targets_rpm[place] = value
             image.touch(place)
+            if self._targets_rpm[place] != value:
+                self._targets_rpm[place] = value
+                image.news.is_there = True
 
         def error() -> int:
             fault = drive.fault_tenths if self._online(place) else 0

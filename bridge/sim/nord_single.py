@@ -90,6 +90,7 @@ class NordSingle(NordNode):
 
     def rpdo_applied(self, number: int) -> None:
         del number  # the objects written tell which
+        self.slave.news.is_there = True
         if 0 in self._written and self._control & VALID and self.linked:
             self._watch.on_telegram(self._now)
             self._causes_gone(TELEGRAM_DOWNTIME)
@@ -142,6 +143,7 @@ class NordSingle(NordNode):
         dictionary.add_array(ACTUAL_VALUES, [actual(place) for place in range(self.variant.values)])
         if not self.variant.has_interface:
             dictionary.add(ENCODER, 0, self._encoder())
+            self.drive.has_encoder = True
 
     def _encoder(self) -> Number:
         """The position from an absolute encoder, or from a test that plays one."""

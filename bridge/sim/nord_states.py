@@ -81,9 +81,12 @@ TRANSITIONS: Final = (
 )
 
 
+_FROM: Final = {state: tuple(one for one in TRANSITIONS if one.source is state) for state in State}
+
+
 def commanded(state: State, control_word: int) -> Transition | None:
     """The transition that this control word asks for in this state."""
-    for transition in TRANSITIONS:
-        if transition.source is state and transition.command.matches(control_word):
+    for transition in _FROM[state]:
+        if transition.command.matches(control_word):
             return transition
     return None

@@ -74,6 +74,7 @@ class NordTu4(NordNode):
             self._communication.save()
         self._interface.save()  # commissioned before it was connected to this bus
         self._build()
+        self.image.news = self.slave.news
 
     # What a test or a demonstration does to its drives.
 
@@ -106,12 +107,11 @@ class NordTu4(NordNode):
                 drive.communication_lost(INTERFACE_MISSING)
                 drive.cause_gone()
 
-    def accepts_rpdo(self, number: int, length: int) -> bool:
+    def accepts_rpdo(self, number: int, length: int, mapped_bits: int) -> bool:
         """§6.4: a drive's PDO is evaluated only with all four words, mapped and received. In the drive
         profile it has the words that are mapped by §6.7.3."""
         if number >= DRIVES:
             return True
-        mapped_bits = self._communication.current.rpdo[number].mapped_bits
         if self.profile.is_on:
             return length * 8 == mapped_bits
         return mapped_bits == 16 * PDO_WORDS and length == 2 * PDO_WORDS
@@ -220,7 +220,7 @@ class NordTu4(NordNode):
             drive = self.drives[place]
             control = self.image.control[place]
             if control & VALID:
-                drive.demand = self.profile.demand(place) if self.profile.is_on else None
+                drive.follow(self.profile.demand(place) if self.profile.is_on else None)
             drive.on_telegram(control, self.image.setpoints_of(place))
 
     def _present_faults(self) -> Sequence[int | None]:

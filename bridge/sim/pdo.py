@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from bridge.sim.abort import SdoAbort
-from bridge.sim.dictionary import Dictionary, Number
+from bridge.sim.dictionary import Dictionary, Entry, Number
 from bridge.sim.settings import PdoSettings
 
 CYCLIC_MAX: Final = 240
@@ -38,14 +40,17 @@ class Tpdo:
         self._syncs = 0
         return True
 
-    def is_due(self, settings: PdoSettings, payload: bytes, now: float) -> bool:
-        """Whether an event-driven PDO is to be sent now: changed or event timer out, and not inhibited."""
+    def due(self, settings: PdoSettings, sample: Callable[[], bytes], now: float) -> bytes | None:
+        """The data if an event-driven PDO is to be sent now: changed or timer out, and not inhibited."""
+        if settings.transmission_type < EVENT_MIN:
+            return None
+        payload = sample()
         self._waiting = payload != self._last
         if self._sent_at is None:
-            return True
+            return payload
         if now < self._inhibited_until(settings, self._sent_at):
-            return False
-        return self._waiting or now >= self._event_at(settings, self._sent_at)
+            return None
+        return payload if self._waiting or now >= self._event_at(settings, self._sent_at) else None
 
     def sent(self, payload: bytes, now: float) -> None:
         self._last = payload
@@ -93,28 +98,71 @@ class Rpdo:
         return data
 
 
-def pack(dictionary: Dictionary, settings: PdoSettings) -> bytes:
-    """The data of a TPDO at this moment."""
-    parts: list[bytes] = []
-    for word in settings.mapping:
-        entry = dictionary.find(word >> 16, word >> 8 & 0xFF)
-        parts.append(entry.upload())
-    return b"".join(parts)
+@dataclass(frozen=True, slots=True)
+class ActiveTpdo:
+    """A TPDO that is on, with the objects that it carries."""
+
+    tpdo: Tpdo
+    settings: PdoSettings
+    entries: tuple[Entry, ...]
+
+    def payload(self) -> bytes:
+        """Its data at this moment."""
+        return b"".join([entry.upload() for entry in self.entries])
 
 
-def unpack(dictionary: Dictionary, settings: PdoSettings, data: bytes) -> int:
-    """Write the mapped objects from an RPDO. Returns how many values the objects refused."""
-    refused = offset = 0
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where an RPDO has the value of an object: bytes ``start`` … ``end``. The object may be missing."""
+
+    start: int
+    end: int
+    entry: Entry | None
+
+
+@dataclass(frozen=True, slots=True)
+class MappedRpdo:
+    """An RPDO, numbered from 0, with the objects that it writes."""
+
+    number: int
+    settings: PdoSettings
+    mapped_bits: int
+    places: tuple[Place, ...]
+
+
+def entries_of(dictionary: Dictionary, settings: PdoSettings) -> tuple[Entry, ...]:
+    """The objects that a TPDO carries. Raises ``SdoAbort`` for one that does not exist."""
+    return tuple(dictionary.find(word >> 16, word >> 8 & 0xFF) for word in settings.mapping)
+
+
+def places_of(dictionary: Dictionary, settings: PdoSettings) -> tuple[Place, ...]:
+    """The objects that an RPDO writes."""
+    places: list[Place] = []
+    start = 0
     for word in settings.mapping:
-        size = (word & 0xFF) // 8
-        part = data[offset : offset + size]
-        offset += size
-        if word >> 16 < 0x20:
-            continue  # dummy entry (CiA 301 §7.4.7): fills a gap
+        end = start + (word & 0xFF) // 8
+        if word >> 16 >= 0x20:  # below are dummy entries, which fill a gap (CiA 301 §7.4.7)
+            places.append(Place(start, end, _found(dictionary, word)))
+        start = end
+    return tuple(places)
+
+
+def _found(dictionary: Dictionary, word: int) -> Entry | None:
+    try:
+        return dictionary.find(word >> 16, word >> 8 & 0xFF)
+    except SdoAbort:
+        return None
+
+
+def unpack(places: Sequence[Place], data: bytes) -> int:
+    """Write the objects from an RPDO. Returns how many values were refused."""
+    refused = 0
+    for place in places:
         try:
-            entry = dictionary.find(word >> 16, word >> 8 & 0xFF)
-            if isinstance(entry, Number):
-                entry.download(part)
+            if isinstance(place.entry, Number):
+                place.entry.download(data[place.start : place.end])
+            else:
+                refused += place.entry is None
         except SdoAbort:
             refused += 1
     return refused

@@ -20,7 +20,8 @@ class Simulation:
     def __init__(self, bus: Bus, nodes: Sequence[SimulatedDevice]) -> None:
         self._bus = bus
         self._nodes = tuple(nodes)
-        self._work = asyncio.Event()
+        self._woken: asyncio.Future[None] | None = None
+        self._timer: asyncio.TimerHandle | None = None
         self._is_open = False
         self._due: dict[SimulatedDevice, float | None] = {}
         """When each node is due; one that is missing here is due now. Asking all of them for every frame of a
@@ -28,7 +29,7 @@ class Simulation:
 
     def open(self) -> None:
         """Open the bus. Raises ``Unavailable`` if that fails."""
-        self._bus.open(self._work.set)
+        self._bus.open(self._wake)
         self._is_open = True
 
     async def run(self) -> None:
@@ -38,42 +39,60 @@ class Simulation:
             self.open()
         for node in self._nodes:
             node.start(loop.time())
-        while True:
-            await asyncio.sleep(0)  # a bus that wakes us while we send must not starve the loop
-            self._work.clear()
-            self._pump(loop.time())
-            deadline = self._next_deadline()
-            timer = None if deadline is None else loop.call_at(deadline, self._work.set)
-            try:
-                await self._work.wait()
-            finally:
-                if timer is not None:
-                    timer.cancel()
+        try:
+            while True:
+                self._woken = loop.create_future()
+                self._pump(loop.time())
+                self._arm(loop)
+                if self._woken.done():
+                    await asyncio.sleep(0)  # a bus that wakes us while we send must not starve the loop
+                await self._woken
+        finally:
+            if self._timer is not None:
+                self._timer.cancel()
 
     def poke(self) -> None:
         """A node was changed from outside: serve it now instead of at its next deadline."""
         self._due.clear()
-        self._work.set()
+        self._wake()
 
     def close(self) -> None:
         self._bus.close()
 
+    def _wake(self) -> None:
+        if self._woken is not None and not self._woken.done():
+            self._woken.set_result(None)
+
+    def _arm(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Wake at the next deadline."""
+        deadline = earliest(self._bus.next_deadline(), *self._due.values())
+        if self._timer is not None:
+            if self._timer.when() == deadline:
+                return
+            self._timer.cancel()
+        self._timer = None if deadline is None else loop.call_at(deadline, self._on_timer)
+
+    def _on_timer(self) -> None:
+        self._timer = None
+        self._wake()
+
     def _pump(self, now: float) -> None:
         # Frames first, by their own time of reception: a late loop must not look like a silent master.
+        addressed: set[SimulatedDevice] = set()
         for frame in self._bus.drain(now):
             for node in self._nodes:
                 if frame.can_id & STANDARD_MASK in node.heard:
                     node.on_frame(frame, frame.time)
-                    self._due.pop(node, None)
+                    addressed.add(node)
         self._bus.on_time(now)
         for node in self._nodes:
-            due = self._due.get(node, now)
-            if due is None or due > now:
+            is_known, due = node in self._due, self._due.get(node)
+            if is_known and node in addressed:
+                due = self._due[node] = node.next_deadline()
+            if not is_known or (due is not None and due <= now):
+                node.on_time(now)
+                self._due[node] = node.next_deadline()
+            elif node not in addressed:
                 continue
-            node.on_time(now)
             for frame in node.take_frames():
                 self._bus.send(frame, now, now + _SEND_WITHIN_S)
-            self._due[node] = node.next_deadline()
-
-    def _next_deadline(self) -> float | None:
-        return earliest(self._bus.next_deadline(), *self._due.values())

@@ -125,12 +125,14 @@ class StoeberAxis:
         self._ramp(dt_s)
         self.settle()
 
-    def settle(self) -> None:
-        """Take every change of state that is due."""
+    def settle(self) -> bool:
+        """Take every change of state that is due. True if there was any."""
+        before = self.state
         while (state := self._next_state()) is not self.state:
             if state is AxisState.SWITCHED_ON:
                 self._until = self._time + CLOSING_S
             self.state = state
+        return self.state is not before
 
     def next_deadline(self) -> float | None:
         timed = (AxisState.SELF_TEST, AxisState.SWITCHED_ON, AxisState.FAULT_REACTION)

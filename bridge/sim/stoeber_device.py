@@ -80,8 +80,9 @@ class StoeberDevice:
     def settle(self) -> None:
         """Make all transitions that are due; an axis that has come to rest frees the others."""
         for _ in range(2):
-            for axis in self.axes:
-                axis.settle()
+            changes = [axis.settle() for axis in self.axes]
+            if not any(changes):
+                return
 
     def next_deadline(self) -> float | None:
         return earliest(*(axis.next_deadline() for axis in self.axes))

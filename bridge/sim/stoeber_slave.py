@@ -10,10 +10,10 @@ from bridge.sim.canopen_slave import Application, CanopenSlave
 from bridge.sim.dictionary import Dictionary
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.nmt_slave import NmtCommand, NmtState, nmt_command_for
-from bridge.sim.pdo import Tpdo, pack, unpack
+from bridge.sim.pdo import MappedRpdo, Tpdo, unpack
 from bridge.sim.sdo_server import SdoServer
 from bridge.sim.settings import CommunicationSettings, PdoSettings, SdoSettings
-from bridge.sim.stoeber_settings import ANSWERED, StoeberPdo
+from bridge.sim.stoeber_settings import ANSWERED
 from bridge.sim.store import Store
 from bridge.sim.supervision import Watch
 from bridge.sim.ticks import earliest
@@ -35,7 +35,10 @@ class StoeberTpdo(Tpdo):
     def ask(self) -> None:
         self._asked = True
 
-    def is_due(self, settings: PdoSettings, payload: bytes, now: float) -> bool:
+    def due(self, settings: PdoSettings, sample: Callable[[], bytes], now: float) -> bytes | None:
+        return sample() if self._is_due(settings, now) else None
+
+    def _is_due(self, settings: PdoSettings, now: float) -> bool:
         if settings.transmission_type != ANSWERED:
             return False
         if self._sent_at is None:
@@ -117,28 +120,23 @@ class StoeberSlave(CanopenSlave):
     def _sdo_channels(self) -> list[SdoSettings]:
         return self._open_sdo
 
-    def _accepts(self, number: int, pdo: PdoSettings, data: bytes) -> bool:
+    def _accepts(self, rpdo: MappedRpdo, data: bytes) -> bool:
         return True
+
+    def _objects_of(self, number: int) -> Dictionary:
+        return self._views[number]
 
     def _on_sync(self, now: float) -> None:
         self._sync.start(now)
+        if self._sync.next_deadline() is not None:
+            self.news.is_there = True
         super()._on_sync(now)
 
-    def _apply(self, number: int, pdo: PdoSettings, data: bytes) -> None:
+    def _apply(self, rpdo: MappedRpdo, data: bytes) -> None:
         """§8.1.1: surplus bytes are ignored, an object that is not completely covered stays unchanged."""
-        covered: list[int] = []
-        bits = 0
-        for entry in pdo.mapping:
-            bits += entry & 0xFF
-            if bits > 8 * len(data):
-                break
-            covered.append(entry)
-        part = StoeberPdo(pdo.cob_id, entries=covered, count=len(covered))
-        self.rpdos_ignored += unpack(self._views[number], part, data)
-        self._application.rpdo_applied(number)
-        if pdo.transmission_type == ANSWERED:
-            self._answers[number].ask()
-
-    def _payload(self, settings: PdoSettings) -> bytes:
-        number = next(n for n, one in enumerate(self._store.current.tpdo) if one is settings)
-        return pack(self._views[number], settings)
+        covered = [place for place in rpdo.places if place.end <= len(data)]
+        self.rpdos_ignored += unpack(covered, data)
+        self._application.rpdo_applied(rpdo.number)
+        self.news.is_there = True
+        if rpdo.settings.transmission_type == ANSWERED:
+            self._answers[rpdo.number].ask()

@@ -33,8 +33,10 @@ class Watch:
         return True
 
     def next_deadline(self) -> float | None:
+        if self._since is None:
+            return None
         time_s = self._time_s()
-        return self._since + time_s if self._since is not None and time_s else None
+        return self._since + time_s if time_s else None
 
 
 class HeartbeatConsumer(Watch):

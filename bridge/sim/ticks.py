@@ -15,4 +15,4 @@ def next_tick(time: float) -> float:
 
 
 def earliest(*deadlines: float | None) -> float | None:
-    return min((deadline for deadline in deadlines if deadline is not None), default=None)
+    return min([deadline for deadline in deadlines if deadline is not None], default=None)

@@ -125,10 +125,11 @@ class Browser:
         classes: int = get(wanted, "NodeClassMask")
         forward = direction == ua.BrowseDirection.Forward
         mask: int = get(wanted, "ResultMask")
-        self._looked_at += len(node.references) + 1
+        references = node.references
+        self._looked_at += len(references) + 1
         return [
             _masked(found, mask)
-            for found in node.references
+            for found in references
             if (direction == ua.BrowseDirection.Both or get(found, "IsForward") == forward)
             and (types is None or get(found, "ReferenceTypeId") in types)
             and (not classes or classes & get(found, "NodeClass"))

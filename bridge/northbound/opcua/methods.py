@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from asyncua.server.address_space import AddressSpace
@@ -28,12 +28,14 @@ _AT_FAULT: Final = {Code.UNKNOWN_PARAMETER: 0, Code.READ_ONLY: 0, Code.WRITE_ONL
 
 
 class Caller:
-    """Carries out Call requests on the methods of the address space."""
+    """Carries out Call requests on the methods that ``method`` finds."""
 
-    def __init__(self, view: View, space: AddressSpace, methods: Mapping[ua.NodeId, MethodNode]) -> None:
+    def __init__(
+        self, view: View, space: AddressSpace, method: Callable[[ua.NodeId], MethodNode | None]
+    ) -> None:
         self._view = view
         self._space = space
-        self._methods = methods
+        self._method = method
 
     async def call(
         self, identity: Identity, calls: Sequence[ua.CallMethodRequest]
@@ -43,7 +45,7 @@ class Caller:
 
     async def _call(self, identity: Identity, call: ua.CallMethodRequest) -> ua.CallMethodResult:
         method_id: ua.NodeId = get(call, "MethodId")
-        method = self._methods.get(method_id)
+        method = self._method(method_id)
         refusal = self._refusal(call, method_id)
         if refusal is not None or method is None:
             return self._rejected(identity, call, refusal or StatusCodes.BadMethodInvalid)
@@ -73,7 +75,7 @@ class Caller:
         self, identity: Identity, call: ua.CallMethodRequest, code: int, faults: Sequence[int] = ()
     ) -> ua.CallMethodResult:
         """The result of a call that becomes no request, once it was told."""
-        method = self._methods.get(get(call, "MethodId"))
+        method = self._method(get(call, "MethodId"))
         action = method.action if method else "call"
         target = method.target if method else str(get(call, "ObjectId").Identifier)
         if action != Action.READ_PARAMETER:
@@ -85,7 +87,7 @@ class Caller:
         owner = self._space.get(get(call, "ObjectId"))
         if node is None or owner is None:
             return StatusCodes.BadNodeIdUnknown
-        method = self._methods.get(method_id)
+        method = self._method(method_id)
         if method is None:
             return StatusCodes.BadMethodInvalid
         if (

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cache
 from typing import Final
 
 from bridge.command.request import Action
@@ -139,6 +140,7 @@ _BUS_METHODS: Final[_Methods] = (
 )
 
 
+@cache
 def pascal_case(name: str) -> str:
     """``worst_case_stop_ms`` as ``WorstCaseStopMs``."""
     return "".join(word[:1].upper() + word[1:] for word in name.split("_"))

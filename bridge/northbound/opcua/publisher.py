@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.guard import Guard
 from bridge.image import Image
-from bridge.northbound.opcua.address_space import Binding
+from bridge.northbound.opcua.address_space import AllWatched
 from bridge.northbound.opcua.events import EventSender
 
 TICK_S: Final = 0.05
@@ -19,11 +19,11 @@ _BEFORE_YIELD: Final = 20
 
 
 class Publisher:
-    """Follows the image for the nodes in ``variables`` (in the order of its points)."""
+    """Follows the image for the variables in ``watched``."""
 
-    def __init__(self, image: Image, variables: Sequence[Sequence[Binding]], events: EventSender) -> None:
+    def __init__(self, image: Image, watched: AllWatched, events: EventSender) -> None:
         self._image = image
-        self._variables = variables
+        self._watched = watched
         self._events = events
         self._guard = Guard("OPC UA publisher")
 
@@ -46,12 +46,12 @@ class Publisher:
     async def _publish(self, indices: Sequence[int]) -> None:
         sent = 0
         for index in indices:
-            for binding in self._variables[index]:
-                watchers = binding.value.datachange_callbacks
+            for _, variable in sorted(self._watched.get(index, {}).items()):
+                watchers = variable.callbacks
                 if not watchers:
                     continue
                 with self._guard:
-                    value = binding.read()
+                    value = variable.read()
                     for handle, tell in list(watchers.items()):
                         if handle not in watchers:  # deleted while others had their turn
                             continue
@@ -62,5 +62,5 @@ class Publisher:
                             sent = 0
                             await asyncio.sleep(0)
                             # Who was told a newer one meanwhile must not be told an older one now.
-                            value = binding.read()
+                            value = variable.read()
         await asyncio.sleep(0)

@@ -20,7 +20,6 @@ from bridge.config import OpcUaTable
 from bridge.errors import OperationFailed
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua import decoding
-from bridge.northbound.opcua.address_space import Bindings, Builder
 from bridge.northbound.opcua.browsing import MOST_CONTINUATION_POINTS
 from bridge.northbound.opcua.certificates import (
     OwnCertificate,
@@ -30,7 +29,7 @@ from bridge.northbound.opcua.certificates import (
 )
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
 from bridge.northbound.opcua.items import LEAST_SAMPLING_MS
-from bridge.northbound.opcua.library import ObjectIds, node_id, ua, variant
+from bridge.northbound.opcua.library import ObjectIds, get, make, node_id, text, ua, variant
 from bridge.northbound.opcua.librarylog import quieten
 from bridge.northbound.opcua.listener import WINDOW, Listener
 from bridge.northbound.opcua.methods import Caller
@@ -39,6 +38,7 @@ from bridge.northbound.opcua.publisher import Publisher
 from bridge.northbound.opcua.routes import MOST_CALLS
 from bridge.northbound.opcua.security import CheckedPolicy, Users, security_policies
 from bridge.northbound.opcua.session import Server, Services
+from bridge.northbound.opcua.tree import Tree
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
@@ -187,20 +187,20 @@ class OpcUaServer:
         server = _Outer(inner, bound, trusted, self._pulse)
         await self._describe(server, users)
         namespace = await server.register_namespace(NAMESPACE)
-        builder = Builder(inner.aspace, namespace, self._view.image, self._view.epoch_ns)
-        bindings = builder.build(layout(self._view.image.points))
+        image = self._view.image
+        tree = Tree(inner.aspace, namespace, image, self._view.epoch_ns, layout(image.points))
         inner.services = Services(
             users,
-            Writer(self._view, inner.aspace, bindings.writable),
-            Caller(self._view, inner.aspace, bindings.methods),
+            Writer(self._view, inner.aspace, tree.writable),
+            Caller(self._view, inner.aspace, tree.method),
         )
-        events = self._events(inner, builder, bindings)
+        events = self._events(inner, tree)
         inner.subscriptions.prepare()
         self._server = server
         await server.start()
-        publisher = Publisher(self._view.image, bindings.variables, events)
+        publisher = Publisher(image, tree.watched, events)
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
-        # The tree lives as long as the process; a full collection of it takes a quarter of a second.
+        # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
 
     async def _describe(self, server: _Outer, users: Users) -> None:
@@ -219,10 +219,10 @@ class OpcUaServer:
         for capability, value in _CAPABILITIES.items():
             await server.get_node(node_id(capability)).write_value(value)
 
-    def _events(self, inner: Server, builder: Builder, bindings: Bindings) -> EventSender:
-        base = builder.object_type(BASE_TYPE, node_id(ObjectIds.BaseEventType))
-        types = {kind: builder.object_type(type_name(kind), base) for kind in Kind}
-        events = EventSender(self._view.epoch_ns, inner.subscriptions, bindings.notifiers, types)
+    def _events(self, inner: Server, tree: Tree) -> EventSender:
+        base = _event_type(inner, node_id(BASE_TYPE, tree.namespace), node_id(ObjectIds.BaseEventType))
+        types = {kind: _event_type(inner, node_id(type_name(kind), tree.namespace), base) for kind in Kind}
+        events = EventSender(self._view.epoch_ns, inner.subscriptions, tree.notifiers, types)
         self._view.on_event(events.on_event)
         return events
 
@@ -237,3 +237,20 @@ class OpcUaServer:
             )
         if settings.anonymous == "none" and not settings.user:
             _log.warning('OPC UA: nobody can log in: no [[opcua.user]] and anonymous = "none"')
+
+
+def _event_type(inner: Server, where: ua.NodeId, parent: ua.NodeId) -> ua.NodeId:
+    """A new type below ``parent``. Raises UaError where there is one already."""
+    name = str(where.Identifier)
+    item = make(
+        ua.AddNodesItem,
+        RequestedNewNodeId=where,
+        BrowseName=ua.QualifiedName(name, where.NamespaceIndex),
+        NodeClass=ua.NodeClass.ObjectType,
+        ParentNodeId=parent,
+        ReferenceTypeId=node_id(ObjectIds.HasSubtype),
+        NodeAttributes=make(ua.ObjectTypeAttributes, DisplayName=text(name)),
+    )
+    (result,) = inner.node_mgt_service.add_nodes([item])
+    get(result, "StatusCode").check()
+    return where

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 from bridge.northbound.opcua.library import ObjectIds, make, node_id, text, ua, variant
-from bridge.northbound.opcua.nodes import Argument, ArgumentType, VariableKind, VariableNode, enum_strings
+from bridge.northbound.opcua.nodes import (
+    Argument,
+    ArgumentType,
+    MethodNode,
+    VariableKind,
+    VariableNode,
+    enum_strings,
+)
 from bridge.northbound.opcua.units import UNIT_NAMESPACE, unit_description, unit_id
+from bridge.northbound.opcua.values import VARIANT_TYPE
 
 READ: Final = 1
 READ_WRITE: Final = 3
@@ -22,30 +32,57 @@ _ARGUMENT_TYPE: Final = {
     ArgumentType.ANY: ObjectIds.BaseDataType,
 }
 
-Property = tuple[str, ua.Variant, int]
-"""BrowseName, value, data type."""
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Property:
+    """One for all nodes that have the same."""
+
+    name: str
+    value: ua.Variant
+    data_type: int
 
 
-def properties(node: VariableNode) -> list[Property]:
-    """The properties that Part 8 gives a variable of this kind."""
+@dataclass(frozen=True, slots=True)
+class PropertyNode:
+    id: str
+    content: Property
+
+    @property
+    def browse_name(self) -> str:
+        return self.content.name
+
+
+def property_nodes(node: MethodNode | VariableNode) -> Iterator[PropertyNode]:
+    """The properties of a method, or those that Part 8 gives a variable of this kind."""
+    for found in _arguments(node) if isinstance(node, MethodNode) else _properties(node):
+        yield PropertyNode(f"{node.id}/{found.name}", found)
+
+
+def _properties(node: VariableNode) -> Iterator[Property]:
     point = node.point
     match node.kind:
         case VariableKind.ANALOG:
-            found = [_structure("EngineeringUnits", _unit(point.unit), ObjectIds.EUInformation)]
+            yield _engineering_units(point.unit)
             if point.low is not None and point.high is not None:
-                limits = make(ua.Range, Low=float(point.low), High=float(point.high))
-                found.append(_structure("EURange", limits, ObjectIds.Range))
-            return found
+                # One range for -0.0 and 0.0, too.
+                yield _range(point.low + 0.0, point.high + 0.0)
         case VariableKind.MULTI_STATE:
-            return [_texts("EnumStrings", [text(state) for state in enum_strings(point.states)])]
+            yield _enum_strings(point.states)
         case VariableKind.TWO_STATE:
-            return [_texts("FalseState", text("false")), _texts("TrueState", text("true"))]
+            yield from _TWO_STATE
         case VariableKind.PLAIN:
-            return []
+            pass
 
 
-def arguments(name: str, described: Sequence[Argument]) -> Property:
-    """The property of a method called ``name``: InputArguments or OutputArguments."""
+def _arguments(node: MethodNode) -> Iterator[Property]:
+    if node.arguments:
+        yield _described("InputArguments", node.arguments)
+    if node.results:
+        yield _described("OutputArguments", node.results)
+
+
+@cache
+def _described(name: str, arguments: tuple[Argument, ...]) -> Property:
     structures = [
         make(
             ua.Argument,
@@ -54,17 +91,35 @@ def arguments(name: str, described: Sequence[Argument]) -> Property:
             ValueRank=_SCALAR,
             Description=text(argument.description),
         )
-        for argument in described
+        for argument in arguments
     ]
     return _structure(name, structures, ObjectIds.Argument)
 
 
+@cache
+def _engineering_units(unit: str) -> Property:
+    return _structure("EngineeringUnits", _unit(unit), ObjectIds.EUInformation)
+
+
+@cache
+def _range(low: float, high: float) -> Property:
+    return _structure("EURange", make(ua.Range, Low=low, High=high), ObjectIds.Range)
+
+
+@cache
+def _enum_strings(states: tuple[tuple[int, str], ...]) -> Property:
+    return _texts("EnumStrings", [text(state) for state in enum_strings(states)])
+
+
 def _structure(name: str, value: object, data_type: int) -> Property:
-    return name, variant(value, ua.VariantType.ExtensionObject), data_type
+    return Property(name, variant(value, ua.VariantType.ExtensionObject), data_type)
 
 
 def _texts(name: str, value: object) -> Property:
-    return name, variant(value, ua.VariantType.LocalizedText), ObjectIds.LocalizedText
+    return Property(name, variant(value, ua.VariantType.LocalizedText), ObjectIds.LocalizedText)
+
+
+_TWO_STATE: Final = (_texts("FalseState", text("false")), _texts("TrueState", text("true")))
 
 
 def _unit(unit: str) -> ua.EUInformation:
@@ -77,9 +132,13 @@ def _unit(unit: str) -> ua.EUInformation:
     )
 
 
-def property_attributes(value: ua.Variant, data_type: int) -> ua.VariableAttributes:
-    rank = _ONE_DIMENSION if value.is_array else _SCALAR
-    return _variable_attributes(data_type, READ, rank, Value=value)
+def value_type(node: VariableNode) -> ua.VariantType:
+    return VARIANT_TYPE[node.point.data_type] if node.bit is None else ua.VariantType.Boolean
+
+
+def property_attributes(content: Property) -> ua.VariableAttributes:
+    rank = _ONE_DIMENSION if content.value.is_array else _SCALAR
+    return _variable_attributes(content.data_type, READ, rank, Value=content.value)
 
 
 def point_attributes(kind: ua.VariantType, *, writable: bool) -> ua.VariableAttributes:

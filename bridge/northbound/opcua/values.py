@@ -147,16 +147,12 @@ def reading_value(
     return data_value(value, code, stamp, datetime.now(UTC))
 
 
-def reader(
+def present_value(
     image: Image, index: int, variant_type: ua.VariantType, epoch_ns: EpochNs, bit: int | None = None
-) -> Callable[..., ua.DataValue]:
-    """Gives the present reading of a point, whatever it is called with."""
-
-    def read(*_: object) -> ua.DataValue:
-        reading = image[index]
-        return reading_value(reading, variant_type, epoch_ns(reading.time), bit)
-
-    return read
+) -> ua.DataValue:
+    """The present reading of a point."""
+    reading = image[index]
+    return reading_value(reading, variant_type, epoch_ns(reading.time), bit)
 
 
 def point_value(point: Point, written: ua.Variant) -> Value:

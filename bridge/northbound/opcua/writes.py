@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from typing import Final
@@ -91,9 +91,11 @@ async def ask(view: View, request: Request) -> Outcome:
 
 
 class Writer:
-    """Carries out Write calls. ``writable`` are the points that may be written, by NodeId."""
+    """Carries out Write calls. ``writable`` finds the points that may be written."""
 
-    def __init__(self, view: View, space: AddressSpace, writable: Mapping[ua.NodeId, VariableNode]) -> None:
+    def __init__(
+        self, view: View, space: AddressSpace, writable: Callable[[ua.NodeId], VariableNode | None]
+    ) -> None:
         self._view = view
         self._space = space
         self._writable = writable
@@ -104,7 +106,7 @@ class Writer:
         telegrams: list[_Telegram] = []
         latest: dict[str, _Telegram] = {}
         for place, write in enumerate(writes):
-            node = self._writable.get(get(write, "NodeId"))
+            node = self._writable(get(write, "NodeId"))
             if node is None or get(write, "AttributeId") != AttributeIds.Value:
                 code = self._refusal(write)
                 results[place] = status(code)

@@ -18,6 +18,7 @@ from bridge.northbound.opcua.nodes import (
     layout,
     pascal_case,
 )
+from bridge.northbound.opcua.structures import property_nodes
 from bridge.northbound.opcua.units import unit_id
 from tests.support.opcua_site import make_plant
 
@@ -178,3 +179,19 @@ def test_sparse_codes_stand_at_their_index() -> None:
 )
 def test_units_are_those_of_unece(unit: str, number: int) -> None:
     assert unit_id(unit) == number
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [
+        ("bus/can0/load", 0.0, 100.0),
+        # P105 = 50 Hz is 4000h; the words are two's complements
+        ("conveyor/fu1/command/frequency", -100.0, 50 * 0x7FFF / 0x4000),
+    ],
+)
+def test_values_with_ends_have_their_range(
+    trees: tuple[ObjectNode, ...], name: str, low: float, high: float
+) -> None:
+    (variable,) = [variable for variable in variables(trees) if variable.id == name]
+    (limits,) = [one.content.value.Value for one in property_nodes(variable) if one.browse_name == "EURange"]
+    assert (limits.Low, limits.High) == (low, high)

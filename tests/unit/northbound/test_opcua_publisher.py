@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from types import SimpleNamespace
 from typing import Any
 
 from asyncua import ua
 
+from bridge.northbound.opcua.address_space import Watched
 from bridge.northbound.opcua.publisher import Publisher
 from tests.support.zenoh_peer import until
 
@@ -56,15 +56,12 @@ async def test_many_that_watch_one_point_are_told_in_turns_and_of_the_newest_val
             del watchers[WATCHERS - 1]
 
     watchers: dict[int, Any] = dict.fromkeys(range(WATCHERS), tell)
-    binding: Any = SimpleNamespace(
-        value=SimpleNamespace(datachange_callbacks=watchers),
-        read=lambda: ua.DataValue(ua.Variant(number, ua.VariantType.UInt16)),
-    )
+    variable = Watched(watchers, lambda: ua.DataValue(ua.Variant(number, ua.VariantType.UInt16)))
     image: Any = Image()
     events: Any = Events()
     running = [
         asyncio.create_task(count_turns()),
-        asyncio.create_task(Publisher(image, [[binding]], events).run()),
+        asyncio.create_task(Publisher(image, {0: {-1: variable}}, events).run()),
     ]
     await until(lambda: len(told) >= WATCHERS - 1, "the last one to be told")
     for task in running:

@@ -19,7 +19,7 @@ from asyncua.crypto.cert_gen import (
     generate_self_signed_app_certificate,
 )
 from asyncua.crypto.uacrypto import CertProperties
-from asyncua.server.address_space import AttributeValue
+from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509.oid import ExtendedKeyUsageOID
@@ -326,14 +326,22 @@ class TestRoles:
         async with logged_in(open_, None, "anna", PASSWORD) as client:
             space = await namespace(client)
             nodes = open_[0]._server.iserver.aspace  # pyright: ignore
-            stop = nodes[ua.NodeId("conveyor/fu2/Stop", space)].attributes
+            stop = _own(nodes, ua.NodeId("conveyor/fu2/Stop", space))
             stop[ua.AttributeIds.Executable] = _constant(False, ua.VariantType.Boolean)
             with pytest.raises(ua.uaerrors.BadNotExecutable):
                 await client.get_node(ua.NodeId("conveyor/fu2", space)).call_method(f"{space}:Stop")
-            load = nodes[ua.NodeId("bus/can0/load", space)].attributes
+            load = _own(nodes, ua.NodeId("bus/can0/load", space))
             load[ua.AttributeIds.AccessLevel] = _constant(0, ua.VariantType.Byte)
             with pytest.raises(ua.uaerrors.BadNotReadable):
                 await client.get_node(ua.NodeId("bus/can0/load", space)).read_value()
+
+
+def _own(nodes: AddressSpace, where: ua.NodeId) -> dict[ua.AttributeIds, AttributeValue]:
+    """The attributes of a node that is no other's like from now on."""
+    made = NodeData(where)
+    made.attributes, made.references = dict(nodes[where].attributes), nodes[where].references
+    nodes[where] = made
+    return made.attributes
 
 
 def _constant(value: object, kind: ua.VariantType) -> AttributeValue:

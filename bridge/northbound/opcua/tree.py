@@ -1,0 +1,236 @@
+"""The nodes of the points, below the Objects folder and the Server object.
+
+asyncua would keep every attribute and every reference of each of them, a megabyte for a drive. Here only the
+layout is kept, and all that clients see follows from it when they look. Of what they have looked at, the
+references downwards are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Final, cast
+
+from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
+
+from bridge.image import Image
+from bridge.northbound.opcua.address_space import AllWatched, Attributes, Callbacks, Nodes, PointValue
+from bridge.northbound.opcua.kinds import SUBSCRIBE_TO_EVENTS, Kinds, Name, Node, constant, reference_to
+from bridge.northbound.opcua.library import AttributeIds, ObjectIds, get, node_id, ua
+from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableNode
+from bridge.northbound.opcua.structures import PropertyNode, property_nodes
+from bridge.northbound.opcua.values import EpochNs
+
+_ORGANIZES: Final = node_id(ObjectIds.Organizes)
+_HAS_COMPONENT: Final = node_id(ObjectIds.HasComponent)
+_HAS_PROPERTY: Final = node_id(ObjectIds.HasProperty)
+_HAS_NOTIFIER: Final = node_id(ObjectIds.HasNotifier)
+
+
+class _TreeNode:
+    """What asyncua calls NodeData, as far as anybody looks at it. ``reference`` is the type of the reference
+    to it from ``above``, which is None below the Objects folder."""
+
+    __slots__ = ("_below", "_kind", "_tree", "above", "node", "reference")
+
+    def __init__(self, tree: Tree, node: Node, above: _TreeNode | None, reference: ua.NodeId) -> None:
+        self._tree = tree
+        self._kind = tree.kinds.of(node)
+        self._below: list[ua.ReferenceDescription] | None = None
+        self.node = node
+        self.above = above
+        self.reference = reference
+
+    @property
+    def nodeid(self) -> ua.NodeId:
+        return node_id(self.node.id, self._tree.namespace)
+
+    @property
+    def references(self) -> list[ua.ReferenceDescription]:
+        if self._below is None:
+            self._below = list(self._downwards())
+        return [*self._upwards(), *self._below]
+
+    @property
+    def attributes(self) -> Attributes:
+        own = _OWN_OF_POINT if isinstance(self.node, VariableNode) else _OWN
+        return Attributes(self._kind.attributes, own, self)
+
+    @property
+    def is_notifier(self) -> bool:
+        return isinstance(self.node, ObjectNode) and self.node.notifier
+
+    @property
+    def notified(self) -> _TreeNode | None:
+        """Who hears its events besides itself, None for the server."""
+        return self.above if self.above and self.above.is_notifier else None
+
+    def refer(self, reference: ua.NodeId, *, forward: bool = True) -> ua.ReferenceDescription:
+        """A reference of this type to it."""
+        kind, name = self._kind, self.name
+        return ua.ReferenceDescription(
+            reference, forward, self.nodeid, name.qualified, name.text, kind.node_class, kind.type_id
+        )
+
+    def _upwards(self) -> Iterator[ua.ReferenceDescription]:
+        yield self.above.refer(self.reference, forward=False) if self.above else self._tree.to_objects
+        yield from self._kind.to_type
+        if self.is_notifier:
+            notified = self.notified
+            yield notified.refer(_HAS_NOTIFIER, forward=False) if notified else self._tree.to_server
+
+    def _downwards(self) -> Iterator[ua.ReferenceDescription]:
+        for below in self._tree.below(self):
+            yield below.refer(below.reference)
+            if below.is_notifier and below.notified is self:
+                yield below.refer(_HAS_NOTIFIER)
+
+    # what it has for itself of its attributes
+
+    @property
+    def name(self) -> Name:
+        # The names of properties are the standard's, in the standard's namespace.
+        namespace = 0 if isinstance(self.node, PropertyNode) else self._tree.namespace
+        return self._tree.kinds.name(self.node.browse_name, namespace)
+
+    def id_attribute(self) -> AttributeValue:
+        made = constant(self.nodeid, ua.VariantType.NodeId)
+        made.datachange_callbacks = self._tree.never_called
+        return made
+
+    def description_attribute(self) -> AttributeValue:
+        return self._tree.kinds.description(_description(self.node))
+
+    def value_attribute(self) -> AttributeValue:
+        return self._tree.value_of(cast("VariableNode", self.node))
+
+
+_OWN: Final[Mapping[int, Callable[[_TreeNode], AttributeValue]]] = {
+    AttributeIds.NodeId: _TreeNode.id_attribute,
+    AttributeIds.BrowseName: lambda node: node.name.browse_name,
+    AttributeIds.DisplayName: lambda node: node.name.display_name,
+    AttributeIds.Description: _TreeNode.description_attribute,
+}
+_OWN_OF_POINT: Final = {**_OWN, AttributeIds.Value: _TreeNode.value_attribute}
+
+
+class Tree:
+    """The nodes of ``trees`` in ``space``. Raises ValueError where two have the same id.
+
+    ``notifiers`` are the objects that send events, by their names, ``watched`` the variables with watchers.
+    """
+
+    def __init__(
+        self,
+        space: AddressSpace,
+        namespace: int,
+        image: Image,
+        epoch_ns: EpochNs,
+        trees: Sequence[ObjectNode],
+    ) -> None:
+        self._image = image
+        self._epoch_ns = epoch_ns
+        self._nodes: dict[str, _TreeNode] = {}
+        self._latest_property: _TreeNode | None = None
+        self.namespace = namespace
+        self.kinds = Kinds(space)
+        self.to_objects = reference_to(space, ObjectIds.ObjectsFolder, ObjectIds.Organizes, forward=False)
+        self.to_server = reference_to(space, ObjectIds.Server, ObjectIds.HasNotifier, forward=False)
+        self.notifiers: dict[str, ua.NodeId] = {}
+        self.watched: AllWatched = {}
+        self.never_called: Callbacks = {}
+        """Of what never changes."""
+        for tree in trees:
+            self._add(tree, None, _ORGANIZES)
+        self._attach(space, [self._nodes[tree.id] for tree in trees])
+
+    def _add(self, node: Node, above: _TreeNode | None, reference: ua.NodeId) -> None:
+        if node.id in self._nodes:
+            raise ValueError(f"OPC UA: two nodes have the id {node.id!r}")
+        made = self._nodes[node.id] = _TreeNode(self, node, above, reference)
+        if made.is_notifier:
+            self.notifiers[node.id] = made.nodeid
+        for kind, part in _parts(node):
+            self._add(part, made, kind)
+
+    def _attach(self, space: AddressSpace, tops: Iterable[_TreeNode]) -> None:
+        """Refer to the tree from asyncua's nodes, and have it found behind them."""
+        space[node_id(ObjectIds.ObjectsFolder)].references += [top.refer(_ORGANIZES) for top in tops]
+        notifiers = [self._nodes[name] for name in self.notifiers]
+        server = space[node_id(ObjectIds.Server)]
+        server.references += [one.refer(_HAS_NOTIFIER) for one in notifiers if one.notified is None]
+        server.attributes[AttributeIds.EventNotifier] = constant(SUBSCRIBE_TO_EVENTS, ua.VariantType.Byte)
+        # asyncua puts a mapping of its own there, too, for nodes that it loads when they are asked for.
+        space._nodes = Nodes(get(space, "_nodes"), self._find)  # pyright: ignore[reportPrivateUsage]
+
+    def method(self, where: ua.NodeId) -> MethodNode | None:
+        node = self._node(where)
+        return node if isinstance(node, MethodNode) else None
+
+    def writable(self, where: ua.NodeId) -> VariableNode | None:
+        """The variable, where it is one that clients may write."""
+        node = self._node(where)
+        return node if isinstance(node, VariableNode) and node.writable else None
+
+    def _node(self, where: ua.NodeId) -> Node | None:
+        found = self._nodes.get(self._name(where))
+        return found.node if found else None
+
+    def _name(self, where: ua.NodeId) -> str:
+        """The id in the layout; "" where there can be none."""
+        name = where.Identifier
+        return name if where.NamespaceIndex == self.namespace and isinstance(name, str) else ""
+
+    def _find(self, where: ua.NodeId) -> NodeData | None:
+        name = self._name(where)
+        return cast("NodeData | None", self._nodes.get(name) or self._property(name))
+
+    def _property(self, name: str) -> _TreeNode | None:
+        # Clients ask for one attribute of a node after the other.
+        if self._latest_property and self._latest_property.node.id == name:
+            return self._latest_property
+        owner = self._nodes.get(name.rpartition("/")[0])
+        for one in self._properties(owner) if owner else ():
+            if one.node.id == name:
+                self._latest_property = one
+                return one
+        return None
+
+    def below(self, above: _TreeNode) -> Iterator[_TreeNode]:
+        yield from self._properties(above)
+        for _, part in _parts(above.node):
+            yield self._nodes[part.id]
+
+    def _properties(self, owner: _TreeNode) -> Iterator[_TreeNode]:
+        if isinstance(owner.node, MethodNode | VariableNode):
+            for one in property_nodes(owner.node):
+                yield _TreeNode(self, one, owner, _HAS_PROPERTY)
+
+    def value_of(self, node: VariableNode) -> PointValue:
+        return PointValue(self._image, self._epoch_ns, node, self.watched)
+
+
+def _description(node: Node) -> str:
+    match node:
+        case MethodNode():
+            return node.description
+        case VariableNode():
+            return node.point.description if node.bit is None else f"bit {node.bit} of {node.point.leaf}"
+        case _:
+            return ""
+
+
+def _parts(node: Node) -> Iterator[tuple[ua.NodeId, Node]]:
+    """What is below a node besides its properties, and by which reference."""
+    match node:
+        case ObjectNode():
+            for method in node.methods:
+                yield _HAS_COMPONENT, method
+            for child in node.objects:
+                yield _ORGANIZES if node.folder else _HAS_COMPONENT, child
+            for variable in node.variables:
+                yield _HAS_COMPONENT, variable
+        case VariableNode():
+            for bit in node.bits:
+                yield _HAS_COMPONENT, bit
+        case _:
+            pass

@@ -1,0 +1,163 @@
+"""The tree as asyncua's own services make and hold it: node by node, each with all that belongs to it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from asyncua import ua
+from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData, NodeManagementService
+from asyncua.server.standard_address_space import standard_address_space
+from asyncua.ua.ua_binary import struct_to_binary
+
+from bridge.image import Image
+from bridge.northbound.opcua.library import make, node_id, text
+from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableKind, VariableNode, layout
+from bridge.northbound.opcua.structures import (
+    point_attributes,
+    property_attributes,
+    property_nodes,
+    value_type,
+)
+
+Ids = ua.ObjectIds
+_CHANGED = (Ids.ObjectsFolder, Ids.Server)
+_TYPES = {
+    VariableKind.PLAIN: Ids.BaseDataVariableType,
+    VariableKind.ANALOG: Ids.AnalogUnitType,
+    VariableKind.MULTI_STATE: Ids.MultiStateDiscreteType,
+    VariableKind.TWO_STATE: Ids.TwoStateDiscreteType,
+}
+
+
+def standard_space() -> AddressSpace:
+    made = AddressSpace()
+    standard_address_space.fill_address_space(NodeManagementService(made))
+    return made
+
+
+def copy_of(standard: AddressSpace) -> AddressSpace:
+    """Another space on the same nodes, besides those that a tree changes."""
+    made = AddressSpace()
+    made._nodes = dict(standard._nodes)
+    for number in _CHANGED:
+        before, node = standard[ua.NodeId(number)], NodeData(ua.NodeId(number))
+        node.attributes, node.references = dict(before.attributes), list(before.references)
+        made[node.nodeid] = node
+    return made
+
+
+Seen = tuple[list[bytes], dict[int, bytes]]
+"""References and attributes as they go to clients."""
+
+
+class HeldTree:
+    """The nodes of an image's points in ``space``. ``ids`` are theirs, ``points`` those with a value of the
+    image."""
+
+    def __init__(self, space: AddressSpace, namespace: int, image: Image) -> None:
+        self.space = space
+        self.ids: list[ua.NodeId] = []
+        self.points: set[ua.NodeId] = set()
+        self._namespace = namespace
+        self._management = NodeManagementService(space)
+        server = ua.NodeId(Ids.Server)
+        notifies = ua.DataValue(ua.Variant(1, ua.VariantType.Byte))
+        space[server].attributes[ua.AttributeIds.EventNotifier] = AttributeValue(notifies)
+        for tree in layout(image.points):
+            self._object(tree, ua.NodeId(Ids.ObjectsFolder), Ids.Organizes, server)
+
+    def seen(self, where: ua.NodeId, space: AddressSpace | None = None) -> Seen:
+        """What clients see of a node here or in another ``space``, without times and values of points."""
+        space = space or self.space
+        node = space[where]
+        kinds = [
+            kind for kind in node.attributes if kind != ua.AttributeIds.Value or where not in self.points
+        ]
+        values = {int(kind): space.read_attribute_value(where, kind) for kind in kinds}
+        references = [struct_to_binary(one) for one in node.references]
+        return references, {kind: as_told(value) for kind, value in values.items()}
+
+    def _object(self, node: ObjectNode, parent: ua.NodeId, reference: int, notifier: ua.NodeId) -> None:
+        attributes = make(ua.ObjectAttributes, EventNotifier=1 if node.notifier else 0)
+        type_id = Ids.FolderType if node.folder else Ids.BaseObjectType
+        where = self._add(node, ua.NodeClass.Object, attributes, type_id, parent, reference)
+        if node.notifier:
+            self._refer(notifier, Ids.HasNotifier, where)
+            notifier = where
+        for method in node.methods:
+            self._method(method, where)
+        for child in node.objects:
+            self._object(child, where, Ids.Organizes if node.folder else Ids.HasComponent, notifier)
+        for variable in node.variables:
+            self._variable(variable, where)
+
+    def _method(self, method: MethodNode, parent: ua.NodeId) -> None:
+        attributes = make(ua.MethodAttributes, Executable=True, UserExecutable=True)
+        where = self._add(
+            method, ua.NodeClass.Method, attributes, Ids.Null, parent, Ids.HasComponent, method.description
+        )
+        self._properties(method, where)
+
+    def _variable(self, node: VariableNode, parent: ua.NodeId) -> None:
+        told = node.point.description if node.bit is None else f"bit {node.bit} of {node.point.leaf}"
+        attributes = point_attributes(value_type(node), writable=node.writable)
+        where = self._add(
+            node, ua.NodeClass.Variable, attributes, _TYPES[node.kind], parent, Ids.HasComponent, told
+        )
+        self.points.add(where)
+        self._properties(node, where)
+        for bit in node.bits:
+            self._variable(bit, where)
+
+    def _properties(self, node: MethodNode | VariableNode, parent: ua.NodeId) -> None:
+        for one in property_nodes(node):
+            attributes = property_attributes(one.content)
+            self._add(
+                one, ua.NodeClass.Variable, attributes, Ids.PropertyType, parent, Ids.HasProperty, "", 0
+            )
+
+    def _add(
+        self,
+        node: Any,
+        node_class: ua.NodeClass,
+        attributes: Any,
+        type_id: int,
+        parent: ua.NodeId,
+        reference: int,
+        description: str = "",
+        namespace: int | None = None,
+    ) -> ua.NodeId:
+        attributes.DisplayName, attributes.Description = text(node.browse_name), text(description)
+        item = make(
+            ua.AddNodesItem,
+            RequestedNewNodeId=node_id(node.id, self._namespace),
+            BrowseName=ua.QualifiedName(
+                node.browse_name, self._namespace if namespace is None else namespace
+            ),
+            NodeClass=node_class,
+            ParentNodeId=parent,
+            ReferenceTypeId=ua.NodeId(reference),
+            NodeAttributes=attributes,
+            TypeDefinition=ua.NodeId(type_id),
+        )
+        (result,) = self._management.add_nodes([item])
+        result.StatusCode.check()
+        self.ids.append(result.AddedNodeId)
+        return result.AddedNodeId
+
+    def _refer(self, source: ua.NodeId, reference: int, target: ua.NodeId) -> None:
+        for forward, start, end in ((True, source, target), (False, target, source)):
+            item = make(
+                ua.AddReferencesItem,
+                SourceNodeId=start,
+                ReferenceTypeId=ua.NodeId(reference),
+                IsForward=forward,
+                TargetNodeId=end,
+                TargetNodeClass=ua.NodeClass.Object,
+            )
+            self._management.add_references([item])
+
+
+def as_told(value: ua.DataValue) -> bytes:
+    """Without its times."""
+    return struct_to_binary(ua.DataValue(value.Value, value.StatusCode))

@@ -1,0 +1,61 @@
+"""The whole tree as clients see it: what asyncua would have held, whoever looks first and from which end."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+
+import pytest
+from asyncua import Client, ua
+from asyncua.ua.ua_binary import struct_to_binary
+
+from bridge.northbound.opcua.server import OpcUaServer
+from tests.support.opcua_held import HeldTree, Seen, as_told, copy_of, standard_space
+from tests.support.opcua_site import LocalView, connected, namespace
+
+pytestmark = pytest.mark.asyncio(loop_scope="module")
+
+AT_ONCE = 100
+ALL = 0x3F
+BOTH = ua.BrowseDirection.Both
+KINDS = set(ua.AttributeIds) - {
+    # Depend on who asks.
+    ua.AttributeIds.UserAccessLevel,
+    ua.AttributeIds.UserExecutable,
+    # None of our nodes has any; asyncua's client takes that for an empty list.
+    ua.AttributeIds.ArrayDimensions,
+}
+
+
+async def look(client: Client, ids: Sequence[ua.NodeId], points: set[ua.NodeId]) -> dict[ua.NodeId, Seen]:
+    seen: dict[ua.NodeId, Seen] = {}
+    for start in range(0, len(ids), AT_ONCE):
+        some = ids[start : start + AT_ONCE]
+        asked = [ua.BrowseDescription(one, BOTH, ua.NodeId(), True, 0, ALL) for one in some]
+        for where, result in zip(
+            some, await client.uaclient.browse(ua.BrowseParameters(NodesToBrowse=asked)), strict=True
+        ):
+            seen[where] = [struct_to_binary(one) for one in result.References], {}
+        wanted = [ua.ReadValueId(one, kind) for one in some for kind in KINDS]
+        for one, value in zip(
+            wanted, await client.uaclient.read(ua.ReadParameters(NodesToRead=wanted)), strict=True
+        ):
+            is_missing = value.StatusCode.value == ua.StatusCodes.BadAttributeIdInvalid
+            if not is_missing and not (one.AttributeId == ua.AttributeIds.Value and one.NodeId in points):
+                seen[one.NodeId][1][int(one.AttributeId)] = as_told(value)
+    return seen
+
+
+async def test_two_who_look_at_once_from_both_ends_see_what_asyncua_would_have_held(
+    served: tuple[OpcUaServer, LocalView], client: Client
+) -> None:
+    server, view = served
+    held = HeldTree(copy_of(standard_space()), await namespace(client), view.image)
+    async with connected(server) as other:
+        found = await asyncio.gather(
+            look(client, held.ids, held.points), look(other, held.ids[::-1], held.points)
+        )
+    for where in held.ids:
+        references, attributes = held.seen(where)
+        expected = references, {kind: value for kind, value in attributes.items() if kind in KINDS}
+        assert [seen[where] for seen in found] == [expected, expected], where

@@ -27,6 +27,7 @@ from bridge.can.linkwatch import LinkWatch
 from bridge.can.netlink import Link
 from bridge.can.outbox import Outbox
 from bridge.can.receiver import BATCH, Receiver, Stamps
+from bridge.can.wakeups import Wakeups
 from bridge.can.wirebits import WireBits
 from bridge.canopen.frame import Frame
 from bridge.errors import Unavailable
@@ -50,8 +51,7 @@ class SocketCanBus:
         self._status = BusStatus()
         self._raw: socket.socket | None = None
         self._receiver: Receiver | None = None
-        self._wake: Callable[[], None] = lambda: None
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self._wakeups = Wakeups()
         self._sockets = sockets or CanSockets(channel)
         self._watch = LinkWatch(self._sockets.link)
         self._foreign = ForeignWatch(self._sockets)
@@ -76,9 +76,9 @@ class SocketCanBus:
     # opening and closing
 
     def open(self, wake: Callable[[], None]) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._wake = wake
-        self._watch.begin(self._loop, wake)
+        loop = asyncio.get_running_loop()
+        self._wakeups.begin(loop, wake)
+        self._watch.begin(loop, wake)
         try:
             self._open(self._sockets.link())
         except OSError as error:
@@ -97,8 +97,7 @@ class SocketCanBus:
         self._foreign.own.stalled(self._last_drain, is_stalled=False)
         self._watch.opened(self._last_drain)
         self._status.state = ControllerState.OK
-        if self._loop:
-            self._loop.add_reader(raw.fileno(), self._wake)
+        self._wakeups.open(raw.fileno())
 
     def _open_manager(self) -> None:
         self._bursts.open(self._sockets.manager())
@@ -130,8 +129,7 @@ class SocketCanBus:
         self._foreign.close()
         self._receiver = None
         if self._raw:
-            if self._loop and self._raw.fileno() >= 0:
-                self._loop.remove_reader(self._raw.fileno())
+            self._wakeups.close()
             self._raw.close()
             self._raw = None
 
@@ -159,6 +157,7 @@ class SocketCanBus:
             except OSError as error:
                 self._break_down(error, now)
                 break
+            self._wakeups.fetched(number)
             for can_id, data in errors:
                 self._on_error_frame(can_id, data, now)
             if number < BATCH:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Final
 
 from bridge.can.burstend import Burst
@@ -33,12 +34,15 @@ class SoftBursts:
 
     def __init__(self) -> None:
         self._jobs: dict[int, _Job] = {}
+        self._next = inf
+        """When the first of them is due."""
 
     def start(self, burst: Burst, now: float, *, at_once: bool) -> Frame | None:
         """Start or renew; gives the frame that is to be sent right now."""
         job = self._jobs.get(burst.can_id)
         if job is None or job.burst.period_s != burst.period_s:
             job = self._jobs[burst.can_id] = _Job(burst, burst.total - 1, now + burst.period_s)
+            self._look()
             return job.take(now)
         if len(burst.frames) != len(job.burst.frames):
             job.place = 0
@@ -49,16 +53,23 @@ class SoftBursts:
         return can_id in self._jobs
 
     def end(self, can_id: int) -> None:
-        self._jobs.pop(can_id, None)
+        if self._jobs.pop(can_id, None):
+            self._look()
 
     def clear(self) -> None:
         self._jobs.clear()
+        self._look()
+
+    def _look(self) -> None:
+        self._next = min((job.due for job in self._jobs.values()), default=inf)
 
     def next_deadline(self) -> float | None:
-        return min((job.due for job in self._jobs.values()), default=None)
+        return self._next if self._jobs else None
 
     def due(self, now: float) -> list[Frame]:
         """What is to be sent by ``now``. Periods that were missed are missed: no bunch is sent."""
+        if now < self._next:
+            return []
         frames: list[Frame] = []
         for can_id, job in list(self._jobs.items()):
             if job.due > now:
@@ -76,6 +87,7 @@ class SoftBursts:
             missed = int((now - job.due) / period_s)
             job.left -= missed
             job.due += (missed + 1) * period_s
+        self._look()
         # SYNC last: an RPDO that is due with it is taken over by it and not by the next one.
         frames.sort(key=lambda frame: frame.can_id == _SYNC)
         return frames

@@ -23,4 +23,4 @@ def decode(data: bytes) -> Emergency | None:
     if len(data) < _HEAD.size:
         return None
     code, register = _HEAD.unpack_from(data)
-    return Emergency(code, register, data[3:8])
+    return Emergency(code, register, data[3:])

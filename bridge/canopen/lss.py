@@ -91,7 +91,7 @@ def _message(command: int, rest: bytes = b"") -> bytes:
 def settle() -> Service[None]:
     """Send nothing for a whole answer time, so that late answers are not taken for those of the next
     query."""
-    yield LssExchange(b"", None, "waiting for late answers", fails=False, by_many=True)
+    yield LssExchange(b"", None, "waiting for late answers", by_many=True)
 
 
 def switch_global(*, configuration: bool) -> Service[None]:

@@ -46,7 +46,7 @@ class _Owed:
     index: int
     sub: int
     until: float
-    answers: int = 1
+    answers: int
 
     def is_about(self, job: SdoJob) -> bool:
         return (self.index, self.sub) == (job.index, job.sub)
@@ -284,10 +284,7 @@ class SdoChannel:
         self._owed = _Owed(job.index, job.sub, now + job.timeout_s, answers)
 
     def _clear(self) -> None:
-        if self._transfer:
-            self._transfer.close()
         self._job = self._transfer = self._exchange = self._deadline = self._send_at = None
-        self._unsent.clear()
 
     def _end(self, result: Result, now: float) -> None:
         job = self._job

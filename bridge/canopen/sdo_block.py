@@ -33,7 +33,7 @@ BLOCK_FROM_BYTES: Final = 112
 MOST_SEGMENTS: Final = 127
 _LEAST_SEGMENTS: Final = 4
 _MOST_REPEATS: Final = 3
-"""The transfer is given up when this many blocks in a row bring nothing new."""
+"""The transfer is given up when a block has been repeated this often in a row and brings nothing new."""
 
 _DOWNLOAD: Final = 0xC6  # with our CRC and the length
 _DOWNLOAD_END: Final = 0xC1

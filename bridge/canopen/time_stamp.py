@@ -54,6 +54,6 @@ class TimeProducer:
         """The frame that is due. After a pause one frame is sent at once, and missed ones are skipped."""
         if self._due is not None and now < self._due:
             return None
-        late = self._due is None or now - self._due > self._period_s
+        late = self._due is None or now - self._due >= self._period_s
         self._due = (now if late or self._due is None else self._due) + self._period_s
         return Frame(cobid.TIME, encode(self._epoch_ns(now)))

@@ -212,14 +212,14 @@ class AuditTrail:
             telegrams = self._telegrams.pop(entry.target, None) if entry.ending.code == Code.OK else None
             if telegrams is not None:
                 # What follows a stop or a release is no repetition of what went before it.
-                self._tell_waiting(entry.target, telegrams, self._note_other)
+                self._tell_waiting(entry.target, telegrams, self._note_other, entry.time)
             self._note_other(entry)
 
     def _note_telegram(self, entry: AuditEntry) -> None:
         before = self._telegrams.get(entry.target)
         if before is None or not before.identity.is_same(entry.identity):
             if before is not None:
-                self._tell_waiting(entry.target, before, self._note_other)
+                self._tell_waiting(entry.target, before, self._note_other, entry.time)
             self._note_other(entry)
             self._telegrams[entry.target] = _Telegrams(entry.identity, entry.new, entry.ending, entry.time)
             return
@@ -230,7 +230,7 @@ class AuditTrail:
             return
         before.new, before.ending = new, entry.ending
         if not goes_on and self._share(entry).allows(entry.time):
-            self._tell_waiting(entry.target, before, self._tell)
+            self._tell_waiting(entry.target, before, self._tell, entry.time)
             self._tell(entry)
             before.told_at = entry.time
             return
@@ -238,18 +238,19 @@ class AuditTrail:
             before.repeated += 1
         before.waiting = entry
         if entry.time - before.told_at >= SETPOINTS_S:
-            self._tell_waiting(entry.target, before, self._tell)
+            self._tell_waiting(entry.target, before, self._tell, entry.time)
 
-    def _tell_waiting(self, target: str, telegrams: _Telegrams, tell: Callable[[AuditEntry], None]) -> None:
-        """The newest setpoints, and how many telegrams went before them untold."""
+    def _tell_waiting(
+        self, target: str, telegrams: _Telegrams, tell: Callable[[AuditEntry], None], now: float
+    ) -> None:
+        """The newest setpoints, and how many telegrams have gone untold up to ``now``."""
         entry, telegrams.waiting = telegrams.waiting, None
         if entry is not None:
             tell(entry)
             telegrams.told_at = entry.time
         if telegrams.repeated:
             who, ending = telegrams.identity, telegrams.ending
-            at = telegrams.told_at if entry is None else entry.time
-            tell(AuditEntry(at, who, target, "telegrams", ending, count=telegrams.repeated))
+            tell(AuditEntry(now, who, target, "telegrams", ending, count=telegrams.repeated))
             telegrams.repeated = 0
 
     def _note_other(self, entry: AuditEntry) -> None:
@@ -286,7 +287,7 @@ class AuditTrail:
     def sum_up(self, now: float) -> None:
         """Write what was only counted."""
         for target, telegrams in self._telegrams.items():
-            self._tell_waiting(target, telegrams, self._tell)
+            self._tell_waiting(target, telegrams, self._tell, now)
         for key, share in list(self._shares.items()):
             if not share.is_used:
                 del self._shares[key]
@@ -313,11 +314,10 @@ def client_of(identity: Identity) -> str:
 
 
 def _goes_on(before: _Telegrams, entry: AuditEntry) -> bool:
-    """Whether this telegram brings only new setpoints, from the same controller and with the same outcome."""
+    """Whether this telegram of the same controller brings only new setpoints, with the same outcome."""
     word = entry.new.get("control_word", before.new.get("control_word"))
     return (
-        before.identity.is_same(entry.identity)
-        and before.ending == entry.ending
+        before.ending == entry.ending
         and before.new.get("control_word") == word
         and entry.new.keys() <= before.new.keys()
     )

@@ -35,7 +35,8 @@ class DriveChannel:
     After any call the caller compares ``output`` and sends it. ``report`` gets the events. ``settled`` is
     called when what others may see has changed beyond the status word, before outcomes are told: so a client
     that reads after its outcome sees the new values. ``tripped`` gets the deadline whenever the watchdog
-    trips.
+    trips. ``due`` is told of deadlines that may be earlier than before, ``NOW`` where they are not computed;
+    whoever is told by ``settled`` has to ask for them, too.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class DriveChannel:
         *,
         settled: Callable[[float], None],
         tripped: Callable[[float], None],
+        due: Callable[[float], None] = lambda at: None,
     ) -> None:
         self.name = name
         self.family = family
@@ -61,6 +63,7 @@ class DriveChannel:
         self._report = report
         self._settled = settled
         self._tripped = tripped
+        self.due = due
         self._status = DriveStatus(family)
         decode = TelegramDecoder(
             name, family, family.slot_named(settings.slot), self.scales, self.unserved
@@ -223,6 +226,9 @@ class DriveChannel:
 
     def on_pdo(self, now: float) -> None:
         """A TPDO arrived; what it says comes after this."""
+        deadline_s = self.link.pdo_deadline_s
+        if deadline_s is not None:
+            self.due(now + deadline_s)
         if self.link.on_pdo(now):
             self._status.link_fault = 0.0
             self._happen(self._way(now), now)

@@ -1,60 +1,129 @@
-"""When the next of many timers is due, without asking all of them after every frame."""
+"""Which of many have something to do now: only those that are due cost anything."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Final
+import heapq
+from math import inf
+from typing import Final, Generic, Protocol, TypeVar
 
-_AT_ONCE_S: Final = 0.001
-"""With so few timers that they may be looked at more often than this, they are looked at every time."""
+NOW: Final = -inf
+_AHEAD_S: Final = 0.005
+"""What is to be looked at within this time is looked at before the timer is set: mostly its deadline has been
+put off meanwhile, and nobody has to wake up for that."""
+_SWEEPS: Final = 10
+_MOST_ENTRIES: Final = 8
+"""For each owner, before those that count no more are thrown away."""
 
 
-class Deadlines:
-    """Keeps the earliest of some deadlines that ``look`` finds. Times are monotonic seconds.
+class Owner(Protocol):
+    """Who has deadlines: the earliest of them at any time, ``now`` for one that is past."""
 
-    ``on_change``: any timer may have become earlier. ``on_readings``: only timers that received data restart
-    may have changed, and looking at them within ``look_every_s`` is enough.
+    def next_deadline(self, now: float) -> float | None: ...
+
+
+T = TypeVar("T", bound=Owner)
+
+
+class Deadlines(Generic[T]):
+    """For each of its owners when to look at it, which is never later than its earliest deadline.
+
+    A deadline that was put off (each TPDO and telegram does that) is noticed when the old one comes. Of one
+    that was brought forward ``due`` must be told. Times are monotonic seconds.
     """
 
-    def __init__(self, look: Callable[[float], float | None]) -> None:
-        self.look_every_s = 0.0
-        self._look = look
-        self._deadline: float | None = None
-        self._looked_at = float("-inf")
-        self._changed = True
-        self._readings = False
+    def __init__(self) -> None:
+        self._owners: list[T] = []
+        self._planned: list[float] = []
+        self._touched: dict[int, None] = {}
+        self._heap: list[tuple[float, int]] = []
+        self._swept = 0
+        self.missed = 0
+        """How often ``sweep`` has found a deadline that nobody had told of."""
 
-    def on_change(self) -> None:
-        self._changed = True
+    def add(self, owner: T) -> None:
+        """It gets the next place, from 0."""
+        self._touched[len(self._owners)] = None
+        self._owners.append(owner)
+        self._planned.append(inf)
 
-    def on_readings(self) -> None:
-        self._readings = True
+    def due(self, place: int, at: float = NOW) -> None:
+        """The owner at ``place`` has a deadline then; ``NOW``: another than it had, whenever that is."""
+        if at < self._planned[place]:
+            self._touched[place] = None
 
-    def is_due(self, now: float) -> bool:
-        """Whether something may be due; what it does makes all deadlines uncertain."""
-        if self._must_look(now):
-            self._look_again(now)
-        if self._deadline is None or now < self._deadline:
-            return False
-        self._changed = True
-        return True
+    @property
+    def is_touched(self) -> bool:
+        """Somebody may have an earlier deadline than ``next`` has said."""
+        return bool(self._touched)
+
+    def take_due(self, now: float) -> list[T]:
+        """Who has a deadline that has come, in the order of the owners. What they do about it makes all of
+        their deadlines uncertain."""
+        heap, planned = self._heap, self._planned
+        if not self._touched and (not heap or heap[0][0] > now):
+            return []
+        self._plan_touched(now)
+        due = set[int]()
+        while heap and heap[0][0] <= now:
+            at, place = heapq.heappop(heap)
+            if planned[place] != at:
+                continue
+            planned[place] = inf
+            at = self._next_of(place, now)
+            if at <= now:
+                due.add(place)
+                self._touched[place] = None
+            else:
+                self._plan(place, at)
+        return [self._owners[place] for place in sorted(due)]
 
     def next(self, now: float) -> float | None:
-        """When to ask ``is_due`` next."""
-        # Whoever has just asked ``is_due`` has looked.
-        if self._changed or (now != self._looked_at and self._must_look(now)):
-            self._look_again(now)
-        if not self._readings:
-            return self._deadline
-        again = self._looked_at + self.look_every_s
-        return again if self._deadline is None else min(again, self._deadline)
+        """When to ask ``take_due`` next."""
+        self._plan_touched(now)
+        heap, planned = self._heap, self._planned
+        while heap:
+            at, place = heap[0]
+            later = inf
+            if planned[place] == at:
+                if at > now + _AHEAD_S or (later := self._next_of(place, now)) <= at:
+                    return at
+                planned[place] = inf
+            heapq.heappop(heap)
+            self._plan(place, later)
+        return None
 
-    def _must_look(self, now: float) -> bool:
-        if self._changed or self.look_every_s < _AT_ONCE_S:
-            return True
-        return self._readings and now >= self._looked_at + self.look_every_s
+    def sweep(self, now: float) -> list[T]:
+        """Look at the next few owners, whoever has been told of: all of them in ten calls. Gives those with a
+        deadline of which ``due`` should have been told."""
+        count = len(self._owners)
+        first, self._swept = self._swept, self._swept + -(-count // _SWEEPS)
+        missed = [
+            place
+            for place in (place % count for place in range(first, self._swept))
+            if place not in self._touched and self._next_of(place, now) < self._planned[place]
+        ]
+        self._swept %= max(count, 1)
+        self.missed += len(missed)
+        self._touched |= dict.fromkeys(missed)
+        return [self._owners[place] for place in missed]
 
-    def _look_again(self, now: float) -> None:
-        self._deadline = self._look(now)
-        self._looked_at = now
-        self._changed = self._readings = False
+    def _next_of(self, place: int, now: float) -> float:
+        at = self._owners[place].next_deadline(now)
+        return inf if at is None else at
+
+    def _plan_touched(self, now: float) -> None:
+        if self._touched:
+            touched, self._touched = self._touched, {}
+            for place in touched:
+                self._plan(place, self._next_of(place, now))
+
+    def _plan(self, place: int, at: float) -> None:
+        """Look at it then, unless it is looked at before."""
+        heap, planned = self._heap, self._planned
+        if at >= planned[place]:
+            return
+        planned[place] = at
+        heapq.heappush(heap, (at, place))
+        if len(heap) > _MOST_ENTRIES * len(planned):
+            heap[:] = [(at, place) for place, at in enumerate(planned) if at < inf]
+            heapq.heapify(heap)

@@ -8,6 +8,7 @@ from typing import Final
 
 from bridge.command.actual import ActualData
 from bridge.command.channel import DriveChannel
+from bridge.command.deadlines import NOW
 from bridge.command.event import Event
 from bridge.command.follow import Verdict
 from bridge.command.following import Following
@@ -65,6 +66,7 @@ class Drive:
         report: Callable[[Event], None],
         settled: Callable[[Drive, float], None],
         tripped: Callable[[float], None],
+        due: Callable[[float], None],
     ) -> None:
         self.name = f"{node.name}/{family.leaf_of(table)}"
         self.node_name = node.name
@@ -80,6 +82,7 @@ class Drive:
             report,
             settled=lambda now: settled(self, now),
             tripped=tripped,
+            due=due,
         )
         self.following = Following(self.channel)
         self.identification = Identification()
@@ -214,7 +217,6 @@ class Drive:
         """What the boot-up has read of it is not true any more."""
         self.own = OwnJudgement()
         self.channel.on_own_watch(why, now)
-        self._refresh_supervision(now)
         self._image.set(self._bridge_ms, 0, now, Quality.CONFIG_ERROR, why)
 
     def on_wire(self, wire: Wire, now: float) -> None:
@@ -260,6 +262,7 @@ class Drive:
 
     def refresh(self, now: float) -> None:
         """Bring every point of the drive up to date; called when something about it has changed."""
+        self.channel.due(NOW)
         self.following.on_settled()
         self._actual.refresh(now)
         self._refresh_command(now)

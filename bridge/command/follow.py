@@ -215,10 +215,9 @@ class Follow:
 
     def on_node_stopped(self, now: float) -> None:
         """The node has said that it is in a state in which its drives do not run."""
-        is_open = self.state is LastStop.FORWARDED or not self._obeys(now)
-        if self._is_cut_off and is_open and self.state is not LastStop.IGNORED:
+        if self._is_cut_off and self.state is not LastStop.IGNORED:
             self._says = Says.AT_REST
-            self._conclude(LastStop.FOLLOWED, now)
+            self._judge(now)
 
     def on_restart(self) -> None:
         """The node has started anew."""
@@ -226,7 +225,7 @@ class Follow:
             self._forget()
 
     def _begin(self) -> None:
-        self._forget()
+        """A stop; whatever was before it has been forgotten."""
         self.state = LastStop.FORWARDED
         self.awaits_sending = self._is_there
 

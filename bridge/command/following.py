@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.command.channel import DriveChannel
+from bridge.command.deadlines import NOW
 from bridge.command.follow import Bounds, Follow, LastStop, Says, Sent, Verdict
 from bridge.command.link import NodeState
 from bridge.drive import MOVING, DriveState, OwnJudgement, OwnVerdict, StatusWords
@@ -69,14 +70,17 @@ class Following:
         """What was to be sent has been handed to the bus. ``rpdo_period_ms`` is how long it may take to the
         drive, ``own`` what the drive does when we fall silent."""
         self._follow.on_handed_over(now, self._bounds(rpdo_period_ms, own))
+        self._channel.due(NOW)
 
     def on_cut_off(self, now: float, rpdo_period_ms: int, own: OwnJudgement | None) -> None:
         """The bridge takes the node out of operation: the drive will not be heard any more."""
         self._follow.on_cut_off(now, self._bounds(rpdo_period_ms, own))
+        self._channel.due(NOW)
 
     def on_node_stopped(self, now: float) -> None:
         """The node has said that it is in a state in which its drives do not run."""
         self._follow.on_node_stopped(now)
+        self._channel.due(NOW)
 
     def on_restart(self) -> None:
         """The node has started: what it was told before is over."""
@@ -107,6 +111,7 @@ class Following:
         last, deadline_s = link.last_pdo, link.pdo_deadline_s
         if last is not None and deadline_s is not None and now - last > deadline_s:
             self._follow.on_pause(now)
+            self._channel.due(NOW)
 
     def after_pdo(self, now: float) -> None:
         """The channel has the status word of the TPDO."""
@@ -114,6 +119,7 @@ class Following:
         if word != self._status_word or not self._follow.is_informed:
             self._status_word = word
             self._follow.on_report(self._says(word), now)
+            self._channel.due(NOW)
 
     def _says(self, word: int) -> Says:
         state = self._channel.state

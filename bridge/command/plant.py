@@ -36,9 +36,7 @@ from bridge.guard import Guard
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Family
 from bridge.parameter import Ledger, Names
-
-_LOOK_PER_DRIVE_S: Final = 50e-6
-"""Readings alone make us look at all timers this often at most, so that looking takes a tenth of the CPU."""
+from bridge.ratelimit import RateLimit
 
 CarryOut = Callable[[Request, float, Reply], bool]
 """Takes a command on a node or a bus, or a request for a parameter; False where there is nobody to do it."""
@@ -75,6 +73,7 @@ class Node:
 
 _LONGEST_NAME: Final = 80
 """Clients may call anything a drive."""
+_SEVERITY_MISSED, _MISSED_EVENTS, _MISSED_EVERY_S = 700, 3, 60.0
 _BRINGS_TIMERS_FORWARD: Final = (Action.SET_TIMEOUT, Action.TAKE_CONTROL)
 
 
@@ -94,11 +93,11 @@ class Plant:
         self.eeprom_writes = Ledger()
         """How often parameters were written; whoever keeps it across restarts fills it first."""
         self._stop_due: float | None = None
-        self.changes = 0
-        """Counts up whenever what a drive is sent may have changed."""
+        self._changed: dict[str, set[str]] = {bus.name: set() for bus in site.bus}
         self.unsent_stops: set[Drive] = set()
         """Drives with a stop that has not been handed to the bus yet."""
-        self._deadlines = Deadlines(self._next_of_drives)
+        self._deadlines = Deadlines[Drive]()
+        self._missed_limit = RateLimit(_MISSED_EVENTS, _MISSED_EVERY_S)
         self._listeners: list[Callable[[Event], None]] = []
         self._outcomes: deque[tuple[Reply, Outcome]] = deque()
         self._gate = EventGate()
@@ -115,10 +114,12 @@ class Plant:
             for table in bus.node:
                 family = families[table.mapping]
                 node = self.nodes[table.name] = Node(bus, table, family, names[table.mapping])
-                told = self.report, partial(self._on_settled, node), self._tripped
+                settled = partial(self._on_settled, node)
                 for position, drive_table in enumerate(table.drive):
                     unit_id = units[table.name, position]
+                    told = self.report, settled, self._tripped, partial(self._deadlines.due, len(self.drives))
                     drive = Drive(table, bus, drive_table, family, unit_id, self.image, points, *told)
+                    self._deadlines.add(drive)
                     node.drives.append(drive)
                     self.drives[drive.name] = drive
                     self.by_unit[unit_id] = drive
@@ -132,7 +133,6 @@ class Plant:
             for drive in node.drives:
                 self.set(f"{drive.name}/supervision/sdo_abort_code", 0, began)
                 self._on_settled(node, drive, began)
-        self._deadlines.look_every_s = len(self.drives) * _LOOK_PER_DRIVE_S
         self.set("bridge/version", version, began)
         self.set("bridge/drives_configured", len(self.drives), began)
         for leaf in CONNECTION_COUNTS:
@@ -184,7 +184,6 @@ class Plant:
         if self._is_closing and request.action not in STOP_ACTIONS:
             reply(Outcome(Code.NOT_READY, "the bridge is being stopped", forwarded=False))
             return False
-        self._deadlines.on_change()
         if request.action in NODE_ACTIONS:
             reply = self._counting_refusals(request, now, reply)
             is_taken = carry_out(request, now, reply)
@@ -258,7 +257,7 @@ class Plant:
 
         return conclude
 
-    def count(self, leaf: str, now: float, by: int = 1) -> None:
+    def count(self, leaf: str, now: float, by: int) -> None:
         """Count up a point of the bridge's own, such as ``modbus_refused_connections``."""
         index = self.image.index[f"bridge/{leaf}"]
         self.image.set(index, int(self.image[index].value) + by, now)
@@ -266,17 +265,18 @@ class Plant:
     def on_time(self, now: float, enforce: Enforce = lambda node, action, why, now: None) -> None:
         """Let the timers of every channel run and bring the image up to date. ``enforce`` acts on the node of
         a drive that ignores its stop."""
-        if not self._deadlines.is_due(now):
-            return
-        for drive in self.drives.values():
-            deadline = drive.next_deadline(now)
-            if deadline is not None and deadline <= now:
-                node = self.nodes[drive.node_name]
-                for verdict in drive.on_time(now):
-                    conclude(node, drive, verdict, now, self.report, self.audit, enforce)
+        for drive in self._deadlines.take_due(now):
+            node = self.nodes[drive.node_name]
+            for verdict in drive.on_time(now):
+                conclude(node, drive, verdict, now, self.report, self.audit, enforce)
 
     def refresh(self, now: float) -> None:
         """The slow part: ages, counters and the faults of the nodes; a few times a second."""
+        for drive in self._deadlines.sweep(now):
+            message = "a fault of the bridge's own: it had not planned a deadline of this drive"
+            if self._missed_limit.allows(now):
+                self.report(Event(now, Kind.WATCHDOG, drive.name, _SEVERITY_MISSED, message))
+        self.set("bridge/missed_deadlines", self._deadlines.missed, now)
         for drive in self.drives.values():
             drive.look(now)
         self.image.tell_kept()
@@ -291,8 +291,7 @@ class Plant:
         102.0 is there while a controller is silent; it clears by itself and is then the last fault, as
         P170 does.
         """
-        self.changes += 1
-        self._deadlines.on_change()
+        self._changed[node.bus.name].add(node.name)
         drive.refresh(now)
         if drive.following.awaits_sending:
             self.unsent_stops.add(drive)
@@ -310,23 +309,25 @@ class Plant:
     def next_deadline(self, now: float) -> float | None:
         return self._deadlines.next(now)
 
+    @property
+    def has_news(self) -> bool:
+        """Since the last round something has come of a drive beside its values."""
+        return self._deadlines.is_touched or any(self._changed.values()) or bool(self._outcomes)
+
+    def take_changed(self, bus: str) -> set[str]:
+        """The nodes of this bus with a drive that may be sent something else since the last call."""
+        changed = self._changed[bus]
+        if changed:
+            self._changed[bus] = set()
+        return changed
+
     def on_handed_over(self, drive: Drive, now: float) -> None:
         """What this drive is sent has been handed to the bus."""
         self.unsent_stops.discard(drive)
         drive.on_handed_over(now)
-        self._deadlines.on_change()
-
-    def on_readings(self) -> None:
-        """The master has taken in frames: timers of drives may have moved."""
-        self._deadlines.on_readings()
-
-    def _next_of_drives(self, now: float) -> float | None:
-        times = [drive.next_deadline(now) for drive in self.drives.values()]
-        return min((time for time in times if time is not None), default=None)
 
     def on_node(self, node: Node, state: NodeState, now: float, *, tell: bool = True) -> None:
         """The master says that a node is in another state; ``tell`` makes that an event."""
-        self._deadlines.on_change()
         for drive in node.drives:
             drive.channel.on_node(state, now)
         if not tell:

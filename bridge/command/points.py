@@ -244,5 +244,6 @@ def _bridge_points() -> list[Point]:
             "longest delay of a round of the bus process, since start",
             unit="ms",
         ),
+        point("missed_deadlines", _U32, "deadlines of drives that the bridge had not planned, since start"),
         *(point(leaf, _U32, f"{what}, since start") for leaf, what in CONNECTION_COUNTS.items()),
     ]

@@ -78,7 +78,7 @@ class TelegramDecoder:
             name for name, codec in self._values.items() if family.depends_on_set(codec.model)
         }
 
-    def decode(self, values: Mapping[str, Value], before: tuple[int, ...], held: int = 0) -> Telegram:
+    def decode(self, values: Mapping[str, Value], before: tuple[int, ...], held: int) -> Telegram:
         """The words to be sent; setpoints that are not written stay as ``before``. ``held`` is the control
         word that counts where none is written. Raises ``Refusal``."""
         control_word: int | None = None

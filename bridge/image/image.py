@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from bridge.image.point import Point, Value
@@ -18,17 +18,34 @@ class Reading(NamedTuple):
     reason: str
 
 
-class Feed:
-    """One consumer's set of changed points. Newest value wins: a slow consumer costs only itself."""
+class Columns(NamedTuple):
+    """The present states of several points, as those of ``Reading``: cheaper than one of these for each."""
 
-    def __init__(self, count: int) -> None:
+    values: list[Value]
+    qualities: list[Quality]
+    times: list[float]
+    reasons: list[str]
+
+
+class Feed:
+    """One consumer's set of changed points. Newest value wins: a slow consumer costs only itself.
+
+    ``wake`` is called for the first change after all others have been taken.
+    """
+
+    def __init__(self, count: int, wake: Callable[[], None]) -> None:
         self._dirty: dict[int, None] = dict.fromkeys(range(count))
+        self._wake = wake
 
     def mark(self, index: int) -> None:
+        if not self._dirty:
+            self._wake()
         self._dirty[index] = None
 
     def mark_all(self, indices: dict[int, None]) -> None:
-        """Mark the keys of ``indices``; one that is waiting already keeps its place."""
+        """Mark the keys of ``indices``, at least one; one that is waiting already keeps its place."""
+        if not self._dirty:
+            self._wake()
         self._dirty.update(indices)
 
     def take(self, most: int) -> list[int]:
@@ -66,9 +83,10 @@ class Image:
         self._feeds: list[Feed] = []
         self._untold: dict[int, None] = {}
 
-    def feed(self) -> Feed:
-        """A new consumer; it is shown every point once, then each change."""
-        feed = Feed(len(self.points))
+    def feed(self, wake: Callable[[], None] = lambda: None) -> Feed:
+        """A new consumer; it is shown every point once, then each change. ``wake`` tells it that there are
+        changes, once until it has taken all of them; there are some from the beginning."""
+        feed = Feed(len(self.points), wake)
         self._feeds.append(feed)
         return feed
 
@@ -79,6 +97,15 @@ class Image:
 
     def __getitem__(self, index: int) -> Reading:
         return Reading(self._values[index], self._qualities[index], self._times[index], self._reasons[index])
+
+    def columns(self, indices: Sequence[int]) -> Columns:
+        """The present states of these points."""
+        return Columns(
+            [self._values[index] for index in indices],
+            [self._qualities[index] for index in indices],
+            [self._times[index] for index in indices],
+            [self._reasons[index] for index in indices],
+        )
 
     def qualities(self, indices: Iterable[int]) -> list[Quality]:
         """The present qualities of these points."""
@@ -128,9 +155,10 @@ class Image:
 
     def tell_kept(self) -> None:
         """Mark what ``keep`` has changed."""
-        for feed in self._feeds:
-            feed.mark_all(self._untold)
-        self._untold.clear()
+        if self._untold:
+            for feed in self._feeds:
+                feed.mark_all(self._untold)
+            self._untold.clear()
 
     def set_values(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:
         """Store values of points whose quality stays as it is; ``indices`` and ``values`` go together."""

@@ -3,7 +3,7 @@ been told to repeat."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from math import inf
 from typing import Final
@@ -17,6 +17,7 @@ from bridge.canopen.sync import burst_length, sync_frames
 from bridge.command import Plant
 from bridge.master.network import Network
 from bridge.master.standstill import Alarm
+from bridge.node.node import NodeCore
 from bridge.node.process.process_data import Repetition, RunningBurst
 from bridge.ratelimit import RateLimit
 
@@ -39,22 +40,27 @@ class Repeated:
         self._plant = plant
         self._sync = sync_frames(network.bus.sync_counter)
         self._repetitions: Repetitions = {}
-        self._made_for: tuple[int, int, NmtState, bool] | None = None
+        self._of_nodes: dict[str, list[tuple[Repetition, bool]]] = {}
+        """By the node's name, in order; and whether each needs SYNC."""
+        self._made_for: tuple[int, NmtState, bool] | None = None
 
     def repetitions(self, *, anew: bool = False) -> Repetitions:
         """The frames to be repeated: the same object while they are the same.
 
-        A drive's settling, a node's new PDOs and our own state change them; asked ``anew``, every drive is
-        looked at.
+        A drive's settling changes those of its node; where a node has new PDOs or our own state is another,
+        and asked ``anew``, every drive is looked at.
         """
         network = self._network
-        made_for = self._plant.changes, network.routings, network.nmt_state, network.charge.acts()
-        if anew or made_for != self._made_for:
+        changed = self._plant.take_changed(network.bus.name)
+        made_for = network.routings, network.nmt_state, network.charge.acts()
+        anew = anew or made_for != self._made_for
+        if anew or changed:
             self._made_for = made_for
-            self._repetitions = self._make() if network.charge.acts() else {}
+            self._repetitions = self._make(None if anew else changed) if network.charge.acts() else {}
         return self._repetitions
 
-    def _make(self) -> Repetitions:
+    def _make(self, changed: set[str] | None) -> Repetitions:
+        """With what has become of the nodes that have changed, or of all."""
         repetitions: Repetitions = {}
         bus, state = self._network.bus, self._network.nmt_state
         # Initialising is said once, by the boot-up message.
@@ -63,19 +69,26 @@ class Repeated:
             repetitions[frame.can_id] = Repetition((frame,), bus.heartbeat_ms / 1000)
         hold_at: list[float] = []
         for node in self._network.nodes:
-            if node.sends_process_data:
-                for pdos in node.wire.drives.values():
-                    if not pdos.is_silent:
-                        for wanted in pdos.repetitions(bus.rpdo_period_s):
-                            repetitions[wanted.frames[0].can_id] = wanted
-                            if pdos.needs_sync:
-                                hold_at += wanted.hold_at
+            name = node.node.name
+            if changed is None or name in changed:
+                self._of_nodes[name] = list(self._of_node(node))
+            for wanted, needs_sync in self._of_nodes[name]:
+                repetitions[wanted.frames[0].can_id] = wanted
+                if needs_sync:
+                    hold_at += wanted.hold_at
         # SYNC last: it makes effective what is sent together with it (CiA 301 §7.2.2.2).
         if bus.sync_period_ms:
             repetitions[cobid.SYNC] = Repetition(
                 self._sync, bus.sync_period_ms / 1000, hold_at=tuple(hold_at)
             )
         return repetitions
+
+    def _of_node(self, node: NodeCore) -> Iterator[tuple[Repetition, bool]]:
+        if node.sends_process_data:
+            for pdos in node.wire.drives.values():
+                if not pdos.is_silent:
+                    for wanted in pdos.repetitions(self._network.bus.rpdo_period_s):
+                        yield wanted, pdos.needs_sync
 
 
 @dataclass(slots=True)
@@ -107,10 +120,16 @@ class Line:
         frames = self.bus.drain(now)
         if frames:
             self.network.on_frames(frames, now)
-            self.plant.on_readings()
         foreign = self.bus.take_foreign(now)
         if foreign:
             self.network.on_foreign(foreign, now)
+
+    @property
+    def has_news(self) -> bool:
+        """What has been taken in needs a round."""
+        status = self.bus.status
+        known = self.shown, self.outages, self.shown_refusal
+        return (status.state, status.outages, status.bursts_refused) != known or self.network.has_news
 
     def stood_still(self, since: float) -> bool:
         """The process was stopped after ``since`` for longer than deadman_ms, so words computed before are
@@ -141,9 +160,10 @@ class Line:
             self.renew_at = now + self.renew_s
         if repetitions is self.repetitions and not (renew or ended) and now < self.hold_at:
             return
+        due = self._due(repetitions, now, renew=renew)
         self.repetitions = repetitions
         self.alarm.set(self.burst_s)
-        for wanted, changed in self._due(repetitions, now, renew=renew):
+        for wanted, changed in due:
             # In this order: the process may be stopped right after it has read the clock.
             if self.stood_still(now) or self.alarm.rang:
                 self.repetitions = None
@@ -177,11 +197,13 @@ class Line:
         deadline than what went before it, so setpoints end before the stop comes.
         """
         new, kept = list[tuple[Repetition, bool]](), list[tuple[Repetition, bool]]()
+        # What was right at the last call is right until one has to be held.
+        before = {} if now >= self.hold_at else self.repetitions or {}
         for can_id, wanted in repetitions.items():
             told = self.running.get(can_id)
             if told is None or told.frames != wanted.frames:
                 new.append((wanted, True))
-            elif renew or not told.ends_as(wanted, now):
+            elif renew or (before.get(can_id) is not wanted and not told.ends_as(wanted, now)):
                 kept.append((wanted, False))
         return [*new, *reversed(kept)]
 

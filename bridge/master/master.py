@@ -1,7 +1,9 @@
 """The shell of the CANopen side: drains the buses, runs every timer, keeps the bursts alive.
 
-All of that happens in ``pump`` and nowhere else, and only ``pump`` says that the service is alive:
-"process alive" and "drives supervised" cannot come apart (``docs/explanation/dead-man-chain.md``).
+All of that happens in ``pump``, and only ``pump`` says that the service is alive: "process alive" and "drives
+supervised" cannot come apart (``docs/explanation/dead-man-chain.md``). Between two rounds ``take_in`` takes
+frames of which nothing comes but values, and lets the buses do what is theirs: look for frames of others, and
+send what the kernel does not send for them.
 """
 
 from __future__ import annotations
@@ -79,17 +81,17 @@ class Master:
     async def start(self) -> None:
         """Open the buses. Raises ``Unavailable`` with all that cannot be opened; none stays open then."""
         try:
-            open_all(partial(line.bus.open, self.wake) for line in self._lines)
+            open_all(partial(line.bus.open, self.on_bus) for line in self._lines)
         except BaseException:
             self._close_buses()
             raise
         self._failure = asyncio.get_running_loop().create_future()
-        self._timer = LoopTimer(asyncio.get_running_loop(), self._clock, self.wake)
+        self._timer = LoopTimer(asyncio.get_running_loop(), self._clock, self.on_bus)
         self.attach(self._timer.arm)
         self.wake()
 
     def attach(self, set_timer: Callable[[float], None]) -> None:
-        """Run by whoever calls ``pump`` at the times given to ``set_timer``."""
+        """Run by whoever calls ``take_in`` or ``pump`` at the times given to ``set_timer``."""
         self._set_timer = set_timer
         self._running = True
 
@@ -134,14 +136,21 @@ class Master:
         return any(line.network.carry_out(request, now, reply) for line in self._lines)
 
     def wake(self) -> None:
-        """One round, while running. An outcome may call this: it is told when the work of a round is done.
+        """One round, while running. An outcome may call this: it is told when the work of a round is done."""
+        self._carry_on(self.pump)
 
-        A fault of our own ends it: no drive is left to a master that does half of its work. Each drive gets a
-        last, stopped word if possible; the bursts end within the dead-man time, and ``failed`` says why."""
+    def on_bus(self) -> None:
+        """A bus has something to give, or to do, or a round is due."""
+        self._carry_on(self.take_in)
+
+    def _carry_on(self, turn: Callable[[], None]) -> None:
+        """A fault of our own ends it: no drive is left to a master that does half of its work. Each drive
+        gets a last, stopped word if possible; the bursts end within the dead-man time, and ``failed`` says
+        why."""
         if not self._running:
             return
         try:
-            self.pump()
+            turn()
         except Exception as error:
             self._running = False
             if self._failure and not self._failure.done():
@@ -166,6 +175,34 @@ class Master:
         """Wait for ever, or raise ``OperationFailed`` when a fault of our own has ended the running."""
         if self._failure:
             await self._failure
+
+    def take_in(self) -> None:
+        """Take in what has come, and let the buses do what is due; a whole round follows where something
+        comes of it, or where one is due.
+
+        Else all stays as the last round has left it: what is repeated, and who is alive."""
+        now, due = self._clock(), self._due
+        if due is None or now >= due:
+            self.pump()
+            return
+        self._check_gap(now)
+        self._last_round = now
+        for line in self._lines:
+            line.receive(now)
+        if self._plant.has_news or self._lines_have_news():
+            self.pump()
+            return
+        # After what a round sends: a SYNC that is due makes it effective.
+        for line in self._lines:
+            if not line.stood_still(now):
+                line.bus.on_time(now)
+        if self._lines_have_news():
+            self.pump()
+        else:
+            self._set_timer_for(due)
+
+    def _lines_have_news(self) -> bool:
+        return any(line.has_news for line in self._lines)
 
     def pump(self) -> None:
         """One round: drain, judge, send, renew; then outcomes are told."""
@@ -289,6 +326,15 @@ class Master:
             # Also with the bus down: a round that comes too late means that the process hung.
             renew_at = max(min(line.renew_at, line.hold_at), now)
             times.append(renew_at if line.was_up else now + _REFRESH_S / RENEWALS)
-            times += [t for t in (line.network.next_deadline(), line.bus.next_deadline()) if t is not None]
+            network = line.network.next_deadline()
+            times += [] if network is None else [network]
         self._due = max(min(times), now)
-        self._set_timer(self._due)
+        self._set_timer_for(self._due)
+
+    def _set_timer_for(self, due: float) -> None:
+        """A round is due then; a bus may have something to do before."""
+        for line in self._lines:
+            at = line.bus.next_deadline()
+            if at is not None and at < due:
+                due = at
+        self._set_timer(due)

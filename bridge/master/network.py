@@ -67,6 +67,7 @@ class Network:
         self.ours: frozenset[int] = frozenset()
         """Identifiers on which nobody else may send what we repeat; brought up to date by ``take_routes``."""
         self._has_booted = False
+        self._has_news = False
         self._nmt_for_all: Frame | None = None
         self._routes_changed = True
         self._routes: dict[int, Handler] = {}
@@ -88,6 +89,7 @@ class Network:
 
     def on_foreign(self, frames: list[Frame], now: float) -> None:
         """What others have sent on identifiers that are ours."""
+        self._has_news = True
         for frame in frames:
             if frame.can_id == cobid.ERROR_CONTROL + self.bus.master_node_id:
                 self._watch.on_own_id(now)
@@ -99,6 +101,7 @@ class Network:
     def _pump(self, now: float) -> None:
         """Continue every boot-up that something has happened to, and start nodes that may start."""
         while touched := self._schedule.take_touched():
+            self._has_news = True
             for node in touched:
                 node.booting.pump(now)
             self._gate.judge()
@@ -252,8 +255,14 @@ class Network:
         """Plans and frames that it holds: bounded, whatever is received."""
         return len(self._schedule) + len(self._frames)
 
+    @property
+    def has_news(self) -> bool:
+        """Since ``take_frames`` something has come of a node beside its signs of life."""
+        return self._has_news or self._schedule.is_touched
+
     def take_frames(self) -> list[Frame]:
         """Frames to be sent once, now."""
+        self._has_news = False
         frames, self._frames = self._frames, []
         if not self.charge.acts():
             self._nmt_for_all = None

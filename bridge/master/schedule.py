@@ -25,6 +25,10 @@ class Schedule(Generic[N]):
     def touch(self, node: Neighbour) -> None:
         self._touched[self._places[id(node)]] = None
 
+    @property
+    def is_touched(self) -> bool:
+        return bool(self._touched)
+
     def take_touched(self) -> list[N]:
         """Each node once, in the order in which they were touched."""
         touched, self._touched = self._touched, {}

@@ -15,7 +15,7 @@ from bridge.errors import Unavailable
 from bridge.mirror import protocol
 from bridge.mirror.endpoint import close_to_others, prepare_folder
 from bridge.mirror.protocol import Changed, Delta, Malformed, Rejected, Snapshot
-from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
+from bridge.zenohlink import Asked, Message, Pace, ZenohLink, zenoh_config
 
 _POINTS_PER_DELTA: Final = 500
 _HEARTBEAT_S: Final = 0.25
@@ -42,14 +42,13 @@ class MirrorPublisher:
         self._image = view.image
         self._endpoint = endpoint
         self._clock = clock
-        self._period_s = period_s
         self._link = self._new_link()
-        self._feed = self._image.feed()
+        self._pace = Pace(self._tick, period_s, _HEARTBEAT_S)
+        self._feed = self._image.feed(self._pace.wake)
+        self._has_fronts = False
         self._instance = random.getrandbits(63)
         self._sequence = 0
-        self._last_delta = float("-inf")
         self._snapshots: set[asyncio.Task[None]] = set()
-        self._timer: asyncio.TimerHandle | None = None
         self._was_started = False
 
     def _new_link(self) -> ZenohLink:
@@ -60,7 +59,8 @@ class MirrorPublisher:
         if self._was_started:
             await self.close()
             self._link = self._new_link()
-            self._feed = self._image.feed()
+            self._feed = self._image.feed(self._pace.wake)
+            self._has_fronts = False
         self._was_started = True
         prepare_folder(self._endpoint)
         try:
@@ -74,12 +74,13 @@ class MirrorPublisher:
         self._link.declare_subscriber(protocol.REJECTED, self._on_rejected)
         self._link.declare_subscriber(protocol.COUNTED, self._on_counted)
         self._link.declare_token(protocol.TOKEN)
+        self._link.follow_readers(protocol.DELTA, self._on_fronts)
         self._view.on_event(self._on_event)
-        self._tick()
+        self._pace.wake()
+        self._pace.start()
 
     async def close(self) -> None:
-        if self._timer:
-            self._timer.cancel()
+        self._pace.stop()
         for task in tuple(self._snapshots):
             task.cancel()
         self._view.forget(self._on_event)
@@ -92,12 +93,17 @@ class MirrorPublisher:
 
     # out
 
+    def _on_fronts(self, are_there: bool) -> None:
+        self._has_fronts = are_there
+        if are_there:
+            self._pace.wake()
+
     def _tick(self) -> None:
-        loop = asyncio.get_running_loop()
-        self._timer = loop.call_later(self._period_s, self._tick)
-        if self._feed or loop.time() - self._last_delta >= _HEARTBEAT_S:
-            self._last_delta = loop.time()
+        """What has changed waits while nobody listens."""
+        if self._has_fronts:
             self._publish_delta()
+            if self._feed:
+                self._pace.wake()
 
     def _publish_delta(self) -> None:
         self._sequence += 1

@@ -10,6 +10,8 @@ It knows no key layout: both the zenoh server and the link between our processes
 from bridge.zenohlink.asked import Asked
 from bridge.zenohlink.link import ZenohLink
 from bridge.zenohlink.message import Answer, Message
+from bridge.zenohlink.pace import Pace
+from bridge.zenohlink.publishers import Value
 from bridge.zenohlink.settings import zenoh_config
 
-__all__ = ["Answer", "Asked", "Message", "ZenohLink", "zenoh_config"]
+__all__ = ["Answer", "Asked", "Message", "Pace", "Value", "ZenohLink", "zenoh_config"]

@@ -8,10 +8,9 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from itertools import islice
-from typing import Final, TypeVar
+from typing import Final, TypeVar, cast
 
 import zenoh
 
@@ -19,6 +18,7 @@ from bridge.errors import OperationFailed, Unavailable
 from bridge.zenohlink.asked import Asked
 from bridge.zenohlink.lane import LIMIT, Job, Lane
 from bridge.zenohlink.message import Answer, Message, sentence
+from bridge.zenohlink.publishers import Publishers, Readers, Value
 from bridge.zenohlink.worker import Inbox, Worker
 
 Result = TypeVar("Result")
@@ -39,8 +39,8 @@ def _one_for_all(key: str, payload: bytes | None) -> str:
 class ZenohLink:
     """A zenoh session on a worker thread. All methods are called from the event loop.
 
-    ``name`` is used in messages to the user. Handlers are called in the loop. Declarations and messages keep
-    their order, except that of several ``put`` on one key only the newest may be sent.
+    ``name`` is used in messages to the user, ``encoding`` is that of all values that are published. Handlers
+    are called in the loop. Declarations and messages keep their order, but for values.
 
     Queries are answered in two further lanes: one for keys with ``is_prompt``, whose replies never wait
     (``prompt`` of the session's settings), and one for all others. ``on_strangers`` gets the addresses of
@@ -53,6 +53,7 @@ class ZenohLink:
         name: str,
         is_prompt: Callable[[str], bool] | None = None,
         on_strangers: Callable[[list[str]], None] | None = None,
+        encoding: str = "",
     ) -> None:
         self.name = name
         self._is_prompt = is_prompt or (lambda _: True)
@@ -63,8 +64,9 @@ class ZenohLink:
             self._on_closed,
             on_strangers and (lambda places: self._inbox.take_in(partial(on_strangers, places))),
         )
-        self._latest: dict[str, Message] = {}
-        self._batch_is_out = False
+        self._publishers = Publishers(encoding)
+        self.is_publishing = False
+        """What was given to ``publish`` last is not sent yet."""
 
     @property
     def errors(self) -> int:
@@ -96,7 +98,6 @@ class ZenohLink:
         """Close the session. False: zenoh did not end in time and was abandoned."""
         if self._worker.is_stopping or not self._worker.is_alive:
             return True
-        self._latest.clear()
         self._inbox.is_closed = True
         self._worker.stop()
         await asyncio.wait((self._closed,), timeout=timeout_s)
@@ -119,16 +120,27 @@ class ZenohLink:
 
     # sending
 
-    def put(self, message: Message) -> None:
-        """Publish. If the worker is behind, a newer value replaces an older one."""
-        if self._worker.is_stopping or not self._worker.is_alive:
-            return
-        if len(self._latest) >= LIMIT and message.key not in self._latest:
-            return
-        self._latest[message.key] = message
-        if not self._batch_is_out:
-            self._batch_is_out = True
-            self._loop.call_soon(self._hand_over)
+    def publish(self, values: Sequence[Value]) -> bool:
+        """Publish each value; a reader who does not keep up loses some. False: there was no room.
+
+        Whoever waits until ``is_publishing`` is over has at most the newest value of each key wait.
+        """
+
+        def put_some(rest: Sequence[Value], session: zenoh.Session) -> None:
+            for value in rest[:_PUTS_AT_ONCE]:
+                try:
+                    self._publishers.put(session, value)
+                except Exception as error:  # noqa: BLE001 - one bad value must not stop the others
+                    self._worker.complain(error)
+            if rest := rest[_PUTS_AT_ONCE:]:
+                self._worker.do(partial(put_some, rest))
+            else:
+                self.is_publishing = False
+
+        self.is_publishing = True
+        if not self.submit(partial(put_some, values)):
+            self.is_publishing = False
+        return self.is_publishing
 
     def send(self, message: Message) -> bool:
         """Publish each message in order. False: there was no room, the message is dropped."""
@@ -149,20 +161,6 @@ class ZenohLink:
 
     def own_lane(self, like: Lane) -> Lane:
         return self._worker.lane(like.session)
-
-    def _hand_over(self) -> None:
-        batch = [self._latest.pop(key) for key in list(islice(self._latest, _PUTS_AT_ONCE))]
-        self._batch_is_out = bool(batch)
-        if batch:
-            self._worker.do(partial(self._put_batch, batch))
-
-    def _put_batch(self, batch: list[Message], session: zenoh.Session) -> None:
-        for message in batch:
-            try:
-                _publish(session, message)
-            except Exception as error:  # noqa: BLE001 - one bad value must not stop the others
-                self._worker.complain(error)
-        self._inbox.tell(self._hand_over)
 
     # asking
 
@@ -207,6 +205,22 @@ class ZenohLink:
         return list(answers)
 
     # declaring
+
+    def follow_readers(self, key: str, handler: Callable[[bool], None]) -> None:
+        """Call ``handler`` when somebody else begins to subscribe to some of what matches ``key``, and when
+        nobody does any more."""
+        readers = Readers(handler, self._inbox.tell)
+
+        def declare(session: zenoh.Session) -> None:
+            publisher = session.declare_publisher(key, allowed_destination=zenoh.Locality.REMOTE)
+            callback = zenoh.handlers.Callback(readers.on_status, indirect=False)
+            self._worker.declared += [publisher.declare_matching_listener(callback), publisher]
+            # Those that were there before. Of the first one since then the listener may have been told.
+            status = cast(zenoh.MatchingStatus, publisher.matching_status)  # a bool in zenoh's stubs
+            if status.matching:
+                readers.on_status(status)
+
+        self.submit(declare)
 
     def declare_queryable(
         self, key: str, handler: Callable[[Asked], None], share: Share = _one_for_all

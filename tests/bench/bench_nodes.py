@@ -39,18 +39,19 @@ parameters = {{ P105 = 50.0, P112 = 10.0 }}
 """
 
 
-def site(folder: Path) -> Site:
+def site(folder: Path, nodes: int) -> Site:
     path = folder / "site.toml"
-    path.write_text(BUS + "".join(NODE.format(n=n) for n in range(1, NODES + 1)), encoding="utf-8")
+    path.write_text(BUS + "".join(NODE.format(n=n) for n in range(1, nodes + 1)), encoding="utf-8")
     return load_site(path)
 
 
 class Crowd:
-    """A bench with all its nodes; they are simulated while they boot, and only replayed afterwards."""
+    """A bench with so many nodes; they are simulated while they boot, and only replayed afterwards."""
 
-    def __init__(self, folder: Path) -> None:
-        self.bench = Bench(site(folder), present=False)
-        self._nodes = {n: NordTu4(n) for n in range(1, NODES + 1)}
+    def __init__(self, folder: Path, nodes: int) -> None:
+        self.bench = Bench(site(folder, nodes), present=False)
+        self.numbers = range(1, nodes + 1)
+        self._nodes = {n: NordTu4(n) for n in self.numbers}
         self.rounds, self.spent_s = 0, 0.0
 
     def boot(self) -> None:
@@ -93,7 +94,7 @@ class Crowd:
 
 
 def test_127_nodes_with_heartbeats_and_sync_every_millisecond(tmp_path: Path) -> None:
-    crowd = Crowd(tmp_path)
+    crowd = Crowd(tmp_path, NODES)
     crowd.boot()
     operational = sum(crowd.bench.value(f"node{n}/node/nmt_state") == 5 for n in range(1, NODES + 1))
     assert operational == NODES

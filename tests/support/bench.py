@@ -132,7 +132,7 @@ class Bench:
         self.network = Network(site.bus[0], self.plant, epoch_ns, listening=listening)
         self.master = Master([(self.bus, self.network)], self.plant, self.clock)
         self.view = PlantView(self.plant, self.clock, epoch_ns, self.master.carry_out, self.master.wake)
-        self._wake_at = self.now
+        self.wake_at = self.now
         self.master.attach(self._set_timer)
         self.node = NordTu4(5) if node is None else node
         self.powered = False
@@ -151,7 +151,7 @@ class Bench:
         self.node.start(self.now)
 
     def _set_timer(self, at: float) -> None:
-        self._wake_at = at
+        self.wake_at = at
 
     def _from_master(self, frame: Frame) -> None:
         self.log.append(frame)
@@ -173,17 +173,21 @@ class Bench:
             if frame.can_id in self.bus.ours:
                 self.bus.foreign.append(frame._replace(time=self.now))
 
+    def turn(self) -> None:
+        """The master is woken, by its timer or by the bus."""
+        self.master.take_in()
+
     def run(self, seconds: float) -> None:
         """Let time pass; everything happens at its own moment."""
         end = self.now + seconds
         while True:
             node_at = self.node.next_deadline() if self.powered else None
-            self.now = min(end, max(self.now, min(self._wake_at, node_at if node_at is not None else end)))
+            self.now = min(end, max(self.now, min(self.wake_at, node_at if node_at is not None else end)))
             if node_at is not None and node_at <= self.now:
                 self.node.on_time(self.now)
-            self.master.pump()
+            self.turn()
             while self._from_node():
-                self.master.pump()
+                self.turn()
             if self.now >= end:
                 return
 

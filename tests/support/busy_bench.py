@@ -72,7 +72,7 @@ class BusyBench(Bench):
         if self._node_at is not None and self._node_at <= until:
             self.node.on_time(until)
             self._node_at = self.node.next_deadline()
-        if self._wake_at <= until or self.bus.inbox:
+        if self.wake_at <= until or self.bus.inbox:
             self.master.pump()
         self._from_node()
         if self._on_wire is None:

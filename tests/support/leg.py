@@ -58,9 +58,16 @@ class Leg:
 
     # who commands it
 
-    def asks(self, command: Command | Action) -> int:
+    def asks(
+        self,
+        command: Command | Action,
+        who: Identity = PLC,
+        *,
+        received_at: float | None = None,
+        pressed: bool | None = None,
+    ) -> int:
         asked = Do(command) if isinstance(command, Action) else command
-        return self.happens(Request(PLC, "n/d", asked))
+        return self.happens(Request(who, "n/d", asked, received_at, pressed))
 
     def writes(self, control_word: int | None = None, **values: Value) -> int:
         words: dict[str, Value] = {} if control_word is None else {"control_word": control_word}
@@ -74,24 +81,26 @@ class Leg:
 
     # time
 
+    def at(self, now: float) -> None:
+        """It is this time: what is due happens."""
+        self.now = now
+        self.happens(Time(self.state.way))
+
     def waits(self, seconds: float) -> list[Effect]:
         """Let the time pass, asked for as the master does; what has come of it."""
         end = self.now + seconds
         effects: list[Effect] = []
         while (due := next_deadline(self.state)) is not None and due <= end:
-            self.now = due
-            self.happens(Time(self.state.way))
+            self.at(due)
             effects += self.effects
-        self.now = end
-        self.happens(Time(self.state.way))
+        self.at(end)
         return effects + self.effects
 
     def trips(self) -> int:
         """The owner is silent until its time is up."""
         deadline = self.state.timer.deadline
         assert deadline is not None
-        self.now = deadline
-        self.happens(Time(self.state.way))
+        self.at(deadline)
         assert self.state.stage.is_tripped
         return self.sent
 

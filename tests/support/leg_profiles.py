@@ -175,7 +175,7 @@ def space(
     table = DriveTable.model_validate(settings)
     drive = leg_settings(family, table, TelegramDecoder(f"n/{name}", family, family.slot[0], {}, {}).decode)
     leg = initial(drive)
-    for event in (NodeBack(), Way(True, "", "", True), Report(DriveState.READY)):
+    for event in (NodeBack(), Way(True, "", "", True), Report(DriveState.READY, False, "")):
         leg, _ = step(drive, leg, event, NOW)
     reaction = table.on_expiry
     rules = Rules(

@@ -120,10 +120,10 @@ class PausingBench(Bench):
         end = self.now + seconds
         while self.now < end:
             node_at = self.node.next_deadline()
-            times = [self._wake_at, node_at, self.kernel.next_deadline()]
+            times = [self.wake_at, node_at, self.kernel.next_deadline()]
             self.now = max(self.now, min([end, *(time for time in times if time is not None)]))
             self.kernel.on_time()
             if node_at is not None and self.now >= node_at:
                 self.node.on_time(self.now)
-            if self._from_node() or self.now >= self._wake_at:
+            if self._from_node() or self.now >= self.wake_at:
                 self.master.pump()

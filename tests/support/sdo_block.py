@@ -94,8 +94,8 @@ def once(way: str, first: int) -> Lose:
 class Asker:
     """A channel whose server is the test."""
 
-    def __init__(self, retries: int = 0) -> None:
-        self.channel = SdoChannel(REQUEST, REPLY, 0.5, retries=retries, segment_s=0.0)
+    def __init__(self, retries: int = 0, segment_s: float = 0.0) -> None:
+        self.channel = SdoChannel(REQUEST, REPLY, 0.5, retries=retries, segment_s=segment_s)
         self.results: list[Result] = []
         self.now = 0.0
 

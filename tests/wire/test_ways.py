@@ -16,7 +16,7 @@ async def test_the_page_draws_the_ways_that_values_take(tmp_path: Path) -> None:
     assert [list(files)[-1] for files in found.values()] == [
         "northbound/modbus/session.py",
         "northbound/opcua/values.py",
-        "zenohlink/worker.py",
+        "zenohlink/publishers.py",
         "can/softbus.py",
     ]
     for files in ways.ON_SOCKETCAN.values():

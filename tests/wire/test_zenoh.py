@@ -6,12 +6,15 @@ import asyncio
 import itertools
 import json
 import time
+from typing import Any
 
 import pytest
 
 from bridge.command.link import NodeState
 from bridge.config import ZenohTable
 from bridge.northbound.zenoh import ZenohServer
+from bridge.zenohlink import Value
+from bridge.zenohlink.publishers import Publishers
 from tests.support.views import view_of
 from tests.support.zenoh_peer import free_port, until, zenoh_peer
 from tests.support.zenoh_rig import FU3, TOP, rig
@@ -168,6 +171,43 @@ async def test_a_get_brings_present_values() -> None:
             said = await r.peer.do("get", f"{FU3}/command/{leaf}")
             assert json.loads(said["errors"][0])["code"] == "malformed"
         assert r.fu3.channel.owner is None, "reading commands nothing"
+
+
+async def test_only_what_somebody_subscribes_to_is_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+    sent: list[str] = []
+    put = Publishers.put
+
+    def noted(publishers: Publishers, session: Any, value: Value) -> None:
+        sent.append(value[0])
+        put(publishers, session, value)
+
+    monkeypatch.setattr(Publishers, "put", noted)
+    async with rig() as r:
+        await r.peer.subscribe(f"{FU3}/actual/value_1")
+        node_is(r.plant, NodeState.OPERATIONAL)
+        for value in range(1, 50):
+            drive_says(r.fu3, READY, value, value)
+            drive_says(r.plant.drives["conveyor/fu1"], READY, value)
+            await asyncio.sleep(0.001)
+        await r.sees(f"{FU3}/actual/value_1", v=49)
+        assert {key.rsplit("/", 2)[0] for key in sent} == {FU3}
+        for group in ("status", "actual"):
+            assert any(key.startswith(f"{FU3}/{group}/") for key in sent)
+
+
+async def test_who_comes_first_gets_what_has_changed_before() -> None:
+    async with rig() as r:
+        node_is(r.plant, NodeState.OPERATIONAL)
+        drive_says(r.fu3, READY, 7)
+        await asyncio.sleep(0.1)
+        await r.peer.do("subscribe", f"{TOP}/**")
+        await r.sees(f"{FU3}/actual/value_1", v=7, q="good")
+        await r.sees(f"{TOP}/conveyor/node/state", s="operational")
+        async with zenoh_peer(r.endpoint) as second:
+            await second.subscribe(f"{TOP}/**")
+            drive_says(r.fu3, READY, 8)
+            await until(lambda: second.latest(f"{FU3}/actual/value_1"), "the new value")
+            assert second.latest(f"{TOP}/conveyor/node/state") is None, "it did not change"
 
 
 async def test_bare_values_have_the_rest_in_the_attachment() -> None:

@@ -18,6 +18,7 @@ from bridge.project import load_project
 from bridge.service import Service
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 from bridge.zenohlink import link as link_module
+from bridge.zenohlink.publishers import Publishers
 from tests.support import sites
 from tests.support.zenoh_peer import free_port, until, zenoh_peer
 
@@ -25,10 +26,12 @@ DIES = pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadException
 
 
 @asynccontextmanager
-async def link(endpoint: str | None = None, *, to: str | None = None) -> AsyncIterator[ZenohLink]:
+async def link(
+    endpoint: str | None = None, *, to: str | None = None, encoding: str = ""
+) -> AsyncIterator[ZenohLink]:
     """A session that listens at ``endpoint`` or connects ``to`` one."""
     config = zenoh_config(listen=[endpoint] if endpoint else [], connect=[to] if to else [])
-    opened = ZenohLink(config, "test")
+    opened = ZenohLink(config, "test", encoding=encoding)
     await opened.open()
     try:
         yield opened
@@ -37,9 +40,9 @@ async def link(endpoint: str | None = None, *, to: str | None = None) -> AsyncIt
 
 
 @asynccontextmanager
-async def pair() -> AsyncIterator[tuple[ZenohLink, ZenohLink]]:
+async def pair(encoding: str = "") -> AsyncIterator[tuple[ZenohLink, ZenohLink]]:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
-    async with link(endpoint) as server, link(to=endpoint) as client:
+    async with link(endpoint, encoding=encoding) as server, link(to=endpoint) as client:
         yield server, client
 
 
@@ -73,12 +76,13 @@ async def test_a_client_waits_for_its_router_and_can_be_closed_meanwhile() -> No
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     waiting = ZenohLink(zenoh_config(mode="client", connect=[endpoint]), "zenoh")
     assert not await waiting.open(patience_s=0.2)
-    waiting.put(Message("a/b", b"early"))
+    waiting.publish([("a/b", b"early", None)])
     got: list[Message] = []
     async with link(endpoint) as server:
         server.declare_subscriber("a/*", got.append)
         await until(
-            lambda: any(m.payload == b"late" for m in got) or waiting.put(Message("a/b", b"late")), "late"
+            lambda: any(m.payload == b"late" for m in got) or not waiting.publish([("a/b", b"late", None)]),
+            "late",
         )
     await waiting.close()
     hopeless = ZenohLink(zenoh_config(mode="client", connect=[endpoint]), "zenoh")
@@ -161,17 +165,41 @@ async def test_liveliness_comes_and_goes() -> None:
         await until(lambda: seen[1:] == [("x/@/one", False)], "its end")
 
 
-async def test_newest_value_wins_and_nothing_is_lost_at_the_end() -> None:
-    got: dict[str, bytes] = {}
-    async with pair() as (server, client):
-        client.declare_subscriber("v/*", lambda message: got.__setitem__(message.key, message.payload))
+async def test_each_value_arrives_in_its_order_however_many_keys_there_are() -> None:
+    got: dict[str, list[bytes]] = {}
+    async with pair("text/plain") as (server, client):
+        kinds = set[str]()
+
+        def hear(message: Message) -> None:
+            got.setdefault(message.key, []).append(message.payload)
+            kinds.add(message.encoding)
+
+        client.declare_subscriber("v/*", hear)
         await client.settle()
         await asyncio.sleep(0.1)
-        for value in range(50):
-            for point in range(200):
-                server.put(Message(f"v/{point}", str(value).encode()))
-            await asyncio.sleep(0)
-        await until(lambda: len(got) == 200 and set(got.values()) == {b"49"}, "the last value of each")
+        # More keys than get a publisher of their own, and more values than it takes to get one.
+        for value in range(14):
+            assert server.publish([(f"v/{point}", str(value).encode(), None) for point in range(1200)])
+            await until(lambda: not server.is_publishing, "they are sent")
+            await until(lambda count=value: len(got) == 1200 and len(got["v/1199"]) > count, "they arrive")
+        assert len(got) == 1200
+        assert all(values == [str(value).encode() for value in range(14)] for values in got.values())
+        assert kinds == {"text/plain"}
+        assert server.errors == 0
+
+
+async def test_who_reads_is_known() -> None:
+    told: list[bool] = []
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    async with link(endpoint) as server, zenoh_peer(endpoint) as peer:
+        await peer.do("subscribe", "v/a/*")
+        server.follow_readers("v/b/**", told.append)
+        server.follow_readers("v/a/**", told.append)
+        await until(lambda: told == [True], "who was there before is known")
+        async with zenoh_peer(endpoint) as other:
+            await other.do("subscribe", "**/x")
+            await until(lambda: told == [True, True], "who comes to one of the others")
+        await until(lambda: told == [True, True, False], "and goes again, without a word")
 
 
 async def test_a_stalled_subscriber_does_not_hold_up_the_loop() -> None:
@@ -179,15 +207,15 @@ async def test_a_stalled_subscriber_does_not_hold_up_the_loop() -> None:
     async with link(endpoint) as server, zenoh_peer(endpoint) as peer, zenoh_peer(endpoint) as other:
         await peer.do("subscribe", "v/**")
         await other.do("subscribe", "v/0")
-        await until(lambda: server.put(Message("v/0", b"0")) or peer.samples, "the peer hears")
+        await until(lambda: not server.publish([("v/0", b"0", None)]) or peer.samples, "the peer hears")
         peer.stop()
         enough = asyncio.Event()
         pause = asyncio.create_task(longest_pause(enough))
         for value in range(200):
-            for point in range(200):
-                server.put(Message(f"v/{point}", f"{value:01000d}".encode()))
+            if not server.is_publishing:
+                server.publish([(f"v/{point}", f"{value:01000d}".encode(), None) for point in range(200)])
             await asyncio.sleep(0.01)
-        server.put(Message("v/0", b"end"))
+        server.publish([("v/0", b"end", None)])
         await until(
             lambda: other.samples and other.samples[-1]["payload"] == "end", "the other one is served"
         )
@@ -225,7 +253,8 @@ async def test_a_flood_of_queries_leaves_the_loop_its_time() -> None:
 async def test_nothing_raises_after_the_end() -> None:
     async with pair() as (server, client):
         await server.close()
-        server.put(Message("a", b"1"))
+        assert not server.publish([("a", b"1", None)])
+        assert not server.is_publishing
         assert not server.send(Message("a", b"1"))
         server.declare_token("a/@/b")
         await server.settle()
@@ -242,10 +271,11 @@ async def test_a_job_that_raises_costs_nothing_but_itself(monkeypatch: pytest.Mo
         await asyncio.sleep(0.1)
         with monkeypatch.context() as patched:
             patched.setattr(link_module, "_publish", broken)
-            server.put(Message("v/1", b"lost"))
+            patched.setattr(Publishers, "put", broken)
+            server.publish([("v/1", b"lost", None)])
             server.send(Message("v/1", b"lost too"))
             await until(lambda: server.errors == 2, "both are counted")
-        server.put(Message("v/1", b"later"))
+        server.publish([("v/1", b"later", None)])
         await until(lambda: [message.payload for message in got] == [b"later"], "the later one")
 
 

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
 import re
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from bridge.command.link import NodeState
-from tests.support.zenoh_peer import until, zenoh_peer
+from bridge.config import ZenohTable
+from bridge.northbound.zenoh import ZenohServer
+from tests.support.views import view_of
+from tests.support.zenoh_peer import Peer, until, zenoh_peer
 from tests.support.zenoh_rig import FU3, TOP, Rig, rig
 from tests.support.zenoh_router import zenoh_router
-from tests.support.zenoh_site import READY, drive_says, node_is
+from tests.support.zenoh_site import READY, drive_says, epoch, make_plant, node_is
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "follow-drives-with-zenoh.md"
 LIE = '{"ok":true,"forwarded":true}'
@@ -60,6 +67,32 @@ async def test_the_plc_commands_and_the_display_reads(tmp_path: Path) -> None:
         assert (await hmi.value(f"{FU3}/actual/frequency"))["q"] == "good"
         said = await hmi.do("get", f"{FU3}/command/control_word", payload="1151")
         assert (said["values"], said["errors"]) == ([], [])
+
+
+def shown(peer: Peer) -> object:
+    return (peer.latest(f"{FU3}/actual/value_1") or {}).get("v")
+
+
+@pytest.mark.parametrize(("ours", "theirs"), [("client", "client"), ("client", "peer"), ("peer", "client")])
+async def test_the_bridge_knows_who_reads_behind_a_router(ours: str, theirs: str) -> None:
+    plant = make_plant()
+    node_is(plant, NodeState.OPERATIONAL)
+    (fu3,) = (drive for drive in plant.drives.values() if drive.name.endswith("/fu3"))
+    drive_says(fu3, READY, 5)
+    async with zenoh_router("{}") as router:
+        table = ZenohTable.model_validate({"mode": ours, "connect": [router], "listen": []})
+        server = ZenohServer(view_of(plant, epoch_ns=epoch), table, "demo", time.monotonic)
+        await server.start()
+        try:
+            async with zenoh_peer(router, mode=theirs) as peer:
+                await peer.do("subscribe", f"{FU3}/actual/*")
+                await until(lambda: shown(peer) == 5, "the first gets what changed before it came")
+            async with zenoh_peer(router, mode=theirs) as other:
+                await other.do("subscribe", f"{FU3}/actual/*")
+                values = itertools.count(6)
+                await until(lambda: drive_says(fu3, READY, next(values)) or shown(other), "another is served")
+        finally:
+            await server.close()
 
 
 async def test_nobody_speaks_in_the_bridges_place(tmp_path: Path) -> None:

@@ -12,11 +12,11 @@ from bridge.drive import DriveState
 @dataclass(frozen=True, slots=True)
 class Report:
     """The drive's status word says this. ``is_taken``: with the bit "set-point acknowledge"; ``fault_text``
-    is needed with a fault only."""
+    is empty but for a fault."""
 
     state: DriveState
-    is_taken: bool = False
-    fault_text: str = ""
+    is_taken: bool
+    fault_text: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,9 +22,7 @@ _LOW_S: Final = 0.1
 
 def dropped(order: Order) -> Order:
     """The drive is stopped: pending orders are dropped."""
-    if order.is_waiting or order.is_raised or order.taken is not None or order.deadline is not None:
-        return order._replace(is_waiting=False, is_raised=False, taken=None, deadline=None)
-    return order
+    return order._replace(is_waiting=False, is_raised=False, taken=None, deadline=None)
 
 
 def ordered(order: Order, words: tuple[int, ...]) -> Order:

@@ -35,16 +35,16 @@ class LegSettings:
     control: str
     reaction: Reaction
     timeout_ms: int
-    then_silence_s: float = 0.0
-    ignores_errors: bool = False
+    then_silence_s: float
+    ignores_errors: bool
     """telegram_downtime_s = -0.1: whatever is wrong is reported only."""
-    stop_by_anyone: bool = True
-    timeout_writable: bool = False
-    timeout_range_ms: tuple[int, int] = (0, 0)
-    follows: tuple[tuple[int, int], ...] = ()
+    stop_by_anyone: bool
+    timeout_writable: bool
+    timeout_range_ms: tuple[int, int]
+    follows: tuple[tuple[int, int], ...]
     """Places of setpoints that are the drive's actual words, and those of these words, as long as nothing is
     commanded: enabling moves nothing then."""
-    handshake: HandshakeSettings | None = None
+    handshake: HandshakeSettings | None
 
 
 def leg_settings(family: Family, table: DriveTable, decode: Decode) -> LegSettings:

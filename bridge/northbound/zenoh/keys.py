@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from math import isfinite, nan
 from typing import Final
 
 import msgspec
 
 from bridge.command import Event, Outcome
-from bridge.image import Point, Quality, Reading, Value
+from bridge.image import Columns, Point, Quality, Reading, Value
 from bridge.northbound.zenoh.users import own_keys
 
 JSON: Final = "application/json"
@@ -74,8 +75,13 @@ class KeySpace:
         self.commands = f"{self.top}/*/*/command/**"
         self.controllers = f"{self.top}/@/controller/**"
         self.own_commands = f"{self.top}/@/controller/*/*/*/command/**"
-        self._owners = frozenset(_owner(point.name) for point in points)
-        self.prompt = (*(f"{self.top}/{owner}/**" for owner in sorted(self._owners)), self.controllers)
+        owners = [_owner(point.name) for point in points]
+        self.owners = tuple(dict.fromkeys(owners))
+        """What points belong to: each drive, node and bus, and the bridge."""
+        self._places = {owner: place for place, owner in enumerate(self.owners)}
+        self.owner_of: tuple[int, ...] = tuple(self._places[owner] for owner in owners)
+        """The place of each point's in ``owners``."""
+        self.prompt = (*(f"{self.top}/{owner}/**" for owner in self.owners), self.controllers)
         """The keys of one drive, node, bus or the bridge: so few points that the answer fits into the queue
         to any client that reads at all."""
         self.bridge_token = f"{self.top}/@/bridge"
@@ -89,7 +95,7 @@ class KeySpace:
         own = tail.removeprefix("@/controller")
         if "/@" in own:  # which ** does not include
             return False
-        return _owner(tail) in self._owners or (own != tail and own[:1] in ("", "/"))
+        return _owner(tail) in self._places or (own != tail and own[:1] in ("", "/"))
 
     def share(self, key: str, payload: bytes | None) -> str:
         """In whose queue a query or put waits. zenoh does not tell who sent it, but each user has command
@@ -116,6 +122,21 @@ class KeySpace:
         """``{"v": …, "q": "good", "t": seconds since 1970}``; ``s`` is the name of an enumeration's value,
         ``r`` the reason for a quality that is not good. ``index`` is None for a parameter that was read."""
         return _encode(_Shown(_value(reading), *self._circumstances(index, reading, epoch_ns)))
+
+    def as_jsons(self, indices: Sequence[int], columns: Columns, at_zero_ns: int) -> Iterator[bytes]:
+        """The same for many points. ``at_zero_ns``: the wall clock at time 0 of the readings."""
+        last, tail = nan, ""
+        for index, value, quality, time, reason in zip(indices, *columns, strict=True):
+            if time != last:  # many change together
+                last = time
+                tail = f',"q":"good","t":{seconds(at_zero_ns + round(time * 1e9))!r}}}'
+            # What most of them are is written here, four times as fast.
+            is_plain = type(value) is int or (type(value) is float and isfinite(value))
+            if is_plain and quality is Quality.GOOD and not reason and not self._states[index]:
+                yield f'{{"v":{value!r}{tail}'.encode()
+            else:
+                reading = Reading(value, quality, time, reason)
+                yield self.as_json(index, reading, at_zero_ns + round(time * 1e9))
 
     def as_bare(self, index: int | None, reading: Reading, epoch_ns: int) -> tuple[bytes, bytes]:
         """The value as text, empty if there is none, and the attachment with everything else."""

@@ -19,8 +19,6 @@ from typing import Final
 import zenoh
 
 from bridge.command import Code, Event, Identity, Outcome, Rejection, Reply, Request, Source
-from bridge.command.link import NodeState
-from bridge.command.points import NODE_CODES
 from bridge.command.request import STOP_ACTIONS
 from bridge.config import ZenohTable
 from bridge.errors import Unavailable
@@ -32,15 +30,13 @@ from bridge.northbound.zenoh import keys
 from bridge.northbound.zenoh.access import access_control
 from bridge.northbound.zenoh.askers import Askers
 from bridge.northbound.zenoh.commands import MALFORMED, BadCommand, Commands, identity_of
+from bridge.northbound.zenoh.publication import Publication
 from bridge.northbound.zenoh.users import ANONYMOUS, Users, read_users
 from bridge.quietlog import about
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 
 _log = logging.getLogger(__name__)
 
-_NODE_STATE: Final = "/node/state"
-_OPERATIONAL: Final = NODE_CODES[NodeState.OPERATIONAL]
-_POINTS_PER_TICK: Final = 500
 _REPLIES_AT_ONCE: Final = 200
 _GETS_AT_ONCE: Final = 16
 """Gets with wildcards that are answered at the same time."""
@@ -58,25 +54,22 @@ class ZenohServer:
         self._clock = clock
         self._keys = keys.KeySpace(settings.prefix, site_name, self._image.points)
         self._commands = Commands(self._image.points)
-        self._node_states = [
-            (name.removesuffix(_NODE_STATE), index)
-            for name, index in self._image.index.items()
-            if name.endswith(_NODE_STATE) and not name.startswith("bus/")
-        ]
         self._users = read_users(settings)
         self._link = self._new_link()
         self._pulse = Pulse(clock)
         self._askers = Askers()
-        self._feed = self._image.feed()
-        self._present: set[str] = set()
+        self._publication = self._new_publication()
         self._gets: dict[asyncio.Task[None], float] = {}
         """When each was begun, the oldest first."""
-        self._tick_timer: asyncio.TimerHandle | None = None
         self._was_started = False
 
     def _new_link(self) -> ZenohLink:
         config = _config(self._settings, self._keys, self._users)
-        return ZenohLink(config, "zenoh", self._keys.is_prompt, self._on_strangers)
+        encoding = keys.JSON if self._settings.encoding == "json" else keys.TEXT
+        return ZenohLink(config, "zenoh", self._keys.is_prompt, self._on_strangers, encoding)
+
+    def _new_publication(self) -> Publication:
+        return Publication(self._view, self._keys, self._settings, self._link)
 
     async def start(self) -> None:
         """Open the session, also again after ``failed``. Raises Unavailable where zenoh cannot listen."""
@@ -101,24 +94,21 @@ class ZenohServer:
         self._link.declare_token(space.bridge_token)
         self._link.follow_endings(lambda: self._view.count("zenoh_broken_connections"))
         self._view.on_event(self._on_event)
-        self._tick()
+        self._publication.start()
 
     async def _start_anew(self) -> None:
         """Start with a new session that knows nothing of the one before."""
         await self.close()
         self._users = read_users(self._settings)
         self._link = self._new_link()
-        self._feed = self._image.feed()
-        self._present.clear()
+        self._publication = self._new_publication()
 
     async def close(self) -> None:
         self._pulse.stop()
-        if self._tick_timer:
-            self._tick_timer.cancel()
         for task in tuple(self._gets):
             task.cancel()
         self._view.forget(self._on_event)
-        self._image.drop_feed(self._feed)
+        self._publication.stop()
         await self._link.close()
 
     async def failed(self) -> None:
@@ -126,24 +116,6 @@ class ZenohServer:
         await self._link.failed()
 
     # out
-
-    def _tick(self) -> None:
-        self._tick_timer = asyncio.get_running_loop().call_later(self._settings.period_ms / 1000, self._tick)
-        at_zero_ns = self._view.epoch_ns(0.0)
-        for index in self._feed.take(_POINTS_PER_TICK):
-            self._link.put(self._render(index, at_zero_ns))
-        for node, index in self._node_states:
-            self._follow_node(node, self._image[index])
-
-    def _follow_node(self, name: str, state: Reading) -> None:
-        """A node has a token while it is operational."""
-        is_operational = state.quality is Quality.GOOD and state.value == _OPERATIONAL
-        if is_operational and name not in self._present:
-            self._present.add(name)
-            self._link.declare_token(self._keys.node_token(name))
-        elif not is_operational and name in self._present:
-            self._present.discard(name)
-            self._link.drop_token(self._keys.node_token(name))
 
     def _render(self, index: int, at_zero_ns: int) -> Message:
         """``at_zero_ns``: the wall clock at time 0, which is read once for many points."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from bridge.command import Action, Write
+from bridge.command import Action, Start, Write
 from bridge.command.leg.event import ActualWords
 from bridge.command.telegram import Telegram
 from bridge.config import Reaction
@@ -87,6 +87,16 @@ def test_a_stop_makes_it_follow_although_the_drive_is_still_enabled() -> None:
     axis.write(STOP, 8, 0, 0)
     assert axis.stands(ELSEWHERE) == (STOP, *ELSEWHERE, 0)
     assert axis.write(RUN, 8, 0, 0) == (RUN, *ELSEWHERE, 0)
+
+
+def test_a_start_goes_to_no_place_that_was_written_before_the_stop() -> None:
+    axis = enabled(AT)
+    axis.write(None, 8, 0, 0)
+    assert axis.write(STOP, 8, 0, 0) == (STOP, 8, 0, 0)
+    axis.asks(Start())
+    assert axis.state.sent.words == (STOP, *AT, 0)
+    axis.says(DriveState.OPERATION_ENABLED, 0.2)
+    assert axis.state.sent.words == (RUN, *AT, 0)
 
 
 def test_leaving_the_state_makes_it_follow() -> None:

@@ -137,6 +137,30 @@ class TestFeed:
         image.tell_kept()
         assert seen(feed) == [1]
 
+    def test_it_is_told_of_the_first_change_since_it_took_all(self, image: Image):
+        told: list[int] = []
+        feed = image.feed(lambda: told.append(len(feed)))
+        image.set(0, 1.0, 1.0)
+        assert told == [], "there are changes from the beginning"
+        feed.take(3)
+        image.set(0, 2.0, 1.0)
+        assert told == [], "one has been waiting"
+        for change in (
+            lambda: image.set(0, 3.0, 1.0),
+            lambda: image.set_values([0, 1], [4.0, 4], 1.0),
+            lambda: image.renew(1, 4, 2.0),
+            lambda: (image.keep(1, 5, 2.0), image.tell_kept()),
+            lambda: image.judge([0, 1], Quality.LOST, 2.0),
+        ):
+            seen(feed)
+            told.clear()
+            change()
+            assert told == [0]
+        seen(feed)
+        image.tell_kept()
+        image.set_values([0], [4.0], 3.0)
+        assert told == [0], "nothing has changed"
+
     def test_a_dropped_one_is_marked_no_more(self, image: Image):
         feed = image.feed()
         seen(feed)
@@ -154,6 +178,13 @@ class TestFeed:
             known |= {taken: image[taken].value for taken in feed.take(most)}
         known |= {taken: image[taken].value for taken in feed.take(100)}
         assert known == {index: image[index].value for index in range(4)}
+
+
+def test_columns_are_readings_side_by_side(image: Image):
+    image.set(1, 7, 1.0)
+    image.set(0, 2.5, 2.0, Quality.LOST, "node lost")
+    rows = [Reading(*row) for row in zip(*image.columns([0, 3, 1]), strict=True)]
+    assert rows == [image[0], image[3], image[1]]
 
 
 def test_qualities_are_numbered_as_modbus_serves_them():

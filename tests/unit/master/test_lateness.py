@@ -74,7 +74,7 @@ def test_a_machine_that_was_suspended_starts_all_drives_anew(tmp_path: Path) -> 
         bench.clock,
         suspended=lambda: (offset[0], offset[0] + 0.001),
     )
-    bench.master.attach(lambda at: setattr(bench, "_wake_at", at))
+    bench.master.attach(lambda at: setattr(bench, "wake_at", at))
     bench.run(1.0)
     bench.write(control_word=0x047E)
     bench.keep_writing(1.0, control_word=0x047F, setpoint_1=0x2000)

@@ -109,6 +109,13 @@ def test_whatever_happens_can_be_told(source: str, message: str, value: str | in
     assert back.readings[0] == delta.readings[0], "what is well is as it was"
 
 
+def test_a_changed_value_takes_25_bytes() -> None:
+    readings = tuple(
+        Changed(1000 + n, 25.0 + n / 7, Quality.GOOD, 1_763_888_888.123456, "") for n in range(100)
+    )
+    assert len(protocol.encode(Delta(2**62, 123_456, readings))) <= 25 * 100
+
+
 @given(any_identities, any_text, any_values)
 def test_a_request_is_passed_on_as_it_is_or_not_at_all(
     who: Identity, target: str, values: dict[str, str | int | float]

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from bridge.can.burstend import Burst
 from bridge.can.softbursts import SoftBursts
 from bridge.canopen import emcy, nmt
+from bridge.canopen.emcy import Emergency
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.heartbeat import HeartbeatConsumer, NodeGuard
 
@@ -81,6 +82,72 @@ def test_a_late_loop_asks_once() -> None:
     assert asked == 2
 
 
+def test_the_rhythm_of_guarding_is_kept_though_a_turn_is_late() -> None:
+    guard = NodeGuard(5, 0.25, 10)
+    guard.expect(10.0)
+    deadlines = []
+    for now in (10.125, 10.25, 10.625, 10.75):
+        assert not guard.on_time(now)
+        assert len(guard.take_frames()) == 1
+        deadlines.append(guard.next_deadline())
+    assert deadlines == [10.25, 10.5, 10.75, 11.0]
+
+
+@pytest.mark.parametrize("late_s", [0.25, 0.375])
+def test_after_a_missed_turn_a_whole_guard_time_passes(late_s: float) -> None:
+    guard = NodeGuard(5, 0.25, 10)
+    guard.expect(10.0)
+    assert not guard.on_time(10.0 + late_s)
+    assert guard.next_deadline() == 10.25 + late_s
+
+
+def test_a_late_turn_does_not_put_off_the_loss() -> None:
+    guard = NodeGuard(5, 0.25, 2)
+    guard.expect(10.0)
+    assert not guard.on_time(10.375)
+    assert guard.next_deadline() == 10.5
+    assert guard.on_time(10.5)
+
+
+def test_a_wrong_toggle_bit_counts_once_and_the_next_right_one_is_a_sign_of_life() -> None:
+    guard = NodeGuard(5, 0.1, 3)
+    guard.expect(10.0)
+    assert [guard.on_frame(guard_answer(toggle, 10.0)) for toggle in (1, 1, 0, 0, 1)] == [
+        True,
+        False,
+        True,
+        False,
+        True,
+    ]
+    assert guard.toggle_errors == 2
+
+
+def test_any_state_may_come_with_either_toggle_bit() -> None:
+    guard = NodeGuard(5, 0.1, 3)
+    guard.expect(10.0)
+    answers = ("05", "FF", "04", "85", "7F")
+    assert all(guard.on_frame(Frame(0x705, bytes.fromhex(data), 10.0)) for data in answers)
+    assert guard.toggle_errors == 0
+
+
+@pytest.mark.parametrize("data", ["", "0500"])
+def test_an_answer_of_another_length_is_no_sign_of_life(data: str) -> None:
+    guard = NodeGuard(5, 0.1, 3)
+    guard.expect(10.0)
+    assert not guard.on_frame(Frame(0x705, bytes.fromhex(data), 10.2))
+    assert guard.on_time(10.3)
+
+
+def test_until_guarding_begins_nothing_is_asked_nor_judged() -> None:
+    """Somebody else may guard the node."""
+    guard = NodeGuard(5, 0.1, 3)
+    assert all(guard.on_frame(guard_answer(1, 10.0)) for _ in range(3))
+    assert guard.toggle_errors == 0
+    assert guard.next_deadline() is None
+    assert not guard.on_time(100.0)
+    assert guard.take_frames() == []
+
+
 def test_an_emergency_message_of_the_manual() -> None:
     """BU 2500 §8.3: code, register, drive id in byte 3."""
     emergency = emcy.decode(bytes.fromhex("0081 11 02 00000000".replace(" ", "")))
@@ -88,8 +155,9 @@ def test_an_emergency_message_of_the_manual() -> None:
     assert (emergency.code, emergency.register, emergency.vendor[0]) == (0x8100, 0x11, 2)
 
 
-def test_a_short_emergency_message_is_none() -> None:
+def test_a_short_emergency_message_has_its_code_and_register_at_least() -> None:
     assert emcy.decode(b"\x00\x81") is None
+    assert emcy.decode(b"\x00\x81\x11") == Emergency(0x8100, 0x11, b"")
 
 
 def test_nmt_commands() -> None:

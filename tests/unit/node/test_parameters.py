@@ -112,6 +112,15 @@ def test_a_value_read_a_moment_ago_is_given_without_asking(parameters: Parameter
     assert len([f for f in parameters.bench.sent(0x605) if f.data[1:3] == b"\xaa\x21"]) == before
 
 
+def test_who_accepts_no_old_value_has_the_drive_asked_each_time(parameters: Parameters) -> None:
+    for count in (1, 2, 3):
+        outcomes = parameters.begin(READ, parameter="P426")
+        parameters.bench.run(0.0005)
+        assert [outcome.value for outcome in outcomes] == [0.1]
+        asked = [frame for frame in parameters.bench.sent(0x605) if frame.data[1:3] == b"\xaa\x21"]
+        assert len(asked) == count
+
+
 def test_a_drive_without_a_channel_is_told_how_to_get_one(tmp_path: Path) -> None:
     parameters = Parameters(tmp_path, node="")
     outcome = parameters.ask(READ, target="conveyor/fu2", parameter="P105")

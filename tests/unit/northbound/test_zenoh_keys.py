@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.command import Code, Event, Kind, Outcome
-from bridge.image import DataType, Point, Quality, Reading
+from bridge.image import Columns, DataType, Point, Quality, Reading
 from bridge.northbound.zenoh.keys import KeySpace, event_json, outcome_json
 
 POINTS = (
@@ -53,6 +53,24 @@ def test_a_value_that_is_gone_is_not_shown(quality: Quality) -> None:
     shown = json.loads(KEYS.as_json(STATE, reading, NOW_NS))
     assert shown["v"] is None and "s" not in shown
     assert KEYS.as_bare(STATE, reading, NOW_NS)[0] == b""
+
+
+VALUES = st.booleans() | st.integers(-(2**31), 2**32) | st.floats() | st.text(max_size=5)
+READINGS = st.builds(
+    Reading,
+    VALUES,
+    st.sampled_from(Quality),
+    st.sampled_from([0.0, 5.0, 5.001]),
+    st.sampled_from(["", "why"]),
+)
+
+
+@given(st.lists(st.tuples(st.integers(0, len(POINTS) - 1), READINGS), max_size=8))
+def test_many_are_written_as_each_of_them(some: list[tuple[int, Reading]]) -> None:
+    indices, readings = [index for index, _ in some], [reading for _, reading in some]
+    columns = Columns(*(list(map(list, zip(*readings, strict=True))) or [[], [], [], []]))
+    each = [KEYS.as_json(i, one, NOW_NS + round(one.time * 1e9)) for i, one in some]
+    assert list(map(json.loads, KEYS.as_jsons(indices, columns, NOW_NS))) == list(map(json.loads, each))
 
 
 def test_a_point_that_never_had_a_value_has_no_time() -> None:

@@ -47,14 +47,55 @@ def test_what_is_only_said_is_left_alone(source: str):
 
 
 def test_tests_are_asked_that_run_the_statement_those_that_are_about_the_file_first():
-    suite = Recorded(
-        took_s={"short": 0.1, "thorough": 0.1, "long": 2.0},
-        lines={str(PATH): {1: {""}, 5: {"short", "long", "thorough"}, 6: {"thorough"}, 7: {"long"}}},
+    suite = Recorded()
+    suite.add(
+        Recorded(
+            took_s={"short": 0.1, "thorough": 0.1, "long": 2.0},
+            lines={
+                str(PATH): {1: {""}, 5: {"short", "long", "thorough"}, 6: {"thorough"}, 7: {"long"}},
+                "other.py": {1: {"short", "thorough"}},
+            },
+        )
     )
     assert suite.tests_of(Mutant(PATH, 5, 5, 0, "1", "2")) == ["thorough", "short", "long"]
     assert suite.tests_of(Mutant(PATH, 6, 7, 0, "1", "2")) == ["thorough", "long"]
     assert len(suite.tests_of(Mutant(PATH, 1, 1, 0, "1", "2"))) == 3, "run by the import: all of them"
     assert not suite.tests_of(Mutant(PATH, 9, 9, 0, "1", "2")), "run by none"
+    suite.add(Recorded(lines={str(PATH): {1: {"long"}}}))
+    assert len(suite.tests_of(Mutant(PATH, 1, 1, 0, "1", "2"))) == 3, "all, though one of them imports it"
+
+
+def test_a_test_of_little_else_is_asked_before_one_of_the_whole_program():
+    """The latter runs more of the file, and is quick for what it does."""
+    suite = Recorded()
+    suite.add(
+        Recorded(
+            took_s={"unit": 0.01, "whole": 0.1},
+            lines={
+                str(PATH): {5: {"unit", "whole"}, **{line: {"whole"} for line in range(6, 30)}},
+                "other.py": {line: {"whole"} for line in range(1, 500)},
+            },
+        )
+    )
+    assert suite.tests_of(Mutant(PATH, 5, 5, 0, "1", "2")) == ["unit", "whole"]
+
+
+def test_of_a_file_that_only_an_import_runs_those_are_asked_that_run_its_folder():
+    types = PATH.with_name("types.py")
+    suite = Recorded()
+    suite.add(
+        Recorded(
+            took_s={"short": 0.1, "thorough": 0.1, "other": 0.1, "long": 2.0},
+            lines={
+                str(types): {1: {"", "long"}, 2: {""}},
+                str(PATH): {1: {""}, 5: {"short", "thorough"}, 6: {"thorough"}},
+                "bridge/hall/file.py": {1: {"other", "short"}},
+            },
+        )
+    )
+    for line in (1, 2):
+        assert suite.tests_of(Mutant(types, line, line, 0, "1", "2")) == ["thorough", "short", "long"]
+    assert not suite.tests_of(Mutant(types, 3, 3, 0, "1", "2"))
 
 
 def test_what_no_test_notices_is_told_and_the_rest_is_not():

@@ -3,8 +3,8 @@
     python -m tools.mutants [--jobs N] [--every N] [--seconds S] [--tests FOLDER] [FILE_OR_FOLDER ...]
 
 Each mutant is the program with one small change: a comparison, an operator, a constant, a call left out. The
-unit tests that run the changed line run on it, until one fails; first those that run most of its file in the
-shortest time. Mutants that no test notices are printed: either a test is missing, or the change makes no
+unit tests that run the changed line run on it, until one fails; first the quick ones that run little beside
+its file. Mutants that no test notices are printed: either a test is missing, or the change makes no
 difference that anybody could see.
 """
 

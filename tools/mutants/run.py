@@ -48,6 +48,8 @@ class Recorded:
     failed: list[str] = field(default_factory=list[str])
     lines: dict[str, dict[int, set[str]]] = field(default_factory=dict[str, dict[int, set[str]]])
     modules: set[str] = field(default_factory=set[str])
+    much: Counter[str] = field(default_factory=Counter[str])
+    """How many lines each test runs of all files, counted by ``add``."""
 
     def add(self, other: Recorded) -> None:
         self.took_s |= other.took_s
@@ -56,17 +58,27 @@ class Recorded:
         for path, lines in other.lines.items():
             mine = self.lines.setdefault(path, {})
             for line, tests in lines.items():
-                mine.setdefault(line, set()).update(tests)
+                known = mine.setdefault(line, set())
+                self.much.update(tests - known)
+                known |= tests
 
     def tests_of(self, mutant: Mutant) -> list[str]:
-        """Those that run what is changed; of what is run by the import, all that run anything of the file.
-        First those that run most of the file in the shortest time: they are about it."""
+        """Those that run what is changed; of what is run by the import, all that run anything of the file,
+        even if one of them was the first to import it, or of its folder where the import runs all of it.
+        First the quick ones that run little beside that: they are about it."""
         lines = self.lines.get(str(mutant.path), {})
         runs = {test for line in range(mutant.statement, mutant.line + 1) for test in lines.get(line, ())}
-        if runs == {""}:
-            runs = {test for tests in lines.values() for test in tests}
-        much = Counter(test for tests in lines.values() for test in tests)
-        return sorted(runs - {""}, key=lambda test: (self.took_s[test] + _BEGIN_S) / much[test])
+        here = Counter(test for tests in lines.values() for test in tests)
+        if "" in runs:
+            if all("" in tests for tests in lines.values()):
+                paths = (path for path in self.lines if Path(path).parent == mutant.path.parent)
+                here = Counter(
+                    test for path in paths for tests in self.lines[path].values() for test in tests
+                )
+            runs = set(here)
+        return sorted(
+            runs - {""}, key=lambda test: (self.took_s[test] + _BEGIN_S) * self.much[test] / here[test]
+        )
 
 
 class _Recorder:

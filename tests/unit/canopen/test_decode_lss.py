@@ -61,6 +61,8 @@ MASTER, SLAVE = True, False
             "fastscan: vendor id, bits 0…31 as in 0000007Bh",
             {"number": 0x7B, "bit": 0},
         ),
+        (MASTER, "5178563412050400", "fastscan: 78 56 34 12 05 04 00", {}),
+        (MASTER, "5178563412200000", "fastscan: 78 56 34 12 20 00 00", {}),
         (MASTER, "517B000000000901", "fastscan: 7B 00 00 00 00 09 01", {}),
         (MASTER, "5A00000000000000", "inquire vendor id", {}),
         (SLAVE, "5A7B000000000000", "inquire vendor id: 0000007Bh", {"number": 0x7B}),

@@ -305,6 +305,15 @@ def test_whoever_refuses_a_node_id_is_no_success() -> None:
     assert requests(lss.configure_node_id(lss.NO_NODE_ID)) == ["11 FF 00 00 00 00 00 00"]
 
 
+def test_the_questions_of_a_scan() -> None:
+    """CiA 305 §6.7: number, lowest bit that is compared, field, next field; 80h begins a scan."""
+    assert requests(lss.is_anybody_there()) == ["51 00 00 00 00 80 00 00"]
+    assert requests(lss.has(2, 0x1234_5678, 7)) == ["51 78 56 34 12 07 02 02"]
+    assert requests(lss.has(2, 0x1234_5678)) == ["51 78 56 34 12 00 02 02"], "the whole number"
+    assert requests(lss.enter(2, 0x1234_5678)) == ["51 78 56 34 12 00 02 03"]
+    assert requests(lss.enter(3, 0x1234_5678)) == ["51 78 56 34 12 00 03 00"]
+
+
 def test_who_answers_everything_is_asked_for_both_values_of_a_bit() -> None:
     assert requests(lss.answers_everything(), bytes(8)) == [
         "51 00 00 00 00 1F 03 03",

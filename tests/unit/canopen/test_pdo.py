@@ -31,6 +31,14 @@ def test_a_mapping_entry_is_index_sub_length() -> None:
     assert entry.to_object() == 0x30020310
 
 
+@pytest.mark.parametrize(
+    ("index", "is_dummy"), [(0x0000, False), (0x0001, True), (0x001F, True), (0x0020, False), (0x6041, False)]
+)
+def test_an_index_of_a_data_type_stands_for_a_gap(index: int, is_dummy: bool) -> None:
+    """CiA 301 §7.4.7: 0001h to 001Fh are the simple types."""
+    assert PdoEntry(index, 0, 16).is_dummy == is_dummy
+
+
 def test_four_words_little_endian() -> None:
     codec = PdoCodec(tuple(PdoEntry(0x3000 + n, 1, 16) for n in range(4)))
     assert codec.pack((0x047F, 0x2000, 0, 0)) == bytes.fromhex("7F04002000000000")
@@ -46,6 +54,8 @@ def test_a_length_that_cannot_be_packed_is_named(bits: int) -> None:
 def test_more_than_eight_bytes_cannot_be_mapped() -> None:
     with pytest.raises(MappingError, match="10 bytes"):
         PdoCodec((PdoEntry(0x6064, 0, 64), PdoEntry(0x6041, 0, 16)))
+    with pytest.raises(MappingError, match="9 bytes"):
+        PdoCodec((PdoEntry(0x6064, 0, 64), PdoEntry(0x6041, 0, 1)))
 
 
 def lengths(sizes: st.SearchStrategy[int]) -> st.SearchStrategy[list[int]]:
@@ -64,6 +74,22 @@ def test_what_is_packed_is_unpacked(bits: list[int], data: st.DataObject) -> Non
     packed = codec.pack(values)
     assert len(packed) == codec.length == (sum(bits) + 7) // 8
     assert codec.unpack(packed) == values
+
+
+@pytest.mark.parametrize("bits", [16, 12])
+@pytest.mark.parametrize("values", [(1,), (1, 2, 3)])
+def test_there_is_a_value_for_each_object(bits: int, values: tuple[int, ...]) -> None:
+    codec = PdoCodec((PdoEntry(0x2000, 1, bits), PdoEntry(0x2000, 2, bits)))
+    with pytest.raises(ValueError):
+        codec.pack(values)
+
+
+def test_an_object_of_any_length_has_all_its_bits() -> None:
+    for bits in range(1, 65):
+        codec = PdoCodec((PdoEntry(0x2000, 0, bits),))
+        highest = (1 << bits) - 1
+        data = highest.to_bytes((bits + 7) // 8, "little")
+        assert (codec.pack((highest,)), codec.unpack(data)) == (data, (highest,))
 
 
 @given(lengths(st.integers(1, 64)), st.integers(0, 2**64 - 1))
@@ -318,10 +344,14 @@ def test_an_object_that_the_mapping_does_not_know_has_no_word() -> None:
         (254, 100, 0, 0.170),
         (1, 0, 10, 0.035),
         (10, 250, 10, 0.170),
+        (240, 0, 10, 3.620),
+        (241, 250, 10, None),  # reserved, as are those up to 251
+        (251, 250, 10, None),
         (0, 250, 10, None),  # only changes
         (255, 0, 10, None),
         (1, 0, 0, None),  # no SYNC, no PDO
-        (253, 0, 10, 0.170),  # asked for every 100 ms
+        (252, 0, 10, 0.170),  # asked for every 100 ms
+        (253, 0, 10, 0.170),
     ],
 )
 def test_when_a_tpdo_is_late(kind: int, event_ms: int, sync_ms: int, expected: float | None) -> None:
@@ -330,7 +360,22 @@ def test_when_a_tpdo_is_late(kind: int, event_ms: int, sync_ms: int, expected: f
     )
 
 
+def test_a_tpdo_that_nobody_asks_for_is_never_late() -> None:
+    assert tpdo_deadline_s(252, 250, 10, 0) is None
+    assert tpdo_deadline_s(253, 250, 10) is None
+
+
 @given(st.floats(0.001, 1.0), st.integers(10, 10_000))
-def test_a_burst_never_outlives_the_dead_man_time(period_s: float, deadman_ms: int) -> None:
+def test_a_burst_is_as_long_as_the_dead_man_time_allows(period_s: float, deadman_ms: int) -> None:
     count = burst_length(period_s, deadman_ms)
     assert count == 1 or count * period_s <= deadman_ms / 1000 + 1e-6
+    assert (count + 1) * period_s > deadman_ms / 1000 - 1e-6
+
+
+@pytest.mark.parametrize(
+    ("period_s", "deadman_ms", "count"), [(0.1, 300, 3), (0.01, 400, 40), (0.02, 99, 4), (1.0, 400, 1)]
+)
+def test_a_burst_whose_last_frame_ends_with_the_dead_man_time(
+    period_s: float, deadman_ms: int, count: int
+) -> None:
+    assert burst_length(period_s, deadman_ms) == count

@@ -102,6 +102,14 @@ def test_a_short_object_takes_no_block_transfer() -> None:
     assert link.count("> a4") + link.count("> c6") == 0
 
 
+@pytest.mark.parametrize(("size", "blocks"), [(15 * 7, 0), (16 * 7 - 1, 0), (16 * 7, 1)])
+def test_sixteen_whole_segments_are_worth_a_block(size: int, blocks: int) -> None:
+    link = Link(LONG[:size])
+    assert link.read() == LONG[:size]
+    assert link.write(LONG[:size]) == b""
+    assert (link.count("> a4"), link.count("> c6")) == (blocks, blocks)
+
+
 @pytest.mark.parametrize("segment", [1, 5, 126, 127])
 def test_a_segment_lost_on_the_way_here_is_sent_again(segment: int) -> None:
     link = Link(lose=once("from", segment))

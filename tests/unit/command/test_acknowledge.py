@@ -11,10 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.command import Action
+from bridge.command import Action, Kind
 from bridge.command.link import NodeState
 from tests.support.rig import (
     ACKNOWLEDGE,
+    ENABLE,
     ENABLED,
     ENGINEER,
     FAULT,
@@ -181,12 +182,34 @@ class TestServedWord:
         assert not rig.sent & _BIT
         assert rig.channel.control_word & _BIT
 
+    def test_a_bit_that_stays_1_stays_on_the_bus_until_a_stop_and_comes_back_with_an_edge(self):
+        rig = Rig()
+        rig.run()
+        rig.write(ACKNOWLEDGE)
+        assert rig.sent == ACKNOWLEDGE
+        rig.write(ACKNOWLEDGE)
+        assert rig.sent == ACKNOWLEDGE
+        rig.ask(Action.STOP, OPERATOR)
+        rig.write(ACKNOWLEDGE)
+        assert rig.sent == SHUT_DOWN, "it never fell: that would be an edge"
+        rig.write(SHUT_DOWN)
+        rig.write(ACKNOWLEDGE)
+        assert rig.sent == ACKNOWLEDGE
+
     def test_it_is_gone_with_the_owner(self):
         rig = Rig()
         rig.run()
         rig.write(ACKNOWLEDGE)
         rig.ask(Action.RELEASE_CONTROL)
         assert not rig.channel.control_word & _BIT
+
+
+def test_of_a_drive_without_a_fault_it_stops_nothing(running: Rig):
+    """It is an edge for the drive, and a telegram."""
+    assert running.ask(Action.RESET_FAULT).forwarded
+    assert running.sent == ENABLE | _BIT
+    running.wait(0.1)
+    assert running.sent == ENABLE
 
 
 class TestRegister:
@@ -204,7 +227,16 @@ class TestRegister:
             assert rig.watchdog == "tripped"
             rig.ask(Action.RESET_FAULT, pressed=True)
             assert rig.watchdog == "running"
+            assert rig.told(Kind.WATCHDOG)[-1] == f"acknowledged by {PLC}; the drive stays stopped"
             rig.ask(Action.KEEP_ALIVE, pressed=False)
+
+    def test_a_1_that_is_no_edge_is_told_as_not_forwarded(self):
+        rig = self.rig()
+        (outcome,) = rig.submit(Action.RESET_FAULT, pressed=True)
+        assert outcome.forwarded
+        (outcome,) = rig.submit(Action.RESET_FAULT, pressed=True)
+        assert (outcome.ok, outcome.forwarded) == (True, False)
+        assert "no edge" in outcome.message
 
     @pytest.mark.parametrize("between", IN_BETWEEN)
     def test_a_1_in_each_telegram_acknowledges_once(self, between: str):

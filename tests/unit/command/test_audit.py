@@ -40,8 +40,8 @@ SITE = sites.site(
 class Hall:
     """A plant with its trail, on a virtual clock."""
 
-    def __init__(self, *, every_telegram: bool = False) -> None:
-        self.plant = sites.plant_of(SITE)
+    def __init__(self, text: str = SITE, *, every_telegram: bool = False) -> None:
+        self.plant = sites.plant_of(text)
         self.entries: list[AuditEntry] = []
         self.events: list[Event] = []
         self.plant.on_event(self.events.append)

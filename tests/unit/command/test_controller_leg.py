@@ -14,6 +14,7 @@ from tests.support.rig import (
     FAULT,
     HALF_SPEED,
     INHIBITED,
+    OPERATOR,
     OTHER_PLC,
     READY,
     SHUT_DOWN,
@@ -98,6 +99,13 @@ class TestRunning:
         assert running.watchdog == "running"
         assert running.sent == ENABLE
 
+    def test_a_telegram_leaves_what_it_does_not_name_as_it_was(self, running: Rig):
+        running.write(ENABLE, 0x1000, 0x0200)
+        running.write(None, 0x0800)
+        assert running.sent_setpoints == (0x0800, 0x0200, 0, 0)
+        running.write(ENABLE)
+        assert running.sent_setpoints == (0x0800, 0x0200, 0, 0)
+
     def test_an_invalid_telegram_is_refused_and_the_timer_goes_on(self, running: Rig):
         running.wait(0.15)
         outcome = running.write(0x007F)
@@ -106,6 +114,21 @@ class TestRunning:
         assert running.channel.left_ms(running.now) == 50
         running.wait(0.05)
         assert running.watchdog == "tripped"
+
+    def test_the_owners_valid_telegrams_are_counted_and_nothing_else(self, running: Rig):
+        before = running.channel.telegrams
+        running.write(ENABLE)
+        running.write(None, HALF_SPEED)
+        running.ask(Action.KEEP_ALIVE)
+        running.ask(Action.RESET_FAULT)
+        running.ask(Action.STOP)
+        assert running.channel.telegrams == before + 5
+        running.write(0x007F)
+        running.write(SHUT_DOWN, identity=OTHER_PLC)
+        running.ask(Action.STOP, OPERATOR)
+        running.ask(Action.TAKE_CONTROL)
+        running.wait(0.1)
+        assert running.channel.telegrams == before + 5
 
     def test_the_timer_expires_at_its_time_and_not_before(self, running: Rig):
         running.wait(0.1999)
@@ -222,6 +245,19 @@ class TestTripped:
         assert not rig.sent & 0x0080
         assert not rig.enables
 
+    def test_an_edge_of_the_owners_word_lasts_as_long_as_its_bit(self):
+        rig = tripped()
+        rig.write(ACKNOWLEDGE)
+        assert rig.sent & 0x0080
+        rig.wait(0.15)
+        assert rig.sent & 0x0080
+        rig.write(SHUT_DOWN)
+        assert rig.sent == SHUT_DOWN
+        again = tripped()
+        again.write(ACKNOWLEDGE)
+        again.write(SHUT_DOWN)
+        assert again.sent == SHUT_DOWN
+
     def test_a_telegram_does_not_cut_the_edge_short(self):
         rig = tripped()
         rig.ask(Action.RESET_FAULT)
@@ -305,6 +341,31 @@ class TestBridgeStart:
         running.channel.on_bridge_gap(running.now)
         assert running.watchdog == "tripped"
         assert running.channel.current_fault == 10.3
+
+    def test_a_gap_ends_what_is_held_and_the_trip_stays(self):
+        rig = tripped(on_expiry="hold")
+        rig.channel.on_bridge_gap(rig.now)
+        assert rig.watchdog == "tripped"
+        assert rig.channel.output.words == (SHUT_DOWN, 0, 0, 0, 0)
+        assert (rig.channel.control_word, rig.channel.setpoints) == (SHUT_DOWN, (0, 0, 0, 0))
+
+    def test_a_bus_that_was_gone_leaves_nothing_of_the_old_telegrams(self, running: Rig):
+        running.channel.start_anew(running.now)
+        assert running.channel.output.words == (SHUT_DOWN, 0, 0, 0, 0)
+        assert (running.channel.control_word, running.channel.setpoints) == (SHUT_DOWN, (0, 0, 0, 0))
+        running.write(SHUT_DOWN)
+        running.write(ENABLE)
+        assert running.enables
+        assert running.sent_setpoints == (0, 0, 0, 0)
+
+    def test_before_its_node_is_seen_a_drive_is_not_commanded(self, rig: Rig):
+        assert rig.channel.output.words == (0x0400, 0, 0, 0, 0)
+        for outcome in (rig.write(ENABLE, HALF_SPEED), rig.write(SHUT_DOWN), rig.write(ENABLE)):
+            assert outcome.ok
+            assert not rig.enables
+        (outcome,) = rig.submit(Action.START)
+        assert (outcome.code, outcome.forwarded) == (Code.NOT_READY, False)
+        assert "node" in outcome.message
 
     def test_a_gap_does_not_look_like_a_dead_drive(self):
         """Its frames are still waiting in the socket: they are judged when it has been drained."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command import Start
+from bridge.command import Action, Start
+from bridge.command.leg.event import NodeBack, Time
 from bridge.drive import DriveState
 from bridge.mapping import load_family
 from tests.support.leg import OPEN, SHUT, Leg, settings_of, told
@@ -127,6 +128,15 @@ def test_a_start_keeps_what_was_ordered_before(axis: Axis):
     assert axis.orders
 
 
+def test_the_first_start_goes_to_no_position_that_nobody_has_ordered() -> None:
+    leg = Leg(settings_of(FAMILY))
+    leg.says(DriveState.READY)
+    leg.asks(Start())
+    leg.says(DriveState.OPERATION_ENABLED)
+    assert leg.enables
+    assert not leg.sent & NEW
+
+
 def test_one_that_the_drive_does_not_take_ends_after_a_second_and_is_told_once(axis: Axis):
     axis.enable()
     axis.write(position=PLACE)
@@ -165,6 +175,41 @@ def test_one_that_is_taken_in_time_is_not_told(axis: Axis):
     axis.waits(0.5)
     axis.says(DriveState.OPERATION_ENABLED, is_taken=TAKEN)
     assert not told(axis.waits(5))
+
+
+@pytest.mark.parametrize("way", ["stop", "release", "restart"])
+def test_the_place_where_the_drive_was_before_a_stop_can_be_ordered_again(axis: Axis, way: str):
+    axis.enable()
+    axis.write(position=PLACE)
+    axis.says(DriveState.OPERATION_ENABLED, is_taken=TAKEN)
+    axis.says(DriveState.OPERATION_ENABLED)
+    axis.write(position=PLACE)
+    assert not axis.orders, "it is there, or on its way"
+    if way == "restart":
+        axis.restarts()
+    else:
+        axis.asks(Action.STOP if way == "stop" else Action.RELEASE_CONTROL)
+    axis.asks(Start())
+    axis.says(DriveState.READY)
+    axis.enable()
+    assert not axis.orders
+    axis.write(position=PLACE)
+    assert axis.orders
+
+
+def test_one_that_waits_behind_another_that_is_not_taken_is_forgotten_with_the_node(axis: Axis):
+    axis.enable()
+    axis.write(position=PLACE)
+    axis.write(position=OTHER)
+    axis.now += 1.0
+    axis.happens(Time())
+    assert not axis.orders
+    axis.happens(NodeBack())
+    axis.asks(Start())
+    axis.waits(0.5)
+    axis.says(DriveState.OPERATION_ENABLED)
+    assert axis.enables
+    assert not axis.orders
 
 
 @pytest.mark.parametrize("with_word", [True, False])

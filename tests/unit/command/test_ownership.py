@@ -54,6 +54,7 @@ class TestFixedSource:
 
     def test_a_released_drive_is_free(self, running: Rig):
         running.ask(Action.RELEASE_CONTROL)
+        assert running.told(Kind.OWNER)[-1] == "released by modbus:192.168.1.10"
         assert running.write(SHUT_DOWN, identity=OTHER_PLC).forwarded
 
     def test_a_reader_commands_nothing(self, rig: Rig):

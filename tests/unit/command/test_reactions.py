@@ -135,6 +135,25 @@ def test_an_acknowledge_turns_no_ramp_into_coasting(on_expiry: str, word: int):
     assert rig.sent == word
 
 
+@pytest.mark.parametrize(
+    ("on_expiry", "word"), [("stop", SHUT_DOWN), ("quick_stop", 0x047B), ("disable_voltage", 0x0474)]
+)
+@pytest.mark.parametrize("written", [SHUT_DOWN, ENABLE, 0x0474])
+def test_what_was_written_while_tripped_does_not_follow_an_acknowledge(
+    on_expiry: str, word: int, written: int
+):
+    rig = tripped(on_expiry)
+    rig.write(written, HALF_SPEED)
+    rig.ask(Action.RESET_FAULT)
+    rig.wait(0.1)
+    assert rig.channel.output.words == (word, 0, 0, 0, 0)
+    assert (rig.channel.control_word, rig.channel.setpoints) == (word, (0, 0, 0, 0))
+    rig.write(SHUT_DOWN)
+    rig.write(ENABLE)
+    assert rig.enables
+    assert rig.sent_setpoints == (0, 0, 0, 0)
+
+
 class TestHold:
     def test_new_telegrams_do_not_reach_the_drive(self):
         rig = tripped("hold")

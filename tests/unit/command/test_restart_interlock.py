@@ -149,6 +149,12 @@ class TestStopCommands:
         running.wait(0.05)
         assert running.watchdog == "tripped"
 
+    def test_of_somebody_else_are_told(self, running: Rig):
+        running.ask(Action.QUICK_STOP)
+        before = running.told(Kind.OWNER)
+        running.ask(Action.STOP, OPERATOR)
+        assert running.told(Kind.OWNER) == [*before, "stop by opcua:ann"]
+
     def test_of_the_owner_are_one(self, running: Rig):
         running.wait(0.15)
         running.ask(Action.STOP)

@@ -73,7 +73,25 @@ def test_what_is_said_late_brings_no_stop_back(drive: Drive) -> None:
     drive.writes(drive.run)
     drive.says(READY)
     assert drive.says(ENABLED, 0.003) == drive.withheld
+    assert drive.released() == drive.withheld
     assert drive.says(READY, 0.003) == drive.withheld
+
+
+def test_nor_after_a_fault_that_came_before_it_had_moved(drive: Drive) -> None:
+    drive.gets_ready()
+    drive.writes(drive.run)
+    drive.says(DriveState.FAULT)
+    assert drive.released() == drive.withheld
+    assert drive.says(ENABLED, 0.003) == drive.withheld
+    assert drive.happens(StartAnew()) == drive.withheld
+
+
+def test_one_that_turned_after_all_is_on_its_ramp_until_it_says_that_it_stands(drive: Drive) -> None:
+    drive.gets_ready()
+    drive.writes(drive.run)
+    assert drive.restarts() == drive.stop
+    assert drive.says(ENABLED, 0.05) == drive.stop
+    assert drive.says(READY) == drive.withheld
 
 
 def test_what_was_said_before_it_was_enabled_takes_no_ramp_away(drive: Drive) -> None:
@@ -102,6 +120,14 @@ def test_a_stop_that_was_asked_for_stays_as_it_is(drive: Drive) -> None:
     assert drive.asks(Action.STOP) == drive.stop
     assert drive.says(READY) == drive.stop
     assert drive.writes(drive.run) == drive.stop
+
+
+def test_the_owners_own_stop_gives_way_where_the_bridge_keeps_it_in_force(drive: Drive) -> None:
+    drive.says(READY)
+    assert drive.writes(drive.stop) == drive.stop
+    drive.restarts()
+    drive.says(READY)
+    assert drive.writes(drive.run) == drive.withheld
 
 
 def test_the_owners_acknowledge_goes_on_to_a_drive_that_is_interlocked(drive: Drive) -> None:
@@ -140,6 +166,24 @@ def test_what_a_drive_says_after_its_node_has_restarted_is_believed_at_once(driv
     drive.writes(drive.run)
     assert drive.happens(StartAnew()) == drive.stop
     assert drive.says(READY, 0.01) == drive.withheld
+
+
+def test_one_that_ran_when_the_bus_was_gone_is_still_on_its_ramp(drive: Drive) -> None:
+    drive.runs()
+    assert drive.happens(StartAnew()) == drive.stop
+    drive.waits(0.1)
+    assert drive.sent == drive.stop
+    assert drive.says(ENABLED) == drive.stop
+    assert drive.says(READY) == drive.withheld
+
+
+def test_after_a_bus_that_was_gone_a_start_waits_for_nothing_from_before(drive: Drive) -> None:
+    drive.gets_ready()
+    drive.writes(drive.run)
+    drive.says(DriveState.FAULT)
+    drive.happens(StartAnew())
+    drive.says(READY, 0.01)
+    assert drive.asks(Start()) == drive.words.run
 
 
 def test_and_of_one_that_was_released_only_what_it_says_of_its_run(drive: Drive) -> None:

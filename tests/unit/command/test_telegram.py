@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from bridge.command import Code
 from bridge.command.link import NodeState
+from bridge.command.telegram import Refusal
 from bridge.image import Value
 from tests.support.rig import ENABLE, HALF_SPEED, PLC, SHUT_DOWN, Rig
 
@@ -107,6 +108,11 @@ _WRONG = st.fixed_dictionaries(
         "nothing": st.integers(),
     },
 )
+
+
+def test_a_refusal_says_why_also_to_whoever_only_prints_it(rig: Rig):
+    with pytest.raises(Refusal, match=r"^control_word takes 0…65535, not -1$"):
+        rig.channel.leg_settings.decode({"control_word": -1}, (0, 0, 0, 0), 0)
 
 
 @given(values=_WRONG)

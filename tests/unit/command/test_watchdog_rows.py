@@ -31,6 +31,9 @@ NEXT: Final[Mapping[str, Mapping[str, str]]] = {
 }
 """Where an event is not named, the state stays. A trip outlives its owner, and a bridge that hung."""
 
+NUMBERS: Final[Mapping[str, int]] = {"off": 0, "idle": 1, "running": 2, "tripped": 3}
+"""Modbus, input register 14."""
+
 
 class Watched(Leg):
     """Commanded by Modbus: whoever writes while nobody owns the drive does from then on."""
@@ -92,6 +95,12 @@ EVENTS: Final[Mapping[str, Callable[[Watched], None]]] = {
     "owner changes": Watched.changes,
     "bridge hung": Watched.hung,
 }
+
+
+@pytest.mark.parametrize("state", NUMBERS)
+def test_each_state_has_its_number(state: str) -> None:
+    watched = Watched(state)
+    assert watchdog_state(watched.settings, watched.state) == NUMBERS[state]
 
 
 @pytest.mark.parametrize("state", NEXT)

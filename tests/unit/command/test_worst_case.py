@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.command.freshness import GRAIN_MS
-from bridge.command.worst_case import Wire, stop_time
+from bridge.command.worst_case import Wire, stop_time, sync_wait_ms, takeover_ms
 from bridge.config import BusTable, DriveTable
 from tests.support.docs import REPOSITORY
 
@@ -46,6 +46,33 @@ def test_a_synchronous_rpdo_waits_for_sync_and_sync_may_be_late(kind: int, perio
     assert found == PLAIN | {"sync_ms": 10 * periods, "sync_late_ms": 5.06}
 
 
+def test_the_last_synchronous_transmission_type_is_240() -> None:
+    """CiA 301 v4.2.0 §7.5.2.35."""
+    assert terms(drive(), bus(), 240)["sync_ms"] == 2400
+    assert terms(drive(), bus(), 241) == PLAIN
+    assert (sync_wait_ms(bus(), 241), takeover_ms(bus(), 241)) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("period_ms", "kind", "wait_ms"),
+    [(10, 0, 10), (10, 1, 10), (10, 5, 50), (10, 240, 2400), (10, 255, 0), (0, 0, 0), (0, 5, 0)],
+)
+def test_a_word_on_the_bus_waits_for_sync_and_for_the_bridge(period_ms: int, kind: int, wait_ms: int) -> None:
+    of_bus = bus(sync_period_ms=period_ms)
+    assert sync_wait_ms(of_bus, kind) == wait_ms
+    late_ms = 20 if kind <= 240 else 0
+    # For a SYNC that somebody else sends, it is not waited longer than a tenth of a second.
+    assert takeover_ms(of_bus, kind) == (wait_ms or (100 if late_ms else 0)) + late_ms
+
+
+def test_the_sum_is_written_with_three_digits_where_it_is_below_a_millisecond() -> None:
+    stop = stop_time(drive(), bus(), 200, 255, Wire(frames_ms=0.54321, before_ms=1.0625))
+    assert stop.sum == (
+        "way_ms 25 + timeout_ms 200 + reaction_ms 20 + burst_ms 10 + period_ms 10 + before_ms 1.0625 "
+        "+ frames_ms 0.543"
+    )
+
+
 @pytest.mark.parametrize("kind", [0, 1, 240])
 def test_a_foreign_sync_producer_leaves_no_number(kind: int) -> None:
     stop = stop_time(drive(), bus(sync_period_ms=0), 200, kind, WIRE)
@@ -70,6 +97,7 @@ def test_with_silence_the_drives_own_time_out_is_in_it() -> None:
     assert stop_time(silent, bus(), 200, 255, WIRE, 0.0) == stop_time(drive(), bus(), 200, 255, WIRE), (
         "it gets disable voltage where it has none"
     )
+    assert stop_time(drive(), bus(), 200, 255, WIRE, 300.0) == stop_time(drive(), bus(), 200, 255, WIRE)
     assert "not been read" in stop_time(silent, bus(), 200, 255, WIRE, None).unknown
 
 

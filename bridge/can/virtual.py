@@ -22,6 +22,9 @@ class VirtualWire:
         self.cut = False
         self.listeners: list[Callable[[Frame], None]] = []
         """Called with every frame put on the wire, whoever sends it."""
+        self.players: list[Callable[[float], None]] = []
+        """Called before an end is drained: simulated nodes of this process, which share its pauses, say what
+        real ones would have said meanwhile."""
         self._random = random.Random(seed)
         self._ends: list[VirtualBus] = []
 
@@ -91,6 +94,8 @@ class VirtualBus(SoftBus):
             self._loop.call_soon(self._wake_up)
 
     def drain(self, now: float) -> list[Frame]:
+        for play in self._wire.players:
+            play(now)
         waiting = self._waiting
         frames: list[Frame] = []
         while waiting and waiting[0].time <= now:

@@ -146,7 +146,9 @@ async def _serve(
         from bridge.cli.simulation import simulation
 
         wire = VirtualWire()
-        simulations.append(simulation(wire.end(f"{table.name}-simulation"), table, project.path))
+        nodes = simulation(wire.end(f"{table.name}-simulation"), table, project.path)
+        wire.players.append(nodes.catch_up)
+        simulations.append(nodes)
         return wire.end(table.name)
 
     service = Service(project, open_bus, fronts=fronts, alarm=SignalAlarm())

@@ -12,6 +12,7 @@ from bridge.sim.device import SimulatedDevice
 from bridge.sim.ticks import earliest
 
 _SEND_WITHIN_S: Final = 0.1
+_LATE_S: Final = 0.02
 
 
 class Simulation:
@@ -23,6 +24,7 @@ class Simulation:
         self._woken: asyncio.Future[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._is_open = False
+        self._due_at: float | None = None
         self._due: dict[SimulatedDevice, float | None] = {}
         """When each node is due; one that is missing here is due now. Asking all of them for every frame of a
         busy bus would cost more than simulating them."""
@@ -51,6 +53,12 @@ class Simulation:
             if self._timer is not None:
                 self._timer.cancel()
 
+    def catch_up(self, now: float) -> None:
+        """Where this process was held up, what was due meanwhile is played now: a master in it must not take
+        its own pause for the nodes' silence."""
+        if self._due_at is not None and self._due_at < now - _LATE_S:
+            self._pump(now)
+
     def poke(self) -> None:
         """A node was changed from outside: serve it now instead of at its next deadline."""
         self._due.clear()
@@ -66,6 +74,7 @@ class Simulation:
     def _arm(self, loop: asyncio.AbstractEventLoop) -> None:
         """Wake at the next deadline."""
         deadline = earliest(self._bus.next_deadline(), *self._due.values())
+        self._due_at = deadline
         if self._timer is not None:
             if self._timer.when() == deadline:
                 return
@@ -77,6 +86,7 @@ class Simulation:
         self._wake()
 
     def _pump(self, now: float) -> None:
+        self._due_at = None
         # Frames first, by their own time of reception: a late loop must not look like a silent master.
         addressed: set[SimulatedDevice] = set()
         for frame in self._bus.drain(now):

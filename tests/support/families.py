@@ -122,6 +122,7 @@ class FamilyBridge:
         nodes = {node.name: simulate_node(node.mapping, node.id, {}) for node in table.node}
         self._nodes = nodes
         self._simulation = Simulation(self._wire.end("simulation"), list(nodes.values()))
+        self._wire.players.append(self._simulation.catch_up)
         return self._wire.end(table.name)
 
     def call(self, function: Callable[[], T]) -> T:

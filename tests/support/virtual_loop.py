@@ -25,5 +25,9 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         self._virtual = _Selector()
         super().__init__(self._virtual)
 
+    def hold_up(self, pause_s: float) -> None:
+        """Let time pass in which nothing could run."""
+        self._virtual.now += pause_s
+
     def time(self) -> float:
         return self._virtual.now

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
+from math import floor, inf
 from typing import Final
 
 from bridge.can.burstend import Burst
 from bridge.canopen.frame import Frame
 
 _SYNC: Final = 0x080
+_ROUNDING: Final = 1e-6
+"""Of a period: a time that is a multiple of it but for its last bits counts as one."""
 
 
 @dataclass(slots=True)
@@ -30,9 +32,14 @@ class _Job:
 
 
 class SoftBursts:
-    """Finite bursts by COB-ID. Times are monotonic seconds; ``due`` gives the frames to be sent."""
+    """Finite bursts by COB-ID. Times are monotonic seconds; ``due`` gives the frames to be sent.
 
-    def __init__(self) -> None:
+    Those ``in_step`` are due at the multiples of their period, so that those of one period are due together
+    and wake their process once. Only the first interval of such a burst is shorter than its period.
+    """
+
+    def __init__(self, *, in_step: bool = False) -> None:
+        self._in_step = in_step
         self._jobs: dict[int, _Job] = {}
         self._next = inf
         """When the first of them is due."""
@@ -41,7 +48,8 @@ class SoftBursts:
         """Start or renew; gives the frame that is to be sent right now."""
         job = self._jobs.get(burst.can_id)
         if job is None or job.burst.period_s != burst.period_s:
-            job = self._jobs[burst.can_id] = _Job(burst, burst.total - 1, now + burst.period_s)
+            due = self._step_after(now, burst.period_s) if self._in_step else now + burst.period_s
+            job = self._jobs[burst.can_id] = _Job(burst, burst.total - 1, due)
             self._look()
             return job.take(now)
         if len(burst.frames) != len(job.burst.frames):
@@ -62,6 +70,10 @@ class SoftBursts:
 
     def _look(self) -> None:
         self._next = min((job.due for job in self._jobs.values()), default=inf)
+
+    @staticmethod
+    def _step_after(time: float, period_s: float) -> float:
+        return (floor(time / period_s + _ROUNDING) + 1) * period_s
 
     def next_deadline(self) -> float | None:
         return self._next if self._jobs else None
@@ -87,6 +99,8 @@ class SoftBursts:
             missed = int((now - job.due) / period_s)
             job.left -= missed
             job.due += (missed + 1) * period_s
+            if self._in_step:  # the same number for all of one period, which a sum of floats is not
+                job.due = round(job.due / period_s) * period_s
         self._look()
         # SYNC last: an RPDO that is due with it is taken over by it and not by the next one.
         frames.sort(key=lambda frame: frame.can_id == _SYNC)

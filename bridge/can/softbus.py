@@ -20,10 +20,10 @@ _WITHIN_S: Final = 0.05
 class SoftBus(ABC):
     """One end of a bus, as ``interface.Bus`` has it."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, *, bursts_in_step: bool = False) -> None:
         self._name = name
         self._status = BusStatus()
-        self._bursts = SoftBursts()
+        self._bursts = SoftBursts(in_step=bursts_in_step)
         self._bits = WireBits()
         self._accepted: frozenset[int] | None = None
         self._ours: frozenset[int] = frozenset()

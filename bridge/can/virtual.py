@@ -50,7 +50,7 @@ class VirtualBus(SoftBus):
     """One end. Everything runs in the event loop of the one who opened it."""
 
     def __init__(self, name: str, wire: VirtualWire) -> None:
-        super().__init__(name)
+        super().__init__(name, bursts_in_step=True)
         self._wire = wire
         self._waiting: deque[Frame] = deque()
         self._foreign: list[Frame] = []

@@ -175,6 +175,30 @@ def test_a_burst_of_several_frames_takes_turns_and_keeps_its_place_when_renewed(
     assert len(sent) == 25
 
 
+def test_bursts_in_step_are_due_together_and_none_sooner_than_at_a_multiple_of_its_period() -> None:
+    beats = SoftBursts(in_step=True)
+    starts = {0x205: 7.0031, 0x206: 7.0048, 0x080: 7.0}
+    for can_id, start in starts.items():
+        assert beats.start(Burst((Frame(can_id),), 0.01, 300), start, at_once=False) is not None
+    wakes: list[float] = []
+    while (due := beats.next_deadline()) is not None and len(wakes) < 200:
+        wakes.append(due)
+        assert [frame.can_id for frame in beats.due(due)] == [0x205, 0x206, 0x080]
+    assert wakes == [step * 0.01 for step in range(701, 901)]
+
+
+def test_a_burst_in_step_ends_no_later_than_one_that_is_not() -> None:
+    ends: list[float] = []
+    for in_step in (False, True):
+        beats = SoftBursts(in_step=in_step)
+        beats.start(Burst((Frame(0x205),), 0.01, 10), 7.0031, at_once=False)
+        end = 7.0031
+        for millisecond in range(7004, 7200):
+            end = millisecond / 1000 if beats.due(millisecond / 1000) else end
+        ends.append(end)
+    assert ends[0] - 0.01 <= ends[1] <= ends[0]
+
+
 def test_the_message_to_the_broadcast_manager() -> None:
     """<linux/can/bcm.h>, as a 64-bit kernel aligns it."""
     frames = (Frame(0x80, b"\1"), Frame(0x80, b"\2"))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 import statistics
+import subprocess
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -40,6 +41,8 @@ MOST_LATE: Final = 0.02
 busy."""
 FEW_LATE: Final = 3
 """So many may in any case: a newcomer has few exchanges."""
+ENDING_S: Final = 0.5
+"""Between the end of a front and that of its bus process, where both end."""
 STARVED: Final = 0.5
 """Part of the time between two looks for which the main thread of a process of the bridge, or of the good
 clients, was ready and did not run. What takes long then is no fault of the bridge."""
@@ -158,9 +161,14 @@ class Judge:
         return faults
 
     def _processes(self) -> list[str]:
-        if self._rig.process.popen.poll() is not None:
-            return [f"the bus process has ended with {self._rig.process.popen.returncode}"]
-        now = [self._rig.process.pid, *self._rig.fronts()]
+        bus = self._rig.process
+        now = [bus.pid, *self._rig.fronts()]
+        if now != self._pids:
+            # One that ends loses its front first.
+            with suppress(subprocess.TimeoutExpired):
+                bus.popen.wait(ENDING_S)
+        if bus.popen.poll() is not None:
+            return [f"the bus process has ended with {bus.popen.returncode}"]
         if now != self._pids:
             return [f"the processes are others: {self._pids} before, {now} now"]
         if self._rig.good.popen.poll() is not None:

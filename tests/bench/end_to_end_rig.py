@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.bench.pair import named, wire
+from tests.bench.pair import managers, named, wire
 from tests.bench.reference.command_line import Ports
 from tests.support.process import REPOSITORY, Process, free_port, peer, running
 
@@ -62,14 +62,16 @@ def rig(
 ) -> Iterator[Rig]:
     """All of them, running and connected. The plant's report is ``plant.json`` in ``folder``, once it has
     ended."""
-    with wire() as (near, far), contextlib.ExitStack() as stack:
-        at = Ports(named(near), NODES, *(free_port() for _ in range(3)))
-        sends = (named(far), NODES, traffic.rate, traffic.changed, traffic.seconds, folder / "plant.json")
-        plant = stack.enter_context(peer(folder, "traffic", *map(str, sends), files=[far.fileno()]))
+    with wire() as (near, far), managers() as (manager, kernel), contextlib.ExitStack() as stack:
+        at = Ports(f"{named(near)},{manager.fileno()}", NODES, *(free_port() for _ in range(3)))
+        what = traffic.rate, traffic.changed, traffic.seconds
+        sends = (named(far), kernel.fileno(), NODES, *what, folder / "plant.json")
+        files = [far.fileno(), kernel.fileno()]
+        plant = stack.enter_context(peer(folder, "traffic", *map(str, sends), files=files))
         plant.wait_output("are there", LIMIT_S)
         script = REPOSITORY / "tests" / "bench" / "reference" / f"{name}.py"
         command = [sys.executable, str(script), *at.arguments]
-        bridge = stack.enter_context(running(folder, name, *command, files=[near.fileno()]))
+        bridge = stack.enter_context(running(folder, name, *command, files=[near.fileno(), manager.fileno()]))
         made = Rig(bridge, plant, {})
         made.wait(plant, "all operational")
         for title, client in clients(at).items():

@@ -2,7 +2,8 @@
 
 It carries ``struct can_frame`` with the kernel's time stamps, so the code that receives is the one that
 receives from SocketCAN, ours as well as python-can's; what CAN's own part of the kernel needs is missing
-for both. It filters nothing and repeats nothing: bursts are sent by the process.
+for both. It filters nothing. Bursts are repeated by whoever is at the other end of ``wire``'s managers, as
+the kernel's broadcast manager would; where nobody is, the process sends them itself.
 """
 
 from __future__ import annotations
@@ -29,6 +30,14 @@ def wire() -> Iterator[tuple[socket.socket, socket.socket]]:
         yield near, far
 
 
+@contextlib.contextmanager
+def managers() -> Iterator[tuple[socket.socket, socket.socket]]:
+    """A bridge's socket of the broadcast manager, and the one of who plays that."""
+    near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with near, far:
+        yield near, far
+
+
 def named(end: socket.socket) -> str:
     """The end as a peer takes it as its argument."""
     return f"fd:{end.fileno()}"
@@ -37,9 +46,10 @@ def named(end: socket.socket) -> str:
 class PairSockets(CanSockets):
     """One end in place of an interface."""
 
-    def __init__(self, end: socket.socket) -> None:
+    def __init__(self, end: socket.socket, manager: socket.socket | None = None) -> None:
         super().__init__("pair")
         self._end = end
+        self._manager = manager
 
     def raw(self) -> socket.socket:
         raw = self._end.dup()
@@ -47,7 +57,11 @@ class PairSockets(CanSockets):
         return raw
 
     def manager(self) -> socket.socket:
-        """Nobody is behind it: the bus then sends the bursts itself."""
+        """Without one, nobody is behind it: the bus then sends the bursts itself."""
+        if self._manager:
+            manager = self._manager.dup()
+            manager.setblocking(False)
+            return manager
         manager, kernel = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         kernel.close()
         return manager
@@ -71,8 +85,8 @@ class PairSockets(CanSockets):
 class PairBus(SocketCanBus):
     """Our SocketCAN bus on one end."""
 
-    def __init__(self, end: socket.socket) -> None:
-        super().__init__("can0", "pair", sockets=PairSockets(end))
+    def __init__(self, end: socket.socket, manager: socket.socket | None = None) -> None:
+        super().__init__("can0", "pair", sockets=PairSockets(end, manager))
 
 
 class PairCan(SocketcanBus):

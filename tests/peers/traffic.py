@@ -1,11 +1,12 @@
 """Slaves that boot, and then send TPDOs at a given rate: what the end-to-end figures are measured with.
 
-traffic.py CHANNEL NODES RATE CHANGED SECONDS REPORT
+traffic.py CHANNEL MANAGER NODES RATE CHANGED SECONDS REPORT
 
-SIGUSR1 begins RATE TPDOs a second, of the nodes in turn, for SECONDS. In CHANGED percent of them the three
-values are new: the first is the number of the change. Nobody waits for the other end: a frame for which its
-queue has no room is lost, as in the kernel. SIGTERM ends it; then REPORT becomes a JSON file: what was sent
-and when, and for each node when its RPDO had which new setpoint 1.
+MANAGER is an open socket on which the bridge tells the kernel's broadcast manager what to repeat; its part is
+played here. SIGUSR1 begins RATE TPDOs a second, of the nodes in turn, for SECONDS. In CHANGED percent of them
+the three values are new: the first is the number of the change. Nobody waits for the other end: a frame for
+which its queue has no room is lost, as in the kernel. SIGTERM ends it; then REPORT becomes a JSON file: what
+was sent and when, and for each node when its RPDO had which new setpoint 1.
 """
 
 import contextlib
@@ -21,6 +22,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bridge.canopen.frame import Frame
+from tests.peers.broadcast_manager import MOST_BYTES, BroadcastManager
 from tests.peers.can_end import FRAME, can_end
 from tests.peers.crowd import be_hardware
 from tests.support.quick import OPERATIONAL, QuickNode
@@ -35,8 +37,18 @@ _NEVER = float("inf")
 class Traffic:
     """Slaves 1 … ``nodes``; of ``every`` PDOs of one, the first has new values."""
 
-    def __init__(self, bus: socket.socket, nodes: int, rate: float, every: int, seconds: float) -> None:
+    def __init__(
+        self,
+        bus: socket.socket,
+        bridge: socket.socket,
+        nodes: int,
+        rate: float,
+        every: int,
+        seconds: float,
+    ) -> None:
         self._bus = bus
+        self._bridge = bridge
+        self._manager = BroadcastManager()
         self._nodes = {number: QuickNode(number) for number in range(1, nodes + 1)}
         self._rate = rate
         self._every = every
@@ -70,10 +82,15 @@ class Traffic:
         if self.begun and self._begin == _NEVER:
             self._begin = now
         pdo_at = self._begin + self.sent / self._rate if not self.all_sent else _NEVER
-        pause_s = min(pdo_at, self._beat_at, now + 0.1) - now
-        if select.select([self._bus], [], [], max(0.0, pause_s))[0]:
+        pause_s = min(pdo_at, self._beat_at, self._manager.due, now + 0.1) - now
+        ready = select.select([self._bus, self._bridge], [], [], max(0.0, pause_s))[0]
+        if self._bus in ready:
             self._receive()
+        if self._bridge in ready:
+            self._obey()
         now = time.monotonic()
+        for frame in self._manager.send(now):
+            self._hear(frame)
         if now >= self._beat_at:
             self._beat(now)
         while pdo_at <= now:
@@ -103,10 +120,19 @@ class Traffic:
         with contextlib.suppress(BlockingIOError):
             while True:
                 can_id, length, data = FRAME.unpack(self._bus.recv(FRAME.size, socket.MSG_DONTWAIT))
-                if can_id == 0 or can_id & 0x780 == 0x600:
-                    self._tell(Frame(can_id, data[:length]))
-                elif can_id & 0x780 == 0x200:
-                    self._command(self.setpoints[can_id & 0x7F], int.from_bytes(data[2:4], "little"))
+                self._hear(Frame(can_id, data[:length]))
+
+    def _obey(self) -> None:
+        with contextlib.suppress(BlockingIOError):
+            while message := self._bridge.recv(MOST_BYTES, socket.MSG_DONTWAIT):
+                for frame in self._manager.take(message, time.monotonic()):
+                    self._hear(frame)
+
+    def _hear(self, frame: Frame) -> None:
+        if frame.can_id == 0 or frame.can_id & 0x780 == 0x600:
+            self._tell(frame)
+        elif frame.can_id & 0x780 == 0x200:
+            self._command(self.setpoints[frame.can_id & 0x7F], int.from_bytes(frame.data[2:4], "little"))
 
     @staticmethod
     def _command(setpoints: list[tuple[float, int]], setpoint: int) -> None:
@@ -132,10 +158,12 @@ class Traffic:
         node.outbox = []
 
 
-def main(channel: str, nodes: int, rate: float, changed: int, seconds: float, report: Path) -> None:
+def main(
+    channel: str, manager: int, nodes: int, rate: float, changed: int, seconds: float, report: Path
+) -> None:
     be_hardware()
-    with can_end(channel, *_FILTERS) as bus:
-        traffic = Traffic(bus, nodes, rate, 100 // changed, seconds)
+    with can_end(channel, *_FILTERS) as bus, socket.socket(fileno=manager) as bridge:
+        traffic = Traffic(bus, bridge, nodes, rate, 100 // changed, seconds)
         signal.signal(signal.SIGUSR1, lambda *_: setattr(traffic, "begun", True))
         signal.signal(signal.SIGTERM, lambda *_: setattr(traffic, "running", False))
         print("the nodes are there", flush=True)
@@ -155,5 +183,5 @@ def main(channel: str, nodes: int, rate: float, changed: int, seconds: float, re
 
 
 if __name__ == "__main__":
-    first, second, third, fourth, fifth, last = sys.argv[1:]
-    main(first, int(second), float(third), int(fourth), float(fifth), Path(last))
+    end, kernel, number, pdos, new, lasts, file = sys.argv[1:]
+    main(end, int(kernel), int(number), float(pdos), int(new), float(lasts), Path(file))

@@ -9,11 +9,14 @@ from xml.etree import ElementTree
 
 import pytest
 
+from bridge.can import bcm
+from bridge.canopen.frame import Frame
 from tests.bench import end_to_end_report as report
 from tests.bench.delays import Delays, delays, summary
 from tests.bench.end_to_end_runs import Cell, Run, Spread, ratio, spread
 from tests.bench.line_plot import Line, line_plot
 from tests.bench.processes import usage
+from tests.peers.broadcast_manager import BroadcastManager
 
 CELL = Cell(1000, 100)
 
@@ -131,3 +134,38 @@ def test_cpu_and_memory_of_this_process() -> None:
     assert after.cpu_s - before.cpu_s >= 0.03
     assert after.memory_mb > 5
     assert after.processes >= 1
+
+
+WORDS = (Frame(0x205, b"\x7e\x04"), Frame(0x205, b"\x7f\x04"))
+
+
+def played(manager: BroadcastManager, until: float, step: float = 0.001) -> list[tuple[float, bytes]]:
+    """What it sends until then, from 0 on."""
+    sent: list[tuple[float, bytes]] = []
+    for number in range(round(until / step)):
+        now = number * step
+        sent += [(now, frame.data) for frame in manager.send(now)]
+    return sent
+
+
+def test_a_burst_is_sent_at_once_and_so_many_more_times():
+    manager = BroadcastManager()
+    frames = [*manager.take(bcm.setup(WORDS[:1], 0.01, 3, start=True, at_once=True), 0.0)]
+    assert frames == [WORDS[0]]
+    assert [at for at, _ in played(manager, 0.1)] == pytest.approx([0.01, 0.02])
+
+
+def test_a_refilled_burst_keeps_its_phase_and_takes_its_frames_in_turn():
+    manager = BroadcastManager()
+    [*manager.take(bcm.setup(WORDS[:1], 0.01, 5, start=True, at_once=True), 0.0)]
+    assert not [*manager.take(bcm.setup(WORDS, 0.01, 4, start=False, at_once=False, anew=True), 0.004)]
+    sent = played(manager, 0.1)
+    assert [at for at, _ in sent] == pytest.approx([0.01, 0.02, 0.03, 0.04])
+    assert [data for _, data in sent] == [WORDS[0].data, WORDS[1].data] * 2
+
+
+def test_a_burst_that_is_deleted_is_over():
+    manager = BroadcastManager()
+    [*manager.take(bcm.setup(WORDS[:1], 0.01, 5, start=True, at_once=True), 0.0)]
+    [*manager.take(bcm.delete(0x205), 0.005)]
+    assert played(manager, 0.1) == []

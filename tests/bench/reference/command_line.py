@@ -24,7 +24,9 @@ class Ports:
 def ports() -> Ports:
     """``CHANNEL NODES MODBUS OPCUA ZENOH`` of the command line."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("channel", help="vcan0, or fd:N for an end of a pair of sockets")
+    parser.add_argument(
+        "channel", help="vcan0, or fd:N,M: an end of a pair of sockets, and the broadcast manager's"
+    )
     for name in ("nodes", "modbus", "opcua", "zenoh"):
         parser.add_argument(name, type=int)
     return Ports(**vars(parser.parse_args()))

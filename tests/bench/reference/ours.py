@@ -44,7 +44,8 @@ def bus(channel: str) -> Bus:
     number = channel.removeprefix("fd:")
     if number == channel:
         return SocketCanBus("can0", channel)
-    return PairBus(socket.socket(fileno=int(number)))
+    frames, manager = (socket.socket(fileno=int(one)) for one in number.split(","))
+    return PairBus(frames, manager)
 
 
 def main(at: Ports) -> None:

@@ -198,7 +198,7 @@ def zenoh_session(port: int, drives: list[Drive]) -> zenoh.Session:
 @contextlib.contextmanager
 def connected(channel: str) -> Iterator[canopen.Network]:
     """canopen's network on an interface, or on one end of a pair of sockets."""
-    number = channel.removeprefix("fd:")
+    number = channel.removeprefix("fd:").partition(",")[0]
     if number == channel:
         network = canopen.Network()
         network.connect(interface="socketcan", channel=channel)

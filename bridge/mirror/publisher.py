@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Final, TypeVar
 
+from bridge.beat import LOOK_EVERY_S, next_before_look
 from bridge.command import Code, Event, Outcome, PlantView
 from bridge.command.freshness import NEVER, TAKEN_LATE
 from bridge.errors import Unavailable
@@ -33,9 +34,7 @@ class MirrorPublisher:
     machine would need its times translated.
     """
 
-    def __init__(
-        self, view: PlantView, endpoint: str, clock: Callable[[], float], *, period_s: float = 0.01
-    ) -> None:
+    def __init__(self, view: PlantView, endpoint: str, clock: Callable[[], float]) -> None:
         self.malformed = 0
         """Messages of fronts that could not be read."""
         self._view = view
@@ -43,7 +42,7 @@ class MirrorPublisher:
         self._endpoint = endpoint
         self._clock = clock
         self._link = self._new_link()
-        self._pace = Pace(self._tick, period_s, _HEARTBEAT_S)
+        self._pace = Pace(self._tick, LOOK_EVERY_S, _HEARTBEAT_S, beat=next_before_look)
         self._feed = self._image.feed(self._pace.wake)
         self._has_fronts = False
         self._instance = random.getrandbits(63)
@@ -81,6 +80,7 @@ class MirrorPublisher:
 
     async def close(self) -> None:
         self._pace.stop()
+        self._has_fronts = False
         for task in tuple(self._snapshots):
             task.cancel()
         self._view.forget(self._on_event)
@@ -100,10 +100,18 @@ class MirrorPublisher:
 
     def _tick(self) -> None:
         """What has changed waits while nobody listens."""
-        if self._has_fronts:
-            self._publish_delta()
-            if self._feed:
-                self._pace.wake()
+        self._publish(len(self._feed))
+
+    def _publish(self, left: int) -> None:
+        """A delta, or several: the bus has its turn between two of them."""
+        if not self._has_fronts:
+            return
+        self._publish_delta()
+        left -= _POINTS_PER_DELTA
+        if left > 0:
+            asyncio.get_running_loop().call_soon(self._publish, left)
+        elif self._feed:
+            self._pace.wake()
 
     def _publish_delta(self) -> None:
         self._sequence += 1

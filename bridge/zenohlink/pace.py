@@ -9,16 +9,23 @@ from math import inf
 
 class Pace:
     """Calls ``turn`` in the event loop after ``wake``: at once where the last call was ``period_s`` ago, else
-    when it will be; with ``waits`` always ``period_s`` after it. Unless woken it rests, but for no longer
-    than ``most_s``.
+    when it will be, or the next time that ``beat`` gives; with ``waits`` always ``period_s`` after it. Unless
+    woken it rests, but for no longer than ``most_s``.
 
     Works from ``start`` until ``stop``; what woke it before counts.
     """
 
     def __init__(
-        self, turn: Callable[[], None], period_s: float, most_s: float = inf, *, waits: bool = False
+        self,
+        turn: Callable[[], None],
+        period_s: float,
+        most_s: float = inf,
+        *,
+        waits: bool = False,
+        beat: Callable[[float], float] | None = None,
     ) -> None:
         self._waits = waits
+        self._beat = beat
         self._turn = turn
         self._period_s = period_s
         self._most_s = most_s
@@ -52,7 +59,10 @@ class Pace:
         if pause_s < inf:
             now = self._loop.time()
             since = now if self._waits and self._is_woken else self._last
-            self._timer = self._loop.call_at(max(since + pause_s, now), self._now)
+            at = max(since + pause_s, now)
+            if self._beat and self._is_woken and at > now:
+                at = self._beat(now)
+            self._timer = self._loop.call_at(at, self._now)
 
     def _now(self) -> None:
         self._timer = None

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Final
 
+from bridge.beat import LOOK_EVERY_S
 from bridge.northbound.opcua.eventfilter import EventFilter, Occurrence
 from bridge.northbound.opcua.filters import ChangeFilter
 from bridge.northbound.opcua.library import (
@@ -28,9 +29,8 @@ from bridge.northbound.opcua.library import (
 )
 from bridge.northbound.opcua.reading import Window
 
-LEAST_SAMPLING_MS: Final = 50.0
-"""The publisher's tick: nobody looks more often at what has changed."""
-_HALF_TICK_S: Final = LEAST_SAMPLING_MS / 2000
+LEAST_SAMPLING_MS: Final = LOOK_EVERY_S * 1000
+_HALF_LOOK_S: Final = LOOK_EVERY_S / 2
 
 MOST_SAMPLING_MS: Final = 3_600_000.0
 VALUE_QUEUE: Final = 100
@@ -100,9 +100,9 @@ class ValueItem:
         """The attribute may have changed. Between two samples the newest value waits for the next."""
         if self.mode == Monitoring.Disabled:
             return
-        if self._held is not None and now - self._due > 2 * _HALF_TICK_S:
+        if self._held is not None and now - self._due > 2 * _HALF_LOOK_S:
             # Nobody has looked since: what was there when the sample was due is told, too.
-            self.sample(self._due + _HALF_TICK_S)
+            self.sample(self._due + _HALF_LOOK_S)
         self._held = value
         self.sample(now)
 
@@ -112,8 +112,8 @@ class ValueItem:
             return
         self._held = None
         if self.settings.sampling_ms > LEAST_SAMPLING_MS:
-            # What changed is looked at in ticks: half of one early is not too early.
-            self._due = now + self.settings.sampling_ms / 1000 - _HALF_TICK_S
+            # Half the time between two looks early is not too early.
+            self._due = now + self.settings.sampling_ms / 1000 - _HALF_LOOK_S
         value = self.window.part(held)
         if self.filter.reports(self._last, value):
             self._last = value

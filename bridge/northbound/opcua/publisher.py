@@ -1,4 +1,4 @@
-"""Tells clients what has changed: once per tick, the newest value, only where somebody watches."""
+"""Tells clients what has changed: at each look the newest value, only where somebody watches."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ import asyncio
 from collections.abc import Sequence
 from typing import Final
 
+from bridge.beat import next_look
 from bridge.guard import Guard
 from bridge.image import Image
 from bridge.northbound.opcua.address_space import AllWatched
 from bridge.northbound.opcua.events import EventSender
-
-TICK_S: Final = 0.05
-"""As long as the shortest publishing interval: more often, nobody would see it."""
 
 _TAKE: Final = 500
 _BEFORE_YIELD: Final = 20
@@ -33,13 +31,14 @@ class Publisher:
             while True:
                 with self._guard:
                     await self._events.send_waiting()
-                # What changes meanwhile waits for the next tick, or a busy image would never let go.
+                # What changes meanwhile waits for the next look, or a busy image would never let go.
                 left = len(feed)
                 while left > 0:
                     taken = feed.take(min(left, _TAKE))
                     left -= len(taken)
                     await self._publish(taken)
-                await asyncio.sleep(TICK_S)
+                now = asyncio.get_running_loop().time()
+                await asyncio.sleep(next_look(now) - now)
         finally:
             self._image.drop_feed(feed)
 

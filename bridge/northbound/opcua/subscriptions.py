@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from asyncua.server.address_space import AddressSpace
 
+from bridge.beat import cycle_by
 from bridge.northbound.opcua.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.northbound.opcua.monitoring import MonitoredItems, code_of, loop_time
 from bridge.northbound.opcua.passwords import ANONYMOUS
@@ -56,7 +57,7 @@ class Subscriptions:
         enabled: bool = get(params, "PublishingEnabled")
         made = Subscription(next(self._numbers), owner, terms(params), enabled=enabled)
         self.subscriptions[made.number] = made
-        self._arm(made, loop_time() + made.terms.interval_ms / 1000)
+        self._begin(made)
         return change(_revised(ua.CreateSubscriptionResult(), made), SubscriptionId=made.number)
 
     def modify(self, owner: Owner, params: ua.ModifySubscriptionParameters) -> ua.ModifySubscriptionResult:
@@ -65,7 +66,7 @@ class Subscriptions:
         found.modify(terms(params))
         if found.terms.interval_ms != before:
             self._timers[found.number].cancel()
-            self._arm(found, loop_time() + found.terms.interval_ms / 1000)
+            self._begin(found)
         return _revised(ua.ModifySubscriptionResult(), found)
 
     def set_publishing_mode(
@@ -150,6 +151,9 @@ class Subscriptions:
 
     # cycles and ends
 
+    def _begin(self, subscription: Subscription) -> None:
+        self._arm(subscription, cycle_by(loop_time() + subscription.terms.interval_ms / 1000))
+
     def _arm(self, subscription: Subscription, at: float) -> None:
         loop = asyncio.get_running_loop()
         self._timers[subscription.number] = loop.call_at(at, self._on_timer, subscription, at)
@@ -157,7 +161,8 @@ class Subscriptions:
     def _on_timer(self, subscription: Subscription, at: float) -> None:
         now = loop_time()
         # First of all, so that nothing below can end it. Cycles that were missed are not made up for.
-        self._arm(subscription, max(at + subscription.terms.interval_ms / 1000, now))
+        interval_s = subscription.terms.interval_ms / 1000
+        self._arm(subscription, at + interval_s if at + interval_s > now else cycle_by(now + interval_s))
         if not subscription.on_cycle(now):
             owner = subscription.owner
             self._close(subscription)

@@ -70,13 +70,11 @@ class Controller:
 
     def ask(self, leaf: str, **payload: object) -> dict[str, object]:
         """Send one command; returns its outcome, or an error of our own if nobody answered."""
-        replies = self._session.get(
-            f"{self._key}/command/{leaf}",
-            payload=json.dumps(payload),
-            attachment=_IDENTITY,
-            timeout=_ANSWER_S,
-        )
-        for reply in replies:
+        return self._get(f"{self._key}/command/{leaf}", json.dumps(payload))
+
+    def _get(self, key: str, payload: str | None = None) -> dict[str, object]:
+        """A command if it has a payload."""
+        for reply in self._session.get(key, payload=payload, attachment=_IDENTITY, timeout=_ANSWER_S):
             answer = reply.ok.payload if reply.ok is not None else reply.err.payload if reply.err else None
             # A query that nobody answers is answered by zenoh itself, in plain text.
             with suppress(json.JSONDecodeError):
@@ -90,13 +88,17 @@ class Controller:
             self.run_once()
 
     def run_once(self) -> bool:
-        """Take control, run, pause. False: something failed, so try again."""
-        if not self.ask("take_control", ttl_ms=_TTL_MS).get("ok"):
+        """Take control, run, pause. False: it was too early or something failed, so try again."""
+        if not (self._node_is_operational() and self.ask("take_control", ttl_ms=_TTL_MS).get("ok")):
             time.sleep(self._times.retry_s)
             return False
         self.ask("reset_fault")
         self.ask("disable_voltage")
         return self._run() or self._hold(self._times.retry_s)
+
+    def _node_is_operational(self) -> bool:
+        node_key = self._key.rpartition("/")[0]
+        return self._get(f"{node_key}/node/state").get("s") == "operational"
 
     def _run(self) -> bool:
         started = self.ask("start", direction=1)

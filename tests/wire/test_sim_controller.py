@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 
 import zenoh
@@ -44,3 +45,31 @@ def test_the_demos_controller_never_trips_its_own_watchdog(tmp_path: Path) -> No
         kinds = {event["kind"] for event in told if event["source"] == "conveyor/fu4"}
         assert "owner" in kinds
         assert "watchdog" not in kinds
+
+
+def test_the_demos_controller_asks_nothing_of_a_node_that_is_not_operational(tmp_path: Path) -> None:
+    port = free_port()
+    bus = sites.bus(sites.node(sites.drive("fu4", "lease", TIMEOUT_MS)))
+    site = sites.write(tmp_path, bus, sites.zenoh(port), name="demo")
+    times = Times(cycle_s=0.05, run_s=0.1, pause_s=0.1, retry_s=0.05)
+    with drivebridge(tmp_path, "run", "run", str(site), notify=True) as bridge:
+        bridge.wait_ready()
+        with session_to(port) as session:
+            controller = Controller(session, Move("drives/demo/conveyor/fu4", "frequency", 40.0), times)
+
+            def tell(what: str) -> None:
+                [reply] = session.get(f"drives/demo/conveyor/node/{what}", payload="{}", timeout=5.0)
+                assert reply.ok is not None, bridge.output()
+
+            def run_until_moved() -> None:
+                end = time.monotonic() + 20
+                while not controller.run_once():
+                    assert time.monotonic() < end, bridge.output()
+
+            run_until_moved()
+            controller.ask("release_control")
+            tell("disable")
+            assert [controller.run_once() for _ in range(3)] == [False] * 3
+            tell("enable")
+            run_until_moved()
+        assert "refused" not in bridge.output()

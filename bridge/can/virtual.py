@@ -93,6 +93,12 @@ class VirtualBus(SoftBus):
         else:
             self._loop.call_soon(self._wake_up)
 
+    def _wake_up(self) -> None:
+        self._woken = False
+        # Whoever has drained us meanwhile, for another reason, need not be woken for it again.
+        if self._wake and (self._waiting or self._foreign):
+            self._wake()
+
     def drain(self, now: float) -> list[Frame]:
         for play in self._wire.players:
             play(now)

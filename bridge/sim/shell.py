@@ -21,17 +21,24 @@ class Simulation:
     def __init__(self, bus: Bus, nodes: Sequence[SimulatedDevice]) -> None:
         self._bus = bus
         self._nodes = tuple(nodes)
-        self._woken: asyncio.Future[None] | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._failed: asyncio.Future[None] | None = None
+        """Ends ``run``."""
         self._timer: asyncio.TimerHandle | None = None
         self._is_open = False
+        self._is_playing = False
         self._due_at: float | None = None
         self._due: dict[SimulatedDevice, float | None] = {}
         """When each node is due; one that is missing here is due now. Asking all of them for every frame of a
         busy bus would cost more than simulating them."""
+        self._heard: dict[SimulatedDevice, frozenset[int]] = {}
+        """What ``_hearers`` was made of."""
+        self._hearers: dict[int, list[SimulatedDevice]] = {}
+        """By identifier."""
 
     def open(self) -> None:
         """Open the bus. Raises ``Unavailable`` if that fails."""
-        self._bus.open(self._wake)
+        self._bus.open(self._play)
         self._is_open = True
 
     async def run(self) -> None:
@@ -41,15 +48,13 @@ class Simulation:
             self.open()
         for node in self._nodes:
             node.start(loop.time())
+        self._listen()
+        self._loop, self._failed = loop, loop.create_future()
+        self._play()
         try:
-            while True:
-                self._woken = loop.create_future()
-                self._pump(loop.time())
-                self._arm(loop)
-                if self._woken.done():
-                    await asyncio.sleep(0)  # a bus that wakes us while we send must not starve the loop
-                await self._woken
+            await self._failed
         finally:
+            self._loop = None
             if self._timer is not None:
                 self._timer.cancel()
 
@@ -62,17 +67,30 @@ class Simulation:
     def poke(self) -> None:
         """A node was changed from outside: serve it now instead of at its next deadline."""
         self._due.clear()
-        self._wake()
+        if self._loop is not None:
+            self._loop.call_soon(self._play)
 
     def close(self) -> None:
         self._bus.close()
 
-    def _wake(self) -> None:
-        if self._woken is not None and not self._woken.done():
-            self._woken.set_result(None)
+    def _play(self) -> None:
+        """The loop calls this when there are frames, or when something is due."""
+        if self._loop is None or self._failed is None or self._failed.done():
+            return
+        if self._is_playing:  # a bus that wakes us while we send must not starve the loop
+            self._loop.call_soon(self._play)
+            return
+        self._is_playing = True
+        try:
+            self._pump(self._loop.time())
+            self._arm(self._loop)
+        except Exception as error:  # noqa: BLE001 - it ends the task, whose owner is told of it
+            self._failed.set_exception(error)
+        finally:
+            self._is_playing = False
 
     def _arm(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Wake at the next deadline."""
+        """Play at the next deadline."""
         deadline = earliest(self._bus.next_deadline(), *self._due.values())
         self._due_at = deadline
         if self._timer is not None:
@@ -83,17 +101,32 @@ class Simulation:
 
     def _on_timer(self) -> None:
         self._timer = None
-        self._wake()
+        if self._loop is not None:
+            self._loop.call_soon(self._play_alone)
+
+    def _play_alone(self) -> None:
+        """Unless frames of the same moment have made us play meanwhile, which has armed the timer again."""
+        if self._timer is None:
+            self._play()
+
+    def _listen(self) -> None:
+        """Nodes hear other identifiers than before."""
+        self._heard = {node: node.heard for node in self._nodes}
+        self._hearers = {}
+        for node, heard in self._heard.items():
+            for can_id in heard:
+                self._hearers.setdefault(can_id, []).append(node)
 
     def _pump(self, now: float) -> None:
         self._due_at = None
         # Frames first, by their own time of reception: a late loop must not look like a silent master.
         addressed: set[SimulatedDevice] = set()
         for frame in self._bus.drain(now):
-            for node in self._nodes:
-                if frame.can_id & STANDARD_MASK in node.heard:
-                    node.on_frame(frame, frame.time)
-                    addressed.add(node)
+            for node in self._hearers.get(frame.can_id & STANDARD_MASK, ()):
+                node.on_frame(frame, frame.time)
+                addressed.add(node)
+                if node.heard is not self._heard[node]:
+                    self._listen()
         self._bus.on_time(now)
         for node in self._nodes:
             is_known, due = node in self._due, self._due.get(node)
@@ -102,6 +135,8 @@ class Simulation:
             if not is_known or (due is not None and due <= now):
                 node.on_time(now)
                 self._due[node] = node.next_deadline()
+                if node.heard is not self._heard[node]:
+                    self._listen()
             elif node not in addressed:
                 continue
             for frame in node.take_frames():

@@ -36,7 +36,7 @@ class Wire:
 
     def arrive(self, can_id: int, data: bytes, time: float) -> None:
         self._arrived.append(Frame(can_id, data, time))
-        self._wake()
+        asyncio.get_running_loop().call_soon(self._wake)
 
     async def expect(self, can_id: int) -> Frame:
         """The next frame with this identifier."""
@@ -104,3 +104,31 @@ async def test_what_is_done_to_a_node_shows_after_a_poke():
 async def test_a_bus_that_cannot_be_opened_says_so():
     with pytest.raises(Unavailable, match="no such interface"):
         await Simulation(Wire(broken=True), [NordTu4(5)]).run()
+
+
+async def test_a_node_that_fails_ends_the_simulation() -> None:
+    wire = Wire()
+    node = NordTu4(5)
+    simulation = Simulation(wire, [node])
+    running = asyncio.create_task(simulation.run())
+    await wire.expect(0x705)
+    node._injected.append(lambda: 1 // 0)
+    simulation.poke()
+    with pytest.raises(ZeroDivisionError):
+        await asyncio.wait_for(running, 5)
+
+
+async def test_a_bus_that_wakes_while_a_node_sends_does_not_starve_the_loop() -> None:
+    class Eager(Wire):
+        def send(self, frame: Frame, now: float, deadline: float) -> None:
+            super().send(frame, now, deadline)
+            self._wake()
+
+    wire = Eager()
+    running = asyncio.create_task(Simulation(wire, [NordTu4(5)]).run())
+    await wire.expect(0x705)
+    for _ in range(3):
+        await asyncio.sleep(0)
+    assert [frame.can_id for frame in wire.sent] == [0x705]
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)

@@ -17,10 +17,13 @@ def simulation(bus: Bus, table: BusTable, site: Path) -> Simulation:
     no simulation of its own is played by the nearest that it extends."""
     nodes: list[SimulatedDevice] = []
     folders = mapping_folders(site)
+    simulated: dict[str, str] = {}
     for node in table.node:
         parameters: dict[str, float] = {}
         for drive in node.drive:
             parameters |= {f"{drive.slot}/{name}": value for name, value in drive.parameters.items()}
-        known = [name for name in lineage(node.mapping, folders) if name in SIMULATED]
-        nodes.append(simulate_node(known[0] if known else node.mapping, node.id, parameters))
+        if node.mapping not in simulated:
+            known = (name for name in lineage(node.mapping, folders) if name in SIMULATED)
+            simulated[node.mapping] = next(known, node.mapping)
+        nodes.append(simulate_node(simulated[node.mapping], node.id, parameters))
     return Simulation(bus, nodes)

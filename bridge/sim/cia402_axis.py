@@ -162,6 +162,9 @@ class Cia402Axis:
         if self.state is State.NOT_READY and now >= self._ready_at:
             self.automaton.initialised()
             self._settle()
+        if not self._is_busy:
+            self._settle()
+            return dt_s > 0
         steps = 0 if dt_s == 0 else min(_MOST_STEPS, max(1, math.ceil(dt_s / _STEP_S)))
         for _ in range(steps):
             self._move(dt_s / steps)

@@ -48,7 +48,8 @@ class Simulation:
             self.open()
         for node in self._nodes:
             node.start(loop.time())
-        self._listen()
+        for node in self._nodes:
+            self._listen(node)
         self._loop, self._failed = loop, loop.create_future()
         self._play()
         try:
@@ -109,13 +110,16 @@ class Simulation:
         if self._timer is None:
             self._play()
 
-    def _listen(self) -> None:
-        """Nodes hear other identifiers than before."""
-        self._heard = {node: node.heard for node in self._nodes}
-        self._hearers = {}
-        for node, heard in self._heard.items():
-            for can_id in heard:
-                self._hearers.setdefault(can_id, []).append(node)
+    def _listen(self, node: SimulatedDevice) -> None:
+        """The node may hear other identifiers than before."""
+        before, heard = self._heard.get(node, frozenset[int]()), node.heard
+        if before is heard:
+            return
+        self._heard[node] = heard
+        for can_id in before - heard:
+            self._hearers[can_id] = [one for one in self._hearers[can_id] if one is not node]
+        for can_id in heard - before:
+            self._hearers[can_id] = [*self._hearers.get(can_id, ()), node]
 
     def _pump(self, now: float) -> None:
         self._due_at = None
@@ -125,8 +129,7 @@ class Simulation:
             for node in self._hearers.get(frame.can_id & STANDARD_MASK, ()):
                 node.on_frame(frame, frame.time)
                 addressed.add(node)
-                if node.heard is not self._heard[node]:
-                    self._listen()
+                self._listen(node)
         self._bus.on_time(now)
         for node in self._nodes:
             is_known, due = node in self._due, self._due.get(node)
@@ -135,8 +138,7 @@ class Simulation:
             if not is_known or (due is not None and due <= now):
                 node.on_time(now)
                 self._due[node] = node.next_deadline()
-                if node.heard is not self._heard[node]:
-                    self._listen()
+                self._listen(node)
             elif node not in addressed:
                 continue
             for frame in node.take_frames():

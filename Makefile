@@ -100,13 +100,8 @@ FUZZ ?= 600
 fuzz: compiled ## throw changed messages at the bridge, 10 minutes for each protocol
 	@$(IN) -m tests.fuzz $(PROTOCOL) --seconds $(FUZZ) $(SEED:%=--seed %) $(REPLAY:%=--replay %) $(if $(REDUCE),--reduce) $(if $(KNOWN),--known '$(KNOWN)')
 
-bench: compiled packages ## print the measured figures
-	@echo "== figures: this machine"
-	@$(PYTEST) -s -p no:cacheprovider -o python_files='bench_*.py' --ignore=tests/bench/lab tests/bench $(ARGS)
-ifneq ($(LAB),0)
-	@echo "== figures: SocketCAN"
-	@$(VCAN) $(PYTEST) -s -p no:cacheprovider -o python_files='bench_*.py' tests/bench/lab $(ARGS)
-endif
+bench: compiled packages ## measure everything in half an hour, write docs/explanation/performance.md (ARGS='--rounds 1')
+	@$(ON_VCAN) $(IN) -m tests.bench $(if $(filter 0,$(LAB)),--no-lab) --json build/bench.json --plots docs/images docs/explanation/performance.md $(ARGS)
 
 # Half of the cycles on each of two machines. PROOF=n: how many times each fault is injected.
 PROOF ?= 12

@@ -2,8 +2,8 @@
 
 *The path* is what is done with a burst of frames that is there: reading it from the socket, finding out
 whose it is, decoding, into the image; canopen: ``recv``, ``notify``, decoding, reading the four values.
-*The process* has everything: being woken, a whole round of the master each time with its timers, canopen's
-thread. The frames come from a pair of Unix sockets; the sender is another process or is not counted.
+*The process* has everything: being woken, the master's rounds and timers, canopen's thread. The frames come
+from a pair of Unix sockets; the sender is another process or is not counted.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from bridge.can.socketcan import SocketCanBus
 from bridge.master.network import Network
 from tests.bench.canopen_node import with_four_words
 from tests.bench.crowd import crowd
-from tests.bench.figures import show
+from tests.bench.figures import record, show
 from tests.bench.pair import PairBus, PairCan, named, wire
 from tests.support.process import peer
 
@@ -116,6 +116,22 @@ async def test_the_process(tmp_path: Path, burst: int) -> None:
             finally:
                 network.disconnect()
     tell("process", burst, True, ours, theirs)
+
+
+@pytest.mark.parametrize("drives", [4, 16, 40])
+async def test_a_single_frame_costs_the_same_however_many_drives_there_are(
+    tmp_path: Path, drives: int
+) -> None:
+    found: list[float] = []
+    with wire() as (near, far):
+        bus = PairBus(near)
+        async with crowd(tmp_path, drives, bus, named(far), "", [far.fileno()]):
+            found += [
+                await process_us(tmp_path, far, 1, lambda: bus.status.frames_received) for _ in range(3)
+            ]
+    figure = statistics.median(found)
+    record(f"single frame, {drives} drives, µs", figure)
+    show(f"a changed PDO that comes alone, {drives} drives: process", f"{figure:6.2f} µs of CPU")
 
 
 async def process_us(folder: Path, far: socket.socket, burst: int, received: Callable[[], int]) -> float:

@@ -94,7 +94,7 @@ def measure_all(cells: Sequence[Cell], bridges: Sequence[str], rounds: int, seco
     return runs
 
 
-def _numbers(text: str) -> list[int]:
+def numbers(text: str) -> list[int]:
     return [int(number) for number in text.split(",")]
 
 
@@ -102,10 +102,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--rates", type=_numbers, default=list(RATES), help="PDOs a second")
-    parser.add_argument(
-        "--changed", type=_numbers, default=list(CHANGED), help="percent of PDOs that are new"
-    )
+    parser.add_argument("--rates", type=numbers, default=list(RATES), help="PDOs a second")
+    parser.add_argument("--changed", type=numbers, default=list(CHANGED), help="percent of PDOs that are new")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--seconds", type=float, default=6.0)
     parser.add_argument("--bridges", type=lambda text: text.split(","), default=list(BRIDGES))

@@ -52,7 +52,7 @@ def markdown(runs: Sequence[Run]) -> str:
             for cell in _cells(runs, changed)
             for bridge in _bridges(runs)
         ]
-        parts += [f"## New values in {changed} % of the PDOs\n", _table(_HEADS, rows)]
+        parts += [f"## New values in {changed} % of the PDOs\n", table(_HEADS, rows)]
     late = sum(run.is_late for run in runs)
     if late:
         parts.append(f"In {late} of {len(runs)} runs the plant could not keep its pace.\n")
@@ -101,7 +101,7 @@ def _delays(runs: Sequence[Run], cell: Cell, bridge: str) -> list[str]:
     return shown
 
 
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [heads, ["---"] * len(heads), *rows]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 

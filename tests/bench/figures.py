@@ -1,17 +1,38 @@
-"""How ``make bench`` prints its figures: one line each, ratios beside times."""
+"""How ``make bench`` tells its figures: one line each, ratios beside times. The report, which is
+``tests/bench/__main__``, gets them by the file that the environment names."""
 
 from __future__ import annotations
 
 import contextlib
 import itertools
+import json
 import os
 import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Final
+
+TOLD: Final = "BENCH_TOLD"
+"""The environment's name for the file of what is told, a JSON array a line: file, what, figure, number."""
 
 
 def show(what: str, figure: str) -> None:
     print(f"  {what:<62} {figure}", flush=True)
+    _tell(what, figure, None)
+
+
+def record(name: str, number: float) -> None:
+    """A number that the report works with, under this name."""
+    _tell(name, "", number)
+
+
+def _tell(what: str, figure: str, number: float | None) -> None:
+    path = os.environ.get(TOLD)
+    if path:
+        file = os.environ.get("PYTEST_CURRENT_TEST", "").partition("::")[0]
+        with Path(path).open("a", encoding="utf-8") as told:
+            told.write(json.dumps([file, what, figure, number]) + "\n")
 
 
 @contextlib.contextmanager

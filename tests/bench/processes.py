@@ -29,6 +29,10 @@ def usage(pid: int) -> Usage:
     return Usage(len(members), ticks / _TICKS_PER_S, sum(map(_memory_kb, members)) / 1024)
 
 
+def children(pid: int) -> list[int]:
+    return [child for child, stat in _stats().items() if int(stat[_PARENT]) == pid]
+
+
 def _stats() -> dict[int, list[str]]:
     stats: dict[int, list[str]] = {}
     for folder in _PROC.iterdir():

@@ -240,6 +240,7 @@ class SocketCanBus:
             self._break_down(error, now)
             return False
         self._wire.sample(frame)
+        self._wakeups.sent()
         return True
 
     def _send_waiting(self, now: float) -> None:

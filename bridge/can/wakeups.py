@@ -17,7 +17,8 @@ class Wakeups:
     """Calls ``wake`` in the event loop when a socket has something. Whoever fetches it tells ``fetched``.
 
     A wake-up costs more than ten frames. So on a busy bus the socket is not waited for but looked at, until
-    a look finds less than two frames. What is due and what is asked for is done in rounds of its own, which
+    a look finds less than two frames. A frame that comes after one of ours may be the answer to it: that
+    makes no bus busy. What is due and what is asked for is done in rounds of its own, which
     fetch the frames that wait, too: only frames can be late, by a millisecond at most.
     """
 
@@ -27,6 +28,7 @@ class Wakeups:
         self._file: int | None = None
         self._last = -inf
         self._fetched = 0
+        self._has_asked = False
         self._timer: asyncio.TimerHandle | None = None
 
     def begin(self, loop: asyncio.AbstractEventLoop, wake: Callable[[], None]) -> None:
@@ -50,13 +52,18 @@ class Wakeups:
     def fetched(self, count: int) -> None:
         self._fetched += count
 
+    def sent(self) -> None:
+        """A frame of ours, to which somebody may answer."""
+        self._has_asked = True
+
     def _wait(self) -> None:
         if self._file is not None and self._loop:
             self._loop.add_reader(self._file, self._on_readable, self._loop, self._file)
 
     def _on_readable(self, loop: asyncio.AbstractEventLoop, file: int) -> None:
         now = loop.time()
-        is_crowd, self._last = now - self._last < _CROWD_S, now
+        is_crowd, self._last = now - self._last < _CROWD_S and not self._has_asked, now
+        self._has_asked = False
         if is_crowd:
             loop.remove_reader(file)
             self._look_soon(loop)

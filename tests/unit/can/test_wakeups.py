@@ -20,11 +20,12 @@ LATEST_S = 0.0005
 class End:
     """Fetches frames as a bus does, and notes when."""
 
-    def __init__(self, *, breaks: bool = False) -> None:
+    def __init__(self, *, breaks: bool = False, asks: bool = False) -> None:
         self.wakeups = Wakeups()
         self.waits_s: list[float] = []
         self.wakes = 0
         self._breaks = breaks
+        self._asks = asks
 
     def wake(self) -> None:
         self.wakes += 1
@@ -43,6 +44,8 @@ class End:
             count += 1
             self.waits_s.append(now - sent)
         self.wakeups.fetched(count)
+        if self._asks:
+            self.wakeups.sent()
 
     async def receive(self, times: Sequence[float]) -> None:
         loop = asyncio.get_running_loop()
@@ -83,6 +86,11 @@ def test_on_a_busy_bus_frames_are_fetched_together() -> None:
     end = received([0.000125 * n for n in range(1, 8001)])
     assert len(end.waits_s) == 8000
     assert end.wakes < 2100
+
+
+def test_answers_do_not_wait_however_fast_they_come() -> None:
+    end = received([0.0001 * n for n in range(1, 200)], asks=True)
+    assert max(end.waits_s) < 1e-9
 
 
 def test_after_a_busy_time_none_waits_again() -> None:

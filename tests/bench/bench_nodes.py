@@ -7,9 +7,9 @@ from pathlib import Path
 
 from bridge.canopen.frame import Frame
 from bridge.config import Site, load_site
-from bridge.sim.nord_tu4 import NordTu4
 from tests.bench.figures import show
 from tests.support.bench import Bench
+from tests.support.quick import QuickNode
 
 NODES = 126
 """With the bridge itself there are 127."""
@@ -51,7 +51,7 @@ class Crowd:
     def __init__(self, folder: Path, nodes: int) -> None:
         self.bench = Bench(site(folder, nodes), present=False)
         self.numbers = range(1, nodes + 1)
-        self._nodes = {n: NordTu4(n) for n in self.numbers}
+        self._nodes = {n: QuickNode(n) for n in self.numbers}
         self.rounds, self.spent_s = 0, 0.0
 
     def boot(self) -> None:
@@ -64,7 +64,9 @@ class Crowd:
             for node in self._nodes.values():
                 node.on_time(bench.now)
             for _ in range(40):  # question and answer take no time here
-                bench.receive(*(frame for node in self._nodes.values() for frame in node.take_frames()))
+                for node in self._nodes.values():
+                    said, node.outbox = node.outbox, []
+                    bench.receive(*said)
                 bench.master.pump()
                 news, told = bench.log[told:], len(bench.log)
                 if not sum(self._hand_over(frame) for frame in news):

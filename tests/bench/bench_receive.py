@@ -64,8 +64,7 @@ def our_path(bus: SocketCanBus, network: Network) -> Callable[[int], None]:
     return read
 
 
-def their_path(end: socket.socket) -> Callable[[int], None]:
-    bus = PairCan(end)
+def their_path(bus: PairCan) -> Callable[[int], None]:
     network = canopen.Network(bus)
     with_four_words(network, lambda: None)
     (listener,) = network.listeners
@@ -88,10 +87,12 @@ async def test_the_path(tmp_path: Path, burst: int, changing: bool) -> None:
         bus = PairBus(near)
         async with crowd(tmp_path, NODES, bus, named(far), "", [far.fileno()]) as nodes:
             frames = tpdos(changing)
-            our_read, their_read = our_path(bus, nodes.network), their_path(their_near)
+            their_bus = PairCan(their_near)
+            our_read, their_read = our_path(bus, nodes.network), their_path(their_bus)
             for _ in range(ROUNDS):
                 ours.append(path_us(far, burst, frames, our_read))
                 theirs.append(path_us(their_far, burst, frames, their_read))
+            their_bus.shutdown()
             assert not changing or nodes.plant.image.read("n5/fu1/status/status_word").value == 0x0B37
     tell("path", burst, changing, ours, theirs)
 

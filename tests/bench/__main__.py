@@ -1,7 +1,7 @@
 """All benchmarks as one report: ``make bench``.
 
     python -m tests.bench [--rates 250,1000] [--changed 10,100] [--rounds 3] [--seconds 6] [--writes 300]
-                          [--no-lab] [--only-single] --json FILE --plots FOLDER PAGE
+                          [--no-lab] [--only-single] [--told FILE] --json FILE --plots FOLDER PAGE
 
 PAGE gets it between its marks. What end to end means: tests/bench/reference/README.md.
 """
@@ -28,13 +28,15 @@ from tests.bench.targets import Found, rows
 HERE: Final = Path(__file__).resolve().parent
 REPOSITORY: Final = HERE.parents[1]
 LAB_S: Final = 900
+TOLD_FILE: Final = "told.jsonl"
+"""Beside the JSON: what single benchmarks have told."""
 BEGIN: Final = "<!-- What follows is made by `make bench`. -->"
 END: Final = "<!-- end of what `make bench` makes -->"
 
 
 def singles(*, lab: bool, build: Path) -> list[tuple[str, str, str, float | None]]:
     """What the ``bench_*.py`` tell. Raises CalledProcessError where one of them fails."""
-    told = build / "told.jsonl"
+    told = build / TOLD_FILE
     told.unlink(missing_ok=True)
     pytest = [sys.executable, "-m", "pytest", "-s", "-q", "-p", "no:cacheprovider"]
     pytest += ["-o", "python_files=bench_*.py"]
@@ -45,6 +47,10 @@ def singles(*, lab: bool, build: Path) -> list[tuple[str, str, str, float | None
         commands.append([*vcan, *pytest, str(HERE / "lab")])
     for command in commands:
         subprocess.run(command, env=environment, cwd=REPOSITORY, check=True)
+    return read(told)
+
+
+def read(told: Path) -> list[tuple[str, str, str, float | None]]:
     return [tuple(json.loads(line)) for line in told.read_text(encoding="utf-8").splitlines()]
 
 
@@ -101,6 +107,7 @@ def main() -> None:
     parser.add_argument("--writes", type=int, default=300)
     parser.add_argument("--no-lab", action="store_true", help="without SocketCAN")
     parser.add_argument("--only-single", action="store_true", help="without the bridges end to end")
+    parser.add_argument("--told", type=Path, help=f"not measured again: a {TOLD_FILE}")
     parser.add_argument("--json", type=Path, required=True)
     parser.add_argument("--plots", type=Path, required=True)
     parser.add_argument("page", type=Path)
@@ -109,7 +116,7 @@ def main() -> None:
     build.mkdir(parents=True, exist_ok=True)
     where = machine()
     # First: where one of them fails, half an hour is not lost.
-    told = singles(lab=not given.no_lab, build=build)
+    told = read(given.told) if given.told else singles(lab=not given.no_lab, build=build)
     found = Found(numbers={what: number for _, what, _, number in told if number is not None})
     if not given.only_single:
         cells = [Cell(rate, changed) for changed in given.changed for rate in given.rates]

@@ -122,6 +122,13 @@ TARGETS: Sequence[Target] = (
         )
         for drives in (4, 16, 40)
     ),
+    Target(
+        "zenoh per value, with a subscriber",
+        _number("zenoh per value with a subscriber, µs"),
+        most=2,
+        unit=" µs",
+    ),
+    Target("the same without one", _number("zenoh per value without one, µs"), most=0.4, unit=" µs"),
     Target("demo at rest, all processes", _number("demo at rest, % of a core"), most=10, unit=" %"),
     Target("front with 244 drives: memory", _number("front with 244 drives, MB"), most=180, unit=" MB"),
     Target(

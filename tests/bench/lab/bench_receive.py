@@ -16,6 +16,7 @@ from bridge.canopen.pdo import PdoCodec, PdoEntry
 from bridge.command.link import NodeState
 from bridge.node.boot import PdoPlan
 from bridge.node.process.process_data import DrivePdos
+from bridge.node.process.words import Place
 from tests.bench.canopen_node import with_four_words
 from tests.bench.figures import show
 from tests.support.bench import Bench, write_site
@@ -44,9 +45,9 @@ async def measure_ours(folder: Path) -> float:
     drive = bench.plant.drives["conveyor/fu1"]
     bench.plant.on_node(bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, time.monotonic())
     entries = tuple(PdoEntry(0x3001 if n == 0 else 0x3003, max(n, 1), 16) for n in range(4))
-    plan = PdoPlan(0x185, 255, 250, PdoCodec(entries), (0, 1, 2, 3))
-    pdos = DrivePdos(drive, plan, plan, lambda frame, why: None)
-    routes = {0x185: pdos.on_tpdo}
+    plan = PdoPlan(0x185, 255, 250, PdoCodec(entries), tuple(Place(n) for n in range(4)))
+    pdos = DrivePdos(drive, (plan,), (plan,), lambda frame, why: None)
+    routes = pdos.handlers
     bus = SocketCanBus("can0", "vcan0")
     received = 0
 

@@ -2,28 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from bridge.can import Bus
 from bridge.config import BusTable
-from bridge.mapping.loader import lineage, mapping_folders
-from bridge.sim.catalogue import SIMULATED, simulate_node
+from bridge.mapping.loader import lineage, load_family, mapping_folders
+from bridge.sim.catalogue import SIMULATED, simulate_family, simulate_node
 from bridge.sim.device import SimulatedDevice
 from bridge.sim.shell import Simulation
 
 
 def simulation(bus: Bus, table: BusTable, site: Path) -> Simulation:
-    """All nodes of one bus, with the parameters that the site file gives their drives. A mapping that has
-    no simulation of its own is played by the nearest that it extends."""
+    """All nodes of one bus."""
+    return Simulation(bus, simulated_nodes(table, site))
+
+
+def simulated_nodes(table: BusTable, site: Path) -> list[SimulatedDevice]:
+    """The nodes of one bus, with the parameters that the site file gives their drives. A mapping of the
+    site's own, under whatever name, is simulated as that file says."""
     nodes: list[SimulatedDevice] = []
     folders = mapping_folders(site)
-    simulated: dict[str, str] = {}
+    makers: dict[str, _Make] = {}
     for node in table.node:
         parameters: dict[str, float] = {}
         for drive in node.drive:
             parameters |= {f"{drive.slot}/{name}": value for name, value in drive.parameters.items()}
-        if node.mapping not in simulated:
-            known = (name for name in lineage(node.mapping, folders) if name in SIMULATED)
-            simulated[node.mapping] = next(known, node.mapping)
-        nodes.append(simulate_node(simulated[node.mapping], node.id, parameters))
-    return Simulation(bus, nodes)
+        if node.mapping not in makers:
+            makers[node.mapping] = _maker(node.mapping, folders)
+        nodes.append(makers[node.mapping](node.id, parameters))
+    return nodes
+
+
+_Make = Callable[[int, dict[str, float]], SimulatedDevice]
+"""A node of one mapping, by its id and parameters: files are read once for all nodes."""
+
+
+def _maker(mapping: str, folders: Sequence[Path]) -> _Make:
+    family = load_family(mapping, folders)
+    if mapping in SIMULATED and family == load_family(mapping):
+        return partial(simulate_node, mapping)
+    return partial(simulate_family, lineage(mapping, folders), family)

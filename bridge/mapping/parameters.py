@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from typing import Annotated, Final, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
-from bridge.canopen.datatypes import TypeName
+from bridge.canopen.datatypes import Plain, TypeName, encode
+from bridge.config.fields import PlainValue
 from bridge.image import DataType
 from bridge.mapping.fields import ObjectRef, Ref, States, Table
 
@@ -80,6 +81,9 @@ class Parameter(Table):
     low: float | None = Field(None, allow_inf_nan=False)
     high: float | None = Field(None, allow_inf_nan=False)
     access: Literal["rw", "ro", "wo"] = "rw"
+    default: PlainValue | None = Field(
+        None, description="what is read from a drive as delivered, without `factor`: for the simulator"
+    )
     sets: int = Field(0, ge=0, le=16, description="how many parameter sets it has; 0: it has one value")
     elements: int = Field(0, ge=0, le=255, description="how many elements it has; 0: it is no array")
     states: States = Field(default_factory=dict[int, str])
@@ -95,6 +99,15 @@ class Parameter(Table):
     )
     backup: bool = Field(True, description="false: identity, addresses and commands, in no parameter set")
     of_node: bool = Field(False, description="true: the node's own, over its first SDO channel")
+
+    @field_validator("default")
+    @classmethod
+    def _encodes(cls, value: Plain | None, info: ValidationInfo) -> Plain | None:
+        """Without a type there is a fault already."""
+        kind = info.data.get("data_type")
+        if kind is not None and value is not None:
+            encode(kind, value)
+        return value
 
     @property
     def leaf(self) -> str:

@@ -99,6 +99,11 @@ class CanopenSlave:
         self.news.is_there = True
 
     @property
+    def dictionary(self) -> Dictionary:
+        """What its PDOs can map."""
+        return self._dictionary
+
+    @property
     def master_is_lost(self) -> bool:
         return self._error_control.life.tripped
 

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final
 
+from bridge.canopen.datatypes import REALS
 from bridge.errors import OperationFailed
+from bridge.mapping import Family, load_family
+from bridge.sim.adopted import adopt
 from bridge.sim.device import SimulatedDevice
+from bridge.sim.generic_family import pattern, plan_of_family
+from bridge.sim.generic_node import GenericNode
 from bridge.sim.nord_catalogue import NORD
 from bridge.sim.object_catalogue import MAPPINGS, cia402, lenze_8400_motec
 from bridge.sim.stoeber_catalogue import stoeber_5000, stoeber_5000_four_axes
@@ -28,6 +33,42 @@ def simulate_node(mapping: str, node_id: int, parameters: dict[str, float]) -> S
         known = ", ".join(sorted(_FAMILIES))
         raise OperationFailed(f"{mapping} cannot be simulated; families that can: {known}")
     return factory(node_id, parameters)
+
+
+def simulate_family(
+    mappings: Sequence[str], family: Family, node_id: int, parameters: Mapping[str, float]
+) -> SimulatedDevice:
+    """A simulated node of a family of the site's own. ``mappings`` names it and those that it extends, the
+    nearest first: it is played as the first of them that has a simulation, else as a generic node, whose
+    values are its set-points. Raises ``OperationFailed`` as ``simulate_node`` does."""
+    kind = next((name for name in mappings if name in _FAMILIES), None)
+    own: dict[str, float] = {}
+    known = dict(parameters)
+    if kind is None or kind != mappings[0]:
+        of_kind = {one.name for one in load_family(kind).parameter} if kind else set[str]()
+        for name in parameters:
+            if name.rpartition("/")[2] in {one.name for one in family.parameter} - of_kind:
+                own[name] = known.pop(name)
+    values = {at: value for name, given in own.items() for at, value in _value(family, name, given)}
+    if kind is None:
+        if known:
+            raise OperationFailed(f"{', '.join(known)}: the simulated {mappings[0]} has no such parameter")
+        return GenericNode(node_id, plan_of_family(family, node_id).with_numbers(values))
+    node = simulate_node(kind, node_id, known)
+    adopt(node, family, values)
+    return node
+
+
+def _value(family: Family, name: str, given: float) -> Iterator[tuple[tuple[int, int], int]]:
+    """Where a parameter is, and what it holds. Raises ``OperationFailed`` where that cannot be."""
+    parameter = family.parameter_named(name.rpartition("/")[2])
+    ref = family.object_of(parameter)
+    is_real = parameter.data_type in REALS
+    try:
+        raw = given / parameter.factor
+        yield (ref.index, ref.sub), pattern(parameter.data_type, raw if is_real else round(raw))
+    except ValueError as error:
+        raise OperationFailed(f"{name} = {given:g}: {error}") from None
 
 
 _FAMILIES: Final[dict[str, Factory]] = {

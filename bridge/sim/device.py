@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 
 from bridge.canopen.frame import ERROR, EXTENDED, STANDARD_MASK, Frame
 from bridge.sim.canopen_slave import Application, CanopenSlave
+from bridge.sim.dictionary import Dictionary
 from bridge.sim.ticks import earliest
 
 
@@ -61,6 +62,11 @@ class SimulatedDevice(Application):
     def _finish_due(self) -> float | None:
         """When ``_finish`` has something to do although there is no news."""
         return self.slave.next_deadline()
+
+    @property
+    def dictionary(self) -> Dictionary:
+        """The objects of the node itself, as its first SDO channel reaches them."""
+        return self.slave.dictionary
 
     # The core: frames and time in, frames out.
 

@@ -18,7 +18,7 @@ DUMMY_BITS: Final = {2: 8, 3: 16, 4: 32, 5: 8, 6: 16, 7: 32}
 
 
 class DataType(Enum):
-    """Integer types with their length in bytes and sign."""
+    """Integer types with their length in bytes and sign. Simulated reals are their bit patterns."""
 
     UNSIGNED8 = (1, False)
     UNSIGNED16 = (2, False)
@@ -26,6 +26,16 @@ class DataType(Enum):
     INTEGER8 = (1, True)
     INTEGER16 = (2, True)
     INTEGER32 = (4, True)
+    UNSIGNED24 = (3, False)
+    UNSIGNED40 = (5, False)
+    UNSIGNED48 = (6, False)
+    UNSIGNED56 = (7, False)
+    UNSIGNED64 = (8, False)
+    INTEGER24 = (3, True)
+    INTEGER40 = (5, True)
+    INTEGER48 = (6, True)
+    INTEGER56 = (7, True)
+    INTEGER64 = (8, True)
 
     def __init__(self, size: int, signed: bool) -> None:
         self.size = size

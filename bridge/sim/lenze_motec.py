@@ -60,6 +60,10 @@ class LenzeMotec(SimulatedDevice):
         """The codes as they are now."""
         return self._codes.current
 
+    @property
+    def dictionary(self) -> Dictionary:
+        return self.objects
+
     def save(self) -> None:
         """What C00002/11 does, and who commissions it: the codes outlast the mains."""
         self._codes.save()

@@ -22,6 +22,7 @@ _COMMANDS: Final = {
     "drop-test": "drop_test.drop_test",
     "witness": "witness.witness",
     "eds": "eds.eds",
+    "family": "family.app",
     "hash-password": "project.hash_password",
     "scan": "scan.scan",
     "nmt": "nmt.nmt",

@@ -1,0 +1,57 @@
+"""``family``: make a mapping file of a device description."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from bridge.cli.terminal import printable
+from bridge.derive import derive_family
+from bridge.eds import Severity, read_device_file
+from bridge.errors import OperationFailed
+from bridge.mapping.loader import mappings_dir, read_family
+from bridge.mapping.model import Parameter
+
+app = typer.Typer(help="Mapping files of drive families.", no_args_is_help=True)
+
+_FOLDER: Final = Path("mappings")
+
+
+@app.callback()
+def _group() -> None:  # pyright: ignore[reportUnusedFunction]
+    """Without it a single command would have no name."""
+
+
+@app.command()
+def new(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="an EDS, DCF, XDD or XDC")],
+    mode: Annotated[
+        str | None, typer.Option(help="the mode of operation, such as velocity; left out, the best known")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="where to write it; left out, mappings/VENDOR/PRODUCT.toml")
+    ] = None,
+) -> None:
+    """Write a mapping for the CiA 402 drive that FILE describes."""
+    description = read_device_file(file)
+    lost = [one for one in description.findings if one.severity is Severity.ERROR]
+    derived = derive_family(description, file.name, mode)
+    path = output or _FOLDER / f"{derived.name}.toml"
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("x", encoding="utf-8") as out:
+            out.write(derived.text)
+    except FileExistsError:
+        raise OperationFailed(f"{path} is there already") from None
+    except OSError as error:
+        raise OperationFailed(f"{path} cannot be written: {error.strerror}") from error
+    family = read_family(path, (_FOLDER, mappings_dir()))
+    print(printable(f"{path}: {family.family.name}, {derived.mode.mapping}, {_count(family.parameter)}"))
+    for one in lost:
+        print(printable(f"{file}:{one.line}: {one.text}"))
+
+
+def _count(parameters: list[Parameter]) -> str:
+    return f"{len(parameters)} parameters"

@@ -1,0 +1,7 @@
+"""Mapping files made from device descriptions, and site files from what is on a bus."""
+
+from bridge.derive.family import Derived as Derived
+from bridge.derive.family import derive_family as derive_family
+from bridge.derive.site import ProposedBus as ProposedBus
+from bridge.derive.site import ProposedNode as ProposedNode
+from bridge.derive.site import propose_site as propose_site

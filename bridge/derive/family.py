@@ -1,0 +1,184 @@
+"""A mapping file for the device that a description describes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence, Set
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.derive.layout import Layout, NoLayout, layout_of
+from bridge.derive.modes import MODE, MODE_DISPLAY, PROFILE_402, Mode, is_drive, modes_of
+from bridge.derive.parameters import FURTHER_AXES, entries_of, parameter_lines
+from bridge.derive.toml import file_name, one_line, string, strings, word
+from bridge.eds import Description
+from bridge.errors import OperationFailed
+from bridge.mapping import Family, load_family
+
+_NEEDED: Final = ("603F", "6007")
+"""Parameters that the base itself speaks of; a device without them refuses to be asked."""
+_INTERPOLATION: Final = 0x60C2
+_CYCLIC: Final = (8, 9)
+
+
+@dataclass(frozen=True, slots=True)
+class Derived:
+    """``name`` is what the mapping may be called, such as ``acme/spin-3000``; ``text`` is the file."""
+
+    name: str
+    mode: Mode
+    text: str
+
+
+def derive_family(description: Description, source: str, mode: str | None = None) -> Derived:
+    """The mapping of a drive of the profile CiA 402; ``source`` is the name of the file. ``mode`` is the part
+    of a mapping's name behind ``cia402/``; left out, the first that the device has.
+
+    Raises ``OperationFailed`` for a device that is no such drive, or has not that mode.
+    """
+    if not is_drive(description):
+        raise OperationFailed(
+            f"{source} describes no drive that follows CiA 402 ({_why_not(description)}): its mapping has to "
+            "be written by hand"
+        )
+    there = modes_of(description)
+    refused: list[str] = []
+    for one in there if mode is None else [one for one in there if one.name == mode]:
+        try:
+            layout = layout_of(description, one)
+        except NoLayout as error:
+            refused.append(f"{one.name}: {error}")
+            continue
+        others = [other for other in there if other is not one]
+        text = "\n".join(_lines(description, source, one, layout, others))
+        return Derived(_name(description, source), one, text)
+    if refused:
+        raise OperationFailed(f"{source}: {'; '.join(refused)}")
+    what = ", ".join(one.name for one in there) or "none that a mapping of ours drives"
+    raise OperationFailed(f"{source}: the device has not the mode {mode or 'asked for'}; it has {what}")
+
+
+def _why_not(description: Description) -> str:
+    profile = (description.number(0x1000) or 0) & 0xFFFF
+    if profile and profile != PROFILE_402:
+        return f"1000h has the profile {profile}"
+    return "it has not both words, 6040h and 6041h"
+
+
+def _name(description: Description, source: str) -> str:
+    device = description.device
+    vendor = file_name(device.vendor) or "unknown"
+    return f"{vendor}/{file_name(device.product) or file_name(source.rpartition('.')[0]) or 'device'}"
+
+
+def _lines(
+    description: Description, source: str, mode: Mode, layout: Layout, others: Sequence[Mode]
+) -> Iterator[str]:
+    base = load_family(mode.mapping)
+    device = description.device
+    yield f"# Made of {one_line(source)} by `drivebridge family new`. A key behind a # is what the file does"
+    yield "# not say: fill it in from the manual, and compare the rest with the device."
+    for other in others:
+        yield f"# The device has the mode {other.number} too: {other.mapping}."
+    further = sum(1 for one in description.objects if one.index in FURTHER_AXES)
+    if further:
+        yield f"# Left out: {further} objects from {FURTHER_AXES.start:X}h on (further axes, other profiles)."
+    yield f"extends = {string(mode.mapping)}"
+    known = {one.name: one for one in base.parameter}
+    entries = list(entries_of(description))
+    without = list(_without(description, base, layout, {name for name, _ in entries}))
+    if without:
+        yield f"without = [{''.join(f'{chr(10)}  {string(one)},' for one in without)}"
+        yield "]"
+    yield ""
+    yield "[family]"
+    yield f"name = {string(device.product or source)}"
+    yield f"vendor = {string(device.vendor or 'unknown')}"
+    yield f"source = {string(source)}"
+    yield ""
+    yield from _identity(description)
+    yield from _process(description, layout, mode)
+    carried = {(index, 0) for index, _ in (*mode.commanded, *mode.told)}
+    names = {one.index: one.name for one in description.objects}
+    for name, entry in entries:
+        title = f"{names[entry.index]}: {entry.name}" if ":" in name else entry.name
+        yield from parameter_lines(name, entry, title, known, carried)
+
+
+def _without(description: Description, base: Family, layout: Layout, there: Set[str]) -> Iterator[str]:
+    """What the base has and this device has not."""
+    for parameter in base.parameter:
+        if parameter.name not in there and parameter.name not in _NEEDED:
+            yield f"parameter:{parameter.name}"
+    for own in base.own_supervision:
+        if own.object and description.entry(own.object.index, own.object.sub) is None:
+            yield f"own_supervision:{own.name}"
+    if not layout.tells_mode:
+        yield "value:actual/mode"
+
+
+def _identity(description: Description) -> Iterator[str]:
+    """1000h and 1018h as far as the file has them; 0 is what a file has that does not say."""
+    device = description.device
+    facts = (
+        ("vendor_id", description.number(0x1018, 1) or device.vendor_id, 4),
+        ("product_code", description.number(0x1018, 2) or device.product_code, 4),
+    )
+    yield "[identity]"
+    for key, number, digits in facts:
+        yield f"{key} = {word(number, digits)}" if number else f"# {key} = 0x"
+    revision = description.number(0x1018, 3) or device.revision
+    # Another firmware is the same device.
+    yield f"# revision = {word(revision, 8)}" if revision else "# revision = 0x"
+    yield ""
+
+
+def _start(description: Description, mode: Mode) -> str | None:
+    """What the boot-up writes, where it is not what the base has it write."""
+    has_mode = _is_writable(description, MODE, 0)
+    has_period = all(_is_writable(description, _INTERPOLATION, sub) for sub in (1, 2))
+    if has_mode and (has_period or mode.number not in _CYCLIC):
+        return None
+    mode_write = f'{{ object = "{MODE:04X}:00", type = "int8", value = {mode.number} }}'
+    return mode_write if has_mode else ""
+
+
+def _is_writable(description: Description, index: int, sub: int) -> bool:
+    entry = description.entry(index, sub)
+    return entry is not None and entry.access.writable
+
+
+def _process(description: Description, layout: Layout, mode: Mode) -> Iterator[str]:
+    """The PDOs, where they are not the base's, and what is written at start, where the device has less."""
+    if not layout.is_base:
+        yield "[process]"
+        for direction, words, own in (
+            ("rpdo", layout.rpdo_words, layout.rpdo),
+            ("tpdo", layout.tpdo_words, layout.tpdo),
+        ):
+            if own:
+                yield f"{direction} = {strings(words)}"
+        yield ""
+    start = _start(description, mode)
+    if layout.is_base and start is None:
+        return
+    yield "[[slot]]"
+    yield 'name = "drive"'
+    if start is not None:
+        yield f"start = [{start}]"
+    for direction, own in (("rpdo", layout.rpdo), ("tpdo", layout.tpdo)):
+        for pdo in own:
+            yield from pdo.lines(direction)
+    yield ""
+    if not layout.is_base and layout.tells_mode and layout.tpdo:
+        # Where the word of the mode is called otherwise than in the base.
+        name = next(
+            name
+            for pdo in layout.tpdo
+            for name, ref in zip(pdo.words, pdo.objects, strict=True)
+            if ref.startswith(f"{MODE_DISPLAY:04X}:")
+        )
+        yield "[[value]]"
+        yield 'name = "mode"'
+        yield 'group = "actual"'
+        yield f"word = {string(name)}"
+        yield ""

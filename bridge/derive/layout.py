@@ -1,0 +1,211 @@
+"""In which PDOs a drive of the profile CiA 402 gets its control word and tells its status word."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridge.derive.modes import MODE_DISPLAY, Mode, bits_of
+from bridge.derive.toml import string, strings, word
+from bridge.eds import Description
+from bridge.eds.pdos import MappedObject, PdoSummary, pdos
+
+_WORD: Final = 16
+_MOST_WORDS: Final = 4
+_MOST_PROCESS_WORDS: Final = 9
+_FIRST_COB_ID: Final = {True: 0x200, False: 0x180}
+_PREDEFINED: Final = 4
+_MOST_COB_ID: Final = 0x780
+
+
+class NoLayout(Exception):
+    """The device cannot be driven in this mode; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class PdoLayout:
+    """One PDO; ``objects`` has for each of ``words`` what stands for it."""
+
+    number: int
+    cob_id: int
+    words: tuple[str, ...]
+    objects: tuple[str, ...]
+    turn_on: bool = False
+    """The device has it off."""
+
+    def lines(self, direction: str, *, names_words: bool = True) -> list[str]:
+        """As an item of ``[[slot]]``."""
+        objects = ", ".join(f"[{string(one)}]" for one in self.objects)
+        lines = [f"[[slot.{direction}]]", f"number = {self.number}", f"cob_id = {word(self.cob_id, 3)}"]
+        if names_words:
+            lines.append(f"words = {strings(self.words)}")
+        lines.append(f"objects = [{objects}]")
+        if self.turn_on:
+            lines.append("write = true                 # the device has it switched off")
+        return lines
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Both directions. Where one has no PDOs here, it is as the base has it."""
+
+    rpdo_words: tuple[str, ...]
+    tpdo_words: tuple[str, ...]
+    rpdo: tuple[PdoLayout, ...] = field(default=())
+    tpdo: tuple[PdoLayout, ...] = field(default=())
+    tells_mode: bool = True
+
+    @property
+    def is_base(self) -> bool:
+        return not self.rpdo and not self.tpdo
+
+
+def layout_of(description: Description, mode: Mode) -> Layout:
+    """How the device can be driven in ``mode``. Raises ``NoLayout``."""
+    commands = _words(mode.commanded, "control_word", "setpoint")
+    told = _words(mode.told, "status_word", "value")
+    tells_mode = bits_of(description, MODE_DISPLAY) == 8
+    rpdo: tuple[PdoLayout, ...] = ()
+    tpdo: tuple[PdoLayout, ...] = ()
+    if not _is_free(description, mode.commanded, receives=True):
+        rpdo = _own(description, commands, "setpoint", receives=True)
+    if _is_free(description, (*mode.told, (MODE_DISPLAY, 8)), receives=False) and tells_mode:
+        told[f"value_{len(told)}"] = (MODE_DISPLAY, 8)
+    elif _is_free(description, mode.told, receives=False):
+        tells_mode = False
+        objects = tuple(_ref(index) for index, _ in told.values())
+        tpdo = (PdoLayout(1, 0x180, tuple(told), objects),)
+    else:
+        if tells_mode:
+            told[f"value_{len(told)}"] = (MODE_DISPLAY, 8)
+        tpdo = _own(description, told, "value", receives=False)
+        tells_mode = any(_ref(MODE_DISPLAY, 8) in pdo.objects for pdo in tpdo)
+    rpdo_words = _process(commands, rpdo)
+    tpdo_words = _process(told, tpdo)
+    for words in (rpdo_words, tpdo_words):
+        if len(words) > _MOST_PROCESS_WORDS:
+            raise NoLayout(f"its PDOs have {len(words)} words, a drive has {_MOST_PROCESS_WORDS}")
+    return Layout(rpdo_words, tpdo_words, rpdo, tpdo, tells_mode)
+
+
+_Words = dict[str, tuple[int, int]]
+"""By the name of each word: the object that fills it, and how many bits it has."""
+
+
+def _words(objects: Sequence[tuple[int, int]], first: str, others: str) -> _Words:
+    words: _Words = {first: objects[0]}
+    for index, bits in objects[1:]:
+        for _ in range(bits // _WORD):
+            words[f"{others}_{len(words)}"] = (index, bits)
+    return words
+
+
+def _ref(index: int, bits: int = _WORD, sub: int = 0) -> str:
+    return f"{index:04X}:{sub:02X}" + (f"/{bits}" if bits < _WORD else "")
+
+
+def _process(words: _Words, own: Sequence[PdoLayout]) -> tuple[str, ...]:
+    """The words of a direction: those of the mode first, then what else its PDOs carry."""
+    if not own:
+        return tuple(words)
+    carried = [name for pdo in own for name in pdo.words]
+    first = [name for name in words if name in carried]
+    return (*first, *(name for name in carried if name not in first))
+
+
+def _is_free(description: Description, objects: Sequence[tuple[int, int]], *, receives: bool) -> bool:
+    """Whether the first PDO of the direction can be made to carry these objects."""
+    mapping = description.object(0x1600 if receives else 0x1A00)
+    communication = description.object(0x1400 if receives else 0x1800)
+    if mapping is None or communication is None:
+        return False
+    subs = [mapping.entry(sub) for sub in range(len(objects) + 1)]
+    if not all(entry and entry.access.writable for entry in subs):
+        return False
+    cob_id = communication.entry(1)
+    if not cob_id or not cob_id.access.writable:
+        return False
+    entries = [description.entry(index) for index, _ in objects]
+    return all(entry and entry.pdo_mappable for entry in entries)
+
+
+def _own(description: Description, words: _Words, others: str, *, receives: bool) -> tuple[PdoLayout, ...]:
+    """The device's own PDOs that carry the objects of ``words``. Raises ``NoLayout``."""
+    of_direction = [one for one in pdos(description) if one.receives is receives]
+    bases = {one.number: base for one in of_direction if (base := _base(description, one)) is not None}
+    there = [one for one in of_direction if one.number in bases and _is_usable(description, one)]
+    there.sort(key=lambda one: not one.enabled)
+    wanted = dict.fromkeys(words.values())
+    needed = [one for one in wanted if one[0] != MODE_DISPLAY]
+    whole = [one for one in there if all(_carries(one, want) for want in needed)]
+    whole.sort(key=lambda one: not all(_carries(one, want) for want in wanted))
+    chosen = whole[:1]
+    if not whole:
+        for want in needed:
+            if any(_carries(one, want) for one in chosen):
+                continue
+            carriers = [one for one in there if _carries(one, want)]
+            if not carriers:
+                kind = "RPDO" if receives else "TPDO"
+                raise NoLayout(
+                    f"no {kind} of the device carries {want[0]:04X}h, and {kind}1 cannot be made to"
+                )
+            chosen.append(carriers[0])
+    names = _Names(words, others)
+    return tuple(names.layout(one, bases[one.number]) for one in sorted(chosen, key=lambda one: one.number))
+
+
+def _is_usable(description: Description, pdo: PdoSummary) -> bool:
+    """Whether a mapping can say what it carries, in words and whole objects, and it can be on."""
+    if not pdo.mapped or any(one.bits not in (8, 16, 32) for one in pdo.mapped):
+        return False
+    if sum(-(-one.bits // _WORD) for one in pdo.mapped) > _MOST_WORDS:
+        return False
+    entry = description.entry((0x1400 if pdo.receives else 0x1800) + pdo.number - 1, 1)
+    return pdo.enabled or bool(entry and entry.access.writable)
+
+
+def _base(description: Description, pdo: PdoSummary) -> int | None:
+    """Its COB-ID without the node id; None where the file does not tell."""
+    entry = description.entry((0x1400 if pdo.receives else 0x1800) + pdo.number - 1, 1)
+    value = entry.current if entry else None
+    if value and value.plus_node_id and isinstance(value.plain, int):
+        base = value.plain & 0x7FF
+        return base if base <= _MOST_COB_ID else None
+    if pdo.number <= _PREDEFINED:
+        return _FIRST_COB_ID[pdo.receives] + 0x100 * (pdo.number - 1)
+    return None
+
+
+def _carries(pdo: PdoSummary, want: tuple[int, int]) -> bool:
+    return any((one.index, one.bits) == want and one.sub == 0 for one in pdo.mapped)
+
+
+class _Names:
+    """Gives each word of the chosen PDOs a name, and none twice."""
+
+    def __init__(self, words: _Words, others: str) -> None:
+        self._free = dict(words)
+        self._others = others
+        self._next = len(words)
+
+    def layout(self, pdo: PdoSummary, cob_id: int) -> PdoLayout:
+        words: list[str] = []
+        objects: list[str] = []
+        for one in pdo.mapped:
+            names = self._known(one) or self._new(max(1, one.bits // _WORD))
+            words += names
+            objects += [_ref(one.index, one.bits, one.sub)] * len(names)
+        return PdoLayout(pdo.number, cob_id, tuple(words), tuple(objects), not pdo.enabled)
+
+    def _known(self, one: MappedObject) -> list[str]:
+        names = [name for name, want in self._free.items() if want == (one.index, one.bits) and not one.sub]
+        for name in names:
+            del self._free[name]
+        return names
+
+    def _new(self, count: int) -> list[str]:
+        names = [f"{self._others}_{self._next + place}" for place in range(count)]
+        self._next += count
+        return names

@@ -1,0 +1,150 @@
+"""The parameters of a device description as ``[[parameter]]`` tables."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator, Mapping
+from typing import Final
+
+from bridge.canopen.datatypes import INTEGERS, REALS, TypeName, encode
+from bridge.derive.toml import number, one_line, string, value
+from bridge.eds import DataType, Description, Entry, Value
+from bridge.mapping.model import Parameter
+
+TYPES: Final[dict[DataType, TypeName]] = {
+    DataType.BOOLEAN: "bool",
+    DataType.INTEGER8: "int8",
+    DataType.INTEGER16: "int16",
+    DataType.INTEGER32: "int32",
+    DataType.INTEGER64: "int64",
+    DataType.UNSIGNED8: "uint8",
+    DataType.UNSIGNED16: "uint16",
+    DataType.UNSIGNED32: "uint32",
+    DataType.UNSIGNED64: "uint64",
+    DataType.REAL32: "real32",
+    DataType.REAL64: "real64",
+    DataType.VISIBLE_STRING: "string",
+    DataType.OCTET_STRING: "bytes",
+    DataType.UNICODE_STRING: "bytes",
+    DataType.TIME_OF_DAY: "bytes",
+    DataType.TIME_DIFFERENCE: "bytes",
+    DataType.DOMAIN: "bytes",
+}
+"""Types that a parameter may have; INTEGER24 and its like are not among them."""
+MANUFACTURER: Final = range(0x2000, 0x6000)
+PROFILE: Final = range(0x6000, 0x6800)
+FURTHER_AXES: Final = range(0x6800, 0xA000)
+_COMMANDS: Final = frozenset((0x6040, 0x6042, 0x6071, 0x607A, *range(0x60B0, 0x60B3), 0x60C1, 0x60FE, 0x60FF))
+"""What commands a drive: set-points, offsets, outputs."""
+_OF_BASE: Final = frozenset((0x6040, 0x6042, 0x6071, 0x607A, *range(0x60B0, 0x60B3), 0x60FF))
+"""Those among them that the base protects by itself."""
+
+
+def parameter_name(index: int, sub: int, *, has_subs: bool) -> str:
+    """As ``cia402/base`` writes them: 6083, 6046:01."""
+    return f"{index:04X}:{sub:02X}" if has_subs else f"{index:04X}"
+
+
+def entries_of(description: Description) -> Iterator[tuple[str, Entry]]:
+    """Every entry of the maker's and the profile's objects that can be a parameter, by its name."""
+    for one in description.objects:
+        if one.index not in MANUFACTURER and one.index not in PROFILE:
+            continue
+        has_subs = one.object_type.has_subs
+        for entry in one.entries:
+            if not (has_subs and entry.sub == 0):  # how many there are
+                yield parameter_name(one.index, entry.sub, has_subs=has_subs), entry
+
+
+def parameter_lines(
+    name: str, entry: Entry, title: str, known: Mapping[str, Parameter], in_pdos: Container[tuple[int, int]]
+) -> list[str]:
+    """The table of one entry; of one that is ``known`` from what the mapping extends only what differs. Empty
+    where there is nothing to say."""
+    if entry.index in _OF_BASE or (entry.index, entry.sub) in in_pdos:
+        return []
+    kind = TYPES.get(entry.data_type) if entry.data_type else None
+    if kind is None:
+        what = entry.data_type.name if entry.data_type else "not known"
+        return [f"# {name} {one_line(title)}: its type is {what}, which no parameter has", ""]
+    if name in known:
+        facts = [*_changes(entry, kind, known[name]), *_limits(entry, kind)]
+        facts += _default(entry, kind)
+        return ["[[parameter]]", f"name = {string(name)}", *facts, ""] if facts else []
+    lines = ["[[parameter]]", f"name = {string(name)}", f"title = {string(title or name)}"]
+    lines.append(f"data_type = {string(kind)}")
+    if kind in INTEGERS and kind != "bool":
+        lines += ['# unit = ""', "# factor = 1.0"]
+    elif kind in REALS:
+        lines.append('# unit = ""')
+    lines += _limits(entry, kind)
+    if _access(entry) != "rw":
+        lines.append(f"access = {string(_access(entry))}")
+    lines += _protection(entry)
+    lines += _default(entry, kind)
+    if entry.data_type is DataType.DOMAIN:
+        lines.append("backup = false")
+    return [*lines, ""]
+
+
+def _access(entry: Entry) -> str:
+    if not entry.access.writable:
+        return "ro"
+    return "rw" if entry.access.readable else "wo"
+
+
+def _changes(entry: Entry, kind: TypeName, known: Parameter) -> Iterator[str]:
+    if kind != known.data_type:
+        yield f"data_type = {string(kind)}"
+    if _access(entry) != known.access:
+        yield f"access = {string(_access(entry))}"
+
+
+def _protection(entry: Entry) -> Iterator[str]:
+    """What can be mapped into an RPDO is made to command the device."""
+    if entry.index in _COMMANDS:
+        yield 'protected = "command"'
+    elif entry.pdo_mappable and entry.access.writable:
+        yield 'protected = "while_enabled"'
+
+
+def _limits(entry: Entry, kind: TypeName) -> Iterator[str]:
+    """``low`` and ``high``, where they are narrower than the type and do not contradict each other."""
+    low, high = _number(entry.low), _number(entry.high)
+    if kind not in INTEGERS and kind not in REALS:
+        return
+    if low is not None and high is not None and low > high:
+        yield f"# low = {low}, high = {high}: the file contradicts itself"
+        return
+    for key, limit in (("low", low), ("high", high)):
+        if limit is None:
+            continue
+        widest = INTEGERS.get(kind)
+        if widest and (limit <= widest.low if key == "low" else limit >= widest.high):
+            continue
+        try:
+            yield f"{key} = {number(limit)}"
+        except ValueError as error:
+            yield f"# {key}: {error}"
+
+
+def _default(entry: Entry, kind: TypeName) -> Iterator[str]:
+    """The value as delivered, if it is one of this type on every node."""
+    plain = entry.default.at(None) if entry.default else None
+    if plain is None:
+        return
+    if isinstance(plain, bytes):
+        plain = plain.hex()
+    if kind == "bool":
+        plain = bool(plain)
+    elif kind in REALS and isinstance(plain, int):
+        plain = float(plain)
+    try:
+        encode(kind, plain)
+        yield f"default = {value(plain)}"
+    except (ValueError, OverflowError) as error:
+        yield f"# default = {one_line(str(plain))}: {error}"
+
+
+def _number(limit: Value | None) -> int | float | None:
+    plain = limit.at(None) if limit else None
+    return plain if isinstance(plain, int | float) else None

@@ -1,0 +1,51 @@
+"""TOML as a person would have written it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+
+from bridge.canopen.datatypes import Plain
+
+
+def one_line(text: str) -> str:
+    """``text`` without line breaks and control characters: what stands in comments and titles."""
+    return " ".join("".join(one if one.isprintable() else " " for one in text).split())
+
+
+def string(text: str) -> str:
+    return json.dumps(one_line(text), ensure_ascii=False)
+
+
+def strings(texts: Sequence[str]) -> str:
+    return f"[{', '.join(map(string, texts))}]"
+
+
+def value(plain: Plain) -> str:
+    """Raises ValueError for a number that no file can hold."""
+    if isinstance(plain, bool):
+        return "true" if plain else "false"
+    if isinstance(plain, str):
+        return json.dumps(plain).replace("\x7f", "\\u007f")
+    if not math.isfinite(plain):
+        raise ValueError(f"{plain} is no number for a file")
+    return str(plain) if isinstance(plain, int) else repr(plain)
+
+
+def number(plain: float) -> str:
+    """A number that may have decimals. Raises ValueError as ``value`` does."""
+    try:
+        return value(float(plain))
+    except OverflowError:
+        raise ValueError(f"{plain} is too large") from None
+
+
+def word(number: int, digits: int = 4) -> str:
+    return f"0x{number:0{digits}X}"
+
+
+def file_name(text: str) -> str:
+    """``text`` as part of a mapping's name: lower case, words joined by hyphens."""
+    letters = "".join(one if one.isascii() and one.isalnum() else " " for one in text.lower())
+    return "-".join(letters.split())

@@ -1,0 +1,38 @@
+"""Descriptions in every dialect of the field: read, made into a mapping, simulated, booted and served."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bridge.eds.model import Report
+from bridge.eds.text import decode
+from bridge.mapping.loader import mappings_dir
+from tests.support.eds_dialects import in_every_dialect
+from tests.support.foreign import Result, served, table
+from tests.support.invented_eds import FIXED, SPIN, eds
+
+FILES = {
+    "spin.eds": eds(SPIN),
+    "fixed.eds": eds(FIXED),
+    **{
+        name: (mappings_dir() / name).read_bytes()
+        for name in (
+            "cia402/cia402.eds",
+            "nord/sk-cu4-cao.eds",
+            "nord/sk-tu4-cao.eds",
+            "nord/sk-tu4-cao-ds402.eds",
+        )
+    },
+}
+
+
+def test_every_dialect_is_understood(tmp_path: Path) -> None:
+    results: list[Result] = []
+    for seed, (name, content) in enumerate(FILES.items()):
+        text = decode(content, Report())
+        for dialect, changed in in_every_dialect(text, seed):
+            results.append(served(tmp_path / f"{seed}{dialect}", f"{name} as {dialect}", changed))
+    print(table(results))
+    assert len(results) >= 100
+    good = [one for one in results if not one.problem]
+    assert len(good) >= 0.9 * len(results), table(results)

@@ -11,9 +11,11 @@ from typing import Annotated
 import typer
 
 from bridge.cli.bus import AsJson, BusChoice, Line, carry_out, choose_line, print_table, takes_bus, tell
+from bridge.cli.scan_site import write_site
 from bridge.cli.terminal import progress
 from bridge.errands.scan import FoundNode, Scanner
 from bridge.mapping import Family, family_names, load_family
+from bridge.mapping.loader import mapping_folders
 from bridge.mapping.match import Found, Match, best_match
 
 _PASSIVE_S = 3.0
@@ -33,12 +35,21 @@ def scan(
         int, typer.Option(min=10, max=10_000, help="how long to wait for each answer")
     ] = 300,
     as_json: AsJson = False,
+    write: Annotated[
+        Path | None, typer.Option(help="write a site file with the nodes that were found; none may be there")
+    ] = None,
+    eds: Annotated[
+        Path | None, typer.Option(help="with --write: a folder with EDS files, to make mappings of")
+    ] = None,
 ) -> None:
     """List the nodes of a bus: by heartbeat, guarding and SDO."""
+    if write and passive:
+        raise typer.BadParameter("a site file needs what the nodes answer: leave out --passive")
     line = choose_line(site, which)
     listen_s = seconds or (_PASSIVE_S if passive else _ACTIVE_S)
     scanner = _run(line, passive=passive, listen_s=listen_s, timeout_s=timeout_ms / 1000)
-    families = {name: load_family(name) for name in family_names()}
+    folders = mapping_folders(write or site)
+    families = {name: load_family(name, folders) for name in family_names(folders)}
     found = [_row(node, line, families) for node in scanner.nodes()]
     for phantom, owner in scanner.phantoms().items():
         whose = "nobody confirms it" if owner is None else f"they are another SDO channel of node {owner}"
@@ -47,6 +58,8 @@ def scan(
         print(json.dumps([row.for_scripts() for row in found], indent=2))
     else:
         _print(found)
+    if write:
+        tell(write_site(write, eds, line.table, [(row.node, row.match) for row in found], families))
 
 
 def _run(line: Line, *, passive: bool, listen_s: float, timeout_s: float) -> Scanner:

@@ -1,0 +1,111 @@
+"""What ``scan --write`` writes: a site file, and mappings made of EDS files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from bridge.config import BusTable
+from bridge.derive import Derived, ProposedBus, ProposedNode, derive_family, propose_site
+from bridge.derive.toml import file_name
+from bridge.eds import Description, read_device_file
+from bridge.errands.scan import FoundNode
+from bridge.errors import BridgeError, OperationFailed
+from bridge.mapping import Family
+from bridge.mapping.loader import mappings_dir, read_family
+from bridge.mapping.match import Match
+
+_SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
+_PROFILE_ONLY: Final = ("device_type",)
+
+
+@dataclass(frozen=True, slots=True)
+class _File:
+    path: Path
+    description: Description
+
+
+def write_site(
+    path: Path,
+    eds: Path | None,
+    bus: BusTable,
+    found: Sequence[tuple[FoundNode, Match | None]],
+    families: Mapping[str, Family],
+) -> str:
+    """Write the site file, and beside it in ``mappings/`` what was made of the files in ``eds`` for nodes
+    that no mapping is meant for. Returns what was written, in words. Raises ``OperationFailed``."""
+    if path.exists():
+        raise OperationFailed(f"{path} is there already")
+    files = list(_files(eds)) if eds else []
+    known = dict(families)
+    made: dict[str, Derived] = {}
+    nodes: list[ProposedNode] = []
+    for node, match in found:
+        mapping, why = match.mapping if match else None, "no mapping fits"
+        if match is None or match.by == _PROFILE_ONLY:
+            file = next((one for one in files if _is_of(one.description, node)), None)
+            if file is not None:
+                try:
+                    derived = derive_family(file.description, file.path.name)
+                    mapping = derived.name
+                    if mapping not in known:
+                        made[mapping] = derived
+                        known[mapping] = _written(path.parent / "mappings", derived)
+                except OperationFailed as error:
+                    why = str(error)
+        says = _says(node)
+        nodes.append(ProposedNode(node.id, node.name, says, mapping, node.has_heartbeat, why))
+    where = ProposedBus(bus.interface, bus.channel, bus.bitrate)
+    text = propose_site(file_name(path.stem) or "site", where, nodes, known)
+    _write(path, text)
+    beside = "".join(f", mappings/{name}.toml" for name in made)
+    served = sum(node.mapping is not None for node in nodes)
+    return f"{path}{beside}: {served} of {len(nodes)} nodes have a mapping"
+
+
+def _files(folder: Path) -> Iterator[_File]:
+    """What can be read in ``folder``; what cannot is somebody else's."""
+    for path in sorted(folder.rglob("*")):
+        if path.suffix.lower() in _SUFFIXES:
+            try:
+                yield _File(path, read_device_file(path))
+            except BridgeError:
+                continue
+
+
+def _is_of(description: Description, node: FoundNode) -> bool:
+    """Whether vendor and product are those of the node."""
+    vendor = description.number(0x1018, 1) or description.device.vendor_id
+    product = description.number(0x1018, 2) or description.device.product_code
+    return bool(vendor and product) and (vendor, product) == (node.vendor, node.product)
+
+
+def _says(node: FoundNode) -> str:
+    numbers = (
+        ("1000h", node.device_type),
+        ("vendor", node.vendor),
+        ("product", node.product),
+        ("revision", node.revision),
+        ("serial", node.serial),
+    )
+    told = ", ".join(f"{name} {number:X}h" for name, number in numbers if number is not None)
+    return f"node {node.id}, {told}" if told else f"node {node.id}"
+
+
+def _written(folder: Path, derived: Derived) -> Family:
+    path = folder / f"{derived.name}.toml"
+    _write(path, derived.text)
+    return read_family(path, (folder, mappings_dir()))
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("x", encoding="utf-8") as out:
+            out.write(text)
+    except FileExistsError:
+        raise OperationFailed(f"{path} is there already") from None
+    except OSError as error:
+        raise OperationFailed(f"{path} cannot be written: {error.strerror}") from error

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from bridge import clock
 from bridge.cli.bus import AsJson, print_table, tell
 from bridge.cli.parameter_drive import DriveArgument, Force, SiteArgument, Target, Yes, find
+from bridge.cli.parameter_sets import read_all, write_all
 from bridge.errors import OperationFailed
 from bridge.image import Value
 from bridge.mapping.model import Parameter
@@ -20,6 +23,9 @@ from bridge.parameter.backup_file import BackupFile, read_backup
 from bridge.parameter.codec import shown
 
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="a parameter set, TOML")]
+Wait = Annotated[
+    int, typer.Option("--wait", min=0, metavar="S", help="go on if the node answers again within S seconds")
+]
 
 
 def backup(
@@ -27,34 +33,66 @@ def backup(
     drive: DriveArgument,
     file: FileArgument,
     force: Annotated[bool, typer.Option("--force", help="overwrite FILE")] = False,
+    listed: Annotated[bool, typer.Option("--listed", help="only what the mapping file lists")] = False,
+    wait: Wait = 60,
     as_json: AsJson = False,
 ) -> None:
-    """Read every setting that the mapping file lists, and write them to FILE."""
+    """Read all settings of a drive, and write them to FILE."""
     target = find(site, drive)
     if file.exists() and not force:
         raise typer.BadParameter(f"{file} exists already: --force overwrites it")
-    found = backups.Backup()
-    target.run(lambda now: backups.back_up(target.access, found, now))
+    began = clock.now()
+    found = read_all(target, wait, scan=not listed)
+    took_s = clock.now() - began
     saved = datetime.now(UTC).isoformat(timespec="seconds")
     entries = {entry.name: entry for entry in backups.settings(target.access.names)}
     comments = {name: _comment(entries[name].definition) for name in found.values}
-    content = BackupFile(target.node.mapping, target.name, saved, found.values, comments, found.missing)
+    content = BackupFile(
+        target.node.mapping,
+        target.name,
+        saved,
+        found.values,
+        comments,
+        found.missing,
+        found.identity,
+        found.objects,
+        found.unreadable,
+    )
     try:
         file.write_text(content.text(), encoding="utf-8")
     except OSError as error:
         raise OperationFailed(f"{file}: {error.strerror or error}") from None
     if as_json:
-        print(json.dumps({"ok": True, "parameters": found.values, "missing": found.missing}))
+        facts = {"parameters": found.values, "objects": found.objects, "missing": found.missing}
+        facts |= {"unreadable": found.unreadable, "identity": found.identity}
+        print(json.dumps({"ok": True, **facts, "seconds": round(took_s, 1)}))
         return
+    for name, why in found.unreadable.items():
+        tell(f"not read: {name}: {why}")
     missing = f"; the drive does not have {len(found.missing)} others" if found.missing else ""
-    print(f"{len(found.values)} parameters of {target.name} in {file}{missing}")
+    count = len(found.values) + len(found.objects)
+    print(f"{count} parameters of {target.name} in {file}, read in {took_s:.0f} s{missing}")
 
 
-def compare(site: SiteArgument, drive: DriveArgument, file: FileArgument, as_json: AsJson = False) -> None:
-    """Compare FILE with the drive; exit code 1 where they differ."""
+def compare(
+    site: SiteArgument,
+    drive: DriveArgument,
+    file: FileArgument,
+    other: Annotated[
+        Path | None, typer.Option("--with", metavar="OTHER", help="a file in place of the drive")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Compare FILE with the drive, or with another file; exit code 1 where they differ."""
     target = find(site, drive)
-    found = _compare(target, _values(target, file))
-    _print_comparison(target, found, as_json)
+    content = _content(target, file)
+    if other is None:
+        found = _compare(target, content.all)
+    else:
+        found = backups.Comparison()
+        names, second = target.access.names, _content(target, other)
+        backups.compare_sets(names, second.all, content.all, found)
+    _print_comparison(target, found, as_json, str(other) if other else "")
     if found.differences or found.missing:
         raise typer.Exit(OperationFailed.exit_code)
 
@@ -66,13 +104,21 @@ def restore(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="only say what would be written")] = False,
     yes: Yes = False,
     force: Force = False,
+    wait: Wait = 60,
     as_json: AsJson = False,
 ) -> None:
     """Write FILE to the drive where it differs, in the order of the mapping file, and read it back."""
     target = find(site, drive)
-    values = _values(target, file)
+    content = _content(target, file)
+    identity: dict[str, int] = {}
+    target.run(lambda now: backups.identify(identity))
+    if why := backups.why_another(content.identity, identity):
+        raise OperationFailed(f"{file}: {why}; nothing written")
+    serial = content.identity.get("serial")
+    if serial != identity.get("serial") and serial is not None:
+        tell(f"{target.name} has the serial number {identity.get('serial', 'unknown')}, the file {serial}")
     asks = not yes and sys.stdin.isatty()
-    found = _compare(target, values)
+    found = _compare(target, content.all)
     if dry_run or asks:
         _print_comparison(target, found, as_json)
         if dry_run or not found.differences:
@@ -82,13 +128,11 @@ def restore(
         target.refuse_unforced(changed)
     if asks and not typer.confirm(f"write {len(changed)} parameters of {target.name}?", err=True):
         raise OperationFailed("nothing written")
-    check = target.alone(force=force).check
+    check = target.alone(force=force, whole=bool(changed)).check
     target.run(lambda now: check(changed))
     done = backups.Restored()
     try:
-        target.run(
-            lambda now: backups.restore(target.access, values, done, now, before_it=check), writes=True
-        )
+        write_all(target, content.all, identity, done, check, wait)
     except OperationFailed:
         _print_restored(target, done)
         raise
@@ -107,28 +151,27 @@ def restore(
         )
 
 
-def _values(target: Target, file: Path) -> dict[str, Value]:
-    """The values of a file that fit this drive. Raises ``BadParameter`` where they do not."""
+def _content(target: Target, file: Path) -> BackupFile:
+    """A file that fits this drive. Raises ``BadParameter`` where it does not."""
     content = read_backup(file)
     if content.mapping != target.node.mapping:
         raise typer.BadParameter(
             f"{file} is of {content.mapping}, and {target.name} has {target.node.mapping}"
         )
-    values = dict(content.values)
     try:
-        backups.in_order(target.access.names, values)
+        backups.in_order(target.access.names, content.all)
     except ParameterError as error:
         raise typer.BadParameter(f"{file}: {error}") from None
-    return values
+    return content
 
 
-def _compare(target: Target, values: dict[str, Value]) -> backups.Comparison:
+def _compare(target: Target, values: Mapping[str, Value]) -> backups.Comparison:
     found = backups.Comparison()
     target.run(lambda now: backups.compare(target.access, values, found, now))
     return found
 
 
-def _print_comparison(target: Target, found: backups.Comparison, as_json: bool) -> None:
+def _print_comparison(target: Target, found: backups.Comparison, as_json: bool, other: str = "") -> None:
     if as_json:
         differences = [
             {"name": one.entry.name, "in_drive": one.in_drive, "in_file": one.in_set, "unit": one.entry.unit}
@@ -143,9 +186,9 @@ def _print_comparison(target: Target, found: backups.Comparison, as_json: bool) 
             (one.entry.name, shown(one.entry, one.in_drive), shown(one.entry, one.in_set))
             for one in found.differences
         ]
-        print_table([("name", "in the drive", "in the file"), *rows])
+        print_table([("name", f"in {other or 'the drive'}", "in the file"), *rows])
     for name in found.missing:
-        print(f"{name}: the drive does not have it")
+        print(f"{name}: {other or 'the drive'} does not have it")
     print(f"{target.name}: {len(found.differences)} differ, {len(found.same)} are the same")
 
 
@@ -155,6 +198,8 @@ def _print_restored(target: Target, done: backups.Restored) -> None:
         print(f"{one.reading}{was}")
     for name in done.missing:
         print(f"{name}: the drive does not have it")
+    for name in done.read_only:
+        print(f"{name}: the drive says that it is read-only")
     print(f"{target.name}: {len(done.written)} written, {len(done.same)} were the same")
 
 
@@ -167,6 +212,7 @@ def _as_json(done: backups.Restored) -> dict[str, object]:
         ],
         "same": len(done.same),
         "missing": done.missing,
+        "read_only": done.read_only,
         "failed": done.failed or None,
         "message": str(done.error or ""),
         "left": done.left,

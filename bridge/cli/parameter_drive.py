@@ -11,7 +11,7 @@ import typer
 
 from bridge import clock
 from bridge.cli.bus import Line, carry_out, not_virtual, tell
-from bridge.cli.terminal import progress
+from bridge.cli.terminal import Show, progress
 from bridge.config import BusTable, NodeTable
 from bridge.errands.bystander import Bystander, Standstill
 from bridge.errands.parameter import ParameterErrand
@@ -62,9 +62,9 @@ class Target:
                 "drive is not enabled"
             )
 
-    def alone(self, *, force: bool = False) -> Standstill:
+    def alone(self, *, force: bool = False, whole: bool = False) -> Standstill:
         """Listen, and return what is known of the drive's state. Raises ``OperationFailed`` if another master
-        commands this bus."""
+        commands this bus. ``whole`` is that of ``Standstill``."""
         table = not_virtual(self.line.table)
         listen_s = max(_LISTEN_S, 3 * table.heartbeat_ms / 1000)
         heard = carry_out(
@@ -75,30 +75,48 @@ class Target:
             raise OperationFailed(
                 f"another master is active on {table.name}: {heard.found}; write through it, or stop it first"
             )
-        return Standstill(self.access.names, self.family, self.slot, heard.status, force=force)
+        return Standstill(self.access.names, self.family, self.slot, heard.status, force=force, whole=whole)
 
-    def run(self, make: Callable[[float], Procedure[T]], *, writes: bool = False) -> T:
+    def run(
+        self,
+        make: Callable[[float], Procedure[T]],
+        *,
+        writes: bool = False,
+        watch: Callable[[Show], None] = lambda show: None,
+    ) -> T:
         """Run a procedure on the bus. Raises ``OperationFailed`` with the reason.
 
-        Where it ``writes``, nothing is begun unless writes can be counted.
+        Where it ``writes``, nothing is begun unless writes can be counted. ``watch`` shows how far it is.
         """
+        result = self.attempt(make, writes=writes, watch=watch)
+        if isinstance(result, ParameterError):
+            raise OperationFailed(f"{self.name}: {result}") from None
+        return result
+
+    def attempt(
+        self,
+        make: Callable[[float], Procedure[T]],
+        *,
+        writes: bool = False,
+        watch: Callable[[Show], None] = lambda show: None,
+    ) -> T | ParameterError:
+        """As ``run``, with the reason of a failure as the result."""
         not_virtual(self.line.table)
         if writes:
             self.count()
         try:
-            with progress(self.name):
+            with progress(self.name) as show:
                 errand = carry_out(
-                    self.line, lambda now: ParameterErrand(self.node, self.family, self.slot, make, now)
+                    self.line,
+                    lambda now: ParameterErrand(self.node, self.family, self.slot, make, now),
+                    lambda _: watch(show),
                 )
         finally:
             if writes:
                 self.count()
-        result = errand.result
-        if isinstance(result, ParameterError):
-            raise OperationFailed(f"{self.name}: {result}") from None
         if not errand.is_done:
             raise OperationFailed("interrupted")
-        return result  # pyright: ignore[reportReturnType]  # None is what some procedures return
+        return errand.result  # pyright: ignore[reportReturnType]  # None is what some procedures return
 
     def count(self) -> None:
         """Keep the counts of the EEPROM guard. Raises ``OperationFailed`` where they cannot be kept."""

@@ -34,15 +34,26 @@ class Standstill:
     """Sees to it that what is protected is not written while the drive is enabled.
 
     ``heard`` is the status word that it has sent by itself, for a drive that cannot be asked for it. Where
-    nobody knows it, only who uses ``force`` writes.
+    nobody knows it, only who uses ``force`` writes. ``whole``: nothing else is written while it is known to
+    be enabled either.
     """
 
-    def __init__(self, names: Names, family: Family, slot: Slot, heard: int | None, *, force: bool) -> None:
+    def __init__(
+        self,
+        names: Names,
+        family: Family,
+        slot: Slot,
+        heard: int | None,
+        *,
+        force: bool,
+        whole: bool = False,
+    ) -> None:
         self._names = names
         self._words = StatusWords(family.status_word)
         self._parts = slot.tpdo[0].objects[0][0].parts
         self._heard = heard
         self._force = force
+        self._whole = whole
 
     def concerns(self, entry: Entry) -> bool:
         return self._names.protection.level(entry.address) in _LEVELS
@@ -50,13 +61,13 @@ class Standstill:
     def check(self, entries: Iterable[Entry]) -> Generator[Transfer, tuple[bytes, float], None]:
         """Raises ``ParameterError`` with the names of those that are not written now."""
         concerned = ", ".join(entry.name for entry in entries if self.concerns(entry))
-        if not concerned:
+        if not concerned and not self._whole:
             return
         word = yield from self._status()
-        rule = f"{concerned}: not written while the drive is enabled"
+        rule = f"{concerned or 'a set of parameters'}: not written while the drive is enabled"
         if word is not None and self._words.state(word) in MOVING:
             raise ParameterError(Why.PROTECTED, f"{rule}, and it is: stop and disable it first")
-        if word is None and not self._force:
+        if word is None and concerned and not self._force:
             raise ParameterError(
                 Why.PROTECTED, f"{rule}, and it does not tell whether it is; --force writes all the same"
             )

@@ -67,6 +67,17 @@ class ParameterNames(Table):
         default_factory=list[str],
         description="objects that command the drive, such as 6040 or 3000-300F: never written as parameters",
     )
+    settings: list[IndexRange] = Field(
+        default_factory=list[str],
+        description="objects among which the drive keeps its settings, such as 2064-20C7: a backup asks for "
+        "all of them, and has what the file does not list as the drive sends it",
+    )
+
+
+def indices(text: str) -> range:
+    """The indices of an ``IndexRange``, such as ``2064-20C7``."""
+    first, _, last = text.partition("-")
+    return range(int(first, 16), int(last or first, 16) + 1)
 
 
 class Parameter(Table):

@@ -6,14 +6,17 @@ import json
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, cast
 
 from bridge.errors import Fault, FileFaults
 from bridge.image import Value
 
-_FORMAT: Final = 1
+_FORMAT: Final = 2
+_READ: Final = (1, 2)
+"""Format 1 has neither identity nor objects."""
+IDENTITY: Final = ("vendor", "product", "revision", "serial")
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +31,17 @@ class BackupFile:
     comments: Mapping[str, str]
     """What a value means, by its name; not read back."""
     missing: Sequence[str] = ()
+    identity: Mapping[str, int] = field(default_factory=dict[str, int])
+    """What the node says in 1018h, as far as it does, by ``IDENTITY``."""
+    objects: Mapping[str, Value] = field(default_factory=dict[str, Value])
+    """What the mapping file does not list, as the drive sends it."""
+    unreadable: Mapping[str, str] = field(default_factory=dict[str, str])
+    """Why something was not read, by its name; not read back."""
+
+    @property
+    def all(self) -> dict[str, Value]:
+        """What it has of the drive, listed or not."""
+        return {**self.values, **self.objects}
 
     def text(self) -> str:
         lines = [
@@ -39,10 +53,18 @@ class BackupFile:
         ]
         if self.missing:
             lines += ["", "# The drive does not have:", *(f"#   {name}" for name in self.missing)]
+        if self.unreadable:
+            lines += ["", "# Could not be read:"]
+            lines += [f"#   {name}: {_one_line(why)}" for name, why in self.unreadable.items()]
+        if self.identity:
+            lines += ["", "[identity]", *(f"{name} = 0x{self.identity[name]:08X}" for name in self.identity)]
         lines += ["", "[parameters]"]
         for name, value in self.values.items():
-            comment = self.comments.get(name, "").replace("\n", " ")
+            comment = _one_line(self.comments.get(name, ""))
             lines.append(f"{_quoted(name)} = {_written(value)}" + (f"  # {comment}" if comment else ""))
+        if self.objects:
+            lines += ["", "# What the mapping file does not list, as the drive sends it.", "[objects]"]
+            lines += [f"{_quoted(name)} = {_written(value)}" for name, value in self.objects.items()]
         return "\n".join(lines) + "\n"
 
 
@@ -59,28 +81,50 @@ def read_backup(path: Path) -> BackupFile:
     def fault(key: str, message: str, hint: str = "") -> None:
         faults.append(Fault(str(path), 0, key, message, hint))
 
-    if content.get("format") != _FORMAT:
+    if content.get("format") not in _READ:
         fault("format", f"must be {_FORMAT}", "is this a file of `drivebridge parameters backup`?")
     texts: dict[str, str] = {}
     for key in ("mapping", "drive", "saved"):
         texts[key] = str(content.get(key, ""))
     if not texts["mapping"]:
         fault("mapping", "is missing", "the mapping that the parameters are named by")
-    values: dict[str, Value] = {}
-    found: object = content.get("parameters")
-    if not isinstance(found, dict):
+    if "parameters" not in content:
         fault("parameters", "is missing", "a table of names and values")
-    else:
+
+    def table(key: str) -> dict[str, Value]:
+        values: dict[str, Value] = {}
+        found: object = content.get(key, {})
+        if not isinstance(found, dict):
+            fault(key, "must be a table of names and values")
+            return values
         for name, value in cast("dict[str, object]", found).items():
             if not isinstance(value, bool | int | float | str) or (
                 isinstance(value, float) and not math.isfinite(value)
             ):
-                fault(f'parameters."{name}"', "must be a number, a text, true or false")
+                fault(f'{key}."{name}"', "must be a number, a text, true or false")
             else:
                 values[name] = value
+        return values
+
+    values, objects = table("parameters"), table("objects")
+    for name in values.keys() & objects.keys():
+        fault(f'objects."{name}"', "stands in [parameters], too: leave one of them out")
+    identity: dict[str, int] = {}
+    for name, value in table("identity").items():
+        if name not in IDENTITY or isinstance(value, bool) or not isinstance(value, int):
+            fault(f"identity.{name}", f"must be a whole number, called {', '.join(IDENTITY)}")
+        else:
+            identity[name] = value
     if faults:
         raise FileFaults(faults)
-    return BackupFile(texts["mapping"], texts["drive"], texts["saved"], values, {})
+    return BackupFile(
+        texts["mapping"], texts["drive"], texts["saved"], values, {}, identity=identity, objects=objects
+    )
+
+
+def _one_line(text: str) -> str:
+    """Without what a TOML comment may not have."""
+    return "".join(one if one.isprintable() else " " for one in text)
 
 
 def _quoted(text: str) -> str:

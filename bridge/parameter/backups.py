@@ -1,21 +1,32 @@
 """Backups of a drive's parameters: made, compared with a drive, written back. Procedures without a bus.
 
 A backup holds every parameter of the mapping file that can be read and written, each element in each
-parameter set. It is restored in the order of the mapping file, and only where the drive differs.
+parameter set, and beside them what is found where the family keeps its settings. It is restored in the order
+of the mapping file, what that does not list after it, and only where the drive differs. What is interrupted
+goes on where it was when it is begun again with what it has filled so far.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
+from bridge.canopen import abort
 from bridge.image import Value
 from bridge.mapping.model import ObjectRef
 from bridge.parameter.access import MISSING, Asks, DriveParameters, Transfer, Written
+from bridge.parameter.backup_file import IDENTITY
 from bridge.parameter.codec import encode_value
 from bridge.parameter.definition import Entry
-from bridge.parameter.error import ParameterError, Why
+from bridge.parameter.error import ParameterError, TransferFailed, Why
 from bridge.parameter.names import Names
+
+_NO_OBJECT: Final = 0x0602_0000
+_READ_ONLY: Final = (0x0601_0000, 0x0601_0002)
+"""Abort codes: no such access, read-only."""
+_SUBS: Final = 0xFF
+"""Sub-index FFh is the object's structure (CiA 301 §7.4.3)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +40,16 @@ class Difference:
 
 @dataclass(slots=True)
 class Backup:
-    """The values by name; ``missing`` are those that this drive does not have."""
+    """The values by name; ``missing`` are those that this drive does not have, ``unreadable`` has why others
+    were not read. ``objects`` are values that the mapping file does not list."""
 
     values: dict[str, Value] = field(default_factory=dict[str, Value])
     missing: list[str] = field(default_factory=list[str])
+    objects: dict[str, Value] = field(default_factory=dict[str, Value])
+    unreadable: dict[str, str] = field(default_factory=dict[str, str])
+    identity: dict[str, int] = field(default_factory=dict[str, int])
+    indices_done: int = 0
+    """Of ``Names.settings``."""
 
 
 @dataclass(slots=True)
@@ -49,6 +66,8 @@ class Restored:
     written: list[Written] = field(default_factory=list[Written])
     same: list[str] = field(default_factory=list[str])
     missing: list[str] = field(default_factory=list[str])
+    read_only: list[str] = field(default_factory=list[str])
+    """Objects that no file describes and the drive does not take: what a scan finds may be actual values."""
     failed: str = ""
     error: ParameterError | None = None
     left: list[str] = field(default_factory=list[str])
@@ -99,17 +118,100 @@ def in_order(names: Names, values: Mapping[str, Value]) -> list[tuple[Entry, Val
 
 
 def back_up(access: DriveParameters, into: Backup, now: float) -> Steps:
-    """Read every setting into ``into``. Raises ``ParameterError`` where one cannot be read."""
+    """Read every setting into ``into`` that is not there yet. Raises ``ParameterError`` where the drive does
+    not answer; what it refuses costs that value alone."""
     for entry in settings(access.names, on_first=access.on_first):
+        if entry.name in into.values or entry.name in into.missing or entry.name in into.unreadable:
+            continue
         try:
             reading = yield from access.read(entry, now)
         except ParameterError as error:
-            if error.abort_code not in MISSING:
-                raise
-            into.missing.append(entry.name)
+            if error.abort_code in MISSING:
+                into.missing.append(entry.name)
+            else:
+                into.unreadable[entry.name] = _refusal(error)
             continue
         now = reading.time
         into.values[entry.name] = reading.value
+
+
+def scan(access: DriveParameters, into: Backup, now: float) -> Steps:
+    """Read what is found where the family keeps its settings and the mapping file does not list. Raises
+    ``ParameterError`` where the drive does not answer."""
+    for index in access.names.settings[into.indices_done :]:
+        found = yield from _scan_object(access, index, now)
+        into.objects |= found.objects
+        into.unreadable |= found.unreadable
+        into.indices_done += 1
+
+
+def _scan_object(
+    access: DriveParameters, index: int, now: float
+) -> Generator[Transfer, tuple[bytes, float], Backup]:
+    """Every sub-index of one object. Where there are others, the first is their number (CiA 301 §7.4.3)."""
+    names, found, gap, has_subs = access.names, Backup(), 0, False
+    first = ""
+    for sub in range(_SUBS):
+        entry = names.at(ObjectRef(index, sub))
+        try:
+            reading = yield from access.read(entry, now)
+            _, is_told = yield from access.compare(entry, reading.value, reading.time)
+        except ParameterError as error:
+            why = _refusal(error)
+            if error.abort_code == _NO_OBJECT:
+                break
+            if error.abort_code not in MISSING:
+                found.unreadable[entry.name] = why
+            gap += 1
+            if gap > names.widest_gap:
+                break
+            continue
+        gap, has_subs = 0, has_subs or sub > 0
+        first = first if sub else entry.name
+        if entry.definition is not None or names.protection.why_never(entry):
+            continue
+        if is_told:
+            found.objects[entry.name] = reading.value
+        else:
+            found.unreadable[entry.name] = "is neither a number nor a text"
+    if has_subs:
+        found.objects.pop(first, None)
+        found.unreadable.pop(first, None)
+    return found
+
+
+def identify(into: dict[str, int]) -> Steps:
+    """What the node says that it is (1018h). Raises ``ParameterError`` where it does not answer, and where it
+    says something else than ``into`` has."""
+    found: dict[str, int] = {}
+    for sub, name in enumerate(IDENTITY, 1):
+        try:
+            data, _ = yield Transfer(ObjectRef(0x1018, sub), of_node=True)
+        except TransferFailed as failure:
+            if not failure.by_drive:
+                raise ParameterError(Why.NO_ANSWER, f"its identity: {failure}") from None
+            continue
+        found[name] = int.from_bytes(data[:4], "little")
+    if into and into != found:
+        raise ParameterError(Why.NOT_CONFIGURED, "another device answers than before (1018h)")
+    into |= found
+
+
+def why_another(of_file: Mapping[str, int], of_node: Mapping[str, int]) -> str:
+    """Why a set is not of a drive of this kind; empty where it is, or where the set does not say."""
+    for name in ("vendor", "product"):
+        if name in of_file and of_file[name] != of_node.get(name):
+            is_now = f"{of_node[name]:08X}h" if name in of_node else "not told"
+            return f"the file is of a node with {name} {of_file[name]:08X}h, and this one's is {is_now}"
+    return ""
+
+
+def _refusal(error: ParameterError) -> str:
+    """Why a value was not read, in words. Raises ``error`` again where the drive has not answered at all."""
+    if error.why is Why.NO_ANSWER:
+        raise error
+    code = error.abort_code
+    return f"{abort.text(code)} ({code:08X}h)" if code else str(error)
 
 
 def compare(
@@ -134,6 +236,26 @@ def compare(
             into.differences.append(Difference(entry, reading.value, value))
 
 
+def compare_sets(
+    names: Names, values: Mapping[str, Value], wanted: Mapping[str, Value], into: Comparison
+) -> None:
+    """Compare ``wanted`` with ``values``, which stand for the drive. Raises ``ParameterError``."""
+    held = {entry.address: value for entry, value in in_order(names, values)}
+    for entry, value in in_order(names, wanted):
+        if entry.address not in held:
+            into.missing.append(entry.name)
+        elif _is_same(entry, held[entry.address], value):
+            into.same.append(entry.name)
+        else:
+            into.differences.append(Difference(entry, held[entry.address], value))
+
+
+def _is_same(entry: Entry, one: Value, other: Value) -> bool:
+    if entry.definition is None:
+        return one == other
+    return encode_value(entry, one, None) == encode_value(entry, other, None)
+
+
 def restore(
     access: DriveParameters,
     values: Mapping[str, Value],
@@ -142,17 +264,23 @@ def restore(
     before_it: Asks | None = None,
 ) -> Steps:
     """Write a set where the drive differs; every write is read back, and the first refusal ends it.
-    ``before_it`` is that of ``DriveParameters.write``.
+    ``before_it`` is that of ``DriveParameters.write``. It may be done again with the same ``into``.
 
     Raises ``ParameterError`` only for a set that does not fit, before anything is written.
     """
     wanted = _checked(access, values)
+    ours = {one.reading.entry.address for one in into.written}
+    into.same, into.missing, into.read_only, into.left = [], [], [], []
+    into.failed, into.error = "", None
     for place, (entry, value) in enumerate(wanted):
         try:
             written = yield from access.write(entry, value, now, before_it=before_it)
         except ParameterError as error:
             if error.abort_code in MISSING:
                 into.missing.append(entry.name)
+                continue
+            if error.abort_code in _READ_ONLY and entry.definition is None:
+                into.read_only.append(entry.name)
                 continue
             into.failed, into.error = entry.name, error
             into.left = [later.name for later, _ in wanted[place + 1 :]]
@@ -162,7 +290,7 @@ def restore(
             into.written.append(written)
             if access.keeps_in_ram(entry):
                 into.warning = _in_ram(access)
-        else:
+        elif entry.address not in ours:
             into.same.append(entry.name)
 
 

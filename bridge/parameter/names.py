@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import difflib
 import re
+import string
 from collections.abc import Iterator
 from typing import Final
 
 from bridge.mapping.model import Family, ObjectRef, Parameter
-from bridge.mapping.parameters import object_of
+from bridge.mapping.parameters import indices, object_of
 from bridge.parameter.definition import Entry
 from bridge.parameter.error import ParameterError, Why
 from bridge.parameter.protection import Protection
@@ -25,6 +26,7 @@ _SPELLINGS: Final = (
 _PUNCTUATION: Final = re.compile(r"[^0-9A-Za-z]+$")
 _NEAREST: Final = 3
 _MOST_SUB: Final = 0xFF
+_MOST_NUMBER: Final = 99_999
 
 
 class Names:
@@ -80,6 +82,58 @@ class Names:
             if definition.point and definition.readable:
                 for element in self._elements(definition):
                     yield self._entry(definition, element, None)
+
+    @property
+    def settings(self) -> list[int]:
+        """The indices among which the drive keeps its settings, whether or not the file lists them."""
+        spans = self._rule.settings if self._rule else []
+        return [index for span in spans for index in indices(span)]
+
+    @property
+    def widest_gap(self) -> int:
+        """So many sub-indices of an object in turn may be missing before one that is there: an array
+        without sets has its elements that far apart."""
+        return max(1, abs(self._rule.element_step)) if self._rule else 1
+
+    def at(self, address: ObjectRef) -> Entry:
+        """The entry at ``address``, by the vendor's name where the pattern has one for it."""
+        return self._by_address.get(address) or Entry(self._vendors(address) or str(address), address)
+
+    def _vendors(self, address: ObjectRef) -> str:
+        """How the vendor writes ``address``, in the shape of the family's example; empty if it does not."""
+        rule = self._rule
+        shape = re.match(r"([A-Z])(\d+)", rule.example) if rule else None
+        if rule is None or shape is None or rule.hexadecimal or not rule.number_step:
+            return ""
+        letters = string.ascii_uppercase if rule.letter_step else shape[1]
+        for letter in letters:
+            offset = rule.letter_step * (ord(letter) - ord("A"))
+            number, rest = divmod(address.index - rule.index - offset, rule.number_step)
+            if rest or not 0 <= number <= _MOST_NUMBER:
+                continue
+            for name in self._candidates(f"{letter}{number:0{len(shape[2])}}", address.sub):
+                try:
+                    if object_of(rule, name) == address:
+                        return name
+                except ValueError:
+                    continue
+        return ""
+
+    def _candidates(self, name: str, sub: int) -> Iterator[str]:
+        """The names under ``name`` that may stand for the sub-index, the shortest first."""
+        yield name
+        rule = self._rule
+        if rule is None:
+            return
+        in_set = range(1, abs(rule.element_step) + 1) if rule.set_step else (None,)
+        for number in in_set:
+            left = sub - rule.sub - rule.set_step * (number or 0)
+            place, rest = divmod(left, rule.element_step or 1)
+            if rest or place < 0:
+                continue
+            if number is not None and not place:
+                yield self._spelled(name, None, number)
+            yield self._spelled(name, place + rule.element_first, number)
 
     def hint(self, text: str) -> str:
         """The nearest names and how names look, as the end of a sentence."""

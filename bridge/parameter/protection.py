@@ -12,6 +12,7 @@ from typing import Final
 from bridge.mapping.aliases import COMMUNICATION, Alias, aliases
 from bridge.mapping.model import Family, ObjectRef, Parameter
 from bridge.mapping.own_places import places
+from bridge.mapping.parameters import indices
 from bridge.parameter.definition import Entry
 
 NEVER: Final = "command"
@@ -23,7 +24,7 @@ class Protection:
 
     def __init__(self, family: Family, flagged: Iterable[tuple[int, Parameter]]) -> None:
         rule = family.parameter_names
-        self._commands = [_span(one) for one in rule.protected] if rule else []
+        self._commands = [indices(one) for one in rule.protected] if rule else []
         self._own = {place.ref.index for place in places(family, link=True)}
         self._flags: dict[int, str] = {index: one.protected for index, one in flagged if one.protected}
         self._aliases: dict[int, list[Alias]] = {}
@@ -84,8 +85,3 @@ class Protection:
         if not why and self.level(entry.address) == "communication":
             why = f"{entry.name} decides who commands the drive and what supervises it"
         return why
-
-
-def _span(text: str) -> range:
-    first, _, last = text.partition("-")
-    return range(int(first, 16), int(last or first, 16) + 1)

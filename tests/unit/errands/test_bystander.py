@@ -120,3 +120,13 @@ def test_who_commands_the_bus_is_heard(can_id: int) -> None:
     assert (bystander.found, bystander.status) == ("", 0x0B37)
     bystander.on_frame(Frame(can_id, bytes(2), 0.2))
     assert bystander.found
+
+
+def test_nothing_of_a_whole_set_is_written_while_the_drive_is_known_to_be_enabled() -> None:
+    family = load_family("nord/sk-tu4-cao")
+    names = Names(family)
+    entries = [names.resolve("P102")]
+    enabled = Standstill(names, family, family.slot[0], 0x0B37, force=True, whole=True)
+    assert "a set of parameters: not written while" in str(answered(enabled.check(entries), {}))
+    unknown = Standstill(names, family, family.slot[0], None, force=False, whole=True)
+    assert answered(unknown.check(entries), {}) is None

@@ -5,18 +5,29 @@ The command line's errand with the simulated NORD interface, on a virtual clock.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 import pytest
 
+from bridge.canopen import abort
 from bridge.config import NodeTable
 from bridge.errands.parameter import ParameterErrand
 from bridge.errors import FileFaults
 from bridge.image import Value
 from bridge.mapping import load_family
 from bridge.node.parameters.run import Procedure
-from bridge.parameter import DriveParameters, Ledger, Names, ParameterError, backups
+from bridge.parameter import (
+    DriveParameters,
+    Ledger,
+    Names,
+    ObjectRef,
+    ParameterError,
+    Transfer,
+    TransferFailed,
+    Why,
+    backups,
+)
 from bridge.parameter.backup_file import BackupFile, read_backup
 from bridge.parameter.ledger import Saved
 from bridge.sim.nord_supervision import Presence
@@ -157,11 +168,22 @@ def test_a_name_that_there_is_not_stops_it_before_anything_is_written(workshop: 
 
 def test_a_file_is_read_as_it_was_written(tmp_path: Path, workshop: Workshop) -> None:
     values = {**workshop.back_up().values, 'a "name"\\': "über\n\t\x7f", "yes": True, "tiny": 1e-300}
-    written = BackupFile("nord/sk-tu4-cao", "conveyor/fu1", "2026-11-21", values, {"P102.1": "s"}, ("P999",))
+    written = BackupFile(
+        "nord/sk-tu4-cao",
+        "conveyor/fu1",
+        "2026-11-21",
+        values,
+        {"P102.1": "s"},
+        ("P999",),
+        {"vendor": 0x38, "serial": 7},
+        {"P203": 11, "P220.2": "text"},
+        {"P240": "a line\nand another"},
+    )
     path = tmp_path / "fu1.toml"
     path.write_text(written.text(), "utf-8")
     read = read_backup(path)
     assert read.values == values
+    assert (read.identity, read.objects) == (written.identity, written.objects)
     assert (read.mapping, read.drive, read.saved) == ("nord/sk-tu4-cao", "conveyor/fu1", "2026-11-21")
 
 
@@ -169,7 +191,11 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path, workshop: Workshop) ->
     ("text", "message"),
     [
         ("format = ", "is not TOML"),
-        ("", "format: must be 1"),
+        ("", "format: must be 2"),
+        ("format = 3", "format: must be 2"),
+        ('format = 2\nmapping = "a"\n[parameters]\n[objects]\nP1 = []', 'objects."P1": must be a number'),
+        ('format = 2\nmapping = "a"\n[parameters]\nP1 = 1\n[objects]\nP1 = 2', "stands in [parameters], too"),
+        ('format = 2\nmapping = "a"\n[parameters]\n[identity]\nserial = "x"', "identity.serial: must be"),
         ("", "parameters: is missing"),
         ('format = 1\nmapping = "a"\n[parameters]\nP102 = [1]', 'parameters."P102": must be a number'),
         ('format = 1\nmapping = "a"\n[parameters]\nP102 = nan', 'parameters."P102": must be a number'),
@@ -243,3 +269,155 @@ def test_an_object_that_no_file_lists_echoes_the_sign_that_was_written() -> None
     with pytest.raises(StopIteration) as end:
         steps.send((b"\xfb\xff", 0.0))
     assert end.value.value.reading.value == -5
+
+
+class AnyDrive:
+    """Answers a procedure as a drive with these objects does: bytes, or the abort code that it refuses with.
+    It falls silent after ``answers`` of them."""
+
+    def __init__(self, objects: dict[tuple[int, int], bytes | int], answers: int = 100_000) -> None:
+        self.objects, self.answers = objects, answers
+        self.written: dict[tuple[int, int], bytes] = {}
+
+    def run(self, steps: Generator[Transfer, tuple[bytes, float], None]) -> ParameterError | None:
+        try:
+            transfer = next(steps)
+            while True:
+                try:
+                    answer = self._answer(transfer)
+                except TransferFailed as failure:
+                    transfer = steps.throw(failure)
+                else:
+                    transfer = steps.send((answer, 0.0))
+        except StopIteration:
+            return None
+        except ParameterError as error:
+            return error
+
+    def _answer(self, transfer: Transfer) -> bytes:
+        self.answers -= 1
+        if self.answers < 0:
+            raise TransferFailed("no valid answer", abort.TIMED_OUT, by_drive=False)
+        place = (transfer.address.index, transfer.address.sub)
+        is_there = any(index == place[0] for index, _ in self.objects)
+        held = self.objects.get(place, 0x0609_0011 if is_there else 0x0602_0000)
+        if isinstance(held, int):
+            raise TransferFailed("the node aborted", held, by_drive=True)
+        if transfer.data is not None:
+            if place in READ_ONLY:
+                raise TransferFailed("the node aborted", 0x0601_0002, by_drive=True)
+            self.written[place] = self.objects[place] = transfer.data
+        return held
+
+
+READ_ONLY = {(0x20C9, 0)}
+MOTOR = {
+    (0x20C8, 0): b"\x07\0",  # P200, a plain one
+    (0x20C9, 0): b"\x01\0\0\0",  # P201, which the drive does not let be written
+    (0x20CB, 0): b"\x04",  # P203 in four sets; the first says how many
+    **{(0x20CB, number): bytes((10 * number, 0)) for number in range(1, 5)},
+    (0x20CC, 1): b"\x01\0",  # P204, an array without sets
+    (0x20CC, 5): b"\x02\0",
+    (0x20CD, 0): 0x0601_0001,  # P205 can only be written
+    (0x20CE, 0): b"\x01\x02\x03",  # P206 is no number of any length that there is
+    (0x2066, 1): b"\x64\0",  # P102 is listed
+}
+FOUND = {"P200": 7, "P201": 1, "P203.1": 10, "P203.2": 20, "P203.3": 30, "P203.4": 40}
+FOUND |= {"P204.1": 1, "P204[2].1": 2}
+
+
+def _access() -> DriveParameters:
+    return DriveParameters("conveyor/fu1", "conveyor", NORD, Names(NORD), Ledger())
+
+
+def test_a_scan_finds_what_the_mapping_file_does_not_list_under_the_makers_names() -> None:
+    found = backups.Backup()
+    assert AnyDrive(dict(MOTOR)).run(backups.scan(_access(), found, 0.0)) is None
+    assert found.objects == FOUND
+    assert found.unreadable == {
+        "P205": "attempt to read a write-only object (06010001h)",
+        "P206": "is neither a number nor a text",
+    }
+    names = Names(NORD)
+    assert all(names.resolve(name).name == name for name in (*found.objects, *found.unreadable))
+
+
+@pytest.mark.parametrize("answers", [0, 1, 350, 400, 500, 520, 540])
+def test_a_scan_that_broke_off_goes_on_where_it_was(answers: int) -> None:
+    found, access = backups.Backup(), _access()
+    error = AnyDrive(dict(MOTOR), answers).run(backups.scan(access, found, 0.0))
+    assert error is None or error.why is Why.NO_ANSWER
+    assert AnyDrive(dict(MOTOR)).run(backups.scan(access, found, 0.0)) is None
+    assert found.objects == FOUND
+
+
+def test_a_value_that_the_drive_refuses_costs_a_backup_that_value_alone() -> None:
+    names, found = Names(NORD), backups.Backup()
+    objects: dict[tuple[int, int], bytes | int] = {
+        (entry.address.index, entry.address.sub): b"\x01\0\0\0" for entry in backups.settings(names)
+    }
+    objects[0x2066, 2] = 0x0606_0000
+    assert AnyDrive(objects).run(backups.back_up(_access(), found, 0.0)) is None
+    assert found.unreadable == {"P102.2": "access failed due to a hardware error (06060000h)"}
+    assert len(found.values) == len(backups.settings(names)) - 1
+
+
+def test_what_was_scanned_is_restored_where_it_differs_and_what_is_read_only_is_named() -> None:
+    drive, done = AnyDrive(dict(MOTOR)), backups.Restored()
+    values: dict[str, Value] = {**FOUND, "P203.2": 25, "P201": 2, "P102.1": 1.0}
+    assert drive.run(backups.restore(_access(), values, done, 0.0)) is None
+    assert drive.written == {(0x20CB, 2): b"\x19\0"}
+    assert (done.read_only, done.error) == (["P201"], None)
+
+
+def test_a_restore_that_broke_off_goes_on_and_writes_nothing_twice() -> None:
+    objects, done, access = dict(MOTOR), backups.Restored(), _access()
+    values: dict[str, Value] = {"P200": 8, "P203.1": 11, "P203.2": 21}
+    # read P200, read P560, write, read back: four answers each
+    AnyDrive(objects, 5).run(backups.restore(access, values, done, 0.0))
+    assert done.error
+    assert done.error.why is Why.NO_ANSWER
+    again = AnyDrive(objects)
+    access.forget()
+    assert again.run(backups.restore(access, values, done, 0.0)) is None
+    assert (done.error, done.same) == (None, [])
+    assert [one.reading.entry.name for one in done.written] == ["P200", "P203.1", "P203.2"]
+    assert again.written.keys() == {(0x20CB, 1), (0x20CB, 2)}
+
+
+def test_the_makers_name_is_found_for_an_object_of_every_family() -> None:
+    for family, place, name in (
+        ("nord/sk-tu4-cao", "20CB:03", "P203.3"),
+        ("nord/sk-tu4-cao", "1018:01", "1018:01"),
+        ("lenze/8400-motec", "5FF4:00", "C00011"),
+        ("lenze/8400-motec", "5FD8:01", "C00039/1"),
+        ("stoeber/5000", "2401:00", "C01"),
+    ):
+        names = Names(load_family(family))
+        index, _, sub = place.partition(":")
+        assert names.at(ObjectRef(int(index, 16), int(sub, 16))).name == name
+
+
+def test_a_set_is_of_a_drive_with_the_same_vendor_and_product() -> None:
+    of_file = {"vendor": 0x38, "product": 2, "serial": 1}
+    assert not backups.why_another(of_file, {"vendor": 0x38, "product": 2, "serial": 9})
+    assert not backups.why_another({}, {"vendor": 0x38})
+    assert "product 00000002h" in backups.why_another(of_file, {"vendor": 0x38, "product": 3})
+    assert "not told" in backups.why_another(of_file, {"vendor": 0x38})
+
+
+def test_another_device_that_answers_after_a_break_is_noticed(workshop: Workshop) -> None:
+    identity: dict[str, int] = {}
+    assert workshop.run(lambda now: backups.identify(identity)) is None
+    assert {"vendor", "product"} <= identity.keys()
+    assert workshop.run(lambda now: backups.identify(identity)) is None
+    identity["serial"] = 99
+    assert "another device" in str(workshop.run(lambda now: backups.identify(identity)))
+
+
+def test_two_sets_are_compared_without_a_drive() -> None:
+    found = backups.Comparison()
+    one: dict[str, Value] = {"P102.1": 2.0, "P200": 7, "P560": 1}
+    backups.compare_sets(Names(NORD), one, {**one, "P102.1": 2.5, "P513": 1.0}, found)
+    assert [(one.entry.name, one.in_drive, one.in_set) for one in found.differences] == [("P102.1", 2.0, 2.5)]
+    assert (found.missing, len(found.same)) == (["P513"], 2)

@@ -1,0 +1,73 @@
+"""Files of parameter sets on the command line, without a drive."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import Result
+from typer.testing import CliRunner
+
+from bridge.cli.app import make_app
+
+SITE = """
+[site]
+name = "hall3"
+[[bus]]
+name = "can0"
+interface = "socketcan"
+channel = "can0"
+[[bus.node]]
+name = "conveyor"
+id = 5
+mapping = "nord/sk-tu4-cao"
+[[bus.node.drive]]
+slot = "fu1"
+"""
+FILE = 'format = 2\nmapping = "nord/sk-tu4-cao"\n[parameters]\n"P102.1" = {}\n[objects]\n"P203.1" = 11\n'
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "site.toml").write_text(SITE, "utf-8")
+    (tmp_path / "monday.toml").write_text(FILE.format(2.0), "utf-8")
+    (tmp_path / "fu1.toml").write_text(FILE.format(1.5), "utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def compare(*arguments: str) -> Result:
+    words = ["parameters", "compare", "site.toml", "conveyor/fu1", *arguments]
+    return CliRunner().invoke(make_app("parameters"), words)
+
+
+@pytest.mark.usefixtures("folder")
+def test_two_files_are_compared_without_a_bus() -> None:
+    done = compare("fu1.toml", "--with", "monday.toml")
+    assert done.exit_code == 1
+    assert done.output.splitlines() == [
+        "name    in monday.toml  in the file",
+        "P102.1  2 s             1.5 s",
+        "conveyor/fu1: 1 differ, 1 are the same",
+    ]
+    same = compare("fu1.toml", "--with", "fu1.toml", "--json")
+    assert (same.exit_code, json.loads(same.output)["ok"]) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (('"nord/sk-tu4-cao"', '"lenze/8400-motec"'), "is of lenze/8400-motec"),
+        (('"P203.1" = 11', '"P203.1" = '), "is not TOML"),
+        (('"P203.1" = 11', '"P102.1" = 1.5'), "stands in [parameters], too"),
+        (('"P203.1" = 11', '"P102" = 1.5'), "are the same parameter"),
+    ],
+)
+def test_a_file_that_does_not_fit_is_named(folder: Path, change: tuple[str, str], message: str) -> None:
+    text = (folder / "fu1.toml").read_text("utf-8").replace(*change)
+    (folder / "fu1.toml").write_text(text, "utf-8")
+    done = compare("fu1.toml", "--with", "monday.toml")
+    said = " ".join((done.output + str(done.exception)).replace("│", " ").split())
+    assert done.exit_code != 0
+    assert message in said

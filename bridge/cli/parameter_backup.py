@@ -13,6 +13,7 @@ import typer
 
 from bridge import clock
 from bridge.cli.bus import AsJson, print_table, tell
+from bridge.cli.factory import DESCRIPTIONS, described, factory
 from bridge.cli.parameter_drive import DriveArgument, Force, SiteArgument, Target, Yes, find
 from bridge.cli.parameter_sets import read_all, write_all
 from bridge.errors import OperationFailed
@@ -34,6 +35,9 @@ def backup(
     file: FileArgument,
     force: Annotated[bool, typer.Option("--force", help="overwrite FILE")] = False,
     listed: Annotated[bool, typer.Option("--listed", help="only what the mapping file lists")] = False,
+    eds: Annotated[
+        Path | None, typer.Option("--eds", metavar="EDS", help="also read what this device file describes")
+    ] = None,
     wait: Wait = 60,
     as_json: AsJson = False,
 ) -> None:
@@ -41,8 +45,9 @@ def backup(
     target = find(site, drive)
     if file.exists() and not force:
         raise typer.BadParameter(f"{file} exists already: --force overwrites it")
+    also = described(eds, target.access.names) if eds else []
     began = clock.now()
-    found = read_all(target, wait, scan=not listed)
+    found = read_all(target, wait, also, scan=not listed)
     took_s = clock.now() - began
     saved = datetime.now(UTC).isoformat(timespec="seconds")
     entries = {entry.name: entry for entry in backups.settings(target.access.names)}
@@ -109,6 +114,10 @@ def restore(
 ) -> None:
     """Write FILE to the drive where it differs, in the order of the mapping file, and read it back."""
     target = find(site, drive)
+    if file.suffix.lower() in DESCRIPTIONS:
+        raise typer.BadParameter(
+            "a device description is no backup: have the drive load its factory settings"
+        )
     content = _content(target, file)
     identity: dict[str, int] = {}
     target.run(lambda now: backups.identify(identity))
@@ -152,7 +161,13 @@ def restore(
 
 
 def _content(target: Target, file: Path) -> BackupFile:
-    """A file that fits this drive. Raises ``BadParameter`` where it does not."""
+    """A file that fits this drive, or the factory settings of a device description. Raises ``BadParameter``
+    where it does not fit."""
+    if file.suffix.lower() in DESCRIPTIONS:
+        objects = factory(file, target.access.names, target.node.id)
+        if not objects:
+            raise typer.BadParameter(f"{file} has no factory settings of {target.name}")
+        return BackupFile(target.node.mapping, target.name, "", {}, {}, objects=objects)
     content = read_backup(file)
     if content.mapping != target.node.mapping:
         raise typer.BadParameter(

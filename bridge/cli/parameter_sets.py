@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from bridge import clock
@@ -12,16 +12,16 @@ from bridge.cli.parameter_drive import Target
 from bridge.cli.terminal import Show
 from bridge.errors import OperationFailed
 from bridge.image import Value
-from bridge.parameter import ParameterError, Why, backups
+from bridge.parameter import ObjectRef, ParameterError, Why, backups
 from bridge.parameter.access import Asks
 
 _PAUSE_S: Final = 1.0
 """Between two attempts at a node that does not answer."""
 
 
-def read_all(target: Target, wait_s: float, *, scan: bool) -> backups.Backup:
-    """All settings of a drive. Raises ``OperationFailed`` if the node does not answer for ``wait_s``, or if
-    another device answers meanwhile."""
+def read_all(target: Target, wait_s: float, also: Sequence[ObjectRef], *, scan: bool) -> backups.Backup:
+    """All settings of a drive, and what is at ``also``. Raises ``OperationFailed`` if the node does not
+    answer for ``wait_s``, or if another device answers meanwhile."""
     access, found = target.access, backups.Backup()
 
     def watch(show: Show) -> None:
@@ -34,10 +34,12 @@ def read_all(target: Target, wait_s: float, *, scan: bool) -> backups.Backup:
         yield from backups.back_up(access, found, now)
         if scan:
             yield from backups.scan(access, found, now)
+        yield from backups.read_objects(access, also, found, now)
 
     patience = _Patience(wait_s)
     while error := target.attempt(steps, watch=watch):
         done = len(found.values) + len(found.missing) + len(found.unreadable) + found.indices_done
+        done += len(found.objects)
         if not patience.wait(error, done):
             raise OperationFailed(f"{target.name}: {error}; no file was written")
     return found

@@ -8,7 +8,7 @@ goes on where it was when it is begun again with what it has filled so far.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -22,6 +22,7 @@ from bridge.parameter.definition import Entry
 from bridge.parameter.error import ParameterError, TransferFailed, Why
 from bridge.parameter.names import Names
 
+_NO_VALUE: Final = "is neither a number nor a text"
 _NO_OBJECT: Final = 0x0602_0000
 _READ_ONLY: Final = (0x0601_0000, 0x0601_0002)
 """Abort codes: no such access, read-only."""
@@ -145,6 +146,30 @@ def scan(access: DriveParameters, into: Backup, now: float) -> Steps:
         into.indices_done += 1
 
 
+def read_objects(access: DriveParameters, addresses: Iterable[ObjectRef], into: Backup, now: float) -> Steps:
+    """Read those of these objects that the mapping file does not list and ``into`` does not have yet. Raises
+    ``ParameterError`` where the drive does not answer."""
+    for address in addresses:
+        entry = access.names.at(address)
+        known = (into.objects, into.missing, into.unreadable)
+        if entry.definition is not None or any(entry.name in names for names in known):
+            continue
+        try:
+            reading = yield from access.read(entry, now)
+            _, is_told = yield from access.compare(entry, reading.value, reading.time)
+        except ParameterError as error:
+            if error.abort_code in MISSING:
+                into.missing.append(entry.name)
+            else:
+                into.unreadable[entry.name] = _refusal(error)
+            continue
+        now = reading.time
+        if is_told:
+            into.objects[entry.name] = reading.value
+        else:
+            into.unreadable[entry.name] = _NO_VALUE
+
+
 def _scan_object(
     access: DriveParameters, index: int, now: float
 ) -> Generator[Transfer, tuple[bytes, float], Backup]:
@@ -173,7 +198,7 @@ def _scan_object(
         if is_told:
             found.objects[entry.name] = reading.value
         else:
-            found.unreadable[entry.name] = "is neither a number nor a text"
+            found.unreadable[entry.name] = _NO_VALUE
     if has_subs:
         found.objects.pop(first, None)
         found.unreadable.pop(first, None)

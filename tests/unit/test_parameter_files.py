@@ -10,6 +10,11 @@ from click.testing import Result
 from typer.testing import CliRunner
 
 from bridge.cli.app import make_app
+from bridge.cli.factory import described, factory
+from bridge.mapping import load_family
+from bridge.mapping.loader import mappings_dir
+from bridge.parameter import Names, ObjectRef
+from bridge.parameter.codec import decode
 
 SITE = """
 [site]
@@ -71,3 +76,26 @@ def test_a_file_that_does_not_fit_is_named(folder: Path, change: tuple[str, str]
     said = " ".join((done.output + str(done.exception)).replace("│", " ").split())
     assert done.exit_code != 0
     assert message in said
+
+
+def test_an_eds_gives_the_factory_settings_and_what_there_is_to_read() -> None:
+    names = Names(load_family("lenze/8400-motec"))
+    file = mappings_dir() / "lenze" / "8400-motec.eds"
+    settings = factory(file, names, 6)
+    # 5A20h:01 has the default 200 in the file
+    entry = names.at(ObjectRef(0x5A20, 1))
+    assert settings[entry.name] == decode(entry, (200).to_bytes(4, "little"))
+    assert entry.address in described(file, names)
+    assert not any(names.protection.why_never(names.resolve(name)) for name in settings)
+    assert min(place.index for place in described(file, names)) >= 0x2000
+
+
+def test_an_eds_is_compared_with_but_not_restored(folder: Path) -> None:
+    eds = str(mappings_dir() / "nord" / "sk-tu4-cao.eds")
+    done = compare("fu1.toml", "--with", eds)
+    assert done.exit_code == 2
+    assert "has no factory settings" in " ".join(done.output.replace("│", " ").split())
+    words = ["parameters", "restore", str(folder / "site.toml"), "conveyor/fu1", eds]
+    done = CliRunner().invoke(make_app("parameters"), words)
+    assert done.exit_code == 2
+    assert "is no backup" in " ".join(done.output.replace("│", " ").split())

@@ -421,3 +421,13 @@ def test_two_sets_are_compared_without_a_drive() -> None:
     backups.compare_sets(Names(NORD), one, {**one, "P102.1": 2.5, "P513": 1.0}, found)
     assert [(one.entry.name, one.in_drive, one.in_set) for one in found.differences] == [("P102.1", 2.0, 2.5)]
     assert (found.missing, len(found.same)) == (["P513"], 2)
+
+
+def test_what_a_device_file_describes_is_read_once_and_what_is_refused_is_named() -> None:
+    found = backups.Backup()
+    places = [ObjectRef(*place) for place in ((0x2066, 1), (0x20C8, 0), (0x20CD, 0), (0x2FFF, 0))]
+    drive = AnyDrive(dict(MOTOR))
+    for _ in range(2):
+        assert drive.run(backups.read_objects(_access(), places, found, 0.0)) is None
+    assert (found.objects, found.missing) == ({"P200": 7}, ["2FFF:00"])
+    assert list(found.unreadable) == ["P205"]

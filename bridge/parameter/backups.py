@@ -51,6 +51,8 @@ class Backup:
     identity: dict[str, int] = field(default_factory=dict[str, int])
     indices_done: int = 0
     """Of ``Names.settings``."""
+    silent: set[str] = field(default_factory=set[str])
+    """What the drive has not answered for once."""
 
 
 @dataclass(slots=True)
@@ -130,7 +132,7 @@ def back_up(access: DriveParameters, into: Backup, now: float) -> Steps:
             if error.abort_code in MISSING:
                 into.missing.append(entry.name)
             else:
-                into.unreadable[entry.name] = _refusal(error)
+                into.unreadable[entry.name] = _refusal(entry, error, into)
             continue
         now = reading.time
         into.values[entry.name] = reading.value
@@ -140,7 +142,7 @@ def scan(access: DriveParameters, into: Backup, now: float) -> Steps:
     """Read what is found where the family keeps its settings and the mapping file does not list. Raises
     ``ParameterError`` where the drive does not answer."""
     for index in access.names.settings[into.indices_done :]:
-        found = yield from _scan_object(access, index, now)
+        found = yield from _scan_object(access, index, into, now)
         into.objects |= found.objects
         into.unreadable |= found.unreadable
         into.indices_done += 1
@@ -161,7 +163,7 @@ def read_objects(access: DriveParameters, addresses: Iterable[ObjectRef], into: 
             if error.abort_code in MISSING:
                 into.missing.append(entry.name)
             else:
-                into.unreadable[entry.name] = _refusal(error)
+                into.unreadable[entry.name] = _refusal(entry, error, into)
             continue
         now = reading.time
         if is_told:
@@ -171,7 +173,7 @@ def read_objects(access: DriveParameters, addresses: Iterable[ObjectRef], into: 
 
 
 def _scan_object(
-    access: DriveParameters, index: int, now: float
+    access: DriveParameters, index: int, into: Backup, now: float
 ) -> Generator[Transfer, tuple[bytes, float], Backup]:
     """Every sub-index of one object. Where there are others, the first is their number (CiA 301 §7.4.3)."""
     names, found, gap, has_subs = access.names, Backup(), 0, False
@@ -182,7 +184,7 @@ def _scan_object(
             reading = yield from access.read(entry, now)
             _, is_told = yield from access.compare(entry, reading.value, reading.time)
         except ParameterError as error:
-            why = _refusal(error)
+            why = _refusal(entry, error, into)
             if error.abort_code == _NO_OBJECT:
                 break
             if error.abort_code not in MISSING:
@@ -231,12 +233,16 @@ def why_another(of_file: Mapping[str, int], of_node: Mapping[str, int]) -> str:
     return ""
 
 
-def _refusal(error: ParameterError) -> str:
-    """Why a value was not read, in words. Raises ``error`` again where the drive has not answered at all."""
+def _refusal(entry: Entry, error: ParameterError, into: Backup) -> str:
+    """Why a value was not read, in words. Raises ``error`` again where the drive has not answered at all, but
+    for what it was silent about before: whoever begins again has seen that it answers."""
     if error.why is Why.NO_ANSWER:
-        raise error
+        if entry.name not in into.silent:
+            into.silent.add(entry.name)
+            raise error
+        return "no answer, twice"
     code = error.abort_code
-    return f"{abort.text(code)} ({code:08X}h)" if code else str(error)
+    return f"{abort.text(code)} ({code:08X}h)" if code and error.why is Why.REFUSED else str(error)
 
 
 def compare(

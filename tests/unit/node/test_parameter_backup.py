@@ -431,3 +431,21 @@ def test_what_a_device_file_describes_is_read_once_and_what_is_refused_is_named(
         assert drive.run(backups.read_objects(_access(), places, found, 0.0)) is None
     assert (found.objects, found.missing) == ({"P200": 7}, ["2FFF:00"])
     assert list(found.unreadable) == ["P205"]
+
+
+def test_what_the_drive_is_silent_about_twice_holds_up_nothing() -> None:
+    found, access = backups.Backup(), _access()
+
+    class Silent(AnyDrive):
+        def _answer(self, transfer: Transfer) -> bytes:
+            if (transfer.address.index, transfer.address.sub) == (0x20C8, 0):
+                raise TransferFailed("no valid answer", abort.TIMED_OUT, by_drive=False)
+            return super()._answer(transfer)
+
+    drive = Silent(dict(MOTOR))
+    error = drive.run(backups.scan(access, found, 0.0))
+    assert error
+    assert error.why is Why.NO_ANSWER
+    assert drive.run(backups.scan(access, found, 0.0)) is None
+    assert found.unreadable["P200"] == "no answer, twice"
+    assert found.objects == {name: value for name, value in FOUND.items() if name != "P200"}

@@ -96,8 +96,16 @@ class Names:
         return max(1, abs(self._rule.element_step)) if self._rule else 1
 
     def at(self, address: ObjectRef) -> Entry:
-        """The entry at ``address``, by the vendor's name where the pattern has one for it."""
-        return self._by_address.get(address) or Entry(self._vendors(address) or str(address), address)
+        """The entry at ``address``, by the vendor's name where that leads back to it."""
+        if listed := self._by_address.get(address):
+            return listed
+        name = self._vendors(address)
+        try:
+            leads_back = bool(name) and self.resolve(name).address == address
+        except ParameterError:
+            # Such as P120.2, where the file has P120 without parameter sets.
+            leads_back = False
+        return Entry(name if leads_back else str(address), address)
 
     def _vendors(self, address: ObjectRef) -> str:
         """How the vendor writes ``address``, in the shape of the family's example; empty if it does not."""

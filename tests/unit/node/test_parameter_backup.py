@@ -398,6 +398,15 @@ def test_the_makers_name_is_found_for_an_object_of_every_family() -> None:
         assert names.at(ObjectRef(int(index, 16), int(sub, 16))).name == name
 
 
+def test_every_name_that_a_scan_gives_leads_back_to_its_object() -> None:
+    names = Names(NORD)
+    for index in names.settings:
+        for sub in range(17):
+            place = ObjectRef(index, sub)
+            assert names.resolve(names.at(place).name).address == place
+    assert names.at(ObjectRef(0x2078, 2)).name == "2078:02", "P120 has no parameter sets"
+
+
 def test_a_set_is_of_a_drive_with_the_same_vendor_and_product() -> None:
     of_file = {"vendor": 0x38, "product": 2, "serial": 1}
     assert not backups.why_another(of_file, {"vendor": 0x38, "product": 2, "serial": 9})

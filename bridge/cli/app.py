@@ -20,6 +20,7 @@ _COMMANDS: Final = {
     "check": "project.check",
     "audit": "own_check.audit",
     "drop-test": "drop_test.drop_test",
+    "exchange": "exchange.exchange",
     "witness": "witness.witness",
     "eds": "eds.eds",
     "family": "family.app",

@@ -27,7 +27,7 @@ class Occasion:
 
 
 def facts(occasion: Occasion, node: Node, test: DropTest) -> dict[str, Any]:
-    """The report as a JSON object; ``sha256`` is that of the object without it, keys sorted, no spaces."""
+    """The report as a JSON object."""
     first = node.drives[0].identification
     report: dict[str, Any] = {
         "report": "drivebridge drop-test",
@@ -59,6 +59,11 @@ def facts(occasion: Occasion, node: Node, test: DropTest) -> dict[str, Any]:
         "failure": test.failure or None,
         "drives": [_drive(one) for one in test.outcomes],
     }
+    return sealed(report)
+
+
+def sealed(report: dict[str, Any]) -> dict[str, Any]:
+    """The report with its ``sha256``: that of the object without it, keys sorted, no spaces."""
     canonical = json.dumps(report, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return report | {"sha256": hashlib.sha256(canonical.encode()).hexdigest()}
 
@@ -143,12 +148,13 @@ def _ms(value: float | None) -> str:
     return "–" if value is None else f"{value:g} ms"
 
 
-def write(report: dict[str, Any], folder: Path) -> tuple[Path, Path]:
-    """The two files in ``folder``; raises OSError where they cannot be written."""
+def write(report: dict[str, Any], text: str, folder: Path) -> tuple[Path, Path]:
+    """The report as JSON, and ``text`` for people, in ``folder``; raises OSError where they cannot be
+    written."""
     folder.mkdir(parents=True, exist_ok=True)
     stamp = report["time"].replace(":", "").replace("+0000", "Z").replace("-", "")
     base = folder / f"{report['node']['name']}-{stamp}"
     as_json, as_text = base.with_suffix(".json"), base.with_suffix(".md")
     as_json.write_text(json.dumps(report, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    as_text.write_text(markdown(report), encoding="utf-8")
+    as_text.write_text(text, encoding="utf-8")
     return as_json, as_text

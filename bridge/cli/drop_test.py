@@ -46,17 +46,17 @@ def drop_test(
 ) -> None:
     """Stop supervising the drives of NODE, measure what they do, and write a report to be signed."""
     project = load_project(site)
-    bus, table = _find(project, node)
-    consent = _consent(table, at_the_machine=at_the_machine)
-    _refuse_company(project, bus, table)
+    bus, table = find_node(project, node)
+    consent = agree(table, at_the_machine=at_the_machine)
+    refuse_company(project, bus, table)
     occasion = drop_report.Occasion(
         operator or getpass.getuser(), socket.gethostname(), consent, datetime.now(UTC), site
     )
-    plant, test = _run(project, bus, table)
+    plant, test = perform(project, bus, table)
     facts = drop_report.facts(occasion, plant.nodes[table.name], test)
     folder = report or Path(project.site.site.state_dir) / "drop-tests"
     try:
-        files = drop_report.write(facts, folder)
+        files = drop_report.write(facts, drop_report.markdown(facts), folder)
     except OSError as error:
         print(json.dumps(facts, indent=2))
         raise OperationFailed(f"the report cannot be written to {folder}: {error.strerror}") from None
@@ -71,7 +71,8 @@ def drop_test(
         raise typer.Exit(1)
 
 
-def _find(project: Project, name: str) -> tuple[BusTable, NodeTable]:
+def find_node(project: Project, name: str) -> tuple[BusTable, NodeTable]:
+    """An enabled node on a real bus. Raises ``BadParameter``."""
     nodes = {node.name: (bus, node) for bus in project.site.bus for node in bus.node}
     if name not in nodes:
         raise typer.BadParameter(f"{name!r} is no node: {', '.join(nodes)}")
@@ -82,16 +83,17 @@ def _find(project: Project, name: str) -> tuple[BusTable, NodeTable]:
     return bus, node
 
 
-def _consent(node: NodeTable, *, at_the_machine: bool) -> str:
-    """How the operator agreed. Raises ``BadParameter`` or ``OperationFailed`` if nobody did."""
+def agree(node: NodeTable, *, at_the_machine: bool, first: str = "") -> str:
+    """How the operator agreed. ``first`` says what is done before the test. Raises ``BadParameter`` or
+    ``OperationFailed`` if nobody agreed."""
     if at_the_machine:
         return "agreed by --yes-i-am-at-the-machine"
     if not sys.stdin.isatty():
         raise typer.BadParameter("somebody has to be at the machine: run it on a terminal")
     tell(
-        f"The drives of {node.name} (id {node.id}) are booted, get stopped words, and are then left without "
-        "supervision until they report a fault. None is enabled; all of them will have to be acknowledged. "
-        "Nobody else may command this bus meanwhile. Be where the machine's emergency stop is."
+        f"{first}The drives of {node.name} (id {node.id}) are booted, get stopped words, and are then left "
+        "without supervision until they report a fault. None is enabled; all of them will have to be "
+        "acknowledged. Nobody else may command this bus meanwhile. Be where the machine's emergency stop is."
     )
     typed = typer.prompt("The node's name, to go on", err=True, default="", show_default=False)
     if typed.strip() != node.name:
@@ -99,7 +101,7 @@ def _consent(node: NodeTable, *, at_the_machine: bool) -> str:
     return "agreed by typing the node's name"
 
 
-def _refuse_company(project: Project, bus: BusTable, node: NodeTable) -> None:
+def refuse_company(project: Project, bus: BusTable, node: NodeTable) -> None:
     """Raises ``OperationFailed`` if another master commands this bus."""
     family = project.families[node.mapping]
     commands = frozenset(pdo.cob_id + node.id for slot in family.slot for pdo in slot.rpdo)
@@ -125,7 +127,8 @@ def alone(site: Site, bus: BusTable, node: NodeTable) -> Site:
     )
 
 
-def _run(project: Project, bus: BusTable, node: NodeTable) -> tuple[Plant, DropTest]:
+def perform(project: Project, bus: BusTable, node: NodeTable) -> tuple[Plant, DropTest]:
+    """The test on the drives of ``node``. Raises ``OperationFailed`` if it was interrupted."""
     site, families = alone(project.site, bus, node), project.families
     plant = Plant(site, families, __version__, clock.now())
     file = LedgerFile(Path(site.site.state_dir))

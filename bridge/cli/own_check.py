@@ -75,9 +75,13 @@ def audit(
     if bus is not None and bus not in names:
         raise typer.BadParameter(f"which bus? One of {', '.join(names)}")
     unavailable: list[str] = []
-    found = list(_audit(project, bus, unavailable, offline=offline))
+    found = list(audit_drives(project, bus, unavailable, offline=offline))
     if as_json:
-        print(json.dumps({"ok": all(one.is_ok for one in found), "drives": [*map(_facts, found)]}, indent=2))
+        print(
+            json.dumps(
+                {"ok": all(one.is_ok for one in found), "drives": [*map(audit_facts, found)]}, indent=2
+            )
+        )
     else:
         print_table([_COLUMNS, *(row for one in found for row in _rows(one))])
         _explain(found, site)
@@ -87,9 +91,11 @@ def audit(
         raise typer.Exit(1)
 
 
-def _audit(project: Project, only: str | None, unavailable: list[str], *, offline: bool) -> Iterator[Audited]:
-    """Each drive of the site, or of the bus ``only``; ``unavailable`` gets a line for each bus that cannot be
-    opened."""
+def audit_drives(
+    project: Project, only: str | None, unavailable: list[str], *, offline: bool = False, of_node: str = ""
+) -> Iterator[Audited]:
+    """Each drive of the site, or of the bus ``only``, or of one node alone; ``unavailable`` gets a line for
+    each bus that cannot be opened."""
     verdict = lint(project.site, project.families, project.path, project.downloads)
     cases = {case.drive: case for case in verdict.worst_cases}
     plant = Plant(project.site, project.families, __version__)
@@ -97,6 +103,7 @@ def _audit(project: Project, only: str | None, unavailable: list[str], *, offlin
         if only not in (None, table.name):
             continue
         nodes = [one for one in plant.nodes.values() if one.bus is table and one.table.enabled]
+        nodes = [one for one in nodes if of_node in ("", one.name)]
         answers: _Answers | None = None
         if not offline and table.interface == "virtual":
             tell(f"bus {table.name} is virtual: by site file and factory settings alone")
@@ -211,7 +218,8 @@ def _configure(want: OwnWant) -> Iterator[str]:
     yield f"value = {text}"
 
 
-def _facts(one: Audited) -> dict[str, Any]:
+def audit_facts(one: Audited) -> dict[str, Any]:
+    """What ``--json`` says of one drive."""
     own = one.own
     wants = (
         [] if own.verdict is OwnVerdict.STOPS else suggested(one.node.family, one.node.bus, one.node.table)

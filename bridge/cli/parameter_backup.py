@@ -90,14 +90,14 @@ def compare(
 ) -> None:
     """Compare FILE with the drive, or with another file; exit code 1 where they differ."""
     target = find(site, drive)
-    content = _content(target, file)
+    content = content_for(target, file)
     if other is None:
-        found = _compare(target, content.all)
+        found = differences(target, content.all)
     else:
         found = backups.Comparison()
-        names, second = target.access.names, _content(target, other)
+        names, second = target.access.names, content_for(target, other)
         backups.compare_sets(names, second.all, content.all, found)
-    _print_comparison(target, found, as_json, str(other) if other else "")
+    print_comparison(target, found, as_json, str(other) if other else "")
     if found.differences or found.missing:
         raise typer.Exit(OperationFailed.exit_code)
 
@@ -118,7 +118,7 @@ def restore(
         raise typer.BadParameter(
             "a device description is no backup: have the drive load its factory settings"
         )
-    content = _content(target, file)
+    content = content_for(target, file)
     identity: dict[str, int] = {}
     target.run(lambda now: backups.identify(identity))
     if why := backups.why_another(content.identity, identity):
@@ -127,9 +127,9 @@ def restore(
     if serial != identity.get("serial") and serial is not None:
         tell(f"{target.name} has the serial number {identity.get('serial', 'unknown')}, the file {serial}")
     asks = not yes and sys.stdin.isatty()
-    found = _compare(target, content.all)
+    found = differences(target, content.all)
     if dry_run or asks:
-        _print_comparison(target, found, as_json)
+        print_comparison(target, found, as_json)
         if dry_run or not found.differences:
             return
     changed = [one.entry for one in found.differences]
@@ -143,16 +143,16 @@ def restore(
     try:
         write_all(target, content.all, identity, done, check, wait)
     except OperationFailed:
-        _print_restored(target, done)
+        print_restored(target, done)
         raise
     for warning in (one.warning for one in done.written if one.warning):
         tell(f"warning: {warning}")
     if done.warning:
         tell(f"warning: {done.warning}")
     if as_json:
-        print(json.dumps(_as_json(done)))
+        print(json.dumps(restored_facts(done)))
     else:
-        _print_restored(target, done)
+        print_restored(target, done)
     if done.error:
         raise OperationFailed(
             f"{target.name}: {done.error}; it ended there: {len(done.written)} written, "
@@ -160,7 +160,7 @@ def restore(
         )
 
 
-def _content(target: Target, file: Path) -> BackupFile:
+def content_for(target: Target, file: Path) -> BackupFile:
     """A file that fits this drive, or the factory settings of a device description. Raises ``BadParameter``
     where it does not fit."""
     if file.suffix.lower() in DESCRIPTIONS:
@@ -180,13 +180,13 @@ def _content(target: Target, file: Path) -> BackupFile:
     return content
 
 
-def _compare(target: Target, values: Mapping[str, Value]) -> backups.Comparison:
+def differences(target: Target, values: Mapping[str, Value]) -> backups.Comparison:
     found = backups.Comparison()
     target.run(lambda now: backups.compare(target.access, values, found, now))
     return found
 
 
-def _print_comparison(target: Target, found: backups.Comparison, as_json: bool, other: str = "") -> None:
+def print_comparison(target: Target, found: backups.Comparison, as_json: bool, other: str = "") -> None:
     if as_json:
         differences = [
             {"name": one.entry.name, "in_drive": one.in_drive, "in_file": one.in_set, "unit": one.entry.unit}
@@ -207,7 +207,7 @@ def _print_comparison(target: Target, found: backups.Comparison, as_json: bool, 
     print(f"{target.name}: {len(found.differences)} differ, {len(found.same)} are the same")
 
 
-def _print_restored(target: Target, done: backups.Restored) -> None:
+def print_restored(target: Target, done: backups.Restored) -> None:
     for one in done.written:
         was = "" if one.before is None else f", was {shown(one.reading.entry, one.before)}"
         print(f"{one.reading}{was}")
@@ -218,7 +218,7 @@ def _print_restored(target: Target, done: backups.Restored) -> None:
     print(f"{target.name}: {len(done.written)} written, {len(done.same)} were the same")
 
 
-def _as_json(done: backups.Restored) -> dict[str, object]:
+def restored_facts(done: backups.Restored) -> dict[str, object]:
     return {
         "ok": done.error is None,
         "written": [

@@ -38,9 +38,7 @@ def read_all(target: Target, wait_s: float, also: Sequence[ObjectRef], *, scan: 
 
     patience = _Patience(wait_s)
     while error := target.attempt(steps, watch=watch):
-        done = len(found.values) + len(found.missing) + len(found.unreadable) + found.indices_done
-        done += len(found.objects)
-        if not patience.wait(error, done):
+        if not patience.wait(error, found.answers):
             raise OperationFailed(f"{target.name}: {error}; no file was written")
     return found
 

@@ -53,6 +53,8 @@ class Backup:
     """Of ``Names.settings``."""
     silent: set[str] = field(default_factory=set[str])
     """What the drive has not answered for once."""
+    answers: int = 0
+    """How often the drive has answered, if only with a refusal."""
 
 
 @dataclass(slots=True)
@@ -129,12 +131,14 @@ def back_up(access: DriveParameters, into: Backup, now: float) -> Steps:
         try:
             reading = yield from access.read(entry, now)
         except ParameterError as error:
+            why = _refusal(entry, error, into)
             if error.abort_code in MISSING:
                 into.missing.append(entry.name)
             else:
-                into.unreadable[entry.name] = _refusal(entry, error, into)
+                into.unreadable[entry.name] = why
             continue
         now = reading.time
+        into.answers += 1
         into.values[entry.name] = reading.value
 
 
@@ -160,12 +164,14 @@ def read_objects(access: DriveParameters, addresses: Iterable[ObjectRef], into: 
             reading = yield from access.read(entry, now)
             _, is_told = yield from access.compare(entry, reading.value, reading.time)
         except ParameterError as error:
+            why = _refusal(entry, error, into)
             if error.abort_code in MISSING:
                 into.missing.append(entry.name)
             else:
-                into.unreadable[entry.name] = _refusal(entry, error, into)
+                into.unreadable[entry.name] = why
             continue
         now = reading.time
+        into.answers += 1
         if is_told:
             into.objects[entry.name] = reading.value
         else:
@@ -193,6 +199,7 @@ def _scan_object(
             if gap > names.widest_gap:
                 break
             continue
+        into.answers += 1
         gap, has_subs = 0, has_subs or sub > 0
         first = first if sub else entry.name
         if entry.definition is not None or names.protection.why_never(entry):
@@ -241,6 +248,7 @@ def _refusal(entry: Entry, error: ParameterError, into: Backup) -> str:
             into.silent.add(entry.name)
             raise error
         return "no answer, twice"
+    into.answers += 1
     code = error.abort_code
     return f"{abort.text(code)} ({code:08X}h)" if code and error.why is Why.REFUSED else str(error)
 

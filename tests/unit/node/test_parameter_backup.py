@@ -442,6 +442,13 @@ def test_what_a_device_file_describes_is_read_once_and_what_is_refused_is_named(
     assert list(found.unreadable) == ["P205"]
 
 
+def test_a_drive_that_never_answers_is_not_taken_for_one_that_goes_on() -> None:
+    found, access, drive = backups.Backup(), _access(), AnyDrive(dict(MOTOR), answers=0)
+    for _ in range(5):
+        assert drive.run(backups.back_up(access, found, 0.0))
+    assert (found.answers, len(found.unreadable)) == (0, 4)
+
+
 def test_what_the_drive_is_silent_about_twice_holds_up_nothing() -> None:
     found, access = backups.Backup(), _access()
 

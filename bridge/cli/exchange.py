@@ -1,0 +1,222 @@
+"""``exchange``: a new device takes the place of an old one, with its settings, and is proven to stop."""
+
+from __future__ import annotations
+
+import getpass
+import json
+import socket
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from bridge import __version__
+from bridge.cli import drop_report, drop_test, exchange_report
+from bridge.cli.bus import AsJson, Line, carry_out, tell
+from bridge.cli.exchange_report import Exchange
+from bridge.cli.factory import DESCRIPTIONS
+from bridge.cli.own_check import audit_drives, audit_facts
+from bridge.cli.parameter_backup import (
+    Wait,
+    content_for,
+    differences,
+    print_comparison,
+    restored_facts,
+)
+from bridge.cli.parameter_drive import SiteArgument, Target, find
+from bridge.cli.parameter_sets import write_all
+from bridge.command import Plant
+from bridge.config import BusTable, NodeTable
+from bridge.errands.open_channels import OpenChannels
+from bridge.errors import OperationFailed
+from bridge.parameter import backups
+from bridge.parameter.backup_file import BackupFile
+from bridge.project import Project, load_project
+
+_ALL_BITS = 0xFFFF_FFFF
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """One drive of the node, and the backup that it gets."""
+
+    target: Target
+    file: Path
+    content: BackupFile
+
+    @property
+    def name(self) -> str:
+        return self.target.name
+
+
+def exchange(
+    site: SiteArgument,
+    node: Annotated[str, typer.Argument(metavar="NODE", help="the node's name in the site file")],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="a backup of each drive of the node, in any order")
+    ],
+    at_the_machine: Annotated[
+        bool, typer.Option("--yes-i-am-at-the-machine", help="agree without typing the node's name")
+    ] = False,
+    same_serial: Annotated[
+        bool, typer.Option("--same-serial", help="go on although the node's serial number is the old one")
+    ] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="also if a drive does not tell whether it is enabled")
+    ] = False,
+    operator: Annotated[str | None, typer.Option(help="who signs the report; the user's name")] = None,
+    wait: Wait = 60,
+    as_json: AsJson = False,
+) -> None:
+    """After NODE was exchanged: restore its backups, save, do the drop test, audit, and write a report."""
+    project = load_project(site)
+    bus, table = drop_test.find_node(project, node)
+    places = _places(project, site, table, files)
+    drop_test.refuse_company(project, bus, table)
+    identity: dict[str, int] = {}
+    places[0].target.run(lambda now: backups.identify(identity))
+    _judge(site, table, places, identity, same_serial=same_serial)
+    consent = drop_test.agree(
+        table,
+        at_the_machine=at_the_machine,
+        first=f"The settings of {node} are overwritten with those of the backups. ",
+    )
+    now = datetime.now(UTC)
+    occasion = drop_report.Occasion(operator or getpass.getuser(), socket.gethostname(), consent, now, site)
+    done = exchange_report.begin(Path(project.site.site.state_dir), occasion, table.name, identity, files)
+    if done.began != done.last:
+        tell(f"{node}: goes on with what was begun at {done.began}")
+    _open_channels(project, bus, node)
+    for place in places:
+        _restore(place, done, wait, force=force, quiet=as_json)
+    _save(places[0].target, done)
+    plant, test = drop_test.perform(project, bus, table)
+    dropped = drop_report.facts(occasion, plant.nodes[table.name], test)
+    audited = list(audit_drives(project, bus.name, [], of_node=table.name))
+    facts = exchange_report.facts(
+        occasion,
+        done,
+        table,
+        _old(places),
+        dropped,
+        [audit_facts(one) for one in audited],
+        ok=dropped["ok"] and all(one.is_ok for one in audited),
+    )
+    try:
+        written = done.end(facts)
+    except OSError as error:
+        print(json.dumps(facts, indent=2))
+        raise OperationFailed(f"the report cannot be written to {done.folder}: {error.strerror}") from None
+    if as_json:
+        print(json.dumps(facts | {"report_files": [str(file) for file in written]}, indent=2))
+    else:
+        print(exchange_report.markdown(facts))
+        tell(f"report: {written[0]}, {written[1]}")
+    if not facts["ok"]:
+        raise OperationFailed(test.failure or "the node has the settings, and is not proven to stop")
+
+
+def _places(project: Project, site: Path, node: NodeTable, files: Sequence[Path]) -> list[_Place]:
+    """Each drive of the node with its file. Raises ``BadParameter`` where one has none, or two."""
+    family = project.families[node.mapping]
+    targets = {
+        name: find(site, name) for name in (f"{node.name}/{family.leaf_of(one)}" for one in node.drive)
+    }
+    found: dict[str, _Place] = {}
+    for file in files:
+        if file.suffix.lower() in DESCRIPTIONS:
+            raise typer.BadParameter(f"{file} is a device description, and no backup")
+        # The file says whose it is; all drives of a node have the same mapping.
+        content = content_for(next(iter(targets.values())), file)
+        if content.drive not in targets:
+            raise typer.BadParameter(
+                f"{file} is of {content.drive or 'no drive'}, and {node.name} has {', '.join(targets)}"
+            )
+        if content.drive in found:
+            raise typer.BadParameter(f"{file} and {found[content.drive].file} are both of {content.drive}")
+        found[content.drive] = _Place(targets[content.drive], file, content)
+    if lacking := [name for name in targets if name not in found]:
+        raise typer.BadParameter(f"no backup is given of {', '.join(lacking)}")
+    return [found[name] for name in targets]
+
+
+def _old(places: Sequence[_Place]) -> dict[str, int]:
+    """What the files say that the old device was."""
+    for place in places:
+        if place.content.identity:
+            return dict(place.content.identity)
+    return {}
+
+
+def _judge(
+    site: Path, node: NodeTable, places: Sequence[_Place], identity: dict[str, int], *, same_serial: bool
+) -> None:
+    """Raises ``OperationFailed`` unless the node is a new device of the same kind that the site file lets be
+    used."""
+    for place in places:
+        if why := backups.why_another(place.content.identity, identity):
+            raise OperationFailed(f"{place.file}: {why}; nothing written")
+    # CiA 301 §7.5.2.18: 0 is no serial number.
+    old, new = _old(places).get("serial", 0), identity.get("serial", 0)
+    if old and old == new and not same_serial:
+        raise OperationFailed(
+            f"{node.name} still has the serial number {new}: it was not exchanged. If what was exchanged is "
+            "a drive behind it, say --same-serial"
+        )
+    tell(f"{node.name}: serial number {new or 'not told'}, was {old or 'not told'}")
+    wanted, mask = node.identity.serial, node.identity.serial_mask
+    if wanted is not None and (wanted ^ new) & (_ALL_BITS if mask is None else mask):
+        raise OperationFailed(
+            f"{site} has serial = {wanted} for {node.name}, and would refuse {new}: change it there first"
+        )
+
+
+def _open_channels(project: Project, bus: BusTable, name: str) -> None:
+    """A new interface may have only its first SDO channel open, which does not reach all of its drives."""
+    node = Plant(project.site, project.families, __version__).nodes[name]
+    errand = carry_out(Line(bus, project.families, is_of_site=True), lambda now: OpenChannels(node, now))
+    for note in errand.notes:
+        tell(f"{name}: {note}")
+    if errand.failure:
+        raise OperationFailed(f"{name}: {errand.failure}")
+
+
+def _restore(place: _Place, done: Exchange, wait_s: float, *, force: bool, quiet: bool) -> None:
+    """Show the differences, write the backup, and keep what was written also where it ends early. Raises
+    ``OperationFailed``."""
+    found = differences(place.target, place.content.all)
+    if not quiet:
+        print_comparison(place.target, found, as_json=False)
+    target = place.target
+    restored = backups.Restored(same=found.same, missing=found.missing)
+    try:
+        if found.differences:
+            changes = [one.entry for one in found.differences]
+            check = target.alone(force=force, whole=True).check
+            target.run(lambda now: check(changes))
+            write_all(target, place.content.all, done.identity, restored, check, wait_s)
+    finally:
+        done.keep(place.name, _facts(restored))
+    tell(f"{target.name}: {len(restored.written)} written")
+    if restored.error:
+        raise OperationFailed(
+            f"{target.name}: {restored.error}; {len(restored.left)} parameters not reached. Begin again when "
+            "it is mended: what is written already is not written again"
+        )
+
+
+def _facts(restored: backups.Restored) -> dict[str, Any]:
+    warnings = {one.warning for one in restored.written if one.warning} | {restored.warning} - {""}
+    return restored_facts(restored) | {"warnings": sorted(warnings)}
+
+
+def _save(target: Target, done: Exchange) -> None:
+    """Have the node keep what was written, where its family has a command for that."""
+    eeprom = target.family.eeprom
+    if eeprom is None or eeprom.save is None or not done.is_unsaved:
+        return
+    warning = target.run(target.access.save, writes=True)
+    done.saved(warning)

@@ -110,7 +110,7 @@ def main() -> None:
     for output in ("json", "markdown", "plots"):
         parser.add_argument(f"--{output}", type=Path)
     given = parser.parse_args()
-    if max(given.rates) * given.seconds / NODES > MOST_CHANGES:
+    if max(given.rates) * max(given.changed) / 100 * given.seconds / NODES > MOST_CHANGES:
         parser.error(f"a drive's value can count {MOST_CHANGES} changes: fewer seconds, please")
     if any(100 % changed for changed in given.changed):
         parser.error("the share of new values is one of 1, 2, 4, 5, 10, 20, 25, 50, 100")

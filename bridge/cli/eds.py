@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,8 +20,16 @@ from bridge.eds.pdos import PdoSummary, pdos
 from bridge.errors import OperationFailed
 
 
+class Format(StrEnum):
+    TEXT = "text"
+    CANOPEN = "canopen"
+
+
 def eds(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="an EDS, DCF, XDD or XDC")],
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="an EDS, DCF, XDD or XDC; with --format canopen a family too"),
+    ],
     node_id: Annotated[
         int | None, typer.Option(min=1, max=127, help="the node id that $NODEID stands for")
     ] = None,
@@ -27,8 +37,17 @@ def eds(
         Path | None, typer.Option(help="write what the file configures as a concise DCF (1F22h)")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="machine-readable")] = False,
+    form: Annotated[
+        Format,
+        typer.Option("--format", help="canopen: the EDS that python-canopen reads, with units and factors"),
+    ] = Format.TEXT,
 ) -> None:
     """Read FILE even if it has faults; print what it describes and what was wrong with it."""
+    if form is Format.CANOPEN:
+        if concise or as_json:
+            raise typer.BadParameter("goes with neither --concise nor --json", param_hint="--format canopen")
+        print(_canopen_eds()(str(file), node_id), end="")
+        return
     description = read_device_file(file)
     node_id = node_id or description.commissioning.node_id
     report = Report()
@@ -41,6 +60,20 @@ def eds(
         return
     for line in _lines(file, description, downloads, findings, node_id):
         print(printable(line))
+
+
+def _canopen_eds() -> Callable[[str, int | None], str]:
+    """Raises OperationFailed where canopen is missing: it is an extra, because nothing else needs it."""
+    try:
+        from bridge.dictionary import as_eds, load_dictionary
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.partition(".")[0] != "canopen":
+            raise
+        raise OperationFailed(
+            "an object dictionary for canopen needs that package, which is not installed: "
+            f"`{sys.executable} -m pip install canopen` (or install drivebridge as drivebridge[canopen])"
+        ) from None
+    return lambda what, node_id: as_eds(load_dictionary(what, node_id))
 
 
 def _write(path: Path, content: bytes) -> None:

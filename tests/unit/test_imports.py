@@ -22,6 +22,7 @@ _OTHERS = (
     "bridge.lint",
     "bridge.eds",
     "bridge.dbc",
+    "bridge.dictionary",
 )
 
 
@@ -44,6 +45,17 @@ def test_without_cantools_a_dbc_export_says_what_to_install() -> None:
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("writing a DBC file needs cantools")
     assert f"`{sys.executable} -m pip install cantools`" in done.stderr
+
+
+def test_without_canopen_its_object_dictionary_says_what_to_install() -> None:
+    script = (
+        "import sys; sys.modules['canopen'] = None; "
+        "sys.argv = ['drivebridge', 'eds', 'nord/sk-tu4-cao', '--format', 'canopen']; "
+        "from bridge.cli.app import run_app; run_app()"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert f"`{sys.executable} -m pip install canopen`" in done.stderr
 
 
 def commands(word: str = "") -> set[str]:

@@ -1,0 +1,9 @@
+"""Object dictionaries for the ``canopen`` package, of drive families, mapping files and device descriptions.
+
+Needs that package, which is an extra: nothing else of the bridge does.
+"""
+
+from bridge.dictionary.description import dictionary_of as dictionary_of
+from bridge.dictionary.family import add_family as add_family
+from bridge.dictionary.load import as_eds as as_eds
+from bridge.dictionary.load import load_dictionary as load_dictionary

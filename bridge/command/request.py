@@ -181,20 +181,22 @@ class SetTimeout:
 @dataclass(frozen=True, slots=True)
 class ReadParameter:
     """``parameter`` is a vendor's name, an object or the name of a point; ``max_age_ms`` is how old a value
-    read earlier may be."""
+    read earlier may be. ``raw``: the outcome's value is the bytes of the object, in hexadecimal."""
 
     action: ClassVar[Action] = Action.READ_PARAMETER
     parameter: str
     max_age_ms: int = 0
+    raw: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class WriteParameter:
-    """``parameter`` as in ``ReadParameter``."""
+    """``parameter`` and ``raw`` as in ``ReadParameter``: of a raw write ``value`` is the bytes."""
 
     action: ClassVar[Action] = Action.WRITE_PARAMETER
     parameter: str
     value: Value
+    raw: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -101,6 +101,11 @@ class DriveParameters:
         held = self._cache.get(entry.address)
         return Reading(entry, decode(entry, held[0]), held[1]) if held else None
 
+    def held(self, entry: Entry) -> bytes | None:
+        """The bytes that were last read."""
+        held = self._cache.get(entry.address)
+        return held[0] if held else None
+
     # reading
 
     def read(self, entry: Entry, now: float, max_age_s: float = 0.0) -> Reads:

@@ -107,6 +107,18 @@ def parse(entry: Entry, text: str) -> Value:
     raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {takes}, not {text!r}")
 
 
+def check_raw(entry: Entry, value: Value) -> None:
+    """Raises ``ParameterError`` where ``value`` is not bytes in hexadecimal that the parameter takes."""
+    try:
+        data = bytes.fromhex(value) if isinstance(value, str) else None
+    except ValueError:
+        data = None
+    if data is None:
+        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name}: bytes are pairs of hexadecimal digits")
+    if entry.definition is not None:
+        encode_value(entry, decode(entry, data), data)
+
+
 def shown(entry: Entry, value: Value) -> str:
     """``1.03 s``, ``1 (automatic)``."""
     definition = entry.definition

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bridge.mapping.model import ObjectRef, Parameter
 from bridge.mapping.parameters import leaf_of
@@ -15,6 +15,22 @@ class Entry:
     name: str
     address: ObjectRef
     definition: Parameter | None = None
+
+    @property
+    def as_bytes(self) -> Entry:
+        """The same object with its bytes for a value; whatever protects it stays."""
+        if self.definition is None:
+            bare = Parameter.model_validate({"name": self.name, "title": "", "data_type": "bytes"})
+            return replace(self, definition=bare)
+        plain: dict[str, object] = {
+            "data_type": "bytes",
+            "factor": 1.0,
+            "low": None,
+            "high": None,
+            "states": {},
+            "unit": "",
+        }
+        return replace(self, definition=self.definition.model_copy(update=plain))
 
     @property
     def leaf(self) -> str:

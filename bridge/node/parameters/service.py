@@ -8,6 +8,7 @@ parameter.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -45,7 +46,7 @@ from bridge.parameter import (
     Why,
     Written,
 )
-from bridge.parameter.codec import shown
+from bridge.parameter.codec import check_raw, decode, shown
 
 _CODES: Final = {
     Why.UNKNOWN_NAME: Code.UNKNOWN_PARAMETER,
@@ -154,12 +155,16 @@ class NodeParameters:
         command = request.command
         if isinstance(command, ReadParameter):
             entry = access.names.resolve(command.parameter)
-            self._read(drive, entry, command.max_age_ms / 1000, partial(self._on_read, conclude))
+            done = partial(self._on_read, drive, entry if command.raw else None, conclude)
+            self._read(drive, entry, command.max_age_ms / 1000, done)
             return
         if not isinstance(command, WriteParameter):
             self._run(access.save(now), drive, partial(self._on_saved, conclude))
             return
         entry = access.names.resolve(command.parameter)
+        if command.raw:
+            check_raw(entry, command.value)
+            entry = entry.as_bytes
         access.check_writable(entry)
         level = access.names.protection.level(entry.address)
         refusal = _why_protected(level, entry, request.identity, drive)
@@ -221,11 +226,16 @@ class NodeParameters:
 
     # results
 
-    def _on_read(self, conclude: Reply, result: Reading | ParameterError) -> None:
+    def _on_read(
+        self, drive: Drive, raw: Entry | None, conclude: Reply, result: Reading | ParameterError
+    ) -> None:
+        """``raw`` is the object whose bytes are asked for."""
         if isinstance(result, ParameterError):
             conclude(_failed(result))
-        else:
-            conclude(Outcome(Code.OK, value=result.value, time=result.time))
+            return
+        held = self._drives[drive.name].held(raw) if raw else None
+        value = result.value if held is None else held.hex(" ").upper()
+        conclude(Outcome(Code.OK, value=value, time=result.time))
 
     def _on_written(
         self,
@@ -242,7 +252,7 @@ class NodeParameters:
             conclude(_failed(result))
             return
         reading = result.reading
-        self._show(drive, entry, reading)
+        self._show(drive, entry, self._as_listed(drive, entry, reading))
         if result.changed:
             self._own_watch.forget(drive, entry, "was changed", self._now)
             was = "" if result.before is None else f" (was {shown(entry, result.before)})"
@@ -250,6 +260,17 @@ class NodeParameters:
         self._warn(drive.name, result.warning)
         message = "" if result.changed else "the drive holds this value already: not written again"
         conclude(Outcome(Code.OK, message, value=reading.value, time=reading.time))
+
+    def _as_listed(self, drive: Drive, entry: Entry, reading: Reading) -> Reading | ParameterError:
+        """What was written as bytes, as the value that it is of."""
+        listed = self._names.resolve(str(entry.address))
+        held = self._drives[drive.name].held(entry)
+        if listed.definition is None or listed.definition == reading.entry.definition or held is None:
+            return reading
+        try:
+            return replace(reading, entry=listed, value=decode(listed, held))
+        except ParameterError as error:
+            return error
 
     def _on_saved(self, conclude: Reply, result: str | ParameterError) -> None:
         if isinstance(result, ParameterError):

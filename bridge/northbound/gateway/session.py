@@ -1,0 +1,273 @@
+"""One client of the gateway: bytes and outcomes in, requests and lines out. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Final
+
+from bridge.canopen import abort
+from bridge.command import Code, Do, Identity, Outcome, ReadParameter, Reply, Request, WriteParameter
+from bridge.northbound.gateway.datatypes import BadText, decode
+from bridge.northbound.gateway.syntax import (
+    LONGEST_LINE,
+    ErrorCode,
+    Nmt,
+    Read,
+    Refused,
+    Set,
+    Setting,
+    Version,
+    Write,
+    parse,
+    split_sequence,
+)
+
+MOST_PENDING: Final = 32
+"""Commands of one client whose answers are still to come; it is told of each beyond (error 600)."""
+_COMMAND_TIMEOUT_MS: Final = 60_000
+_LONGEST_TIMEOUT_MS: Final = 3_600_000
+_TYPE_MISMATCH: Final = 0x0607_0010
+_SDO_CODES: Final = {
+    Code.READ_ONLY: 0x0601_0002,
+    Code.WRITE_ONLY: 0x0601_0001,
+    Code.OUT_OF_RANGE: 0x0609_0030,
+    Code.NOT_VALID: 0x0609_0030,
+    # Not now, or not for this client: "because of local control".
+    Code.NOT_ALLOWED: 0x0800_0021,
+    Code.TOO_OFTEN: 0x0800_0020,
+    Code.BUSY: abort.BUSY,
+}
+"""What the bridge refuses instead of the node, in the words of SDO."""
+_CODES: Final = {
+    Code.TIMED_OUT: ErrorCode.TIMED_OUT,
+    Code.UNKNOWN_TARGET: ErrorCode.UNSUPPORTED_NODE,
+    Code.NOT_CONFIGURED: ErrorCode.NOT_SUPPORTED,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Net:
+    """A bus: its number as clients name it, what NMT for all its nodes is addressed to, and by node id each
+    node and the drive whose SDO channel is the node's first (None where no drive has it)."""
+
+    number: int
+    target: str
+    nodes: Mapping[int, tuple[str, str | None]]
+    version: str = "0 0 0 0 0 3.00 0.0"
+    """The answer to ``info version``."""
+
+
+Submit = Callable[[Request, Reply], None]
+
+
+@dataclass(slots=True)
+class _Defaults:
+    net: int | None = None
+    node: int | None = None
+    timeout_s: float = _COMMAND_TIMEOUT_MS / 1000
+
+
+@dataclass(slots=True)
+class _Pending:
+    sequence: int
+    deadline: float
+    is_open: bool = field(default=True)
+
+
+class Session:
+    """``submit`` hands a request to the bridge. ``on_lines`` is called when a line has come outside of
+    ``receive`` and ``on_time``. Times are monotonic seconds."""
+
+    def __init__(
+        self, net: Net, identity: Identity, submit: Submit, on_lines: Callable[[], None] = lambda: None
+    ) -> None:
+        self._net = net
+        self._identity = identity
+        self._submit = submit
+        self._on_lines = on_lines
+        self._defaults = _Defaults(net=net.number)
+        self._buffer = bytearray()
+        self._skips = False
+        self._pending: list[_Pending] = []
+        self._lines: list[str] = []
+        self._is_working = False
+
+    @property
+    def pending(self) -> int:
+        return len(self._pending)
+
+    def receive(self, data: bytes, now: float) -> None:
+        """What the client has sent: whole lines are carried out, the rest waits for more."""
+        self._is_working = True
+        try:
+            for piece in data.splitlines(keepends=True) if data else ():
+                self._take(piece, now)
+        finally:
+            self._is_working = False
+
+    def _take(self, piece: bytes, now: float) -> None:
+        ends = piece.endswith((b"\n", b"\r"))
+        if not self._skips:
+            self._buffer += piece
+        if len(self._buffer) > LONGEST_LINE:
+            self._buffer.clear()
+            self._skips = True
+            self._answer(0, ErrorCode.SYNTAX)
+        if not ends:
+            return
+        line, self._skips = bytes(self._buffer), False
+        self._buffer.clear()
+        self._on_line(line.decode("utf-8", "replace"), now)
+
+    def _on_line(self, line: str, now: float) -> None:
+        if not line.strip() or line.lstrip().startswith("#"):
+            return
+        sequence = 0
+        try:
+            sequence, rest = split_sequence(line)
+            found = parse(rest)
+            if found is None:
+                return
+            match found.command:
+                case Set():
+                    self._check_net(found.net)
+                    self._set(found.command)
+                    self._say(sequence, "OK")
+                case Version():
+                    self._check_net(found.net)
+                    self._say(sequence, self._net.version)
+                case Nmt(action):
+                    self._check_net(found.net)
+                    target = self._nmt_target(found.node)
+                    self._ask(sequence, Request(self._identity, target, Do(action)), None, now)
+                case Read(index, sub, kind):
+                    command = ReadParameter(f"{index:04X}:{sub:02X}", raw=True)
+                    request = Request(self._identity, self._drive(found.net, found.node), command)
+                    self._ask(sequence, request, kind, now)
+                case Write(index, sub, data):
+                    written = WriteParameter(f"{index:04X}:{sub:02X}", data.hex(" ").upper(), raw=True)
+                    request = Request(self._identity, self._drive(found.net, found.node), written)
+                    self._ask(sequence, request, None, now)
+        except Refused as error:
+            self._answer(sequence, error.code)
+
+    # where to
+
+    def _check_net(self, given: int | None) -> None:
+        net = self._defaults.net if given is None else given
+        if net is None:
+            raise Refused(ErrorCode.NO_DEFAULT_NET)
+        if net != self._net.number:
+            raise Refused(ErrorCode.UNSUPPORTED_NET)
+
+    def _node(self, given: int | None) -> int:
+        node = self._defaults.node if given is None else given
+        if node is None:
+            raise Refused(ErrorCode.NO_DEFAULT_NODE)
+        return node
+
+    def _nmt_target(self, given: int | None) -> str:
+        node = self._node(given)
+        if node == 0:
+            return self._net.target
+        if node not in self._net.nodes:
+            raise Refused(ErrorCode.UNSUPPORTED_NODE)
+        return self._net.nodes[node][0]
+
+    def _drive(self, net: int | None, given: int | None) -> str:
+        self._check_net(net)
+        found = self._net.nodes.get(self._node(given))
+        if found is None:
+            raise Refused(ErrorCode.UNSUPPORTED_NODE)
+        if found[1] is None:
+            raise Refused(ErrorCode.NOT_SUPPORTED)
+        return found[1]
+
+    def _set(self, command: Set) -> None:
+        match command.setting:
+            case Setting.NETWORK:
+                if command.value != self._net.number:
+                    raise Refused(ErrorCode.UNSUPPORTED_NET)
+                self._defaults.net = command.value
+            case Setting.NODE:
+                if command.value not in range(128):
+                    raise Refused(ErrorCode.UNSUPPORTED_NODE)
+                self._defaults.node = command.value
+            case Setting.COMMAND_TIMEOUT:
+                if command.value not in range(1, _LONGEST_TIMEOUT_MS + 1):
+                    raise Refused(ErrorCode.SYNTAX)
+                self._defaults.timeout_s = command.value / 1000
+            case Setting.SDO_TIMEOUT | Setting.SDO_BLOCK:
+                # The site file's for everybody; blocks are used where the node offers them.
+                raise Refused(ErrorCode.NOT_SUPPORTED)
+
+    # requests and their ends
+
+    def _ask(self, sequence: int, request: Request, kind: str | None, now: float) -> None:
+        if len(self._pending) >= MOST_PENDING:
+            raise Refused(ErrorCode.OUT_OF_MEMORY)
+        pending = _Pending(sequence, now + self._defaults.timeout_s)
+        self._pending.append(pending)
+        self._submit(request, partial(self._on_outcome, pending, kind, isinstance(request.command, Do)))
+
+    def _on_outcome(self, pending: _Pending, kind: str | None, is_nmt: bool, outcome: Outcome) -> None:
+        if not pending.is_open:
+            return
+        self._close(pending)
+        if not outcome.ok:
+            self._answer(pending.sequence, _error(outcome, is_nmt=is_nmt))
+        elif kind is None:
+            self._say(pending.sequence, "OK")
+        else:
+            try:
+                text = decode(kind, bytes.fromhex(str(outcome.value)))
+            except BadText:
+                self._answer(pending.sequence, _TYPE_MISMATCH)
+            else:
+                self._say(pending.sequence, text)
+        if not self._is_working:
+            self._on_lines()
+
+    def on_time(self, now: float) -> None:
+        """Tell of every command whose time is up; its transfer goes on, and its answer is dropped."""
+        for pending in [one for one in self._pending if now >= one.deadline]:
+            self._close(pending)
+            self._answer(pending.sequence, ErrorCode.TIMED_OUT)
+
+    def next_deadline(self) -> float | None:
+        return min((one.deadline for one in self._pending), default=None)
+
+    def close(self) -> None:
+        """The client is gone: nobody waits for answers."""
+        for pending in self._pending:
+            pending.is_open = False
+        self._pending.clear()
+        self._lines.clear()
+
+    def _close(self, pending: _Pending) -> None:
+        pending.is_open = False
+        self._pending.remove(pending)
+
+    # lines
+
+    def take_lines(self) -> bytes:
+        """What is to be sent to the client."""
+        lines, self._lines = self._lines, []
+        return "".join(lines).encode("utf-8")
+
+    def _answer(self, sequence: int, code: int) -> None:
+        is_own = isinstance(code, ErrorCode)
+        self._say(sequence, f"ERROR:{int(code)}" if is_own else f"ERROR:0x{code:08X}")
+
+    def _say(self, sequence: int, text: str) -> None:
+        self._lines.append(f"[{sequence}] {text}\r\n")
+
+
+def _error(outcome: Outcome, *, is_nmt: bool) -> int:
+    if outcome.abort_code:
+        return outcome.abort_code
+    if not is_nmt and outcome.code in _SDO_CODES:
+        return _SDO_CODES[outcome.code]
+    return _CODES.get(outcome.code, ErrorCode.INTERNAL_STATE)

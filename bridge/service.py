@@ -25,6 +25,8 @@ from bridge.master.network import Network
 from bridge.master.standstill import Alarm
 from bridge.mirror.endpoint import socket_endpoint
 from bridge.mirror.publisher import MirrorPublisher
+from bridge.northbound.gateway.nets import net_of
+from bridge.northbound.gateway.server import GatewayServer
 from bridge.northbound.listening import Port
 from bridge.northbound.modbus.registers import units_of
 from bridge.northbound.modbus.server import ModbusServer
@@ -87,6 +89,17 @@ class Service:
         self.zenoh = ZenohServer(self.view, site.zenoh, site.site.name, clock.now) if site.zenoh else None
         endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
         self.mirror = MirrorPublisher(self.view, endpoint, clock.now)
+        self.gateways = {
+            table.name: GatewayServer(
+                self.view,
+                net_of(table, number, self.plant.nodes.values()),
+                Path(site.site.runtime_dir).absolute() / f"{site.site.name}-{table.name}.gateway",
+                None if table.gateway == "socket" else table.gateway,
+                clock.now,
+            )
+            for number, table in enumerate(site.bus, 1)
+            if table.gateway
+        }
         self._tasks: list[asyncio.Task[None]] = []
         self._ending: Ending | None = None
         drives, buses = count(len(self.plant.drives), "drive"), count(len(site.bus), "bus")
@@ -137,6 +150,10 @@ class Service:
             stack.push_async_callback(self.zenoh.close)
         await self.mirror.start()
         stack.push_async_callback(self.mirror.close)
+        # After the mirror, which sees that the folder of their sockets is ours alone.
+        for gateway in self.gateways.values():
+            await gateway.start()
+            stack.push_async_callback(gateway.close)
 
     def halt(self) -> None:
         """Stop all drives now, and take no command any more but stops. ``run`` is to be cancelled next."""
@@ -165,6 +182,8 @@ class Service:
             yield ServerPart("modbus", "the Modbus server", self.modbus)
         if self.zenoh:
             yield ServerPart("zenoh", "the zenoh session", self.zenoh)
+        for name, gateway in self.gateways.items():
+            yield ServerPart(f"gateway {name}", f"the gateway of {name}", gateway)
         yield ServerPart("mirror", "the link to the fronts", self.mirror)
 
     async def _start(self) -> None:

@@ -70,6 +70,22 @@ def _endpoint(text: str) -> str:
     return text
 
 
+def _gateway(text: str) -> str:
+    if text == "socket":
+        return text
+    try:
+        host = _endpoint(text).rpartition(":")[0].strip("[]")
+    except ValueError:
+        raise ValueError(
+            'must be "socket", or an address of this machine and a port, "127.0.0.1:7000"'
+        ) from None
+    if not ipaddress.ip_address(host).is_loopback:
+        raise ValueError(
+            "must be an address of this machine such as 127.0.0.1: the gateway asks nobody who he is"
+        )
+    return text
+
+
 def _network(text: str) -> str:
     try:
         ipaddress.ip_network(text, strict=True)
@@ -130,6 +146,7 @@ RegularExpression = Annotated[str, AfterValidator(_regular_expression)]
 PlainValue = Annotated[bool | int | float | str, BeforeValidator(_plain)]
 ObjectName = Annotated[str, AfterValidator(_object)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
+Gateway = Annotated[str, AfterValidator(_gateway)]
 Network = Annotated[str, AfterValidator(_network)]
 Locator = Annotated[str, AfterValidator(_locator)]
 ControllerName = Annotated[str, AfterValidator(_controller)]

@@ -26,6 +26,7 @@ from bridge.config.fields import (
     Downtime,
     Endpoint,
     Full,
+    Gateway,
     Locator,
     MandatoryMissing,
     Name,
@@ -244,6 +245,7 @@ class BusTable(Table):
         "none", description="none, communication or node"
     )
     on_intruder: OnIntruder = Field("stop_node", description="stop_node, stop_all or report")
+    gateway: Gateway | None = Field(None, description='"socket", or address:port on loopback')
     node: list[NodeTable] = Field(default_factory=list[NodeTable])
 
     @property

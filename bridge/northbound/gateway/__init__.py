@@ -1,1 +1,1 @@
-"""The ASCII gateway after CiA 309-3 (version 3.0): foreign tools on the bridge's own SDO queue and rights."""
+"""The ASCII gateway after CiA 309-3: foreign tools on the bridge's own SDO queue and rights."""

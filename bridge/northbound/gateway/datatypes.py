@@ -1,4 +1,4 @@
-"""The data types of CiA 309-3 (§5, table 2) between their text and their bytes."""
+"""The data types of CiA 309-3 between their text and their bytes."""
 
 from __future__ import annotations
 

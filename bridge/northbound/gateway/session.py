@@ -24,7 +24,7 @@ from bridge.northbound.gateway.syntax import (
     split_sequence,
 )
 
-MOST_PENDING: Final = 32
+MOST_PENDING: Final = 8
 """Commands of one client whose answers are still to come; it is told of each beyond (error 600)."""
 _COMMAND_TIMEOUT_MS: Final = 60_000
 _LONGEST_TIMEOUT_MS: Final = 3_600_000

@@ -1,0 +1,32 @@
+"""What the gateway serves of a bus."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from bridge import __version__
+from bridge.command.plant import Node
+from bridge.config import BusTable
+from bridge.northbound.gateway.session import Net
+
+_VERSION: Final = "0 0 {version} 0 1 3.00 {version}"
+"""Vendor id, product code, revision, serial number, gateway class, version of the protocol, version of the
+implementation (CiA 309-3). The bridge has neither a vendor id nor a serial number."""
+
+
+def net_of(bus: BusTable, number: int, nodes: Iterable[Node]) -> Net:
+    """``number`` is what clients call it; ``nodes`` are those of the site."""
+    version = ".".join(__version__.split(".")[:2])
+    return Net(
+        number,
+        f"bus/{bus.name}",
+        {node.table.id: (node.name, _on_first(node)) for node in nodes if node.bus is bus},
+        _VERSION.format(version=version),
+    )
+
+
+def _on_first(node: Node) -> str | None:
+    """The drive whose parameters the node's first SDO channel reaches."""
+    drives = (drive.name for drive in node.drives if drive.slot.parameters_by_sdo)
+    return next(drives, None)

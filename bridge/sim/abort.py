@@ -30,8 +30,8 @@ class AbortCode(IntEnum):
 
 
 class SdoAbort(Exception):
-    """A request for an object that the dictionary refuses."""
+    """A request for an object that the dictionary refuses, with one of ``AbortCode`` or another's code."""
 
-    def __init__(self, code: AbortCode) -> None:
-        super().__init__(f"{code.name} {code:08X}h")
+    def __init__(self, code: int) -> None:
+        super().__init__(f"{code.name} {code:08X}h" if isinstance(code, AbortCode) else f"{code:08X}h")
         self.code = code

@@ -158,8 +158,27 @@ class Domain:
 Entry = Number | Text | Domain
 
 
-class ObjectAccess(Protocol):
+class ServedObject(Protocol):
+    """An object as an SDO server has it. All of its methods raise ``SdoAbort``."""
+
+    @property
+    def max_size(self) -> int: ...
+
+    def upload(self) -> bytes: ...
+
+    def check_writable(self) -> None: ...
+
+    def download(self, data: bytes) -> None: ...
+
+
+class ServedObjects(Protocol):
     """What an SDO server asks for."""
+
+    def find(self, index: int, sub: int) -> ServedObject: ...
+
+
+class ObjectAccess(Protocol):
+    """A dictionary, or what stands before one."""
 
     def has_object(self, index: int) -> bool: ...
 

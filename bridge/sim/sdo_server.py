@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.sim.abort import AbortCode, SdoAbort
-from bridge.sim.dictionary import ObjectAccess
+from bridge.sim.dictionary import ServedObjects
 from bridge.sim.sdo_block_server import BlockDownload, BlockUpload, checked_size
 
 _REQUEST_SIZE: Final = 8
@@ -41,7 +41,7 @@ class SdoServer:
     With ``block_segments`` 0 block transfer is not offered; its commands are answered as unknown.
     """
 
-    def __init__(self, objects: ObjectAccess, block_segments: int = 0) -> None:
+    def __init__(self, objects: ServedObjects, block_segments: int = 0) -> None:
         self._objects = objects
         self._block_segments = block_segments
         self._transfer: _Upload | _Download | BlockUpload | BlockDownload | None = None

@@ -27,6 +27,10 @@ SILENCE_S: Final = 1.0
 """After this long out of step the bus process counts as gone."""
 _LOOK_EVERY_S: Final = 0.1
 _SNAPSHOT_TIMEOUT_S: Final = 2.0
+_RENEW_S: Final = 4.0
+"""Out of step for this long, a front connects anew under another identity. When its peer was stopped for
+about as long as a connection may be silent, zenoh can leave a session half open: it is told of everything
+that the peer declares, and no query of it is ever answered."""
 _MOST_PENDING: Final = 2000
 """Deltas kept while a snapshot is on its way."""
 UNREACHABLE: Final = "bus process not reachable"
@@ -50,13 +54,15 @@ class MirrorClient:
         """Deltas that were missed."""
         self.malformed = 0
         self._clock = clock
-        self._link = ZenohLink(zenoh_config(connect=[endpoint]), "mirror")
+        self._endpoint = endpoint
+        self._link = self._new_link()
         self._image: Image | None = None
         self._instance = 0
         self._sequence = 0
         self._in_step = False
         self._pending: list[Delta] = []
         self._last_in_step = float("-inf")
+        self._connected_at = float("-inf")
         self._is_dead = False
         self._points_changed = False
         self._listeners: list[Callable[[Event], None]] = []
@@ -113,6 +119,8 @@ class MirrorClient:
         for answer in answers:
             if answer.ok and (outcome := self._read(partial(protocol.decode, Outcome), answer.message)):
                 return outcome
+        # The deltas may still come where nothing is answered: a snapshot will tell.
+        self._in_step = False
         return Outcome(Code.TIMED_OUT, "the bus process did not answer", forwarded=False)
 
     def rejected(self, rejection: Rejection) -> None:
@@ -141,15 +149,35 @@ class MirrorClient:
             await self._link.close()
             raise
 
+    def _new_link(self) -> ZenohLink:
+        return ZenohLink(zenoh_config(connect=[self._endpoint]), "mirror")
+
     async def _connect(self) -> None:
-        await self._link.open()
-        self._link.declare_subscriber(protocol.DELTA, self._on_delta)
-        self._link.declare_subscriber(protocol.EVENT, self._on_event)
-        self._link.follow_liveliness(protocol.TOKEN, self._on_token)
+        await self._open(self._link)
         while not self._in_step:
-            await self._take_snapshot()
+            await self._catch_up()
             if not self._in_step:
                 await asyncio.sleep(_LOOK_EVERY_S)
+
+    async def _open(self, link: ZenohLink) -> None:
+        await link.open()
+        self._connected_at = self._clock()
+        link.declare_subscriber(protocol.DELTA, self._on_delta)
+        link.declare_subscriber(protocol.EVENT, self._on_event)
+        link.follow_liveliness(protocol.TOKEN, self._on_token)
+
+    async def _catch_up(self) -> None:
+        """Get in step again; where that fails for long, over another connection."""
+        await self._take_snapshot()
+        if not self._in_step and self._clock() - max(self._last_in_step, self._connected_at) > _RENEW_S:
+            await self._renew_link()
+
+    async def _renew_link(self) -> None:
+        _log.warning("mirror: %s for %g s, connecting anew", UNREACHABLE, _RENEW_S, extra=about("mirror"))
+        fresh = self._new_link()
+        await self._open(fresh)
+        before, self._link = self._link, fresh
+        await before.close()
 
     async def run(self) -> None:
         """Keep the image in step, or every point dead, until cancelled.
@@ -161,7 +189,7 @@ class MirrorClient:
             while not self._points_changed:
                 with self._guard:
                     if not self._in_step:
-                        await self._take_snapshot()
+                        await self._catch_up()
                 await asyncio.sleep(_LOOK_EVERY_S)
             watching.cancel()
         raise PointsChanged("the bus process runs another site now; this process has to start anew")
@@ -181,7 +209,10 @@ class MirrorClient:
 
     async def failed(self) -> None:
         """Wait until closed, or raise ``OperationFailed`` when the link has ended by itself."""
-        await self._link.failed()
+        link = None
+        while link is not self._link:
+            link = self._link
+            await link.failed()
 
     # in step with the publisher
 

@@ -9,12 +9,13 @@ import stat
 import sys
 import tempfile
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from functools import partial
 from pathlib import Path
 
 import pytest
+import zenoh
 
 from bridge.command import (
     Action,
@@ -37,6 +38,7 @@ from bridge.command.link import NodeState
 from bridge.errors import Unavailable
 from bridge.image import Image, Quality, Value
 from bridge.mirror import MirrorClient, MirrorPublisher, PointsChanged, protocol, socket_endpoint
+from bridge.mirror import client as mirror_client
 from bridge.mirror.client import UNREACHABLE
 from bridge.mirror.endpoint import socket_path
 from bridge.northbound.view import View
@@ -321,6 +323,64 @@ async def test_a_hung_bus_process_counts_as_gone_after_a_second(endpoint: str) -
         await until(lambda: client.image.read(frequency).quality is Quality.DEAD, "dead", 2.5)
         process.send_signal(signal.SIGCONT)
         await until(lambda: client.image.read(frequency).quality is Quality.GOOD, "good again", 5)
+
+
+class HalfOpen(MirrorPublisher):
+    """A bus process as zenoh sometimes leaves it after a pause: sessions of before are told of what it
+    declares, and get no answer."""
+
+    unanswered: frozenset[str] = frozenset()
+
+    async def peers(self) -> frozenset[str]:
+        loop = asyncio.get_running_loop()
+        found: asyncio.Future[frozenset[str]] = loop.create_future()
+
+        def look(session: zenoh.Session) -> None:
+            peers = frozenset(str(peer) for peer in session.info.peers_zid())
+            loop.call_soon_threadsafe(found.set_result, peers)
+
+        self._link.submit(look)
+        return await found
+
+    def _on_snapshot(self, asked: Asked) -> None:
+        self._snapshots.add(asyncio.create_task(self._unless_before(asked, super()._on_snapshot)))
+
+    def _on_request(self, asked: Asked) -> None:
+        self._snapshots.add(asyncio.create_task(self._unless_before(asked, super()._on_request)))
+
+    async def _unless_before(self, asked: Asked, answer: Callable[[Asked], None]) -> None:
+        if await self.peers() - self.unanswered:
+            answer(asked)
+        else:
+            # Kept, and so neither answered nor ended.
+            await asyncio.sleep(60)
+
+
+@pytest.mark.parametrize("deltas_come", [True, False])
+async def test_a_front_that_is_never_answered_connects_anew(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch, deltas_come: bool
+) -> None:
+    monkeypatch.setattr(mirror_client, "_RENEW_S", 0.5)
+    monkeypatch.setattr(mirror_client, "_SNAPSHOT_TIMEOUT_S", 0.3)
+    plant = make_plant()
+    node_is(plant, NodeState.OPERATIONAL)
+    publisher = HalfOpen(view_of(plant, epoch_ns=epoch), endpoint, time.monotonic)
+    await publisher.start()
+    stop = Request(SCADA, "conveyor/fu1", Do(Action.STOP))
+    async with front(endpoint) as client:
+        ended = asyncio.create_task(client.failed())
+        assert (await client.request(stop)).ok
+        publisher.unanswered = await publisher.peers()
+        if not deltas_come:
+            client._in_step = False
+        assert (await client.request(stop, timeout_s=0.3)).code is Code.TIMED_OUT
+        await until(lambda: in_step(client), "in step again", 10)
+        assert (await client.request(stop)).ok
+        drive_says(plant.drives["conveyor/fu1"], ENABLED, 0x2000)
+        await until(lambda: client.image.read("conveyor/fu1/actual/frequency").value == 25.0, "25 Hz")
+        assert not ended.done()
+    await asyncio.wait_for(ended, 5)
+    await publisher.close()
 
 
 async def test_another_site_ends_the_front(endpoint: str) -> None:

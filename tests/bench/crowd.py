@@ -30,13 +30,22 @@ NODE = "supervision_ms = 300\n"
 """The boot-up sets the heartbeat to a third of it: 100 ms."""
 
 
+_OF_SLAVES = frozenset((0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700))
+"""Identifiers without node id: EMCY, TPDO1 ... 4, SDO answers, heartbeat (CiA 301, pre-defined connection
+set)."""
+
+
 class Hearing(Network):
-    """Keeps the time stamps of all frames it gets."""
+    """Keeps the time stamps of all frames that the nodes sent; it gets some of the bridge's own, too."""
 
     heard: list[float]
 
     def on_frames(self, frames: list[Frame], now: float) -> None:
-        self.heard += [frame.time for frame in frames]
+        self.heard += [
+            frame.time
+            for frame in frames
+            if 1 <= frame.can_id & 0x7F <= NODES and frame.can_id & ~0x7F in _OF_SLAVES
+        ]
         super().on_frames(frames, now)
 
 

@@ -21,6 +21,7 @@ _COMMANDS: Final = {
     "audit": "own_check.audit",
     "drop-test": "drop_test.drop_test",
     "exchange": "exchange.exchange",
+    "conformance": "conformance.conformance",
     "witness": "witness.witness",
     "eds": "eds.eds",
     "family": "family.app",

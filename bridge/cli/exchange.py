@@ -159,7 +159,7 @@ def _judge(
     for place in places:
         if why := backups.why_another(place.content.identity, identity):
             raise OperationFailed(f"{place.file}: {why}; nothing written")
-    # CiA 301 §7.5.2.18: 0 is no serial number.
+    # CiA 301 §7.5.2.21: 0 is no serial number.
     old, new = _old(places).get("serial", 0), identity.get("serial", 0)
     if old and old == new and not same_serial:
         raise OperationFailed(

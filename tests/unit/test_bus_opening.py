@@ -129,6 +129,7 @@ ON_ONE = {
     "parameters read": ["parameters", "read", "SITE", "n1/fu1", "P105"],
     "parameters write": ["parameters", "write", "SITE", "n1/fu1", "P105", "50", "--yes"],
     "drop-test": ["drop-test", "SITE", "n1", "--yes-i-am-at-the-machine"],
+    "conformance": ["conformance", "SITE", "n1", "--yes"],
     "audit --bus": ["audit", "SITE", "--bus", "can1"],
 }
 

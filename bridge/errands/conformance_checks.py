@@ -1,0 +1,395 @@
+"""The checks of ``conformance``: SDO server, error control, NMT, emergency, PDOs. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import Final
+
+from bridge.canopen import abort, cobid, nmt
+from bridge.canopen.frame import REMOTE, Frame
+from bridge.canopen.nmt import NmtCommand, NmtState
+from bridge.canopen.sdo_block import crc16
+from bridge.canopen.sdo_transfer import MUX, SEGMENT, U32
+from bridge.errands.conformance import (
+    Answers,
+    Check,
+    Slave,
+    Step,
+    Verdict,
+    aborted,
+    expedited_bytes,
+    plain,
+    shown,
+)
+
+_NO_OBJECT: Final = 0x0602_0000
+_NO_SUB: Final = 0x0609_0011
+_READ_ONLY: Final = 0x0601_0002
+_NO_ACCESS: Final = 0x0601_0000
+_RESERVED: Final = 0x0FFF
+"""An index that no device has (CiA 301 §7.4.1, table 40)."""
+_NO_SUCH_SUB: Final = 0x7F
+_NAME: Final = 0x1008
+_NO_COMMAND: Final = 0x55
+"""No NMT command."""
+_MOST_SEGMENTS: Final = 200
+_BEAT_MS: Final = 100
+_BEATS: Final = 5
+_BEAT_SLACK: Final = 0.25
+"""How far the mean period may be from what was set, as a share of it: the test's own jitter is in it."""
+_REACTION_S: Final = 1.0
+_BOOT_UP_S: Final = 10.0
+_PDOS: Final = 4
+"""So many of each kind are looked at: those that have a place in the pre-defined connection set."""
+_PDO_BITS: Final = 64
+
+
+def checks(slave: Slave, *, reset: bool) -> list[Check]:
+    """All of them, in the order in which they are made. ``reset`` resets the node's communication, too."""
+    found = [
+        mandatory(slave),
+        error_codes(slave),
+        unknown_requests(slave),
+        segmented(slave),
+        block(slave),
+        emergency(slave),
+        *(pdo(slave, number, sent=sent) for sent in (True, False) for number in range(_PDOS)),
+        guarding(slave),
+        heartbeat(slave),
+        stopping(slave),
+    ]
+    return [*found, boot_up(slave)] if reset else found
+
+
+def put_back(slave: Slave) -> Check:
+    """Undo what the checks have changed: 1017h, and the NMT state."""
+    if slave.is_stopped:
+        yield _send(nmt.command(NmtCommand.ENTER_PRE_OPERATIONAL, slave.id))
+        slave.is_stopped = False
+    if slave.heartbeat_ms is not None:
+        before = slave.heartbeat_ms
+        yield from slave.write(0x1017, 0, before.to_bytes(2, "little"))
+        now = yield from slave.number(0x1017)
+        slave.found(
+            "§7.5.2.20", "1017h holds again what it held", now == before, f"{now} ms, was {before} ms"
+        )
+        slave.heartbeat_ms = None
+
+
+def mandatory(slave: Slave) -> Check:
+    """Objects that every device has, which do not change from one reading to the next."""
+    for index, sub, name in (
+        (0x1000, 0, "device type"),
+        (0x1001, 0, "error register"),
+        (0x1018, 1, "vendor"),
+    ):
+        answer = yield from slave.read(index, sub)
+        place = f"{index:04X}h:{sub:02X}"
+        slave.found("§7.5.2", f"{place}, {name}, can be read", plain(answer) is not None, shown(answer))
+        if index != 0x1001:
+            again = yield from slave.read(index, sub)
+            slave.found("§7.5.2", f"{place} is the same when it is read again", answer == again, shown(again))
+    highest = yield from slave.number(0x1018, 0)
+    for sub in range(2, min(highest or 0, 4) + 1):
+        answer = yield from slave.read(0x1018, sub)
+        rule = f"1018h:{sub:02X} is there, as 1018h:00 says"
+        slave.found("§7.5.2.21", rule, plain(answer) is not None, shown(answer))
+
+
+def error_codes(slave: Slave) -> Check:
+    """What is not there, or must not be written, is refused with the code for it."""
+    for rule, request, codes in (
+        ("reading an object that is not there is refused", (_RESERVED, 0, b""), (_NO_OBJECT,)),
+        ("reading a sub-index that is not there is refused", (0x1018, _NO_SUCH_SUB, b""), (_NO_SUB,)),
+        ("writing an object that is not there is refused", (_RESERVED, 0, b"\0"), (_NO_OBJECT,)),
+    ):
+        index, sub, data = request
+        answer = yield from (slave.write(index, sub, data) if data else slave.read(index, sub))
+        wanted = " or ".join(f"{code:08X}h" for code in codes)
+        is_about_it = answer[1:4] == MUX.pack(index, sub)
+        slave.found(
+            "§7.2.4.3.17", f"{rule}: {wanted}", aborted(answer) in codes and is_about_it, shown(answer)
+        )
+    # The value that it has: if a faulty node takes it, nothing has changed.
+    held = yield from slave.number(0x1000)
+    if held is not None:
+        answer = yield from slave.write(0x1000, 0, U32.pack(held))
+        ok = aborted(answer) in (_READ_ONLY, _NO_ACCESS)
+        slave.found("§7.2.4.3.17", "writing a read-only object is refused: 06010002h", ok, shown(answer))
+
+
+def unknown_requests(slave: Slave) -> Check:
+    """Requests that make no sense, and one that needs no answer."""
+    answer = yield from slave.ask(b"\xe0" + MUX.pack(0x1000, 0))
+    rule = "an unknown command specifier is refused: 05040001h"
+    slave.found("§7.2.4.3.17", rule, aborted(answer) == abort.UNKNOWN_COMMAND, shown(answer))
+    answer = yield from slave.ask(b"\x60")
+    rule = "a segment is refused if no transfer was begun"
+    slave.found("§7.2.4.3.17", rule, aborted(answer) is not None, shown(answer))
+    data = b"\x80" + MUX.pack(0x1000, 0) + U32.pack(abort.GENERAL)
+    answer = yield from slave.ask(data)
+    slave.found("§7.2.4.3.17", "an abort is not answered", not answer, shown(answer) if answer else "")
+    answer = yield from slave.read(0x1000)
+    slave.found("§7.2.4.3", "after all this it still answers", plain(answer) is not None, shown(answer))
+
+
+def _whole(slave: Slave, index: int) -> Generator[Step, Answers, tuple[bytes | None, int | None, str]]:
+    """An object of any length by segments: what came, how much was announced, and what went wrong."""
+    answer = yield from slave.ask(b"\x40" + MUX.pack(index, 0))
+    size = expedited_bytes(answer)
+    if size is not None:
+        return answer[4 : 4 + size], None, "expedited"
+    if not answer or answer[0] & 0xE2 != 0x40:
+        return None, None, shown(answer)
+    announced = U32.unpack_from(answer, 4)[0] if answer[0] & 1 else None
+    data, toggle = b"", 0
+    for _ in range(_MOST_SEGMENTS):
+        answer = yield from slave.ask(bytes((0x60 | toggle,)))
+        if not answer or answer[0] & 0xE0:
+            return None, announced, f"segment {len(data) // SEGMENT + 1}: {shown(answer)}"
+        if answer[0] & 0x10 != toggle:
+            yield from slave.break_off(index, 0)
+            return None, announced, f"segment {len(data) // SEGMENT + 1} has the wrong toggle bit"
+        data += answer[1 : 8 - (answer[0] >> 1 & 7)]
+        if answer[0] & 1:
+            return data, announced, ""
+        toggle ^= 0x10
+    yield from slave.break_off(index, 0)
+    return None, announced, "no end"
+
+
+def segmented(slave: Slave) -> Check:
+    """The device name by segments, and the toggle bit."""
+    clause, rule = "§7.2.4.3.6", "1008h is read by segments, with alternating toggle bit"
+    data, announced, why = yield from _whole(slave, _NAME)
+    if data is None and announced is None:
+        slave.skipped(clause, rule, why)
+        return
+    if why == "expedited":
+        slave.skipped(clause, rule, "1008h is no longer than four bytes", Verdict.NOT_SEEN)
+        return
+    slave.found(clause, rule, data is not None, why or f"{len(data or b'')} bytes")
+    if announced is not None and data is not None:
+        rule = "so many bytes come as were announced"
+        slave.found("§7.2.4.3.5", rule, announced == len(data), f"{announced} announced, {len(data)} came")
+    yield from slave.ask(b"\x40" + MUX.pack(_NAME, 0))
+    answer = yield from slave.ask(b"\x70")
+    rule = "a wrong toggle bit is refused: 05030000h"
+    slave.found(clause, rule, aborted(answer) == abort.TOGGLE, shown(answer))
+    if aborted(answer) is None:
+        yield from slave.break_off(_NAME, 0)
+
+
+def block(slave: Slave) -> Check:
+    """The device name as a block upload with CRC, against what came by segments."""
+    clause, rule = "§7.2.4.3.12", "1008h is read as a block"
+    wanted, _, _ = yield from _whole(slave, _NAME)
+    if wanted is None:
+        slave.skipped(clause, rule, "1008h cannot be read")
+        return
+    answer = yield from slave.ask(b"\xa4" + MUX.pack(_NAME, 0) + bytes((127, 0)))
+    if not answer or answer[0] & 0xF9 != 0xC0:
+        if answer and aborted(answer) is None:
+            yield from slave.break_off(_NAME, 0)
+        slave.skipped(clause, rule, shown(answer))
+        return
+    has_crc = bool(answer[0] & 4)
+    data, number, is_last = b"", 0, False
+    came = yield Step((slave.request(b"\xa3"),), slave.is_reply, slave.timeout_s)
+    while came and not is_last and number < _MOST_SEGMENTS:
+        number += 1
+        if came[0].data[0] & 0x7F != number:
+            break
+        data, is_last = data + came[0].data[1:], bool(came[0].data[0] & 0x80)
+        if not is_last:
+            came = yield Step((), slave.is_reply, slave.timeout_s)
+    end = (yield from slave.ask(bytes((0xA2, number, 127)))) if is_last else b""
+    if not end or end[0] & 0xE3 != 0xC1:
+        slave.found(clause, rule, ok=False, seen=f"after {number} segments: {shown(end)}")
+        yield from slave.break_off(_NAME, 0)
+        return
+    yield Step((slave.request(b"\xa1"),), slave.is_reply, 0.0)
+    data = data[: len(data) - (end[0] >> 2 & 7)]
+    slave.found(clause, f"{rule}, and is the same as by segments", data == wanted, f"{len(data)} bytes")
+    if has_crc:
+        crc = int.from_bytes(end[1:3], "little")
+        slave.found("§7.2.4.3.16", "the CRC of the block is right", crc == crc16(data), f"{crc:04X}h")
+
+
+def emergency(slave: Slave) -> Check:
+    """Where emergency messages come, and the history of errors."""
+    rule = "1014h is a COB-ID for emergency messages"
+    cob_id = yield from slave.number(0x1014)
+    if cob_id is None:
+        slave.skipped("§7.5.2.17", rule, "no 1014h")
+    else:
+        ok = bool(cob_id & cobid.PDO_DISABLED) or cobid.is_for_emcy(cob_id & cobid.COB_ID_MASK)
+        slave.found("§7.5.2.17", rule, ok, f"{cob_id:08X}h")
+    count = yield from slave.number(0x1003)
+    if count is None:
+        slave.skipped("§7.5.2.4", "1003h has as many errors as 1003h:00 says", "no 1003h")
+        return
+    for sub in range(1, min(count, 254) + 1):
+        answer = yield from slave.read(0x1003, sub)
+        if expedited_bytes(answer) != 4:
+            rule = f"1003h has {count} errors, as 1003h:00 says"
+            slave.found("§7.5.2.4", rule, ok=False, seen=f"1003h:{sub:02X}: {shown(answer)}")
+            return
+    slave.found("§7.5.2.4", "1003h has as many errors as 1003h:00 says", ok=True, seen=str(count))
+
+
+def pdo(slave: Slave, number: int, *, sent: bool) -> Check:
+    """One PDO of the node's: its COB-ID, and that its mapped objects exist and fit into a frame."""
+    name, of_mapping = (f"TPDO {number + 1}", "§7.5.2.38") if sent else (f"RPDO {number + 1}", "§7.5.2.36")
+    parameter, mapping = (0x1800, 0x1A00) if sent else (0x1400, 0x1600)
+    cob_id = yield from slave.number(parameter + number, 1)
+    if cob_id is None:
+        slave.skipped("§7.5.2.37" if sent else "§7.5.2.35", f"{name} has a COB-ID", "no such PDO")
+        return
+    if cob_id & cobid.PDO_DISABLED:
+        return
+    ok = bool(cob_id & cobid.PDO_EXTENDED) or cobid.is_for_pdos(cob_id & cobid.COB_ID_MASK)
+    slave.found("§7.5.2.37" if sent else "§7.5.2.35", f"{name} has a COB-ID for PDOs", ok, f"{cob_id:08X}h")
+    count = yield from slave.number(mapping + number, 0)
+    bits = 0
+    for sub in range(1, min(count or 0, 64) + 1):
+        entry = yield from slave.number(mapping + number, sub)
+        if entry is None:
+            rule = f"the mapping of {name} has {count} objects, as its sub-index 0 says"
+            slave.found(of_mapping, rule, ok=False, seen=f"no {mapping + number:04X}h:{sub:02X}")
+            return
+        bits += entry & 0xFF
+        yield from _mapped(slave, name, entry, sent=sent)
+    rule = f"what is mapped to {name} fits into a frame"
+    slave.found(of_mapping, rule, bits <= _PDO_BITS, f"{bits} bits")
+    if sent:
+        slave.mapped_bits[cob_id & cobid.COB_ID_MASK] = bits
+
+
+def _mapped(slave: Slave, name: str, entry: int, *, sent: bool) -> Check:
+    """That one mapped object is there, and as long as it is mapped. Below 0020h it is a gap."""
+    of_mapping = "§7.5.2.38" if sent else "§7.5.2.36"
+    index, sub, bits = entry >> 16, entry >> 8 & 0xFF, entry & 0xFF
+    if index < 0x20:
+        return
+    answer = yield from slave.read(index, sub)
+    place, code, size = f"{index:04X}h:{sub:02X}", aborted(answer), expedited_bytes(answer)
+    if code in (_NO_OBJECT, _NO_SUB) or not answer:
+        slave.found(of_mapping, f"{place}, mapped to {name}, is there", ok=False, seen=shown(answer))
+    elif sent and size is not None and answer[0] & 1 and 8 * size < bits:
+        rule = f"{place} is as long as it is mapped to {name}"
+        slave.found(of_mapping, rule, ok=False, seen=f"{8 * size} bits, mapped with {bits}")
+
+
+def _is_state(slave: Slave, *states: NmtState) -> Step:
+    """Until the node says in a heartbeat that it is in one of these states."""
+
+    def fits(frame: Frame) -> bool:
+        one = frame.can_id == cobid.ERROR_CONTROL + slave.id and len(frame.data) == 1
+        return one and (not states or nmt.state_of(frame.data[0]) in states)
+
+    return Step((), fits, _REACTION_S)
+
+
+def _send(*frames: Frame) -> Step:
+    return Step(frames, lambda _: False, 0.05)
+
+
+def heartbeat(slave: Slave) -> Check:
+    """A period set in 1017h is kept. It stays set for the checks of the NMT states."""
+    clause, rule = "§7.2.8.3.2.2", f"the heartbeat comes every {_BEAT_MS} ms where 1017h says so"
+    before = yield from slave.number(0x1017)
+    if before is None:
+        slave.skipped(clause, rule, "no 1017h")
+        return
+    slave.heartbeat_ms = before
+    answer = yield from slave.write(0x1017, 0, _BEAT_MS.to_bytes(2, "little"))
+    if aborted(answer) is not None or not answer:
+        slave.heartbeat_ms = None
+        slave.skipped(clause, rule, f"1017h cannot be written: {shown(answer)}", Verdict.NOT_SEEN)
+        return
+    yield _is_state(slave)
+    beats = yield Step((), _is_state(slave).fits, (_BEATS + 5) * _BEAT_MS / 1000, _BEATS)
+    if len(beats) < _BEATS:
+        slave.found(clause, rule, ok=False, seen=f"{len(beats)} came in {(_BEATS + 5) * _BEAT_MS} ms")
+        return
+    period_ms = 1000 * (beats[-1].time - beats[0].time) / (_BEATS - 1)
+    ok = abs(period_ms - _BEAT_MS) <= _BEAT_SLACK * _BEAT_MS
+    slave.found(clause, rule, ok, f"every {period_ms:.1f} ms")
+
+
+def guarding(slave: Slave) -> Check:
+    """Two guarding answers, the toggle bit of which differs. Not where they would start the life guarding, or
+    while the node has a heartbeat: it has one of both."""
+    clause, rule = "§7.2.8.3.2.1", "guarding is answered, with alternating toggle bit"
+    if (yield from slave.number(0x1017)):
+        slave.skipped(clause, rule, "it has a heartbeat", Verdict.NOT_SEEN)
+        return
+    guard, factor = (yield from slave.number(0x100C)), (yield from slave.number(0x100D))
+    if guard is None or factor is None or guard * factor:
+        why = "no 100Ch and 100Dh" if guard is None or factor is None else "life guarding would begin"
+        slave.skipped(clause, rule, why, Verdict.NOT_SEEN if guard else Verdict.NOT_OFFERED)
+        return
+    question = Frame(cobid.ERROR_CONTROL + slave.id | REMOTE)
+    seen: list[int] = []
+    for _ in range(3):
+        came = yield Step((question,), _is_state(slave).fits, slave.timeout_s)
+        seen += [frame.data[0] for frame in came]
+    toggles = [octet >> 7 for octet in seen]
+    ok = len(seen) == 3 and toggles[0] == toggles[2] != toggles[1]
+    slave.found(clause, rule, ok, " ".join(f"{octet:02X}h" for octet in seen) or "no answer")
+
+
+def stopping(slave: Slave) -> Check:
+    """Stop and enter pre-operational, as the heartbeat and the SDO server show it."""
+    has_beat = slave.heartbeat_ms is not None
+    slave.is_stopped = True
+    for command, state, answers in (
+        (NmtCommand.STOP, NmtState.STOPPED, False),
+        (NmtCommand.ENTER_PRE_OPERATIONAL, NmtState.PRE_OPERATIONAL, True),
+    ):
+        frames = (nmt.command(command, slave.id),)
+        if has_beat:
+            told = yield Step(frames, _is_state(slave, state).fits, _REACTION_S)
+            slave.found("§7.2.8.2.1", f"the heartbeat says {state.words} when it is told so", bool(told))
+        else:
+            yield _send(*frames)
+        answer = yield from slave.read(0x1000)
+        words = "is answered" if answers else "is not answered"
+        rule = f"{state.words}, SDO {words}"
+        slave.found("§7.3.2.2", rule, bool(answer) is answers, shown(answer))
+    slave.is_stopped = False
+    if not has_beat:
+        return
+    yield _send(Frame(cobid.NMT, bytes((_NO_COMMAND, slave.id))))
+    told = yield _is_state(slave)
+    states = [nmt.state_of(frame.data[0]) for frame in told]
+    ok = states == [NmtState.PRE_OPERATIONAL]
+    rule = "an unknown NMT command changes nothing"
+    slave.found("§7.2.8.2.1", rule, ok, states[0].words if states else "silent")
+
+
+def boot_up(slave: Slave) -> Check:
+    """Reset communication ends with one boot-up message, and the node answers after it."""
+
+    def fits(frame: Frame) -> bool:
+        return frame.can_id == cobid.ERROR_CONTROL + slave.id and frame.data == b"\0"
+
+    command = nmt.command(NmtCommand.RESET_COMMUNICATION, slave.id)
+    came = yield Step((command,), fits, _BOOT_UP_S)
+    seen = "" if came else f"none within {_BOOT_UP_S:g} s"
+    slave.found("§7.2.8.3.3", "reset communication ends with a boot-up message", bool(came), seen)
+    answer = yield from slave.read(0x1000)
+    slave.found("§7.3.2.2", "after its boot-up message it answers SDO", bool(answer), shown(answer))
+
+
+def lengths(slave: Slave, heard: dict[int, set[int]]) -> None:
+    """How long the node's frames were that were heard meanwhile."""
+    if sizes := heard.get(cobid.EMCY + slave.id):
+        slave.found("§7.2.7.3.1", "emergency messages have 8 bytes", sizes == {8}, f"{sorted(sizes)} bytes")
+    for cob_id, bits in slave.mapped_bits.items():
+        rule = f"the TPDO on {cob_id:03X}h is as long as its mapping, {bits} bits"
+        if sizes := heard.get(cob_id):
+            slave.found("§7.5.2.38", rule, sizes == {-(-bits // 8)}, f"{sorted(sizes)} bytes")
+        else:
+            slave.skipped("§7.5.2.38", rule, "none came", Verdict.NOT_SEEN)

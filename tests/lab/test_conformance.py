@@ -1,0 +1,44 @@
+"""``conformance`` on real SocketCAN: our simulated devices, and a slave that we did not write."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from tests.lab.test_exchange import NODES
+from tests.support import sites
+from tests.support.process import drivebridge, drivebridge_called, peer
+
+
+def report_of(site: Path, node: str, *options: str, status: int = 0) -> dict[str, Any]:
+    done = drivebridge_called("conformance", str(site), node, "--yes", "--json", *options)
+    assert done.returncode == status, done.stdout + done.stderr
+    return json.loads(done.stdout)
+
+
+def verdicts(report: dict[str, Any]) -> dict[str, str]:
+    return {one["rule"]: one["verdict"] for one in report["checks"]}
+
+
+def test_our_own_devices_have_no_faults(tmp_path: Path) -> None:
+    site = sites.write(tmp_path, sites.socketcan(*NODES))
+    with drivebridge(tmp_path, "simulate", "simulate", str(site)) as process:
+        process.wait_output("simulating")
+        for node in ("conveyor", "pump", "lift"):
+            report = report_of(site, node)
+            assert report["ok"]
+            assert verdicts(report)["1017h holds again what it held"] == "passed"
+        assert all(Path(file).exists() for file in report["files"])
+
+
+def test_the_faults_of_a_foreign_slave_are_found(tmp_path: Path) -> None:
+    """canopen.LocalNode answers SDO although it is stopped."""
+    site = sites.write(tmp_path, sites.socketcan(NODES[0]))
+    with peer(tmp_path, "foreign_slave", "vcan0", "5") as slave:
+        slave.wait_output("is there")
+        report = report_of(site, "conveyor", "--reset", status=1)
+        failed = [rule for rule, verdict in verdicts(report).items() if verdict == "failed"]
+        assert failed == ["stopped, SDO is not answered"]
+        assert verdicts(report)["1008h is read as a block"] == "not offered"
+        assert verdicts(report)["1017h holds again what it held"] == "passed"

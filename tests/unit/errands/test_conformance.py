@@ -1,0 +1,187 @@
+"""``conformance`` finds the faults of a small slave, and puts back what it has changed."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+
+from bridge.canopen.frame import REMOTE, Frame
+from bridge.errands.conformance import Conformance, Slave, Verdict
+from bridge.errands.conformance_checks import checks, lengths, put_back
+
+NODE = 5
+NAME = b"a drive with a long name"
+_MUX = struct.Struct("<HB")
+
+
+class SmallSlave:
+    """A slave after CiA 301, but for its ``fault``."""
+
+    def __init__(self, fault: str = "") -> None:
+        self.fault = fault
+        u32 = {
+            (0x1000, 0): 0x192,
+            (0x1018, 0): 2,
+            (0x1018, 1): 0x38,
+            (0x1018, 2): 1,
+            (0x1014, 0): 0x80 + NODE,
+        }
+        u32 |= {(0x1800, 1): 0x180 + NODE, (0x1A00, 0): 1, (0x1A00, 1): 0x6041_0010, (0x1003, 0): 0}
+        self.objects = {place: value.to_bytes(4, "little") for place, value in u32.items()}
+        self.objects |= {(0x1001, 0): b"\0", (0x1017, 0): b"\0\0", (0x6041, 0): b"\x50\2"}
+        self.objects |= {(0x100C, 0): b"\0\0", (0x100D, 0): b"\0", (0x1008, 0): NAME}
+        if fault == "errors":
+            self.objects[0x1003, 0] = b"\2\0\0\0"
+        if fault == "mapping":
+            del self.objects[0x6041, 0]
+        self.state, self.toggle, self.guard = 0x7F, 0, 0
+        self.left: bytes | None = None
+        self.beat_at: float | None = None
+        self.types = 0
+
+    @property
+    def beat_s(self) -> float:
+        period_ms = int.from_bytes(self.objects[0x1017, 0], "little")
+        return period_ms / (500 if self.fault == "period" else 1000)
+
+    def on_frame(self, frame: Frame, now: float) -> list[Frame]:
+        if frame.can_id == 0 and frame.data[1] == NODE:
+            return self._nmt(frame.data[0])
+        if frame.can_id == (0x700 + NODE) | REMOTE:
+            self.guard ^= 0 if self.fault == "guarding" else 0x80
+            return [Frame(0x700 + NODE, bytes((self.guard ^ 0x80 | self.state,)))]
+        if frame.can_id != 0x600 + NODE or (self.state == 4 and self.fault != "stopped"):
+            return []
+        answer = self._sdo(frame.data)
+        if self.beat_at is None and self.beat_s:
+            self.beat_at = now + self.beat_s
+        return [Frame(0x580 + NODE, answer)] if answer else []
+
+    def _nmt(self, command: int) -> list[Frame]:
+        self.state = {2: 4, 0x80: 0x7F, 0x55: 4 if self.fault == "nmt" else self.state}.get(
+            command, self.state
+        )
+        if command == 0x82:
+            self.beat_at, self.objects[0x1017, 0] = None, b"\0\0"
+            return [] if self.fault == "boot-up" else [Frame(0x700 + NODE, b"\0")]
+        return []
+
+    def _sdo(self, data: bytes) -> bytes:
+        index, sub = _MUX.unpack_from(data, 1)
+
+        def refuse(code: int) -> bytes:
+            self.left = None
+            return b"\x80" + data[1:4] + struct.pack("<I", 0x0800_0000 if self.fault == "codes" else code)
+
+        command = data[0] & 0xE0
+        if data[0] == 0x80:
+            self.left = None
+            return data if self.fault == "abort" else b""
+        if command == 0x60:
+            return self._segment(data, refuse(0x0504_0001) if self.left is None else b"")
+        if command not in (0x20, 0x40):
+            return refuse(0x0504_0001)
+        if (index, sub) not in self.objects:
+            return refuse(0x0609_0011 if any(index == one for one, _ in self.objects) else 0x0602_0000)
+        if command == 0x20:
+            if index == 0x1017:
+                if self.fault != "stuck" or data[4:6] != b"\0\0":
+                    self.objects[index, sub] = data[4:6]
+                return b"\x60" + data[1:4] + bytes(4)
+            return b"\x60" + data[1:4] + bytes(4) if self.fault == "read-only" else refuse(0x0601_0002)
+        value = self.objects[index, sub]
+        if (index, sub) == (0x1000, 0) and self.fault == "changes":
+            self.types += 1
+            value = self.types.to_bytes(4, "little")
+        if len(value) <= 4:
+            return bytes((0x43 | (4 - len(value)) << 2,)) + data[1:4] + value.ljust(4, b"\0")
+        self.left, self.toggle = value, 0
+        return b"\x41" + data[1:4] + struct.pack("<I", len(value) + (self.fault == "announced"))
+
+    def _segment(self, data: bytes, refusal: bytes) -> bytes:
+        if self.left is None:
+            return refusal
+        if data[0] & 0x10 != self.toggle and self.fault != "toggle":
+            self.left = None
+            return b"\x80" + bytes(3) + struct.pack("<I", 0x0503_0000)
+        part, self.left = self.left[:7], self.left[7:] or None
+        head = self.toggle | (7 - len(part)) << 1 | (self.left is None)
+        self.toggle ^= 0x10
+        return bytes((head,)) + part.ljust(7, b"\0")
+
+
+def tried(device: SmallSlave) -> Slave:
+    slave, now = Slave(NODE, 0.5), 100.0
+    errand = Conformance(slave, checks(slave, reset=True), put_back(slave), now)
+    while not errand.is_finished(now):
+        while frames := errand.take_frames():
+            for frame in frames:
+                for answer in device.on_frame(frame, now):
+                    errand.on_frame(answer._replace(time=now))
+        deadline = errand.next_deadline()
+        if deadline is None:
+            continue
+        if device.beat_at is not None and device.beat_s and device.beat_at <= deadline:
+            now = max(now, device.beat_at)
+            device.beat_at = now + device.beat_s
+            errand.on_frame(Frame(0x700 + NODE, bytes((device.state,)), now))
+        else:
+            now = max(now, deadline)
+            errand.on_time(now)
+    assert errand.done == errand.total + 1
+    lengths(slave, errand.heard)
+    return slave
+
+
+def failures(slave: Slave) -> list[str]:
+    return [one.rule for one in slave.findings if one.verdict is Verdict.FAILED]
+
+
+def test_a_slave_after_the_standard_has_no_faults() -> None:
+    device = SmallSlave()
+    slave = tried(device)
+    assert failures(slave) == []
+    passed = {one.clause for one in slave.findings if one.verdict is Verdict.PASSED}
+    assert {"§7.2.8.3.2.1", "§7.2.8.3.2.2", "§7.2.8.3.3", "§7.2.4.3.6", "§7.5.2.38"} <= passed
+    assert (device.state, device.objects[0x1017, 0]) == (0x7F, b"\0\0"), "all is as it was"
+
+
+@pytest.mark.parametrize(
+    ("fault", "rule"),
+    [
+        ("changes", "1000h:00 is the same when it is read again"),
+        ("codes", "reading an object that is not there is refused: 06020000h"),
+        ("codes", "an unknown command specifier is refused: 05040001h"),
+        ("read-only", "writing a read-only object is refused: 06010002h"),
+        ("abort", "an abort is not answered"),
+        ("announced", "so many bytes come as were announced"),
+        ("toggle", "a wrong toggle bit is refused: 05030000h"),
+        ("errors", "1003h has 2 errors, as 1003h:00 says"),
+        ("mapping", "6041h:00, mapped to TPDO 1, is there"),
+        ("guarding", "guarding is answered, with alternating toggle bit"),
+        ("period", "the heartbeat comes every 100 ms where 1017h says so"),
+        ("stopped", "stopped, SDO is not answered"),
+        ("nmt", "an unknown NMT command changes nothing"),
+        ("boot-up", "reset communication ends with a boot-up message"),
+    ],
+)
+def test_a_fault_is_found(fault: str, rule: str) -> None:
+    assert rule in failures(tried(SmallSlave(fault)))
+
+
+def test_what_cannot_be_put_back_is_told() -> None:
+    slave, device = Slave(NODE, 0.5), SmallSlave("stuck")
+    slave.heartbeat_ms, device.objects[0x1017, 0] = 0, b"\x64\0"
+    errand = Conformance(slave, (), put_back(slave), 0.0)
+    while not errand.is_finished(0.0):
+        for frame in errand.take_frames():
+            for answer in device.on_frame(frame, 0.0):
+                errand.on_frame(answer)
+    assert failures(slave) == ["1017h holds again what it held"]
+
+
+def test_a_node_that_is_silent_ends_it_all_the_same() -> None:
+    device = SmallSlave()
+    device.on_frame = lambda frame, now: []  # type: ignore[method-assign]
+    assert failures(tried(device))

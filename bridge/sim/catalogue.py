@@ -14,7 +14,7 @@ from bridge.sim.generic_family import pattern, plan_of_family
 from bridge.sim.generic_node import GenericNode
 from bridge.sim.nord_catalogue import NORD
 from bridge.sim.object_catalogue import MAPPINGS, cia402, lenze_8400_motec
-from bridge.sim.stoeber_catalogue import stoeber_5000, stoeber_5000_four_axes
+from bridge.sim.stoeber_catalogue import stoeber_5000, stoeber_5000_four_axes, stoeber_5000_posi
 
 Factory = Callable[[int, Mapping[str, float]], SimulatedDevice]
 
@@ -24,9 +24,10 @@ def simulate_node(mapping: str, node_id: int, parameters: dict[str, float]) -> S
 
     NORD: ``P105`` sets all drives of a node, ``fu2/P105`` one, ``P151`` (ms) the interface, and without an
     interface that has parameters ``P513`` (s) the drive's own supervision. STÖBER: ``C01`` (1/min) and the
-    ramps ``accelerate_s``, ``decelerate_s``, ``quick_stop_s``, ``axis2/C01`` of one. CiA 402: objects,
-    ``6083``, ``6046:02``, in the drive's units. Lenze: codes, ``C00011`` (1/min), ``C00593/1``. Raises
-    ``OperationFailed`` for a family or a parameter that the simulation does not have.
+    ramps ``accelerate_s``, ``decelerate_s``, ``quick_stop_s``, ``axis2/C01`` of one; ``I07``, ``I08``,
+    ``I10`` where it positions. CiA 402: objects, ``6083``, ``6046:02``, in the drive's units. Lenze: codes,
+    ``C00011`` (1/min), ``C00593/1``. Raises ``OperationFailed`` for a family or a parameter that the
+    simulation does not have.
     """
     factory = _FAMILIES.get(mapping)
     if factory is None:
@@ -77,6 +78,7 @@ _FAMILIES: Final[dict[str, Factory]] = {
     **NORD,
     "stoeber/5000": stoeber_5000,
     "stoeber/5000-four-axes": stoeber_5000_four_axes,
+    "stoeber/5000-posi": stoeber_5000_posi,
 }
 
 SIMULATED: Final = tuple(sorted(_FAMILIES))

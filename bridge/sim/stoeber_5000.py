@@ -17,6 +17,7 @@ from bridge.sim.stoeber_events import CODES, COMMUNICATION, LIFE_GUARDING, SYNC_
 from bridge.sim.stoeber_objects import CommunicationObjects, identity
 from bridge.sim.stoeber_parameters import add_axis, add_device
 from bridge.sim.stoeber_pdo_objects import StoeberPdoObjects
+from bridge.sim.stoeber_posi import PositioningAxis
 from bridge.sim.stoeber_settings import CHANNELS, RULES, factory_communication, factory_settings
 from bridge.sim.stoeber_slave import StoeberSlave
 from bridge.sim.store import Store
@@ -25,8 +26,9 @@ from bridge.sim.supervision import Watch
 
 class Stoeber5000(SimulatedDevice):
     """``axes`` is 1, with A180 and D230 in PDO channel 1, or up to 4, with Q00 and Q01 of axis n in channel
-    n. ``mapped`` says that an application was downloaded; a drive as delivered maps nothing. ``fail`` and
-    its like happen at the next ``on_time`` or ``on_frame``.
+    n. ``positions``: the application of its one axis is command positioning. ``mapped`` says that an
+    application was downloaded; a drive as delivered maps nothing. ``fail`` and its like happen at the next
+    ``on_time`` or ``on_frame``.
     """
 
     def __init__(
@@ -34,6 +36,7 @@ class Stoeber5000(SimulatedDevice):
         node_id: int,
         *,
         axes: int = 1,
+        positions: bool = False,
         mapped: bool = True,
         rated_power_kw: float = 1.5,
         name: str = "MDS 5015",
@@ -41,11 +44,16 @@ class Stoeber5000(SimulatedDevice):
     ) -> None:
         if not 1 <= axes <= CHANNELS:
             raise ValueError(f"axes = {axes}: a POSISwitch has 1 … {CHANNELS}")
+        if positions and axes > 1:
+            raise ValueError("the simulated command positioning has one axis")
         super().__init__(node_id)
-        self._communication = Store(lambda: factory_communication(node_id, axes, mapped=mapped))
+        self._communication = Store(
+            lambda: factory_communication(node_id, axes, mapped=mapped, positions=positions)
+        )
         self._settings = Store(lambda: factory_settings(axes))
         self._emcy = EmcyProducer(self._communication, RULES)
-        self.device = StoeberDevice(axes, self._settings, self._report)
+        kind = PositioningAxis if positions else StoeberAxis
+        self.device = StoeberDevice(axes, self._settings, self._report, kind)
         self.slave = self._build(rated_power_kw, name, bit_31_opens_sdo)
         self.heard = self.slave.hears()
 

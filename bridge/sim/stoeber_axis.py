@@ -55,6 +55,11 @@ class AxisParameters:
     accelerate_s: float = 0.5
     decelerate_s: float = 0.5
     quick_stop_s: float = 0.2
+    i07: int = 360
+    i08: int = 1
+    """Way per revolution of the motor, with command positioning."""
+    max_speed: int = 18_000
+    """I10, in units of the axis per second; the times are those to this speed then."""
 
 
 class StoeberAxis:
@@ -138,7 +143,12 @@ class StoeberAxis:
         timed = (AxisState.SELF_TEST, AxisState.SWITCHED_ON, AxisState.FAULT_REACTION)
         if self.state in timed and self._time < self._until:
             return min(self._until, next_tick(self._time)) if self.speed_rpm else self._until
-        return next_tick(self._time) if self.speed_rpm != self._target_rpm() else None
+        return next_tick(self._time) if self._moves else None
+
+    @property
+    def _moves(self) -> bool:
+        """Whether anything changes with time in a state that lasts."""
+        return self.speed_rpm != self._target_rpm()
 
     def _next_state(self) -> AxisState:
         enable, stop = bool(self.control & ENABLE), bool(self.control & QUICK_STOP)

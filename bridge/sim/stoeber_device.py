@@ -17,7 +17,11 @@ class StoeberDevice:
     it has gone (ID 441684.06 §9.3)."""
 
     def __init__(
-        self, axes: int, settings: Store[StoeberSettings], report: Callable[[int, int], None]
+        self,
+        axes: int,
+        settings: Store[StoeberSettings],
+        report: Callable[[int, int], None],
+        kind: type[StoeberAxis] = StoeberAxis,
     ) -> None:
         self.event = NO_EVENT
         self.cause = 0
@@ -25,7 +29,7 @@ class StoeberDevice:
         self._settings = settings
         self._report = report
         self.axes = tuple(
-            StoeberAxis(number + 1, partial(self.parameters, number), partial(self._is_free_for, number))
+            kind(number + 1, partial(self.parameters, number), partial(self._is_free_for, number))
             for number in range(axes)
         )
 

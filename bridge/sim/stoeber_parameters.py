@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 from bridge.sim.dictionary import DataType as Type
 from bridge.sim.dictionary import Dictionary, Number, constant, item, variable
 from bridge.sim.stoeber_axis import ACKNOWLEDGE, AxisParameters, StoeberAxis
 from bridge.sim.stoeber_device import StoeberDevice
+from bridge.sim.stoeber_posi import PositioningAxis
 from bridge.sim.stoeber_settings import CHANNELS, StoeberSettings, coordinate
 from bridge.sim.store import Store
 
@@ -43,12 +45,34 @@ def add_axis(dictionary: Dictionary, device: StoeberDevice, number: int) -> None
 
     _put(dictionary, "C01", variable(i16, parameters, "c01_rpm", 1, 32767))
     _put(dictionary, "C230", variable(i16, parameters, "c230_percent", 0, 200))
+    if isinstance(axis, PositioningAxis):
+        _add_positioning(dictionary, axis, parameters)
     if len(device.axes) > 1:
         _add_command(dictionary, device, axis, "Q00", "Q01")
         _put(dictionary, "Q02", Number(u8, lambda: axis.state, in_tpdo=True))
         _put(dictionary, "Q03", Number(u8, lambda: axis.status_byte, in_tpdo=True))
         _put(dictionary, "Q04", Number(i16, lambda: round(axis.speed_rpm), in_tpdo=True))
         _put(dictionary, "Q05", Number(i16, lambda: round(10 * axis.current_a), in_tpdo=True))
+
+
+def _add_positioning(
+    dictionary: Dictionary, axis: PositioningAxis, parameters: Callable[[], AxisParameters]
+) -> None:
+    u8, u16, i16, i32 = Type.UNSIGNED8, Type.UNSIGNED16, Type.INTEGER16, Type.INTEGER32
+    for name, attribute in (("I07", "i07"), ("I08", "i08"), ("I10", "max_speed")):
+        _put(dictionary, name, variable(i32, parameters, attribute, 1))
+    for name, kind, attribute in (
+        ("I210", u8, "command"),
+        ("I213", i32, "target"),
+        ("I216", u16, "velocity"),
+        ("I217", u16, "acceleration"),
+        ("I218", u16, "deceleration"),
+    ):
+        _put(dictionary, name, variable(kind, lambda: axis, attribute, in_pdos=True))
+    motor = axis.motor
+    _put(dictionary, "I80", Number(i32, lambda: round(motor.position), in_tpdo=True))
+    _put(dictionary, "I88", Number(i16, lambda: round(motor.velocity), in_tpdo=True))
+    _put(dictionary, "I200", Number(u8, lambda: axis.posi_status, in_tpdo=True))
 
 
 def _put(dictionary: Dictionary, name: str, entry: Number) -> None:

@@ -44,6 +44,10 @@ SENT: Final = _words(("E48", 8), ("E200", 8), ("E08", 16), ("E00", 16))
 AXIS_RECEIVED: Final = _words(("Q00", 8), ("Q01", 16))
 AXIS_SENT: Final = _words(("Q02", 8), ("Q03", 8), ("Q04", 16), ("Q05", 16))
 """The same for an application with a channel to each axis, mappings/stoeber/5000-four-axes.toml."""
+POSI_RECEIVED: Final = _words(("A180", 8), ("I210", 8), ("I213", 32), ("I216", 16))
+POSI_RAMPS: Final = _words(("I217", 16), ("I218", 16))
+POSI_SENT: Final = _words(("E48", 8), ("I200", 8), ("I80", 32), ("I88", 16))
+"""The same for command positioning, mappings/stoeber/5000-posi.toml; the ramps are in RPDO2."""
 
 
 @dataclass(slots=True)
@@ -73,12 +77,18 @@ def factory_settings(axes: int) -> StoeberSettings:
     return StoeberSettings([AxisParameters() for _ in range(axes)], edited)
 
 
-def factory_communication(node_id: int, axes: int, *, mapped: bool) -> CommunicationSettings:
-    """As delivered; ``mapped``: with an application downloaded from POSITool."""
-    received, sent = (RECEIVED, SENT) if axes == 1 else (AXIS_RECEIVED, AXIS_SENT)
+def factory_communication(
+    node_id: int, axes: int, *, mapped: bool, positions: bool = False
+) -> CommunicationSettings:
+    """As delivered; ``mapped``: with an application downloaded from POSITool, which ``positions`` or not."""
+    received, sent = [RECEIVED], [SENT]
+    if positions:
+        received, sent = [POSI_RECEIVED, POSI_RAMPS], [POSI_SENT]
+    elif axes > 1:
+        received, sent = [AXIS_RECEIVED] * axes, [AXIS_SENT] * axes
 
-    def pdo(base: int, channel: int, words: list[int]) -> PdoSettings:
-        used = words if mapped and channel < axes else []
+    def pdo(base: int, channel: int, words: list[list[int]]) -> PdoSettings:
+        used = words[channel] if mapped and channel < len(words) else []
         return StoeberPdo(
             base + node_id,
             transmission_type=ANSWERED,

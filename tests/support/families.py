@@ -216,3 +216,9 @@ def setpoint_of(family: Family) -> tuple[str, float] | None:
         if value.group == "command" and value.name in ("frequency", "velocity", "position"):
             return value.name, {"Hz": 2.0, "1/min": 120.0}.get(value.unit, 500.0)
     return None
+
+
+def speed_of(family: Family) -> dict[str, float]:
+    """How fast a drive is to go to its set-point, where that is a value of its own."""
+    names = {value.name for value in family.values_of(family.slot[0]) if value.group == "command"}
+    return {"velocity": 9000.0} if {"position", "velocity"} <= names else {}

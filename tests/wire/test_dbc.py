@@ -14,7 +14,7 @@ from bridge.canopen.frame import REMOTE, Frame
 from bridge.command import Action, Code, Identity, Source
 from bridge.image import Quality
 from bridge.sim.catalogue import SIMULATED
-from tests.support.families import FamilyBridge, family_bridge, setpoint_of
+from tests.support.families import FamilyBridge, family_bridge, setpoint_of, speed_of
 from tests.support.process import drivebridge_called, peer_called, until
 
 ME = Identity(Source.ZENOH, "test")
@@ -58,7 +58,8 @@ class Recording:
         assert bridge.ask(Action.START, drive, ME).code is Code.OK
         if setpoint is not None:
             name, value = setpoint
-            assert bridge.ask(Action.WRITE, drive, ME, values={name: -value}).code is Code.OK
+            values = {**speed_of(self.site.families[mapping]), name: -value}
+            assert bridge.ask(Action.WRITE, drive, ME, values=values).code is Code.OK
 
             def is_there() -> bool:
                 return abs(float(str(bridge.value(f"{drive}/actual/{name}"))) + value) <= 0.02 * value

@@ -20,7 +20,7 @@ from bridge.drive import ControlWords, DriveState
 from bridge.mapping import Family, family_names
 from bridge.northbound.modbus.registers import DriveMap, Row
 from bridge.sim.catalogue import SIMULATED
-from tests.support.families import FamilyBridge, family_bridge, setpoint_of
+from tests.support.families import FamilyBridge, family_bridge, setpoint_of, speed_of
 from tests.support.process import until
 
 PROTOCOLS = ("modbus", "opcua", "zenoh")
@@ -252,6 +252,8 @@ def run(controller: Controller, family: Family, multiple: int) -> None:
         if any(value.name == "homing_attained" for value in family.value):
             controller.wait("actual/homing_attained", bool)
         return
+    for name, speed in speed_of(family).items():
+        controller.write(name, speed)
     name, value = setpoint[0], multiple * setpoint[1]
     controller.write(name, value)
     controller.wait(f"actual/{name}", lambda actual: abs(actual - value) <= 0.02 * value)

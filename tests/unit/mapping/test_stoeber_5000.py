@@ -16,6 +16,7 @@ from bridge.sim.stoeber_events import CODES
 
 ONE = load_family("stoeber/5000")
 FOUR = load_family("stoeber/5000-four-axes")
+POSI = load_family("stoeber/5000-posi")
 
 
 def test_are_found_by_their_names():
@@ -69,6 +70,28 @@ def test_other_names_are_none(name: str):
     assert ONE.parameter_names is not None
     with pytest.raises(ValueError, match="C01, E08, A225"):
         object_of(ONE.parameter_names, name)
+
+
+def test_command_positioning_fills_a_pdo():
+    """§8.1.1: at most eight bytes, six objects; §10: RPDO1 and TPDO1 have eight."""
+    (slot,) = POSI.slot
+    rpdo, ramps = slot.rpdo
+    (tpdo,) = slot.tpdo
+    assert (rpdo.cob_id, ramps.cob_id, tpdo.cob_id) == (0x200, 0x300, 0x180)
+    assert [len(pdo.objects) for pdo in (rpdo, ramps, tpdo)] == [4, 2, 4]
+    assert ramps.optional
+    assert POSI.parameter_names is not None
+    named = {"A180": "20B4:00", "I213": "30D5:00", "I216": "30D8:00", "I217": "30D9:00", "I80": "3050:00"}
+    for name, place in named.items():
+        assert str(object_of(POSI.parameter_names, name)) == place, "§11.2"
+
+
+def test_no_number_of_a_command_stops_or_enables():
+    words = ControlWords(POSI.control_word)
+    for high in range(0x20):
+        assert words.enables(high << 8 | 0x01)
+        assert not words.enables(high << 8)
+        assert not words.enables(words.stop(high << 8 | 0x01))
 
 
 def test_states_come_from_e48_whatever_e200_says():

@@ -216,7 +216,7 @@ def _facts(restored: backups.Restored) -> dict[str, Any]:
 def _save(target: Target, done: Exchange) -> None:
     """Have the node keep what was written, where its family has a command for that."""
     eeprom = target.family.eeprom
-    if eeprom is None or eeprom.save is None or not done.is_unsaved:
+    if eeprom is None or not eeprom.can_save or not done.is_unsaved:
         return
     warning = target.run(target.access.save, writes=True)
     done.saved(warning)

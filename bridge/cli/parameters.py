@@ -127,14 +127,16 @@ def write(
 
 
 @app.command()
-def save(site: SiteArgument, drive: DriveArgument, yes: Yes = False, as_json: AsJson = False) -> None:
+def save(
+    site: SiteArgument, drive: DriveArgument, yes: Yes = False, force: Force = False, as_json: AsJson = False
+) -> None:
     """Keep the parameters of the drive's node in its EEPROM."""
     target = find(site, drive)
     question = f"write the EEPROM of {target.node.name}?"
     if not yes and sys.stdin.isatty() and not typer.confirm(question, err=True):
         raise OperationFailed("nothing saved")
-    target.alone()
-    warning = target.run(target.access.save, writes=True)
+    check = target.alone(force=force).check
+    warning = target.run(lambda now: target.access.save(now, before_it=check), writes=True)
     if warning:
         tell(f"warning: {warning}")
     print(json.dumps({"ok": True}) if as_json else f"{target.node.name}: saved")

@@ -89,6 +89,16 @@ def _check_eeprom(family: Family, file: MergedFile) -> None:
     ram_only = family.eeprom.ram_only if family.eeprom else None
     if ram_only is not None:
         check_parameter(ram_only.parameter, family, ("eeprom", "ram_only", "parameter"), file)
+    saving = family.eeprom.save_command if family.eeprom else None
+    if saving is None:
+        return
+    key: Key = ("eeprom", "save_command", "parameter")
+    if check_parameter(saving.parameter, family, key, file):
+        one = family.parameter_named(saving.parameter)
+        if not (one.command and one.writable):
+            file.fault(key, f"{one.name} is no command", "give it command = true")
+    if family.eeprom and family.eeprom.save:
+        file.fault(("eeprom", "save"), "has no effect beside save_command")
 
 
 def _check_polls(family: Family, file: MergedFile) -> None:

@@ -102,7 +102,11 @@ class Parameter(Table):
     every_ms: int = Field(0, ge=0, le=3_600_000, description="how often a point is read; 0: on demand")
     read: bool = Field(True, description="false where it can only be given in the site file")
     volatile: bool = Field(False, description="true where a write does not go to the EEPROM")
-
+    command: bool = Field(
+        False,
+        description="true: a write starts something, and what is read is how far it is: it is written even "
+        "if the drive holds the value, and not read back",
+    )
     protected: Protection | None = Field(
         None,
         description="command: never written as a parameter; communication: by an engineer, while the drive "
@@ -152,13 +156,25 @@ class RamOnly(Table):
     value: int | float
 
 
+class SaveCommand(Table):
+    """A device command that saves the parameters: this value is written to this parameter."""
+
+    parameter: str
+    value: int
+
+
 class Eeprom(Table):
     """What writing parameters wears out, and how they are saved."""
 
     cycles: int | None = Field(None, gt=0, description="writes that it endures")
     ram_only: RamOnly | None = None
     save: Ref | None = Field(None, description='"save" is written here, on request only')
+    save_command: SaveCommand | None = Field(None, description="saves instead of `save`, on request only")
     written_on_save_only: bool = Field(False, description="true: a write stays in the RAM until it is saved")
+
+    @property
+    def can_save(self) -> bool:
+        return self.save is not None or self.save_command is not None
 
 
 def object_of(names: ParameterNames, name: str, sets: int = 0, elements: int = 0) -> ObjectRef:

@@ -148,14 +148,15 @@ class DriveParameters:
         before_it: Asks | None = None,
         why_not: Callable[[], str] | None = None,
     ) -> Writes:
-        """Write ``value`` where the drive does not hold it yet, and read it back.
+        """Write ``value`` where the drive does not hold it yet, and read it back; a command is written and
+        has been given when the drive answers.
 
         What ``before_it`` asks of the drive comes right before the write; it raises ``ParameterError`` where
         there is to be none. ``why_not`` is that of the ``Transfer``.
         """
         self.check_writable(entry)
         definition = entry.definition
-        blind = definition is not None and not definition.readable
+        blind = definition is not None and (definition.command or not definition.readable)
         before: bytes | None = None
         if not blind:
             before, time = yield from self._fetch(entry, now, FRESH_S)
@@ -205,16 +206,31 @@ class DriveParameters:
 
     # the EEPROM
 
-    def save(self, now: float) -> Saves:
-        """Write "save" where the family has it: the parameters of the node go to its EEPROM."""
+    @property
+    def saving(self) -> Entry | None:
+        """What is written when the parameters are saved; None where the family has no such command."""
         eeprom = self._eeprom
-        if eeprom is None or eeprom.save is None:
+        if eeprom is None or not eeprom.can_save:
+            return None
+        if eeprom.save_command is not None:
+            return self.names.resolve(eeprom.save_command.parameter)
+        return None if eeprom.save is None else Entry("save", eeprom.save)
+
+    def save(
+        self, now: float, *, before_it: Asks | None = None, why_not: Callable[[], str] | None = None
+    ) -> Saves:
+        """The parameters of the node go to its EEPROM. ``before_it`` and ``why_not`` as with ``write``."""
+        entry, eeprom = self.saving, self._eeprom
+        if entry is None or eeprom is None:
             raise ParameterError(Why.NOT_CONFIGURED, f"{self.name} has no command that saves its parameters")
-        entry = Entry("save", eeprom.save)
+        command = eeprom.save_command
+        data = _SAVE if command is None else encode_value(entry, command.value, None)
         key = (self._node_name, str(entry.address))
         self._check(key, entry.name, now)
+        if before_it is not None:
+            yield from before_it([entry])
         try:
-            _, now = yield Transfer(entry.address, _SAVE, of_node=True)
+            _, now = yield Transfer(entry.address, data, of_node=True, why_not=why_not)
         except TransferFailed as failure:
             if not failure.by_drive:
                 self._count(key, entry.name, now)

@@ -41,6 +41,8 @@ def parameters(family: Family) -> Iterator[str]:
         said.append("A write stays in the RAM until it is saved.")
     if eeprom.save:
         said.append(f"Saved on request, by `{eeprom.save}`.")
+    if eeprom.save_command:
+        said.append(f"Saved on request, by {eeprom.save_command.parameter} = {eeprom.save_command.value}.")
     yield "### EEPROM"
     yield ""
     yield " ".join(said)

@@ -159,7 +159,7 @@ class NodeParameters:
             self._read(drive, entry, command.max_age_ms / 1000, done)
             return
         if not isinstance(command, WriteParameter):
-            self._run(access.save(now), drive, partial(self._on_saved, conclude))
+            self._save(access, request.identity, drive, now, conclude)
             return
         entry = access.names.resolve(command.parameter)
         if command.raw:
@@ -186,6 +186,20 @@ class NodeParameters:
                 why_not=lambda: _why_protected(level, entry, request.identity, drive),
             )
             self._run(steps, drive, partial(self._on_written, request, drive, entry, conclude))
+
+    def _save(
+        self, access: DriveParameters, identity: Identity, drive: Drive, now: float, conclude: Reply
+    ) -> None:
+        entry = access.saving
+
+        def why_not() -> str:
+            level = access.names.protection.level(entry.address) if entry else ""
+            return _why_protected(level, entry, identity, drive) if entry else ""
+
+        if refusal := why_not():
+            conclude(_no(Code.NOT_ALLOWED, refusal))
+            return
+        self._run(access.save(now, why_not=why_not), drive, partial(self._on_saved, conclude))
 
     def _read(
         self,

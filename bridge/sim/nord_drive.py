@@ -7,10 +7,10 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
-from bridge.sim.dictionary import Dictionary
+from bridge.sim.dictionary import DataType, Dictionary, Number
 from bridge.sim.news import News
 from bridge.sim.nord_faults import INTERFACE_MISSING
-from bridge.sim.nord_parameters import PARAMETERS, DriveParameters, Parameter, add_display
+from bridge.sim.nord_parameters import PARAMETER_BASE, PARAMETERS, DriveParameters, Parameter, add_display
 from bridge.sim.nord_ramp import Demand, step, turned
 from bridge.sim.nord_states import STATE_BITS, State, commanded
 from bridge.sim.ticks import next_tick
@@ -130,6 +130,8 @@ class NordDrive:
         words = 1 + SET_POINTS
         add_display(dictionary, 740, words, lambda n: self._shown((self.control_word, *self.setpoints), n))
         add_display(dictionary, 741, words, lambda n: self._shown((self.status_word, *self.actual_values), n))
+        for number in (744, 748):  # options seen, state of the system bus; BU 2500 prints no bits of either
+            dictionary.add(PARAMETER_BASE + number, 0, Number(DataType.INTEGER16, lambda: 0))
 
     # What happens to it.
 

@@ -45,6 +45,8 @@ PARAMETERS: Final = (
     Parameter(509, (3,), 0, 10),  # source of the control word; 3 = system bus (§7.2)
     Parameter(510, (0, 0), 0, 10),  # source of the setpoints; 0 = as P509
     Parameter(513, (10,), -1, 1000, unit=0.1),  # telegram downtime, s; -0.1 = ignore
+    Parameter(514, (5,), 0, 7),  # bit rate of the system bus; 5 = 250 kbit/s (§7.2)
+    Parameter(515, (32, 32, 32), 0, 255),  # its addresses
     Parameter(543, (1, 4, 5, 0, 0), 0, 57, per_set=True),  # meaning of the actual values
     Parameter(546, (1, 0, 0, 0, 0), 0, 57, per_set=True),  # meaning of the setpoints
     Parameter(560, (1,), 0, 2),  # 0 = changes go to RAM only, 1 = to the EEPROM too

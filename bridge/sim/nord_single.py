@@ -7,7 +7,7 @@ from typing import Final
 
 from bridge.sim.communication_objects import add_communication
 from bridge.sim.dictionary import DataType as Type
-from bridge.sim.dictionary import Dictionary, Number
+from bridge.sim.dictionary import Dictionary, Number, constant
 from bridge.sim.nmt_slave import NmtCommand, NmtState
 from bridge.sim.nord_drive import VALID, NordDrive
 from bridge.sim.nord_faults import LINK_BROKEN, TELEGRAM_DOWNTIME
@@ -22,7 +22,9 @@ from bridge.sim.sdo_server import SdoServer
 from bridge.sim.store import Store
 
 _P513: Final = 513
+_P745: Final = 0x2000 + 745
 _P746: Final = 0x2000 + 746
+_VERSION_TENTHS: Final = 10
 _INTERFACE_ID: Final = 0x0C00
 """The high byte of P746 (§7.2)."""
 
@@ -113,6 +115,7 @@ class NordSingle(NordNode):
         parameters = Dictionary()
         self.drive.add_to(parameters)
         if self.variant.has_interface:
+            parameters.add(_P745, 0, constant(Type.INTEGER16, _VERSION_TENTHS))
             parameters.add(_P746, 0, Number(Type.UNSIGNED16, self._module_state))
         access = DriveAccess(parameters, lambda: self.linked)
         return [SdoServer(FirstChannel([dictionary, access]), RULES.sdo_block_segments)]

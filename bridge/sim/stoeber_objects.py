@@ -14,7 +14,7 @@ from bridge.sim.communication_objects import (
     by_signature,
 )
 from bridge.sim.dictionary import DataType as Type
-from bridge.sim.dictionary import Dictionary, Number, constant, item, variable
+from bridge.sim.dictionary import Dictionary, Number, Text, constant, item, variable
 from bridge.sim.settings import COB_ID_MASK, DISABLED, CobId, CommunicationSettings
 from bridge.sim.stoeber_pdo_objects import StoeberPdoObjects, resolved
 from bridge.sim.stoeber_settings import CHANNELS, MAP_ENTRIES, SDO_BASES, StoeberSettings, coordinate
@@ -83,6 +83,10 @@ class CommunicationObjects:
             self._add_sdo_server(dictionary, number)
         self._pdos.add()
         self._add_coordinates(dictionary)
+        named = {"E50": who.device_name, "E51": who.software_version, "E149": who.hardware_version}
+        for name, text in named.items():
+            dictionary.add(coordinate(name), 0, Text(text))
+        dictionary.add(coordinate("E52"), 0, constant(Type.UNSIGNED32, who.serial))
 
     def _save(self) -> None:
         self._communication.save()

@@ -11,7 +11,7 @@ from bridge.mapping.loader import lineage, mappings_dir
 
 
 def test_a_mapping_without_a_base_is_alone() -> None:
-    assert lineage("stoeber/5000") == ["stoeber/5000"]
+    assert lineage("cia402/base") == ["cia402/base"]
 
 
 def test_templates_count() -> None:
@@ -19,14 +19,11 @@ def test_templates_count() -> None:
 
 
 def test_a_file_of_the_same_name_in_the_sites_folder_is_one_with_it(tmp_path: Path) -> None:
-    own = tmp_path / "stoeber" / "5000.toml"
+    own = tmp_path / "cia402" / "base.toml"
     own.parent.mkdir()
-    own.write_text('extends = "stoeber/5000"\n', encoding="utf-8")
-    assert lineage("stoeber/5000", (tmp_path, mappings_dir())) == ["stoeber/5000"]
-    assert lineage("stoeber/5000-four-axes", (tmp_path, mappings_dir())) == [
-        "stoeber/5000-four-axes",
-        "stoeber/5000",
-    ]
+    own.write_text('extends = "cia402/base"\n', encoding="utf-8")
+    assert lineage("cia402/base", (tmp_path, mappings_dir())) == ["cia402/base"]
+    assert lineage("cia402/homing", (tmp_path, mappings_dir())) == ["cia402/homing", "cia402/base"]
 
 
 def test_a_base_that_is_missing_is_named(tmp_path: Path) -> None:

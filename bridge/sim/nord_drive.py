@@ -11,6 +11,7 @@ from bridge.sim.dictionary import DataType, Dictionary, Number
 from bridge.sim.news import News
 from bridge.sim.nord_faults import INTERFACE_MISSING
 from bridge.sim.nord_parameters import PARAMETER_BASE, PARAMETERS, DriveParameters, Parameter, add_display
+from bridge.sim.nord_posicon import PositionControl, approach, target
 from bridge.sim.nord_ramp import Demand, step, turned
 from bridge.sim.nord_states import STATE_BITS, State, commanded
 from bridge.sim.ticks import next_tick
@@ -214,7 +215,7 @@ class NordDrive:
             return self._until
         if self.state not in (State.ENABLED, State.QUICK_STOP):
             return None
-        restless = self._ripple > 0 and self.output_hz != 0
+        restless = (self._ripple > 0 and self.output_hz != 0) or self._is_under_way()
         return next_tick(self._time) if restless or self.output_hz != self._ramp_target_hz() else None
 
     # How it works inside.
@@ -237,17 +238,36 @@ class NordDrive:
         note 3: bit 12 = 0 means right); clipped to P105."""
         if self.demand:
             return max(-self._max_hz, min(self._max_hz, self.demand.target_hz))
+        share = self._set_share()
+        return self._max_hz * (-share if self.control_word & LEFT else share)
+
+    def _set_share(self) -> float:
+        """The setpoints that are frequencies, together: 1.0 is P105."""
         share = 0.0
         for n, word in enumerate(self.setpoints, start=1):
             if word and self.parameters.meaning(546, n, self._set) == 1:
                 share += ((word & 0xFFFF ^ 0x8000) - 0x8000) / HUNDRED_PERCENT
-        share = max(-1.0, min(1.0, share))
-        return self._max_hz * (-share if self.control_word & LEFT else share)
+        return max(-1.0, min(1.0, share))
+
+    def _position_goal(self) -> int | None:
+        """The set position in increments, where the drive positions."""
+        if self.demand or self.parameters.raw(600, 1, self._set) == PositionControl.OFF:
+            return None
+        return target(self.setpoints, lambda n: self.parameters.meaning(546, n, self._set))
+
+    def _positioning_hz(self) -> float:
+        """How fast it may go there. The position gives the direction."""
+        if self.parameters.raw(600, 1, self._set) == PositionControl.AT_P105:
+            return self._max_hz
+        return abs(self._set_share()) * self._max_hz
 
     def _goal_hz(self) -> float:
         """The frequency demanded by the present control word."""
-        runs = self.state is State.ENABLED and self.control_word & 0x7F == 0x7F
-        return self._commanded_hz() if runs else 0.0
+        return self._commanded_hz() if self._runs and self._position_goal() is None else 0.0
+
+    @property
+    def _runs(self) -> bool:
+        return self.state is State.ENABLED and self.control_word & 0x7F == 0x7F
 
     def _ramp_target_hz(self) -> float:
         if self.state is State.ENABLED and self.control_word & 0x31 == 0x11:
@@ -255,10 +275,24 @@ class NordDrive:
         return self._goal_hz()
 
     def _setpoint_reached(self) -> bool:
-        faulty = self.state in (State.FAULT_REACTION, State.FAULT)
-        return not faulty and self.output_hz == self._goal_hz()
+        """§6.5.2: with POSICON the set position."""
+        if self.state in (State.FAULT_REACTION, State.FAULT):
+            return False
+        goal = self._position_goal()
+        if goal is not None:
+            return abs(goal - self.position_increments) < 1
+        return self.output_hz == self._goal_hz()
+
+    def _is_under_way(self) -> bool:
+        """To a position, with a speed to go there."""
+        goal = self._position_goal() if self._runs else None
+        return goal is not None and self.position_increments != goal and self._positioning_hz() > 0
 
     def _ramp(self, dt_s: float) -> None:
+        goal = self._position_goal() if self._runs else None
+        if goal is not None:
+            self._position(goal, dt_s)
+            return
         before_hz, target_hz = self.output_hz, self._ramp_target_hz()
         if before_hz == target_hz and not self._accelerating and not self._ripple:
             self._turn(before_hz, dt_s)
@@ -272,6 +306,15 @@ class NordDrive:
         self._turn(before_hz, dt_s)
         self._accelerating = abs(self.output_hz) > abs(before_hz) and self.output_hz != target_hz
         self._ripple_now = self._random.uniform(-self._ripple, self._ripple) if self.output_hz else 0.0
+
+    def _position(self, goal: int, dt_s: float) -> None:
+        before = self.position_increments, self.output_hz
+        times_s = self._ramp_times_s()
+        up, down = (self._max_hz / max(time_s, 0.01) for time_s in times_s)
+        after = approach(*before, goal, self._positioning_hz(), (up, down), dt_s)
+        self.position_increments, self.output_hz = after
+        self._accelerating = abs(self.output_hz) > abs(before[1])
+        self.news.is_there |= after != before
 
     def _turn(self, before_hz: float, dt_s: float) -> None:
         """The shaft turns on."""

@@ -50,6 +50,7 @@ PARAMETERS: Final = (
     Parameter(543, (1, 4, 5, 0, 0), 0, 57, per_set=True),  # meaning of the actual values
     Parameter(546, (1, 0, 0, 0, 0), 0, 57, per_set=True),  # meaning of the setpoints
     Parameter(560, (1,), 0, 2),  # 0 = changes go to RAM only, 1 = to the EEPROM too
+    Parameter(600, (0,), 0, 2, per_set=True),  # position control, see nord_posicon
 )
 
 _ON_SYSTEM_BUS: Final = (120, 509, 543, 546)

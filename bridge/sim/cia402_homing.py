@@ -64,6 +64,13 @@ class Homing(Parts):
         self._goal -= self._shift
 
     @property
+    def inputs(self) -> int:
+        """60FDh: bit 0 is the negative limit switch, bit 1 the positive one."""
+        place = self.motor.position + self._shift
+        is_there = self.switches
+        return (place <= -SWITCH_AT and is_there) | (place >= SWITCH_AT and is_there) << 1
+
+    @property
     def demand(self) -> float:
         return self.motor.velocity
 

@@ -141,6 +141,7 @@ class Cia402Objects:
         actual(0x606C, i32, lambda: round(motor.velocity))
         position = Number(i32, lambda: targets.position, set_position, in_rpdo=True, in_tpdo=True)
         dictionary.add(0x607A, 0, position)
+        actual(0x60FD, Type.UNSIGNED32, lambda: axis.homing.inputs)
         dictionary.add(0x60FF, 0, variable(i32, lambda: targets, "velocity", in_pdos=True))
 
     def _add_numbers(self, dictionary: Dictionary) -> None:

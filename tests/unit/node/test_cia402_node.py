@@ -295,6 +295,8 @@ def test_hm_start_begins_homing_once_enabled(booted) -> None:
     assert bench.value("axis/drive/actual/homing_attained") is True
     assert bench.value("axis/drive/actual/position") == 500
     assert bench.value("axis/drive/actual/homing_error") is False
+    bench.run(1.0)
+    assert bench.value("axis/node/digital_inputs") == 1, "60FDh, bit 0: at the negative limit switch"
 
 
 def test_hm_without_switches_fails(booted) -> None:

@@ -315,6 +315,15 @@ def test_hm_finds_its_place(make, method: int, from_: int, to: int):
     assert bench.node.axis.homing._shift == to - 7
 
 
+@pytest.mark.parametrize(("position", "inputs"), [(-100_001, 1), (-100_000, 1), (0, 0), (100_000, 2)])
+def test_60fd_tells_the_limit_switches(make, position: int, inputs: int):
+    bench = make(Mode.HOMING)
+    bench.node.axis.motor.position = position
+    assert bench.read(0x60FD, 0) == inputs
+    bench.node.axis.homing.switches = False
+    assert bench.read(0x60FD, 0) == 0
+
+
 def test_hm_is_interrupted_when_bit_4_falls(make):
     bench = make(Mode.HOMING, homing_method=17)
     enable(bench)

@@ -11,6 +11,7 @@ from bridge.sim.device import SimulatedDevice
 from bridge.sim.nord_drive import NordDrive
 from bridge.sim.nord_interface import Kind
 from bridge.sim.nord_parameters import DriveParameters
+from bridge.sim.nord_posicon import commission as posicon
 from bridge.sim.nord_single import NordSingle
 from bridge.sim.nord_single_settings import RJ45_5XX, RJ45_54X, TU3, Variant
 from bridge.sim.nord_tu4 import NordTu4
@@ -24,14 +25,19 @@ frequency."""
 _SLOTS: Final = ("fu1", "fu2", "fu3", "fu4")
 
 
-def _interface(kind: Kind) -> Callable[[int, Mapping[str, float]], SimulatedDevice]:
-    """``P105`` sets all four drives, ``fu2/P105`` one, ``P151`` (ms) the interface."""
+def _interface(
+    kind: Kind, *, positions: bool = False
+) -> Callable[[int, Mapping[str, float]], SimulatedDevice]:
+    """``P105`` sets all four drives, ``fu2/P105`` one, ``P151`` (ms) the interface. ``positions``: they are
+    set up as in §5.4."""
 
     def make(node_id: int, parameters: Mapping[str, float]) -> SimulatedDevice:
         p151_ms = parameters.get("P151", 0)
         if not 0 <= p151_ms <= _P151_MOST_MS:
             raise OperationFailed(f"P151 = {p151_ms:g} is outside 0 … {_P151_MOST_MS} ms")
         node = NordTu4(node_id, kind=kind, p151_ms=round(p151_ms))
+        for drive in node.drives if positions else ():
+            posicon(drive.parameters)
         others = {name: value for name, value in parameters.items() if name != "P151"}
         _commission(kind, dict(zip(_SLOTS, node.drives, strict=True)), others)
         return node
@@ -80,6 +86,7 @@ def _names(mapping: str, endings: Sequence[str]) -> list[str]:
 NORD: Final = {
     "nord/sk-cu4-cao": _interface("SK CU4-CAO"),
     **dict.fromkeys(_names("nord/sk-tu4-cao", ["ds402"]), _interface("SK TU4-CAO")),
+    "nord/sk-tu4-cao-posicon": _interface("SK TU4-CAO", positions=True),
     **dict.fromkeys(_names("nord/sk-tu3-cao", ["pdo1", "pdo4"]), _single(TU3)),
     "nord/sk-tu3-cao-pdo3": _single(TU3, _POSITION),
     **dict.fromkeys(_names("nord/sk-5xxe-rj45", ["encoder"]), _single(RJ45_5XX)),

@@ -280,7 +280,7 @@ class NordDrive:
             return False
         goal = self._position_goal()
         if goal is not None:
-            return abs(goal - self.position_increments) < 1
+            return self.output_hz == 0 and abs(goal - self.position_increments) < 1
         return self.output_hz == self._goal_hz()
 
     def _is_under_way(self) -> bool:

@@ -108,8 +108,9 @@ class DriveParameters:
         key = (number, value, parameter_set) if by_elements else (number + value - 1, 1, parameter_set)
         return self._ram.get(key, 0) if by_elements or value <= _PLAIN_VALUES else 0
 
-    def commission(self, number: int, value: float) -> None:
-        """Set all sets and elements, as at commissioning, before the drive was connected to the bus.
+    def commission(self, number: int, value: float, element: int | None = None) -> None:
+        """Set all sets, and all elements or one, as at commissioning, before the drive was connected to the
+        bus.
 
         Raises ``KeyError`` for a parameter the simulation does not have and ``ValueError`` out of range.
         """
@@ -118,10 +119,11 @@ class DriveParameters:
         if not parameter.low <= raw <= parameter.high:
             low, high = parameter.low * parameter.unit, parameter.high * parameter.unit
             raise ValueError(f"P{number} = {value:g} is outside {low:g} … {high:g}")
-        for element in range(1, len(parameter.defaults) + 1):
+        elements = range(1, len(parameter.defaults) + 1) if element is None else (element,)
+        for one in elements:
             for parameter_set in range(1, SETS + 1):
-                self._eeprom[number, element, parameter_set] = raw
-                self._ram[number, element, parameter_set] = raw
+                self._eeprom[number, one, parameter_set] = raw
+                self._ram[number, one, parameter_set] = raw
 
     def write(self, parameter: Parameter, element: int, parameter_set: int, raw: int) -> None:
         """A write over the bus: to the EEPROM too, unless P560 says RAM only (§6.6: 100 000 cycles)."""

@@ -12,6 +12,7 @@ from enum import IntEnum
 from typing import Final
 
 from bridge.sim.cia402_motion import Motor
+from bridge.sim.nord_parameters import DriveParameters
 from bridge.sim.nord_ramp import INCREMENTS, POLE_PAIRS
 
 LOW_WORD: Final = 23
@@ -25,6 +26,11 @@ _STEP_S: Final = 0.005
 _MOST_STEPS: Final = 2000
 
 
+ACTUAL: Final = (1, 10, 15)
+SETPOINTS: Final = (1, LOW_WORD, HIGH_WORD)
+"""P543 and P546 of §5.4, step 5: frequency, position in two words."""
+
+
 class PositionControl(IntEnum):
     """P600."""
 
@@ -32,6 +38,14 @@ class PositionControl(IntEnum):
     AT_P105 = 1
     AT_SETPOINT = 2
     """As fast as the set frequency says."""
+
+
+def commission(parameters: DriveParameters) -> None:
+    """A drive as in §5.4."""
+    for number, codes in ((543, ACTUAL), (546, SETPOINTS)):
+        for element, code in enumerate(codes, start=1):
+            parameters.commission(number, code, element)
+    parameters.commission(600, PositionControl.AT_SETPOINT)
 
 
 def target(words: Sequence[int], meaning: Callable[[int], int]) -> int | None:

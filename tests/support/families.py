@@ -212,13 +212,18 @@ def family_bridge(folder: Path, mappings: Sequence[str], protocol: str) -> Itera
 
 def setpoint_of(family: Family) -> tuple[str, float] | None:
     """A setpoint of the family that is soon reached: name and value; None where it has none."""
-    for value in family.values_of(family.slot[0]):
-        if value.group == "command" and value.name in ("frequency", "velocity", "position"):
-            return value.name, {"Hz": 2.0, "1/min": 120.0}.get(value.unit, 500.0)
+    values = [value for value in family.values_of(family.slot[0]) if value.group == "command"]
+    # A drive that follows positions turns for nothing else.
+    values.sort(key=lambda value: value.follows is None)
+    for value in values:
+        if value.name in ("frequency", "velocity", "position"):
+            return value.name, {"Hz": 2.0, "1/min": 120.0, "rev": 2.0}.get(value.unit, 500.0)
     return None
 
 
 def speed_of(family: Family) -> dict[str, float]:
-    """How fast a drive is to go to its set-point, where that is a value of its own."""
+    """How fast a drive is to go to its position, where that is a value of its own."""
+    setpoint = setpoint_of(family)
     names = {value.name for value in family.values_of(family.slot[0]) if value.group == "command"}
-    return {"velocity": 9000.0} if {"position", "velocity"} <= names else {}
+    speeds = {"velocity": 9000.0, "frequency": 25.0} if setpoint and setpoint[0] == "position" else {}
+    return {name: speed for name, speed in speeds.items() if name in names}

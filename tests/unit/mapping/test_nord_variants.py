@@ -12,7 +12,7 @@ from bridge.sim.nord_faults import _CODES, emcy_code
 
 TU3_VIEWS = ("nord/sk-tu3-cao-pdo1", "nord/sk-tu3-cao", "nord/sk-tu3-cao-pdo3", "nord/sk-tu3-cao-pdo4")
 RJ45 = ("nord/sk-5xxe-rj45", "nord/sk-5xxe-rj45-encoder", "nord/sk-54xe-rj45", "nord/sk-54xe-rj45-encoder")
-XU4 = ("nord/sk-tu4-cao", "nord/sk-cu4-cao", "nord/sk-tu4-cao-ds402")
+XU4 = ("nord/sk-tu4-cao", "nord/sk-cu4-cao", "nord/sk-tu4-cao-ds402", "nord/sk-tu4-cao-posicon")
 ALL = (*XU4, *TU3_VIEWS, *RJ45)
 FAMILIES: dict[str, Family] = {name: load_family(name) for name in ALL}
 

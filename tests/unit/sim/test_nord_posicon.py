@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.sim.nord_drive import NordDrive
-from bridge.sim.nord_posicon import PositionControl, target
+from bridge.sim.nord_posicon import PositionControl, commission, target
 from bridge.sim.nord_states import State
 
 REACHED = 0x0100
@@ -20,12 +20,8 @@ class Axis:
         self.drive = NordDrive()
         self.now = 0.0
         self.drive.power_on(0.0)
-        parameters = self.drive.parameters
-        by_number = {parameter.number: parameter for parameter in parameters._by_number.values()}
-        for number, codes in ((543, (1, 10, 15)), (546, (1, 23, 24)), (600, (control,))):
-            for element, code in enumerate(codes, start=1):
-                for parameter_set in range(1, 5):
-                    parameters.write(by_number[number], element, parameter_set, code)
+        commission(self.drive.parameters)
+        self.drive.parameters.commission(600, control)
         self.wait(0.3)
         self.send(0x047E)
 

@@ -1,0 +1,126 @@
+"""The bridge with a NORD SK TU4-CAO whose drives position: BU 2500 §5.4, on a virtual clock."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bridge.command import Action, Code
+from bridge.config import load_site
+from bridge.drive import DriveState
+from bridge.mapping import load_family
+from bridge.sim.catalogue import simulate_node
+from bridge.sim.nord_tu4 import NordTu4
+from tests.support.bench import Bench
+
+MAPPING = "nord/sk-tu4-cao-posicon"
+DRIVE = "hoist/drive"
+SITE = f"""
+[site]
+name = "bench"
+[[bus]]
+name = "can0"
+interface = "virtual"
+[[bus.node]]
+name = "hoist"
+id = 5
+mapping = "{MAPPING}"
+[[bus.node.drive]]
+slot = "fu1"
+name = "drive"
+control = "modbus"
+fieldbus_timeout_ms = 200
+[modbus]
+"""
+SHUT_DOWN, ENABLE = 0x047E, 0x047F
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    """Its axis stands at 7.25 revolutions."""
+    path = tmp_path / "site.toml"
+    path.write_text(SITE, encoding="utf-8")
+    node = simulate_node(MAPPING, 5, {})
+    assert isinstance(node, NordTu4)
+    node.drives[0].position_increments = 7_250.0
+    bench = Bench(load_site(path), family=load_family(MAPPING), mapping=MAPPING, node=node)
+    bench.run(3.0)
+    return bench
+
+
+def write(bench: Bench, seconds: float, **values: float) -> None:
+    """As a controller does: the same telegram again and again."""
+    for _ in range(round(seconds / 0.05)):
+        outcome = bench.write(DRIVE, **values)
+        assert outcome.code is Code.OK, outcome
+        bench.run(0.05)
+
+
+def enable(bench: Bench) -> None:
+    write(bench, 0.3, control_word=SHUT_DOWN)
+    write(bench, 0.3, control_word=ENABLE, frequency=50.0)
+    assert bench.value(f"{DRIVE}/status/state") == DriveState.OPERATION_ENABLED
+
+
+def actual(bench: Bench, name: str) -> object:
+    return bench.value(f"{DRIVE}/actual/{name}")
+
+
+def position(bench: Bench) -> float:
+    value = actual(bench, "position")
+    assert isinstance(value, float)
+    return value
+
+
+def sent(bench: Bench) -> tuple[int, int, int]:
+    """Speed word, and the position in increments, as they are on the wire."""
+    data = bench.sent(0x205)[-1].data
+    return (
+        int.from_bytes(data[:2], "little"),
+        int.from_bytes(data[2:4], "little"),
+        int.from_bytes(data[4:8], "little", signed=True),
+    )
+
+
+def test_enabling_moves_nothing(bench: Bench) -> None:
+    write(bench, 0.3, control_word=SHUT_DOWN, position=900.0)
+    write(bench, 2.0, control_word=ENABLE, frequency=50.0)
+    assert sent(bench) == (ENABLE, 0x4000, 7_250)
+    assert position(bench) == 7.25
+    assert actual(bench, "target_reached") is True
+
+
+def test_it_goes_to_the_position_that_is_written(bench: Bench) -> None:
+    enable(bench)
+    write(bench, 0.5, control_word=ENABLE, frequency=50.0, position=30.0)
+    assert sent(bench) == (ENABLE, 0x4000, 30_000)
+    assert actual(bench, "target_reached") is False
+    write(bench, 5.0, control_word=ENABLE, frequency=50.0, position=30.0)
+    assert (position(bench), actual(bench, "frequency")) == (30.0, 0.0)
+    assert actual(bench, "target_reached") is True
+    write(bench, 5.0, control_word=ENABLE, frequency=25.0, position=-4.321)
+    assert position(bench) == pytest.approx(-4.321)
+
+
+@pytest.mark.parametrize("action", [Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE])
+def test_after_a_stop_it_stays_until_a_position_is_written(bench: Bench, action: Action) -> None:
+    enable(bench)
+    write(bench, 1.0, control_word=ENABLE, frequency=50.0, position=400.0)
+    bench.ask(action, DRIVE)
+    bench.run(0.1)
+    write(bench, 4.0, control_word=SHUT_DOWN)
+    where = position(bench)
+    assert 7.25 < where < 300.0
+    write(bench, 2.0, control_word=ENABLE, frequency=50.0)
+    assert position(bench) == where
+    write(bench, 6.0, control_word=ENABLE, frequency=50.0, position=10.0)
+    assert position(bench) == 10.0
+
+
+def test_a_silent_controller_stops_it(bench: Bench) -> None:
+    enable(bench)
+    write(bench, 1.0, control_word=ENABLE, frequency=50.0, position=400.0)
+    bench.run(3.0)
+    assert bench.value(f"{DRIVE}/status/state") == DriveState.FAULT
+    assert bench.node.drives[0].output_hz == 0

@@ -11,6 +11,7 @@ from bridge.config import load_site
 from bridge.drive import DriveState
 from bridge.mapping import load_family
 from bridge.sim.catalogue import simulate_node
+from bridge.sim.nord_single import NordSingle
 from bridge.sim.nord_tu4 import NordTu4
 from tests.support.bench import Bench
 
@@ -124,3 +125,22 @@ def test_a_silent_controller_stops_it(bench: Bench) -> None:
     bench.run(3.0)
     assert bench.value(f"{DRIVE}/status/state") == DriveState.FAULT
     assert bench.node.drives[0].output_hz == 0
+
+
+def test_a_position_of_32_bits_in_one_pdo_follows_too(tmp_path: Path) -> None:
+    """§6.5.7, the third view of a SK TU3-CAO; here the drive takes its speed from P105 (P600 = 1)."""
+    mapping = "nord/sk-tu3-cao-pdo3"
+    path = tmp_path / "site.toml"
+    path.write_text(SITE.replace(MAPPING, mapping).replace('"fu1"', '"drive"'), encoding="utf-8")
+    node = simulate_node(mapping, 5, {"P600": 1})
+    assert isinstance(node, NordSingle)
+    node.drive.position_increments = 7_250.0
+    bench = Bench(load_site(path), family=load_family(mapping), mapping=mapping, node=node)
+    bench.run(3.0)
+    write(bench, 0.3, control_word=SHUT_DOWN)
+    write(bench, 2.0, control_word=ENABLE)
+    assert bench.value(f"{DRIVE}/status/state") == DriveState.OPERATION_ENABLED
+    assert position(bench) == 7.25
+    assert actual(bench, "target_reached") is True
+    write(bench, 5.0, control_word=ENABLE, position=-2.5)
+    assert position(bench) == -2.5

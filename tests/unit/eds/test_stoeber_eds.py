@@ -46,14 +46,14 @@ def test_a_drive_as_delivered_maps_nothing(description: Description) -> None:
     assert [one.mapped for one in pdos(description, NODE)] == [()] * 8
 
 
-@pytest.mark.parametrize("name", ["stoeber/5000", "stoeber/5000-four-axes"])
+@pytest.mark.parametrize("name", ["stoeber/5000", "stoeber/5000-four-axes", "stoeber/5000-posi"])
 def test_the_mapping_file_and_the_eds_agree_on_the_identifiers(description: Description, name: str) -> None:
     known = {(pdo.receives, pdo.number): pdo for pdo in pdos(description, NODE)}
     family = load_family(name)
     for slot in family.slot:
         for receives, mine in ((True, slot.rpdo), (False, slot.tpdo)):
-            (pdo,) = mine
-            assert known[receives, pdo.number].cob_id == pdo.cob_id + NODE
+            for pdo in mine:
+                assert known[receives, pdo.number].cob_id == pdo.cob_id + NODE
     for server in family.sdo:
         objects = {one.index: one for one in description.objects}[0x1200 + server.number - 1]
         values = [entry.default.at(NODE) for entry in objects.entries if entry.default]

@@ -25,6 +25,7 @@ _COMMANDS: Final = {
     "witness": "witness.witness",
     "eds": "eds.eds",
     "family": "family.app",
+    "faults": "faults.faults",
     "hash-password": "project.hash_password",
     "scan": "scan.scan",
     "nmt": "nmt.nmt",

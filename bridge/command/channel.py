@@ -24,7 +24,7 @@ from bridge.command.request import Identity, Outcome, Reply, Request
 from bridge.command.status import DriveStatus
 from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
-from bridge.drive import FAULTED, DriveState, Told, scales_of
+from bridge.drive import FAULTED, DriveState, Explained, Told, scales_of
 from bridge.image import Quality
 from bridge.mapping.model import Family
 
@@ -183,6 +183,15 @@ class DriveChannel:
     @property
     def fault_text(self) -> str:
         return self._status.fault_text(self._bridge_fault, self.state)
+
+    @property
+    def fault(self) -> Explained:
+        """The present fault as its maker writes it, with cause and remedy."""
+        return self._status.fault(self._bridge_fault, self.state)
+
+    @property
+    def last_fault_text(self) -> str:
+        return self._status.last_fault_text
 
     def refusal(self, identity: Identity) -> str:
         """Why ``identity`` may not command the drive, whose owner is there; empty where it may."""

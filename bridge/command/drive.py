@@ -22,7 +22,9 @@ from bridge.mapping.model import Family, Slot
 
 _ASYNCHRONOUS: Final = 255
 _IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
+_FAULT: Final = ("fault_text", "fault_number", "fault_cause", "fault_remedy")
 _SUPERVISION: Final = (
+    "last_fault_text",
     "owner",
     "watchdog_state",
     "fieldbus_timeout_ms",
@@ -120,7 +122,7 @@ class Drive:
 
         self._control_word, *self._setpoint_indices = places("command", ["control_word", *carried])
         self._value_indices = places("command", [codec.model.name for codec in self._commands])
-        self._supervision = places("status", ("fault_text",)) + places("supervision", _SUPERVISION)
+        self._supervision = places("status", _FAULT) + places("supervision", _SUPERVISION)
         self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms", "telegrams"))
         (self._abort_code,) = places("supervision", ("sdo_abort_code",))
         self._follows = places("supervision", ("follows", "last_stop"))
@@ -294,8 +296,13 @@ class Drive:
 
     def _refresh_supervision(self, now: float) -> None:
         channel = self.channel
+        fault = channel.fault
         values: tuple[Value, ...] = (
             channel.fault_text,
+            fault.number,
+            fault.cause,
+            fault.remedy,
+            channel.last_fault_text,
             str(channel.owner or ""),
             int(channel.watchdog_state),
             channel.timeout_ms,

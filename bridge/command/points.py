@@ -101,6 +101,9 @@ def _status_points(name: str, family: Family) -> list[Point]:
         point("drive_status_word", _U16, "status word as the drive sent it", bits=bits),
         point("state", _U8, "drive state", states=DRIVE_STATES),
         point("fault_text", _TEXT, "present fault"),
+        point("fault_number", _TEXT, "number of the present fault as its maker writes it, such as E010/10.3"),
+        point("fault_cause", _TEXT, "what may have caused the present fault, by its manual"),
+        point("fault_remedy", _TEXT, "what to do about the present fault, by its manual"),
         point("emcy_code", _U16, "code of the last emergency message, CiA 301 §7.2.7"),
     ]
 
@@ -141,6 +144,7 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
         ),
         point("last_fault", _REAL, "such as 10.3 for E010/10.3"),
         point("current_fault", _REAL, "present fault; 0: none"),
+        point("last_fault_text", _TEXT, "last fault as its maker writes it, with its text"),
         point("trips", _U32, "watchdog trips since start"),
         point(
             "worst_case_stop_ms",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bridge.drive import FAULTED, DriveState, StatusWords, Told
+from bridge.drive import FAULTED, DriveState, Explained, FaultWords, StatusWords, Told
 from bridge.mapping.model import Family
 
 
@@ -10,12 +10,12 @@ class DriveStatus:
     """Last known status of one drive. Fault numbers are the family's own, 0 where there is none."""
 
     def __init__(self, family: Family) -> None:
-        self._emcy = family.emcy
-        self.faults = family.faults
+        self._fault_words = FaultWords(family)
         self.words = StatusWords(family.status_word)
         self.word = 0
         self.emcy_code = 0
-        self._emcy_text = ""
+        self._told: Told | None = None
+        """The last emergency message, while it says that there is a fault."""
         self.link_fault = 0.0
         """Present fault of the leg between bridge and drive."""
         self.drive_fault: float = 0.0
@@ -25,7 +25,7 @@ class DriveStatus:
 
     def on_emcy(self, told: Told) -> None:
         self.emcy_code = told.code
-        self._emcy_text = "" if told.is_gone else told.text
+        self._told = None if told.is_gone else told
 
     def on_drive_fault(self, current: float | None, last: float | None) -> bool:
         """What the drive answered; True where that changes something. Of the last faults that the bridge
@@ -43,17 +43,23 @@ class DriveStatus:
 
     def fault_text(self, bridge_fault: float, state: DriveState) -> str:
         """The present fault, the bridge's own before the drive's; empty where there is none."""
-        if bridge_fault:
-            number = f"{bridge_fault:.1f}"
-            return f"{self.faults.prefix}{number} {self.faults.texts.get(number, '')}".strip()
-        if self.drive_fault:
-            return self._drive_text(self.drive_fault)
-        if state in FAULTED:
-            return self._emcy_text or "fault"
-        return ""
+        if not (bridge_fault or self.drive_fault) and state in FAULTED:
+            return self._told.text if self._told else "fault"
+        return str(self.fault(bridge_fault, state))
 
-    def _drive_text(self, fault: float) -> str:
-        """The number the drive gives with its text: the family's, or that of the emergency message."""
-        number = f"{fault:g}"
-        text = self.faults.texts.get(f"{fault:.1f}") or self._emcy.events.get(number) or self._emcy_text
-        return text if text.startswith(f"{number} ") else f"{number} {text}".rstrip()
+    def fault(self, bridge_fault: float, state: DriveState) -> Explained:
+        """The present fault with its cause and remedy; empty texts where there is none."""
+        words, told = self._fault_words, self._told
+        if bridge_fault:
+            return words.own(bridge_fault)
+        if self.drive_fault:
+            cause = told.cause if told and told.number == self.drive_fault else None
+            return words.of_drive(self.drive_fault, cause, words.of_code(told.code).text if told else "")
+        if told is None or state not in FAULTED:
+            return Explained()
+        return words.of_code(told.code) if told.number is None else words.of_drive(told.number, told.cause)
+
+    @property
+    def last_fault_text(self) -> str:
+        """The last fault in the maker's form; empty where there was none."""
+        return str(self._fault_words.of_drive(self.last_fault)) if self.last_fault else ""

@@ -2,6 +2,8 @@
 
 from bridge.drive.emergency import EmergencyReader as EmergencyReader
 from bridge.drive.emergency import Told as Told
+from bridge.drive.fault_words import Explained as Explained
+from bridge.drive.fault_words import FaultWords as FaultWords
 from bridge.drive.own_supervision import OwnJudgement as OwnJudgement
 from bridge.drive.own_supervision import OwnVerdict as OwnVerdict
 from bridge.drive.parameter_set import ParameterSet as ParameterSet

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.mapping.model import EmcyTable
+from bridge.drive.fault_words import FaultWords
+from bridge.mapping.model import Family
 
 _VENDOR_BYTE: Final = 3
 """The manufacturer's bytes begin here (CiA 301 §7.2.7.3.1)."""
@@ -14,30 +15,30 @@ _VENDOR_BYTE: Final = 3
 @dataclass(frozen=True, slots=True)
 class Told:
     """``is_gone``: it says that there is no fault any more. ``number`` is the family's own number of the
-    event or error, None where the message has none."""
+    event or error, None where the message has none; ``cause`` that of the event."""
 
     code: int
     text: str
     is_gone: bool
     number: int | None = None
+    cause: int | None = None
 
 
 class EmergencyReader:
     """Reads the emergency messages of one family: the event number first, the code second."""
 
-    def __init__(self, model: EmcyTable) -> None:
-        self._model = model
+    def __init__(self, family: Family) -> None:
+        self._model = family.emcy
+        self._words = FaultWords(family)
 
     def read(self, code: int, vendor: bytes) -> Told:
         """``vendor`` is the manufacturer's five bytes, fewer where the message was short."""
         model = self._model
         if model.event is not None and (event := _byte(vendor, model.event.byte)) is not None:
             is_gone = code == 0 or event == model.event.gone
-            text = model.text(code) if is_gone else self._named(event, "event", code)
             cause = None if model.event.cause_byte is None else _byte(vendor, model.event.cause_byte)
-            if cause and not is_gone:
-                text += f", cause {cause}"
-            return Told(code, text, is_gone, event)
+            text = model.text(code) if is_gone else self._named(event, "event", code, cause)
+            return Told(code, text, is_gone, event, None if is_gone else cause)
         if model.number is not None and self._has_number(code):
             first = model.number.byte - _VENDOR_BYTE
             number = int.from_bytes(vendor[first : first + model.number.size], "little")
@@ -49,9 +50,12 @@ class EmergencyReader:
         names = (f"{code:04X}", f"{code >> 8:02X}xx")
         return any(name in names for name in self._model.number.codes) if self._model.number else False
 
-    def _named(self, number: int, what: str, code: int) -> str:
-        text = self._model.events.get(str(number))
-        return f"{number} {text}" if text else f"{what} {number}, {self._model.text(code)}"
+    def _named(self, number: int, what: str, code: int, cause: int | None = None) -> str:
+        found = self._words.of_drive(number, cause)
+        if self._words.knows(number):
+            return str(found)
+        said = f"{what} {found.number}, {self._model.text(code)}"
+        return f"{said}, cause {cause}" if cause else said
 
 
 def _byte(vendor: bytes, place: int) -> int | None:

@@ -151,7 +151,7 @@ class Decoder:
             return Meaning(Kind.EMCY, node_id, label, f"{len(data)} bytes are no emergency message")
         family = self._families.get(node_id)
         if family:
-            text = EmergencyReader(family.emcy).read(found.code, found.vendor).text
+            text = EmergencyReader(family).read(found.code, found.vendor).text
         else:
             text = emcy_codes.text(found.code)
         vendor = found.vendor.hex(" ").upper()

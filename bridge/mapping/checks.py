@@ -6,6 +6,7 @@ from typing import Final
 
 from bridge.image import DataType
 from bridge.mapping.checks_aliases import check_aliases
+from bridge.mapping.checks_faults import check_faults
 from bridge.mapping.checks_own import check_own_supervision
 from bridge.mapping.checks_process import check_cob_id, check_parameter, check_process, check_slots, twice
 from bridge.mapping.checks_values import check_values
@@ -45,7 +46,7 @@ def check(family: Family, file: MergedFile) -> None:
     _check_control_word(family.control_word, file)
     _check_handshake(family, file)
     _check_states(family, file)
-    _check_faults(family, file)
+    check_faults(family, file)
     check_own_supervision(family, file)
 
 
@@ -203,14 +204,3 @@ def _check_shadows(family: Family, told: list[int], file: MergedFile) -> None:
                     "the first state that matches counts: put the narrower pattern first",
                 )
                 break
-
-
-def _check_faults(family: Family, file: MergedFile) -> None:
-    emcy = family.emcy
-    if emcy.events and emcy.event is None and emcy.number is None:
-        file.fault(("emcy", "events"), "has no meaning without emcy.event or emcy.number")
-    if emcy.number is not None and emcy.number.byte + emcy.number.size > 8:
-        file.fault(("emcy", "number"), "ends behind the message, which has bytes 0…7")
-    for name, given in (("current", family.faults.current), ("last", family.faults.last)):
-        if given is not None:
-            check_parameter(given.parameter, family, ("faults", name, "parameter"), file)

@@ -2,10 +2,33 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+import re
+from typing import Annotated, Final
+
+from pydantic import AfterValidator, Field
 
 from bridge.mapping import emcy_codes
 from bridge.mapping.fields import Decimal, EmcyCode, FaultNumber, Table
+
+FORM_FIELD: Final = re.compile(r"\{(number|group|hex|bits (\d{1,2})-(\d{1,2}))(?::(\d))?\}")
+"""What may stand in a ``FaultForm``, with the least number of its digits."""
+_NAME: Final = re.compile(r"\d{1,10}(\.\d{1,3})?|[0-9A-F]{2}(?:[0-9A-F]{2}|xx)h")
+
+
+def _form(text: str) -> str:
+    if re.search(r"[{}]", FORM_FIELD.sub("", text)):
+        raise ValueError("takes {number}, {group}, {hex} and {bits 15-0}, each with digits as in {group:3}")
+    return text
+
+
+def _fault_name(text: str) -> str:
+    if not _NAME.fullmatch(text):
+        raise ValueError('must be a fault number "10.3", an event "41" or a code "8130h"')
+    return text
+
+
+FaultForm = Annotated[str, AfterValidator(_form)]
+FaultName = Annotated[str, AfterValidator(_fault_name)]
 
 
 class EmcyEvent(Table):
@@ -22,6 +45,9 @@ class EmcyNumber(Table):
     codes: list[EmcyCode] = Field(min_length=1)
     byte: int = Field(ge=3, le=7)
     size: int = Field(ge=1, le=4)
+    mask: int | None = Field(
+        None, gt=0, description="the bits by which a text is found; the others say how the drive reacts"
+    )
 
 
 class EmcyTable(Table):
@@ -39,6 +65,29 @@ class EmcyTable(Table):
         return self.codes.get(name) or self.codes.get(f"{name[:2]}xx") or emcy_codes.text(code)
 
 
+class Wording(Table):
+    """One sentence in two languages."""
+
+    en: str
+    de: str
+
+
+class Explanation(Table):
+    """What a manual says of a fault, in one language; empty where it says nothing."""
+
+    cause: str = ""
+    remedy: str = ""
+
+
+class FaultEntry(Table):
+    """Cause and remedy of a fault, in our own words."""
+
+    name: FaultName = Field(description="a number of `texts`, an event, an event and its cause, or a code")
+    source: str = Field("", description="where the manual has it")
+    en: Explanation = Field(default_factory=lambda: Explanation.model_validate({}))
+    de: Explanation = Field(default_factory=lambda: Explanation.model_validate({}))
+
+
 class FaultParameter(Table):
     """A fault number that the drive itself keeps."""
 
@@ -53,6 +102,14 @@ class FaultNumbers(Table):
     telegram_downtime: float
     node_missing: float
     prefix: str = ""
+    form: FaultForm = Field("", description="how the maker writes a number that the drive tells")
+    form_to: float | None = Field(None, description="numbers above it are written as they are")
+    elsewhere: Wording | None = Field(
+        None, description="where to look for the cause of a fault that this file has none for"
+    )
     texts: dict[FaultNumber, str]
+    german: dict[FaultName, str] = Field(
+        default_factory=dict[str, str], description="texts in German, by what a [[fault]] would be called"
+    )
     current: FaultParameter | None = None
     last: FaultParameter | None = None

@@ -14,7 +14,7 @@ from pydantic import Field
 from bridge.config import DriveTable
 from bridge.config.fields import RegularExpression
 from bridge.mapping.aliases import Aliases
-from bridge.mapping.faults import EmcyTable, FaultNumbers
+from bridge.mapping.faults import EmcyTable, FaultEntry, FaultNumbers
 from bridge.mapping.faults import FaultParameter as FaultParameter
 from bridge.mapping.fields import Bit, Bits, Kind, Name, ObjectRef, Pattern, Ref, Table, Word
 from bridge.mapping.fields import MappedObject as MappedObject
@@ -168,6 +168,7 @@ class Family(Table):
     node_tpdo: list[NodeTpdo] = Field(default_factory=list[NodeTpdo])
     emcy: EmcyTable
     faults: FaultNumbers
+    fault: list[FaultEntry] = Field(default_factory=list[FaultEntry])
     own_supervision: list[OwnSupervision] = Field(default_factory=list[OwnSupervision])
 
     def slot_named(self, name: str) -> Slot:

@@ -27,7 +27,7 @@ class Emergencies:
         self._plant = plant
         self._reject = reject
         self._told = told
-        self._reader = EmergencyReader(node.family.emcy)
+        self._reader = EmergencyReader(node.family)
         self._log = EmergencyLog()
 
     def on_frame(self, frame: Frame) -> None:

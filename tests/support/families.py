@@ -158,8 +158,8 @@ class FamilyBridge:
             assert self._simulation
             self._simulation.poke()
             if isinstance(node, LenzeMotec):
-                node.fail(111)
-                return "error 111"
+                node.fail(0x047F_0002)
+                return "01.0127.00002 CE04"
             if isinstance(node, Stoeber5000):
                 node.fail(41, 2)
             elif isinstance(node, Cia402Drive):

@@ -33,7 +33,7 @@ _ROUNDING_S = 1e-9
 
 def emergency(code: int, vendor: bytes = bytes(5)) -> Told:
     """An emergency message of a NORD drive, read."""
-    return EmergencyReader(NORD.emcy).read(code, vendor)
+    return EmergencyReader(NORD).read(code, vendor)
 
 
 class Rig:

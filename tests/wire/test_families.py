@@ -231,6 +231,7 @@ def test_it_starts_follows_faults_is_acknowledged_and_stops(controllers: Control
     controller.wait_state(DriveState.FAULT)
     controller.wait("status/emcy_code", bool)
     assert text in str(bridge.value(f"{drive}/status/fault_text"))
+    assert bridge.value(f"{drive}/status/fault_number")
 
     controller.acknowledge()
     controller.wait("status/state", lambda state: int(state) != DriveState.FAULT)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from bridge.drive import FaultWords
 from bridge.mapping import Family
 from bridge.mapping.model import OwnSupervision
 from bridge.mapping.own_places import OwnPlace, place_of
@@ -44,13 +45,25 @@ error number."
             ("the bus interface's own time-out", f"{faults.prefix}{faults.bridge_timeout}"),
         ),
     )
+    words = FaultWords(family)
     yield from table(
-        ("fault", "text"), ((f"{faults.prefix}{number}", text) for number, text in faults.texts.items())
+        ("fault", "text"), ((words.listed(name).number, text) for name, text in faults.texts.items())
     )
+    if family.fault:
+        yield "### Causes and remedies"
+        yield ""
+        yield "In German: `drivebridge faults FAMILY --language de`."
+        yield ""
+        explained = [(one, words.listed(one.name)) for one in family.fault]
+        yield from table(
+            ("fault", "cause", "remedy", "source"),
+            ((told.number, told.cause, told.remedy, one.source or "–") for one, told in explained),
+        )
     if emcy.events:
         yield "### Event and error numbers"
         yield ""
-        yield from table(("number", "text"), sorted(emcy.events.items(), key=lambda item: int(item[0])))
+        events = sorted(emcy.events.items(), key=lambda item: int(item[0]))
+        yield from table(("number", "text"), ((words.listed(number).number, text) for number, text in events))
     yield "### Emergency codes"
     yield ""
     yield from table(

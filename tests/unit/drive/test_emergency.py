@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.drive import EmergencyReader
+from bridge.mapping import load_family
 from bridge.mapping.model import EmcyTable
 
 CODES = {"0000": "no fault", "4310": "motor temperature", "F000": "device specific", "10xx": "generic"}
@@ -12,7 +13,8 @@ EVENTS = {"41": "motor temperature (E82)", "52": "communication"}
 
 
 def reader(**entries: object) -> EmergencyReader:
-    return EmergencyReader(EmcyTable.model_validate({"codes": CODES, "events": EVENTS, **entries}))
+    emcy = EmcyTable.model_validate({"codes": CODES, "events": EVENTS, **entries})
+    return EmergencyReader(load_family("stoeber/5000").model_copy(update={"emcy": emcy}))
 
 
 STOEBER = reader(event={"byte": 3, "cause_byte": 4, "gone": 30})

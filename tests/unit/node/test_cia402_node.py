@@ -362,7 +362,7 @@ def test_csp_a_jump_is_a_following_error(booted) -> None:
     bench.write(DRIVE, position=500_000)
     bench.run(0.3)
     assert state(bench) is DriveState.FAULT
-    assert bench.value("axis/drive/status/fault_text") == "34321 following error"
+    assert bench.value("axis/drive/status/fault_text") == "8611h following error"
     assert bench.value("axis/drive/supervision/current_fault") == 0x8611
 
 
@@ -378,7 +378,7 @@ def test_a_fault_is_shown_in_words_and_reset(booted) -> None:
     assert state(bench) is DriveState.FAULT
     assert bench.node.axis.actual_rpm == 0
     channel = bench.plant.drives[DRIVE].channel
-    assert (channel.emcy_code, channel.fault_text) == (0x4310, "17168 drive temperature too high")
+    assert (channel.emcy_code, channel.fault_text) == (0x4310, "4310h drive temperature too high")
     bench.ask(Action.RESET_FAULT, DRIVE)
     keep_alive(bench, 1.0)
     assert state(bench) in (DriveState.SWITCH_ON_INHIBITED, DriveState.READY, DriveState.SWITCHED_ON)

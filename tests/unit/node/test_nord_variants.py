@@ -250,7 +250,7 @@ def test_a_fault_is_told_by_its_number_and_acknowledged(make_single, mapping: st
     bench.node.fail_drive(21)
     hold(bench, 2.0, control_word=0x047F)
     assert bench.value(f"{DRIVE}/status/state") == DriveState.FAULT
-    assert bench.value(f"{DRIVE}/status/fault_text") == "2.1 overtemperature of the motor, I²t"
+    assert bench.value(f"{DRIVE}/status/fault_text") == "E002/2.1 overtemperature of the motor, I²t"
     assert bench.value(f"{DRIVE}/supervision/current_fault") == 2.1
     hold(bench, 0.2, control_word=0x047E)
     hold(bench, 0.2, control_word=0x04FE)

@@ -1,0 +1,94 @@
+"""``faults``: what the drives of a site, or of a family, can report, with causes and remedies."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridge.cli.terminal import printable
+from bridge.drive import FaultWords
+from bridge.drive.fault_words import Explained, Language
+from bridge.errors import OperationFailed
+from bridge.mapping import load_family
+from bridge.mapping.loader import family_names
+from bridge.mapping.model import Family
+from bridge.project import load_project
+
+
+class Tongue(StrEnum):
+    """A language, as an option."""
+
+    EN = "en"
+    DE = "de"
+
+
+def faults(
+    site: Annotated[
+        str, typer.Argument(metavar="SITE", help="a site file, or a family such as nord/sk-tu4-cao")
+    ],
+    fault: Annotated[
+        str, typer.Argument(metavar="[FAULT]", help="a number, or a part of a text; left out, all")
+    ] = "",
+    language: Annotated[Tongue, typer.Option(help="English or German")] = Tongue.EN,
+    as_json: Annotated[bool, typer.Option("--json", help="machine-readable")] = False,
+) -> None:
+    """List the faults that the drives of a site or family report, with causes and remedies."""
+    found = {
+        name: _matching(family, fault, "de" if language is Tongue.DE else "en")
+        for name, family in _families(site).items()
+    }
+    if fault and not any(found.values()):
+        raise OperationFailed(f"{', '.join(found)}: no fault {fault!r}")
+    if as_json:
+        facts = {name: [asdict(one) for one in listed] for name, listed in found.items()}
+        print(json.dumps(facts, indent=2, ensure_ascii=False))
+        return
+    for name, listed in found.items():
+        print(printable(name))
+        for one in listed:
+            print(printable(f"  {one}"))
+            for said in filter(None, (one.cause, one.remedy)):
+                print(printable(f"      {said}"))
+
+
+def _families(site: str) -> dict[str, Family]:
+    if site in family_names():
+        return {site: load_family(site)}
+    if not site.endswith(".toml"):
+        raise typer.BadParameter(f"{site!r} is neither a site file nor one of {', '.join(family_names())}")
+    return load_project(Path(site)).families
+
+
+def _matching(family: Family, wanted: str, language: Language) -> list[Explained]:
+    """The fault with this number, in any of its forms; else those with ``wanted`` in number or text."""
+    words = FaultWords(family, language)
+    every = {name: words.listed(name) for name in listed_faults(family)}
+    exact = [one for name, one in every.items() if wanted and _is_number(wanted, name, one.number)]
+    part = wanted.lower()
+    return exact or [one for one in every.values() if part in one.number.lower() or part in one.text.lower()]
+
+
+def _is_number(wanted: str, name: str, number: str) -> bool:
+    """``number`` may have x for digits that depend on how the drive is set."""
+    asked = wanted.lower()
+    pattern = re.escape(number.lower()).replace("x", "[x0-9]")
+    return asked in (name.lower(), number.lower().rpartition("/")[2]) or bool(re.fullmatch(pattern, asked))
+
+
+def listed_faults(family: Family) -> list[str]:
+    """The names of all that is a fault: the drive's numbers and events, and the emergency codes that say more
+    than these or stand for them."""
+    emcy, faults = family.emcy, family.faults
+    explained = [one.name for one in family.fault]
+    own = {*explained, *faults.german}
+    codes = [f"{code}h" for code in emcy.codes if "{hex" in faults.form or f"{code}h" in own]
+    codes = [code for code in codes if "xx" not in code]  # groups, for codes that nobody lists
+    none = {"0000h", str(emcy.event.gone) if emcy.event else ""}
+    names = dict.fromkeys([*faults.texts, *emcy.events, *codes, *explained])
+    return [name for name in names if name not in none]

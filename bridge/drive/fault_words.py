@@ -1,0 +1,130 @@
+"""A fault as its maker writes it, with its text, cause and remedy."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from bridge.mapping.faults import FORM_FIELD, Explanation
+from bridge.mapping.model import Family
+
+Language = Literal["en", "de"]
+_DECIMAL: Final = ("number", "group")
+"""Fields of a form for numbers such as 10.3; the others take a whole number apart."""
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """``number`` is in the maker's form; a text is empty where nobody says anything."""
+
+    number: str = ""
+    text: str = ""
+    cause: str = ""
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.number} {self.text}".strip()
+
+
+class FaultWords:
+    """What one family says of its faults, in one language."""
+
+    def __init__(self, family: Family, language: Language = "en") -> None:
+        self._emcy, self._faults = family.emcy, family.faults
+        self._language: Language = language
+        self._german = family.faults.german if language == "de" else {}
+        self._entries = {one.name: one for one in family.fault}
+        fields = {field[1] for field in FORM_FIELD.finditer(self._faults.form)}
+        self._is_decimal = bool(fields.intersection(_DECIMAL))
+        self._is_code = "hex" in fields
+        number = self._emcy.number
+        self._mask = number.mask if number else None
+
+    def own(self, fault: float) -> Explained:
+        """A finding of the bridge, under the number that the family has for it."""
+        name = f"{fault:.1f}"
+        return self._explained(f"{self._faults.prefix}{name}", name, self._text(name))
+
+    def of_drive(self, fault: float, cause: int | None = None, text: str = "") -> Explained:
+        """What the drive tells: the number of its fault, or that of an event and the ``cause`` that came with
+        it. ``text`` is that of the emergency code, for numbers that have none."""
+        name = self._name(fault)
+        number = self._decimal(name) if "." in name else self._whole(int(fault))
+        found = self._text(name) or text
+        if not cause:
+            return self._explained(number, name, found)
+        exact = f"{name}.{cause}"
+        said = self._explained(number, exact if exact in self._entries else name, self._text(exact) or found)
+        return Explained(number, f"{said.text}, cause {cause}", said.cause, said.remedy)
+
+    def knows(self, fault: float) -> bool:
+        """Whether the family has a text for what a drive tells."""
+        return bool(self._text(self._name(fault)))
+
+    def of_code(self, code: int) -> Explained:
+        """An emergency message that has nothing but its code."""
+        name = f"{code:04X}h"
+        group = f"{name[:2]}xxh"
+        return self._explained(name, name if name in self._entries else group, self._text(name))
+
+    def listed(self, name: str) -> Explained:
+        """A fault by the name that the mapping file has for it: ``10.3``, ``41``, ``52.1``, ``8130h``."""
+        if name.endswith("h"):
+            return self._explained(name, name, self._german.get(name) or self._emcy.codes.get(name[:-1], ""))
+        number = self._decimal(name) if "." in name else self._whole(int(name), self._mask)
+        return self._explained(number, name, self._text(name))
+
+    def _name(self, fault: float) -> str:
+        """The name that the mapping file has for a number."""
+        decimal = f"{fault:.1f}"
+        if decimal in self._faults.texts or fault != int(fault):
+            return decimal
+        whole = int(fault)
+        if self._is_code:
+            return f"{whole:04X}h"
+        return str(whole & self._mask if self._mask else whole)
+
+    def _text(self, name: str) -> str:
+        if german := self._german.get(name):
+            return german
+        if name.endswith("h"):
+            return self._emcy.text(int(name[:-1], 16))
+        return self._faults.texts.get(name) or self._emcy.events.get(name) or ""
+
+    def _decimal(self, name: str) -> str:
+        highest = self._faults.form_to
+        if not self._is_decimal or (highest is not None and float(name) > highest):
+            return name
+        group = name.partition(".")[0]
+
+        def digits(field: re.Match[str]) -> str:
+            return (group if field[1] == "group" else name).rjust(int(field[4] or 0), "0")
+
+        return FORM_FIELD.sub(digits, self._faults.form)
+
+    def _whole(self, number: int, mask: int | None = None) -> str:
+        """``mask``: bits beside it are not known, and shown as x."""
+        form = self._faults.form
+        if not form or self._is_decimal:
+            return str(number)
+
+        def digits(field: re.Match[str]) -> str:
+            count = int(field[4] or 0)
+            if field[1] == "hex":
+                return f"{number:0{count}X}"
+            high, low = int(field[2]), int(field[3])
+            bits = (1 << high - low + 1) - 1
+            if mask is not None and not mask >> low & bits:
+                return "x" * count
+            return f"{number >> low & bits:0{count}}"
+
+        return FORM_FIELD.sub(digits, form)
+
+    def _explained(self, number: str, name: str, text: str) -> Explained:
+        entry = self._entries.get(name)
+        said = getattr(entry, self._language) if entry else Explanation.model_validate({})
+        elsewhere, remedy = self._faults.elsewhere, said.remedy
+        if text and elsewhere is not None and not (said.cause or remedy):
+            remedy = getattr(elsewhere, self._language)
+        return Explained(number, text, said.cause, remedy)

@@ -1,0 +1,79 @@
+"""Every fault of a family has its name in both languages, and all that its manual says of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bridge.cli.faults import listed_faults
+from bridge.errors import FileFaults
+from bridge.mapping import load_family
+from bridge.mapping.loader import family_names, mappings_dir, read_family
+from bridge.mapping.model import Family
+
+FAMILIES = {name: load_family(name) for name in family_names()}
+EXPLAINED = {
+    # BU 2500 §8.4, both tables
+    "nord": "10.2 10.3 10.4 10.8 10.9 100.0 101.0 102.0 103.0 511.0 511.1 511.2 511.3 512.0",
+    # EDS84DMOTCAN 3.0 §6.5, §10.3.2, §10.4, §13 (I-1003), and what the bridge finds
+    "lenze": "8323074 1000h 3100h 8130h 8150h 8210h 8220h 8700h F000h 10.2 10.3 10.9",
+    # ID 441684.06 §9.4.2, and what the bridge finds
+    "stoeber": "52.1 52.7 52.8 52.9",
+    "cia402": "10.2 10.3 10.9",
+}
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_what_the_manual_explains_is_explained(name: str) -> None:
+    entries = {one.name: one for one in FAMILIES[name].fault}
+    assert sorted(entries) == sorted(EXPLAINED[name.partition("/")[0]].split())
+    for one in entries.values():
+        assert all((one.en.cause, one.en.remedy, one.de.cause, one.de.remedy)), one.name
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_what_it_does_not_explain_names_another_manual(name: str) -> None:
+    elsewhere = FAMILIES[name].faults.elsewhere
+    assert elsewhere is not None
+    assert elsewhere.en != elsewhere.de
+
+
+@pytest.mark.parametrize("name", [name for name in FAMILIES if not name.startswith("cia402/")])
+def test_every_fault_has_a_german_name(name: str) -> None:
+    """But for the codes of CiA 402, which the standard has in English."""
+    family = FAMILIES[name]
+    missing = [one for one in listed_faults(family) if one not in family.faults.german]
+    assert not missing
+
+
+def changed(folder: Path, more: str) -> Family:
+    path = folder / "own.toml"
+    path.write_text(f'extends = "stoeber/5000"\n{more}', encoding="utf-8")
+    return read_family(path, (folder, mappings_dir()))
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ('[[fault]]\nname = "11.1"\n', "there is no fault '11.1'"),
+        ('[[fault]]\nname = "eleven"\n', "must be a fault number"),
+        ('[faults.german]\n"77" = "x"\n', "there is no fault '77'"),
+        ('[[fault]]\nname = "41"\nen.cause = "hot"\n', "has no cause, which en has"),
+        ('[[fault]]\nname = "41"\nde.remedy = "kühlen"\n', "has no remedy, which de has"),
+        ('[faults]\nform = "{shape}"\n', "takes {number}"),
+        ('[faults]\nform = "{bits 3-9}"\n', "has no bits"),
+        ('[eeprom.save_command]\nparameter = "C01"\nvalue = 1\n', "C01 is no command"),
+    ],
+)
+def test_what_does_not_go_together_is_named(tmp_path: Path, more: str, message: str) -> None:
+    with pytest.raises(FileFaults) as caught:
+        changed(tmp_path, more)
+    assert message in str(caught.value)
+
+
+def test_a_file_of_ones_own_changes_one_of_them(tmp_path: Path) -> None:
+    more = '[[fault]]\nname = "52.1"\nen.remedy = "Call Ann."\nde.remedy = "Ann rufen."\n'
+    (one,) = [one for one in changed(tmp_path, more).fault if one.name == "52.1"]
+    assert one.en.remedy == "Call Ann."
+    assert one.en.cause.startswith("The master sent")

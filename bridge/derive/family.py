@@ -7,7 +7,17 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.derive.layout import Layout, NoLayout, layout_of
-from bridge.derive.modes import MODE, MODE_DISPLAY, PROFILE_402, Mode, is_drive, modes_of
+from bridge.derive.modes import (
+    CONTROL_WORD,
+    MODE,
+    MODE_DISPLAY,
+    PROFILE_402,
+    STATUS_WORD,
+    Mode,
+    bits_of,
+    is_drive,
+    modes_of,
+)
 from bridge.derive.parameters import FURTHER_AXES, entries_of, parameter_lines
 from bridge.derive.toml import file_name, one_line, string, strings, word
 from bridge.eds import Description
@@ -58,10 +68,37 @@ def derive_family(description: Description, source: str, mode: str | None = None
 
 
 def _why_not(description: Description) -> str:
+    """What is there instead of a drive, and what would be one."""
+    device_type = description.entry(0x1000)
     profile = (description.number(0x1000) or 0) & 0xFFFF
-    if profile and profile != PROFILE_402:
-        return f"1000h has the profile {profile}"
-    return "it has not both words, 6040h and 6041h"
+    if device_type and profile and profile != PROFILE_402:
+        return f"1000h in line {device_type.line} has the profile {profile}, not {PROFILE_402}"
+    wrong = [word for word in (CONTROL_WORD, STATUS_WORD) if bits_of(description, word) != 16]
+    missing = [word for word in wrong if description.entry(word) is None]
+    carriers = [text for word in missing if (text := _carrier(description, word))]
+    if missing and carriers:
+        return "; ".join(carriers)
+    if missing:
+        names = " and ".join(f"{word:04X}h" for word in missing)
+        return f"{names} {'are' if len(missing) > 1 else 'is'} not described"
+    entry = description.entry(wrong[0])
+    line, kind = (entry.line, entry.data_type) if entry else (0, None)
+    found = f"is a {kind.name}" if kind else "has no type that we know"
+    return f"{wrong[0]:04X}h in line {line} {found}, not a UNSIGNED16"
+
+
+def _carrier(description: Description, word: int) -> str:
+    """A contradiction of the file: a PDO maps the word, which nothing describes."""
+    for one in description.objects:
+        if one.index & 0xFE00 in (0x1600, 0x1A00):
+            for entry in one.entries[1:]:
+                mapped = description.number(entry.index, entry.sub) or 0
+                if mapped >> 16 == word:
+                    return (
+                        f"{word:04X}h is not described, though {entry.index:04X}h:{entry.sub:02X} "
+                        f"in line {entry.line} maps it: it is a UNSIGNED16"
+                    )
+    return ""
 
 
 def _name(description: Description, source: str) -> str:

@@ -35,6 +35,10 @@ def derived(folder: Path, sections: Mapping[str, Section] = SPIN, mode: str | No
     return family_of(folder, derive_family(described(sections), "spin.eds", mode))
 
 
+def without(*names: str) -> Mapping[str, Section]:
+    return {name: section for name, section in SPIN.items() if name not in names}
+
+
 def test_the_mapping_says_who_the_drive_is(tmp_path: Path) -> None:
     made = derive_family(described(), "spin.eds")
     family = family_of(tmp_path, made)
@@ -131,8 +135,19 @@ def test_another_mode_can_be_asked_for(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("sections", "message"),
     [
-        ({**SPIN, "1000": var("device type", U32, "ro", "0x191")}, "1000h has the profile 401"),
-        (BASIC, "it has not both words, 6040h and 6041h"),
+        (
+            {**SPIN, "1000": var("device type", U32, "ro", "0x191")},
+            "1000h in line [0-9]+ has the profile 401, not 402",
+        ),
+        (BASIC, "6040h and 6041h are not described"),
+        (
+            without("6041"),
+            "6041h is not described, though 1A00h:01 in line [0-9]+ maps it: it is a UNSIGNED16",
+        ),
+        (
+            {**SPIN, "6040": mapped("control word", U32)},
+            "6040h in line [0-9]+ is a UNSIGNED32, not a UNSIGNED16",
+        ),
     ],
 )
 def test_what_is_no_drive_is_refused(sections: Mapping[str, Section], message: str) -> None:

@@ -171,7 +171,9 @@ class GenericNode(SimulatedDevice):
         pdos.add()
         taken = self._add_communication(everything)
         for one in self._plan.objects:
-            if one.at[0] not in _PDO_OBJECTS and one.at not in taken:
+            # What a PDO has beyond what PDOs do here is only kept, such as the deadline of an RPDO.
+            is_of_pdo = one.at[0] in _PDO_OBJECTS and _has(self.objects, *one.at)
+            if not is_of_pdo and one.at not in taken:
                 self.objects.add(
                     *one.at, self._number(one) if isinstance(one, NumberPlan) else self._text(one)
                 )

@@ -1,25 +1,41 @@
-"""A device description all the way: read, made into a mapping, simulated, booted, served."""
+"""A device description all the way: read, simulated, made into a mapping, booted, served."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bridge.eds import read_device
+from bridge.canopen.frame import Frame
+from bridge.canopen.sdo import Result as SdoResult
+from bridge.canopen.sdo import SdoChannel
+from bridge.canopen.sdo_transfer import SdoError
+from bridge.derive.modes import is_drive
+from bridge.eds import Description, Entry, read_device
 from bridge.errors import BridgeError
 from bridge.image import Quality
+from bridge.sim.generic_eds import plan_of_description
+from bridge.sim.generic_node import GenericNode
 from bridge.sim.nmt_slave import NmtState
-from tests.support.invented_eds import DerivedBench
+from tests.support.invented_eds import NODE_ID, DerivedBench
+
+_ANSWER_S = 0.5
+_MAKER = range(0x2000, 0x6000)
+_HISTORY = 0x1003
+"""It has the sub-indices of what has happened, and nothing has."""
+_MOST_SHOWN = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """How far a file came; ``problem`` is empty where it came all the way."""
+    """How far a file came; ``problem`` is empty where it came all the way. ``findings`` are what could not be
+    read of it."""
 
     name: str
     step: str
     problem: str = ""
+    is_drive: bool = True
+    findings: tuple[str, ...] = ()
 
 
 def served(folder: Path, name: str, content: bytes) -> Result:
@@ -29,21 +45,85 @@ def served(folder: Path, name: str, content: bytes) -> Result:
         description = read_device(content, name)
     except BridgeError as error:
         return Result(name, "read", str(error))
+    findings = tuple(str(one) for one in description.findings if one.severity == "error")
+    drive = is_drive(description)
+
+    def result(step: str, problem: str = "") -> Result:
+        return Result(name, step, problem, drive, findings)
+
+    unlike = simulated(description)
+    if unlike:
+        return result("simulate", "; ".join(unlike[:_MOST_SHOWN]))
     try:
-        bench = DerivedBench(folder, description)
+        bench = DerivedBench(folder, description, source=name)
     except BridgeError as error:
-        return Result(name, "mapping", str(error))
+        return result("mapping", str(error))
     status = str(bench.value("conveyor/node/boot_status"))
     if bench.generic.slave.state is not NmtState.OPERATIONAL:
-        return Result(name, "boot", status)
+        return result("boot", status)
     point = bench.plant.image.read("conveyor/drive/status/status_word")
     if point.quality is not Quality.GOOD:
-        return Result(name, "serve", f"the status word is {point.quality.label}: {status}")
-    return Result(name, "served")
+        return result("serve", f"the status word is {point.quality.label}: {status}")
+    return result("served")
 
 
-def table(results: Sequence[Result]) -> str:
-    """Those that did not come all the way, with the reason, and how many did."""
-    lines = [f"{one.name}: {one.step}: {one.problem}" for one in results if one.problem]
-    good = sum(not one.problem for one in results)
-    return "\n".join([*lines, f"{good} of {len(results)} are booted and served"])
+def simulated(description: Description) -> list[str]:
+    """How the simulated node differs from its description: it boots, is started, and is asked for every
+    object that can be read."""
+    node = GenericNode(NODE_ID, plan_of_description(description, NODE_ID))
+    node.start(0.0)
+    booted = [frame.can_id for frame in node.take_frames()]
+    unlike = [] if 0x700 + NODE_ID in booted else ["it does not report itself"]
+    node.on_frame(Frame(0, bytes((1, NODE_ID))), 0.0)
+    if node.slave.state is not NmtState.OPERATIONAL:
+        unlike.append("it cannot be started")
+    return [*unlike, *_objects_unlike(node, description)]
+
+
+def _objects_unlike(node: GenericNode, description: Description) -> Iterator[str]:
+    channel = SdoChannel(0x600 + NODE_ID, 0x580 + NODE_ID, _ANSWER_S)
+    for entry in (entry for one in description.objects for entry in one.entries):
+        is_history = entry.index == _HISTORY and entry.sub
+        if entry.data_type is None or not entry.access.readable or is_history:
+            continue
+        results: list[SdoResult] = []
+        channel.read(entry.index, entry.sub, 0.0, results.append)
+        while frames := channel.take_frames():
+            for frame in frames:
+                node.on_frame(frame, 0.0)
+            for frame in node.take_frames():
+                if frame.can_id == channel.reply_id:
+                    channel.on_frame(frame)
+        place = f"{entry.index:04X}h:{entry.sub:02X} in line {entry.line}"
+        if not results:
+            yield f"{place} is not answered"
+        elif isinstance(results[0], SdoError):
+            yield f"{place} cannot be read: {results[0]}"
+        elif not _is_default(entry, results[0]):
+            yield f"{place} is {results[0].hex()}"
+
+
+def _is_default(entry: Entry, data: bytes) -> bool:
+    """Of the maker's integers: whether the value is the one of the file, as far as it fits the type."""
+    plain = entry.current.at(NODE_ID) if entry.current else None
+    if entry.index not in _MAKER or type(plain) is not int:
+        return True
+    return int.from_bytes(data, "little") == plain & ((1 << 8 * len(data)) - 1)
+
+
+def table(results: Sequence[Result], *, findings: bool = False) -> str:
+    """Those that did not come all the way with the reason, and how many did; with ``findings`` what could not
+    be read of each."""
+    lines: list[str] = []
+    for one in results:
+        if one.problem:
+            lines.append(f"{one.name}: {one.step}: {one.problem.removeprefix(f'{one.name} ')}")
+        if findings:
+            lines += [f"{one.name}: {text}" for text in one.findings]
+    drives = [one for one in results if one.is_drive]
+    good = sum(not one.problem for one in drives)
+    lines.append(f"{good} of {len(drives)} drives are booted and served")
+    others = len(results) - len(drives)
+    if others:
+        lines.append(f"{others} files describe no drive")
+    return "\n".join(lines)

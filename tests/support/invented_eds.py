@@ -130,8 +130,10 @@ def family_of(folder: Path, derived: Derived) -> Family:
 class DerivedBench(Bench):
     """The node that a description describes, and a bridge that knows it by the mapping made of it only."""
 
-    def __init__(self, folder: Path, description: Description, mode: str | None = None) -> None:
-        derived = derive_family(description, "spin.eds", mode)
+    def __init__(
+        self, folder: Path, description: Description, mode: str | None = None, source: str = "spin.eds"
+    ) -> None:
+        derived = derive_family(description, source, mode)
         family = family_of(folder, derived)
         self.generic = GenericNode(NODE_ID, plan_of_description(description, NODE_ID))
         node = sites.node(sites.drive("drive", "modbus", 0, ""), mapping=derived.name, node_id=NODE_ID)

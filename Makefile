@@ -42,6 +42,8 @@ VCAN := $(ON_VCAN) tests/lab/vcan-run -n 2 -t $(LAB_SECONDS) --
 LAB_RUN := $(ON_VCAN) tests/lab/run-lab -j $(FEW_JOBS) -t $(LAB_SECONDS) --
 PACKAGES := iproute2:ip kmod:insmod can-utils:cansend mbpoll:mbpoll nodejs:node npm:npm
 CLIENTS := tests/wire/node
+FOREIGN := build/foreign
+REGISTRIES := $(if $(filter 0,$(LAB)),PyPI,all)
 
 ##@ Run
 demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, until Ctrl-C
@@ -50,13 +52,23 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 ##@ Test
 # Wire tests and the lab wait most of their time, and mind when they have to wait for a CPU; unit tests know no
 # time. Fuzzing wants its share of the CPUs: it begins when these are done.
-test: compiled packages clients ## all tests: unit, wire, a minute of fuzzing, lab
-	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab" unit fuzz-short
+test: compiled packages clients ## all tests: unit, foreign, wire, a minute of fuzzing, lab
+	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab" "foreign unit" fuzz-short
 
 # Beside the others they get what these leave of the CPUs.
 unit: $(VENV)/dev.stamp ## tests of the code alone
 	@echo "== unit tests"
 	@$(PYTEST) -n $(JOBS) -o timeout=600 tests/unit $(ARGS)
+
+foreign: compiled $(FOREIGN)/$(REGISTRIES).stamp ## EDS and XDD files of other people's packages: read, simulated, served
+	@echo "== device descriptions of other people's packages"
+	@LAB=$(LAB) $(PYTEST) -p no:cacheprovider -s tests/foreign $(ARGS)
+
+# None of these files is ours to pass on.
+$(FOREIGN)/$(REGISTRIES).stamp: tools/foreign_files.py | $(VENV)/dev.stamp packages
+	@echo "Fetching the device descriptions of other people's packages into $(FOREIGN)"
+	@$(QUIETLY) $(IN) -m tools.foreign_files $(FOREIGN) $(if $(filter 0,$(LAB)),--without npm)
+	@touch $@
 
 wire: compiled packages clients ## tests with real protocol clients on loopback
 	@echo "== wire tests"
@@ -183,5 +195,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test unit wire lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types \
+.PHONY: demo test unit foreign wire lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types \
   check-imports format docs setup lock wheel clean help

@@ -11,9 +11,11 @@ from typing import Annotated
 
 import typer
 
+from bridge.cli.parameter_drive import find
 from bridge.cli.terminal import printable
 from bridge.drive import FaultWords
 from bridge.drive.fault_words import Explained, Language
+from bridge.errands.fault_memory import fault_memory
 from bridge.errors import OperationFailed
 from bridge.mapping import load_family
 from bridge.mapping.loader import family_names
@@ -35,14 +37,22 @@ def faults(
     fault: Annotated[
         str, typer.Argument(metavar="[FAULT]", help="a number, or a part of a text; left out, all")
     ] = "",
+    drive: Annotated[
+        str | None, typer.Option(help="NODE/DRIVE: ask it what it remembers, instead of listing all")
+    ] = None,
     language: Annotated[Tongue, typer.Option(help="English or German")] = Tongue.EN,
     as_json: Annotated[bool, typer.Option("--json", help="machine-readable")] = False,
 ) -> None:
     """List the faults that the drives of a site or family report, with causes and remedies."""
-    found = {
-        name: _matching(family, fault, "de" if language is Tongue.DE else "en")
-        for name, family in _families(site).items()
-    }
+    tongue: Language = "de" if language is Tongue.DE else "en"
+    if drive is not None:
+        if fault:
+            raise typer.BadParameter(
+                "lists all that the drive remembers: give no FAULT", param_hint="--drive"
+            )
+        _show_memory(Path(site), drive, tongue, as_json=as_json)
+        return
+    found = {name: _matching(family, fault, tongue) for name, family in _families(site).items()}
     if fault and not any(found.values()):
         raise OperationFailed(f"{', '.join(found)}: no fault {fault!r}")
     if as_json:
@@ -52,9 +62,29 @@ def faults(
     for name, listed in found.items():
         print(printable(name))
         for one in listed:
-            print(printable(f"  {one}"))
-            for said in filter(None, (one.cause, one.remedy)):
-                print(printable(f"      {said}"))
+            _tell(f"  {one}", one)
+
+
+def _tell(line: str, one: Explained) -> None:
+    print(printable(line))
+    for said in filter(None, (one.cause, one.remedy)):
+        print(printable(f"      {said}"))
+
+
+def _show_memory(site: Path, drive: str, language: Language, *, as_json: bool) -> None:
+    target = find(site, drive)
+    words = FaultWords(target.family, language)
+    found = target.run(lambda now: fault_memory(target.access, target.family, words, now))
+    if as_json:
+        facts = [
+            {"where": one.where, "information": one.information, **asdict(one.explained)} for one in found
+        ]
+        print(json.dumps(facts, indent=2, ensure_ascii=False))
+        return
+    print(printable(target.name if found else f"{target.name}: remembers no fault"))
+    for one in found:
+        more = f" ({one.information:04X}h)" if one.information else ""
+        _tell(f"  {one.where}: {one.explained}{more}", one.explained)
 
 
 def _families(site: str) -> dict[str, Family]:

@@ -57,6 +57,13 @@ def test_read_write_and_save(commands: Commands) -> None:
     assert writes["conveyor"]["1010:01"]["writes"] == 1
 
 
+def test_a_drive_tells_the_faults_that_it_remembers(commands: Commands) -> None:
+    done = drivebridge_called("faults", commands.site, "--drive", FU1)
+    assert (done.returncode, done.stdout) == (0, f"{FU1}: remembers no fault\n"), done.stderr
+    done = drivebridge_called("faults", commands.site, "--drive", FU1, "--json")
+    assert json.loads(done.stdout) == []
+
+
 def test_what_is_wrong_is_told_with_its_exit_code(commands: Commands) -> None:
     for code, text, arguments in (
         (2, "did you mean P102", ("read", "P1002")),

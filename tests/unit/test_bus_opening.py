@@ -128,6 +128,7 @@ ON_ONE = {
     "lss store": ["lss", "store", "SITE", "--only", "--bus", "can1"],
     "parameters read": ["parameters", "read", "SITE", "n1/fu1", "P105"],
     "parameters write": ["parameters", "write", "SITE", "n1/fu1", "P105", "50", "--yes"],
+    "faults --drive": ["faults", "SITE", "--drive", "n1/fu1"],
     "drop-test": ["drop-test", "SITE", "n1", "--yes-i-am-at-the-machine"],
     "conformance": ["conformance", "SITE", "n1", "--yes"],
     "audit --bus": ["audit", "SITE", "--bus", "can1"],

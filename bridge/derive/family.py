@@ -157,12 +157,15 @@ def _identity(description: Description) -> Iterator[str]:
     """1000h and 1018h as far as the file has them; 0 is what a file has that does not say."""
     device = description.device
     facts = (
-        ("vendor_id", description.number(0x1018, 1) or device.vendor_id, 4),
-        ("product_code", description.number(0x1018, 2) or device.product_code, 4),
+        ("vendor_id", description.number(0x1018, 1), device.vendor_id),
+        ("product_code", description.number(0x1018, 2), device.product_code),
     )
     yield "[identity]"
-    for key, number, digits in facts:
-        yield f"{key} = {word(number, digits)}" if number else f"# {key} = 0x"
+    for key, counts, other in facts:
+        if counts and other and counts != other:
+            yield f"# The file contradicts itself: [DeviceInfo] has {key} {word(other, 4)}, 1018h counts."
+        number = counts or other
+        yield f"{key} = {word(number, 4)}" if number else f"# {key} = 0x"
     revision = description.number(0x1018, 3) or device.revision
     # Another firmware is the same device.
     yield f"# revision = {word(revision, 8)}" if revision else "# revision = 0x"

@@ -138,6 +138,12 @@ def _default(entry: Entry, kind: TypeName) -> Iterator[str]:
         plain = bool(plain)
     elif kind in REALS and isinstance(plain, int):
         plain = float(plain)
+    low, high = _number(entry.low), _number(entry.high)
+    if isinstance(plain, int | float) and kind != "bool":
+        is_within = (low is None or low <= plain) and (high is None or plain <= high)
+        if not is_within and not (low is not None and high is not None and low > high):
+            yield f"# default = {plain}: the file contradicts itself, it is beyond low or high"
+            return
     try:
         encode(kind, plain)
         yield f"default = {value(plain)}"

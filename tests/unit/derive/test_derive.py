@@ -10,6 +10,7 @@ import pytest
 from bridge.command import Outcome, Request, Start
 from bridge.derive import derive_family
 from bridge.drive import DriveState
+from bridge.eds import read_device
 from bridge.errors import OperationFailed
 from bridge.mapping import Family
 from tests.support.bench import PLC
@@ -24,6 +25,7 @@ from tests.support.invented_eds import (
     DerivedBench,
     Section,
     described,
+    eds,
     family_of,
     mapped,
     pdo,
@@ -96,6 +98,20 @@ def test_a_limit_that_contradicts_the_other_is_a_comment(tmp_path: Path) -> None
     family = derived(tmp_path, wrong)
     load = family.parameter_named("2001")
     assert (load.low, load.high, load.default) == (None, None, None)
+
+
+def test_a_default_beyond_its_own_limits_is_a_comment(tmp_path: Path) -> None:
+    wrong = {**SPIN, "2001": var("load", U16, "rw", "7", LowLimit="10", HighLimit="100")}
+    assert derived(tmp_path, wrong).parameter_named("2001").default is None
+    assert "\n# default = 7: the file contradicts itself" in derive_family(described(wrong), "spin.eds").text
+
+
+def test_an_identity_that_the_file_has_otherwise_elsewhere_is_said(tmp_path: Path) -> None:
+    content = eds().replace(b"VendorName", b"VendorNumber=0x1234\nProductNumber=0x3000\nVendorName")
+    made = derive_family(read_device(content, "spin.eds"), "spin.eds")
+    assert family_of(tmp_path, made).identity.vendor_id == 0xACE
+    assert "\n# The file contradicts itself: [DeviceInfo] has vendor_id 0x1234, 1018h counts.\n" in made.text
+    assert "product_code 0x" not in made.text
 
 
 def test_names_cannot_leave_their_line(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from bridge.canopen.sdo import COMMANDS
-from bridge.eds import Description, Entry, read_device_file
+from bridge.eds import Description, Entry, read_whole_device_file
 from bridge.eds.values import BadValue, encode
 from bridge.image import Value
 from bridge.parameter import Names, ObjectRef, ParameterError
@@ -20,13 +20,13 @@ _APPLICATION: Final = range(0x2000, 0x10000)
 def described(file: Path, names: Names) -> list[ObjectRef]:
     """The settings that ``file`` describes: what can be read and written, and is no command. Raises
     ``FileFaults``."""
-    return [ObjectRef(one.index, one.sub) for one in _settings(read_device_file(file), names)]
+    return [ObjectRef(one.index, one.sub) for one in _settings(read_whole_device_file(file), names)]
 
 
 def factory(file: Path, names: Names, node_id: int) -> dict[str, Value]:
     """The factory settings that ``file`` has, by name. Raises ``FileFaults``."""
     found: dict[str, Value] = {}
-    for one in _settings(read_device_file(file), names):
+    for one in _settings(read_whole_device_file(file), names):
         entry = names.at(ObjectRef(one.index, one.sub))
         plain = one.default.at(node_id) if one.default else None
         if plain is None or one.data_type is None:

@@ -9,7 +9,7 @@ import typer
 
 from bridge.cli.terminal import printable
 from bridge.derive import derive_family
-from bridge.eds import Severity, read_device_file
+from bridge.eds import Severity, read_whole_device_file
 from bridge.errors import OperationFailed
 from bridge.mapping.loader import mappings_dir, read_family
 from bridge.mapping.model import Parameter
@@ -35,7 +35,7 @@ def new(
     ] = None,
 ) -> None:
     """Write a mapping for the CiA 402 drive that FILE describes."""
-    description = read_device_file(file)
+    description = read_whole_device_file(file)
     lost = [one for one in description.findings if one.severity is Severity.ERROR]
     derived = derive_family(description, file.name, mode)
     path = output or _FOLDER / f"{derived.name}.toml"

@@ -10,9 +10,9 @@ from typing import Final
 from bridge.config import BusTable
 from bridge.derive import Derived, ProposedBus, ProposedNode, derive_family, propose_site
 from bridge.derive.toml import file_name
-from bridge.eds import Description, read_device_file
+from bridge.eds import Description, read_device_file, read_whole_device_file
 from bridge.errands.scan import FoundNode
-from bridge.errors import BridgeError, OperationFailed
+from bridge.errors import BridgeError, FileFaults, OperationFailed
 from bridge.mapping import Family
 from bridge.mapping.loader import mappings_dir, read_family
 from bridge.mapping.match import Match
@@ -43,17 +43,17 @@ def write_site(
     made: dict[str, Derived] = {}
     nodes: list[ProposedNode] = []
     for node, match in found:
-        mapping, why = match.mapping if match else None, "no mapping fits"
+        mapping, why = (match.mapping, "") if match else (None, "no mapping fits")
         if match is None or match.by == _PROFILE_ONLY:
             file = next((one for one in files if _is_of(one.description, node)), None)
             if file is not None:
                 try:
-                    derived = derive_family(file.description, file.path.name)
-                    mapping = derived.name
+                    derived = derive_family(read_whole_device_file(file.path), file.path.name)
+                    mapping, why = derived.name, ""
                     if mapping not in known:
                         made[mapping] = derived
                         known[mapping] = _written(path.parent / "mappings", derived)
-                except OperationFailed as error:
+                except (OperationFailed, FileFaults) as error:
                     why = str(error)
         says = _says(node)
         nodes.append(ProposedNode(node.id, node.name, says, mapping, node.has_heartbeat, why))

@@ -15,8 +15,8 @@ _MASTER_ID: Final = 127
 
 @dataclass(frozen=True, slots=True)
 class ProposedNode:
-    """A node as it was found. ``says`` is its identity in words; without a mapping it becomes a comment, with
-    ``why`` none fits."""
+    """A node as it was found. ``says`` is its identity in words; without a mapping it becomes a comment.
+    ``why`` is a comment, too: why none fits, or none better."""
 
     id: int
     device_name: str
@@ -24,7 +24,7 @@ class ProposedNode:
     mapping: str | None
     has_heartbeat: bool | None = None
     """None: it was not asked."""
-    why: str = "no mapping fits"
+    why: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +74,9 @@ def _lines(
 
 def _node(node: ProposedNode, name: str, family: Family | None) -> Iterator[str]:
     yield f"# {one_line(f'{node.device_name}: ' if node.device_name else '')}{one_line(node.says)}"
-    if node.mapping is None or family is None:
+    if node.why:
         yield f"# {one_line(node.why)}"
+    if node.mapping is None or family is None:
         yield "# [[bus.node]]"
         yield f"# name = {string(name)}"
         yield f"# id = {node.id}"

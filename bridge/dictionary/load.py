@@ -11,7 +11,7 @@ from canopen.objectdictionary.eds import export_eds  # pyright: ignore[reportUnk
 
 from bridge.dictionary.description import dictionary_of
 from bridge.dictionary.family import add_family
-from bridge.eds import Description, read_device_file
+from bridge.eds import Description, read_whole_device_file
 from bridge.mapping.loader import load_family, mapping_folders, read_family
 from bridge.tomlfile import TomlFile
 
@@ -29,12 +29,12 @@ def load_dictionary(
     if path.suffix == ".toml":
         family, eds = read_family(path, folders), _eds_of(path, folders)
     elif path.suffix or path.is_file():
-        return dictionary_of(read_device_file(path), node_id)
+        return dictionary_of(read_whole_device_file(path), node_id)
     else:
         family = load_family(str(what), folders)
         own = next(file for folder in folders if (file := folder / f"{what}.toml").is_file())
         eds = _eds_of(own, folders)
-    description = read_device_file(eds) if eds else Description("EDS")
+    description = read_whole_device_file(eds) if eds else Description("EDS")
     dictionary = dictionary_of(description, node_id)
     add_family(dictionary, family)
     return dictionary

@@ -8,6 +8,7 @@ from bridge.eds.configuration import configuration as configuration
 from bridge.eds.load import read_configuration as read_configuration
 from bridge.eds.load import read_device as read_device
 from bridge.eds.load import read_device_file as read_device_file
+from bridge.eds.load import read_whole_device_file as read_whole_device_file
 from bridge.eds.model import Access as Access
 from bridge.eds.model import DataType as DataType
 from bridge.eds.model import Description as Description

@@ -6,7 +6,7 @@ import re
 from typing import Final
 
 from bridge.eds.fields import Fields
-from bridge.eds.ini import Section, read_sections, shown
+from bridge.eds.ini import Section, read_sections, shown, stripped
 from bridge.eds.model import Commissioning, Description, Device, Object, Report
 from bridge.eds.objects import ObjectReader
 from bridge.eds.pdos import add_compact_pdos
@@ -25,9 +25,13 @@ _COMMISSIONING: Final = ("devicecomissioning", "devicecommissioning")
 
 def read_eds(text: str, report: Report) -> Description:
     """Everything that can be read from ``text``; the report has what cannot."""
-    sections = read_sections(lines(text), report)
+    all_lines = lines(text)
+    sections = read_sections(all_lines, report)
     reader = _EdsReader(sections, report)
     objects = reader.objects()
+    last = stripped(all_lines[-1])
+    if last and (lost := reader.lost(last)):
+        report.breaks_off(len(all_lines), f"it ends within a line, and {lost}")
     commissioning = reader.commissioning()
     return Description(
         format=reader.format(objects),
@@ -35,6 +39,11 @@ def read_eds(text: str, report: Report) -> Description:
         commissioning=commissioning,
         objects=tuple(objects[index] for index in sorted(objects)),
     )
+
+
+def _index(text: str) -> int | None:
+    match = _INDEX.fullmatch(text.lower())
+    return int(match[1], 16) if match else None
 
 
 class _EdsReader:
@@ -55,6 +64,18 @@ class _EdsReader:
                 self._once(self._subs.setdefault(int(match[1], 16), {}), int(match[2], 16), section)
             elif match := _TABLE.fullmatch(key):
                 self._tables[int(match[1], 16), match[2]] = section
+
+    def lost(self, last: str) -> str:
+        """What shows that a file that ends within the line ``last`` went on; empty where nothing does."""
+        if "=" not in last and not last.startswith(("[", ";", "#")):
+            return f"{shown(last)} is no key with a value"
+        for name in _LISTS:
+            section = self._sections.get(name.lower())
+            listed = [_index(text.text) for _, text in section.numbered()] if section else []
+            index = listed[-1] if listed else None
+            if index is not None and index not in self._roots:
+                return f"{index:04X}h, the last of [{name}], is not described"
+        return ""
 
     def _once(self, place: dict[int, Section], number: int, section: Section) -> None:
         """[1018sub1] and [1018sub01] are the same entry."""

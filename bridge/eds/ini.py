@@ -68,7 +68,7 @@ class _Reader:
 
     def read(self, lines: Iterable[str]) -> dict[str, Section]:
         for number, line in enumerate(lines, start=1):
-            line = line.strip(" \t\0\x1a\ufeff")  # 1Ah ended files of old editors
+            line = stripped(line)
             if line and line[0] not in ";#":
                 self._line(line, number)
         if self._other_spelling:
@@ -125,6 +125,11 @@ class _Reader:
                 self._report.error(number, f"{where}: {shown(first.text)} counts, not {shown(value)}")
             return
         section.keys[name] = Text(value, number)
+
+
+def stripped(line: str) -> str:
+    """``line`` without what means nothing at its ends; 1Ah ended the files of old editors."""
+    return line.strip(" \t\0\x1a\ufeff")
 
 
 def shown(text: str) -> str:

@@ -38,7 +38,19 @@ def read_device(content: bytes, name: str) -> Description:
         line, why = (first.line, f": {first.text}") if first else (0, "")
         message = f"is not a device description: no object is described in it{why}"
         raise FileFaults([Fault(name, line, "", message, "an EDS, DCF, XDD or XDC")])
-    return replace(description, findings=findings)
+    return replace(description, findings=findings, broken_off_at=report.broken_off_at)
+
+
+def read_whole_device_file(path: Path) -> Description:
+    """As ``read_device_file``, for those who make something of it: half a description is none, and raises
+    ``FileFaults``, too."""
+    description = read_device_file(path)
+    line = description.broken_off_at
+    if line is None:
+        return description
+    why = next(one.text for one in reversed(description.findings) if one.line == line)
+    message = f"the file breaks off: {why}; nothing is made of half a description"
+    raise FileFaults([Fault(str(path), line, "", message, "the whole file, fetched anew")])
 
 
 def contents(path: Path) -> bytes:

@@ -198,6 +198,8 @@ class Description:
     commissioning: Commissioning = field(default_factory=Commissioning)
     objects: tuple[Object, ...] = ()
     findings: tuple[Finding, ...] = ()
+    broken_off_at: int | None = None
+    """The line in which the file ends before it is complete."""
 
     def object(self, index: int) -> Object | None:
         place = bisect_left(self.objects, index, key=lambda one: one.index)
@@ -223,9 +225,15 @@ class Report:
     def __init__(self) -> None:
         self._findings: list[Finding] = []
         self._more = 0
+        self.broken_off_at: int | None = None
 
     def error(self, line: int, text: str) -> None:
         self._add(Finding(line, Severity.ERROR, text))
+
+    def breaks_off(self, line: int, text: str) -> None:
+        """What follows ``line`` has been lost."""
+        self.broken_off_at = line
+        self.error(line, text)
 
     def warning(self, line: int, text: str) -> None:
         self._add(Finding(line, Severity.WARNING, text))

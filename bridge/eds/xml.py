@@ -54,9 +54,9 @@ def parse(content: bytes, report: Report) -> Element:
     try:
         parser.Parse(content, True)
     except expat.ExpatError as error:
-        report.error(error.lineno, f"is not XML from here on: {expat.ErrorString(error.code)}")
+        report.breaks_off(error.lineno, f"is not XML from here on: {expat.ErrorString(error.code)}")
     except _Refused as error:
-        report.error(parser.CurrentLineNumber, str(error))
+        report.breaks_off(parser.CurrentLineNumber, str(error))
     except (ValueError, LookupError) as error:  # it declares an encoding that Python does not have
         report.error(1, f"cannot be decoded: {error}")
     return builder.root

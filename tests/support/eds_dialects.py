@@ -204,7 +204,7 @@ def noise(text: str, chance: Random) -> bytes:
         if chance.random() < 0.05:
             lines.append(chance.choice(("; remark", "stray line", "// remark", "# 1 = 2", "")))
         lines.append(line)
-    return "\n".join([*lines, "[Tool]", "Owner=nobody", "", "[]", "[broken", "x"]).encode()
+    return "\n".join([*lines, "[Tool]", "Owner=nobody", "", "[]", "[broken", "x", ""]).encode()
 
 
 def shuffled(text: str, chance: Random) -> bytes:

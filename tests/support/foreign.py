@@ -11,7 +11,7 @@ from bridge.canopen.sdo import Result as SdoResult
 from bridge.canopen.sdo import SdoChannel
 from bridge.canopen.sdo_transfer import SdoError
 from bridge.derive.modes import is_drive
-from bridge.eds import Description, Entry, read_device
+from bridge.eds import Description, Entry, read_whole_device_file
 from bridge.errors import BridgeError
 from bridge.image import Quality
 from bridge.sim.generic_eds import plan_of_description
@@ -41,8 +41,10 @@ class Result:
 def served(folder: Path, name: str, content: bytes) -> Result:
     """What becomes of a file. What is no drive with CiA 402 ends with the step ``mapping``."""
     folder.mkdir(parents=True)
+    file = folder / "device"
+    file.write_bytes(content)
     try:
-        description = read_device(content, name)
+        description = read_whole_device_file(file)
     except BridgeError as error:
         return Result(name, "read", str(error))
     findings = tuple(str(one) for one in description.findings if one.severity == "error")

@@ -15,6 +15,7 @@ from bridge.sim.cia402_drive import Cia402Drive
 from bridge.sim.generic_node import GenericNode
 from tests.support import sites
 from tests.support.invented import NAME, SPIN
+from tests.support.invented_eds import SPIN as INVENTED
 from tests.support.invented_eds import eds
 
 RUN = CliRunner()
@@ -48,6 +49,33 @@ def test_a_mapping_that_is_there_is_kept(tmp_path: Path) -> None:
     with pytest.raises(OperationFailed, match="is there already"):
         new(str(file), "--output", str(output))
     assert output.read_text(encoding="utf-8") == "mine"
+
+
+WHOLE = eds(INVENTED)
+LATE = WHOLE.index(b"[6044]")
+
+
+@pytest.mark.parametrize(
+    ("content", "line"),
+    [
+        pytest.param(WHOLE[:-4] + b"Acc", WHOLE.count(b"\n"), id="within a key"),
+        pytest.param(WHOLE[: LATE + 25], WHOLE[:LATE].count(b"\n") + 2, id="within a value"),
+        pytest.param(b'<?xml version="1.0"?>\n<a>\n<CANopenObject index="1000" name="x"/>', 3, id="XML"),
+    ],
+)
+def test_half_a_file_becomes_no_mapping(tmp_path: Path, content: bytes, line: int) -> None:
+    file, output = tmp_path / "spin.eds", tmp_path / "spin.toml"
+    file.write_bytes(content)
+    with pytest.raises(FileFaults, match=rf"spin.eds:{line}: .*breaks off.*fetched anew"):
+        new(str(file), "--output", str(output))
+    assert not output.exists()
+
+
+@pytest.mark.parametrize("end", [b"", b"\r\n\x1a"])
+def test_a_file_whose_last_line_has_no_end_is_whole(tmp_path: Path, end: bytes) -> None:
+    file = tmp_path / "spin.eds"
+    file.write_bytes(WHOLE.rstrip() + end)
+    assert "9 parameters" in new(str(file), "--output", str(tmp_path / "spin.toml"))
 
 
 def test_what_could_not_be_read_is_told(tmp_path: Path) -> None:

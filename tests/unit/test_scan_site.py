@@ -95,6 +95,18 @@ def test_a_mapping_is_made_of_the_nodes_eds(tmp_path: Path) -> None:
     assert len({node.name for node in project.site.bus[0].node}) == 2
 
 
+def test_half_an_eds_says_why_it_does_not_help(tmp_path: Path) -> None:
+    folder = tmp_path / "eds"
+    folder.mkdir()
+    (folder / "spin.eds").write_bytes(eds()[:-4])
+    written(tmp_path, scanned(GenericNode(3, plan_of_description(described(SPIN), 3))), folder)
+    text = (tmp_path / "hall.toml").read_text("utf-8")
+    assert re.search(r"\n# .*spin.eds:[0-9]+: the file breaks off", text)
+    (node,) = load_project(tmp_path / "hall.toml").site.bus[0].node
+    assert node.mapping.startswith("cia402/")
+    assert not (tmp_path / "mappings").exists()
+
+
 def test_an_eds_of_no_drive_says_why_it_does_not_help(tmp_path: Path) -> None:
     folder = tmp_path / "eds"
     folder.mkdir()

@@ -71,7 +71,8 @@ class BackupFile:
 def read_backup(path: Path) -> BackupFile:
     """Raises ``FileFaults`` with everything that is wrong."""
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        content = tomllib.loads(text)
     except OSError as error:
         raise FileFaults([Fault(str(path), 0, "", f"cannot be read: {error.strerror or error}")]) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -115,6 +116,12 @@ def read_backup(path: Path) -> BackupFile:
             fault(f"identity.{name}", f"must be a whole number, called {', '.join(IDENTITY)}")
         else:
             identity[name] = value
+    if not text.endswith("\n"):
+        # Half a number is a number: 12.5 that breaks off is 12.
+        line = text.count("\n") + 1
+        faults.append(
+            Fault(str(path), line, "", "the file ends within this line", "a line end, if it is whole")
+        )
     if faults:
         raise FileFaults(faults)
     return BackupFile(

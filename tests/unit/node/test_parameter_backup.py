@@ -187,6 +187,14 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path, workshop: Workshop) ->
     assert (read.mapping, read.drive, read.saved) == ("nord/sk-tu4-cao", "conveyor/fu1", "2026-11-21")
 
 
+def test_a_file_that_breaks_off_within_a_value_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "set.toml"
+    written = BackupFile("nord/sk-tu4-cao", "conveyor/fu1", "2026-11-21", {"P102.1": 12.5}, {})
+    path.write_text(written.text()[:-3], "utf-8")
+    with pytest.raises(FileFaults, match=r"set.toml:8: the file ends within this line"):
+        read_backup(path)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -14,8 +14,8 @@ What follows an ignored stop may halt a plant, so nothing is called ignored that
   restarts with the first telegram after the pause, or when its node is in operation.
 - A word that takes the voltage has a short bound; any other stop may be a ramp, with a long one. The bound of
   the weaker word holds as long as the drive may still have that word.
-- A drive that reports that it is not enabled has ended its ramp. If it reports enabled again, it has until
-  the short bound after the stop: the word that enabled it may still have been on its way.
+- A drive that reports after the short bound that it is not enabled has ended its ramp. Before that it may
+  say so because the word that enables it is still on its way, and its ramp is yet to begin.
 - Where the word leaves the voltage on, a drive may hold the motor, and may be enabled for a moment on its
   way there: it gets a bound for that, too.
 - A drive that the bridge itself cuts off, by an NMT stop of its node, is judged by its last report: if that
@@ -300,9 +300,11 @@ class Follow:
             if at >= self._until and self.state is not LastStop.IGNORED:
                 self._conclude(LastStop.IGNORED, at)
             return
-        if self._says is Says.AT_REST and not self._rested and self._since is not None:
-            self._rested = True
-            self._until = min(self._until, self._since + self._bounds.off_s)
+        if self._says is Says.AT_REST and self._since is not None:
+            short = self._since + self._bounds.off_s
+            if at >= short and not self._rested:
+                self._rested = True
+                self._until = min(self._until, short)
         if self.state is LastStop.FORWARDED:
             self._conclude(LastStop.FOLLOWED, at)
 

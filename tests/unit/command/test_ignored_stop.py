@@ -359,6 +359,19 @@ def test_a_ramp_is_over_when_the_drive_has_been_at_rest() -> None:
     assert drive.outcomes == [LastStop.FOLLOWED, LastStop.IGNORED]
 
 
+def test_at_rest_before_the_enabling_word_arrives_ends_no_ramp() -> None:
+    drive = Judged()
+    drive.says(Says.AT_REST)
+    drive.send(Sent.ENABLES)
+    drive.send(Sent.RAMP)
+    drive.run(0.05)
+    drive.says(Says.ENABLED)
+    drive.run(0.7)
+    drive.says(Says.AT_REST)
+    drive.run(10)
+    assert drive.outcomes == [LastStop.FOLLOWED]
+
+
 def test_what_was_said_before_the_stop_does_not_count() -> None:
     drive = Judged()
     drive.send(Sent.ENABLES)

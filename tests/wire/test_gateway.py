@@ -227,9 +227,10 @@ def errors(tool: Tool) -> None:
         ("5 r 0x2066 1 i64", "0x06070010"),
     ):
         assert tool.ask(f"[7] {line}") == f"[7] ERROR:{code}", line
-    tool.say(*(f"[{number}] 5 r 0x2069 1 i16" for number in range(9)))
-    heard = sorted(tool.hear() for _ in range(9))
-    assert heard == [*(f"[{number}] 500" for number in range(8)), "[8] ERROR:600"]
+    tool.say(*(f"[{number}] 5 r 0x2069 1 i16" for number in range(40)))
+    heard = sorted(tool.hear().partition("] ")[2] for _ in range(40))
+    assert heard.count("500") >= 8, "as many as may wait"
+    assert 0 < heard.count("ERROR:600") == 40 - heard.count("500")
 
 
 def session(shop: Shop, is_over: Callable[[], bool]) -> int:

@@ -14,8 +14,9 @@ What follows an ignored stop may halt a plant, so nothing is called ignored that
   restarts with the first telegram after the pause, or when its node is in operation.
 - A word that takes the voltage has a short bound; any other stop may be a ramp, with a long one. The bound of
   the weaker word holds as long as the drive may still have that word.
-- A drive that reports after the short bound that it is not enabled has ended its ramp. Before that it may
-  say so because the word that enables it is still on its way, and its ramp is yet to begin.
+- A drive that reports that it is not enabled has ended its ramp. If it reports enabled again, it has until
+  the short bound after the stop. A drive that has not said since the enabling word that it was enabled has
+  perhaps not had that word yet: its ramp may still begin.
 - Where the word leaves the voltage on, a drive may hold the motor, and may be enabled for a moment on its
   way there: it gets a bound for that, too.
 - A drive that the bridge itself cuts off, by an NMT stop of its node, is judged by its last report: if that
@@ -115,6 +116,8 @@ class Follow:
         """The bridge has taken the node out of operation, and the drive was not known to stop before."""
         self._was_enabled = False
         """The stop came after a word that enabled the drive."""
+        self._rose = False
+        """The drive has reported since that word that it is enabled, or on a ramp."""
         self._says = Says.NOTHING
         self._since: float | None = None
         """When the stop was handed to the bus; None where there is none, or the drive is not there."""
@@ -234,7 +237,7 @@ class Follow:
         self._since = None
         self._until = self._off_since = inf
         self._rested = self._graced = False
-        self._is_cut_off = self._was_enabled = False
+        self._is_cut_off = self._was_enabled = self._rose = False
         self._look_at = -inf
         self._verdicts.clear()
 
@@ -253,6 +256,7 @@ class Follow:
     def on_report(self, says: Says, at: float) -> None:
         """The drive's status word is another one now, by a telegram received ``at``."""
         before, self._says = self._says, says
+        self._rose |= says not in (Says.AT_REST, Says.NOTHING)
         if says is Says.STOPPING and before is not says:
             self._stopping_since = at
         if self._since is None or at < self._since or says is Says.NOTHING:
@@ -300,11 +304,10 @@ class Follow:
             if at >= self._until and self.state is not LastStop.IGNORED:
                 self._conclude(LastStop.IGNORED, at)
             return
-        if self._says is Says.AT_REST and self._since is not None:
-            short = self._since + self._bounds.off_s
-            if at >= short and not self._rested:
-                self._rested = True
-                self._until = min(self._until, short)
+        may_rise = self._was_enabled and not self._rose
+        if self._says is Says.AT_REST and not self._rested and not may_rise and self._since is not None:
+            self._rested = True
+            self._until = min(self._until, self._since + self._bounds.off_s)
         if self.state is LastStop.FORWARDED:
             self._conclude(LastStop.FOLLOWED, at)
 

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from bridge.command.channel import DriveChannel
 from bridge.command.following import Following
 from bridge.command.link import FurtherTpdo
-from bridge.drive import ParameterSet, ValueCodec, codecs
+from bridge.drive import Lack, ParameterSet, ValueCodec, codecs
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Slot
 
@@ -30,10 +30,17 @@ class _Judged:
     """One point of the process data: why it is not served, if so, and the further TPDOs it comes by."""
 
     index: int
-    why: str = ""
+    lack: Lack | None = None
     further: tuple[FurtherTpdo, ...] = ()
-    scaled_by: str = ""
-    """The parameter that scales it, where that depends on the parameter set."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Compiled:
+    """How the words become values in one parameter set: first those that are computed without a call."""
+
+    plain: tuple[_Plain, ...]
+    others: tuple[ValueCodec, ...]
+    judged: tuple[_Judged, ...]
 
 
 class ActualData:
@@ -45,7 +52,6 @@ class ActualData:
         self._channel = channel
         self._following = following
         self._has_followers = any(value.follows for value in family.values_of(slot))
-        self._family = family
         self._process = family.process.tpdo
         self._set = ParameterSet(family.status_word.parameter_set_bits)
         self.words: list[int] = [0] * len(self._process)
@@ -57,9 +63,7 @@ class ActualData:
         # Those that most drives have go first: they are computed without a call.
         found = codecs(family, slot, "actual", self._process, {})
         self._codecs = sorted(found, key=lambda codec: not codec.is_plain)
-        self._plain: list[_Plain] = []
-        self._others: list[ValueCodec] = []
-        self._judged: list[_Judged] = []
+        self._of_sets: dict[int, _Compiled] = {}
         self._status = [image.index[f"{drive}/status/{leaf}"] for leaf in _STATUS]
         leaves = [f"actual/{word}" for word in self._carried]
         leaves += [codec.model.leaf for codec in self._codecs]
@@ -69,30 +73,35 @@ class ActualData:
         self.compile()
 
     def compile(self) -> None:
-        """Take over what the boot-up has found."""
-        scales = self._channel.scales
-        self._codecs = [codec.scaled(scales.get(codec.model.leaf)) for codec in self._codecs]
-        plain = [codec for codec in self._codecs if codec.is_plain]
-        self._others = [codec for codec in self._codecs if not codec.is_plain]
-        self._plain = [
-            _Plain(codec.places[0], codec.scale.full, codec.scale.at)
-            if codec.scale
-            else _Plain(codec.places[0], 1, 1)
-            for codec in plain
-        ]
-        self._judged = list(self._to_judge(self._channel.unserved))
+        """Take over what the boot-up has found, or what has been read since."""
+        self._of_sets = {in_set: self._compiled(in_set) for in_set in self._channel.meanings.sets}
+        self._use(self.words[0])
+
+    def _compiled(self, in_set: int) -> _Compiled:
+        found = [self._channel.meanings.codec(codec, in_set) for codec in self._codecs]
+        return _Compiled(
+            tuple(_plain(codec) for codec, _ in found if codec.is_plain),
+            tuple(codec for codec, _ in found if not codec.is_plain),
+            tuple(self._to_judge(self._channel.unserved, found)),
+        )
+
+    def _use(self, status_word: int) -> None:
+        """Words mean what they mean in the parameter set that the drive tells."""
+        compiled = self._of_sets[self._set.of(status_word)]
+        self._plain, self._others, self._judged = compiled.plain, compiled.others, compiled.judged
         self._shown = None
 
-    def _to_judge(self, unserved: Mapping[str, str]) -> Iterable[_Judged]:
+    def _to_judge(
+        self, unserved: Mapping[str, str], found: Iterable[tuple[ValueCodec, Lack | None]]
+    ) -> Iterable[_Judged]:
         for index in self._status:
             yield _Judged(index)
         rest = iter(self._indices)
         for word, place in zip(self._carried, self._places, strict=True):
-            yield _Judged(next(rest), unserved.get(f"actual/{word}", ""), self._further_of((place,)))
-        for codec in self._codecs:
-            why = unserved.get(codec.model.leaf) or codec.why_unknown
-            scaled_by = codec.model.full if self._family.depends_on_set(codec.model) else None
-            yield _Judged(next(rest), why, self._further_of(codec.places), scaled_by or "")
+            yield _Judged(next(rest), _unserved(unserved, [word]), self._further_of((place,)))
+        for codec, lack in found:
+            words = [self._process[place] for place in codec.places]
+            yield _Judged(next(rest), _unserved(unserved, words) or lack, self._further_of(codec.places))
 
     def _further_of(self, places: Sequence[int]) -> tuple[FurtherTpdo, ...]:
         return tuple(pdo for pdo in self._channel.link.further if not pdo.places.isdisjoint(places))
@@ -128,7 +137,7 @@ class ActualData:
         self._following.before_pdo(now)
         has_new_status = words[0] != held[0]
         if (words[0] ^ held[0]) & self._set.mask:
-            self._shown = None
+            self._use(words[0])
         held[:] = words
         channel.on_pdo(now)
         channel.on_status_word(words[0], now)
@@ -190,9 +199,8 @@ class ActualData:
         """A point's quality, and the reason where that is not the one of the drive's ``quality``."""
         if not quality.has_value:
             return quality, ""
-        unknown = point.why or self._why_unknown(point)
-        if unknown:
-            return Quality.CONFIG_ERROR, unknown
+        if point.lack:
+            return point.lack
         for pdo in sorted(point.further, key=_goodness):
             # Waiting goes first, then stale.
             is_worse = quality is Quality.GOOD or pdo.quality is Quality.WAITING
@@ -200,9 +208,22 @@ class ActualData:
                 return pdo.quality, f"no {pdo.name} from the drive"
         return quality, ""
 
-    def _why_unknown(self, point: _Judged) -> str:
-        """Why a scaled value is not known with the parameter set that the drive tells."""
-        return self._set.why_unknown(self.words[0], point.scaled_by) if point.scaled_by else ""
+
+def _plain(codec: ValueCodec) -> _Plain:
+    """With an unknown scale the bare number, without a word zero."""
+    if not codec.places:
+        return _Plain(0, 0, 1)
+    scale = codec.scale
+    return _Plain(codec.places[0], scale.full, scale.at) if scale else _Plain(codec.places[0], 1, 1)
+
+
+def _unserved(unserved: Mapping[str, str], words: Iterable[str]) -> Lack | None:
+    """What there is to say of these words, where the node's PDOs do not carry them."""
+    for word in words:
+        why = unserved.get(f"actual/{word}")
+        if why:
+            return Lack(Quality.CONFIG_ERROR, why)
+    return None
 
 
 def _goodness(pdo: FurtherTpdo) -> int:

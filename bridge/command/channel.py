@@ -24,7 +24,7 @@ from bridge.command.request import Identity, Outcome, Reply, Request
 from bridge.command.status import DriveStatus
 from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
-from bridge.drive import FAULTED, DriveState, Explained, Told, scales_of
+from bridge.drive import FAULTED, DriveState, Explained, Meanings, Told
 from bridge.image import Quality
 from bridge.mapping.model import Family
 
@@ -54,9 +54,10 @@ class DriveChannel:
         self.name = name
         self.family = family
         self.settings = settings
-        self.scales = scales_of(family, settings.parameters)
-        """Known scales by the value's leaf (``actual/frequency``); from the mapping and the site file, and
-        at boot-up."""
+        slot = family.slot_named(settings.slot)
+        self.meanings = Meanings(family, slot, settings.parameters)
+        """What the words mean in each parameter set: from the mapping and the site file, and as read from
+        the drive."""
         self.unserved: dict[str, str] = {}
         """Points that the node cannot serve, by their leaf, with the reason; known after boot-up."""
         self.link = Link(settings.telegram_downtime_s, hold_ms)
@@ -66,7 +67,7 @@ class DriveChannel:
         self.due = due
         self._status = DriveStatus(family)
         decode = TelegramDecoder(
-            name, family, family.slot_named(settings.slot), self.scales, self.unserved
+            name, family, slot, self.meanings, self.unserved, lambda: self._reported_word
         ).decode
         self.leg_settings = leg_settings(family, settings, decode)
         self.words = self.leg_settings.words
@@ -95,6 +96,11 @@ class DriveChannel:
     def output_then(self) -> Output:
         """What belongs on the bus from ``until`` on."""
         return output_then(self.leg_settings, self.leg)
+
+    @property
+    def _reported_word(self) -> int | None:
+        """The status word of a drive that is heard."""
+        return self._status.word if self.leg.way.is_heard else None
 
     @property
     def control_word(self) -> int:
@@ -230,6 +236,8 @@ class DriveChannel:
     def on_actual_words(self, words: Sequence[int], now: float) -> None:
         """What TPDOs have brought, the status word first, in the order of ``process.tpdo``."""
         follows, rest = self.leg_settings.follows, self.leg.rest
+        unknown = self.meanings.unknown_followed(words)
+        words = [0 if place in unknown else word for place, word in enumerate(words)] if unknown else words
         if any(rest[place] != words[source] for place, source in follows):
             self._happen(event.ActualWords(tuple(words)), now)
 

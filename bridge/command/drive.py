@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from bridge.command.actual import ActualData
 from bridge.command.channel import DriveChannel
@@ -15,7 +15,7 @@ from bridge.command.following import Following
 from bridge.command.link import FurtherTpdo
 from bridge.command.worst_case import StopTime, Wire, stop_time, sync_wait_ms, takeover_ms
 from bridge.config import BusTable, DriveTable, NodeTable
-from bridge.drive import OwnJudgement, OwnVerdict, ParameterSet, codecs, scales_of
+from bridge.drive import Codes, Lack, OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, codecs
 from bridge.drive.own_supervision import why_silence_does_not_stop
 from bridge.image import Image, Point, Quality, Value
 from bridge.mapping.model import Family, Slot
@@ -48,6 +48,13 @@ class Identification:
     revision: int = 0
     serial: int = 0
     device_name: str = ""
+
+
+class _Command(NamedTuple):
+    """A scaled command in one parameter set, and why it is not served there."""
+
+    codec: ValueCodec
+    lack: Lack | None
 
 
 class Drive:
@@ -116,6 +123,7 @@ class Drive:
         carried = family.carried(self.slot)[0][1:]
         self._setpoints = [(words.index(word), f"command/{word}") for word in carried]
         self._commands = codecs(family, self.slot, "command", words, self.table.parameters)
+        self._commands_in = self._compiled_commands()
 
         def places(group: str, leaves: Sequence[str]) -> list[int]:
             return [self._image.index[f"{self.name}/{group}/{leaf}"] for leaf in leaves]
@@ -177,15 +185,8 @@ class Drive:
         with the control word."""
         self.channel.link.on_boot(deadline_s, further)
         self.rpdo_type = rpdo_type
-        found = dict(unserved)
-        for value in self.family.values_of(self.slot):
-            why = [
-                unserved[leaf] for word in value.word_names if (leaf := f"{value.group}/{word}") in unserved
-            ]
-            if why:
-                found[value.leaf] = why[0]
         self.channel.unserved.clear()
-        self.channel.unserved.update(found)
+        self.channel.unserved.update(unserved)
         self._compile()
         self.refresh(now)
 
@@ -193,15 +194,33 @@ class Drive:
         """Its node could not be heard for a while, and goes on as it was; the state that follows shows it."""
         self._actual.on_heard_again()
 
-    def on_scale(self, parameter: str, full: float) -> None:
+    def on_scale(self, parameter: str, full: float, in_set: int = 1) -> None:
         """The drive's own value of a scaling parameter; it wins over the site file."""
-        self.channel.scales.update(scales_of(self.family, {parameter: full}))
+        self.channel.meanings.on_scale(parameter, full, in_set)
         self._compile()
 
+    def on_codes(self, codes: Codes, why_unread: str = "cannot be read") -> bool:
+        """What the drive's parameters say that its words carry. True where a setpoint that was written before
+        means something else now: it must not be sent to a drive that is enabled next."""
+        means_otherwise = self.channel.meanings.on_codes(codes, why_unread)
+        self._compile()
+        return means_otherwise
+
     def _compile(self) -> None:
-        scales = self.channel.scales
-        self._commands = [codec.scaled(scales.get(codec.model.leaf)) for codec in self._commands]
+        self._commands_in = self._compiled_commands()
         self._actual.compile()
+
+    def _compiled_commands(self) -> dict[int, list[_Command]]:
+        """The scaled commands in each parameter set."""
+        meanings, words = self.channel.meanings, self.family.process.rpdo[1:]
+
+        def compiled(codec: ValueCodec, in_set: int) -> _Command:
+            found, lack = meanings.codec(codec, in_set)
+            carried = [f"command/{words[place]}" for place in found.places]
+            why = next((why for leaf in carried if (why := self.channel.unserved.get(leaf))), "")
+            return _Command(found, Lack(Quality.CONFIG_ERROR, why) if why else lack)
+
+        return {in_set: [compiled(codec, in_set) for codec in self._commands] for in_set in meanings.sets}
 
     def on_own_supervision(self, own: OwnJudgement, now: float) -> None:
         """What the drive does by itself when the bridge falls silent, as the boot-up has read it."""
@@ -287,12 +306,11 @@ class Drive:
             why = unserved.get(leaf, "")
             quality = Quality.CONFIG_ERROR if why else Quality.GOOD
             image.set(index, setpoints[place], now, quality, why)
-        for index, codec in zip(self._value_indices, self._commands, strict=True):
-            why = unserved.get(codec.model.leaf) or codec.why_unknown
-            if not why and self.family.depends_on_set(codec.model):
-                why = self._set.why_unknown(channel.control_word, codec.model.full)
-            quality = Quality.CONFIG_ERROR if why else Quality.GOOD
-            image.set(index, codec.from_words(setpoints), now, quality, why)
+        in_set = self._set.of(channel.control_word)
+        for index, codec in zip(self._value_indices, self._commands_in[in_set], strict=True):
+            value = codec.codec.from_words(setpoints)
+            quality, why = codec.lack or (Quality.GOOD, "")
+            image.set(index, value, now, quality, why)
 
     def _refresh_supervision(self, now: float) -> None:
         channel = self.channel

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 from bridge.command.request import Code
-from bridge.drive import LinearScale, ParameterSet, ValueCodec, Written, codecs
+from bridge.drive import ControlWords, Meanings, ParameterSet, ValueCodec, Written, codecs
 from bridge.image import Value
 from bridge.mapping.model import Family, Slot
 
@@ -46,6 +46,11 @@ class _Setpoints:
         self._masks[written.place] = mask | written.mask
         self._bits[written.place] = bits | written.bits
 
+    @property
+    def places(self) -> frozenset[int]:
+        """Those of the words that have been written."""
+        return frozenset(self._masks)
+
     def over(self, before: tuple[int, ...]) -> tuple[int, ...]:
         """``before`` with what was written."""
         after = list(before)
@@ -55,71 +60,146 @@ class _Setpoints:
 
 
 class TelegramDecoder:
-    """Knows the command group of one drive. ``scales``, by the value's leaf, and ``unserved``, which has
-    the reason for each point that the node cannot take, are read at each write: they fill at boot-up."""
+    """Knows the command group of one drive. ``meanings`` and ``unserved``, which has the reason for each word
+    that the node cannot take, are read at each write: they fill at boot-up. ``reported`` gives the drive's
+    status word, None while the drive is not heard."""
 
     def __init__(
         self,
         name: str,
         family: Family,
         slot: Slot,
-        scales: Mapping[str, LinearScale],
+        meanings: Meanings,
         unserved: Mapping[str, str],
+        reported: Callable[[], int | None] = lambda: None,
     ) -> None:
         self._name = name
-        self._scales = scales
+        self._meanings = meanings
         self._unserved = unserved
-        words = family.process.rpdo[1:]
+        self._reported = reported
+        self._words = ControlWords(family.control_word)
+        self._names = words = family.process.rpdo[1:]
         carried = family.carried(slot)[0]
         self._setpoints = {word: place for place, word in enumerate(words) if word in carried}
         self._values = {codec.model.name: codec for codec in codecs(family, slot, "command", words, {})}
         self._set = ParameterSet(family.control_word.parameter_set_bits)
-        self._set_values = {
-            name for name, codec in self._values.items() if family.depends_on_set(codec.model)
+        described = {meaning.word for meaning in family.meaning if meaning.group == "command"}
+        described |= {
+            word
+            for codec in self._values.values()
+            if family.depends_on_set(codec.model)
+            for word in codec.model.word_names
         }
+        self._of_set = [place for place, word in enumerate(words) if word in described]
+        """The places of words whose meaning or scale depends on the parameter set."""
+        self._reported_set = ParameterSet(family.status_word.parameter_set_bits)
 
     def decode(self, values: Mapping[str, Value], before: tuple[int, ...], held: int) -> Telegram:
         """The words to be sent; setpoints that are not written stay as ``before``. ``held`` is the control
         word that counts where none is written. Raises ``Refusal``."""
-        control_word: int | None = None
+        control_word = _as_word("control_word", values["control_word"]) if "control_word" in values else None
+        word = held if control_word is None else control_word
+        in_set, was = self._set.of(word), self._set.of(held)
+        stops = control_word is not None and not self._words.enables(word)
         setpoints = _Setpoints()
         for leaf, value in values.items():
             if leaf == "control_word":
-                control_word = _as_word(leaf, value)
                 continue
-            for written in self._written(leaf, value):
-                setpoints.put(leaf, written)
-        self._check_set(values, held if control_word is None else control_word)
-        return Telegram(control_word, setpoints.over(before))
+            if stops and self._has_lost_its_word(leaf, in_set):
+                continue
+            written = self._written(leaf, value, in_set)
+            if in_set == was:
+                written = self._as_reported(leaf, value, word, written)
+            for one in written:
+                setpoints.put(leaf, one)
+        after = setpoints.over(before)
+        if in_set != was:
+            after = self._in_other_set(before, after, setpoints.places, was, word)
+        return Telegram(control_word, after)
 
-    def _check_set(self, values: Mapping[str, Value], control_word: int) -> None:
-        """Scaled values are not known in another parameter set; raw words need no scale."""
-        if not control_word & self._set.mask:
-            return
-        for leaf in values:
-            if leaf in self._set_values:
-                why = self._set.why_unknown(control_word, self._values[leaf].model.full)
-                raise Refusal(Code.NOT_CONFIGURED, f"{leaf}: {why}")
-
-    def _written(self, leaf: str, value: Value) -> tuple[Written, ...]:
+    def _written(self, leaf: str, value: Value, in_set: int) -> tuple[Written, ...]:
         place, codec = self._setpoints.get(leaf), self._values.get(leaf)
-        if place is None and codec is None:
+        if place is not None:
+            self._check_carried(leaf, (place,))
+            return (Written(place, _WORD_MASK, _as_word(leaf, value)),)
+        if codec is None:
             known = ", ".join(["control_word", *self._setpoints, *self._values])
             raise Refusal(Code.UNKNOWN_POINT, f"{self._name}/command has no {leaf!r}; it has {known}")
-        point = f"command/{leaf}"
-        why = self._unserved.get(point)
-        if why:
-            raise Refusal(Code.NOT_CONFIGURED, f"{leaf}: {why}")
-        if place is not None:
-            return (Written(place, _WORD_MASK, _as_word(leaf, value)),)
-        codec = self._values[leaf] = self._values[leaf].scaled(self._scales.get(point))
-        return _from_value(codec, value)
+        found, lack = self._meanings.codec(codec, in_set)
+        self._check_carried(leaf, found.places)
+        if lack:
+            raise Refusal(Code.NOT_CONFIGURED, f"{leaf}: {lack.why}")
+        return _from_value(found, value)
+
+    def _has_lost_its_word(self, leaf: str, in_set: int) -> bool:
+        """Whether the drive gives the value no known meaning: its parameters may be changed while it runs.
+        A word that does not enable is not refused for it: it may be a stop."""
+        codec = self._values.get(leaf)
+        return codec is not None and self._meanings.codec(codec, in_set)[1] is not None
+
+    def _check_carried(self, leaf: str, places: tuple[int, ...]) -> None:
+        for place in places:
+            why = self._unserved.get(f"command/{self._names[place]}")
+            if why:
+                raise Refusal(Code.NOT_CONFIGURED, f"{leaf}: {why}")
+
+    def _as_reported(
+        self, leaf: str, value: Value, word: int, written: tuple[Written, ...]
+    ) -> tuple[Written, ...]:
+        """A scaled value is taken as the parameter set that the control word asks for has it. Where the drive
+        is in another one, it would take the same words for something else: a word that enables is refused,
+        and with any other, which may be a stop, it gets zero. Raises ``Refusal``."""
+        in_set, status = self._set.of(word), self._reported()
+        reported = in_set if status is None else self._reported_set.of(status)
+        if reported == in_set or leaf not in self._values:
+            return written
+        try:
+            same = self._written(leaf, value, reported) == written
+        except Refusal:
+            same = False
+        if same:
+            return written
+        if self._words.enables(word):
+            message = f"{leaf}: parameter set {in_set} is commanded, and the drive is in set {reported}"
+            raise Refusal(Code.NOT_READY, message)
+        return tuple(replace(one, bits=0) for one in written)
+
+    def _in_other_set(
+        self, before: tuple[int, ...], after: tuple[int, ...], written: frozenset[int], was: int, word: int
+    ) -> tuple[int, ...]:
+        """The setpoints with this control word, which changes the parameter set: what is not written keeps
+        its value in its unit. Where that is not known, a drive that is to run is not switched, and one that
+        is not gets zero. Raises ``Refusal``."""
+        in_set = self._set.of(word)
+        kept = list(after)
+        left = {place for place in self._of_set if before[place] and place not in written}
+        taken = set(written)
+        for place in left:
+            kept[place] = 0
+        for codec in self._values.values():
+            old, lack = self._meanings.codec(codec, was)
+            if lack or not left.intersection(old.places):
+                continue
+            new, lack = self._meanings.codec(codec, in_set)
+            if lack or taken.intersection(new.places):
+                continue
+            try:
+                parts = new.to_words(old.from_words(before))
+            except ValueError:
+                continue
+            for part in parts:
+                kept[part.place] = kept[part.place] & ~part.mask | part.bits
+            taken.update(new.places)
+            left.difference_update(old.places)
+        if left and self._words.enables(word):
+            names = ", ".join(self._names[place] for place in sorted(left))
+            message = f"what {names} means in parameter set {in_set} is not known: write it with the switch"
+            raise Refusal(Code.NOT_CONFIGURED, message)
+        return tuple(kept)
 
 
 def _from_value(codec: ValueCodec, value: Value) -> tuple[Written, ...]:
     model = codec.model
-    if codec.is_unknown:
-        raise Refusal(Code.NOT_CONFIGURED, f"{model.name}: {model.full} is not known; see boot_status")
     is_bit = model.bit is not None and isinstance(value, bool)
     try:
         return codec.to_words(int(value) if is_bit else _as_number(model.name, value))

@@ -12,7 +12,7 @@ from bridge.dbc.fields import lay_out
 from bridge.dbc.model import BRIDGE, BusDescription, Message
 from bridge.dbc.protocol import bus_messages, node_messages
 from bridge.dbc.signals import PdoSignals
-from bridge.drive import codecs
+from bridge.drive import default_codecs
 from bridge.errors import OperationFailed
 from bridge.lint.bus import BusView, DriveView, NodeView, PdoView
 from bridge.mapping.model import Pdo, Slot
@@ -86,7 +86,7 @@ def _message(
         lay_out(entries, places, signed),
         process,
         family.control_word.bits if view.receives else family.status_word.bits,
-        codecs(family, slot, group, process, drive.table.parameters),
+        default_codecs(family, slot, group, process, drive.table.parameters),
         drive.table.parameters,
     )
     signals = tuple(found.words() if words else found.values())

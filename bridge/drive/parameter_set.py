@@ -6,10 +6,7 @@ from collections.abc import Sequence
 
 
 class ParameterSet:
-    """``bits`` are the places of the set's number in the word, the low one first; it counts from 1.
-
-    The bridge knows scaling parameters of set 1 alone: what they scale is not known in another one.
-    """
+    """``bits`` are the places of the set's number in the word, the low one first; it counts from 1."""
 
     def __init__(self, bits: Sequence[int]) -> None:
         self._bits = tuple(bits)
@@ -18,9 +15,3 @@ class ParameterSet:
 
     def of(self, word: int) -> int:
         return 1 + sum((word >> bit & 1) << place for place, bit in enumerate(self._bits))
-
-    def why_unknown(self, word: int, parameter: str | None) -> str:
-        """Why what ``parameter`` scales is not known with this word; empty in set 1."""
-        if not word & self.mask:
-            return ""
-        return f"parameter set {self.of(word)} is active, and {parameter} is known of set 1 only"

@@ -10,7 +10,7 @@ from typing import Final
 from bridge.canopen.datatypes import INTEGERS
 from bridge.drive.scaling import LinearScale, scale_of
 from bridge.image import DataType
-from bridge.mapping.model import Family, ProcessValue, Slot
+from bridge.mapping.model import Family, ProcessValue
 
 _WORD_BITS: Final = 16
 _WORD_MASK: Final = 0xFFFF
@@ -26,8 +26,8 @@ class Written:
 
 
 class ValueCodec:
-    """One value of one drive. ``places`` says where its words stand, the low one first; ``scale`` is None
-    for what has none, and where it is not known."""
+    """One value of one drive. ``places`` says where its words stand, the low one first, and is empty where
+    only the drive knows (``Meanings``); ``scale`` is None for what has none, and where it is not known."""
 
     def __init__(self, model: ProcessValue, words: Sequence[str], scale: LinearScale | None = None) -> None:
         self.model = model
@@ -39,6 +39,14 @@ class ValueCodec:
         low, high = model.raw_range
         self._low = low if model.low is None else max(low, model.low)
         self._high = high if model.high is None else min(high, model.high)
+
+    def placed(self, places: tuple[int, ...]) -> ValueCodec:
+        """The codec with its words there; without any it has no value."""
+        if places == self.places:
+            return self
+        other = copy(self)
+        other.places = places
+        return other
 
     def scaled(self, scale: LinearScale | None) -> ValueCodec:
         """The codec with this scale: another one where it is another scale."""
@@ -61,7 +69,7 @@ class ValueCodec:
     def is_plain(self) -> bool:
         """One signed word times a factor: what most values are."""
         return (
-            len(self.places) == 1
+            self.model.width == 1
             and self.model.raw_type is DataType.INT16
             and self._bit is None
             and self.model.scale is not None
@@ -78,7 +86,10 @@ class ValueCodec:
         return self._low, self._high
 
     def from_words(self, words: Sequence[int]) -> bool | int | float:
-        """The value that these words stand for; with an unknown scale the bare number."""
+        """The value that these words stand for; with an unknown scale the bare number, and without words
+        nothing but zero."""
+        if not self.places:
+            return False if self._bit is not None else 0.0 if self.model.scale is not None else 0
         word = words[self.places[0]]
         if len(self.places) > 1:
             word |= words[self.places[1]] << _WORD_BITS
@@ -119,14 +130,3 @@ def scales_of(family: Family, given: Mapping[str, float]) -> dict[str, LinearSca
     """The scales that are known with the parameters that are ``given``, by the value's leaf."""
     found = {value.leaf: scale_of(value, given.get(value.full or "")) for value in family.value}
     return {leaf: scale for leaf, scale in found.items() if scale is not None}
-
-
-def codecs(
-    family: Family, slot: Slot, group: str, words: Sequence[str], given: Mapping[str, float]
-) -> list[ValueCodec]:
-    """The commands or the actual values of a drive, scaled by the parameters that are ``given``."""
-    return [
-        ValueCodec(value, words, scale_of(value, given.get(value.full or "")))
-        for value in family.values_of(slot)
-        if value.group == group
-    ]

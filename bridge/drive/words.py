@@ -47,6 +47,7 @@ class ControlWords:
         self._enable_value = model.enabling.value
         self._valid_mask = 0 if model.valid_bit is None else 1 << model.valid_bit
         self.acknowledge_mask = 1 << model.acknowledge_bit
+        self._set_mask = sum(1 << bit for bit in model.parameter_set_bits)
         self.stopped = model.stopped
         self.ready = model.ready
         self.run = model.run
@@ -79,6 +80,10 @@ class ControlWords:
 
     def is_valid(self, word: int) -> bool:
         return word & self._valid_mask == self._valid_mask
+
+    def in_set_of(self, like: int, word: int) -> int:
+        """``word`` in the parameter set of the control word ``like``."""
+        return word & ~self._set_mask | like & self._set_mask
 
     def stop(self, word: int) -> int:
         return self._changed(word, self._stop)

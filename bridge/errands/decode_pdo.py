@@ -9,7 +9,7 @@ from typing import Final
 from bridge.canopen.decode_sdo import Value
 from bridge.canopen.pdo import PdoCodec
 from bridge.config import NodeTable
-from bridge.drive import ParameterSet, StatusWords, ValueCodec, codecs
+from bridge.drive import ParameterSet, StatusWords, ValueCodec, default_codecs
 from bridge.mapping.model import Family, Pdo, Slot
 from bridge.node.boot import factory_entries, layouts, match_words
 from bridge.node.process.words import WordMap
@@ -120,7 +120,11 @@ def _view(
         WordMap(entries, places, len(process)),
         states,
         # A monitor asks no drive for the parameters that scale the others.
-        tuple(one for one in codecs(family, slot, group, process, scales) if not one.is_unknown),
+        tuple(one for one in default_codecs(family, slot, group, process, scales) if not one.is_unknown),
         ParameterSet((family.control_word if is_command else family.status_word).parameter_set_bits),
-        frozenset(one.name for one in family.value if one.group == group and family.depends_on_set(one)),
+        frozenset(
+            one.name
+            for one in family.value
+            if one.group == group and (one.code or family.depends_on_set(one))
+        ),
     )

@@ -9,7 +9,7 @@ from bridge.mapping.checks_aliases import check_aliases
 from bridge.mapping.checks_faults import check_faults
 from bridge.mapping.checks_own import check_own_supervision
 from bridge.mapping.checks_process import check_cob_id, check_parameter, check_process, check_slots, twice
-from bridge.mapping.checks_values import check_values
+from bridge.mapping.checks_values import check_meanings, check_values
 from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import ControlWord, Family, pattern_bits
 from bridge.tomlfile import Key
@@ -37,6 +37,7 @@ def check(family: Family, file: MergedFile) -> None:
     check_process(family, file)
     check_slots(family, file)
     _check_sdo(family, file)
+    check_meanings(family, file)
     check_values(family, file)
     _check_parameters(family, file)
     check_aliases(family, file)

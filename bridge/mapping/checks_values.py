@@ -27,11 +27,29 @@ def check_values(family: Family, file: MergedFile) -> None:
             file.fault((*key, "name"), message, f"first in line {file.line(first)}")
 
 
+def check_meanings(family: Family, file: MergedFile) -> None:
+    """Each is of a word that there is, and its parameter has an object."""
+    for m, meaning in enumerate(family.meaning):
+        key: Key = ("meaning", m)
+        words = family.process.rpdo if meaning.group == "command" else family.process.tpdo
+        if meaning.word not in words[1:]:
+            hint = f"known: {', '.join(words[1:])}"
+            file.fault((*key, "word"), f"there is no value word {meaning.word!r}", hint)
+        try:
+            family.object_of_meaning(meaning, family.sets)
+        except ValueError as error:
+            file.fault((*key, "parameter"), str(error))
+
+
 def _check_words(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
     process = family.process
-    if (value.word is None) is not bool(value.words):
-        file.fault(key, f"{value.name} needs either word or words")
+    if (value.word is not None and value.words) or not (value.word_names or value.code):
+        file.fault(key, f"{value.name} needs one of word, words and code")
         return
+    if value.code:
+        _check_code(family, value, key, file)
+        if not value.word_names:
+            return
     if len(value.words) == 1 or len(set(value.word_names)) != len(value.word_names):
         file.fault((*key, "words"), "must be two words, the low one first")
     is_command = value.group == "command"
@@ -51,6 +69,17 @@ def _check_words(family: Family, value: ProcessValue, key: Key, file: MergedFile
             file.fault(at, f"the words of {value.name} are in two PDOs of {slot.name}", "they must be in one")
 
 
+def _check_code(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
+    """Something tells the codes of the words that it may be made from."""
+    told = [meaning.word for meaning in family.meaning if meaning.group == value.group]
+    untold = [word for word in value.word_names if word not in told]
+    if untold or not told:
+        which = ", ".join(untold) or f"{value.group} words"
+        file.fault((*key, "code"), f"no [[meaning]] tells what {which} carry")
+    if value.word_names and len(value.code) != len(value.word_names):
+        file.fault((*key, "code"), f"has {len(value.code)} for {len(value.word_names)} words")
+
+
 def _check_kind(value: ProcessValue, key: Key, file: MergedFile) -> None:
     """One meaning, and a type that goes with it."""
     kinds = {
@@ -65,7 +94,7 @@ def _check_kind(value: ProcessValue, key: Key, file: MergedFile) -> None:
             (*key, given[1]), f"{value.name} has {given[0]} already", "one of scale, states, bits, bit"
         )
         return
-    is_long = len(value.words) == 2
+    is_long = value.width == 2
     if value.data_type is not None and value.data_type.endswith("32") is not is_long:
         words = "two words" if is_long else "one word"
         right = "int32 or uint32" if is_long else "int16 or uint16"
@@ -73,8 +102,8 @@ def _check_kind(value: ProcessValue, key: Key, file: MergedFile) -> None:
         return
     if value.bit is not None and is_long:
         file.fault((*key, "bit"), "is a bit of one word", "name it as word")
-    if len(value.bits) > 16 * len(value.word_names):
-        file.fault((*key, "bits"), f"has {len(value.bits)} names for {16 * len(value.word_names)} bits")
+    if len(value.bits) > 16 * value.width:
+        file.fault((*key, "bits"), f"has {len(value.bits)} names for {16 * value.width} bits")
     if given and given[0] != "scale":
         for name in ("low", "high"):
             if getattr(value, name) is not None:
@@ -93,12 +122,15 @@ def _check_follows(family: Family, value: ProcessValue, key: Key, file: MergedFi
     if value.group != "command":
         file.fault((*key, "follows"), "is for commands: an actual value follows nothing")
         return
+    if value.code and not value.word_names:
+        file.fault((*key, "follows"), "needs words: with a code its place is not known before the boot-up")
+        return
     actual = {other.name: other for other in family.value if other.group == "actual"}
     followed = actual.get(value.follows)
     if followed is None:
         message = f"there is no actual value {value.follows!r}"
         file.fault((*key, "follows"), message, f"known: {', '.join(sorted(actual))}")
-    elif (followed.data_type, followed.scale, len(followed.word_names)) != (
+    elif not followed.word_names or (followed.data_type, followed.scale, len(followed.word_names)) != (
         value.data_type,
         value.scale,
         len(value.word_names),

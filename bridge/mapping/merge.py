@@ -1,8 +1,9 @@
 """A mapping file merged over those it extends, which still knows where each of its keys stands.
 
 Tables are merged key by key. The lists ``value``, ``parameter``, ``poll``, ``slot``, ``own_supervision``
-and ``fault`` are merged item by item, by ``name`` (values by ``group`` too), the PDOs of a slot by
-``number``; every other list is replaced. ``without`` leaves items of those lists out first.
+and ``fault`` are merged item by item, by ``name`` (values by ``group`` too), ``meaning`` by ``word`` and
+``group``, the PDOs of a slot by ``number``; every other list is replaced. ``without`` leaves items of
+those lists out first.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from bridge.tomlfile.file import Model, dotted, validated
 
 _BY_NAME: Final = {
     "value": ("name", "group"),
+    "meaning": ("word", "group"),
     **dict.fromkeys(("parameter", "poll", "slot", "own_supervision", "fault"), ("name",)),
 }
 _PDOS: Final = ("rpdo", "tpdo")

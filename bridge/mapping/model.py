@@ -6,6 +6,7 @@ of a vendor's drive is in such a file.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Literal
 
@@ -23,7 +24,7 @@ from bridge.mapping.own_supervision import OwnObject as OwnObject
 from bridge.mapping.own_supervision import OwnReaction as OwnReaction
 from bridge.mapping.own_supervision import OwnSupervision
 from bridge.mapping.parameters import Eeprom, Parameter, ParameterNames, object_of
-from bridge.mapping.process import NodeTpdo, Pdo, Process, ProcessValue, SdoServer, Slot
+from bridge.mapping.process import Meaning, NodeTpdo, Pdo, Process, ProcessValue, SdoServer, Slot
 
 
 class FamilyTable(Table):
@@ -156,6 +157,7 @@ class Family(Table):
     process: Process
     sdo: list[SdoServer] = Field(default_factory=list[SdoServer])
     slot: list[Slot] = Field(min_length=1)
+    meaning: list[Meaning] = Field(default_factory=list[Meaning])
     value: list[ProcessValue] = Field(default_factory=list[ProcessValue])
     control_word: ControlWord
     status_word: StatusWord
@@ -229,7 +231,57 @@ class Family(Table):
         )
 
     def values_of(self, slot: Slot) -> list[ProcessValue]:
-        """The values that there are for this drive: those all of whose words it has."""
+        """The values that there are for this drive: those all of whose words it has, and those that enough
+        of its words may be set to carry."""
         rpdo, tpdo = self.carried(slot)
         words = {"command": set(rpdo[1:]), "actual": set(tpdo)}
-        return [value for value in self.value if words[value.group].issuperset(value.word_names)]
+
+        def may_have(value: ProcessValue) -> bool:
+            if value.code and not value.word_names:
+                runs = self.meanings_of(slot, value.group)
+                return any(len(run) >= value.width for run in runs)
+            return words[value.group].issuperset(value.word_names)
+
+        return [value for value in self.value if may_have(value)]
+
+    def is_usual(self, slot: Slot, value: ProcessValue) -> bool:
+        """Whether this drive's words carry the value where they are set as the mapping file takes them."""
+        runs = self.meanings_of(slot, value.group)
+        if value.word_names:
+            codes = {one.word: one.default for run in runs for one in run}
+            named = zip(value.word_names, value.code, strict=False)
+            return all(codes.get(word) == code for word, code in named)
+        return any({one.default for one in run}.issuperset(value.code) for run in runs)
+
+    def meanings_of(self, slot: Slot, group: str) -> list[list[Meaning]]:
+        """What tells the meaning of this drive's words, for each PDO of one direction."""
+        by_word = {meaning.word: meaning for meaning in self.meaning if meaning.group == group}
+        pdos = slot.rpdo if group == "command" else slot.tpdo
+        words = self.rpdo_words if group == "command" else self.tpdo_words
+        return [[by_word[word] for word in words(pdo) if word in by_word] for pdo in pdos]
+
+    @property
+    def sets(self) -> int:
+        """How many parameter sets its drives have."""
+        return 1 << len(self.status_word.parameter_set_bits)
+
+    def parameter_and_set(self, name: str) -> tuple[str, int]:
+        """A parameter's name and the parameter set that it ends with, 1 where it names none."""
+        names = self.parameter_names
+        match = re.fullmatch(names.pattern, name, re.ASCII) if names else None
+        in_set = match.groupdict().get("set") if match else None
+        if match is None or in_set is None:
+            return name, 1
+        return name[: match.start("set")].rstrip(".-_/ "), int(in_set)
+
+    def object_in_set(self, ref: ObjectRef, in_set: int) -> ObjectRef:
+        """Where a parameter is in this set, given where it is in set 1."""
+        step = self.parameter_names.set_step if self.parameter_names else 0
+        return ObjectRef(ref.index, ref.sub + step * (in_set - 1))
+
+    def object_of_meaning(self, meaning: Meaning, in_set: int) -> ObjectRef:
+        """Where the drive says what a word carries. Raises ValueError where there is no such object."""
+        if self.parameter_names is None:
+            raise ValueError(f"{meaning.parameter} has no object")
+        first = object_of(self.parameter_names, meaning.parameter, self.sets if self.sets > 1 else 0)
+        return self.object_in_set(first, in_set)

@@ -146,6 +146,22 @@ class Scale(Table):
     offset: float = Field(0.0, allow_inf_nan=False)
 
 
+class Meaning(Table):
+    """What one word carries is set in the drive: ``parameter`` says it, by a code that values name."""
+
+    group: Literal["command", "actual"]
+    word: Name
+    parameter: str = Field(description="the parameter that holds the code, such as P543[2]")
+    default: int = Field(
+        0, description="the code that is taken where there is no drive to ask: in a DBC and by `monitor`"
+    )
+
+    @property
+    def leaf(self) -> str:
+        """The word's name below the drive, such as ``actual/value_2``."""
+        return f"{self.group}/{self.word}"
+
+
 class ProcessValue(Table):
     """A value beside the raw words it is made from: a number with a unit, an enumeration, named bits or
     one bit."""
@@ -155,6 +171,12 @@ class ProcessValue(Table):
     word: str | None = Field(None, description="the word it is made from")
     words: list[str] = Field(
         default_factory=list[str], max_length=2, description="two words, the low one first"
+    )
+    code: list[int] = Field(
+        default_factory=list[int],
+        max_length=2,
+        description="the code by which the drive names it (`[[meaning]]`), for two words that of the low one "
+        "first; without word and words it is made from whichever words have these codes",
     )
     data_type: ValueKind | None = Field(None, description="int16 (int32 for two words) where left out")
     scale: Scale | None = None
@@ -180,8 +202,13 @@ class ProcessValue(Table):
 
     @property
     def word_names(self) -> tuple[str, ...]:
-        """The words it is made from, the low one first."""
+        """The words it is made from, the low one first; none where a code tells which they are."""
         return (self.word,) if self.word is not None else tuple(self.words)
+
+    @property
+    def width(self) -> int:
+        """How many words it is made from."""
+        return len(self.code) or len(self.word_names)
 
     @property
     def raw_type(self) -> DataType:
@@ -189,7 +216,7 @@ class ProcessValue(Table):
         if self.data_type is not None:
             return DataType(self.data_type)
         unsigned = bool(self.bits or self.states)
-        if len(self.word_names) > 1:
+        if self.width > 1:
             return DataType.UINT32 if unsigned else DataType.INT32
         return DataType.UINT16 if unsigned else DataType.INT16
 

@@ -104,7 +104,8 @@ def _check_drive(drive: RawTable, family: Family, file: TomlFile) -> None:
     scales = {value.full for value in family.value if value.full is not None}
     given = drive.table("parameters")
     for name in given.content:
-        if name not in scales:
+        parameter, in_set = family.parameter_and_set(name)
+        if parameter not in scales or not 1 <= in_set <= family.sets:
             message = f"{family.family.name} does not scale with {name!r}"
             hint = f"it scales with {', '.join(sorted(scales))}" if scales else ""
             file.fault((*given.key, name), message, hint)

@@ -16,6 +16,7 @@ from bridge.node import boot
 from bridge.node.emergencies import Emergencies
 from bridge.node.error_control import ErrorControl, Sign
 from bridge.node.fault_reading import FaultReading
+from bridge.node.meaning_watch import MeaningWatch
 from bridge.node.process.polling import Polling
 from bridge.node.process.process_data import DrivePdos, connect
 from bridge.node.process.stop_words import StopWords
@@ -52,6 +53,7 @@ class NodeWire:
         self.sdo = SdoChannels(node)
         self.rejected = 0
         self.faults = FaultReading(node, self.sdo)
+        self.meanings = MeaningWatch(node, self.sdo, plant)
         self._emergencies = Emergencies(node, plant, self.reject, self.faults.on_emcy)
         self.error_control = ErrorControl(node.table, listener.on_duplicate)
         self.polling = Polling(node.family.poll, self.sdo.for_polls, self._show_poll)
@@ -141,6 +143,7 @@ class NodeWire:
     def on_time(self, now: float) -> None:
         self._emergencies.on_time(now)
         self.faults.on_time(now)
+        self.meanings.on_time(now)
         self.sdo.on_time(now)
         command = self.put_off.on_time(now)
         if command is not None:
@@ -153,6 +156,7 @@ class NodeWire:
             self.polling.next_deadline(),
             self._emergencies.next_deadline(),
             self.faults.next_deadline(),
+            self.meanings.next_deadline(),
             self.put_off.next_deadline(),
         )
         return min((time for time in times if time is not None), default=None)
@@ -161,10 +165,12 @@ class NodeWire:
         """The node is in operation: ask it what has to be asked for."""
         self.polling.start(self.drives.values(), now)
         self.faults.start(now)
+        self.meanings.start(now)
 
     def stop_polling(self) -> None:
         self.polling.stop()
         self.faults.stop()
+        self.meanings.stop()
 
     def _show_poll(self, name: str, value: int, now: float) -> None:
         self._plant.set(f"{self._node.name}/node/{name}", value, now)

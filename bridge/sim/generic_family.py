@@ -10,7 +10,15 @@ from bridge.canopen.datatypes import INTEGERS, REALS, Plain, TypeName, encode
 from bridge.image import DataType as PointType
 from bridge.mapping import Family
 from bridge.mapping.fields import WORD_BITS
-from bridge.mapping.model import IdentityRule, MappedObject, ObjectRef, Parameter, Pdo, Slot
+from bridge.mapping.model import (
+    IdentityRule,
+    MappedObject,
+    ObjectRef,
+    Parameter,
+    Pdo,
+    ProcessValue,
+    Slot,
+)
 from bridge.sim.communication_objects import DeviceIdentity
 from bridge.sim.dictionary import DataType
 from bridge.sim.generic_plan import At, AxisPlan, BytesPlan, Copy, NodePlan, NumberPlan, PdoPlan
@@ -176,13 +184,22 @@ def _axis(family: Family, slot: Slot) -> AxisPlan:
     copies: list[Copy] = []
     for value in family.values_of(slot):
         twin = actual.get(value.name)
-        if value.group == "actual" or twin is None or len(twin.word_names) != len(value.word_names):
+        if value.group == "actual" or twin is None or twin.width != value.width:
             continue
-        source, target = commanded.get(value.word_names[0]), told.get(twin.word_names[0])
+        source = commanded.get(_first_word(family, slot, value))
+        target = told.get(_first_word(family, slot, twin))
         if source and target and len(source) == len(target) == 1:
             copies.append(Copy(source[0], target[0], stays=value.name == _STAYS))
     control, status = commanded[family.process.rpdo[0]], told[family.process.tpdo[0]]
     return AxisPlan(control, status, family.control_word, family.status_word, tuple(copies))
+
+
+def _first_word(family: Family, slot: Slot, value: ProcessValue) -> str:
+    """Where a code tells the words, by the defaults of the mapping file; empty where none has it."""
+    if value.word_names:
+        return value.word_names[0]
+    runs = family.meanings_of(slot, value.group)
+    return next((one.word for run in runs for one in run if one.default == value.code[0]), "")
 
 
 def _places(family: Family, slot: Slot, pdos: Sequence[Pdo]) -> dict[str, tuple[At, ...]]:

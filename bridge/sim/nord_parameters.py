@@ -47,7 +47,7 @@ PARAMETERS: Final = (
     Parameter(513, (10,), -1, 1000, unit=0.1),  # telegram downtime, s; -0.1 = ignore
     Parameter(514, (5,), 0, 7),  # bit rate of the system bus; 5 = 250 kbit/s (§7.2)
     Parameter(515, (32, 32, 32), 0, 255),  # its addresses
-    Parameter(543, (1, 4, 5, 0, 0), 0, 57, per_set=True),  # meaning of the actual values
+    Parameter(543, (1, 3, 5, 0, 0), 0, 57, per_set=True),  # meaning of the actual values
     Parameter(546, (1, 0, 0, 0, 0), 0, 57, per_set=True),  # meaning of the setpoints
     Parameter(560, (1,), 0, 2),  # 0 = changes go to RAM only, 1 = to the EEPROM too
     Parameter(600, (0,), 0, 2, per_set=True),  # position control, see nord_posicon
@@ -60,7 +60,7 @@ _DIRECT: Final = (
 )
 SK_5XXE: Final = (
     *_DIRECT,
-    *(Parameter(543 + place, (value,), 0, 57, per_set=True) for place, value in enumerate((1, 4, 5))),
+    *(Parameter(543 + place, (value,), 0, 57, per_set=True) for place, value in enumerate((1, 3, 5))),
     *(Parameter(546 + place, (value,), 0, 57, per_set=True) for place, value in enumerate((1, 0, 0))),
 )
 """SK 500E…535E: P543…P545 and P546…P548 without elements (§6.5.4)."""
@@ -124,6 +124,10 @@ class DriveParameters:
             for parameter_set in range(1, SETS + 1):
                 self._eeprom[number, one, parameter_set] = raw
                 self._ram[number, one, parameter_set] = raw
+
+    def at_keypad(self, number: int, raw: int, *, element: int = 1, parameter_set: int = 1) -> None:
+        """Somebody sets it at the drive itself."""
+        self._ram[number, element, parameter_set] = raw
 
     def write(self, parameter: Parameter, element: int, parameter_set: int, raw: int) -> None:
         """A write over the bus: to the EEPROM too, unless P560 says RAM only (§6.6: 100 000 cycles)."""

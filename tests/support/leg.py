@@ -13,7 +13,7 @@ from bridge.command.leg.state import WANTS_STOP_WORD, Way
 from bridge.command.leg.step import initial, step
 from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
-from bridge.drive import DriveState
+from bridge.drive import DriveState, Meanings, default_codes
 from bridge.image import Value
 from bridge.mapping import load_family
 
@@ -27,7 +27,10 @@ def settings_of(mapping: str, **given: object) -> LegSettings:
     family = load_family(mapping)
     keys = {"slot": family.slot[0].name, "control": "modbus", "fieldbus_timeout_ms": 0, **given}
     table = DriveTable.model_validate(keys)
-    return leg_settings(family, table, TelegramDecoder("n/d", family, family.slot[0], {}, {}).decode)
+    meanings = Meanings(family, family.slot[0], {})
+    meanings.on_codes(default_codes(family))
+    decode = TelegramDecoder("n/d", family, family.slot[0], meanings, {}).decode
+    return leg_settings(family, table, decode)
 
 
 class Leg:

@@ -13,7 +13,7 @@ from bridge.command.leg.step import initial, step
 from bridge.command.leg.table import Stimulus
 from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
-from bridge.drive import DriveState
+from bridge.drive import DriveState, Meanings, default_codes
 from bridge.mapping import load_family
 from tests.support.leg_recorded import Cells
 from tests.support.leg_seen import Rules
@@ -173,7 +173,10 @@ def space(
     name = family.slot[0].name
     settings = {"slot": name, "control": "modbus", "fieldbus_timeout_ms": 2000, **given}
     table = DriveTable.model_validate(settings)
-    drive = leg_settings(family, table, TelegramDecoder(f"n/{name}", family, family.slot[0], {}, {}).decode)
+    meanings = Meanings(family, family.slot[0], {})
+    meanings.on_codes(default_codes(family))
+    decode = TelegramDecoder(f"n/{name}", family, family.slot[0], meanings, {}).decode
+    drive = leg_settings(family, table, decode)
     leg = initial(drive)
     for event in (NodeBack(), Way(True, "", "", True), Report(DriveState.READY, False, "")):
         leg, _ = step(drive, leg, event, NOW)

@@ -8,7 +8,7 @@ from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Request
 from bridge.command.channel import DriveChannel
 from bridge.command.link import NodeState
 from bridge.config import DriveTable
-from bridge.drive import EmergencyReader, LinearScale, Told
+from bridge.drive import EmergencyReader, LinearScale, Told, default_codes
 from bridge.image import Value
 from bridge.mapping import Family, load_family
 from tests.support.leg_words import HALF_SPEED, NORD_TU4, LegWords
@@ -66,8 +66,10 @@ class Rig:
             settled=lambda now: None,
             tripped=lambda due: None,
         )
-        self.channel.scales.setdefault("command/frequency", LinearScale(50.0, 16384, 2.0))
-        self.channel.scales.setdefault("command/velocity", LinearScale(3000.0, 1000, 2.0))
+        meanings = self.channel.meanings
+        meanings.scales.setdefault("command/frequency", LinearScale(50.0, 16384, 2.0))
+        meanings.scales.setdefault("command/velocity", LinearScale(3000.0, 1000, 2.0))
+        meanings.on_codes(default_codes(family))
         self.channel.link.pdo_deadline_s = pdo_deadline_s
         self.now = 1000.0
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from bridge.command import Plant
 from bridge.config import Site
+from bridge.drive import default_codes
 from bridge.mapping import load_family
 
 FAMILY = "nord/sk-tu4-cao"
@@ -91,7 +92,16 @@ def write(folder: Path, *tables: str, name: str = "hall") -> Path:
 
 def plant_of(text: str, mapping: str = FAMILY) -> Plant:
     """The plant of a site's text, all of whose nodes have this mapping, without a bus."""
-    return Plant(Site.model_validate(parsed(text)), {mapping: family(mapping)}, "1.2.3")
+    plant = Plant(Site.model_validate(parsed(text)), {mapping: family(mapping)}, "1.2.3")
+    has_default_meanings(plant)
+    return plant
+
+
+def has_default_meanings(plant: Plant) -> None:
+    """As if the drives had been asked, and are as their mapping takes them to be."""
+    for drive in plant.drives.values():
+        drive.on_codes(default_codes(drive.family))
+        drive.refresh(0.0)
 
 
 def parsed(text: str) -> dict[str, object]:

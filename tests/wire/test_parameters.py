@@ -286,7 +286,7 @@ def test_zenoh_reads_writes_and_tells_what_is_wrong(shop: Shop) -> None:
     array, coded, by_object, written, cached, state, unknown, no_value, read_only, saved = [
         a for (a,) in answers
     ]
-    assert (array["v"], coded["v"], by_object["v"]) == (4, 4, 2.0)
+    assert (array["v"], coded["v"], by_object["v"]) == (3, 3, 2.0)
     assert array["q"] == "good"
     assert abs(array["t"] - time.time()) < SECONDS
     assert (written["ok"], written["v"]) == (True, 1.03)

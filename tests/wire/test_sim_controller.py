@@ -28,7 +28,7 @@ def session_to(port: int) -> zenoh.Session:
 
 def test_the_demos_controller_never_trips_its_own_watchdog(tmp_path: Path) -> None:
     port = free_port()
-    bus = sites.bus(sites.node(sites.drive("fu4", "lease", TIMEOUT_MS)))
+    bus = sites.bus(sites.node(sites.drive("fu4", "lease", TIMEOUT_MS), more="sdo_channels = [4]"))
     site = sites.write(tmp_path, bus, sites.zenoh(port), name="demo")
     with drivebridge(tmp_path, "run", "run", str(site), notify=True) as bridge:
         bridge.wait_ready()
@@ -51,7 +51,7 @@ def test_the_demos_controller_never_trips_its_own_watchdog(tmp_path: Path) -> No
 
 def test_the_demos_controller_asks_nothing_of_a_node_that_is_not_operational(tmp_path: Path) -> None:
     port = free_port()
-    bus = sites.bus(sites.node(sites.drive("fu4", "lease", TIMEOUT_MS)))
+    bus = sites.bus(sites.node(sites.drive("fu4", "lease", TIMEOUT_MS), more="sdo_channels = [4]"))
     site = sites.write(tmp_path, bus, sites.zenoh(port), name="demo")
     times = Times(cycle_s=0.05, run_s=0.1, pause_s=0.1, retry_s=0.05)
     with drivebridge(tmp_path, "run", "run", str(site), notify=True) as bridge:
@@ -76,4 +76,4 @@ def test_the_demos_controller_asks_nothing_of_a_node_that_is_not_operational(tmp
             run_until_moved()
         # What waited on a busy machine is refused by its age, and says nothing about the controller.
         refused = [line for line in bridge.output().splitlines() if "refused" in line]
-        assert all("on its way" in line for line in refused)
+        assert all("on its way" in line for line in refused), refused

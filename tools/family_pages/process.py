@@ -79,10 +79,10 @@ def values(family: Family) -> Iterator[str]:
         (
             (
                 f"`{value.leaf}`",
-                _made_of(value),
+                _made_of(family, value),
                 value.unit or "–",
                 range_text(value.low, value.high),
-                _meaning(value),
+                _meaning(family, value),
             )
             for value in family.value
             if value.leaf in there
@@ -90,8 +90,12 @@ def values(family: Family) -> Iterator[str]:
     )
 
 
-def _made_of(value: ProcessValue) -> str:
+def _made_of(family: Family, value: ProcessValue) -> str:
     words = " and ".join(f"`{word}`" for word in value.word_names)
+    if value.code and not value.word_names:
+        asked = [meaning.parameter for meaning in family.meaning if meaning.group == value.group]
+        codes = " and ".join(str(code) for code in value.code)
+        words = f"the word{'s' * (value.width - 1)} with {codes} in {', '.join(asked)}"
     scale = value.scale
     if value.bit is not None:
         return f"{words}, bit {value.bit}"
@@ -104,8 +108,12 @@ def _made_of(value: ProcessValue) -> str:
     return f"{words}{factor}{offset}"
 
 
-def _meaning(value: ProcessValue) -> str:
+def _meaning(family: Family, value: ProcessValue) -> str:
     parts = [value.description] if value.description else []
+    told = {meaning.word: meaning.parameter for meaning in family.meaning if meaning.group == value.group}
+    if value.word_names and value.code:
+        pairs = zip(value.word_names, value.code, strict=True)
+        parts.append("while " + " and ".join(f"{told[word]} is {code}" for word, code in pairs))
     if value.states:
         parts.append(states_text(value.states))
     if value.bits:

@@ -147,8 +147,9 @@ class Turn:
             self.setpoints = tuple(setpoints)
 
     def lead(self, word: int) -> None:
-        """The next word of a start; what the owner has ordered stays."""
-        self.word = word
+        """The next word of a start, in the parameter set that was commanded; what the owner has ordered
+        stays."""
+        self.word = self.settings.words.in_set_of(self.word, word)
         self.is_ours = False
         self.keep_at_rest()
 

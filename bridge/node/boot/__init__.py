@@ -14,6 +14,7 @@ from bridge.node.boot.actions import Read as Read
 from bridge.node.boot.actions import ResetCommunication as ResetCommunication
 from bridge.node.boot.actions import Signal as Signal
 from bridge.node.boot.actions import Step as Step
+from bridge.node.boot.actions import WordFacts as WordFacts
 from bridge.node.boot.actions import Write as Write
 from bridge.node.boot.error_control import heartbeat_period_ms as heartbeat_period_ms
 from bridge.node.boot.layout import factory_entries as factory_entries
@@ -23,5 +24,8 @@ from bridge.node.boot.listening import rpdo_plan as rpdo_plan
 from bridge.node.boot.memory import BootMemory as BootMemory
 from bridge.node.boot.pdo_settings import MOST_ENTRIES as MOST_ENTRIES
 from bridge.node.boot.procedure import boot as boot
+from bridge.node.boot.scales import code_of as code_of
+from bridge.node.boot.scales import meanings_of as meanings_of
 from bridge.node.boot.scales import parameter_value as parameter_value
+from bridge.node.boot.scales import scales_of as scales_of
 from bridge.node.boot.status import BootError as BootError

@@ -112,11 +112,21 @@ class DrivePlan:
 
 
 @dataclass(slots=True)
+class WordFacts:
+    """What a drive has told of its words: ``scales`` by parameter and set, ``codes`` by the word's leaf for
+    each set, None for what it does not tell, and ``why_unread``."""
+
+    scales: dict[tuple[str, int], float] = field(default_factory=dict[tuple[str, int], float])
+    codes: dict[str, list[int | None]] = field(default_factory=dict[str, list[int | None]])
+    why_unread: str = "cannot be read"
+
+
+@dataclass(slots=True)
 class BootResult:
     identification: Identification = field(default_factory=Identification)
     software_version: str = ""
     drives: dict[str, DrivePlan] = field(default_factory=dict[str, DrivePlan])
-    scales: dict[str, dict[str, float]] = field(default_factory=dict[str, dict[str, float]])
+    words: dict[str, WordFacts] = field(default_factory=dict[str, WordFacts])
     node_tpdos: list[NodePdoPlan] = field(default_factory=list[NodePdoPlan])
     notes: list[str] = field(default_factory=list[str])
     emcy_id: int | None = None

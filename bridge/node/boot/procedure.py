@@ -29,7 +29,7 @@ from bridge.node.boot.listening import find_rpdos
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.own_supervision import set_own_supervision
 from bridge.node.boot.pdos import plan_drive, plan_node_tpdos, refuse_doubles
-from bridge.node.boot.scales import read_scales
+from bridge.node.boot.scales import read_words
 from bridge.node.boot.sdo_servers import open_sdo_servers
 from bridge.node.boot.status import BootError
 
@@ -70,9 +70,9 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
     refuse_doubles(result)
     yield from plan_node_tpdos(node, result)
     yield from set_own_supervision(node, result)
-    yield Step("reading the scaling parameters", "J")
+    yield Step("reading what the words mean", "J")
     for drive in node.drives:
-        result.scales[drive.name] = yield from read_scales(node, drive, result)
+        result.words[drive.name] = yield from read_words(node, drive, result)
     yield from _start(node.table, result)
     result.memory.boot_succeeded()
     return result

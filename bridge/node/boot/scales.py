@@ -1,41 +1,77 @@
-"""The drive's own values of the parameters that scale its words."""
+"""The drive's own values of the parameters that scale its words, and of those that say what they carry."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Generator
 
-from bridge.canopen.datatypes import NUMBERS
+from bridge.canopen.datatypes import INTEGERS, NUMBERS
 from bridge.canopen.dialogue import optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
 from bridge.command.plant import Node
-from bridge.mapping.model import Parameter
-from bridge.node.boot.actions import Action, BootResult
+from bridge.mapping.model import Meaning, ObjectRef, Parameter
+from bridge.node.boot.actions import Action, BootResult, WordFacts
 from bridge.node.sdo_channels import FIRST, channel_of
 
 
-def read_scales(
-    node: Node, drive: Drive, result: BootResult
-) -> Generator[Action, bytes | None, dict[str, float]]:
-    """By parameter name, where they can be read: over the SDO channel that reaches this drive."""
-    scales: dict[str, float] = {}
+def meanings_of(drive: Drive) -> list[tuple[Meaning, int, ObjectRef]]:
+    """What a drive is asked for about its words: of which word, in which parameter set, and where."""
+    family = drive.family
+    groups = ("command", "actual")
+    asked = [one for group in groups for run in family.meanings_of(drive.slot, group) for one in run]
+    sets = range(1, family.sets + 1)
+    return [(one, in_set, family.object_of_meaning(one, in_set)) for in_set in sets for one in asked]
+
+
+def scales_of(drive: Drive) -> list[tuple[Parameter, int, ObjectRef]]:
+    """The scaling parameters that a drive is asked for: in which parameter set, and where."""
+    family = drive.family
+    scaling = {value.full for value in family.values_of(drive.slot)}
+    return [
+        (one, in_set, family.object_in_set(family.object_of(one), in_set))
+        for one in family.parameter
+        if one.read and one.name in scaling
+        for in_set in range(1, family.sets + 1 if one.sets else 2)
+    ]
+
+
+def code_of(data: bytes) -> int | None:
+    """The code in an answer; None where it is none."""
+    try:
+        return INTEGERS["int16"].decode(data)
+    except ValueError:
+        return None
+
+
+def read_words(node: Node, drive: Drive, result: BootResult) -> Generator[Action, bytes | None, WordFacts]:
+    """Over the SDO channel that reaches this drive."""
+    found = WordFacts()
     channel = channel_of(node, drive.slot)
+    asked = meanings_of(drive)
+    found.codes = {one.leaf: [None] * drive.family.sets for one, _, _ in asked}
     if channel is None:
-        return scales
-    scaling = {value.full for value in drive.family.values_of(drive.slot)}
-    for parameter in drive.family.parameter:
-        if not parameter.read or parameter.name not in scaling:
-            continue
-        try:
-            ref = node.family.object_of(parameter)
+        found.why_unread = "cannot be read: no SDO channel reaches this drive (sdo_channels)"
+        return found
+    try:
+        for one, in_set, ref in asked:
             data = yield from optional(ref.index, ref.sub, channel)
-        except SdoError:
-            if channel == FIRST:
-                raise
-            # The drive behind the channel may be away while the node itself is there.
-            result.notes.append(f"{drive.slot.name}: SDO channel {channel} does not answer")
-            return scales
+            found.codes[one.leaf][in_set - 1] = None if data is None else code_of(data)
+        yield from _read_scales(node, drive, channel, found, result)
+    except SdoError:
+        if channel == FIRST:
+            raise
+        # The drive behind the channel may be away while the node itself is there.
+        result.notes.append(f"{drive.slot.name}: SDO channel {channel} does not answer")
+        found.why_unread = f"cannot be read: SDO channel {channel} does not answer"
+    return found
+
+
+def _read_scales(
+    node: Node, drive: Drive, channel: int, found: WordFacts, result: BootResult
+) -> Generator[Action, bytes | None]:
+    for parameter, in_set, ref in scales_of(drive):
+        data = yield from optional(ref.index, ref.sub, channel)
         try:
             value = 0.0 if data is None else parameter_value(parameter, data)
         except ValueError as error:
@@ -43,14 +79,19 @@ def read_scales(
             continue
         if not 0 < value < math.inf:
             continue
-        scales[parameter.name] = value
-        given = drive.given_parameters.get(parameter.name)
-        if given is not None and abs(given - value) > 1e-6:
-            result.notes.append(
-                f"{drive.slot.name}: {parameter.name} is {value:g} {parameter.unit} in the drive, "
-                f"{given:g} in the site file; the drive's counts"
-            )
-    return scales
+        found.scales[parameter.name, in_set] = value
+        if in_set == 1:
+            _compare(drive, parameter, value, result)
+
+
+def _compare(drive: Drive, parameter: Parameter, value: float, result: BootResult) -> None:
+    """With what the site file says of set 1."""
+    given = drive.given_parameters.get(parameter.name)
+    if given is not None and abs(given - value) > 1e-6:
+        result.notes.append(
+            f"{drive.slot.name}: {parameter.name} is {value:g} {parameter.unit} in the drive, "
+            f"{given:g} in the site file; the drive's counts"
+        )
 
 
 def parameter_value(parameter: Parameter, data: bytes) -> float:

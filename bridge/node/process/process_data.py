@@ -254,8 +254,12 @@ def connect(
     for drive in node.drives:
         drive.on_identification(result.identification, now)
         drive.on_own_supervision(result.own[drive.name], now)
-        for name, full in result.scales.get(drive.name, {}).items():
-            drive.on_scale(name, full)
+        facts = result.words[drive.name]
+        for (name, in_set), full in facts.scales.items():
+            drive.on_scale(name, full, in_set)
+        if drive.on_codes(facts.codes, facts.why_unread):
+            drive.channel.start_anew(now)
+        result.notes += [f"{drive.slot.name}: {what}" for what in drive.channel.meanings.unknown()]
         plan = result.drives[drive.name]
         if not plan.rpdos or not plan.tpdos or plan.problem:
             continue

@@ -132,7 +132,9 @@ class DriveMap:
             *_input_rows(self.words[Table.INPUT_REGISTER]),
             *_holding_rows(self.words[Table.HOLDING_REGISTER], allows, may_set=is_writable),
         )
-        values = family.values_of(slot)
+        # What has to be set in the drive first goes behind all others, whose addresses do not depend on it.
+        values = sorted(family.values_of(slot), key=lambda value: not family.is_usual(slot, value))
+        unusual = [value.leaf for value in values if not family.is_usual(slot, value)]
         scaled = [value.name for value in values if value.group == "actual"]
         taken = {row.name for row in fixed} | {ABORT_CODE}
         more = [
@@ -142,8 +144,9 @@ class DriveMap:
             and not leaf.startswith("command/")
             and leaf not in taken
         ]
-        first = [f"actual/{name}" for name in scaled]
-        chosen = first + [leaf for leaf in more if leaf not in first]
+        first = [leaf for name in scaled if (leaf := f"actual/{name}") not in unusual]
+        last = [leaf for leaf in unusual if leaf.startswith("actual/")]
+        chosen = first + [leaf for leaf in more if leaf not in first and leaf not in last] + last
         self.inputs = _value_rows(Table.INPUT_REGISTER, chosen, points, _NOTHING)
         commands = [value.leaf for value in values if value.group == "command"]
         self.setpoints = _value_rows(Table.HOLDING_REGISTER, commands, points, allows)

@@ -1,4 +1,4 @@
-"""A drive in another parameter set scales with that set's P105 and P112, which the bridge does not know."""
+"""A drive in another parameter set scales with that set's P105 and P112: here they have not been read."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_actual_values_are_not_known_in_another_set(hall: Hall) -> None:
     hall.pdo(ENABLED | SET_4, HALF_SPEED)
     reading = hall.read("actual/frequency")
     assert reading.quality is Quality.CONFIG_ERROR
-    assert reading.reason == "parameter set 4 is active, and P105 is known of set 1 only"
+    assert reading.reason == "parameter set 4 is active, and P105 is not known of it"
     assert hall.read("actual/value_1").quality is Quality.GOOD
     assert hall.read("actual/value_1").value == HALF_SPEED
     hall.pdo(ENABLED, HALF_SPEED)
@@ -38,7 +38,7 @@ def test_a_scaled_setpoint_is_refused_and_a_raw_one_is_not(hall: Hall) -> None:
     assert hall.drive.channel.output.words[:2] == (ENABLE | SET_2, HALF_SPEED)
     outcome = hall.write(frequency=20.0)
     assert outcome.code is Code.NOT_CONFIGURED
-    assert outcome.message == "frequency: parameter set 2 is active, and P105 is known of set 1 only"
+    assert outcome.message == "frequency: parameter set 2 is active, and P105 is not known of it"
     assert hall.read("command/frequency").quality is Quality.CONFIG_ERROR
     assert hall.read("command/setpoint_1").quality is Quality.GOOD
 

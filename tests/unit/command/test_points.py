@@ -55,4 +55,5 @@ def test_setpoints_are_before_actual_values_and_written_by_the_owner(points: dic
         "command/setpoint_4",
         "command/frequency",
         "command/digital_outputs",
+        "command/position",
     ]

@@ -76,12 +76,13 @@ def test_what_is_not_there_is_told_with_what_is(rig: Rig):
     assert outcome.code is Code.UNKNOWN_POINT
     assert outcome.message == (
         "conveyor/fu1/command has no 'velocity'; "
-        "it has control_word, setpoint_1, setpoint_2, setpoint_3, setpoint_4, frequency, digital_outputs"
+        "it has control_word, setpoint_1, setpoint_2, setpoint_3, setpoint_4, "
+        "frequency, digital_outputs, position"
     )
 
 
 def test_a_scale_that_is_not_known_is_no_reason_to_guess(rig: Rig):
-    rig.channel.scales.clear()
+    rig.channel.meanings.scales.clear()
     outcome = rig.write(frequency=25)
     assert outcome.code is Code.NOT_CONFIGURED
     assert "P105" in outcome.message

@@ -56,7 +56,8 @@ def test_the_digital_outputs_go_with_fu1_by_rpdo5():
     assert (pdo.number, pdo.cob_id, pdo.optional, str(pdo.objects[0][0])) == (5, 0x240, True, "3004:00")
     assert [len(slot.rpdo) for slot in NORD.slot] == [2, 1, 1, 1]
     assert [value.leaf for value in NORD.values_of(NORD.slot[1]) if value.group == "command"] == [
-        "command/frequency"
+        "command/frequency",
+        "command/position",
     ]
 
 

@@ -92,6 +92,23 @@ def test_the_words_are_those_of_the_file_although_the_node_shows_no_mapping(boot
     assert {len(frame.data) for frame in bench.sent(0x305)} == {8}
 
 
+def test_a_drive_that_is_not_controlled_by_the_network_has_no_velocity(booted) -> None:
+    """§8.2: C00007 = 40 makes the words what they are."""
+    bench = booted(control_mode=10)
+    velocity = bench.plant.image.read("conveyor/drive/actual/velocity")
+    assert (velocity.quality, velocity.reason) == (Quality.DISABLED, "not in the telegram: C00007 is 10")
+    refused = bench.write(DRIVE, control_word=WORDS["stop"], velocity=100.0)
+    assert refused.code is Code.NOT_CONFIGURED
+
+
+def test_a_drive_that_is_taken_from_the_network_loses_its_velocity(booted) -> None:
+    bench = booted()
+    assert bench.plant.image.read("conveyor/drive/actual/velocity").quality is Quality.GOOD
+    bench.node.codes.control_mode = 10
+    bench.run(10.0)
+    assert bench.plant.image.read("conveyor/drive/actual/velocity").quality is Quality.DISABLED
+
+
 def test_it_follows_the_setpoint_and_stops(booted) -> None:
     bench = booted()
     start(bench)

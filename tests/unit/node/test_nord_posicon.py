@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -9,8 +10,10 @@ import pytest
 from bridge.command import Action, Code
 from bridge.config import load_site
 from bridge.drive import DriveState
+from bridge.image import Quality
 from bridge.mapping import load_family
 from bridge.sim.catalogue import simulate_node
+from bridge.sim.nord_drive import NordDrive
 from bridge.sim.nord_single import NordSingle
 from bridge.sim.nord_tu4 import NordTu4
 from tests.support.bench import Bench
@@ -34,20 +37,25 @@ control = "modbus"
 fieldbus_timeout_ms = 200
 [modbus]
 """
-SHUT_DOWN, ENABLE = 0x047E, 0x047F
+SHUT_DOWN, ENABLE, SET_2 = 0x047E, 0x047F, 0x4000
+SETPOINT, ACTUAL = 546, 543
 
 
-@pytest.fixture
-def bench(tmp_path: Path) -> Bench:
-    """Its axis stands at 7.25 revolutions."""
-    path = tmp_path / "site.toml"
+def made(folder: Path, prepare: Callable[[NordDrive], None] = lambda drive: None) -> Bench:
+    path = folder / "site.toml"
     path.write_text(SITE, encoding="utf-8")
     node = simulate_node(MAPPING, 5, {})
     assert isinstance(node, NordTu4)
+    prepare(node.drives[0])
     node.drives[0].position_increments = 7_250.0
     bench = Bench(load_site(path), family=load_family(MAPPING), mapping=MAPPING, node=node)
     bench.run(3.0)
     return bench
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return made(tmp_path)
 
 
 def write(bench: Bench, seconds: float, **values: float) -> None:
@@ -125,6 +133,44 @@ def test_a_silent_controller_stops_it(bench: Bench) -> None:
     bench.run(3.0)
     assert bench.value(f"{DRIVE}/status/state") == DriveState.FAULT
     assert bench.node.drives[0].output_hz == 0
+
+
+@pytest.mark.parametrize("number", [SETPOINT, ACTUAL])
+def test_words_that_are_no_position_follow_nothing(tmp_path: Path, number: int) -> None:
+    """P546[2] or P543[2] = 4: what the drive would then be told is no position."""
+    bench = made(tmp_path, lambda drive: drive.parameters.commission(number, 4, 2))
+    write(bench, 0.3, control_word=SHUT_DOWN)
+    write(bench, 1.0, control_word=ENABLE, setpoint_1=0)
+    assert sent(bench) == (ENABLE, 0, 0)
+    if number == SETPOINT:
+        assert bench.write(DRIVE, control_word=ENABLE, position=1.0).code is Code.NOT_CONFIGURED
+    else:
+        assert bench.plant.image.read(f"{DRIVE}/actual/position").quality is Quality.DISABLED
+
+
+def test_in_a_set_without_positions_nothing_is_followed(tmp_path: Path) -> None:
+    def prepare(drive: NordDrive) -> None:
+        drive.parameters.at_keypad(SETPOINT, 2, element=2, parameter_set=2)
+
+    bench = made(tmp_path)
+    prepare(bench.node.drives[0])
+    bench.run(12.0)
+    write(bench, 0.3, control_word=SHUT_DOWN | SET_2)
+    write(bench, 1.0, control_word=ENABLE | SET_2)
+    assert sent(bench) == (ENABLE | SET_2, 0, 0)
+
+
+def test_a_drive_without_step_5_has_no_position(tmp_path: Path) -> None:
+    """Factory settings: P543 and P546 have no positions."""
+
+    def factory(drive: NordDrive) -> None:
+        for number in (SETPOINT, ACTUAL):
+            drive.parameters.commission(number, 0)
+
+    bench = made(tmp_path, factory)
+    reading = bench.plant.image.read(f"{DRIVE}/actual/position")
+    assert reading.quality is Quality.DISABLED
+    assert "P543[2] is 0" in reading.reason
 
 
 def test_a_position_of_32_bits_in_one_pdo_follows_too(tmp_path: Path) -> None:

@@ -150,11 +150,11 @@ def test_a_view_that_is_on_already_is_not_written(make_single):
     assert bench.node.drive.output_hz == 25.0
 
 
-def test_the_third_view_carries_a_position(make_single):
-    bench = make_single("nord/sk-tu3-cao-pdo3")
-    parameters = bench.node.drive.parameters
+def test_the_third_view_carries_a_position(make):
+    node = NordSingle(5, TU3)
     for number, meaning in ((546, 23), (547, 24), (548, 1), (543, 10), (544, 15), (545, 1)):
-        parameters.commission(number, meaning)
+        node.drive.parameters.commission(number, meaning)
+    bench = make("nord/sk-tu3-cao-pdo3", node)
     bench.node.drive.position_increments = 2_800_758.0
     start(bench, position=2800.758, frequency=0.0)
     assert bench.sent(0x405)[-1].data.hex() == "7f0476bc2a000000"
@@ -336,7 +336,9 @@ def test_p151_watches_in_the_profile_too(make_profile):
 
 @pytest.mark.parametrize("layout", ["three", "five"])
 def test_a_cu4_is_a_tu4_in_either_layout(make, layout: str):
-    bench = make("nord/sk-cu4-cao", NordTu4(5, kind="SK CU4-CAO", layout=layout), slot="fu3", drive=GIVEN)
+    bench = make(
+        "nord/sk-cu4-cao", NordTu4(5, kind="SK CU4-CAO", layout=layout), slot="fu3", node="sdo_channels = [3]"
+    )
     assert bench.value(f"{DRIVE}/identity/device_name") == "SK CU4-CAO"
     start(bench, frequency=25.0)
     assert [drive.output_hz for drive in bench.node.drives] == [0.0, 0.0, 25.0, 0.0]

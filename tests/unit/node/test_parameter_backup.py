@@ -101,7 +101,7 @@ def workshop() -> Workshop:
 def test_a_backup_has_every_setting_and_nothing_else(workshop: Workshop) -> None:
     found = workshop.back_up()
     assert found.values["P102.1"] == 2.0
-    assert found.values["P543[2].4"] == 4
+    assert found.values["P543[2].4"] == 3
     assert found.values["P151"] == 0
     # read-only ones are no settings, and commands are none either
     assert not {"P700[1]", "P173", "P152"} & found.values.keys()

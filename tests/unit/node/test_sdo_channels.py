@@ -32,7 +32,7 @@ def bench_with(folder: Path, node: str) -> Bench:
 
 
 def full_of(bench: Bench, drive: str) -> float:
-    return bench.plant.drives[drive].channel.scales["command/frequency"].full
+    return bench.plant.drives[drive].channel.meanings.scales["command/frequency"].full
 
 
 def test_the_second_drives_own_maximum_frequency_is_read_over_its_own_channel(tmp_path: Path) -> None:

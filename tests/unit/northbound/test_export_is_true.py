@@ -29,7 +29,7 @@ from bridge.command import (
 from bridge.command.leg.state import Timer
 from bridge.command.rights import rights_of
 from bridge.config import load_site
-from bridge.image import Point
+from bridge.image import Point, Quality
 from bridge.mapping import family_names
 from bridge.northbound.modbus.registers import STOP, Row, Table, drive_maps, units_of
 from tests.support import sites
@@ -129,10 +129,16 @@ def test_a_register_is_exported_as_writable_where_it_can_be_written(tmp_path: Pa
     bench = kind.bench(tmp_path)
     client = Client(bench)
     for drive_map in drive_maps(bench.plant):
-        unserved = bench.plant.drives[drive_map.drive_name].channel.unserved
+        image, name = bench.plant.image, drive_map.drive_name
+        unserved = {
+            point.name.removeprefix(f"{name}/")
+            for point in image.points
+            if point.name.startswith(f"{name}/command/")
+            and image.read(point.name).quality in (Quality.CONFIG_ERROR, Quality.DISABLED)
+        }
         for row in drive_map.rows:
             if row.name in unserved:
-                continue  # of what its node carries the site file says nothing
+                continue  # of what its words carry the site file says nothing
             if row.table in (Table.HOLDING_REGISTER, Table.COIL):
                 code = client.write_row(drive_map.unit_id, row)
                 is_writable = code not in NOT_ALLOWED

@@ -16,6 +16,7 @@ from bridge.command import Plant
 from bridge.command.link import FurtherTpdo, NodeState
 from bridge.image import Quality
 from bridge.mapping import family_names
+from bridge.mapping.model import ProcessValue
 from bridge.northbound.modbus.registers import DriveMap
 from tests.support import sites
 from tests.support.invented import SPIN, spin_bench, spindle
@@ -110,6 +111,14 @@ class Model:
     def is_good(self, word: str) -> bool:
         return self.comes(0) and self.comes(self.home.get(word, 0))
 
+    def words_of(self, value: ProcessValue) -> tuple[str, ...]:
+        """By the codes that the mapping file takes for its words; none where these do not carry the value."""
+        if not value.code:
+            return value.word_names
+        runs = self.drive.family.meanings_of(self.drive.slot, value.group)
+        by_code = {one.default: one.word for run in runs for one in reversed(run)}
+        return tuple(by_code[code] for code in value.code) if by_code.keys() >= set(value.code) else ()
+
     def check(self) -> None:
         family, slot = self.drive.family, self.drive.slot
         bad = {place for word, place in self.places.items() if not self.is_good(word)}
@@ -119,7 +128,8 @@ class Model:
             value.leaf
             for value in values
             if not self.comes(0)
-            or not all(self.is_good(word) for word in value.word_names if word in self.places)
+            or not all(self.is_good(word) for word in self.words_of(value) if word in self.places)
+            or (value.code and not self.words_of(value))
         }
         rows = self.reader.bad_rows()
         assert {name for name in rows if name.startswith("actual/")} == bad_values & self.first_rows

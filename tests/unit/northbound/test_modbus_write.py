@@ -116,7 +116,7 @@ def test_single_registers(rig: Rig):
         (32, [0], NO_ADDRESS),
         (33, [0], NO_ADDRESS),
         (32, [0, 0, 0], NO_ADDRESS),
-        (36, [0, 0], NO_ADDRESS),
+        (38, [0, 0], NO_ADDRESS),
         (65535, [0, 0], NO_ADDRESS),
         (0, [0x007E], BAD_VALUE),  # control data valid is 0
         (0, [0x007E, 5, *[0] * 8, 1], BAD_VALUE),

@@ -134,7 +134,7 @@ def test_a_position_runs_over_its_32_bits(make):
 def test_meanings_of_values_are_single_parameters(make):
     """§6.5.4: P543, P544, P545 of an SK 500E … 535E."""
     bench = make()
-    assert (bench.read(P543, 1), bench.read(P544, 1)) == (1, 4)
+    assert (bench.read(P543, 1), bench.read(P544, 1)) == (1, 3)
     assert bench.sdo("401F220500000000").endswith("11 00 09 06"), "P543 has no second element"
     assert bench.read(P509, 0) == 6
     assert bench.sdo("4097200100000000") == "80 97 20 01 00 00 02 06", "P151: it has no parameters of its own"

@@ -134,7 +134,7 @@ def test_array_and_parameter_set_share_the_sub_index(bench):
     assert bench.write(0x221F, 0x0A, 9, 2) == "60"  # P543 [-03], set 2
     parameters = bench.node.drives[0].parameters
     assert [parameters.raw(543, 3, one) for one in (1, 2, 3, 4)] == [5, 9, 5, 5]
-    assert [parameters.raw(543, 2, one) for one in (1, 2, 3, 4)] == [4, 4, 4, 4]
+    assert [parameters.raw(543, 2, one) for one in (1, 2, 3, 4)] == [3, 3, 3, 3]
 
 
 def test_a_write_goes_to_the_eeprom_unless_p560_says_ram(bench):

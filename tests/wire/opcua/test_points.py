@@ -62,6 +62,7 @@ class TestNames:
             Codes.Good,
             Codes.BadWaitingForInitialData,
             Codes.BadConfigurationError,
+            Codes.BadOutOfService,
         }
 
     async def test_a_number_with_a_unit_says_which_and_how_far(self, client: Client) -> None:

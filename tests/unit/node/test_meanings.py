@@ -1,0 +1,170 @@
+"""What a word means is read from the drive, in every parameter set: BU 2500 §6.5.4, P543 and P546."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from bridge.command import Action, Code, Outcome, Request, command_of
+from bridge.command.telegram import Refusal
+from bridge.image import Quality
+from bridge.sim.nord_drive import NordDrive
+from tests.support.bench import PLC
+from tests.support.nord_words import (
+    ACTUAL,
+    DRIVE,
+    ENABLE,
+    P105,
+    SET_2,
+    SETPOINT,
+    SHUT_DOWN,
+    enable,
+    inverter,
+    made,
+    means,
+    point,
+)
+
+
+def test_a_word_that_is_a_current_is_no_frequency(tmp_path: Path) -> None:
+    bench = made(tmp_path, prepare=lambda drive: means(drive, ACTUAL, 3, 0, 0))
+    enable(bench, setpoint_1=0x2000)
+    frequency = point(bench, "actual/frequency")
+    assert frequency.quality is Quality.DISABLED
+    assert frequency.reason == (
+        "not in the telegram in parameter set 1: P543[1] is 3, P543[2] is 0, P543[3] is 0"
+    )
+    current = point(bench, "actual/current")
+    assert current.quality is Quality.GOOD
+    assert current.value == pytest.approx(inverter(bench).current_a, abs=0.01)
+
+
+def test_a_value_is_served_from_whichever_word_has_it(tmp_path: Path) -> None:
+    bench = made(tmp_path, prepare=lambda drive: means(drive, ACTUAL, 10, 15, 1))
+    enable(bench, frequency=25.0)
+    assert point(bench, "actual/frequency")[:2] == (25.0, Quality.GOOD)
+    position = point(bench, "actual/position")
+    assert position.quality is Quality.GOOD
+    assert position.value == pytest.approx(inverter(bench).position_increments / 1000, abs=2.0)
+
+
+def test_a_word_of_unknown_meaning_gives_no_value_and_takes_none(tmp_path: Path) -> None:
+    def prepare(drive: NordDrive) -> None:
+        means(drive, ACTUAL, 57, 56, 55)
+        means(drive, SETPOINT, 57, 56, 55)
+
+    bench = made(tmp_path, prepare=prepare)
+    assert "P543[1] is 57 in set 1, which the mapping does not know" in str(
+        bench.value("lift/node/boot_status")
+    )
+    for leaf in ("actual/frequency", "actual/current", "actual/position", "command/frequency"):
+        assert point(bench, leaf).quality is Quality.DISABLED
+    assert bench.write(DRIVE, frequency=10.0).code is Code.NOT_CONFIGURED
+
+
+def test_scales_are_those_of_the_active_set(tmp_path: Path) -> None:
+    def prepare(drive: NordDrive) -> None:
+        drive.parameters.at_keypad(P105, 1000, parameter_set=2)
+
+    bench = made(tmp_path, prepare=prepare)
+    enable(bench, SET_2, frequency=25.0)
+    assert point(bench, "actual/frequency")[:2] == (25.0, Quality.GOOD)
+    assert inverter(bench).output_hz == 25.0
+    assert point(bench, "command/setpoint_1").value == 0x1000
+
+
+def test_set_2_of_the_position_view_is_no_position(tmp_path: Path) -> None:
+    def prepare(drive: NordDrive) -> None:
+        for number, code in ((543, 10), (544, 15), (545, 1), (546, 23), (547, 24), (548, 1)):
+            drive.parameters.at_keypad(number, code)
+        for number, code in ((543, 3), (544, 0), (545, 1), (546, 2), (547, 0), (548, 1)):
+            drive.parameters.at_keypad(number, code, parameter_set=2)
+
+    bench = made(tmp_path, "nord/sk-tu3-cao-pdo3", prepare)
+    assert point(bench, "actual/position").quality is Quality.GOOD
+    enable(bench, SET_2, frequency=25.0)
+    assert point(bench, "actual/position").quality is Quality.DISABLED
+    assert point(bench, "actual/current").quality is Quality.GOOD
+    refused = bench.write(DRIVE, position=100.0)
+    assert refused.code is Code.NOT_CONFIGURED
+    assert "P546 is 2" in refused.message
+
+
+def test_a_switch_of_sets_changes_no_speed(tmp_path: Path) -> None:
+    def prepare(drive: NordDrive) -> None:
+        drive.parameters.at_keypad(P105, 1000, parameter_set=2)
+
+    bench = made(tmp_path, prepare=prepare)
+    enable(bench, frequency=25.0)
+    assert bench.write(DRIVE, control_word=ENABLE | SET_2).code is Code.OK
+    bench.run(0.5)
+    assert inverter(bench).output_hz == pytest.approx(25.0, abs=0.01)
+    assert point(bench, "actual/frequency").value == pytest.approx(25.0, abs=0.01)
+    assert bench.write(DRIVE, control_word=ENABLE).code is Code.OK
+    bench.run(0.5)
+    assert inverter(bench).output_hz == pytest.approx(25.0, abs=0.01)
+
+
+def test_a_running_drive_is_not_switched_to_a_set_that_means_something_else(tmp_path: Path) -> None:
+    bench = made(tmp_path, prepare=lambda drive: means(drive, SETPOINT, 2, 0, 0, in_set=2))
+    enable(bench, frequency=25.0)
+    refused = bench.write(DRIVE, control_word=ENABLE | SET_2)
+    assert refused.code is Code.NOT_CONFIGURED
+    assert bench.write(DRIVE, control_word=SHUT_DOWN | SET_2).code is Code.OK, "a stop is never refused"
+    bench.run(0.1)
+    assert bench.sent(0x205)[-1].data.hex() == "7e44" + "00" * 6
+
+
+def test_a_drive_in_another_set_than_commanded_gets_no_scaled_value(tmp_path: Path) -> None:
+    """A drive whose parameter set is chosen at its inputs."""
+    bench = made(tmp_path, prepare=lambda drive: drive.parameters.at_keypad(P105, 1000, parameter_set=2))
+    enable(bench, SET_2, frequency=25.0)
+    decode = bench.plant.drives[DRIVE].channel.leg_settings.decode
+    with pytest.raises(Refusal, match="parameter set 1 is commanded, and the drive is in set 2"):
+        decode({"frequency": 10.0}, (0,) * 4, ENABLE)
+    assert decode({"frequency": 10.0}, (0,) * 4, SHUT_DOWN).setpoints == (0,) * 4, "a stop is never refused"
+    assert decode({"setpoint_1": 5}, (0,) * 4, ENABLE).setpoints == (5, 0, 0, 0)
+
+
+def test_start_stays_in_its_set(tmp_path: Path) -> None:
+    bench = made(tmp_path)
+    bench.write(DRIVE, control_word=SHUT_DOWN | SET_2)
+    bench.run(0.3)
+    outcomes: list[Outcome] = []
+    bench.view.submit(Request(PLC, DRIVE, command_of(Action.START, direction=1)), outcomes.append)
+    bench.run(2.0)
+    assert [outcome.code for outcome in outcomes] == [Code.OK]
+    assert all(frame.data[1] & 0xC0 == 0x40 for frame in bench.sent(0x205)[-20:])
+    assert point(bench, "status/state").value == 4
+
+
+CODES = st.lists(st.sampled_from([0, 1, 2, 3, 4, 5, 10, 15, 23, 24, 57]), min_size=12, max_size=12)
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(actual=CODES, setpoints=CODES, active=st.integers(1, 4))
+def test_no_point_is_good_unless_its_meaning_was_read(
+    tmp_path: Path, actual: list[int], setpoints: list[int], active: int
+) -> None:
+    def prepare(drive: NordDrive) -> None:
+        for in_set in range(1, 5):
+            means(drive, ACTUAL, *actual[in_set - 1 :: 4], in_set=in_set)
+            means(drive, SETPOINT, *setpoints[in_set - 1 :: 4], in_set=in_set)
+
+    bench = made(tmp_path, prepare=prepare)
+    bench.write(DRIVE, control_word=SHUT_DOWN | active - 1 << 14)
+    bench.run(0.3)
+    for value in bench.plant.drives[DRIVE].family.value:
+        if not value.code:
+            continue
+        codes = (actual if value.group == "actual" else setpoints)[active - 1 :: 4]
+        is_there = set(value.code) <= set(codes)
+        # P112 is given for two sets.
+        is_scaled = value.full != "P112" or active in (1, 2)
+        reading = point(bench, value.leaf)
+        assert (reading.quality is Quality.GOOD) == (is_there and is_scaled), (value.leaf, reading)
+        if not is_there:
+            assert reading.quality is Quality.DISABLED

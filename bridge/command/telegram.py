@@ -38,13 +38,15 @@ class _Setpoints:
         self._masks: dict[int, int] = {}
         self._bits: dict[int, int] = {}
 
-    def put(self, leaf: str, written: Written) -> None:
-        """Raises ``Refusal`` where the same bits have been written otherwise."""
-        mask, bits = self._masks.get(written.place, 0), self._bits.get(written.place, 0)
-        if (bits ^ written.bits) & mask & written.mask:
-            raise Refusal(Code.OUT_OF_RANGE, f"{leaf} and the word it is made from do not agree")
-        self._masks[written.place] = mask | written.mask
-        self._bits[written.place] = bits | written.bits
+    def put(self, leaf: str, written: tuple[Written, ...]) -> None:
+        """All of it or, where the same bits have been written otherwise, nothing: that raises ``Refusal``."""
+        for one in written:
+            mask, bits = self._masks.get(one.place, 0), self._bits.get(one.place, 0)
+            if (bits ^ one.bits) & mask & one.mask:
+                raise Refusal(Code.OUT_OF_RANGE, f"{leaf} and the word it is made from do not agree")
+        for one in written:
+            self._masks[one.place] = self._masks.get(one.place, 0) | one.mask
+            self._bits[one.place] = self._bits.get(one.place, 0) | one.bits
 
     @property
     def places(self) -> frozenset[int]:
@@ -102,16 +104,18 @@ class TelegramDecoder:
         in_set, was = self._set.of(word), self._set.of(held)
         stops = control_word is not None and not self._words.enables(word)
         setpoints = _Setpoints()
-        for leaf, value in values.items():
+        # The raw words first: where a scaled value contradicts one, it is the scaled one that is wrong.
+        for leaf, value in sorted(values.items(), key=lambda item: item[0] in self._values):
             if leaf == "control_word":
                 continue
-            if stops and self._has_lost_its_word(leaf, in_set):
-                continue
-            written = self._written(leaf, value, in_set)
-            if in_set == was:
-                written = self._as_reported(leaf, value, word, written)
-            for one in written:
-                setpoints.put(leaf, one)
+            try:
+                written = self._written(leaf, value, in_set)
+                if in_set == was:
+                    written = self._as_reported(leaf, value, word, written)
+                setpoints.put(leaf, written)
+            except Refusal:
+                if not (stops and self._goes_by_the_drive(leaf, value)):
+                    raise
         after = setpoints.over(before)
         if in_set != was:
             after = self._in_other_set(before, after, setpoints.places, was, word)
@@ -131,11 +135,12 @@ class TelegramDecoder:
             raise Refusal(Code.NOT_CONFIGURED, f"{leaf}: {lack.why}")
         return _from_value(found, value)
 
-    def _has_lost_its_word(self, leaf: str, in_set: int) -> bool:
-        """Whether the drive gives the value no known meaning: its parameters may be changed while it runs.
-        A word that does not enable is not refused for it: it may be a stop."""
+    def _goes_by_the_drive(self, leaf: str, value: Value) -> bool:
+        """Whether parameters of the drive say what the value means, which somebody may change while it runs.
+        A word that does not enable is not refused for what was right until then: it may be a stop."""
         codec = self._values.get(leaf)
-        return codec is not None and self._meanings.codec(codec, in_set)[1] is not None
+        is_number = isinstance(value, int | float)
+        return is_number and codec is not None and bool(codec.model.code or codec.model.full)
 
     def _check_carried(self, leaf: str, places: tuple[int, ...]) -> None:
         for place in places:

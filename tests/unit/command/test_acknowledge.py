@@ -66,8 +66,8 @@ IN_BETWEEN: dict[str, Callable[[Rig], object]] = {
         Action.WRITE, OTHER_PLC, values={"control_word": ACKNOWLEDGE}
     ),
     "a word that is not valid": lambda rig: rig.submit(Action.WRITE, PLC, values={"control_word": 0x007E}),
-    "a value that is too large": lambda rig: rig.submit(
-        Action.WRITE, PLC, values={"control_word": SHUT_DOWN, "frequency": 1e9}
+    "a setpoint that is no word": lambda rig: rig.submit(
+        Action.WRITE, PLC, values={"control_word": SHUT_DOWN, "setpoint_1": 70_000}
     ),
     "another time-out": _time_out,
     "the bridge hung": _gap,

@@ -89,8 +89,40 @@ def test_a_scale_that_is_not_known_is_no_reason_to_guess(rig: Rig):
 
 
 def test_a_setpoint_and_its_raw_word_must_agree(rig: Rig):
-    assert rig.write(SHUT_DOWN, 0x2000, frequency=25.0).ok
-    assert rig.write(SHUT_DOWN, 0x2000, frequency=26.0).code is Code.OUT_OF_RANGE
+    assert rig.write(ENABLE, 0x2000, frequency=25.0).ok
+    assert rig.write(ENABLE, 0x2000, frequency=26.0).code is Code.OUT_OF_RANGE
+
+
+def test_a_stop_is_not_refused_for_what_somebody_has_changed_in_the_drive(rig: Rig):
+    """P105 at the keypad: what was right with its old value is out of range, or another word."""
+    assert rig.write(ENABLE, 0x4000, frequency=50.0).ok
+    rig.channel.meanings.on_scale("P105", 20.0)
+    assert rig.write(ENABLE, frequency=50.0).code is Code.OUT_OF_RANGE
+    assert rig.write(SHUT_DOWN, 0x4000, frequency=50.0).ok
+    assert rig.sent == SHUT_DOWN
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"frequency": "50"}, {"setpoint_1": 70_000}, {"setpoint_1": 0.5}, {"speed": 1}]
+)
+def test_a_stop_with_what_no_drive_would_take_is_refused(rig: Rig, wrong: dict[str, Value]):
+    assert not rig.write(SHUT_DOWN, **wrong).ok
+
+
+@given(
+    p105=st.floats(-1e6, 1e6).filter(bool),
+    values=st.fixed_dictionaries(
+        {"frequency": st.floats() | st.integers()}, optional={"setpoint_1": st.integers(0, 0xFFFF)}
+    ),
+)
+def test_whatever_the_drive_scales_with_a_stop_is_taken(p105: float, values: dict[str, Value]):
+    rig = Rig()
+    rig.node(NodeState.OPERATIONAL)
+    rig.write(SHUT_DOWN)
+    rig.write(ENABLE, frequency=25.0)
+    rig.channel.meanings.on_scale("P105", p105)
+    assert rig.write(SHUT_DOWN, **values).ok
+    assert rig.sent == SHUT_DOWN
 
 
 def test_what_is_not_written_stays(rig: Rig):

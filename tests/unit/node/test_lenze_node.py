@@ -97,7 +97,7 @@ def test_a_drive_that_is_not_controlled_by_the_network_has_no_velocity(booted) -
     bench = booted(control_mode=10)
     velocity = bench.plant.image.read("conveyor/drive/actual/velocity")
     assert (velocity.quality, velocity.reason) == (Quality.DISABLED, "not in the telegram: C00007 is 10")
-    refused = bench.write(DRIVE, control_word=WORDS["stop"], velocity=100.0)
+    refused = bench.write(DRIVE, control_word=WORDS["run"], velocity=100.0)
     assert refused.code is Code.NOT_CONFIGURED
 
 

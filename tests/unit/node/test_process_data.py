@@ -109,7 +109,7 @@ class TestValues:
         assert command(bench, target=12.34, target_low=1734, target_high=0).ok
         refused = command(bench, target=12.34, target_high=1)
         assert refused.code is Code.OUT_OF_RANGE
-        assert refused.message == "target_high and the word it is made from do not agree"
+        assert refused.message == "target and the word it is made from do not agree"
 
     def test_a_negative_one_fills_both(self, tmp_path: Path) -> None:
         node = spindle()

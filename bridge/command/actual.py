@@ -100,8 +100,8 @@ class ActualData:
         for word, place in zip(self._carried, self._places, strict=True):
             yield _Judged(next(rest), _unserved(unserved, [word]), self._further_of((place,)))
         for codec, lack in found:
-            words = [self._process[place] for place in codec.places]
-            yield _Judged(next(rest), _unserved(unserved, words) or lack, self._further_of(codec.places))
+            leaves = [codec.model.name, *(self._process[place] for place in codec.places)]
+            yield _Judged(next(rest), _unserved(unserved, leaves) or lack, self._further_of(codec.places))
 
     def _further_of(self, places: Sequence[int]) -> tuple[FurtherTpdo, ...]:
         return tuple(pdo for pdo in self._channel.link.further if not pdo.places.isdisjoint(places))
@@ -217,10 +217,10 @@ def _plain(codec: ValueCodec) -> _Plain:
     return _Plain(codec.places[0], scale.full, scale.at) if scale else _Plain(codec.places[0], 1, 1)
 
 
-def _unserved(unserved: Mapping[str, str], words: Iterable[str]) -> Lack | None:
-    """What there is to say of these words, where the node's PDOs do not carry them."""
-    for word in words:
-        why = unserved.get(f"actual/{word}")
+def _unserved(unserved: Mapping[str, str], leaves: Iterable[str]) -> Lack | None:
+    """What there is to say of these actual values, where the node's PDOs do not carry one of them."""
+    for leaf in leaves:
+        why = unserved.get(f"actual/{leaf}")
         if why:
             return Lack(Quality.CONFIG_ERROR, why)
     return None

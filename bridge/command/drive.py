@@ -179,8 +179,8 @@ class Drive:
         deadline_s: float | None,
         rpdo_type: int,
     ) -> None:
-        """What the boot-up has found: ``unserved`` has the reason for each word that the node does not
-        carry, by its leaf such as ``actual/value_2``; ``further`` are the TPDOs beside the one with the
+        """What the boot-up has found: ``unserved`` has the reason for each word or value that the node does
+        not carry, by its leaf such as ``actual/value_2``; ``further`` are the TPDOs beside the one with the
         status word, which is late after ``deadline_s``. ``rpdo_type`` is the transmission type of the RPDO
         with the control word."""
         self.channel.link.on_boot(deadline_s, further)
@@ -216,7 +216,7 @@ class Drive:
 
         def compiled(codec: ValueCodec, in_set: int) -> _Command:
             found, lack = meanings.codec(codec, in_set)
-            carried = [f"command/{words[place]}" for place in found.places]
+            carried = [codec.model.leaf, *(f"command/{words[place]}" for place in found.places)]
             why = next((why for leaf in carried if (why := self.channel.unserved.get(leaf))), "")
             return _Command(found, Lack(Quality.CONFIG_ERROR, why) if why else lack)
 

@@ -63,8 +63,8 @@ class _Setpoints:
 
 class TelegramDecoder:
     """Knows the command group of one drive. ``meanings`` and ``unserved``, which has the reason for each word
-    that the node cannot take, are read at each write: they fill at boot-up. ``reported`` gives the drive's
-    status word, None while the drive is not heard."""
+    or value that the node cannot take, are read at each write: they fill at boot-up. ``reported`` gives the
+    drive's status word, None while the drive is not heard."""
 
     def __init__(
         self,
@@ -143,8 +143,8 @@ class TelegramDecoder:
         return is_number and codec is not None and bool(codec.model.code or codec.model.full)
 
     def _check_carried(self, leaf: str, places: tuple[int, ...]) -> None:
-        for place in places:
-            why = self._unserved.get(f"command/{self._names[place]}")
+        for name in (leaf, *(self._names[place] for place in places)):
+            why = self._unserved.get(f"command/{name}")
             if why:
                 raise Refusal(Code.NOT_CONFIGURED, f"{leaf}: {why}")
 

@@ -260,6 +260,25 @@ class Family(Table):
         words = self.rpdo_words if group == "command" else self.tpdo_words
         return [[by_word[word] for word in words(pdo) if word in by_word] for pdo in pdos]
 
+    def needed_bits(self, group: str) -> int:
+        """Bits of the control word, or for the group ``actual`` of the status word, without which a drive
+        cannot be commanded, or would be shown in a state that it is not in."""
+        control, status = self.control_word, self.status_word
+        handshake = [control.handshake] if control.handshake else []
+        if group == "actual":
+            found = 0
+            for pattern in (*(state.pattern for state in status.state), *filter(None, [status.holding])):
+                found |= pattern_bits(pattern)[0]
+            bits = [*status.parameter_set_bits, *(one.acknowledge_bit for one in handshake)]
+        else:
+            found = control.stopped | control.ready | control.run
+            found |= control.forward | control.reverse | control.begin
+            for command in (control.enabling, control.stop, control.quick_stop, control.disable_voltage):
+                found |= command.mask
+            bits = [control.acknowledge_bit, *control.parameter_set_bits, *(one.bit for one in handshake)]
+            bits += [] if control.valid_bit is None else [control.valid_bit]
+        return found | sum(1 << bit for bit in set(bits))
+
     @property
     def sets(self) -> int:
         """How many parameter sets its drives have."""

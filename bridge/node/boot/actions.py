@@ -98,8 +98,8 @@ class NodePdoPlan:
 @dataclass(slots=True)
 class DrivePlan:
     """The PDOs of one drive, those with control and status word first, or the reason why it cannot be
-    served. ``unserved`` has the reason for each word that they do not carry, by its leaf such as
-    ``actual/value_2``."""
+    served. ``unserved`` has the reason for each word that they do not carry, and for each value of a word
+    that they carry in part, by its leaf such as ``actual/value_2``."""
 
     rpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
     tpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])

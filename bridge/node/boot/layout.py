@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
+from typing import NamedTuple
 
 from bridge.canopen.pdo import PdoEntry
+from bridge.mapping.fields import ObjectRef
 from bridge.mapping.model import MappedObject, Pdo
 from bridge.node.process.words import WORD_BITS, Place
 
@@ -69,6 +71,28 @@ def _places(known: Layouts, layout: int) -> dict[_Object, Place]:
                 # An object that fills several words begins with the first.
                 places[key] = first._replace(span=first.span + 1)
     return places
+
+
+class Missing(NamedTuple):
+    """A part of a word that is made from several objects: the bits that no object fills."""
+
+    part: ObjectRef
+    mask: int
+
+
+def missing_parts(refs: Sequence[MappedObject], mapped: Set[_Object]) -> list[Missing]:
+    """What this word lacks: by the layout that lacks least, none where no object of it is mapped."""
+    found: list[list[Missing]] = []
+    for ref in refs:
+        lacks: list[Missing] = []
+        shift = 0
+        for part, bits in zip(ref.parts, ref.lengths, strict=True):
+            if (part.index, part.sub) not in mapped:
+                lacks.append(Missing(part, ((1 << bits) - 1) << shift))
+            shift += bits
+        if len(lacks) < len(ref.parts):
+            found.append(lacks)
+    return min(found, key=len) if found else []
 
 
 def differences(

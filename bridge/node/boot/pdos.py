@@ -31,7 +31,7 @@ from bridge.node.boot.actions import (
     number,
     told_as,
 )
-from bridge.node.boot.layout import Layouts, differences, factory_entries, layouts, match_words
+from bridge.node.boot.layout import Layouts, differences, factory_entries, layouts, match_words, missing_parts
 from bridge.node.boot.pdo_settings import MOST_ENTRIES, PdoObjects, set_pdo, table_for
 from bridge.node.boot.start import write_start
 
@@ -39,6 +39,7 @@ RPDO: Final = (0x1400, 0x1600)
 """First communication and first mapping object."""
 _TPDO: Final = (0x1800, 0x1A00)
 _BYTES: Final = 2
+_ALL_BITS: Final = 0xFFFF
 
 
 class _Off(MappingError):
@@ -145,6 +146,28 @@ def _plan(
             if word not in reasons:
                 missing = f"{word} is not in {direction.name}{pdo.number}"
                 result.notes.append(f"{drive.slot.name}: {missing}")
+    _leave_out_parts(drive, direction, found, plan, result)
+
+
+def _leave_out_parts(
+    drive: Drive, direction: _Direction, found: Sequence[PdoPlan], plan: DrivePlan, result: BootResult
+) -> None:
+    """Bits of words whose other objects are mapped: they would read as 0. Raises MappingError where the
+    control or status word cannot do without them."""
+    family, group = drive.family, direction.group
+    needed = family.needed_bits(group)
+    mapped = {(entry.index, entry.sub) for one in found for entry in one.codec.entries}
+    for place, refs in direction.known.items():
+        for part, mask in missing_parts(refs, mapped):
+            word = direction.process[place]
+            why = f"no {direction.name} of the node carries {part}"
+            if place == 0 and needed & mask:
+                raise MappingError(f"{why}, a part of the {word.replace('_', ' ')}")
+            result.notes.append(f"{drive.slot.name}: {why}, a part of {word}")
+            for value in family.values_of(drive.slot):
+                bits = _ALL_BITS if value.bit is None else 1 << value.bit
+                if value.group == group and word in value.word_names and bits & mask:
+                    plan.unserved[value.leaf] = why
 
 
 def _check_length(pdo: PdoPlan, words: int) -> None:

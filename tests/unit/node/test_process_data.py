@@ -400,6 +400,77 @@ class TestIdentity:
         assert not [frame for frame in bench.sent(0) if frame.data[1] in (0, 33)]
 
 
+class TestAWordOfSeveralObjects:
+    """What no PDO carries would read as 0, which is a value like any other."""
+
+    MAPPING = (
+        SPIN.replace("write = true\nevent_ms = 100\n", "").replace("""[parameter_names]""", """
+[[value]]
+name = "mode_now"
+group = "actual"
+word = "modes_now"
+[[value]]
+name = "aux_ready"
+group = "actual"
+word = "modes_now"
+bit = 0
+[[value]]
+name = "homed"
+group = "actual"
+word = "modes_now"
+bit = 8
+[[value]]
+name = "brake"
+group = "command"
+word = "modes"
+bit = 8
+
+[parameter_names]""")
+    )  # fmt: skip
+
+    def test_a_value_of_a_part_that_is_not_mapped_is_not_good(self, tmp_path: Path) -> None:
+        node = spindle()
+        node.pdo("tpdo", 2, 0x280, ["6064:00/32", "2AC9:00/8"], event_ms=100)
+        node.put("2AC9:00", 1, 1)
+        bench = running(tmp_path, node, self.MAPPING)
+        why = "no TPDO of the node carries 2831:00"
+        assert f"{why}, a part of modes_now" in status(bench)
+        assert quality(bench, "actual/aux_ready") is Quality.GOOD
+        for leaf in ("actual/homed", "actual/mode_now"):
+            assert (quality(bench, leaf), reason(bench, leaf)) == (Quality.CONFIG_ERROR, why)
+
+    def test_nor_is_it_commanded(self, tmp_path: Path) -> None:
+        node = spindle()
+        node.pdo("rpdo", 2, 0x300, ["607A:00/32", "2AC8:00/8"])
+        bench = running(tmp_path, node, self.MAPPING)
+        for values in ({"brake": 1}, {"mode": 1}):
+            refused = command(bench, control_word=RUN, **values)
+            assert (refused.code, refused.message.partition(": ")[2]) == (
+                Code.NOT_CONFIGURED,
+                "no RPDO of the node carries 2830:00",
+            )
+        assert quality(bench, "command/brake") is Quality.CONFIG_ERROR
+
+    @pytest.mark.parametrize(
+        ("word", "of_two", "kind", "mapped", "missing"),
+        [
+            ("6041:00", "6041:00+2041:00", "tpdo", "2041:00/8", "6041:00, a part of the status word"),
+            ("6040:00", "2040:00+6040:00", "rpdo", "2040:00/8", "6040:00, a part of the control word"),
+        ],
+    )
+    def test_without_a_part_of_its_state_a_drive_is_not_served(
+        self, tmp_path: Path, word: str, of_two: str, kind: str, mapped: str, missing: str
+    ) -> None:
+        node = spindle()
+        node.pdo(kind, 1, 0x180 if kind == "tpdo" else 0x200, [mapped], event_ms=50)
+        mapping = SPIN.replace(f'["{word}"]', f'["{of_two}"]')
+        if kind == "rpdo":  # acknowledged and valid by a bit of the high byte
+            mapping = mapping.replace("acknowledge_bit = 7", "acknowledge_bit = 8")
+        bench = running(tmp_path, node, mapping)
+        assert f"no {kind.upper()} of the node carries {missing}" in status(bench)
+        assert quality(bench, "status/state") is Quality.CONFIG_ERROR
+
+
 class TestNordsDigitalOutputs:
     """BU 2500 §6.4: RPDO5, 240h + node id, off at factory; 3004h."""
 

@@ -33,7 +33,7 @@ QUIETLY := tools/quietly $(VENV)/install.log
 
 # Unit tests know no time. The others do: few of them run at a time, a module of them in one place.
 FEW_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 2)))
-WIRE_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 3)))
+WIRE_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 4)))
 
 # The lab runs on slow CPUs as root: it leaves no caches behind and gets a time limit.
 LAB_SECONDS := 1800

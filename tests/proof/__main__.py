@@ -31,7 +31,7 @@ from typing import Any
 from tests.proof import hunt, mutants, report
 from tests.proof import kills as kill_table
 from tests.proof.drives import DRIVES
-from tests.proof.faults import FAULTS, Fault
+from tests.proof.faults import FAULTS, Fault, in_turn
 from tests.proof.machine import is_user_mode
 from tests.proof.measure import Sample
 from tests.proof.rig import HOLD_S, Rig, Stuck
@@ -50,7 +50,7 @@ def run(asked: argparse.Namespace) -> int:
     os.environ["PYTHONPATH"] = str(REPOSITORY)
     names, cycles, out = _names(asked.faults), asked.cycles, asked.out
     faults = [fault for fault in FAULTS if not names or fault.name in names]
-    possible = [fault for fault in faults if fault.possible()]
+    possible = in_turn([fault for fault in faults if fault.possible()])
     began = time.monotonic()
     samples: list[Sample] = []
     errors: list[str] = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -270,3 +270,12 @@ FAULTS: Final = (
 )
 """In the order of a cycle. A service that is started anew in the middle has forgotten which nodes it has lost
 again and again, and how often its front has ended: it waits for neither longer than it has to."""
+
+
+def in_turn(faults: Sequence[Fault]) -> list[Fault]:
+    """The order of a cycle. Nodes that are lost again within half a minute are asked later each time, so the
+    faults that lose them come in two bunches, with half of the others after each."""
+    losing = [fault for fault in faults if fault.leaves_silence and not fault.new_process]
+    others = [fault for fault in faults if fault not in losing]
+    half = len(others) // 2
+    return [*losing[::2], *others[:half], *losing[1::2], *others[half:]]

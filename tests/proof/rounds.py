@@ -147,7 +147,10 @@ def _wait_handed_on(rig: Rig, fault: Fault, since: float, say: Callable[[str], N
         with suppress(Stuck):
             rig.wait(lambda: all(_was_handed_on(rig, drive, since) for drive in DRIVES), _LOOK_S, "telegrams")
             return
-    raise Stuck("drives have no telegram that their owners sent after the fault")
+    lacking = ", ".join(
+        f"{one.path} ({one.protocol})" for one in DRIVES if not _was_handed_on(rig, one, since)
+    )
+    raise Stuck(f"{fault.name}: drives have no telegram that their owners sent after it: {lacking}")
 
 
 def _was_handed_on(rig: Rig, drive: Drive, since: float) -> bool:

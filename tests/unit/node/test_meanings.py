@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -11,7 +12,11 @@ from hypothesis import strategies as st
 from bridge.command import Action, Code, Outcome, Request, command_of
 from bridge.command.telegram import Refusal
 from bridge.image import Quality
+from bridge.sim.abort import AbortCode, SdoAbort
+from bridge.sim.dictionary import Entry
 from bridge.sim.nord_drive import NordDrive
+from bridge.sim.nord_interface import DriveAccess
+from bridge.sim.nord_parameters import PARAMETER_BASE, sub_index
 from tests.support.bench import PLC
 from tests.support.nord_words import (
     ACTUAL,
@@ -129,42 +134,97 @@ def test_a_drive_in_another_set_than_commanded_gets_no_scaled_value(tmp_path: Pa
     assert decode({"setpoint_1": 5}, (0,) * 4, ENABLE).setpoints == (5, 0, 0, 0)
 
 
-def test_start_stays_in_its_set(tmp_path: Path) -> None:
+@pytest.mark.parametrize("in_set", [1, 2, 3, 4])
+def test_start_and_stop_stay_in_their_set(tmp_path: Path, in_set: int) -> None:
     bench = made(tmp_path)
-    bench.write(DRIVE, control_word=SHUT_DOWN | SET_2)
+    bits = in_set - 1 << 14
+    bench.write(DRIVE, control_word=SHUT_DOWN | bits)
     bench.run(0.3)
-    outcomes: list[Outcome] = []
-    bench.view.submit(Request(PLC, DRIVE, command_of(Action.START, direction=1)), outcomes.append)
-    bench.run(2.0)
-    assert [outcome.code for outcome in outcomes] == [Code.OK]
-    assert all(frame.data[1] & 0xC0 == 0x40 for frame in bench.sent(0x205)[-20:])
-    assert point(bench, "status/state").value == 4
+    for action, parameters, state in ((Action.START, {"direction": 1}, 4), (Action.STOP, {}, 2)):
+        outcomes: list[Outcome] = []
+        request = Request(PLC, DRIVE, command_of(action, **parameters))
+        bench.view.submit(request, outcomes.append)
+        bench.run(3.0)
+        assert [outcome.code for outcome in outcomes] == [Code.OK]
+        assert all(frame.data[1] & 0xC0 == bits >> 8 for frame in bench.sent(0x205)[-20:])
+        assert point(bench, "status/state").value == state
 
 
 CODES = st.lists(st.sampled_from([0, 1, 2, 3, 4, 5, 10, 15, 23, 24, 57]), min_size=12, max_size=12)
+"""Of three words in four sets."""
+UNREADABLE = st.sets(st.tuples(st.sampled_from([ACTUAL, SETPOINT]), st.integers(1, 3), st.integers(1, 4)))
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(actual=CODES, setpoints=CODES, active=st.integers(1, 4))
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(actual=CODES, setpoints=CODES, unreadable=UNREADABLE, active=st.integers(1, 4))
 def test_no_point_is_good_unless_its_meaning_was_read(
-    tmp_path: Path, actual: list[int], setpoints: list[int], active: int
+    tmp_path: Path,
+    actual: list[int],
+    setpoints: list[int],
+    unreadable: set[tuple[int, int, int]],
+    active: int,
 ) -> None:
     def prepare(drive: NordDrive) -> None:
         for in_set in range(1, 5):
             means(drive, ACTUAL, *actual[in_set - 1 :: 4], in_set=in_set)
             means(drive, SETPOINT, *setpoints[in_set - 1 :: 4], in_set=in_set)
 
-    bench = made(tmp_path, prepare=prepare)
-    bench.write(DRIVE, control_word=SHUT_DOWN | active - 1 << 14)
-    bench.run(0.3)
+    hidden = {(PARAMETER_BASE + number, sub_index(element, one)) for number, element, one in unreadable}
+    find = DriveAccess.find
+
+    def refusing(self: DriveAccess, index: int, sub: int) -> Entry:
+        if (index, sub) in hidden:
+            raise SdoAbort(AbortCode.HARDWARE_FAULT)
+        return find(self, index, sub)
+
+    with patch.object(DriveAccess, "find", refusing):
+        bench = made(tmp_path, prepare=prepare)
+        bench.write(DRIVE, control_word=SHUT_DOWN | active - 1 << 14)
+        bench.run(0.3)
     for value in bench.plant.drives[DRIVE].family.value:
         if not value.code:
             continue
-        codes = (actual if value.group == "actual" else setpoints)[active - 1 :: 4]
+        number, all_codes = (ACTUAL, actual) if value.group == "actual" else (SETPOINT, setpoints)
+        of_set = enumerate(all_codes[active - 1 :: 4], 1)
+        codes = [None if (number, word, active) in unreadable else code for word, code in of_set]
         is_there = set(value.code) <= set(codes)
         # P112 is given for two sets.
         is_scaled = value.full != "P112" or active in (1, 2)
         reading = point(bench, value.leaf)
         assert (reading.quality is Quality.GOOD) == (is_there and is_scaled), (value.leaf, reading)
         if not is_there:
-            assert reading.quality is Quality.DISABLED
+            is_unread = None in codes
+            assert reading.quality is (Quality.CONFIG_ERROR if is_unread else Quality.DISABLED), reading
+        refused = bench.write(DRIVE, control_word=ENABLE | active - 1 << 14, **{value.name: 1.0})
+        if value.group == "command" and not (is_there and is_scaled):
+            assert refused.code is Code.NOT_CONFIGURED, (value.leaf, refused)
+
+
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    full_hz=st.lists(st.integers(300, 2000).map(lambda tenths: tenths / 10), min_size=4, max_size=4),
+    codes=st.lists(st.permutations([1, 2, 0]), min_size=4, max_size=4),
+    sets=st.lists(st.integers(1, 4), min_size=2, max_size=4),
+    frequency=st.floats(-25.0, 25.0),
+)
+def test_a_frequency_is_the_same_in_every_set_and_through_every_switch(
+    tmp_path: Path, full_hz: list[float], codes: list[list[int]], sets: list[int], frequency: float
+) -> None:
+    """Or the switch is refused, and nothing changes."""
+
+    def prepare(drive: NordDrive) -> None:
+        for in_set in range(1, 5):
+            drive.parameters.at_keypad(P105, round(full_hz[in_set - 1] * 10), parameter_set=in_set)
+            means(drive, SETPOINT, *codes[in_set - 1], in_set=in_set)
+
+    bench = made(tmp_path, prepare=prepare)
+    enable(bench, sets[0] - 1 << 14, frequency=frequency)
+    step = max(full_hz) / 0x4000
+    for in_set in sets:
+        switched = bench.write(DRIVE, control_word=ENABLE | in_set - 1 << 14)
+        bench.run(0.5)
+        assert switched.code in (Code.OK, Code.NOT_CONFIGURED)
+        assert inverter(bench).output_hz == pytest.approx(frequency, abs=len(sets) * step)
+        shown = point(bench, "actual/frequency")
+        assert shown.quality is Quality.GOOD
+        assert shown.value == pytest.approx(frequency, abs=len(sets) * step)

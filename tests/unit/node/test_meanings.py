@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import pytest
@@ -195,7 +196,8 @@ def test_no_point_is_good_unless_its_meaning_was_read(
         if not is_there:
             is_unread = None in codes
             assert reading.quality is (Quality.CONFIG_ERROR if is_unread else Quality.DISABLED), reading
-        refused = bench.write(DRIVE, control_word=ENABLE | active - 1 << 14, **{value.name: 1.0})
+        values: dict[str, Any] = {"control_word": ENABLE | active - 1 << 14, value.name: 1.0}
+        refused = bench.write(DRIVE, **values)
         if value.group == "command" and not (is_there and is_scaled):
             assert refused.code is Code.NOT_CONFIGURED, (value.leaf, refused)
 

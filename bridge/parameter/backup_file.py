@@ -13,9 +13,11 @@ from typing import Final, cast
 from bridge.errors import Fault, FileFaults
 from bridge.image import Value
 
-_FORMAT: Final = 2
-_READ: Final = (1, 2)
-"""Format 1 has neither identity nor objects."""
+_FORMAT: Final = 3
+_READ: Final = (1, 2, 3)
+"""Format 1 has neither identity nor objects, format 2 no line for its end."""
+_ENDED: Final = 3
+_END: Final = "# End of the backup: without this line, half a file would look like a whole one."
 IDENTITY: Final = ("vendor", "product", "revision", "serial")
 
 
@@ -65,6 +67,7 @@ class BackupFile:
         if self.objects:
             lines += ["", "# What the mapping file does not list, as the drive sends it.", "[objects]"]
             lines += [f"{_quoted(name)} = {_written(value)}" for name, value in self.objects.items()]
+        lines += ["", _END]
         return "\n".join(lines) + "\n"
 
 
@@ -116,12 +119,14 @@ def read_backup(path: Path) -> BackupFile:
             fault(f"identity.{name}", f"must be a whole number, called {', '.join(IDENTITY)}")
         else:
             identity[name] = value
+    breaks_off: tuple[str, str] | None = None
     if not text.endswith("\n"):
         # Half a number is a number: 12.5 that breaks off is 12.
-        line = text.count("\n") + 1
-        faults.append(
-            Fault(str(path), line, "", "the file ends within this line", "a line end, if it is whole")
-        )
+        breaks_off = "the file ends within this line", "a line end, if it is whole"
+    elif content.get("format") == _ENDED and _END not in text.splitlines():
+        breaks_off = "the file ends before its last line", f"it is {_END!r}"
+    if breaks_off:
+        faults.append(Fault(str(path), len(text.splitlines()), "", *breaks_off))
     if faults:
         raise FileFaults(faults)
     return BackupFile(

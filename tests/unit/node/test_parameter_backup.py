@@ -187,20 +187,40 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path, workshop: Workshop) ->
     assert (read.mapping, read.drive, read.saved) == ("nord/sk-tu4-cao", "conveyor/fu1", "2026-11-21")
 
 
-def test_a_file_that_breaks_off_within_a_value_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_breaks_off_anywhere_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "set.toml"
-    written = BackupFile("nord/sk-tu4-cao", "conveyor/fu1", "2026-11-21", {"P102.1": 12.5}, {})
-    path.write_text(written.text()[:-3], "utf-8")
+    values: dict[str, Value] = {"P102.1": 12.5, "P103.1": 2.0}
+    written = BackupFile("nord/sk-tu4-cao", "conveyor/fu1", "2026-11-21", values, {}, objects={"2203:01": 11})
+    text = written.text()
+    for end in range(len(text)):
+        path.write_text(text[:end], "utf-8")
+        with pytest.raises(FileFaults):
+            read_backup(path)
+    path.write_text(text[: text.index("12.") + 2], "utf-8")
     with pytest.raises(FileFaults, match=r"set.toml:8: the file ends within this line"):
         read_backup(path)
+    path.write_text(text[: text.index('"P103.1"')], "utf-8")
+    with pytest.raises(FileFaults, match=r"set.toml:8: the file ends before its last line"):
+        read_backup(path)
+
+
+def test_a_file_may_be_changed_by_hand_and_one_of_an_older_format_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "set.toml"
+    values: dict[str, Value] = {"P102.1": 12.5, "P103.1": 2.0}
+    text = BackupFile("nord/sk-tu4-cao", "conveyor/fu1", "2026-11-21", values, {}).text()
+    path.write_text(text.replace('"P103.1" = 2.0\n', "") + "\n# checked by ann\n", "utf-8")
+    assert read_backup(path).values == {"P102.1": 12.5}
+    older = "".join(line for line in text.splitlines(keepends=True) if "End of the backup" not in line)
+    path.write_text(older.replace("format = 3", "format = 2"), "utf-8")
+    assert read_backup(path).values == values
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("format = ", "is not TOML"),
-        ("", "format: must be 2"),
-        ("format = 3", "format: must be 2"),
+        ("", "format: must be 3"),
+        ("format = 4", "format: must be 3"),
         ('format = 2\nmapping = "a"\n[parameters]\n[objects]\nP1 = []', 'objects."P1": must be a number'),
         ('format = 2\nmapping = "a"\n[parameters]\nP1 = 1\n[objects]\nP1 = 2', "stands in [parameters], too"),
         ('format = 2\nmapping = "a"\n[parameters]\n[identity]\nserial = "x"', "identity.serial: must be"),

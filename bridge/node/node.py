@@ -234,6 +234,7 @@ class NodeCore:
         if isinstance(result, boot.BootError):
             self._fail_boot(result, now)
             return
+        self._view.identified(result.identification, now)
         self.wire.connect(result, now)
         problems = [f"J: {name}" for name, plan in result.drives.items() if plan.problem]
         self._enter_operation("; ".join([", ".join(problems) or "ok", *result.notes]), now)

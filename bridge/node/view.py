@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bridge.canopen.nmt import NmtState
-from bridge.command import Event, Kind, Plant
+from bridge.command import Event, Identification, Kind, Plant
 from bridge.command.link import NodeState
 from bridge.command.plant import Node
 from bridge.node.backoff import BackOff
@@ -18,6 +18,7 @@ class NodeView:
         self._top = f"{node.name}/node"
         self._failure = ""
         self._errors = ""
+        self._identification: Identification | None = None
 
     def say(self, text: str, now: float) -> None:
         """Step or result of the boot-up."""
@@ -47,6 +48,22 @@ class NodeView:
         if text and text != self._errors:
             self._tell(Kind.EMERGENCY, 300, f"the node says: {text}", now)
         self._errors = text
+
+    def identified(self, found: Identification, now: float) -> None:
+        """Who the node is, by a boot-up that has succeeded; an event where that is somebody else."""
+        before, self._identification = self._identification, found
+        if before is None:
+            return
+        told = [
+            f"{name} {getattr(found, name):08X}h, was {getattr(before, name):08X}h"
+            for name in ("vendor", "product", "revision")
+            if getattr(found, name) != getattr(before, name)
+        ]
+        if found.serial != before.serial:
+            told.append(f"serial number {found.serial}, was {before.serial}")
+        if told:
+            text = f"another device than before: {', '.join(told)}. Its settings may be others"
+            self._tell(Kind.CONFIGURATION, 600, text, now)
 
     def resets(self, why: str, now: float) -> None:
         self._tell(Kind.CONFIGURATION, 500, f"reset communication by the bridge, once: {why}", now)

@@ -93,3 +93,18 @@ def test_a_lost_heartbeat_says_what_helps(tmp_path: Path) -> None:
     quick.nodes[1].present = False
     quick.run(0.5)
     assert quick.status(1) == f"E: lost: no heartbeat for 300 ms: {HINTS['E']}"
+
+
+def test_another_device_than_before_is_told(tmp_path: Path) -> None:
+    """Nothing in the site file says which serial number the node has: it is served all the same."""
+    quick = booted(tmp_path, "")
+    node = quick.nodes[1]
+    node.start(quick.now)
+    quick.run(3.0)
+    assert not [event for event in quick.events if "another device" in event.message]
+    node.objects[0x1018, 4] = struct.pack("<I", 6)
+    node.start(quick.now)
+    quick.run(3.0)
+    assert quick.states() == "o"
+    [event] = [event for event in quick.events if "another device" in event.message]
+    assert event.message.startswith(f"another device than before: serial number 6, was {0xABCD_0005}")

@@ -221,8 +221,13 @@ class KernelBursts:
         """The kernel refuses to delete a burst that it does not have."""
         assert self._manager is not None
         if can_id in self._held:
-            self._manager.send(bcm.delete(can_id))
+            # Before the message: who is interrupted right after it must not delete the burst twice.
             self._held.remove(can_id)
+            try:
+                self._manager.send(bcm.delete(can_id))
+            except OSError:
+                self._held.add(can_id)
+                raise
         return 0
 
     def _give_up(self, error: OSError, now: float) -> None:

@@ -16,7 +16,7 @@ from bridge.canopen.nmt import NmtState
 from bridge.canopen.sync import burst_length, sync_frames
 from bridge.command import Plant
 from bridge.master.network import Network
-from bridge.master.standstill import Alarm
+from bridge.master.standstill import Alarm, StoodStill
 from bridge.node.node import NodeCore
 from bridge.node.process.process_data import Repetition, RunningBurst
 from bridge.ratelimit import RateLimit
@@ -162,18 +162,31 @@ class Line:
             return
         due = self._due(repetitions, now, renew=renew)
         self.repetitions = repetitions
-        self.alarm.set(self.burst_s)
-        for wanted, changed in due:
-            # In this order: the process may be stopped right after it has read the clock.
-            if self.stood_still(now) or self.alarm.rang:
-                self.repetitions = None
-                return
-            self._burst(wanted, now, at_once=changed)
+        try:
+            self._hand_over(due, now)
+        except StoodStill:
+            self.repetitions = None
+            return
         self.hold_at = min(
             (at for wanted in repetitions.values() for at in wanted.hold_at if at > now), default=inf
         )
         if self.plant.unsent_stops:
             network.on_handed_over(self.clock())
+
+    def _hand_over(self, due: list[tuple[Repetition, bool]], now: float) -> None:
+        """Raises ``StoodStill`` where the process was stopped for so long that the rest is not right any
+        more. What was begun then is handed over anew after the gap."""
+        self.alarm.set(self.burst_s)
+        try:
+            for wanted, changed in due:
+                # In this order: the process may be stopped right after it has read the clock, and anywhere
+                # on the way to the kernel.
+                self.alarm.breaks_in = True
+                if self.stood_still(now) or self.alarm.rang:
+                    raise StoodStill
+                self._burst(wanted, now, at_once=changed)
+        finally:
+            self.alarm.breaks_in = False
 
     @property
     def burst_s(self) -> float:

@@ -10,11 +10,16 @@ from __future__ import annotations
 import signal
 
 
+class StoodStill(Exception):
+    """The process was stopped for longer than what it was about to do may wait."""
+
+
 class Alarm:
-    """``rang``: the time it was last set to has passed. This one never rings: it is for a master that shares
-    its process."""
+    """``rang``: the time it was last set to has passed. While it ``breaks_in``, it raises ``StoodStill``
+    wherever the process is as it rings. This one never rings: it is for a master that shares its process."""
 
     rang = False
+    breaks_in = False
 
     def set(self, seconds: float) -> None:
         """Ring then, unless set again before. 0: not at all."""
@@ -32,3 +37,6 @@ class SignalAlarm(Alarm):
 
     def _ring(self) -> None:
         self.rang = True
+        if self.breaks_in:
+            self.breaks_in = False
+            raise StoodStill

@@ -15,7 +15,7 @@ from bridge.command.plant import Enforce
 from bridge.image import Quality
 from bridge.mapping.model import IdentityRule
 from bridge.master.line import Line
-from bridge.master.standstill import Alarm
+from bridge.master.standstill import Alarm, StoodStill
 from tests.support.bench import NORD, PLC, Bench, write_site
 
 RPDO1 = 0x205
@@ -270,6 +270,33 @@ def test_a_process_stopped_at_the_end_of_its_last_look_at_the_clock_sends_nothin
         patched.setattr(Line, "stood_still", stand_still_after)
         bench.write(control_word=0x047F, setpoint_1=0x2100)
     assert alarm_is_set == [0.1], "the dead-man time"
+    bench.run(0.5)
+    assert bench.sent(RPDO1)
+    assert not [frame.data.hex() for frame in bench.sent(RPDO1) if frame.data[0] & 0x0F == 0x0F]
+
+
+def test_a_process_stopped_on_the_way_to_the_kernel_hands_nothing_over(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Behind both looks: the alarm breaks in."""
+    running(bench)
+    alarm, hand_over = Alarm(), bench.bus.burst
+
+    def stand_still_before(burst: Burst, now: float, **more: bool) -> None:
+        if burst.can_id == RPDO1 and alarm.breaks_in:
+            bench.now += 1.0
+            alarm.rang = True
+            raise StoodStill
+        hand_over(burst, now, **more)
+
+    (line,) = bench.master._lines
+    bench.log.clear()
+    with monkeypatch.context() as patched:
+        patched.setattr(line, "alarm", alarm)
+        patched.setattr(bench.bus, "burst", stand_still_before)
+        bench.write(control_word=0x047F, setpoint_1=0x2100)
+    assert alarm.rang
+    assert not alarm.breaks_in, "nothing but the hand-over is broken into"
     bench.run(0.5)
     assert bench.sent(RPDO1)
     assert not [frame.data.hex() for frame in bench.sent(RPDO1) if frame.data[0] & 0x0F == 0x0F]

@@ -157,5 +157,7 @@ def test_a_drive_with_another_application_gets_no_position(tmp_path: Path):
     bench = bench_with(tmp_path, Stoeber5000(1))
     status = str(bench.value("lift/node/boot_status"))
     assert "26E6:00/16 is no word that the mapping file knows" in status
-    assert bench.write(DRIVE, position=100).code is Code.NOT_CONFIGURED
+    assert "no RPDO of the node carries 30D2:00, a part of the control word" in status
+    assert not bench.write(DRIVE, position=100).forwarded
+    assert bench.plant.image.read(f"{DRIVE}/status/state").quality is Quality.CONFIG_ERROR
     assert bench.plant.image.read(f"{DRIVE}/actual/position").quality is Quality.CONFIG_ERROR

@@ -24,9 +24,13 @@ def main() -> None:
 def _run() -> None:
     from bridge.cli.app import run_app
 
+    run_app(_take_interrupts)
+
+
+def _take_interrupts() -> None:
+    """Not before: an exception in the midst of an import may come out as another one."""
     if not ending_signals.is_held:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    run_app()
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from collections.abc import Callable
 from typing import Final
 
 import typer
@@ -67,10 +68,13 @@ def version() -> None:
     print(__version__)
 
 
-def run_app() -> None:
-    """Run the command line. Exit codes: 0 done, 1 failed, 2 bad usage or file, 3 bus or port."""
+def run_app(imported: Callable[[], None] = lambda: None) -> None:
+    """Run the command line; ``imported`` is called before anything is done. Exit codes: 0 done, 1 failed,
+    2 bad usage or file, 3 bus or port."""
     try:
-        make_app(*sys.argv[1:2])()
+        app = make_app(*sys.argv[1:2])
+        imported()
+        app()
     except BridgeError as error:
         # Empty if a child process has already said it.
         if sentence := str(error):

@@ -9,10 +9,10 @@ import typer
 
 from bridge.cli.terminal import printable
 from bridge.derive import derive_family
-from bridge.eds import Severity, read_whole_device_file
-from bridge.errors import OperationFailed
+from bridge.eds import Severity, contradictions, read_whole_device_file
+from bridge.errors import FileFaults, OperationFailed
 from bridge.mapping.loader import mappings_dir, read_family
-from bridge.mapping.model import Parameter
+from bridge.mapping.model import Family, Parameter
 
 app = typer.Typer(help="Mapping files of drive families.", no_args_is_help=True)
 
@@ -37,20 +37,35 @@ def new(
     """Write a mapping for the CiA 402 drive that FILE describes."""
     description = read_whole_device_file(file)
     lost = [one for one in description.findings if one.severity is Severity.ERROR]
+    told = sorted((*lost, *contradictions(description)), key=lambda one: one.line)
     derived = derive_family(description, file.name, mode)
     path = output or _FOLDER / f"{derived.name}.toml"
+    family = _written(path, derived.text)
+    print(printable(f"{path}: {family.family.name}, {derived.mode.mapping}, {_count(family.parameter)}"))
+    for one in told:
+        print(printable(f"{file}:{one.line}: {one.text}"))
+
+
+def _written(path: Path, text: str) -> Family:
+    """The mapping at ``path``, which is there whole and readable, or not at all. Raises ``OperationFailed``
+    and ``FileFaults``."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("x", encoding="utf-8") as out:
-            out.write(derived.text)
+        out = path.open("x", encoding="utf-8")
     except FileExistsError:
         raise OperationFailed(f"{path} is there already") from None
     except OSError as error:
         raise OperationFailed(f"{path} cannot be written: {error.strerror}") from error
-    family = read_family(path, (_FOLDER, mappings_dir()))
-    print(printable(f"{path}: {family.family.name}, {derived.mode.mapping}, {_count(family.parameter)}"))
-    for one in lost:
-        print(printable(f"{file}:{one.line}: {one.text}"))
+    try:
+        with out:
+            out.write(text)
+        return read_family(path, (_FOLDER, mappings_dir()))
+    except OSError as error:
+        path.unlink(missing_ok=True)
+        raise OperationFailed(f"{path} cannot be written: {error.strerror}") from error
+    except FileFaults:
+        path.unlink(missing_ok=True)
+        raise
 
 
 def _count(parameters: list[Parameter]) -> str:

@@ -5,6 +5,7 @@ oddity with its line. They raise ``FileFaults`` and nothing else.
 """
 
 from bridge.eds.configuration import configuration as configuration
+from bridge.eds.contradictions import contradictions as contradictions
 from bridge.eds.load import read_configuration as read_configuration
 from bridge.eds.load import read_device as read_device
 from bridge.eds.load import read_device_file as read_device_file

@@ -8,6 +8,7 @@ from typing import Final
 
 from bridge.config.download import Download, parse_concise_dcf
 from bridge.eds.configuration import configuration
+from bridge.eds.contradictions import contradictions
 from bridge.eds.eds import read_eds
 from bridge.eds.model import Description, Report, Severity
 from bridge.eds.text import decode
@@ -38,7 +39,9 @@ def read_device(content: bytes, name: str) -> Description:
         line, why = (first.line, f": {first.text}") if first else (0, "")
         message = f"is not a device description: no object is described in it{why}"
         raise FileFaults([Fault(name, line, "", message, "an EDS, DCF, XDD or XDC")])
-    return replace(description, findings=findings, broken_off_at=report.broken_off_at)
+    for one in contradictions(description):
+        report.warning(one.line, one.text)
+    return replace(description, findings=report.findings(), broken_off_at=report.broken_off_at)
 
 
 def read_whole_device_file(path: Path) -> Description:

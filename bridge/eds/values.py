@@ -119,6 +119,12 @@ def encode(plain: int | float | str | bytes, data_type: DataType) -> bytes:
     raise BadValue(f"{plain} is no {data_type.name}")
 
 
+def bits_of_type(data_type: DataType) -> int | None:
+    """The length of a number; None for what may have any length."""
+    found = _INTEGERS.get(data_type) or _REALS.get(data_type)
+    return 8 * found.size if found else None
+
+
 def _octets(text: str) -> bytes:
     bare = re.sub(r"[\s,]|0x", "", text.strip().strip('"'), flags=re.IGNORECASE)
     try:

@@ -9,14 +9,14 @@ from typer.testing import CliRunner
 
 from bridge.cli.app import make_app
 from bridge.cli.simulation import simulated_nodes
-from bridge.errors import FileFaults, OperationFailed
+from bridge.errors import Fault, FileFaults, OperationFailed
 from bridge.project import load_project
 from bridge.sim.cia402_drive import Cia402Drive
 from bridge.sim.generic_node import GenericNode
 from tests.support import sites
 from tests.support.invented import NAME, SPIN
 from tests.support.invented_eds import SPIN as INVENTED
-from tests.support.invented_eds import eds
+from tests.support.invented_eds import eds, pdo
 
 RUN = CliRunner()
 
@@ -85,6 +85,30 @@ def test_what_could_not_be_read_is_told(tmp_path: Path) -> None:
     )
     said = new(str(file), "--output", str(tmp_path / "spin.toml"))
     assert "2004h has no DataType" in said
+
+
+def test_where_the_file_contradicts_itself_is_told(tmp_path: Path) -> None:
+    file = tmp_path / "spin.eds"
+    content = eds({**INVENTED, **pdo("1400", "$NODEID+0x200", "0x60400010", "0x50000010")})
+    file.write_bytes(content)
+    line = content.decode().splitlines().index("[1600sub2]") + 1
+    said = new(str(file), "--output", str(tmp_path / "spin.toml"))
+    assert f"spin.eds:{line}: 1600h:02 maps 50000010h: 5000h:00 is not described" in said
+
+
+def test_a_mapping_that_cannot_be_written_whole_is_not_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, output = tmp_path / "spin.eds", tmp_path / "spin.toml"
+    file.write_bytes(eds())
+
+    def fails(path: Path, folders: object) -> None:
+        raise FileFaults([Fault(str(path), 3, "slot", "is wrong")])
+
+    monkeypatch.setattr("bridge.cli.family.read_family", fails)
+    with pytest.raises(FileFaults, match=r"spin.toml:3: slot"):
+        new(str(file), "--output", str(output))
+    assert not output.exists()
 
 
 def test_a_file_that_is_none_is_a_fault(tmp_path: Path) -> None:

@@ -1,0 +1,117 @@
+"""Where a device description contradicts itself: each value is readable, and they cannot all be right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from bridge.canopen import cobid
+from bridge.eds.model import DataType, Description, Entry, Finding, Object, Severity, Value
+from bridge.eds.values import BadValue, bits_of_type, encode
+
+_MAPPINGS: Final = {True: range(0x1600, 0x1800), False: range(0x1A00, 0x1C00)}
+"""Mapping parameters of RPDOs (True) and TPDOs (CiA 301 §7.5.2.36, §7.5.2.38)."""
+_COMMUNICATION: Final = (range(0x1400, 0x1600), range(0x1800, 0x1A00))
+_MPDO: Final = (0xFE, 0xFF)
+"""In sub-index 0 they are no counts (CiA 301 §7.5.2.36)."""
+_MOST_BITS: Final = 64
+_LAST_TYPE: Final = 0x1F
+"""Up to here a mapped index is a data type: a dummy (CiA 301 §7.4.7.3)."""
+_NODE_IDS: Final = (1, 127)
+
+
+def contradictions(description: Description) -> list[Finding]:
+    """What speaks against what, with the line of the one that names the other."""
+    found: list[Finding] = []
+    for one in description.objects:
+        for entry in one.entries:
+            found += (_told(entry.line, text) for text in (*_limits(entry), *_node_ids(entry)))
+        for receives, mappings in _MAPPINGS.items():
+            if one.index in mappings:
+                found += _mapping(description, one, receives)
+    return found
+
+
+def _told(line: int, text: str) -> Finding:
+    return Finding(line, Severity.WARNING, text)
+
+
+def _place(entry: Entry) -> str:
+    return f"{entry.index:04X}h:{entry.sub:02X}"
+
+
+def _limits(entry: Entry) -> Iterator[str]:
+    low, high, default = (_number(value) for value in (entry.low, entry.high, entry.default))
+    if low is not None and high is not None and low > high:
+        yield f"{_place(entry)}: LowLimit {low} is above HighLimit {high}"
+    elif default is not None and low is not None and default < low:
+        yield f"{_place(entry)}: DefaultValue {default} is below LowLimit {low}"
+    elif default is not None and high is not None and default > high:
+        yield f"{_place(entry)}: DefaultValue {default} is above HighLimit {high}"
+
+
+def _number(value: Value | None) -> int | float | None:
+    """Of what depends on the node id nothing is known here."""
+    if value is None or value.plus_node_id or not isinstance(value.plain, int | float):
+        return None
+    return value.plain
+
+
+def _node_ids(entry: Entry) -> Iterator[str]:
+    """A value with $NODEID has to fit on every node; that of a PDO has to be an identifier, too."""
+    value = entry.current
+    if value is None or not value.plus_node_id or entry.data_type is None:
+        return
+    for node_id in _NODE_IDS:
+        plain = value.at(node_id)
+        if not isinstance(plain, int):
+            return
+        try:
+            encode(plain, entry.data_type)
+        except BadValue as error:
+            yield f"{_place(entry)}: {value} of the node {node_id}: {error}"
+            return
+        is_identifier = entry.sub == 1 and any(entry.index in each for each in _COMMUNICATION)
+        number = plain & ~(cobid.PDO_DISABLED | cobid.NO_REMOTE)
+        if is_identifier and number > cobid.COB_ID_MASK and not plain & cobid.PDO_EXTENDED:
+            yield f"{_place(entry)}: {value} of the node {node_id} is {number:X}h, which is no identifier"
+            return
+
+
+def _mapping(description: Description, one: Object, receives: bool) -> Iterator[Finding]:
+    """What a PDO maps by default, and whether that is there and fits."""
+    count = description.number(one.index, 0)
+    if not count or count in _MPDO:
+        return
+    head = one.entries[0]
+    described = max(entry.sub for entry in one.entries)
+    if count > described:
+        yield _told(head.line, f"{_place(head)} maps {count} objects, and {described} are described")
+    length = 0
+    for entry in one.entries[1:]:
+        word = description.number(one.index, entry.sub)
+        if not word or entry.sub > count:
+            continue
+        length += word & 0xFF
+        text = _mapped(description, word, receives)
+        if text:
+            yield _told(entry.line, f"{_place(entry)} maps {word:08X}h: {text}")
+    if length > _MOST_BITS:
+        yield _told(head.line, f"{_place(head)} maps {length} bits, and a PDO has at most {_MOST_BITS}")
+
+
+def _mapped(description: Description, word: int, receives: bool) -> str:
+    """Why an object cannot be mapped like this; empty where it can."""
+    index, sub, bits = word >> 16, word >> 8 & 0xFF, word & 0xFF
+    if index <= _LAST_TYPE:
+        return ""
+    entry = description.entry(index, sub)
+    if entry is None:
+        return f"{index:04X}h:{sub:02X} is not described"
+    place, kind = _place(entry), entry.data_type
+    length = bits_of_type(kind) if kind else None
+    if kind and length and bits != length and not (kind is DataType.BOOLEAN and bits == 1):
+        return f"{place} has {length} bits ({kind.name}), not {bits}"
+    if not (entry.access.writable if receives else entry.access.readable):
+        return f"{place} is {entry.access.value}, and this PDO is {'received' if receives else 'sent'}"
+    return ""

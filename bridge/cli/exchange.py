@@ -24,6 +24,7 @@ from bridge.cli.parameter_backup import (
     content_for,
     differences,
     print_comparison,
+    refuse_another,
     restored_facts,
 )
 from bridge.cli.parameter_drive import SiteArgument, Target, find
@@ -154,11 +155,10 @@ def _old(places: Sequence[_Place]) -> dict[str, int]:
 def _judge(
     site: Path, node: NodeTable, places: Sequence[_Place], identity: dict[str, int], *, same_serial: bool
 ) -> None:
-    """Raises ``OperationFailed`` unless the node is a new device of the same kind that the site file lets be
-    used."""
+    """Raises ``FileFaults`` where a file is of another kind of node, and ``OperationFailed`` unless the node
+    is a new device that the site file lets be used."""
     for place in places:
-        if why := backups.why_another(place.content.identity, identity):
-            raise OperationFailed(f"{place.file}: {why}; nothing written")
+        refuse_another(place.file, place.content, identity)
     # CiA 301 §7.5.2.21: 0 is no serial number.
     old, new = _old(places).get("serial", 0), identity.get("serial", 0)
     if old and old == new and not same_serial:

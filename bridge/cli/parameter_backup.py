@@ -16,10 +16,10 @@ from bridge.cli.bus import AsJson, print_table, tell
 from bridge.cli.factory import DESCRIPTIONS, described, factory
 from bridge.cli.parameter_drive import DriveArgument, Force, SiteArgument, Target, Yes, find
 from bridge.cli.parameter_sets import read_all, write_all
-from bridge.errors import OperationFailed
+from bridge.errors import Fault, FileFaults, OperationFailed
 from bridge.image import Value
 from bridge.mapping.model import Parameter
-from bridge.parameter import ParameterError, backups
+from bridge.parameter import backups
 from bridge.parameter.backup_file import BackupFile, read_backup
 from bridge.parameter.codec import shown
 
@@ -121,8 +121,7 @@ def restore(
     content = content_for(target, file)
     identity: dict[str, int] = {}
     target.run(lambda now: backups.identify(identity))
-    if why := backups.why_another(content.identity, identity):
-        raise OperationFailed(f"{file}: {why}; nothing written")
+    refuse_another(file, content, identity)
     serial = content.identity.get("serial")
     if serial != identity.get("serial") and serial is not None:
         tell(f"{target.name} has the serial number {identity.get('serial', 'unknown')}, the file {serial}")
@@ -161,7 +160,7 @@ def restore(
 
 
 def content_for(target: Target, file: Path) -> BackupFile:
-    """A file that fits this drive, or the factory settings of a device description. Raises ``BadParameter``
+    """A file that fits this drive, or the factory settings of a device description. Raises ``FileFaults``
     where it does not fit."""
     if file.suffix.lower() in DESCRIPTIONS:
         objects = factory(file, target.access.names, target.node.id)
@@ -169,15 +168,28 @@ def content_for(target: Target, file: Path) -> BackupFile:
             raise typer.BadParameter(f"{file} has no factory settings of {target.name}")
         return BackupFile(target.node.mapping, target.name, "", {}, {}, objects=objects)
     content = read_backup(file)
-    if content.mapping != target.node.mapping:
-        raise typer.BadParameter(
-            f"{file} is of {content.mapping}, and {target.name} has {target.node.mapping}"
-        )
-    try:
-        backups.in_order(target.access.names, content.all)
-    except ParameterError as error:
-        raise typer.BadParameter(f"{file}: {error}") from None
+    wanted = target.node.mapping
+    if content.mapping != wanted:
+        message = f"the file is of {content.mapping}, and {target.name} has {wanted}"
+        raise FileFaults([_fault(file, content, "mapping", message, "a backup of such a drive")])
+    faults = [
+        _fault(file, content, name, str(error))
+        for name, error in backups.misfits(target.access.names, content.all)
+    ]
+    if faults:
+        raise FileFaults(faults)
     return content
+
+
+def refuse_another(file: Path, content: BackupFile, identity: Mapping[str, int]) -> None:
+    """Raises ``FileFaults`` where the file is of another kind of node than has told ``identity``."""
+    if found := backups.why_another(content.identity, identity):
+        name, why = found
+        raise FileFaults([_fault(file, content, name, f"{why}; nothing written", "a backup of such a node")])
+
+
+def _fault(file: Path, content: BackupFile, name: str, message: str, hint: str = "") -> Fault:
+    return Fault(str(file), content.lines.get(name, 0), name, message, hint)
 
 
 def differences(target: Target, values: Mapping[str, Value]) -> backups.Comparison:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, cast
 
-from bridge.errors import Fault, FileFaults
+from bridge.errors import Fault
 from bridge.image import Value
+from bridge.tomlfile import TomlFile, dotted
 
 _FORMAT: Final = 3
 _READ: Final = (1, 2, 3)
@@ -39,6 +39,8 @@ class BackupFile:
     """What the mapping file does not list, as the drive sends it."""
     unreadable: Mapping[str, str] = field(default_factory=dict[str, str])
     """Why something was not read, by its name; not read back."""
+    lines: Mapping[str, int] = field(default_factory=dict[str, int])
+    """Where the file has ``mapping``, a part of its identity or a value, by its name."""
 
     @property
     def all(self) -> dict[str, Value]:
@@ -73,64 +75,69 @@ class BackupFile:
 
 def read_backup(path: Path) -> BackupFile:
     """Raises ``FileFaults`` with everything that is wrong."""
-    try:
-        text = path.read_text(encoding="utf-8")
-        content = tomllib.loads(text)
-    except OSError as error:
-        raise FileFaults([Fault(str(path), 0, "", f"cannot be read: {error.strerror or error}")]) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FileFaults([Fault(str(path), 0, "", f"is not TOML: {error}")]) from None
-    faults: list[Fault] = []
+    file = TomlFile(path)
+    content = file.data
 
-    def fault(key: str, message: str, hint: str = "") -> None:
-        faults.append(Fault(str(path), 0, key, message, hint))
+    def fault(key: tuple[str, ...], message: str, hint: str = "") -> None:
+        shown = dotted(key if key[0] == "identity" else (key[0], *map(_quoted, key[1:])))
+        file.faults.append(Fault(str(path), file.line(key), shown, message, hint))
 
-    if content.get("format") not in _READ:
-        fault("format", f"must be {_FORMAT}", "is this a file of `drivebridge parameters backup`?")
-    texts: dict[str, str] = {}
-    for key in ("mapping", "drive", "saved"):
-        texts[key] = str(content.get(key, ""))
+    form = content.get("format")
+    if form not in _READ:
+        fault(("format",), f"must be {_FORMAT}", "is this a file of `drivebridge parameters backup`?")
+    texts = {key: str(content.get(key, "")) for key in ("mapping", "drive", "saved")}
     if not texts["mapping"]:
-        fault("mapping", "is missing", "the mapping that the parameters are named by")
+        fault(("mapping",), "is missing", "the mapping that the parameters are named by")
     if "parameters" not in content:
-        fault("parameters", "is missing", "a table of names and values")
+        fault(("parameters",), "is missing", "a table of names and values")
 
     def table(key: str) -> dict[str, Value]:
         values: dict[str, Value] = {}
         found: object = content.get(key, {})
         if not isinstance(found, dict):
-            fault(key, "must be a table of names and values")
+            fault((key,), "must be a table of names and values")
             return values
         for name, value in cast("dict[str, object]", found).items():
             if not isinstance(value, bool | int | float | str) or (
                 isinstance(value, float) and not math.isfinite(value)
             ):
-                fault(f'{key}."{name}"', "must be a number, a text, true or false")
+                fault((key, name), "must be a number, a text, true or false")
             else:
                 values[name] = value
         return values
 
     values, objects = table("parameters"), table("objects")
     for name in values.keys() & objects.keys():
-        fault(f'objects."{name}"', "stands in [parameters], too: leave one of them out")
+        fault(("objects", name), "stands in [parameters], too: leave one of them out")
     identity: dict[str, int] = {}
     for name, value in table("identity").items():
         if name not in IDENTITY or isinstance(value, bool) or not isinstance(value, int):
-            fault(f"identity.{name}", f"must be a whole number, called {', '.join(IDENTITY)}")
+            fault(("identity", name), f"must be a whole number, called {', '.join(IDENTITY)}")
         else:
             identity[name] = value
     breaks_off: tuple[str, str] | None = None
-    if not text.endswith("\n"):
+    if not file.text.endswith("\n"):
         # Half a number is a number: 12.5 that breaks off is 12.
         breaks_off = "the file ends within this line", "a line end, if it is whole"
-    elif content.get("format") == _ENDED and _END not in text.splitlines():
+    elif form == _ENDED and _END not in file.text.splitlines():
         breaks_off = "the file ends before its last line", f"it is {_END!r}"
     if breaks_off:
-        faults.append(Fault(str(path), len(text.splitlines()), "", *breaks_off))
-    if faults:
-        raise FileFaults(faults)
+        file.faults.append(Fault(str(path), len(file.text.splitlines()), "", *breaks_off))
+    file.finish()
     return BackupFile(
-        texts["mapping"], texts["drive"], texts["saved"], values, {}, identity=identity, objects=objects
+        texts["mapping"],
+        texts["drive"],
+        texts["saved"],
+        values,
+        {},
+        identity=identity,
+        objects=objects,
+        lines={
+            "mapping": file.line(("mapping",)),
+            **{name: file.line(("identity", name)) for name in identity},
+            **{name: file.line(("parameters", name)) for name in values},
+            **{name: file.line(("objects", name)) for name in objects},
+        },
     )
 
 

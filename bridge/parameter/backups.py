@@ -8,7 +8,7 @@ goes on where it was when it is begun again with what it has filled so far.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -104,22 +104,39 @@ def in_order(names: Names, values: Mapping[str, Value]) -> list[tuple[Entry, Val
     names of one parameter, before anything is done.
     """
     places = {entry.address: place for place, entry in enumerate(settings(names))}
-    found = [(names.resolve(name), value) for name, value in values.items()]
     seen: dict[ObjectRef, str] = {}
-    for name, (entry, _) in zip(values, found, strict=True):
-        if entry.address in seen:
-            other = seen[entry.address]
-            raise ParameterError(
-                Why.OUT_OF_RANGE, f"{other} and {name} are the same parameter: leave one of them out"
-            )
-        seen[entry.address] = name
-        if entry.definition and not entry.definition.backup:
-            raise ParameterError(
-                Why.PROTECTED,
-                f"{name} is an address, an identity or a command, and no set holds it: remove it, and write "
-                "it by itself where it is to be changed",
-            )
+    found = [(_fitting(names, name, seen), value) for name, value in values.items()]
     return sorted(found, key=lambda pair: places.get(pair[0].address, len(places)))
+
+
+def misfits(names: Names, values: Mapping[str, Value]) -> Iterator[tuple[str, ParameterError]]:
+    """Everything in a set that the family cannot have, by its name in the set: what ``in_order`` refuses, and
+    values that a parameter does not take."""
+    seen: dict[ObjectRef, str] = {}
+    for name, value in values.items():
+        try:
+            entry = _fitting(names, name, seen)
+            if entry.definition is not None:  # of others only the drive knows how long they are
+                encode_value(entry, value, None)
+        except ParameterError as error:
+            yield name, error
+
+
+def _fitting(names: Names, name: str, seen: dict[ObjectRef, str]) -> Entry:
+    """What ``name`` means in a set that already has ``seen``. Raises ``ParameterError``."""
+    entry = names.resolve(name)
+    other = seen.setdefault(entry.address, name)
+    if other != name:
+        raise ParameterError(
+            Why.OUT_OF_RANGE, f"{other} and {name} are the same parameter: leave one of them out"
+        )
+    if entry.definition and not entry.definition.backup:
+        raise ParameterError(
+            Why.PROTECTED,
+            f"{name} is an address, an identity or a command, and no set holds it: remove it, and write "
+            "it by itself where it is to be changed",
+        )
+    return entry
 
 
 def back_up(access: DriveParameters, into: Backup, now: float) -> Steps:
@@ -231,13 +248,14 @@ def identify(into: dict[str, int]) -> Steps:
     into |= found
 
 
-def why_another(of_file: Mapping[str, int], of_node: Mapping[str, int]) -> str:
-    """Why a set is not of a drive of this kind; empty where it is, or where the set does not say."""
+def why_another(of_file: Mapping[str, int], of_node: Mapping[str, int]) -> tuple[str, str] | None:
+    """What of its identity says that a set is not of a drive of this kind, and the reason; None where it is,
+    or where the set does not say."""
     for name in ("vendor", "product"):
         if name in of_file and of_file[name] != of_node.get(name):
             is_now = f"{of_node[name]:08X}h" if name in of_node else "not told"
-            return f"the file is of a node with {name} {of_file[name]:08X}h, and this one's is {is_now}"
-    return ""
+            return name, f"the file is of a node with {name} {of_file[name]:08X}h, and this one's is {is_now}"
+    return None
 
 
 def _refusal(entry: Entry, error: ParameterError, into: Backup) -> str:

@@ -60,7 +60,7 @@ class TomlFile:
         """Raises ``FileFaults`` where the file cannot be read or is not TOML."""
         self.path = path
         self.faults: list[Fault] = []
-        text = self._text = self._read()
+        text = self.text = self._read()
         try:
             self.data: dict[str, Any] = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
@@ -76,7 +76,7 @@ class TomlFile:
     @cached_property
     def _lines(self) -> dict[Key, int]:
         """Only a fault needs them, and most files have none."""
-        return key_lines(self._text)
+        return key_lines(self.text)
 
     def _read(self) -> str:
         try:

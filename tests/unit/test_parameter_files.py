@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from bridge.cli.app import make_app
 from bridge.cli.factory import described, factory
+from bridge.errors import FileFaults
 from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
 from bridge.parameter import Names, ObjectRef
@@ -63,10 +64,16 @@ def test_two_files_are_compared_without_a_bus() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (('"nord/sk-tu4-cao"', '"lenze/8400-motec"'), "is of lenze/8400-motec"),
-        (('"P203.1" = 11', '"P203.1" = '), "is not TOML"),
-        (('"P203.1" = 11', '"P102.1" = 1.5'), "stands in [parameters], too"),
-        (('"P203.1" = 11', '"P102" = 1.5'), "are the same parameter"),
+        (
+            ('"nord/sk-tu4-cao"', '"lenze/8400-motec"'),
+            "fu1.toml:2: mapping: the file is of lenze/8400-motec, and conveyor/fu1 has nord/sk-tu4-cao",
+        ),
+        (('"P203.1" = 11', '"P203.1" = '), "fu1.toml:6: is not TOML"),
+        (('"P203.1" = 11', '"P102.1" = 1.5'), 'fu1.toml:6: objects."P102.1": stands in [parameters], too'),
+        (('"P203.1" = 11', '"P102" = 1.5'), "fu1.toml:6: P102: P102.1 and P102 are the same parameter"),
+        (('"P203.1" = 11', '"P9999" = 1.5'), "fu1.toml:6: P9999: there is no parameter"),
+        (('"P102.1" = 1.5', '"P102.1" = "fast"'), "fu1.toml:4: P102.1: P102.1 takes"),
+        (('"P102.1" = 1.5', '"P102.1" = 1e9'), "fu1.toml:4: P102.1: P102.1 takes"),
     ],
 )
 def test_a_file_that_does_not_fit_is_named(folder: Path, change: tuple[str, str], message: str) -> None:
@@ -74,7 +81,7 @@ def test_a_file_that_does_not_fit_is_named(folder: Path, change: tuple[str, str]
     (folder / "fu1.toml").write_text(text, "utf-8")
     done = compare("fu1.toml", "--with", "monday.toml")
     said = " ".join((done.output + str(done.exception)).replace("│", " ").split())
-    assert done.exit_code != 0
+    assert isinstance(done.exception, FileFaults)
     assert message in said
 
 

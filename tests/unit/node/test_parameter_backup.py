@@ -237,6 +237,31 @@ def test_a_file_that_is_none_says_what_is_wrong(tmp_path: Path, text: str, messa
     assert message in str(told.value)
 
 
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b'format = 2\nmapping = "a"\n[parameters]\nP1 = 1\nP2 = 2\nP1 = 3\n', ":6: is not TOML"),
+        (b'format = 2\nmapping = "a"\n[parameters]\n# \xdcberlast\n', ":4: is not UTF-8 (save it as UTF-8)"),
+        (b'format = 2\nmapping = "a"\n[parameters]\nP1 = 1\nP2 = [2]\n', ':5: parameters."P2": must be'),
+        (b'mapping = "a"\nformat = 7\n[parameters]\n', ":2: format: must be"),
+    ],
+)
+def test_each_fault_has_its_line(tmp_path: Path, content: bytes, told: str) -> None:
+    path = tmp_path / "set.toml"
+    path.write_bytes(content)
+    with pytest.raises(FileFaults) as refused:
+        read_backup(path)
+    assert str(refused.value).startswith(f"{path}{told}")
+
+
+def test_a_file_with_other_line_ends_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "set.toml"
+    values: dict[str, Value] = {"P102.1": 12.5}
+    text = BackupFile("nord/sk-tu4-cao", "conveyor/fu1", "2026-11-21", values, {}).text()
+    path.write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
+    assert read_backup(path).values == values
+
+
 def _refusal(workshop: Workshop, values: dict[str, Value]) -> str:
     done = backups.Restored()
     error = workshop.run(lambda now: backups.restore(workshop.access, values, done, now))
@@ -439,8 +464,10 @@ def test_a_set_is_of_a_drive_with_the_same_vendor_and_product() -> None:
     of_file = {"vendor": 0x38, "product": 2, "serial": 1}
     assert not backups.why_another(of_file, {"vendor": 0x38, "product": 2, "serial": 9})
     assert not backups.why_another({}, {"vendor": 0x38})
-    assert "product 00000002h" in backups.why_another(of_file, {"vendor": 0x38, "product": 3})
-    assert "not told" in backups.why_another(of_file, {"vendor": 0x38})
+    name, why = backups.why_another(of_file, {"vendor": 0x38, "product": 3}) or ("", "")
+    assert (name, "product 00000002h" in why) == ("product", True)
+    name, why = backups.why_another(of_file, {"vendor": 0x38}) or ("", "")
+    assert (name, "not told" in why) == ("product", True)
 
 
 def test_another_device_that_answers_after_a_break_is_noticed(workshop: Workshop) -> None:

@@ -14,6 +14,8 @@ from bridge.drive.own_supervision import OwnJudgement as OwnJudgement
 from bridge.drive.own_supervision import OwnVerdict as OwnVerdict
 from bridge.drive.parameter_set import ParameterSet as ParameterSet
 from bridge.drive.scaling import LinearScale as LinearScale
+from bridge.drive.scaling import is_scale as is_scale
+from bridge.drive.scaling import no_scale as no_scale
 from bridge.drive.scaling import scale_of as scale_of
 from bridge.drive.values import ValueCodec as ValueCodec
 from bridge.drive.values import Written as Written

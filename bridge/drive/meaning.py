@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
 from bridge.drive.parameter_set import ParameterSet
-from bridge.drive.scaling import LinearScale, scale_of
+from bridge.drive.scaling import LinearScale, is_scale, no_scale, scale_of
 from bridge.drive.values import ValueCodec, scales_of
 from bridge.image import Quality
 from bridge.mapping.model import Family, Meaning, ProcessValue, Slot
@@ -41,6 +41,8 @@ class Meanings:
             parameter, in_set = family.parameter_and_set(name)
             if in_set in self.sets:
                 self._scales[in_set].update(scales_of(family, {parameter: full}))
+        self._no_scale: dict[tuple[str, int], float] = {}
+        """What the drive has for parameters that scale, and that is no scale."""
         self._codes: dict[str, tuple[int | None, ...]] = {}
         self._unread = Lack(Quality.WAITING, "has not been read yet")
         self._found: dict[tuple[str, int], tuple[ValueCodec, Lack | None]] = {}
@@ -53,10 +55,18 @@ class Meanings:
         return self._codes
 
     def on_scale(self, parameter: str, full: float, in_set: int = _FIRST) -> None:
-        """The drive's own value of a scaling parameter; it wins over the site file. A value that is no scale
-        changes nothing."""
+        """The drive's own value of a scaling parameter; it wins over the site file. Of one that is no scale
+        no value is made, with neither the site file's nor what was read before."""
         self._found.clear()
-        self._scales[in_set].update(scales_of(self._family, {parameter: full}))
+        scales = self._scales[in_set]
+        self._no_scale.pop((parameter, in_set), None)
+        if is_scale(full):
+            scales.update(scales_of(self._family, {parameter: full}))
+            return
+        self._no_scale[parameter, in_set] = full
+        for value in self._family.value:
+            if value.full == parameter:
+                scales.pop(value.leaf, None)
 
     def on_codes(self, codes: Codes, why_unread: str = "cannot be read") -> bool:
         """What the drive's parameters say that its words carry. True where a setpoint that was written before
@@ -102,6 +112,9 @@ class Meanings:
         why = found.why_unknown
         if why and self._depends(model) and in_set > _FIRST:
             why = f"parameter set {in_set} is active, and {model.full} is not known of it"
+        number = in_set if self._depends(model) else _FIRST
+        if why and model.full and (model.full, number) in self._no_scale:
+            why = no_scale(model.full, self._no_scale[model.full, number])
         return found, Lack(Quality.CONFIG_ERROR, why) if why else None
 
     def _depends(self, model: ProcessValue) -> bool:

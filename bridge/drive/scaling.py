@@ -65,11 +65,21 @@ def _ratio(factor: float) -> tuple[float, float]:
     return (float(ratio.numerator), float(ratio.denominator)) if is_exact else (factor, 1.0)
 
 
+def is_scale(full: float) -> bool:
+    """Whether a parameter with this value scales anything."""
+    return 0 < full < math.inf
+
+
+def no_scale(parameter: str, value: float) -> str:
+    """Why nothing is made of words that ``parameter`` scales, where that has a value that is no scale."""
+    return f"{parameter} is {value:g} in the drive, which is no scale"
+
+
 def scale_of(value: ProcessValue, full: float | None = None) -> LinearScale | None:
     """The scale of a value, ``full`` being what its parameter holds; None where it has none, or where
     that is not known."""
     scale = value.scale
-    if scale is None or (scale.full is not None and (full is None or full <= 0)):
+    if scale is None or (scale.full is not None and (full is None or not is_scale(full))):
         return None
     least = -math.inf if value.low is None else value.low
     most = math.inf if value.high is None else value.high

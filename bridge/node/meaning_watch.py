@@ -11,7 +11,7 @@ from bridge.canopen.sdo import Priority, Result, SdoChannel, SdoError
 from bridge.command import Drive
 from bridge.command.event import Event, Kind
 from bridge.command.plant import Node, Plant
-from bridge.drive import MOVING, DriveState, ParameterSet
+from bridge.drive import MOVING, DriveState, ParameterSet, is_scale, no_scale
 from bridge.mapping.model import Meaning, ObjectRef, Parameter
 from bridge.node.boot import code_of, meanings_of, parameter_value, scales_of
 from bridge.node.sdo_channels import SdoChannels, channel_of
@@ -130,12 +130,16 @@ class MeaningWatch:
         try:
             value = parameter_value(parameter, result)
         except ValueError:
-            return
+            value = 0.0
         key = parameter.name, in_set
-        if watched.scales.get(key) != value and 0 < value < math.inf:
-            watched.scales[key] = value
-            watched.drive.on_scale(parameter.name, value, in_set)
-            watched.drive.refresh(self._now)
+        if watched.scales.get(key) == value:
+            return
+        watched.scales[key] = value
+        watched.drive.on_scale(parameter.name, value, in_set)
+        watched.drive.refresh(self._now)
+        if not is_scale(value):
+            message = no_scale(parameter.name, value)
+            self._plant.report(Event(self._now, Kind.CONFIGURATION, watched.drive.name, 500, message))
 
     def _told(self, watched: _Watched, meaning: Meaning, in_set: int, code: int | None) -> None:
         codes = watched.codes.setdefault(meaning.leaf, [None] * watched.drive.family.sets)

@@ -10,6 +10,7 @@ from bridge.canopen.dialogue import optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
 from bridge.command.plant import Node
+from bridge.drive import is_scale, no_scale
 from bridge.mapping.model import Meaning, ObjectRef, Parameter
 from bridge.node.boot.actions import Action, BootResult, WordFacts
 from bridge.node.sdo_channels import FIRST, channel_of
@@ -72,14 +73,17 @@ def _read_scales(
 ) -> Generator[Action, bytes | None]:
     for parameter, in_set, ref in scales_of(drive):
         data = yield from optional(ref.index, ref.sub, channel)
+        if data is None:
+            continue
         try:
-            value = 0.0 if data is None else parameter_value(parameter, data)
+            value = parameter_value(parameter, data)
         except ValueError as error:
             result.notes.append(f"{drive.slot.name}: {error}")
-            continue
-        if not 0 < value < math.inf:
-            continue
+            value = math.nan
         found.scales[parameter.name, in_set] = value
+        if not is_scale(value):
+            result.notes.append(f"{drive.slot.name}: {no_scale(parameter.name, value)}")
+            continue
         if in_set == 1:
             _compare(drive, parameter, value, result)
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from bridge.command import Code
 from bridge.image import Quality
+from bridge.sim.nord_drive import NordDrive
+from tests.support import nord_words
 from tests.support.nord_words import (
     ACTUAL,
     DRIVE,
@@ -49,6 +53,34 @@ def test_a_scale_that_is_changed_in_any_set_is_found(tmp_path: Path) -> None:
     enable(bench, 0x4000, frequency=25.0)
     assert inverter(bench).output_hz == 25.0
     assert point(bench, "actual/frequency")[:2] == (25.0, Quality.GOOD)
+
+
+def test_a_scale_that_is_none_makes_no_value_with_what_was_read_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(NordDrive, "_max_hz", 50.0)
+    bench = made(tmp_path)
+    assert point(bench, "actual/frequency").quality is Quality.GOOD
+    inverter(bench).parameters.at_keypad(P105, 0)
+    bench.run(10.0)
+    assert point(bench, "actual/frequency").quality is Quality.CONFIG_ERROR
+    assert point(bench, "actual/current").quality is not Quality.CONFIG_ERROR
+    assert bench.write(DRIVE, frequency=20.0).code is Code.NOT_CONFIGURED
+    assert "P105 is 0 in the drive, which is no scale" in [one.message for one in bench.events]
+    inverter(bench).parameters.at_keypad(P105, 500)
+    bench.run(10.0)
+    assert point(bench, "actual/frequency").quality is Quality.GOOD
+
+
+def test_a_scale_that_is_none_at_boot_up_is_not_replaced_by_the_site_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(NordDrive, "_max_hz", 50.0)
+    monkeypatch.setattr(nord_words, "SITE", nord_words.SITE.replace("{{ P112", "{{ P105 = 50.0, P112"))
+    bench = made(tmp_path, prepare=lambda drive: drive.parameters.at_keypad(P105, 0))
+    status = str(bench.plant.image.read("lift/node/boot_status").value)
+    assert "fu1: P105 is 0 in the drive, which is no scale" in status
+    assert point(bench, "actual/frequency").quality is Quality.CONFIG_ERROR
 
 
 def test_a_setpoint_of_another_meaning_is_not_sent_with_the_next_enable(tmp_path: Path) -> None:

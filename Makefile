@@ -33,7 +33,8 @@ QUIETLY := tools/quietly $(VENV)/install.log
 
 # Unit tests know no time. The others do: few of them run at a time, a module of them in one place.
 FEW_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 2)))
-WIRE_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 4)))
+WIRE_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 3)))
+PAGES := tests/wire/test_docs.py
 
 # The lab runs on slow CPUs as root: it leaves no caches behind and gets a time limit.
 LAB_SECONDS := 1800
@@ -51,9 +52,9 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 
 ##@ Test
 # Wire tests and the lab wait most of their time, and mind when they have to wait for a CPU; unit tests know no
-# time. Fuzzing wants its share of the CPUs: it begins when these are done.
-test: compiled packages clients ## all tests: unit, foreign, wire, a minute of fuzzing, lab
-	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab" "foreign unit" fuzz-short
+# time. The commands of the docs and fuzzing want their share of the CPUs: they begin when these are done.
+test: compiled packages clients ## all tests: unit, foreign, wire, docs, a minute of fuzzing, lab
+	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab" "foreign unit" "pages fuzz-short"
 
 # Beside the others they get what these leave of the CPUs.
 unit: $(VENV)/dev.stamp ## tests of the code alone
@@ -72,7 +73,11 @@ $(FOREIGN)/$(REGISTRIES).stamp: tools/foreign_files.py | $(VENV)/dev.stamp packa
 
 wire: compiled packages clients ## tests with real protocol clients on loopback
 	@echo "== wire tests"
-	@$(PYTEST) -n $(WIRE_JOBS) --dist loadfile -rs tests/wire $(ARGS)
+	@$(PYTEST) -n $(WIRE_JOBS) --dist loadfile -rs tests/wire --ignore $(PAGES) $(ARGS)
+
+pages: compiled packages clients ## the commands of README and docs, as a reader gives them
+	@echo "== README and docs"
+	@$(PYTEST) -rs $(PAGES) $(ARGS)
 
 ifeq ($(LAB),0)
 lab:
@@ -195,5 +200,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test unit foreign wire lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types \
+.PHONY: demo test unit foreign wire pages lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types \
   check-imports format docs setup lock wheel clean help

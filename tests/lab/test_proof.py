@@ -1,6 +1,6 @@
-"""The proof in short (``make proof`` and ``make proof-mutants`` are the long ones): every fault that needs no
-new process, once, with all families and all protocols on the bus; and two of the seeded faults, each day
-others."""
+"""The proof in short (``make proof`` and ``make proof-mutants`` are the long ones), with all families and all
+protocols on the bus: of the faults that need no new process one half today and the other tomorrow, once; and
+of the seeded faults one, each day another."""
 
 from __future__ import annotations
 
@@ -23,8 +23,12 @@ _LITTLE_NOISE_MS = "60"
 """Where something has to be found: more than that would hide what is late by a tenth of a second."""
 _HOLD_S = "1"
 """Three telegrams of each owner."""
-_MUTANTS = 2
 _DAY_S = 86_400
+
+
+def today() -> int:
+    """Number of the day."""
+    return int(time.time() // _DAY_S)
 
 
 def proof(*arguments: str, noise_ms: str, out: Path) -> dict[str, Any]:
@@ -46,18 +50,17 @@ def _bridges_said(out: Path) -> str:
 
 @pytest.mark.timeout(480)
 def test_no_fault_keeps_a_drive_running_longer_than_published(tmp_path: Path) -> None:
-    names = [fault.name for fault in FAULTS if fault.possible() and not fault.new_process]
+    names = [fault.name for fault in FAULTS if fault.possible() and not fault.new_process][today() % 2 :: 2]
     faults = ("--cycles", "1", "--hold", _HOLD_S, "--faults", ",".join(names))
     found = proof("run", *faults, noise_ms=_NOISE_MS, out=tmp_path / "proof.json")
     assert {sample["fault"] for sample in found["samples"]} == set(names)
 
 
 @pytest.mark.timeout(480)
-def test_the_proof_finds_seeded_faults(tmp_path: Path) -> None:
+def test_the_proof_finds_a_seeded_fault(tmp_path: Path) -> None:
     names = [mutant.name for mutant in load_mutants()]
-    first = int(time.time() // _DAY_S) * _MUTANTS
-    chosen = [names[(first + n) % len(names)] for n in range(_MUTANTS)]
-    mutants = ("--only", "--mutants", ",".join(chosen))
+    chosen = names[today() % len(names)]
+    mutants = ("--only", "--mutants", chosen)
     found = proof("hunt", *mutants, noise_ms=_LITTLE_NOISE_MS, out=tmp_path / "kills.json")
-    assert {kill["mutant"] for kill in found["kills"]} == set(chosen)
+    assert {kill["mutant"] for kill in found["kills"]} == {chosen}
     assert [kill["mutant"] for kill in found["kills"] if not kill["judgement"]] == []

@@ -111,7 +111,7 @@ def test_a_device_of_another_kind_gets_nothing(commands: Commands) -> None:
         "pump/drive", (r"vendor = 0x\w+", "vendor = 0x00000001"), (r'"C00039/1" = .*', '"C00039/1" = 35.0')
     )
     done = commands.exchange("pump", file)
-    assert done.returncode == 1, done.stdout + done.stderr
+    assert done.returncode == 2, done.stdout + done.stderr
     assert "the file is of a node with vendor 00000001h" in done.stderr
     assert "35" not in commands.parameters("read", "pump/drive", "C00039/1")
     done = commands.exchange("lift", file)

@@ -29,7 +29,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LabSite]:
     """The whole product on vcan0: simulated node, bus process, OPC UA front. A controller has ten
     seconds, because a new process for each telegram takes its time in the lab."""
     folder = tmp_path_factory.mktemp("lab")
-    site = lab_site(folder, timeout_ms=10_000, bus="deadman_ms = 400")
+    site = lab_site(folder, timeout_ms=10_000, bus="deadman_ms = 400", node="sdo_channels = [2, 3]")
     with (
         drivebridge(folder, "simulate", "simulate", str(site.path)) as simulation,
         drivebridge(folder, "run", "run", str(site.path), notify=True) as bridge,

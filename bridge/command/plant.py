@@ -14,6 +14,7 @@ from typing import Final
 
 from bridge.command.audit import AuditTrail, Rejection
 from bridge.command.deadlines import Deadlines
+from bridge.command.device import Device
 from bridge.command.drive import Drive
 from bridge.command.event import Event, EventGate, Kind
 from bridge.command.ignored import conclude
@@ -53,13 +54,14 @@ Enforce = Callable[[str, Action, str, float], None]
 
 @dataclass(slots=True)
 class Node:
-    """A configured node and its drives."""
+    """A configured node and its drives, or the device that it is instead."""
 
     bus: BusTable
     table: NodeTable
     family: Family
     names: Names
     drives: list[Drive] = field(default_factory=list[Drive])
+    device: Device | None = None
 
     @property
     def name(self) -> str:
@@ -71,6 +73,8 @@ class Node:
             drive.on_heard_again()
 
 
+_DEVICE: Final = -1
+"""In place of a drive's number among those of its node."""
 _LONGEST_NAME: Final = 80
 """Clients may call anything a drive."""
 _SEVERITY_MISSED, _MISSED_EVENTS, _MISSED_EVERY_S = 700, 3, 60.0
@@ -89,6 +93,8 @@ class Plant:
         self.began = began
         self.nodes: dict[str, Node] = {}
         self.drives: dict[str, Drive] = {}
+        self.devices: dict[str, Device] = {}
+        """Nodes that are no drives, by their names."""
         self.by_unit: dict[int, Drive] = {}
         self.eeprom_writes = Ledger()
         """How often parameters were written; whoever keeps it across restarts fills it first."""
@@ -115,6 +121,9 @@ class Plant:
                 family = families[table.mapping]
                 node = self.nodes[table.name] = Node(bus, table, family, names[table.mapping])
                 settled = partial(self._on_settled, node)
+                if family.is_device:
+                    node.device = Device(table, family, units[table.name, _DEVICE], self.image)
+                    self.devices[table.name] = node.device
                 for position, drive_table in enumerate(table.drive):
                     unit_id = units[table.name, position]
                     told = self.report, settled, self._tripped, partial(self._deadlines.due, len(self.drives))
@@ -129,7 +138,10 @@ class Plant:
             for name in self.nodes
         }
         for node in self.nodes.values():
-            self.image.set(self._node_points[node.name][2], 0.0, began)
+            state, current, last = self._node_points[node.name]
+            self.image.set(state, NODE_CODES[NodeState.ABSENT], began)
+            self.image.set(current, 0.0, began)
+            self.image.set(last, 0.0, began)
             for drive in node.drives:
                 self.set(f"{drive.name}/supervision/sdo_abort_code", 0, began)
                 self._on_settled(node, drive, began)
@@ -279,6 +291,8 @@ class Plant:
         self.set("bridge/missed_deadlines", self._deadlines.missed, now)
         for drive in self.drives.values():
             drive.look(now)
+        for device in self.devices.values():
+            device.on_time(now)
         self.image.tell_kept()
         good = sum(drive.quality is Quality.GOOD for drive in self.drives.values())
         self.set("bridge/drives_good", good, now)
@@ -328,8 +342,11 @@ class Plant:
 
     def on_node(self, node: Node, state: NodeState, now: float, *, tell: bool = True) -> None:
         """The master says that a node is in another state; ``tell`` makes that an event."""
+        self.image.set(self._node_points[node.name][0], NODE_CODES[state], now)
         for drive in node.drives:
             drive.channel.on_node(state, now)
+        if node.device:
+            node.device.on_node(state, now)
         if not tell:
             return
         if state is NodeState.LOST:
@@ -361,7 +378,10 @@ class PlantView:
         self.on_event, self.forget = plant.on_event, plant.forget
 
     def look(self, drive: str) -> None:
-        self._plant.drives[drive].look(self._clock())
+        if drive in self._plant.devices:
+            self._plant.devices[drive].on_time(self._clock())
+        else:
+            self._plant.drives[drive].look(self._clock())
 
     def submit(self, request: Request, reply: Reply) -> None:
         is_changed = True
@@ -386,15 +406,17 @@ class PlantView:
 
 
 def _unit_ids(site: Site) -> dict[tuple[str, int], int]:
-    """Modbus unit ids: as given, the others in order from 1."""
-    given = {d.unit_id for bus in site.bus for node in bus.node for d in node.drive if d.unit_id}
+    """Modbus unit ids: as given, the others in order from 1. Of a node's drives by their places, of a device
+    at ``_DEVICE``."""
+    nodes = [node for bus in site.bus for node in bus.node]
+    given = {drive.unit_id for node in nodes for drive in node.drive} | {node.unit_id for node in nodes}
     free = (unit for unit in range(1, 248) if unit not in given)
     units: dict[tuple[str, int], int] = {}
-    for bus in site.bus:
-        for node in bus.node:
-            for position, drive in enumerate(node.drive):
-                unit = drive.unit_id or next(free, 0)
-                if not unit:
-                    raise FileFaults([Fault("", 0, "unit_id", "more than 247 drives have no Modbus unit id")])
-                units[node.name, position] = unit
+    for node in nodes:
+        owners = [(place, drive.unit_id) for place, drive in enumerate(node.drive)]
+        for position, own in owners or [(_DEVICE, node.unit_id)]:
+            unit = own or next(free, 0)
+            if not unit:
+                raise FileFaults([Fault("", 0, "unit_id", "more than 247 drives have no Modbus unit id")])
+            units[node.name, position] = unit
     return units

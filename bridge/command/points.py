@@ -63,6 +63,8 @@ def site_points(
         for node in bus.node:
             family, shown = families[node.mapping], names[node.mapping]
             points[node.name] = _node_points(node, family.poll)
+            if family.is_device:
+                points[node.name] += _input_points(node.name, family) + parameter_points(node.name, shown)
             for table in node.drive:
                 name = f"{node.name}/{family.leaf_of(table)}"
                 points[name] = _drive_points(name, family, table) + parameter_points(name, shown)
@@ -90,6 +92,22 @@ def _drive_points(name: str, family: Family, table: DriveTable) -> list[Point]:
         *(_value(name, value, scales) for value in values if value.group == "actual"),
         *_supervision_points(name, table.fieldbus_timeout_writable),
         *_identity_points(name),
+    ]
+
+
+def _input_points(name: str, family: Family) -> list[Point]:
+    return [
+        Point(
+            name=f"{name}/input/{signal.name}",
+            data_type=signal.value_type,
+            unit=signal.unit,
+            low=signal.low,
+            high=signal.high,
+            description=signal.description,
+            states=tuple(sorted(signal.states.items())),
+            bits=tuple(signal.bits),
+        )
+        for signal in family.input
     ]
 
 

@@ -105,6 +105,7 @@ def _check_node(bus: RawTable, node: RawTable, file: TomlFile) -> None:
 
 def _check_drives(node: RawTable, units: _Unique, file: TomlFile) -> None:
     names, slots = _Unique(file), _Unique(file)
+    units.add(node, "unit_id", "unit id")
     for drive in node.tables("drive"):
         slot_is_new = slots.add(drive, "slot", "slot")
         units.add(drive, "unit_id", "unit id")

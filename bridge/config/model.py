@@ -224,7 +224,12 @@ class NodeTable(Table):
     configuration: str | None = None
     configuration_store: bool = False
     configure: list[ConfigureTable] = Field(default_factory=list[ConfigureTable])
-    drive: list[DriveTable] = Field(min_length=1, description="a [[bus.node.drive]] table for each drive")
+    unit_id: int | None = Field(
+        None, ge=1, le=247, description="a Modbus unit id, 1…247, of a node without drives"
+    )
+    drive: list[DriveTable] = Field(
+        default_factory=list[DriveTable], description="a [[bus.node.drive]] table for each drive"
+    )
 
 
 class BusTable(Table):

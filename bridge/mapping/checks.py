@@ -6,6 +6,7 @@ from typing import Final
 
 from bridge.image import DataType
 from bridge.mapping.checks_aliases import check_aliases
+from bridge.mapping.checks_device import check_kind, check_signals
 from bridge.mapping.checks_faults import check_faults
 from bridge.mapping.checks_own import check_own_supervision
 from bridge.mapping.checks_process import check_cob_id, check_parameter, check_process, check_slots, twice
@@ -34,21 +35,24 @@ def check(family: Family, file: MergedFile) -> None:
     facts = family.family
     if facts.node_id_low > facts.node_id_high:
         file.fault(("family", "node_id_low"), f"is above node_id_high, {facts.node_id_high}")
-    check_process(family, file)
-    check_slots(family, file)
+    check_kind(family, file)
+    if family.slot:
+        check_process(family, file)
+        check_slots(family, file)
+        check_meanings(family, file)
+        check_values(family, file)
+        _check_control_word(family.control_word, file)
+        _check_handshake(family, file)
+        _check_states(family, file)
+        check_own_supervision(family, file)
+    check_signals(family, file)
     _check_sdo(family, file)
-    check_meanings(family, file)
-    check_values(family, file)
     _check_parameters(family, file)
     check_aliases(family, file)
     _check_eeprom(family, file)
     _check_polls(family, file)
     _check_bits(family, file)
-    _check_control_word(family.control_word, file)
-    _check_handshake(family, file)
-    _check_states(family, file)
     check_faults(family, file)
-    check_own_supervision(family, file)
 
 
 def _check_sdo(family: Family, file: MergedFile) -> None:

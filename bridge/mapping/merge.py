@@ -1,7 +1,7 @@
 """A mapping file merged over those it extends, which still knows where each of its keys stands.
 
-Tables are merged key by key. The lists ``value``, ``parameter``, ``poll``, ``slot``, ``own_supervision``
-and ``fault`` are merged item by item, by ``name`` (values by ``group`` too), ``meaning`` by ``word`` and
+Tables are merged key by key. The lists ``value``, ``parameter``, ``poll``, ``slot``, ``input``,
+``own_supervision`` and ``fault`` are merged item by item, by ``name`` (values by ``group`` too), ``meaning`` by ``word`` and
 ``group``, the PDOs of a slot by ``number``; every other list is replaced. ``without`` leaves items of
 those lists out first.
 """
@@ -19,7 +19,7 @@ from bridge.tomlfile.file import Model, dotted, validated
 _BY_NAME: Final = {
     "value": ("name", "group"),
     "meaning": ("word", "group"),
-    **dict.fromkeys(("parameter", "poll", "slot", "own_supervision", "fault"), ("name",)),
+    **dict.fromkeys(("parameter", "poll", "slot", "input", "own_supervision", "fault"), ("name",)),
 }
 _PDOS: Final = ("rpdo", "tpdo")
 _Place = tuple[TomlFile, Key]

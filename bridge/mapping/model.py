@@ -15,6 +15,7 @@ from pydantic import Field
 from bridge.config import DriveTable
 from bridge.config.fields import RegularExpression
 from bridge.mapping.aliases import Aliases
+from bridge.mapping.device import Signal, no_process
 from bridge.mapping.faults import EmcyTable, FaultEntry, FaultNumbers
 from bridge.mapping.faults import FaultParameter as FaultParameter
 from bridge.mapping.fields import Bit, Bits, Kind, Name, ObjectRef, Pattern, Ref, Table, Word
@@ -144,8 +145,24 @@ class Poll(Table):
     bits: list[str] = Field(default_factory=list[str])
 
 
+def _no_control_word() -> ControlWord:
+    nothing = Command(mask=0, value=0)
+    return ControlWord(
+        bits=[],
+        acknowledge_bit=0,
+        enabling=nothing,
+        stopped=0,
+        ready=0,
+        run=0,
+        stop=nothing,
+        quick_stop=nothing,
+        disable_voltage=nothing,
+    )
+
+
 class Family(Table):
-    """One mapping file, merged with those it extends."""
+    """One mapping file, merged with those it extends: of drives, or, without slots, of a device that is none
+    and has inputs instead of process data, control word and status word."""
 
     extends: str | None = Field(None, description='another mapping, such as "nord/sk-tu4-cao"')
     without: list[str] = Field(
@@ -154,13 +171,16 @@ class Family(Table):
     )
     family: FamilyTable
     identity: IdentityRule = Field(default_factory=lambda: IdentityRule.model_validate({}))
-    process: Process
+    process: Process = Field(default_factory=no_process)
     sdo: list[SdoServer] = Field(default_factory=list[SdoServer])
-    slot: list[Slot] = Field(min_length=1)
+    slot: list[Slot] = Field(default_factory=list[Slot], description="one for each drive of the node")
+    input: list[Signal] = Field(
+        default_factory=list[Signal], description="what the PDOs of a node without drives tell"
+    )
     meaning: list[Meaning] = Field(default_factory=list[Meaning])
     value: list[ProcessValue] = Field(default_factory=list[ProcessValue])
-    control_word: ControlWord
-    status_word: StatusWord
+    control_word: ControlWord = Field(default_factory=_no_control_word)
+    status_word: StatusWord = Field(default_factory=lambda: StatusWord(bits=[], state=[]))
     stopping: Stopping = Field(default_factory=lambda: Stopping.model_validate({}))
     parameter_names: ParameterNames | None = None
     aliases: Aliases = Field(default_factory=Aliases)
@@ -172,6 +192,11 @@ class Family(Table):
     faults: FaultNumbers
     fault: list[FaultEntry] = Field(default_factory=list[FaultEntry])
     own_supervision: list[OwnSupervision] = Field(default_factory=list[OwnSupervision])
+
+    @property
+    def is_device(self) -> bool:
+        """It is of a node without drives."""
+        return not self.slot
 
     def slot_named(self, name: str) -> Slot:
         """Raises KeyError where the family has no such slot."""

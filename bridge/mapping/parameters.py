@@ -17,7 +17,7 @@ GROUPS: Final = ("number", "letter", "element", "set")
 IndexRange = Annotated[str, Field(pattern=r"^[0-9A-F]{4}(-[0-9A-F]{4})?$")]
 Protection = Literal["command", "communication", "while_enabled"]
 _PUNCTUATION: Final = re.compile(r"[^a-z0-9]+")
-_VALUE_TYPES: Final = {
+VALUE_TYPES: Final = {
     "bool": DataType.BOOL,
     "int8": DataType.INT16,
     "int16": DataType.INT16,
@@ -141,7 +141,7 @@ class Parameter(Table):
         """The type of the value as users see it."""
         if self.factor != 1.0 and self.data_type not in ("string", "bytes", "bool"):
             return DataType.FLOAT
-        return _VALUE_TYPES[self.data_type]
+        return VALUE_TYPES[self.data_type]
 
 
 def leaf_of(name: str) -> str:

@@ -71,6 +71,17 @@ def _check_node(node: RawTable, family: Family, file: TomlFile) -> None:
         allowed = f"{facts.node_id_low}…{facts.node_id_high}"
         file.fault((*node.key, "id"), f"{facts.name} has addresses {allowed}, not {node_id}")
     _check_sdo_channels(node, family, file)
+    drives = list(node.tables("drive"))
+    if family.is_device and drives:
+        file.fault(drives[0].key, f"{facts.name} is no drive and has none", "leave [[bus.node.drive]] out")
+    if not family.is_device and not drives:
+        slots = ", ".join(slot.name for slot in family.slot)
+        file.fault((*node.key, "drive"), "is missing", f"a [[bus.node.drive]] for each drive; slots: {slots}")
+    if not family.is_device and "unit_id" in node.content:
+        file.fault((*node.key, "unit_id"), "each drive has its own", "put it into [[bus.node.drive]]")
+    for key in ("own_timeout_ms", "enforce"):
+        if family.is_device and key in node.content:
+            file.fault((*node.key, key), f"{facts.name} is no drive: has no effect")
     time_ms = node.whole("own_timeout_ms")
     why = impossible(family, time_ms) if time_ms is not None and 1 <= time_ms <= 0xFFFF else ""
     if why:

@@ -17,6 +17,7 @@ from bridge.node.emergencies import Emergencies
 from bridge.node.error_control import ErrorControl, Sign
 from bridge.node.fault_reading import FaultReading
 from bridge.node.meaning_watch import MeaningWatch
+from bridge.node.process.inputs import connect_inputs
 from bridge.node.process.polling import Polling
 from bridge.node.process.process_data import DrivePdos, connect
 from bridge.node.process.stop_words import StopWords
@@ -144,6 +145,8 @@ class NodeWire:
         self._emergencies.on_time(now)
         self.faults.on_time(now)
         self.meanings.on_time(now)
+        if self._node.device:
+            self._node.device.on_time(now)
         self.sdo.on_time(now)
         command = self.put_off.on_time(now)
         if command is not None:
@@ -158,6 +161,7 @@ class NodeWire:
             self.faults.next_deadline(),
             self.meanings.next_deadline(),
             self.put_off.next_deadline(),
+            self._node.device.next_deadline() if self._node.device else None,
         )
         return min((time for time in times if time is not None), default=None)
 
@@ -186,6 +190,8 @@ class NodeWire:
             self.routes |= pdos.handlers
         sync_ms = self._node.bus.sync_period_ms
         self.routes |= node_tpdos(result.node_tpdos, sync_ms, self.polling.on_pdo, self.reject)
+        if self._node.device and result.inputs:
+            self.routes |= connect_inputs(self._node.device, result.inputs, sync_ms, self.reject, now)
         self.routes_changed = True
 
     def _usable_emcy_id(self, result: boot.BootResult) -> int | None:

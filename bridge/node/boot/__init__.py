@@ -6,6 +6,7 @@ from bridge.node.boot.actions import Boot as Boot
 from bridge.node.boot.actions import BootResult as BootResult
 from bridge.node.boot.actions import DeviceErrors as DeviceErrors
 from bridge.node.boot.actions import DrivePlan as DrivePlan
+from bridge.node.boot.actions import InputPlan as InputPlan
 from bridge.node.boot.actions import Nmt as Nmt
 from bridge.node.boot.actions import NodePdoPlan as NodePdoPlan
 from bridge.node.boot.actions import Pause as Pause

@@ -13,6 +13,7 @@ from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.canopen.sdo import SdoError
 from bridge.command import Identification
 from bridge.drive import OwnJudgement
+from bridge.mapping.fields import ObjectRef
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.pdo_plan import PdoPlan
 from bridge.node.boot.status import BootError
@@ -112,6 +113,14 @@ class DrivePlan:
 
 
 @dataclass(slots=True)
+class InputPlan:
+    """The TPDOs of a device that is no drive; ``unserved`` has the reason for each input that none carries."""
+
+    tpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
+    unserved: dict[ObjectRef, str] = field(default_factory=dict[ObjectRef, str])
+
+
+@dataclass(slots=True)
 class WordFacts:
     """What a drive has told of its words: ``scales`` by parameter and set, ``codes`` by the word's leaf for
     each set, None for what it does not tell, and ``why_unread``."""
@@ -128,6 +137,7 @@ class BootResult:
     drives: dict[str, DrivePlan] = field(default_factory=dict[str, DrivePlan])
     words: dict[str, WordFacts] = field(default_factory=dict[str, WordFacts])
     node_tpdos: list[NodePdoPlan] = field(default_factory=list[NodePdoPlan])
+    inputs: InputPlan | None = None
     notes: list[str] = field(default_factory=list[str])
     emcy_id: int | None = None
     """Where emergency messages come; None where the node sends none."""

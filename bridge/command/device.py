@@ -1,0 +1,160 @@
+"""A node that is no drive: what its TPDOs tell, as points, and how good that is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from bridge.command.link import Link, NodeState
+from bridge.config import NodeTable
+from bridge.image import Image, Quality, Value
+from bridge.mapping.device import Signal
+from bridge.mapping.fields import ObjectRef
+from bridge.mapping.model import Family
+
+
+@dataclass(frozen=True, slots=True)
+class InputPdo:
+    """A TPDO as the boot-up has found it. ``objects`` has one for each of its entries, None for a dummy;
+    ``deadline_s`` is the longest regular pause between two of them, None if it is sent on change only."""
+
+    name: str
+    objects: tuple[ObjectRef | None, ...]
+    deadline_s: float | None
+
+
+@dataclass(slots=True)
+class _Heard:
+    """One TPDO: the points that its entries are shown by, and how good they are shown to be."""
+
+    pdo: InputPdo
+    link: Link
+    shown: list[tuple[int, Signal, int]] = field(default_factory=list[tuple[int, Signal, int]])
+    """Entry, what it is, and its point."""
+    quality: tuple[Quality, str] | None = None
+
+    @property
+    def points(self) -> list[int]:
+        return [index for _, _, index in self.shown]
+
+
+class Device:
+    """The inputs of one node. Times are monotonic seconds."""
+
+    def __init__(self, node: NodeTable, family: Family, unit_id: int, image: Image) -> None:
+        self.name = node.name
+        self.unit_id = unit_id
+        self.family = family
+        self._hold_ms = node.hold_ms
+        self._image = image
+        self._node = NodeState.ABSENT
+        self._signals = {signal.object: signal for signal in family.input}
+        self._points = {
+            signal.object: image.index[f"{node.name}/input/{signal.name}"] for signal in family.input
+        }
+        self._heard: list[_Heard] = []
+        self._unserved: dict[int, str] = {}
+        """Points that no TPDO carries, with the reason."""
+        self._state: tuple[Quality, str] = (Quality.WAITING, "")
+        """How good those inputs are of which no TPDO is known."""
+
+    def on_pdos(self, pdos: Sequence[InputPdo], unserved: Mapping[ObjectRef, str], now: float) -> None:
+        """What the boot-up has found; ``unserved`` has the reason for each input that no TPDO carries."""
+        self._heard = []
+        for pdo in pdos:
+            link = Link(0.0, self._hold_ms)
+            link.on_boot(pdo.deadline_s, ())
+            link.on_node(self._node, now)
+            heard = _Heard(pdo, link)
+            for entry, ref in enumerate(pdo.objects):
+                if ref is not None and ref in self._signals:
+                    heard.shown.append((entry, self._signals[ref], self._points[ref]))
+            self._heard.append(heard)
+        self._unserved = {self._points[ref]: why for ref, why in unserved.items()}
+        self._judge(now)
+
+    def on_node(self, state: NodeState, now: float) -> None:
+        self._node = state
+        for heard in self._heard:
+            heard.link.on_node(state, now)
+        self._judge(now)
+
+    def on_data(self, place: int, values: Sequence[int], now: float) -> None:
+        """The TPDO at this place of ``pdos`` has come: the values of its entries, with their signs."""
+        heard = self._heard[place]
+        heard.link.on_pdo(now)
+        if heard.quality != (Quality.GOOD, ""):
+            self._judge_one(heard, now)
+        shown: list[Value] = [signal.decode(values[entry]) for entry, signal, _ in heard.shown]
+        self._image.set_values(heard.points, shown, now)
+
+    def on_time(self, now: float) -> None:
+        """Judge what is late by now."""
+        for heard in self._heard:
+            heard.link.on_time(now)
+        self._judge(now)
+
+    def next_deadline(self) -> float | None:
+        times = [heard.link.next_deadline() for heard in self._heard]
+        return min((time for time in times if time is not None), default=None)
+
+    @property
+    def quality(self) -> Quality:
+        """That of its inputs as a whole: the worst of its TPDOs."""
+        found = [heard.quality[0] for heard in self._heard if heard.quality]
+        return max(found, key=_badness) if found else self._state[0]
+
+    def age_ms(self, now: float) -> int:
+        """Of the oldest of its TPDOs; FFFFFFFFh where one has never come."""
+        return max((heard.link.age_ms(now) for heard in self._heard), default=0xFFFF_FFFF)
+
+    def _judge(self, now: float) -> None:
+        for heard in self._heard:
+            self._judge_one(heard, now)
+        state = self._state_of_node()
+        self._state = state
+        known = {index for heard in self._heard for index in heard.points}
+        for index in self._points.values():
+            if index in known:
+                continue
+            quality, reason = state
+            why = self._unserved.get(index, "")
+            if why and quality in (Quality.GOOD, Quality.STALE, Quality.LOST):
+                quality, reason = Quality.CONFIG_ERROR, why
+            self._image.judge((index,), quality, now, reason)
+
+    def _judge_one(self, heard: _Heard, now: float) -> None:
+        quality = heard.link.quality(now)
+        if quality is Quality.STALE and heard.link.last_pdo is None:
+            quality = Quality.WAITING
+        reason = "" if quality is Quality.GOOD else f"no {heard.pdo.name} from the node"
+        if self._node is not NodeState.OPERATIONAL:
+            reason = f"node {self._node.value}"
+        if (quality, reason) != heard.quality:
+            heard.quality = quality, reason
+            self._image.judge(heard.points, quality, now, reason)
+
+    def _state_of_node(self) -> tuple[Quality, str]:
+        match self._node:
+            case NodeState.OPERATIONAL:
+                return Quality.GOOD, ""
+            case NodeState.DISABLED:
+                return Quality.DISABLED, f"node {self._node.value}"
+            case NodeState.CONFIG_ERROR:
+                return Quality.CONFIG_ERROR, f"node {self._node.value}"
+            case _:
+                return Quality.WAITING, f"node {self._node.value}"
+
+
+def _badness(quality: Quality) -> int:
+    order = (
+        Quality.GOOD,
+        Quality.STALE,
+        Quality.LOST,
+        Quality.WAITING,
+        Quality.DEAD,
+        Quality.DISABLED,
+        Quality.CONFIG_ERROR,
+        Quality.DEVICE_FAULT,
+    )
+    return order.index(quality)

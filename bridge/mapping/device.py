@@ -1,0 +1,71 @@
+"""A node that is no drive: an encoder (CiA 406), inputs and outputs (CiA 401), anything that sends PDOs."""
+
+from __future__ import annotations
+
+import struct
+from typing import Annotated, Final, Literal
+
+from pydantic import Field
+
+from bridge.canopen.datatypes import INTEGERS
+from bridge.image import DataType, Value
+from bridge.mapping.fields import Name, Ref, States, Table
+from bridge.mapping.parameters import VALUE_TYPES
+from bridge.mapping.process import Process
+
+SignalType = Literal[
+    "bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "real32", "real64"
+]
+_REALS: Final = {"real32": struct.Struct("<f"), "real64": struct.Struct("<d")}
+
+
+class Signal(Table):
+    """One object of a PDO: value = what is received × factor + offset."""
+
+    name: Name
+    object: Ref
+    data_type: SignalType
+    factor: float = Field(1.0, allow_inf_nan=False)
+    offset: float = Field(0.0, allow_inf_nan=False)
+    unit: str = ""
+    low: float | None = Field(None, allow_inf_nan=False)
+    high: float | None = Field(None, allow_inf_nan=False)
+    states: States = Field(default_factory=dict[int, str])
+    bits: Annotated[list[str], Field(max_length=32)] = Field(
+        default_factory=list[str], description="names of the bits from bit 0 on"
+    )
+    description: str = ""
+
+    @property
+    def is_scaled(self) -> bool:
+        return (self.factor, self.offset) != (1.0, 0.0) and self.data_type != "bool"
+
+    @property
+    def is_signed(self) -> bool:
+        number = INTEGERS.get(self.data_type)
+        return number is not None and number.low < 0
+
+    @property
+    def size(self) -> int:
+        """How many bits it has in a PDO."""
+        return 1 if self.data_type == "bool" else int("".join(filter(str.isdigit, self.data_type)))
+
+    @property
+    def value_type(self) -> DataType:
+        """The type of its point."""
+        return DataType.FLOAT if self.is_scaled else VALUE_TYPES[self.data_type]
+
+    def decode(self, raw: int) -> Value:
+        """``raw`` is the entry of a PDO as an integer, with its sign where the type has one."""
+        if self.data_type == "bool":
+            return bool(raw)
+        real = _REALS.get(self.data_type)
+        number = raw if real is None else real.unpack(raw.to_bytes(real.size, "little"))[0]
+        if self.is_scaled:
+            return number * self.factor + self.offset
+        return float(number) if self.value_type is DataType.FLOAT else number
+
+
+def no_process() -> Process:
+    """What a family without slots has instead of process data of drives."""
+    return Process(rpdo=["control_word"], tpdo=["status_word"])

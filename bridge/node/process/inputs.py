@@ -1,0 +1,41 @@
+"""TPDOs of a device that is no drive: its inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from bridge.canopen.frame import Frame
+from bridge.canopen.sync import tpdo_deadline_s
+from bridge.command.device import Device, InputPdo
+from bridge.mapping.fields import ObjectRef
+from bridge.node.boot import InputPlan, PdoPlan
+
+Reject = Callable[[Frame, str], None]
+
+
+def connect_inputs(
+    device: Device, plan: InputPlan, sync_period_ms: int, reject: Reject, now: float
+) -> dict[int, Callable[[Frame], None]]:
+    """Tell ``device`` what the boot-up has found; who takes its TPDOs, by COB-ID."""
+    device.on_pdos([_input_pdo(tpdo, sync_period_ms) for tpdo in plan.tpdos], plan.unserved, now)
+    return {
+        tpdo.cob_id: partial(_on_frame, device, place, tpdo, reject) for place, tpdo in enumerate(plan.tpdos)
+    }
+
+
+def _input_pdo(tpdo: PdoPlan, sync_period_ms: int) -> InputPdo:
+    objects = tuple(
+        None if entry.is_dummy else ObjectRef(entry.index, entry.sub) for entry in tpdo.codec.entries
+    )
+    deadline_s = tpdo_deadline_s(tpdo.transmission_type, tpdo.event_timer_ms, sync_period_ms)
+    return InputPdo(tpdo.name, objects, deadline_s)
+
+
+def _on_frame(device: Device, place: int, tpdo: PdoPlan, reject: Reject, frame: Frame) -> None:
+    length = tpdo.codec.length
+    if len(frame.data) != length:
+        reject(frame, f"{length} bytes are mapped")
+        if len(frame.data) < length:
+            return
+    device.on_data(place, tpdo.codec.unpack(frame.data[:length]), frame.time)

@@ -1,0 +1,78 @@
+"""Nodes that are no drives: an encoder and an I/O block of nobody's make."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bridge.mapping.site import load_site_and_families
+from tests.support.bench import Bench
+from tests.support.pdo_node import PdoNode
+
+ENCODER = """\
+extends = "generic/device"
+[family]
+name = "Encoder"
+vendor = "Acme"
+source = "nobody's manual"
+
+[identity]
+vendor_id = 0xACE
+
+[[input]]
+name = "position"
+object = "6004:00"
+data_type = "int32"
+factor = 0.001
+unit = "rev"
+description = "position of the shaft"
+
+[[input]]
+name = "speed"
+object = "6030:01"
+data_type = "int16"
+
+[[input]]
+name = "alarms"
+object = "6503:00"
+data_type = "uint16"
+bits = ["position_error", "commissioning"]
+
+[[parameter]]
+name = "6000"
+title = "operating parameters"
+data_type = "uint16"
+point = true
+"""
+SITE = """\
+[site]
+name = "hall"
+[[bus]]
+name = "can0"
+interface = "virtual"
+[[bus.node]]
+name = "shaft"
+id = 20
+mapping = "acme/encoder"
+{node}
+"""
+
+
+def encoder() -> PdoNode:
+    """Position by timer, alarms by SYNC; no PDO carries the speed."""
+    node = PdoNode(20)
+    node.put("1018:01", 4, 0xACE)
+    node.put("6000:00", 2, 4)
+    node.pdo("tpdo", 1, 0x180, ["6004:00/32"], event_ms=100)
+    node.pdo("tpdo", 2, 0x280, ["6503:00/16"], event_ms=100)
+    node.put("6004:00", 4, -1500)
+    return node
+
+
+def device_bench(folder: Path, node: PdoNode, mapping: str = ENCODER, more: str = "") -> Bench:
+    file = folder / "mappings" / "acme" / "encoder.toml"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(mapping, encoding="utf-8")
+    path = folder / "site.toml"
+    path.write_text(SITE.format(node=more), encoding="utf-8")
+    site, families = load_site_and_families(path)
+    return Bench(site, family=families["acme/encoder"], mapping="acme/encoder", node=node)

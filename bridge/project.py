@@ -9,6 +9,7 @@ from typing import Final
 
 from bridge.config import NodeTable, Site, read_site
 from bridge.config.download import Download
+from bridge.derive import describe
 from bridge.drive.own_supervision import judge, why_silence_does_not_stop
 from bridge.eds import read_configurations
 from bridge.errors import FileFaults
@@ -33,7 +34,7 @@ class Project:
 def load_project(path: Path) -> Project:
     """Read a site file and every file it names. Raises ``FileFaults`` with all faults of the site file and
     its mappings, or else of its configuration files."""
-    site, families = load_site_and_families(path)
+    site, families = load_site_and_families(path, describe)
     project = Project(path, site, families, read_configurations(site, path))
     _refuse_vain_silence(project)
     return project

@@ -28,8 +28,8 @@ from bridge.mirror.publisher import MirrorPublisher
 from bridge.northbound.gateway.nets import net_of
 from bridge.northbound.gateway.server import GatewayServer
 from bridge.northbound.listening import Port
-from bridge.northbound.modbus.registers import units_of
 from bridge.northbound.modbus.server import ModbusServer
+from bridge.northbound.modbus.units import units_of
 from bridge.northbound.zenoh.session import ZenohServer
 from bridge.notify import Notifier
 from bridge.parts import Parts, ServerPart

@@ -20,7 +20,8 @@ from bridge.image import Point
 from bridge.lint import family_dictionaries
 from bridge.lint.bus import view_bus
 from bridge.mapping.loader import mapping_folders
-from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row, drive_maps, units_of
+from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row
+from bridge.northbound.modbus.units import device_maps, drive_maps, units_of
 from bridge.northbound.zenoh.keys import KeySpace
 from bridge.project import load_project
 
@@ -44,6 +45,11 @@ def modbus(site: SiteArgument, as_json: AsJson = False) -> None:
         (drive_map.unit_id, drive_map.drive_name, *_register(row))
         for drive_map in drive_maps(plant)
         for row in drive_map.rows
+    ]
+    rows += [
+        (device.unit_id, device.device_name, *_register(row))
+        for device in device_maps(plant)
+        for row in device.rows
     ]
     rows += [(BRIDGE_UNITS[0], "bridge", *_register(row)) for row in units_of(plant).bridge_rows]
     _print(_MODBUS, rows, as_json)

@@ -34,14 +34,14 @@ def new(
         Path | None, typer.Option(help="where to write it; left out, mappings/VENDOR/PRODUCT.toml")
     ] = None,
 ) -> None:
-    """Write a mapping for the CiA 402 drive that FILE describes."""
+    """Write a mapping for the device that FILE describes: a drive with CiA 402, or one that is no drive."""
     description = read_whole_device_file(file)
     lost = [one for one in description.findings if one.severity is Severity.ERROR]
     told = sorted((*lost, *contradictions(description)), key=lambda one: one.line)
     derived = derive_family(description, file.name, mode)
     path = output or _FOLDER / f"{derived.name}.toml"
     family = _written(path, derived.text)
-    print(printable(f"{path}: {family.family.name}, {derived.mode.mapping}, {_count(family.parameter)}"))
+    print(printable(f"{path}: {family.family.name}, {derived.base}, {_count(family.parameter)}"))
     for one in told:
         print(printable(f"{file}:{one.line}: {one.text}"))
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 from bridge.command.link import Link, NodeState
 from bridge.config import NodeTable
@@ -52,6 +53,7 @@ class Device:
         self._points = {
             signal.object: image.index[f"{node.name}/input/{signal.name}"] for signal in family.input
         }
+        self._age = image.index[f"{node.name}/node/pdo_age_ms"]
         self._heard: list[_Heard] = []
         self._unserved: dict[int, str] = {}
         """Points that no TPDO carries, with the reason."""
@@ -93,6 +95,7 @@ class Device:
         for heard in self._heard:
             heard.link.on_time(now)
         self._judge(now)
+        self._image.keep(self._age, self.age_ms(now), now)
 
     def next_deadline(self) -> float | None:
         times = [heard.link.next_deadline() for heard in self._heard]
@@ -101,8 +104,7 @@ class Device:
     @property
     def quality(self) -> Quality:
         """That of its inputs as a whole: the worst of its TPDOs."""
-        found = [heard.quality[0] for heard in self._heard if heard.quality]
-        return max(found, key=_badness) if found else self._state[0]
+        return worst_of([heard.quality[0] for heard in self._heard if heard.quality] or [self._state[0]])
 
     def age_ms(self, now: float) -> int:
         """Of the oldest of its TPDOs; FFFFFFFFh where one has never come."""
@@ -146,15 +148,18 @@ class Device:
                 return Quality.WAITING, f"node {self._node.value}"
 
 
-def _badness(quality: Quality) -> int:
-    order = (
-        Quality.GOOD,
-        Quality.STALE,
-        Quality.LOST,
-        Quality.WAITING,
-        Quality.DEAD,
-        Quality.DISABLED,
-        Quality.CONFIG_ERROR,
-        Quality.DEVICE_FAULT,
-    )
-    return order.index(quality)
+_FROM_GOOD_TO_BAD: Final = (
+    Quality.GOOD,
+    Quality.STALE,
+    Quality.DEVICE_FAULT,
+    Quality.LOST,
+    Quality.WAITING,
+    Quality.CONFIG_ERROR,
+    Quality.DEAD,
+    Quality.DISABLED,
+)
+
+
+def worst_of(qualities: Iterable[Quality]) -> Quality:
+    """The quality of several as a whole; waiting where there are none."""
+    return max(qualities, key=_FROM_GOOD_TO_BAD.index, default=Quality.WAITING)

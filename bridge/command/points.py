@@ -96,18 +96,22 @@ def _drive_points(name: str, family: Family, table: DriveTable) -> list[Point]:
 
 
 def _input_points(name: str, family: Family) -> list[Point]:
+    age = "age of the oldest of its TPDOs; 4294967295: one never came"
     return [
-        Point(
-            name=f"{name}/input/{signal.name}",
-            data_type=signal.value_type,
-            unit=signal.unit,
-            low=signal.low,
-            high=signal.high,
-            description=signal.description,
-            states=tuple(sorted(signal.states.items())),
-            bits=tuple(signal.bits),
-        )
-        for signal in family.input
+        _point(f"{name}/node", "pdo_age_ms", _U32, age, unit="ms"),
+        *(
+            Point(
+                name=f"{name}/input/{signal.name}",
+                data_type=signal.value_type,
+                unit=signal.unit,
+                low=signal.low,
+                high=signal.high,
+                description=signal.description,
+                states=tuple(sorted(signal.states.items())),
+                bits=tuple(signal.bits),
+            )
+            for signal in family.input
+        ),
     ]
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
+from bridge.derive.device import GENERIC, device_lines, identity_lines
 from bridge.derive.layout import Layout, NoLayout, layout_of
 from bridge.derive.modes import (
     CONTROL_WORD,
@@ -19,10 +21,11 @@ from bridge.derive.modes import (
     modes_of,
 )
 from bridge.derive.parameters import FURTHER_AXES, entries_of, parameter_lines
-from bridge.derive.toml import file_name, one_line, string, strings, word
-from bridge.eds import Description
-from bridge.errors import OperationFailed
+from bridge.derive.toml import file_name, one_line, string, strings
+from bridge.eds import Description, read_whole_device_file
+from bridge.errors import Fault, FileFaults, OperationFailed
 from bridge.mapping import Family, load_family
+from bridge.mapping.loader import family_of
 
 _NEEDED: Final = ("603F", "6007")
 """Parameters that the base itself speaks of; a device without them refuses to be asked."""
@@ -32,19 +35,24 @@ _CYCLIC: Final = (8, 9)
 
 @dataclass(frozen=True, slots=True)
 class Derived:
-    """``name`` is what the mapping may be called, such as ``acme/spin-3000``; ``text`` is the file."""
+    """``name`` is what the mapping may be called, such as ``acme/spin-3000``; ``base`` is the mapping that it
+    extends, ``text`` is the file."""
 
     name: str
-    mode: Mode
+    base: str
     text: str
 
 
 def derive_family(description: Description, source: str, mode: str | None = None) -> Derived:
-    """The mapping of a drive of the profile CiA 402; ``source`` is the name of the file. ``mode`` is the part
-    of a mapping's name behind ``cia402/``; left out, the first that the device has.
+    """The mapping of a drive of the profile CiA 402, or of a device that is no drive; ``source`` is the name
+    of the file. ``mode`` is the part of a drive's mapping behind ``cia402/``; left out, the first that the
+    drive has.
 
-    Raises ``OperationFailed`` for a device that is no such drive, or has not that mode.
+    Raises ``OperationFailed`` for a drive that has not that mode, or of which half is missing.
     """
+    if not is_drive(description) and mode is None and not _claims_drive(description):
+        text = "\n".join(device_lines(description, source))
+        return Derived(_name(description, source), GENERIC, text)
     if not is_drive(description):
         raise OperationFailed(
             f"{source} describes no drive that follows CiA 402 ({_why_not(description)}): its mapping has to "
@@ -60,11 +68,20 @@ def derive_family(description: Description, source: str, mode: str | None = None
             continue
         others = [other for other in there if other is not one]
         text = "\n".join(_lines(description, source, one, layout, others))
-        return Derived(_name(description, source), one, text)
+        return Derived(_name(description, source), one.mapping, text)
     if refused:
         raise OperationFailed(f"{source}: {'; '.join(refused)}")
     what = ", ".join(one.name for one in there) or "none that a mapping of ours drives"
     raise OperationFailed(f"{source}: the device has not the mode {mode or 'asked for'}; it has {what}")
+
+
+def _claims_drive(description: Description) -> bool:
+    """It says that it is one, or has one of its words."""
+    profile = (description.number(0x1000) or 0) & 0xFFFF
+    words = [
+        word for word in (CONTROL_WORD, STATUS_WORD) if description.entry(word) or _carrier(description, word)
+    ]
+    return profile == PROFILE_402 or bool(words)
 
 
 def _why_not(description: Description) -> str:
@@ -132,7 +149,7 @@ def _lines(
     yield f"vendor = {string(device.vendor or 'unknown')}"
     yield f"source = {string(source)}"
     yield ""
-    yield from _identity(description)
+    yield from identity_lines(description)
     yield from _process(description, layout, mode)
     carried = {(index, 0) for index, _ in (*mode.commanded, *mode.told)}
     names = {one.index: one.name for one in description.objects}
@@ -151,25 +168,6 @@ def _without(description: Description, base: Family, layout: Layout, there: Set[
             yield f"own_supervision:{own.name}"
     if not layout.tells_mode:
         yield "value:actual/mode"
-
-
-def _identity(description: Description) -> Iterator[str]:
-    """1000h and 1018h as far as the file has them; 0 is what a file has that does not say."""
-    device = description.device
-    facts = (
-        ("vendor_id", description.number(0x1018, 1), device.vendor_id),
-        ("product_code", description.number(0x1018, 2), device.product_code),
-    )
-    yield "[identity]"
-    for key, counts, other in facts:
-        if counts and other and counts != other:
-            yield f"# The file contradicts itself: [DeviceInfo] has {key} {word(other, 4)}, 1018h counts."
-        number = counts or other
-        yield f"{key} = {word(number, 4)}" if number else f"# {key} = 0x"
-    revision = description.number(0x1018, 3) or device.revision
-    # Another firmware is the same device.
-    yield f"# revision = {word(revision, 8)}" if revision else "# revision = 0x"
-    yield ""
 
 
 def _start(description: Description, mode: Mode) -> str | None:
@@ -222,3 +220,13 @@ def _process(description: Description, layout: Layout, mode: Mode) -> Iterator[s
         yield 'group = "actual"'
         yield f"word = {string(name)}"
         yield ""
+
+
+def describe(path: Path, folders: Sequence[Path] = ()) -> Family:
+    """The family of the device that the description in ``path`` describes. Raises ``FileFaults``."""
+    description = read_whole_device_file(path)
+    try:
+        made = derive_family(description, path.name)
+    except OperationFailed as error:
+        raise FileFaults([Fault(str(path), 0, "", str(error), "a mapping file written by hand")]) from None
+    return family_of(made.text, path, folders)

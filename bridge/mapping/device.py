@@ -68,4 +68,4 @@ class Signal(Table):
 
 def no_process() -> Process:
     """What a family without slots has instead of process data of drives."""
-    return Process(rpdo=["control_word"], tpdo=["status_word"])
+    return Process.model_validate({"rpdo": ["control_word"], "tpdo": ["status_word"]})

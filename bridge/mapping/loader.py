@@ -87,7 +87,10 @@ def template_names(folders: Sequence[Path] = ()) -> list[str]:
 
 def read_family(path: Path, folders: Sequence[Path] = ()) -> Family:
     """Read and check one mapping file and those it extends. Raises ``FileFaults`` with every fault."""
-    file = MergedFile(_chain(path, folders or mapping_folders()))
+    return _checked(MergedFile(_chain(TomlFile(path), folders or mapping_folders())))
+
+
+def _checked(file: MergedFile) -> Family:
     family = file.validate(Family)
     if family is not None:
         check(family, file)
@@ -97,19 +100,24 @@ def read_family(path: Path, folders: Sequence[Path] = ()) -> Family:
     return family
 
 
+def family_of(text: str, path: Path, folders: Sequence[Path] = ()) -> Family:
+    """The family that was made of the file in ``path`` as the text of a mapping. Raises ``FileFaults``."""
+    return _checked(MergedFile(_chain(TomlFile(path, text), folders or mapping_folders())))
+
+
 def lineage(name: str, folders: Sequence[Path] = ()) -> list[str]:
     """The mapping ``name`` and those it extends, by their names. Raises ``FileFaults`` where one is
     missing; there must be a mapping of this name."""
     folders = folders or mapping_folders()
     files = _files(folders)
     by_path = {path.resolve(): known for known, paths in files.items() for path in paths}
-    chain = _chain(files[name][0], folders)
+    chain = _chain(TomlFile(files[name][0]), folders)
     return list(dict.fromkeys(by_path[file.path.resolve()] for file in reversed(chain)))
 
 
-def _chain(path: Path, folders: Sequence[Path]) -> list[TomlFile]:
+def _chain(first: TomlFile, folders: Sequence[Path]) -> list[TomlFile]:
     """The file and those it extends, the last of those first."""
-    chain = [TomlFile(path)]
+    chain = [first]
     files = _files(folders)
     while isinstance(name := chain[0].data.get("extends"), str):
         file = chain[0]

@@ -1,9 +1,9 @@
 """A mapping file merged over those it extends, which still knows where each of its keys stands.
 
 Tables are merged key by key. The lists ``value``, ``parameter``, ``poll``, ``slot``, ``input``,
-``own_supervision`` and ``fault`` are merged item by item, by ``name`` (values by ``group`` too), ``meaning`` by ``word`` and
-``group``, the PDOs of a slot by ``number``; every other list is replaced. ``without`` leaves items of
-those lists out first.
+``own_supervision`` and ``fault`` are merged item by item, by ``name`` (values by ``group`` too), ``meaning``
+by ``word`` and ``group``, the PDOs of a slot by ``number``; every other list is replaced. ``without`` leaves
+items of those lists out first.
 """
 
 from __future__ import annotations

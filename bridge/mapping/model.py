@@ -146,18 +146,15 @@ class Poll(Table):
 
 
 def _no_control_word() -> ControlWord:
-    nothing = Command(mask=0, value=0)
-    return ControlWord(
-        bits=[],
-        acknowledge_bit=0,
-        enabling=nothing,
-        stopped=0,
-        ready=0,
-        run=0,
-        stop=nothing,
-        quick_stop=nothing,
-        disable_voltage=nothing,
-    )
+    nothing = {"mask": 0, "value": 0}
+    commands = ("enabling", "stop", "quick_stop", "disable_voltage")
+    words = ("acknowledge_bit", "stopped", "ready", "run")
+    none: dict[str, object] = {"bits": [], **dict.fromkeys(commands, nothing), **dict.fromkeys(words, 0)}
+    return ControlWord.model_validate(none)
+
+
+def _no_status_word() -> StatusWord:
+    return StatusWord.model_validate({"bits": [], "state": []})
 
 
 class Family(Table):
@@ -180,7 +177,7 @@ class Family(Table):
     meaning: list[Meaning] = Field(default_factory=list[Meaning])
     value: list[ProcessValue] = Field(default_factory=list[ProcessValue])
     control_word: ControlWord = Field(default_factory=_no_control_word)
-    status_word: StatusWord = Field(default_factory=lambda: StatusWord(bits=[], state=[]))
+    status_word: StatusWord = Field(default_factory=_no_status_word)
     stopping: Stopping = Field(default_factory=lambda: Stopping.model_validate({}))
     parameter_names: ParameterNames | None = None
     aliases: Aliases = Field(default_factory=Aliases)

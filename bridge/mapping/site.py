@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import cast
+from typing import Final, cast
 
 from bridge.config import Site, read_site
 from bridge.errors import Fault, FileFaults
@@ -21,9 +22,15 @@ from bridge.mapping.own_places import impossible
 from bridge.mapping.process import SYNC_PERIOD
 from bridge.tomlfile import RawTable, TomlFile
 
+DESCRIBED: Final = "eds:"
+"""What stands before the name of a device description in the place of a mapping."""
+Describe = Callable[[Path, Sequence[Path]], Family]
+"""The family that a device description gives, with the folders of mappings. Raises ``FileFaults``."""
 
-def load_site_and_families(path: Path) -> tuple[Site, dict[str, Family]]:
-    """A site file and every mapping it names. Raises ``FileFaults`` with all faults of all files."""
+
+def load_site_and_families(path: Path, describe: Describe | None = None) -> tuple[Site, dict[str, Family]]:
+    """A site file and every mapping it names; ``describe`` makes those of device descriptions. Raises
+    ``FileFaults`` with all faults of all files."""
     file, site = read_site(path)
     families: dict[str, Family] = {}
     of_families: list[Fault] = []
@@ -31,6 +38,12 @@ def load_site_and_families(path: Path) -> tuple[Site, dict[str, Family]]:
     for node in _nodes(file):
         name = node.text("mapping")
         if name is None or name in families:
+            continue
+        if describe and name.startswith(DESCRIBED):
+            try:
+                families[name] = describe(path.parent / name.removeprefix(DESCRIBED), folders)
+            except FileFaults as error:
+                of_families += error.faults
             continue
         if not is_family(name, folders):
             known, templates = family_names(folders), template_names(folders)

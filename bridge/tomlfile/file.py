@@ -56,11 +56,12 @@ class RawTable:
 class TomlFile:
     """A parsed TOML file that knows on which line each of its keys stands."""
 
-    def __init__(self, path: Path) -> None:
-        """Raises ``FileFaults`` where the file cannot be read or is not TOML."""
+    def __init__(self, path: Path, text: str | None = None) -> None:
+        """``text`` is what was made of the file in ``path``. Raises ``FileFaults`` where the file cannot be
+        read or is not TOML."""
         self.path = path
         self.faults: list[Fault] = []
-        text = self.text = self._read()
+        text = self.text = self._read() if text is None else text
         try:
             self.data: dict[str, Any] = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from bridge.command import Plant, PlantView
 from bridge.config import WordOrder
 from bridge.northbound.modbus.dispatch import Dispatcher
-from bridge.northbound.modbus.registers import units_of
+from bridge.northbound.modbus.units import units_of
 
 
 def view_of(

@@ -19,9 +19,9 @@ from bridge.command.link import NodeState
 from bridge.config import ModbusTable, ZenohTable
 from bridge.eventlog import log_event
 from bridge.mirror.client import MirrorClient
-from bridge.northbound.modbus.registers import units_of
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.session import Session
+from bridge.northbound.modbus.units import units_of
 from bridge.northbound.sources import source_of
 from bridge.northbound.zenoh.session import ZenohServer
 from bridge.notify import Notifier

@@ -24,7 +24,8 @@ from bridge.mapping.model import Family, MappedObject, ObjectRef
 from bridge.node.boot.status import TEXTS as BOOT_TEXTS
 from bridge.northbound.modbus.dispatch import EXCEPTIONS
 from bridge.northbound.modbus.pdu import Function
-from bridge.northbound.modbus.registers import DriveMap, Row, Table, drive_maps, units_of
+from bridge.northbound.modbus.registers import DriveMap, Row, Table
+from bridge.northbound.modbus.units import drive_maps, units_of
 from bridge.northbound.opcua.events import type_name
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, layout
 from bridge.northbound.opcua.services import SERVICES

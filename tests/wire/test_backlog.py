@@ -18,8 +18,8 @@ from bridge.command import Action, Code, Do, Identity, Plant, Reply, Request, So
 from bridge.command.link import NodeState
 from bridge.config import ModbusTable, ZenohTable
 from bridge.mirror import MirrorClient, MirrorPublisher, socket_endpoint
-from bridge.northbound.modbus.registers import units_of
 from bridge.northbound.modbus.server import ModbusServer
+from bridge.northbound.modbus.units import units_of
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.zenoh import ZenohServer
 from tests.support import sites

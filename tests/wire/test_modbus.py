@@ -25,8 +25,9 @@ from bridge.config import ModbusTable
 from bridge.config.model import AuditTable
 from bridge.errors import Unavailable
 from bridge.northbound.modbus import session
-from bridge.northbound.modbus.registers import DriveMap, units_of
+from bridge.northbound.modbus.registers import DriveMap
 from bridge.northbound.modbus.server import ModbusServer
+from bridge.northbound.modbus.units import units_of
 from tests.support import sites
 from tests.support.modbus_site import ENABLED, READY, SWITCH_ON_INHIBITED, float_words, make_plant
 from tests.support.views import view_of

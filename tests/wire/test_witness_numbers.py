@@ -11,8 +11,8 @@ import pytest
 from bridge.command import Action, Do, Identity, Plant, Request, SetTimeout, Source
 from bridge.command.link import NodeState
 from bridge.config import ModbusTable
-from bridge.northbound.modbus.registers import units_of
 from bridge.northbound.modbus.server import ModbusServer
+from bridge.northbound.modbus.units import units_of
 from bridge.witness.numbers import Numbers, Reading
 from tests.support.modbus_site import READY, make_plant
 from tests.support.views import view_of

@@ -114,7 +114,8 @@ class DrivePlan:
 
 @dataclass(slots=True)
 class InputPlan:
-    """The TPDOs of a device that is no drive; ``unserved`` has the reason for each input that none carries."""
+    """The TPDOs of a device that is no drive; ``unserved`` has the reason for each input that none of them
+    carries."""
 
     tpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
     unserved: dict[ObjectRef, str] = field(default_factory=dict[ObjectRef, str])

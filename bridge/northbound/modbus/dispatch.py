@@ -11,6 +11,7 @@ from typing import Final
 from bridge.command import Action, Code, Identity, Outcome, Rejection, Request
 from bridge.command.freshness import NOW_S
 from bridge.config import WordOrder
+from bridge.northbound.modbus.device_unit import DeviceUnit
 from bridge.northbound.modbus.drive_unit import DriveUnit
 from bridge.northbound.modbus.pdu import (
     ExceptionCode,
@@ -29,8 +30,9 @@ from bridge.northbound.modbus.pdu import (
     refusal,
     words_answer,
 )
-from bridge.northbound.modbus.registers import BRIDGE_UNITS, Table, Units, Words32
+from bridge.northbound.modbus.registers import BRIDGE_UNITS, Table, Words32
 from bridge.northbound.modbus.unit import BridgeUnit, Unit
+from bridge.northbound.modbus.units import Units
 from bridge.northbound.view import View
 
 Answer = Callable[[bytes], None]
@@ -95,6 +97,9 @@ class Dispatcher:
         self._units: dict[int, Unit] = {
             drive.unit_id: DriveUnit(drive, view, words32) for drive in units.drives
         }
+        for device in units.devices:
+            self._names[device.unit_id] = device.device_name
+            self._units[device.unit_id] = DeviceUnit(device, view, words32)
         for unit_id in BRIDGE_UNITS:
             self._units[unit_id] = BridgeUnit(units, view)
 

@@ -11,11 +11,9 @@ import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import partial
 from typing import Final
 
-from bridge.command import Drive, Plant, Source
-from bridge.command.rights import rights_of
+from bridge.command import Drive
 from bridge.config import WordOrder
 from bridge.image import DataType, Point, Quality
 from bridge.mapping.model import Family
@@ -42,8 +40,6 @@ PARAMETERS: Final = 1000
 """First holding register of the writable parameters, two registers each."""
 QUALITY_BITS: Final = 16
 """First discrete input of the quality."""
-BRIDGE_DRIVES: Final = 5
-"""First input register of the bridge's one word per drive."""
 ABORT_CODE: Final = "supervision/sdo_abort_code"
 """The point behind the register ``sdo_abort_code``."""
 
@@ -176,64 +172,10 @@ class DriveMap:
         return frozenset(row.address + 1 for row in self.rows if row.table is table and row.size == 2)
 
 
-def drive_maps(plant: Plant) -> tuple[DriveMap, ...]:
-    """The maps of all drives, by unit id, with the access that this site gives."""
-    rights = rights_of(plant, Source.MODBUS)
-
-    def allows(drive: Drive) -> Allows:
-        write = partial(rights.may_write, plant)
-        return Allows(write, may_command=rights.may_command(drive), may_stop=rights.may_stop(drive))
-
-    return tuple(DriveMap(drive, allows(drive)) for _, drive in sorted(plant.by_unit.items()))
-
-
-@dataclass(frozen=True, slots=True)
-class Units:
-    """What has a unit id: the drives, and the bridge itself with its buses and its nodes, but those that the
-    site file leaves out of service. All are in the order of the site file."""
-
-    site: str
-    buses: tuple[str, ...]
-    nodes: tuple[str, ...]
-    drives: tuple[DriveMap, ...]
-
-    @property
-    def bridge_rows(self) -> tuple[Row, ...]:
-        """The map of the bridge's own unit."""
-        row = _row_maker(Table.INPUT_REGISTER, "r")
-        return (
-            row(0, "module_state", "uint16", "", _MODULE_STATE),
-            row(1, "load", "uint16", "0.1 %", "bus load of the first bus"),
-            row(2, "state", "uint16", "", "CAN controller: 0 ok, 1 warning, 2 passive, 3 bus-off, 4 down"),
-            row(3, "drives_configured", "uint16", "", "drives in the site file"),
-            row(4, "drives_good", "uint16", "", "drives with good data"),
-            *(
-                row(address, drive.drive_name, "uint16", "", f"unit {drive.unit_id}: quality + 256 × state")
-                for address, drive in enumerate(self.drives, BRIDGE_DRIVES)
-            ),
-        )
-
-
-def units_of(plant: Plant) -> Units:
-    """The units of a site; what may be written is not looked at."""
-    return Units(
-        plant.site.site.name,
-        tuple(bus.name for bus in plant.site.bus),
-        tuple(node.name for node in plant.nodes.values() if node.table.enabled),
-        tuple(map(DriveMap, plant.drives.values())),
-    )
-
-
-_MODULE_STATE: Final = (
-    "bits as NORD P173: 0 pre-operational, 1 operational, 2 a node lost, 3 a watchdog tripped, "
-    "4 CAN warning, 5 bus-off"
-)
-
-
 _VALUES_NOT_GOOD: Final = f"bit 0: the first value from {VALUES} on is not good, and so on, up to the 32nd"
 
 
-def _row_maker(table: Table, access: str) -> Callable[[int, str, str, str, str], Row]:
+def row_maker(table: Table, access: str) -> Callable[[int, str, str, str, str], Row]:
     def make(address: int, name: str, kind: str, unit: str, description: str) -> Row:
         return Row(table, address, name, kind, access, unit, description)
 
@@ -247,7 +189,7 @@ def _words(group: str, process: list[str], carried: list[str]) -> dict[int, str]
 
 
 def _input_rows(actual: Mapping[int, str]) -> list[Row]:
-    row = _row_maker(Table.INPUT_REGISTER, "r")
+    row = row_maker(Table.INPUT_REGISTER, "r")
     qualities = ", ".join(f"{quality.value} {quality.label}" for quality in Quality)
     states = "0 not ready, 1 switch-on inhibited, 2 ready, 3 switched on, 4 operation enabled, \
 5 quick stop active, 6 fault reaction active, 7 fault, 255 unknown"
@@ -277,9 +219,9 @@ def _input_rows(actual: Mapping[int, str]) -> list[Row]:
 
 
 def _holding_rows(setpoints: Mapping[int, str], allows: Allows, *, may_set: bool) -> list[Row]:
-    row = _row_maker(Table.HOLDING_REGISTER, _access(allows.may_command))
-    stop = _row_maker(Table.HOLDING_REGISTER, _access(allows.may_stop))
-    timeout = _row_maker(Table.HOLDING_REGISTER, _access(may_set and allows.may_command))
+    row = row_maker(Table.HOLDING_REGISTER, _access(allows.may_command))
+    stop = row_maker(Table.HOLDING_REGISTER, _access(allows.may_stop))
+    timeout = row_maker(Table.HOLDING_REGISTER, _access(may_set and allows.may_command))
     name, text = "supervision/fieldbus_timeout_ms", "how long the controller may be silent; 0: off (as P151)"
     return [
         row(0, "command/control_word", "uint16", "", "control word"),
@@ -309,8 +251,8 @@ def _value_rows(
 
 
 def _bit_rows(family: Family, allows: Allows) -> list[Row]:
-    status = _row_maker(Table.DISCRETE_INPUT, "r")
-    coil = _row_maker(Table.COIL, _access(allows.may_command))
+    status = row_maker(Table.DISCRETE_INPUT, "r")
+    coil = row_maker(Table.COIL, _access(allows.may_command))
     return [
         *(
             status(i, f"status/{name or i}", "bool", "", _bit_text(i, "status word as served", name))

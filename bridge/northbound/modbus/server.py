@@ -14,8 +14,8 @@ from bridge.command import Identity, Role, Source
 from bridge.config import ModbusTable
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.modbus.dispatch import Dispatcher
-from bridge.northbound.modbus.registers import Units
 from bridge.northbound.modbus.session import READ_MOST, Session
+from bridge.northbound.modbus.units import Units
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.sources import source_of
 from bridge.northbound.view import ConnectionView

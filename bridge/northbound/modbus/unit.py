@@ -12,7 +12,8 @@ from bridge.command.points import NODE_CODES
 from bridge.drive import DriveState
 from bridge.image import Quality, Value
 from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, Refused
-from bridge.northbound.modbus.registers import BRIDGE_DRIVES, Table, Units
+from bridge.northbound.modbus.registers import Table
+from bridge.northbound.modbus.units import BRIDGE_DRIVES, Units
 from bridge.northbound.view import View
 
 _BUS_WARNING, _BUS_PASSIVE, _BUS_OFF, _BUS_DOWN = 1, 2, 3, 4

@@ -18,6 +18,9 @@ from bridge.image import Point
 GROUPS: Final = ("command", "status", "actual", "parameter", "supervision", "identity")
 """Every drive has these folders, whether or not they hold a point."""
 
+DEVICE_GROUPS: Final = ("input", "parameter")
+"""Of a node that is no drive, beside ``node``."""
+
 
 class VariableKind(Enum):
     PLAIN = "BaseDataVariableType"
@@ -167,6 +170,8 @@ def layout(points: Sequence[Point]) -> tuple[ObjectNode, ObjectNode, ObjectNode]
                 home = _owner(buses, f"bus/{name}", name, _BUS_METHODS)
             case (name, "node", *rest) if rest:
                 home = node(name).folder_below("node")
+            case (name, group, *rest) if len(rest) == 1 and group in DEVICE_GROUPS:
+                home = node(name).folder_below(group)
             case (name, drive, *rest) if len(rest) > 1 and rest[0] in GROUPS:
                 home = _owner(node(name), f"{name}/{drive}", drive, _DRIVE_METHODS, GROUPS)
             case _:

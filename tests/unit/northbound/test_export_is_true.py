@@ -31,7 +31,8 @@ from bridge.command.rights import rights_of
 from bridge.config import load_site
 from bridge.image import Point, Quality
 from bridge.mapping import family_names
-from bridge.northbound.modbus.registers import STOP, Row, Table, drive_maps, units_of
+from bridge.northbound.modbus.registers import STOP, Row, Table
+from bridge.northbound.modbus.units import drive_maps, units_of
 from tests.support import sites
 from tests.support.bench import Bench
 from tests.support.rig import ENABLE, SHUT_DOWN

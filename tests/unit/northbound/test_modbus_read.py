@@ -14,8 +14,9 @@ from bridge.config import WordOrder
 from bridge.drive import OwnJudgement
 from bridge.northbound.modbus.dispatch import EXCEPTIONS
 from bridge.northbound.modbus.pdu import PDU_MOST, Identify, identification_answer
-from bridge.northbound.modbus.registers import DriveMap, Table, Words32, drive_maps, units_of
+from bridge.northbound.modbus.registers import DriveMap, Table, Words32
 from bridge.northbound.modbus.unit import BridgeUnit
+from bridge.northbound.modbus.units import drive_maps, units_of
 from tests.support import sites
 from tests.support.modbus_site import (
     ENABLED,

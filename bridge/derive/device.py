@@ -1,0 +1,106 @@
+"""A mapping file for a device that is no drive: an encoder, inputs and outputs, anything that sends PDOs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from bridge.canopen.datatypes import INTEGERS, REALS
+from bridge.derive.parameters import TYPES, entries_of, parameter_lines
+from bridge.derive.toml import file_name, one_line, string, strings, word
+from bridge.eds import Description, Entry
+from bridge.eds.pdos import pdos
+
+GENERIC: Final = "generic/device"
+_PROFILE_IO: Final = 401
+_DIGITAL_INPUTS: Final = range(0x6000, 0x6020)
+"""CiA 401 §6.4.1: eight inputs to an object."""
+_DUMMIES: Final = range(0x0001, 0x0008)
+
+
+def device_lines(description: Description, source: str) -> Iterator[str]:
+    """The mapping, line by line."""
+    device = description.device
+    signals = dict(_inputs(description))
+    yield f"# Made of {one_line(source)} by `drivebridge family new`. A key behind a # is what the file does"
+    yield "# not say: fill it in from the manual, and compare the rest with the device."
+    yield f"extends = {string(GENERIC)}"
+    yield ""
+    yield "[family]"
+    yield f"name = {string(device.product or source)}"
+    yield f"vendor = {string(device.vendor or 'unknown')}"
+    yield f"source = {string(source)}"
+    yield ""
+    yield from identity_lines(description)
+    for name, (entry, kind, title) in signals.items():
+        yield "[[input]]"
+        yield f"name = {string(name)}"
+        yield f'object = "{entry.index:04X}:{entry.sub:02X}"'
+        yield f"data_type = {string(kind)}"
+        if kind in REALS or (kind in INTEGERS and kind != "bool"):
+            yield '# unit = ""'
+        if _is_eight_inputs(description, entry):
+            yield f"bits = {strings([f'bit_{bit}' for bit in range(8)])}"
+        yield f"description = {string(title)}"
+        yield ""
+    commanded = {(one.index, one.sub) for pdo in pdos(description) if pdo.receives for one in pdo.mapped}
+    told = {(entry.index, entry.sub) for entry, _, _ in signals.values()}
+    for name, entry in entries_of(description):
+        yield from parameter_lines(name, entry, _title(description, entry), {}, commanded | told)
+
+
+def _inputs(description: Description) -> Iterator[tuple[str, tuple[Entry, str, str]]]:
+    """What the TPDOs carry, in their order: name, and entry, type and title."""
+    found: dict[tuple[int, int], Entry] = {}
+    for pdo in pdos(description):
+        for one in () if pdo.receives else pdo.mapped:
+            entry = description.entry(one.index, one.sub)
+            if entry and one.index not in _DUMMIES:
+                found.setdefault((one.index, one.sub), entry)
+    names: set[str] = set()
+    for entry in found.values():
+        kind = TYPES.get(entry.data_type) if entry.data_type else None
+        if kind is None or kind in ("string", "bytes"):
+            continue
+        name = _name(description, entry)
+        if name in names:
+            name = f"{name}_{entry.index:04x}_{entry.sub:02x}"
+        names.add(name)
+        yield name, (entry, kind, _title(description, entry))
+
+
+def _name(description: Description, entry: Entry) -> str:
+    """From the entry's title; the object's goes first where the entry is one of several."""
+    words = file_name(_title(description, entry)).replace("-", "_")
+    return words if words[:1].isalpha() else f"object_{entry.index:04x}_{entry.sub:02x}"
+
+
+def _title(description: Description, entry: Entry) -> str:
+    one = description.object(entry.index)
+    if one is None or not one.object_type.has_subs or entry.name.lower().startswith(one.name.lower()):
+        return entry.name
+    return f"{one.name} {entry.name}"
+
+
+def _is_eight_inputs(description: Description, entry: Entry) -> bool:
+    profile = (description.number(0x1000) or 0) & 0xFFFF
+    return profile == _PROFILE_IO and entry.index in _DIGITAL_INPUTS
+
+
+def identity_lines(description: Description) -> Iterator[str]:
+    """1000h and 1018h as far as the file has them; 0 is what a file has that does not say."""
+    device = description.device
+    facts = (
+        ("vendor_id", description.number(0x1018, 1), device.vendor_id),
+        ("product_code", description.number(0x1018, 2), device.product_code),
+    )
+    yield "[identity]"
+    for key, counts, other in facts:
+        if counts and other and counts != other:
+            yield f"# The file contradicts itself: [DeviceInfo] has {key} {word(other, 4)}, 1018h counts."
+        number = counts or other
+        yield f"{key} = {word(number, 4)}" if number else f"# {key} = 0x"
+    revision = description.number(0x1018, 3) or device.revision
+    # Another firmware is the same device.
+    yield f"# revision = {word(revision, 8)}" if revision else "# revision = 0x"
+    yield ""

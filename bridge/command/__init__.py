@@ -5,6 +5,7 @@ from bridge.command.drive import Drive as Drive
 from bridge.command.drive import Identification as Identification
 from bridge.command.event import Event as Event
 from bridge.command.event import Kind as Kind
+from bridge.command.plant import HasParameters as HasParameters
 from bridge.command.plant import Node as Node
 from bridge.command.plant import Plant as Plant
 from bridge.command.plant import PlantView as PlantView

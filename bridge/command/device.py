@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.command.link import Link, NodeState
+from bridge.command.request import Identity, Role
 from bridge.config import NodeTable
 from bridge.image import Image, Quality, Value
 from bridge.mapping.device import Signal
@@ -54,11 +55,21 @@ class Device:
             signal.object: image.index[f"{node.name}/input/{signal.name}"] for signal in family.input
         }
         self._age = image.index[f"{node.name}/node/pdo_age_ms"]
+        self._refused, self._abort_code = (
+            image.index[f"{node.name}/supervision/{leaf}"] for leaf in ("refused_writes", "sdo_abort_code")
+        )
+        self.refused_writes = 0
         self._heard: list[_Heard] = []
         self._unserved: dict[int, str] = {}
         """Points that no TPDO carries, with the reason."""
         self._state: tuple[Quality, str] = (Quality.WAITING, "")
         """How good those inputs are of which no TPDO is known."""
+
+    def begin(self, now: float) -> None:
+        """Show what is known from the start."""
+        self._image.set(self._refused, 0, now)
+        self._image.set(self._abort_code, 0, now)
+        self._judge(now)
 
     def on_pdos(self, pdos: Sequence[InputPdo], unserved: Mapping[ObjectRef, str], now: float) -> None:
         """What the boot-up has found; ``unserved`` has the reason for each input that no TPDO carries."""
@@ -109,6 +120,29 @@ class Device:
     def age_ms(self, now: float) -> int:
         """Of the oldest of its TPDOs; FFFFFFFFh where one has never come."""
         return max((heard.link.age_ms(now) for heard in self._heard), default=0xFFFF_FFFF)
+
+    # as whoever has its parameters sees it
+
+    @property
+    def is_enabled(self) -> bool:
+        """It moves nothing."""
+        return False
+
+    def refusal(self, identity: Identity) -> str:
+        """Why ``identity`` may not command it; empty where it may."""
+        return f"{identity} may only read" if identity.role < Role.OPERATOR else ""
+
+    def on_refused(self, now: float) -> None:
+        """A request about it was refused elsewhere."""
+        self.refused_writes += 1
+        self._image.set(self._refused, self.refused_writes, now)
+
+    def on_sdo_refused(self, abort_code: int, now: float) -> None:
+        """It has refused an SDO that a client had asked for."""
+        self._image.set(self._abort_code, abort_code, now)
+
+    def on_scale(self, parameter: str, full: float, in_set: int = 1) -> None:
+        """Nothing of it is scaled by a parameter."""
 
     def _judge(self, now: float) -> None:
         for heard in self._heard:

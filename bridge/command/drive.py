@@ -13,9 +13,10 @@ from bridge.command.event import Event
 from bridge.command.follow import Verdict
 from bridge.command.following import Following
 from bridge.command.link import FurtherTpdo
+from bridge.command.request import Identity
 from bridge.command.worst_case import StopTime, Wire, stop_time, sync_wait_ms, takeover_ms
 from bridge.config import BusTable, DriveTable, NodeTable
-from bridge.drive import Codes, Lack, OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, codecs
+from bridge.drive import MOVING, Codes, Lack, OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, codecs
 from bridge.drive.own_supervision import why_silence_does_not_stop
 from bridge.image import Image, Point, Quality, Value
 from bridge.mapping.model import Family, Slot
@@ -248,6 +249,22 @@ class Drive:
     def on_identification(self, identification: Identification, now: float) -> None:
         self.identification = identification
         self._show(self._identity, [getattr(identification, leaf) for leaf in _IDENTITY], now)
+
+    # as whoever has its parameters sees it
+
+    @property
+    def is_enabled(self) -> bool:
+        """It is in motion, or what it gets enables it."""
+        channel = self.channel
+        return channel.state in MOVING or channel.words.enables(channel.output.words[0])
+
+    def refusal(self, identity: Identity) -> str:
+        """Why ``identity`` may not command it; empty where it may."""
+        return self.channel.refusal(identity)
+
+    def on_refused(self, now: float) -> None:
+        """A request about it was refused elsewhere, and counts as one that is refused here."""
+        self.channel.on_refused(now)
 
     def on_sdo_refused(self, abort_code: int, now: float) -> None:
         """It has refused an SDO that a client had asked for."""

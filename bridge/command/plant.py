@@ -6,11 +6,11 @@ Northbounds read the image and submit requests; the master feeds it. Neither kno
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
-from typing import Final
+from typing import Final, Protocol
 
 from bridge.command.audit import AuditTrail, Rejection
 from bridge.command.deadlines import Deadlines
@@ -52,6 +52,33 @@ Enforce = Callable[[str, Action, str, float], None]
 """Does something to a node in the bridge's own name; the second text says why."""
 
 
+class HasParameters(Protocol):
+    """A drive, or a node that is none."""
+
+    name: str
+
+    @property
+    def is_enabled(self) -> bool:
+        """What it moves is in motion or may be: parameters on which that rests are left alone."""
+        ...
+
+    def refusal(self, identity: Identity) -> str:
+        """Why ``identity`` may not command it; empty where it may."""
+        ...
+
+    def on_refused(self, now: float) -> None:
+        """A request about it was refused elsewhere, and counts as one that is refused here."""
+        ...
+
+    def on_sdo_refused(self, abort_code: int, now: float) -> None:
+        """It has refused an SDO that a client had asked for."""
+        ...
+
+    def on_scale(self, parameter: str, full: float, in_set: int = 1) -> None:
+        """Its own value of a scaling parameter."""
+        ...
+
+
 @dataclass(slots=True)
 class Node:
     """A configured node and its drives, or the device that it is instead."""
@@ -66,6 +93,10 @@ class Node:
     @property
     def name(self) -> str:
         return self.table.name
+
+    @property
+    def with_parameters(self) -> Sequence[HasParameters]:
+        return [self.device] if self.device else self.drives
 
     def on_heard_again(self) -> None:
         """It could not be heard for a while, and goes on as it was."""
@@ -142,6 +173,8 @@ class Plant:
             self.image.set(state, NODE_CODES[NodeState.ABSENT], began)
             self.image.set(current, 0.0, began)
             self.image.set(last, 0.0, began)
+            if node.device:
+                node.device.begin(began)
             for drive in node.drives:
                 self.set(f"{drive.name}/supervision/sdo_abort_code", 0, began)
                 self._on_settled(node, drive, began)
@@ -203,7 +236,7 @@ class Plant:
                 reply(Outcome(Code.UNKNOWN_TARGET, f"there is no node {request.target!r}"))
             return is_taken
         drive = self.drives.get(request.target)
-        if drive is None:
+        if drive is None and request.target not in self.devices:
             reply = self._counting_refusals(request, now, reply)
             reply(Outcome(Code.UNKNOWN_TARGET, f"there is no drive {request.target!r}"))
             return False
@@ -211,8 +244,12 @@ class Plant:
             is_taken = carry_out(request, now, reply)
             if not is_taken:
                 reply = self._counting_refusals(request, now, reply)
-                reply(Outcome(Code.NOT_READY, f"{drive.name} is on no bus", forwarded=False))
+                reply(Outcome(Code.NOT_READY, f"{request.target} is on no bus", forwarded=False))
             return is_taken
+        if drive is None:
+            reply = self._counting_refusals(request, now, reply)
+            reply(Outcome(Code.READ_ONLY, f"{request.target} has no outputs", forwarded=False))
+            return False
         before, until = drive.channel.output, drive.channel.until
         drive.channel.handle(request, now, reply)
         is_changed = drive.channel.output != before or request.action in _BRINGS_TIMERS_FORWARD
@@ -297,6 +334,7 @@ class Plant:
         good = sum(drive.quality is Quality.GOOD for drive in self.drives.values())
         self.set("bridge/drives_good", good, now)
         refused = sum(drive.channel.refused_writes for drive in self.drives.values())
+        refused += sum(device.refused_writes for device in self.devices.values())
         self.set("bridge/refused_writes", refused + self._refused_by_others, now)
 
     def _on_settled(self, node: Node, drive: Drive, now: float) -> None:

@@ -47,6 +47,9 @@ CONTROLLER_STATES: Final = ((0, "ok"), (1, "warning"), (2, "passive"), (3, "bus_
 _FLAG, _TEXT, _REAL = DataType.BOOL, DataType.STRING, DataType.FLOAT
 _U8, _U16, _U32 = DataType.UINT8, DataType.UINT16, DataType.UINT32
 
+_REFUSED_WRITES: Final = "refused requests since start"
+_ABORT_CODE: Final = "why the drive last refused an SDO of a client; 0: never"
+
 
 def _point(top: str, leaf: str, data_type: DataType, description: str, **nature: Any) -> Point:
     return Point(name=f"{top}/{leaf}", data_type=data_type, description=description, **nature)
@@ -99,6 +102,8 @@ def _input_points(name: str, family: Family) -> list[Point]:
     age = "age of the oldest of its TPDOs; 4294967295: one never came"
     return [
         _point(f"{name}/node", "pdo_age_ms", _U32, age, unit="ms"),
+        _point(f"{name}/supervision", "refused_writes", _U32, _REFUSED_WRITES),
+        _point(f"{name}/supervision", "sdo_abort_code", _U32, _ABORT_CODE),
         *(
             Point(
                 name=f"{name}/input/{signal.name}",
@@ -177,7 +182,7 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
         point("pdo_age_ms", _U32, "age of the last TPDO", unit="ms"),
         point("sent_control_word", _U16, "control word that the bridge sends to the drive"),
         point("restart_interlock", _FLAG, "true while a control word that enables is not forwarded"),
-        point("refused_writes", _U32, "refused requests since start"),
+        point("refused_writes", _U32, _REFUSED_WRITES),
         point(
             "worst_case_bridge_ms",
             _U32,
@@ -189,7 +194,7 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
         ),
         point("last_stop", _U8, "how the last stop ended", states=follow.LAST_STOPS),
         point("telegrams", _U16, "counts the owner's valid telegrams, modulo 65536"),
-        point("sdo_abort_code", _U32, "why the drive last refused an SDO of a client; 0: never"),
+        point("sdo_abort_code", _U32, _ABORT_CODE),
     ]
 
 

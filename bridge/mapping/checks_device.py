@@ -36,9 +36,6 @@ def check_kind(family: Family, file: MergedFile) -> None:
     for key in _OF_DRIVES:
         if key in file.data:
             file.fault((key,), "has no effect without a [[slot]]", "it is of drives")
-    if not family.input and not family.parameter:
-        hint = "[[slot]] for each drive, or [[input]] and [[parameter]] for a device that is no drive"
-        file.fault(("slot",), "is missing", hint)
 
 
 def check_signals(family: Family, file: MergedFile) -> None:

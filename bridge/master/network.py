@@ -194,9 +194,9 @@ class Network:
 
     def _ask_drive(self, request: Request, now: float, reply: Reply) -> bool:
         for node in self.nodes:
-            for drive in node.node.drives:
-                if drive.name == request.target:
-                    node.parameters.submit(request, drive, now, reply)
+            for who in node.node.with_parameters:
+                if who.name == request.target:
+                    node.parameters.submit(request, who, now, reply)
                     return True
         return False
 

@@ -6,11 +6,12 @@ Each has one transfer at a time; channels do not wait for each other.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final
+from typing import Final, NamedTuple
 
 from bridge.canopen import cobid
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoChannel
+from bridge.command import HasParameters
 from bridge.command.plant import Node
 from bridge.mapping.model import SdoServer, Slot
 
@@ -30,6 +31,24 @@ def opened_servers(node: Node) -> list[SdoServer]:
 def channel_of(node: Node, slot: Slot) -> int | None:
     """The number of the channel that reaches this drive's parameters, or None where none is open."""
     return node.family.sdo_channel(slot, node.table.sdo_channels)
+
+
+class ParameterPlace(NamedTuple):
+    """Who has parameters, and the number of the SDO channel that reaches them; None where none is open."""
+
+    who: HasParameters
+    channel: int | None
+    on_first: bool = True
+    """Its objects are those of the node's first channel."""
+
+
+def parameter_places(node: Node) -> list[ParameterPlace]:
+    if node.device:
+        return [ParameterPlace(node.device, FIRST)]
+    return [
+        ParameterPlace(drive, channel_of(node, drive.slot), drive.slot.parameters_by_sdo)
+        for drive in node.drives
+    ]
 
 
 class SdoChannels:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bridge.command import Drive
+from bridge.command import Drive, HasParameters
 from bridge.command.plant import Node
 from bridge.image import Value
 from bridge.mapping.own_places import OwnPlace, ends_own_watch, places
@@ -21,7 +21,7 @@ class OwnWatch:
         self._protection = names.protection
         self._places = places(node.family)
 
-    def why_kept(self, drive: Drive, entry: Entry, value: Value) -> str:
+    def why_kept(self, drive: HasParameters, entry: Entry, value: Value) -> str:
         """Why this is not written: a drive of the site is stopped by silence, and would not stop."""
         key = entry.address.index, entry.address.sub
         place = next((one for one in self._places if one.key == key), None)
@@ -36,7 +36,7 @@ class OwnWatch:
             "on_expiry and no then_silence_ms in the site file"
         )
 
-    def forget(self, drive: Drive, entry: Entry, what: str, now: float) -> None:
+    def forget(self, drive: HasParameters, entry: Entry, what: str, now: float) -> None:
         """What the boot-up has read of it is not true any more; the next boot-up reads it again."""
         if not self._protection.tells_own_supervision(entry.address):
             return
@@ -44,10 +44,10 @@ class OwnWatch:
         for one in self._concerned(drive, entry):
             one.on_own_supervision_changed(why, now)
 
-    def _concerned(self, drive: Drive, entry: Entry) -> Sequence[Drive]:
+    def _concerned(self, drive: HasParameters, entry: Entry) -> Sequence[Drive]:
         """Whom the object is about: ``drive``, or all of the node."""
         is_of_drive = any(one.per_drive and one.ref.index == entry.address.index for one in self._places)
-        return [drive] if is_of_drive else self._node.drives
+        return [one for one in self._node.drives if not is_of_drive or one is drive]
 
 
 def _raw(place: OwnPlace, entry: Entry, value: Value) -> int | None:

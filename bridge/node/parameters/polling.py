@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from enum import Enum
 from typing import Final
 
-from bridge.command import Drive
+from bridge.command import HasParameters
 from bridge.command.plant import Node
 from bridge.parameter import Entry, Names
 
@@ -34,7 +34,7 @@ class Came(Enum):
     """The drive does not have it."""
 
 
-Ask = Callable[[Drive, Entry, Callable[[Came], None]], None]
+Ask = Callable[[HasParameters, Entry, Callable[[Came], None]], None]
 
 
 class ParameterPolling:
@@ -47,12 +47,12 @@ class ParameterPolling:
         self.pause_s = 1.0 / min(MOST_PER_S, share)
         """The time between two reads."""
         self._due: list[tuple[float, int]] = []
-        self._places: list[tuple[Drive, Entry]] = []
+        self._places: list[tuple[HasParameters, Entry]] = []
         self._next_at = 0.0
         self._asked = False
         self._round = 0
 
-    def start(self, drives: Sequence[Drive], now: float) -> None:
+    def start(self, drives: Sequence[HasParameters], now: float) -> None:
         """Begin with all points of ``drives``."""
         self._places = [(drive, entry) for entry in self._entries for drive in drives]
         self._due = [(now, place) for place in range(len(self._places))]

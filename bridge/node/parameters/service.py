@@ -16,8 +16,8 @@ from bridge.canopen.sdo import Priority, SdoChannel
 from bridge.command import (
     Action,
     Code,
-    Drive,
     Event,
+    HasParameters,
     Identity,
     Kind,
     Outcome,
@@ -30,12 +30,11 @@ from bridge.command import (
 )
 from bridge.command.link import NodeState
 from bridge.command.plant import Node
-from bridge.drive import MOVING
 from bridge.node.parameters.own_watch import OwnWatch
 from bridge.node.parameters.polling import Came, ParameterPolling
 from bridge.node.parameters.run import Procedure, run
 from bridge.node.parameters.view import NO_CHANNEL, ParameterView
-from bridge.node.sdo_channels import FIRST, SdoChannels, channel_of
+from bridge.node.sdo_channels import FIRST, SdoChannels, parameter_places
 from bridge.parameter import (
     DriveParameters,
     Entry,
@@ -73,17 +72,19 @@ class NodeParameters:
         self._now = plant.began
         self._state = NodeState.ABSENT
         names = self._names = node.names
-        self._drives = {
-            drive.name: DriveParameters(
-                drive.name,
+        self._who = parameter_places(node)
+        self._access = {
+            place.who.name: DriveParameters(
+                place.who.name,
                 node.name,
                 node.family,
                 names,
                 plant.eeprom_writes,
-                on_first=drive.slot.parameters_by_sdo,
+                on_first=place.on_first,
             )
-            for drive in node.drives
+            for place in self._who
         }
+        self._channels = {place.who.name: place.channel for place in self._who}
         self._own_watch = OwnWatch(node, names)
         self._view = ParameterView(node, plant.image, names)
         sharing = sum(other.bus is node.bus for other in plant.nodes.values())
@@ -105,11 +106,10 @@ class NodeParameters:
         self._view.on_node(state, now)
         self._polling.stop()
         if state is NodeState.OPERATIONAL:
-            for drive in self._drives.values():
-                drive.forget()
-            reached = [drive for drive in self._node.drives if channel_of(self._node, drive.slot)]
-            self._view.unreached([drive for drive in self._node.drives if drive not in reached], now)
-            self._polling.start(reached, now)
+            for access in self._access.values():
+                access.forget()
+            self._view.unreached([place.who for place in self._who if not place.channel], now)
+            self._polling.start([place.who for place in self._who if place.channel], now)
 
     def on_time(self, now: float) -> None:
         self._now = max(now, self._now)
@@ -122,7 +122,7 @@ class NodeParameters:
 
     # requests
 
-    def submit(self, request: Request, drive: Drive, now: float, reply: Reply) -> None:
+    def submit(self, request: Request, drive: HasParameters, now: float, reply: Reply) -> None:
         """Carry out a request for a parameter; ``reply`` is called once, when the drive has answered."""
         self._now = max(now, self._now)
         refusal = self._refusal(request, drive)
@@ -134,23 +134,23 @@ class NodeParameters:
         except ParameterError as error:
             self._conclude(request, drive, reply, _failed(error))
 
-    def _refusal(self, request: Request, drive: Drive) -> Outcome | None:
+    def _refusal(self, request: Request, drive: HasParameters) -> Outcome | None:
         """Why this is not even asked of the drive."""
         why = "" if request.action is Action.READ_PARAMETER else _why_not_set(request.identity, drive)
         if why:
             return _no(Code.NOT_ALLOWED, why)
         if self._state is not NodeState.OPERATIONAL:
             return _no(Code.NOT_READY, f"the drive's node is {self._state.value}")
-        if request.action is not Action.SAVE_PARAMETERS and channel_of(self._node, drive.slot) is None:
+        if request.action is not Action.SAVE_PARAMETERS and self._channels[drive.name] is None:
             return _no(
                 Code.NOT_CONFIGURED,
                 f"{drive.name}: {NO_CHANNEL}",
             )
         return None
 
-    def _begin(self, request: Request, drive: Drive, now: float, reply: Reply) -> None:
+    def _begin(self, request: Request, drive: HasParameters, now: float, reply: Reply) -> None:
         """Raises ``ParameterError`` where the request itself is wrong."""
-        access = self._drives[drive.name]
+        access = self._access[drive.name]
         conclude = partial(self._conclude, request, drive, reply)
         command = request.command
         if isinstance(command, ReadParameter):
@@ -188,7 +188,7 @@ class NodeParameters:
             self._run(steps, drive, partial(self._on_written, request, drive, entry, conclude))
 
     def _save(
-        self, access: DriveParameters, identity: Identity, drive: Drive, now: float, conclude: Reply
+        self, access: DriveParameters, identity: Identity, drive: HasParameters, now: float, conclude: Reply
     ) -> None:
         entry = access.saving
 
@@ -203,7 +203,7 @@ class NodeParameters:
 
     def _read(
         self,
-        drive: Drive,
+        drive: HasParameters,
         entry: Entry,
         max_age_s: float,
         done: Callable[[Reading | ParameterError], None],
@@ -222,18 +222,18 @@ class NodeParameters:
             for one in self._reading.pop(key) if shares else [done]:
                 one(result)
 
-        steps = self._drives[drive.name].read(entry, self._now, max_age_s)
+        steps = self._access[drive.name].read(entry, self._now, max_age_s)
         self._run(steps, drive, on_result, priority)
 
     def _run(
         self,
         procedure: Procedure[object],
-        drive: Drive,
+        drive: HasParameters,
         done: Callable[..., None],
         priority: Priority = Priority.COMMAND,
     ) -> None:
         def channel_for(transfer: Transfer) -> SdoChannel:
-            number = None if transfer.of_node else channel_of(self._node, drive.slot)
+            number = None if transfer.of_node else self._channels[drive.name]
             return self._sdo()[number or FIRST]
 
         run(procedure, channel_for, lambda: self._now, done, priority=priority)
@@ -241,20 +241,20 @@ class NodeParameters:
     # results
 
     def _on_read(
-        self, drive: Drive, raw: Entry | None, conclude: Reply, result: Reading | ParameterError
+        self, drive: HasParameters, raw: Entry | None, conclude: Reply, result: Reading | ParameterError
     ) -> None:
         """``raw`` is the object whose bytes are asked for."""
         if isinstance(result, ParameterError):
             conclude(_failed(result))
             return
-        held = self._drives[drive.name].held(raw) if raw else None
+        held = self._access[drive.name].held(raw) if raw else None
         value = result.value if held is None else held.hex(" ").upper()
         conclude(Outcome(Code.OK, value=value, time=result.time))
 
     def _on_written(
         self,
         request: Request,
-        drive: Drive,
+        drive: HasParameters,
         entry: Entry,
         conclude: Reply,
         result: Written | ParameterError,
@@ -275,10 +275,10 @@ class NodeParameters:
         message = "" if result.changed else "the drive holds this value already: not written again"
         conclude(Outcome(Code.OK, message, value=reading.value, time=reading.time))
 
-    def _as_listed(self, drive: Drive, entry: Entry, reading: Reading) -> Reading | ParameterError:
+    def _as_listed(self, drive: HasParameters, entry: Entry, reading: Reading) -> Reading | ParameterError:
         """What was written as bytes, as the value that it is of."""
         listed = self._names.resolve(str(entry.address))
-        held = self._drives[drive.name].held(entry)
+        held = self._access[drive.name].held(entry)
         if listed.definition is None or listed.definition == reading.entry.definition or held is None:
             return reading
         try:
@@ -294,13 +294,13 @@ class NodeParameters:
         self._warn(self._node.name, result)
         conclude(Outcome(Code.OK, "saved"))
 
-    def _conclude(self, request: Request, drive: Drive, reply: Reply, outcome: Outcome) -> None:
+    def _conclude(self, request: Request, drive: HasParameters, reply: Reply, outcome: Outcome) -> None:
         """Tell the outcome; a refusal of a write is an event, too."""
         if outcome.abort_code:
             drive.on_sdo_refused(outcome.abort_code, self._now)
         if not outcome.ok and request.action is not Action.READ_PARAMETER:
             message = f"{request.action} by {request.identity} refused: {outcome.message}"
-            drive.channel.on_refused(self._now)
+            drive.on_refused(self._now)
             self._plant.report(Event(self._now, Kind.REFUSED, drive.name, 300, message))
         reply(outcome)
 
@@ -313,7 +313,7 @@ class NodeParameters:
 
     # points
 
-    def _poll(self, drive: Drive, entry: Entry, done: Callable[[Came], None]) -> None:
+    def _poll(self, drive: HasParameters, entry: Entry, done: Callable[[Came], None]) -> None:
         """Read a point."""
 
         def on_result(result: Reading | ParameterError) -> None:
@@ -324,7 +324,7 @@ class NodeParameters:
 
         self._read(drive, entry, 0.0, on_result, Priority.POLL)
 
-    def _show(self, drive: Drive, entry: Entry, result: Reading | ParameterError) -> None:
+    def _show(self, drive: HasParameters, entry: Entry, result: Reading | ParameterError) -> None:
         if isinstance(result, ParameterError):
             self._view.failed(drive.name, entry, result, self._now)
             return
@@ -335,23 +335,21 @@ class NodeParameters:
             drive.on_scale(name, float(result.value))
 
 
-def _why_not_set(identity: Identity, drive: Drive) -> str:
+def _why_not_set(identity: Identity, drive: HasParameters) -> str:
     """Why ``identity`` may not set parameters: an engineer may, and where its protocol knows no roles, who
     controls the drive or could."""
     if identity.role >= Role.ENGINEER:
         return ""
     if not identity.may_set_parameters:
         return f"{identity} may not set parameters: an engineer may"
-    return drive.channel.refusal(identity)
+    return drive.refusal(identity)
 
 
-def _why_protected(protection: str, entry: Entry, identity: Identity, drive: Drive) -> str:
+def _why_protected(protection: str, entry: Entry, identity: Identity, drive: HasParameters) -> str:
     """Why a parameter that more depends on than its own value is not written now."""
     if protection == "communication" and identity.role < Role.ENGINEER:
         return f"{entry.name} decides who commands the drive and what supervises it: an engineer may set it"
-    channel = drive.channel
-    is_enabled = channel.state in MOVING or channel.words.enables(channel.output.words[0])
-    if protection in ("communication", "while_enabled") and is_enabled:
+    if protection in ("communication", "while_enabled") and drive.is_enabled:
         return f"{entry.name} is not written while the drive is enabled: stop and disable it first"
     return ""
 

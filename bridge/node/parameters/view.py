@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from bridge.command import Drive
+from bridge.command import HasParameters
 from bridge.command.link import NodeState
 from bridge.command.plant import Node
 from bridge.image import Image, Quality
@@ -25,8 +25,8 @@ class ParameterView:
         self._image = image
         self._hold_s = node.table.hold_ms / 1000
         self._indices: dict[tuple[str, ObjectRef], int] = {
-            (drive.name, entry.address): image.index[f"{drive.name}/parameter/{entry.leaf}"]
-            for drive in node.drives
+            (who.name, entry.address): image.index[f"{who.name}/parameter/{entry.leaf}"]
+            for who in node.with_parameters
             for entry in names.points()
         }
         self._dead_at: float | None = None
@@ -45,7 +45,7 @@ class ParameterView:
                 quality = Quality.STALE
         self._judge(quality, now, f"node {state.value}")
 
-    def unreached(self, drives: Iterable[Drive], now: float) -> None:
+    def unreached(self, drives: Iterable[HasParameters], now: float) -> None:
         """No open SDO channel leads to these."""
         names = {drive.name for drive in drives}
         for (name, _), index in self._indices.items():

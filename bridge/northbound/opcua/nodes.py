@@ -18,7 +18,7 @@ from bridge.image import Point
 GROUPS: Final = ("command", "status", "actual", "parameter", "supervision", "identity")
 """Every drive has these folders, whether or not they hold a point."""
 
-DEVICE_GROUPS: Final = ("input", "parameter")
+DEVICE_GROUPS: Final = ("input", "output", "parameter", "supervision")
 """Of a node that is no drive, beside ``node``."""
 
 

@@ -7,10 +7,24 @@ from pathlib import Path
 import pytest
 
 from bridge.canopen.frame import Frame
+from bridge.command import (
+    Code,
+    Command,
+    Identity,
+    Outcome,
+    ReadParameter,
+    Request,
+    Role,
+    Source,
+    Write,
+    WriteParameter,
+)
 from bridge.errors import FileFaults
 from bridge.image import Quality, Reading
 from tests.support.bench import Bench
 from tests.support.devices import ENCODER, device_bench, encoder
+
+ENGINEER = Identity(Source.OPCUA, "eve", Role.ENGINEER)
 
 
 @pytest.fixture
@@ -121,3 +135,30 @@ def test_a_site_that_takes_it_for_a_drive_is_refused(tmp_path: Path, more: str, 
     with pytest.raises(FileFaults) as told:
         device_bench(tmp_path, encoder(), more=more)
     assert said in str(told.value)
+
+
+def asked(bench: Bench, command: Command, identity: Identity = ENGINEER) -> Outcome:
+    outcomes: list[Outcome] = []
+    request = Request(identity, "shaft", command)
+    bench.view.submit(request, outcomes.append)
+    bench.run(0.1)
+    assert len(outcomes) == 1
+    return outcomes[0]
+
+
+def test_its_parameters_are_read_and_written(bench: Bench) -> None:
+    assert point(bench, "parameter/6000")[:2] == (4, Quality.GOOD)
+    assert asked(bench, ReadParameter("6000")).value == 4
+    written = asked(bench, WriteParameter("6000", 5))
+    assert (written.code, written.value) == (Code.OK, 5)
+    assert point(bench, "parameter/6000")[:2] == (5, Quality.GOOD)
+
+
+def test_who_may_only_read_sets_no_parameters(bench: Bench) -> None:
+    refused = asked(bench, WriteParameter("6000", 5), Identity(Source.OPCUA, "otto"))
+    assert refused.code is Code.NOT_ALLOWED
+    assert bench.value("shaft/supervision/refused_writes") == 1
+
+
+def test_it_takes_no_command(bench: Bench) -> None:
+    assert asked(bench, Write({"position": 1})).code is Code.READ_ONLY

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from bridge.command.channel import DriveChannel
+from bridge.command.drive_channel import DriveChannel
 from bridge.command.following import Following
 from bridge.command.link import FurtherTpdo
 from bridge.drive import Lack, ParameterSet, ValueCodec, codecs

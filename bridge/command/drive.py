@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from bridge.command.actual import ActualData
-from bridge.command.channel import DriveChannel
 from bridge.command.deadlines import NOW
+from bridge.command.drive_channel import DriveChannel
 from bridge.command.event import Event
 from bridge.command.follow import Verdict
 from bridge.command.following import Following

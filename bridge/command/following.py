@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.command.channel import DriveChannel
 from bridge.command.deadlines import NOW
+from bridge.command.drive_channel import DriveChannel
 from bridge.command.follow import Bounds, Follow, LastStop, Says, Sent, Verdict
 from bridge.command.link import NodeState
 from bridge.drive import MOVING, DriveState, OwnJudgement, OwnVerdict, StatusWords

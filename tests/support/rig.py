@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Request, Role, Source, command_of
-from bridge.command.channel import DriveChannel
+from bridge.command.drive_channel import DriveChannel
 from bridge.command.link import NodeState
 from bridge.config import DriveTable
 from bridge.drive import EmergencyReader, LinearScale, Told, default_codes

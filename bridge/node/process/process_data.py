@@ -10,7 +10,7 @@ from typing import NamedTuple
 from bridge.canopen.frame import Frame
 from bridge.canopen.sync import LAST_SYNCHRONOUS, REMOTE_SYNCHRONOUS, REMOTE_TYPES, tpdo_deadline_s
 from bridge.command import Drive
-from bridge.command.channel import DriveChannel
+from bridge.command.drive_channel import DriveChannel
 from bridge.command.leg.state import Output
 from bridge.command.link import FurtherTpdo
 from bridge.command.plant import Node

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from bridge.command import Action, Event, Kind, Outcome
-from bridge.command.channel import DriveChannel
+from bridge.command.drive_channel import DriveChannel
 from bridge.command.link import NodeState
 from bridge.config import DriveTable
 from tests.support.leg_words import ALL

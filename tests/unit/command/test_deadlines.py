@@ -7,8 +7,8 @@ from math import inf
 
 import pytest
 
-from bridge.command.channel import DriveChannel
 from bridge.command.deadlines import Deadlines
+from bridge.command.drive_channel import DriveChannel
 from bridge.command.event import Event, Kind
 from bridge.command.following import Following
 from bridge.command.link import NodeState

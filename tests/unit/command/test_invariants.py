@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
 
 from bridge.command import Action, Identity, Outcome
-from bridge.command.channel import DriveChannel
+from bridge.command.drive_channel import DriveChannel
 from bridge.command.link import NodeState
 from bridge.drive import DriveState
 from bridge.image import Value

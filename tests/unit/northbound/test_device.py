@@ -101,7 +101,9 @@ class TestModbus:
 def test_opcua_has_its_folders(bench: Bench) -> None:
     drives, _, _ = layout(bench.plant.image.points)
     (shaft,) = drives.objects
-    assert [folder.id for folder in shaft.objects] == ["shaft/node", "shaft/input", "shaft/parameter"]
+    assert [folder.id for folder in shaft.objects] == [
+        f"shaft/{group}" for group in ("node", "supervision", "input", "parameter")
+    ]
     names = [variable.browse_name for variable in shaft.objects[1].variables]
     assert names == ["Position", "Speed", "Alarms", "Switch", "Turns"]
 

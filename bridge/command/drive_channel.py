@@ -1,0 +1,217 @@
+"""The command channel of one drive: its leg, and what the drive says of itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from bridge.command.channel import Channel
+from bridge.command.event import Event, Kind
+from bridge.command.leg import event
+from bridge.command.leg.effect import Tripped
+from bridge.command.leg.settings import leg_settings
+from bridge.command.leg.state import AWAITS_REPORT
+from bridge.command.leg.turn import control_word
+from bridge.command.link import Link, NodeState
+from bridge.command.status import DriveStatus
+from bridge.command.telegram import TelegramDecoder
+from bridge.config import DriveTable
+from bridge.drive import FAULTED, DriveState, Explained, Meanings, Told
+from bridge.image import Quality
+from bridge.mapping.model import Family
+
+
+class DriveChannel(Channel):
+    """See ``Channel``. Its link is judged by TPDOs, its stops by the status word."""
+
+    def __init__(
+        self,
+        name: str,
+        family: Family,
+        settings: DriveTable,
+        hold_ms: int,
+        report: Callable[[Event], None],
+        *,
+        settled: Callable[[float], None],
+        tripped: Callable[[float], None],
+        due: Callable[[float], None] = lambda at: None,
+    ) -> None:
+        self.family = family
+        self.settings = settings
+        slot = family.slot_named(settings.slot)
+        self.meanings = Meanings(family, slot, settings.parameters)
+        """What the words mean in each parameter set: from the mapping and the site file, and as read from
+        the drive."""
+        self.unserved: dict[str, str] = {}
+        """Points that the node cannot serve, by their leaf, with the reason; known after boot-up."""
+        self._status = DriveStatus(family)
+        decode = TelegramDecoder(
+            name, family, slot, self.meanings, self.unserved, lambda: self._reported_word
+        ).decode
+        link = Link(settings.telegram_downtime_s, hold_ms)
+        of_leg = leg_settings(family, settings, decode)
+        super().__init__(name, of_leg, link, report, settled=settled, tripped=tripped, due=due)
+
+    # what others may see
+
+    @property
+    def _reported_word(self) -> int | None:
+        """The status word of a drive that is heard."""
+        return self._status.word if self.leg.way.is_heard else None
+
+    @property
+    def control_word(self) -> int:
+        """As if it were the owner's (``bridge.command.leg.turn``)."""
+        return control_word(self.words, self.leg)
+
+    @property
+    def silence_stops(self) -> bool:
+        """The drive is known to stop by itself when it gets no RPDO any more, or nobody has asked it yet."""
+        return self.leg.silence_stops
+
+    @property
+    def drive_status_word(self) -> int:
+        """The status word as the drive sent it."""
+        return self._status.word
+
+    @property
+    def status_word(self) -> int:
+        """The status word as served: *fault* while tripped, as a bus interface would show it."""
+        status = self._status
+        return status.words.as_fault(status.word) if self.is_tripped else status.word
+
+    @property
+    def state(self) -> DriveState:
+        """The state as the drive reports it."""
+        return self.leg.drive
+
+    @property
+    def served_state(self) -> DriveState:
+        return DriveState.FAULT if self.is_tripped else self.leg.drive
+
+    @property
+    def emcy_code(self) -> int:
+        return self._status.emcy_code
+
+    @property
+    def last_fault(self) -> float:
+        return self._status.last_fault
+
+    @property
+    def current_fault(self) -> float:
+        """Present fault: the bridge's own such as 10.3, else the one that the drive tells; 0 where there is
+        none."""
+        return self._bridge_fault or self._status.drive_fault
+
+    @property
+    def _bridge_fault(self) -> float:
+        return self.family.faults.controller_silent if self.is_tripped else self._status.link_fault
+
+    @property
+    def fault_text(self) -> str:
+        return self._status.fault_text(self._bridge_fault, self.state)
+
+    @property
+    def fault(self) -> Explained:
+        """The present fault as its maker writes it, with cause and remedy."""
+        return self._status.fault(self._bridge_fault, self.state)
+
+    @property
+    def last_fault_text(self) -> str:
+        return self._status.last_fault_text
+
+    # from the drive
+
+    def on_own_watch(self, why_not: str, now: float) -> None:
+        """Whether the drive stops by itself when it gets no RPDO any more: ``why_not``, or an empty text."""
+        stops = not why_not
+        if stops is self.leg.silence_stops:
+            return
+        if why_not and self.settings.falls_silent:
+            message = f"silence does not stop the drive, it gets disable voltage instead: {why_not}"
+            self._tell(now, Kind.WATCHDOG, 700, message)
+        self._happen(event.OwnWatch(stops), now)
+
+    def on_status_word(self, word: int, now: float) -> None:
+        """A TPDO brought this status word."""
+        status, leg, handshake = self._status, self.leg, self.leg_settings.handshake
+        state = status.words.state(word)
+        is_taken = handshake is not None and bool(word & handshake.acknowledged)
+        is_news = state is not leg.drive or (handshake is not None and word != status.word)
+        status.word = word
+        is_news = is_news or not leg.way.is_heard
+        if is_news or leg.stage in AWAITS_REPORT or leg.trip.ramps_until is not None:
+            text = status.fault_text(self._bridge_fault, state) if state in FAULTED else ""
+            self._happen(event.Report(state, is_taken, text), now)
+
+    def on_unchanged(self, now: float) -> None:
+        """A TPDO arrived that says what the last one said."""
+        self.on_pdo(now)
+        if self.leg.stage in AWAITS_REPORT or not self.leg.way.is_heard:
+            self.on_status_word(self._status.word, now)
+
+    def on_actual_words(self, words: Sequence[int], now: float) -> None:
+        """What TPDOs have brought, the status word first, in the order of ``process.tpdo``."""
+        follows, rest = self.leg_settings.follows, self.leg.rest
+        unknown = self.meanings.unknown_followed(words)
+        words = [0 if place in unknown else word for place, word in enumerate(words)] if unknown else words
+        if any(rest[place] != words[source] for place, source in follows):
+            self._happen(event.ActualWords(tuple(words)), now)
+
+    def on_pdo(self, now: float) -> None:
+        """A TPDO arrived; what it says comes after this."""
+        deadline_s = self.link.pdo_deadline_s
+        if deadline_s is not None:
+            self.due(now + deadline_s)
+        if self.link.on_pdo(now):
+            self._status.link_fault = 0.0
+            self._happen(self._way(now), now)
+
+    def on_emcy(self, told: Told, now: float) -> None:
+        """An emergency message about this drive."""
+        self._status.on_emcy(told)
+        severity = 100 if told.is_gone else 700
+        self._tell(now, Kind.EMERGENCY, severity, f"emergency {told.code:04X}h: {told.text}")
+        self._settled(now)
+
+    def on_drive_fault(self, current: float | None, last: float | None, now: float) -> None:
+        """The drive has been asked for its present and its last fault; None for what it did not tell."""
+        if self._status.on_drive_fault(current, last):
+            self._settled(now)
+
+    def _node_has_changed(self, state: NodeState, now: float) -> None:
+        if state in (NodeState.OPERATIONAL, NodeState.DISABLED):
+            self._status.link_fault = 0.0
+        if state is NodeState.LOST:
+            self._link_is_lost(self.family.faults.node_missing, "the node is lost", now)
+
+    def _link_is_lost(self, fault: float, reason: str, now: float) -> None:
+        self._status.link_fault = self._status.last_fault = fault
+        self._tell(now, Kind.WATCHDOG, 700, f"{self.family.faults.prefix}{fault:.1f}: {reason}")
+
+    def _why_unplaced(self, now: float) -> str:
+        if not self._followed:
+            return ""
+        quality = self.link.quality(now)
+        why = self.link.reason(quality)
+        if quality is Quality.GOOD:
+            why = self.link.why_lacking(self._followed, now)
+        return f"the drive's own position is not known: {why}" if why else ""
+
+    # what its watchdogs do
+
+    def _is_silent(self, now: float) -> None:
+        self._link_is_lost(self.family.faults.telegram_downtime, "no process data from the drive", now)
+
+    def _on_tripped(self, tripped: Tripped, now: float) -> None:
+        self._status.last_fault = self.family.faults.controller_silent
+        super()._on_tripped(tripped, now)
+
+    def _reaction(self) -> str:
+        reaction = self.settings.on_expiry
+        if reaction == "silence" and not self.leg.silence_stops:
+            reaction = "disable_voltage"
+        return f"{reaction}, {self._status.fault_text(self.family.faults.controller_silent, self.state)}"
+
+    def _on_ignored(self, now: float) -> None:
+        self._status.last_fault = self.family.faults.controller_silent
+        self._tell(now, Kind.WATCHDOG, 500, "the controller is silent; ignored (telegram_downtime_s)")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.command.link import Link, NodeState
+from bridge.command.outputs import Outputs
 from bridge.command.request import Identity, Role
 from bridge.config import NodeTable
 from bridge.image import Image, Quality, Value
@@ -41,7 +42,7 @@ class _Heard:
 
 
 class Device:
-    """The inputs of one node. Times are monotonic seconds."""
+    """One node: its inputs, and its outputs where it has some. Times are monotonic seconds."""
 
     def __init__(self, node: NodeTable, family: Family, unit_id: int, image: Image) -> None:
         self.name = node.name
@@ -58,7 +59,9 @@ class Device:
         self._refused, self._abort_code = (
             image.index[f"{node.name}/supervision/{leaf}"] for leaf in ("refused_writes", "sdo_abort_code")
         )
-        self.refused_writes = 0
+        self._refused_count = 0
+        self.outputs: Outputs | None = None
+        """Where it has some."""
         self._heard: list[_Heard] = []
         self._unserved: dict[int, str] = {}
         """Points that no TPDO carries, with the reason."""
@@ -125,17 +128,26 @@ class Device:
 
     @property
     def is_enabled(self) -> bool:
-        """It moves nothing."""
-        return False
+        """One of its outputs is not safe."""
+        return self.outputs is not None and self.outputs.is_active
 
     def refusal(self, identity: Identity) -> str:
         """Why ``identity`` may not command it; empty where it may."""
+        if self.outputs:
+            return self.outputs.channel.refusal(identity)
         return f"{identity} may only read" if identity.role < Role.OPERATOR else ""
+
+    @property
+    def refused_writes(self) -> int:
+        return self.outputs.channel.refused_writes if self.outputs else self._refused_count
 
     def on_refused(self, now: float) -> None:
         """A request about it was refused elsewhere."""
-        self.refused_writes += 1
-        self._image.set(self._refused, self.refused_writes, now)
+        if self.outputs:
+            self.outputs.channel.on_refused(now)
+            return
+        self._refused_count += 1
+        self._image.set(self._refused, self._refused_count, now)
 
     def on_sdo_refused(self, abort_code: int, now: float) -> None:
         """It has refused an SDO that a client had asked for."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from bridge.command.actual import ActualData
+from bridge.command.commanded import Commanded
 from bridge.command.deadlines import NOW
 from bridge.command.drive_channel import DriveChannel
 from bridge.command.event import Event
@@ -14,14 +15,13 @@ from bridge.command.follow import Verdict
 from bridge.command.following import Following
 from bridge.command.link import FurtherTpdo
 from bridge.command.request import Identity
-from bridge.command.worst_case import StopTime, Wire, stop_time, sync_wait_ms, takeover_ms
+from bridge.command.worst_case import StopTime, Wire, stop_time
 from bridge.config import BusTable, DriveTable, NodeTable
 from bridge.drive import MOVING, Codes, Lack, OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, codecs
 from bridge.drive.own_supervision import why_silence_does_not_stop
 from bridge.image import Image, Point, Quality, Value
 from bridge.mapping.model import Family, Slot
 
-_ASYNCHRONOUS: Final = 255
 _IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
 _FAULT: Final = ("fault_text", "fault_number", "fault_cause", "fault_remedy")
 _SUPERVISION: Final = (
@@ -58,7 +58,7 @@ class _Command(NamedTuple):
     lack: Lack | None
 
 
-class Drive:
+class Drive(Commanded):
     """One drive: its channel, and where its points stand in the image.
 
     All that is not process data is shown when the channel says that it has settled.
@@ -78,6 +78,7 @@ class Drive:
         tripped: Callable[[float], None],
         due: Callable[[float], None],
     ) -> None:
+        super().__init__(bus)
         self.name = f"{node.name}/{family.leaf_of(table)}"
         self.node_name = node.name
         self._node = node
@@ -99,12 +100,7 @@ class Drive:
         self.own: OwnJudgement | None = None
         """What it does by itself when the bridge falls silent; None until the boot-up has read it, and empty
         where that is not true any more."""
-        self.bus = bus
-        self.rpdo_type = _ASYNCHRONOUS
-        self.wire = Wire()
         self.sync_period_ms = bus.sync_period_ms
-        self.burst_s = bus.deadman_ms / 1000 + bus.rpdo_period_s
-        """How far ahead the bus may have been told what to send."""
         self.table = table
         self.given_parameters = table.parameters
         self._shown_for: tuple[int, int, Wire, float | None] | None = None
@@ -146,16 +142,6 @@ class Drive:
     def words(self) -> list[int]:
         """The words of the last TPDOs, the status word first, in the order of ``process.tpdo``."""
         return self._actual.words
-
-    @property
-    def rpdo_period_ms(self) -> int:
-        """How long a new control word may be on its way: until its frame, and until SYNC takes that over."""
-        return round(1000 * self.bus.rpdo_period_s) + sync_wait_ms(self.bus, self.rpdo_type)
-
-    @property
-    def takeover_s(self) -> float:
-        """How long a stopped word may wait on the drive for SYNC: while its node is in Operational."""
-        return takeover_ms(self.bus, self.rpdo_type) / 1000
 
     def stop_time(self) -> StopTime:
         """Longest time from the controller's last telegram to the stop on the bus."""

@@ -19,6 +19,7 @@ from bridge.command.drive import Drive
 from bridge.command.event import Event, EventGate, Kind
 from bridge.command.ignored import conclude
 from bridge.command.link import NodeState
+from bridge.command.outputs import Outputs
 from bridge.command.points import CONNECTION_COUNTS, NODE_CODES, site_points
 from bridge.command.request import (
     NODE_ACTIONS,
@@ -98,6 +99,13 @@ class Node:
     def with_parameters(self) -> Sequence[HasParameters]:
         return [self.device] if self.device else self.drives
 
+    @property
+    def commanded(self) -> Sequence[Drive | Outputs]:
+        """What it has that somebody commands."""
+        if self.device:
+            return [self.device.outputs] if self.device.outputs else []
+        return self.drives
+
     def on_heard_again(self) -> None:
         """It could not be heard for a while, and goes on as it was."""
         for drive in self.drives:
@@ -126,6 +134,8 @@ class Plant:
         self.drives: dict[str, Drive] = {}
         self.devices: dict[str, Device] = {}
         """Nodes that are no drives, by their names."""
+        self._commanded: dict[str, Drive | Outputs] = {}
+        """All drives, and the outputs of devices by their nodes."""
         self.by_unit: dict[int, Drive] = {}
         self.eeprom_writes = Ledger()
         """How often parameters were written; whoever keeps it across restarts fills it first."""
@@ -133,7 +143,7 @@ class Plant:
         self._changed: dict[str, set[str]] = {bus.name: set() for bus in site.bus}
         self.unsent_stops: set[Drive] = set()
         """Drives with a stop that has not been handed to the bus yet."""
-        self._deadlines = Deadlines[Drive]()
+        self._deadlines = Deadlines[Drive | Outputs]()
         self._missed_limit = RateLimit(_MISSED_EVENTS, _MISSED_EVERY_S)
         self._listeners: list[Callable[[Event], None]] = []
         self._outcomes: deque[tuple[Reply, Outcome]] = deque()
@@ -155,11 +165,15 @@ class Plant:
                 if family.is_device:
                     node.device = Device(table, family, units[table.name, _DEVICE], self.image)
                     self.devices[table.name] = node.device
+                    if family.output:
+                        told = self.report, partial(self._outputs_settled, node), self._tripped, self._due()
+                        node.device.outputs = Outputs(table, bus, family, self.image, *told)
+                        self._add(node.device.outputs)
                 for position, drive_table in enumerate(table.drive):
                     unit_id = units[table.name, position]
-                    told = self.report, settled, self._tripped, partial(self._deadlines.due, len(self.drives))
+                    told = self.report, settled, self._tripped, self._due()
                     drive = Drive(table, bus, drive_table, family, unit_id, self.image, points, *told)
-                    self._deadlines.add(drive)
+                    self._add(drive)
                     node.drives.append(drive)
                     self.drives[drive.name] = drive
                     self.by_unit[unit_id] = drive
@@ -175,6 +189,8 @@ class Plant:
             self.image.set(last, 0.0, began)
             if node.device:
                 node.device.begin(began)
+                if node.device.outputs:
+                    self._outputs_settled(node, node.device.outputs, began)
             for drive in node.drives:
                 self.set(f"{drive.name}/supervision/sdo_abort_code", 0, began)
                 self._on_settled(node, drive, began)
@@ -183,11 +199,19 @@ class Plant:
         for leaf in CONNECTION_COUNTS:
             self.count(leaf, began, 0)
 
+    def _due(self) -> Callable[[float], None]:
+        """Takes the deadlines of who is added next."""
+        return partial(self._deadlines.due, len(self._commanded))
+
+    def _add(self, one: Drive | Outputs) -> None:
+        self._deadlines.add(one)
+        self._commanded[one.name] = one
+
     def close(self, now: float) -> None:
-        """Stop every drive, and take no command any more but stops."""
+        """Stop everything, and take no command any more but stops."""
         self._is_closing = True
-        for drive in self.drives.values():
-            drive.channel.on_bridge_gap(now)
+        for one in self._commanded.values():
+            one.channel.on_bridge_gap(now)
 
     def _tripped(self, due: float) -> None:
         self._stop_due = due if self._stop_due is None else min(due, self._stop_due)
@@ -235,8 +259,8 @@ class Plant:
             if not is_taken:
                 reply(Outcome(Code.UNKNOWN_TARGET, f"there is no node {request.target!r}"))
             return is_taken
-        drive = self.drives.get(request.target)
-        if drive is None and request.target not in self.devices:
+        one = self._commanded.get(request.target)
+        if one is None and request.target not in self.devices:
             reply = self._counting_refusals(request, now, reply)
             reply(Outcome(Code.UNKNOWN_TARGET, f"there is no drive {request.target!r}"))
             return False
@@ -246,15 +270,15 @@ class Plant:
                 reply = self._counting_refusals(request, now, reply)
                 reply(Outcome(Code.NOT_READY, f"{request.target} is on no bus", forwarded=False))
             return is_taken
-        if drive is None:
+        if one is None:
             reply = self._counting_refusals(request, now, reply)
             reply(Outcome(Code.READ_ONLY, f"{request.target} has no outputs", forwarded=False))
             return False
-        before, until = drive.channel.output, drive.channel.until
-        drive.channel.handle(request, now, reply)
-        is_changed = drive.channel.output != before or request.action in _BRINGS_TIMERS_FORWARD
+        before, until = one.channel.output, one.channel.until
+        one.channel.handle(request, now, reply)
+        is_changed = one.channel.output != before or request.action in _BRINGS_TIMERS_FORWARD
         # The bus may have been told to stop the drive by itself: not any more, its owner is there.
-        return is_changed or (until is not None and until < now + drive.burst_s)
+        return is_changed or (until is not None and until < now + one.burst_s)
 
     def reply_later(self, reply: Reply) -> Reply:
         """A reply that waits for ``deliver_outcomes``: what an outcome causes does not happen in the midst of
@@ -276,8 +300,8 @@ class Plant:
     def on_connection(self, identity: Identity, now: float, *, is_there: bool) -> None:
         """``identity`` has connected, or its last connection has ended: no telegram, and no end of control.
         Told where a protocol knows it."""
-        for drive in self.drives.values():
-            drive.channel.on_connection(identity, now, is_there=is_there)
+        for one in self._commanded.values():
+            one.channel.on_connection(identity, now, is_there=is_there)
 
     def rejected(self, rejection: Rejection, now: float, count: int = 1) -> None:
         """What a protocol has refused by itself, ``count`` times: counted, told and written to the audit log
@@ -314,20 +338,22 @@ class Plant:
     def on_time(self, now: float, enforce: Enforce = lambda node, action, why, now: None) -> None:
         """Let the timers of every channel run and bring the image up to date. ``enforce`` acts on the node of
         a drive that ignores its stop."""
-        for drive in self._deadlines.take_due(now):
-            node = self.nodes[drive.node_name]
-            for verdict in drive.on_time(now):
-                conclude(node, drive, verdict, now, self.report, self.audit, enforce)
+        for one in self._deadlines.take_due(now):
+            verdicts = one.on_time(now)
+            if isinstance(one, Drive):
+                for verdict in verdicts:
+                    node = self.nodes[one.node_name]
+                    conclude(node, one, verdict, now, self.report, self.audit, enforce)
 
     def refresh(self, now: float) -> None:
         """The slow part: ages, counters and the faults of the nodes; a few times a second."""
-        for drive in self._deadlines.sweep(now):
+        for one in self._deadlines.sweep(now):
             message = "a fault of the bridge's own: it had not planned a deadline of this drive"
             if self._missed_limit.allows(now):
-                self.report(Event(now, Kind.WATCHDOG, drive.name, _SEVERITY_MISSED, message))
+                self.report(Event(now, Kind.WATCHDOG, one.name, _SEVERITY_MISSED, message))
         self.set("bridge/missed_deadlines", self._deadlines.missed, now)
-        for drive in self.drives.values():
-            drive.look(now)
+        for one in self._commanded.values():
+            one.look(now)
         for device in self.devices.values():
             device.on_time(now)
         self.image.tell_kept()
@@ -347,12 +373,21 @@ class Plant:
         drive.refresh(now)
         if drive.following.awaits_sending:
             self.unsent_stops.add(drive)
-        silent = any(
-            drive.channel.is_tripped and drive.channel.controller_is_overdue for drive in node.drives
-        )
+        self._show_node(node, node.drives, node.drives[0].channel.link.node, now)
+
+    def _outputs_settled(self, node: Node, outputs: Outputs, now: float) -> None:
+        """Something about the outputs of a node has changed."""
+        self._changed[node.bus.name].add(node.name)
+        outputs.refresh(now)
+        self._show_node(node, [outputs], outputs.channel.link.node, now)
+
+    def _show_node(
+        self, node: Node, commanded: Sequence[Drive | Outputs], is_now: NodeState, now: float
+    ) -> None:
+        silent = any(one.channel.is_tripped and one.channel.controller_is_overdue for one in commanded)
         fault = node.family.faults.bridge_timeout if silent else 0.0
         state, current, last = self._node_points[node.name]
-        self.image.set(state, NODE_CODES[node.drives[0].channel.link.node], now)
+        self.image.set(state, NODE_CODES[is_now], now)
         before = self.image[current].value
         if before and not fault:
             self.image.set(last, before, now)
@@ -385,6 +420,8 @@ class Plant:
             drive.channel.on_node(state, now)
         if node.device:
             node.device.on_node(state, now)
+            if node.device.outputs:
+                node.device.outputs.channel.on_node(state, now)
         if not tell:
             return
         if state is NodeState.LOST:

@@ -14,6 +14,7 @@ from bridge.command.parameter_points import parameter_points
 from bridge.config import BusTable, DriveTable, NodeTable, Site
 from bridge.drive import DRIVE_STATES, LinearScale, ValueCodec, scales_of
 from bridge.image import DataType, Point
+from bridge.mapping.device import Signal
 from bridge.mapping.model import Family, Poll, ProcessValue
 from bridge.parameter import Names
 
@@ -104,20 +105,43 @@ def _input_points(name: str, family: Family) -> list[Point]:
         _point(f"{name}/node", "pdo_age_ms", _U32, age, unit="ms"),
         _point(f"{name}/supervision", "refused_writes", _U32, _REFUSED_WRITES),
         _point(f"{name}/supervision", "sdo_abort_code", _U32, _ABORT_CODE),
-        *(
-            Point(
-                name=f"{name}/input/{signal.name}",
-                data_type=signal.value_type,
-                unit=signal.unit,
-                low=signal.low,
-                high=signal.high,
-                description=signal.description,
-                states=tuple(sorted(signal.states.items())),
-                bits=tuple(signal.bits),
-            )
-            for signal in family.input
-        ),
+        *(_signal(f"{name}/input", signal) for signal in family.input),
+        *(_signal(f"{name}/output", signal, writable=True) for signal in family.output),
+        *(_output_supervision(name) if family.output else ()),
     ]
+
+
+def _signal(top: str, signal: Signal, *, writable: bool = False) -> Point:
+    return Point(
+        name=f"{top}/{signal.name}",
+        data_type=signal.value_type,
+        unit=signal.unit,
+        low=signal.low,
+        high=signal.high,
+        writable=writable,
+        description=signal.description,
+        states=tuple(sorted(signal.states.items())),
+        bits=tuple(signal.bits),
+    )
+
+
+_OF_OUTPUTS: Final = (
+    "owner",
+    "watchdog_state",
+    "watchdog_left_ms",
+    "fieldbus_timeout_ms",
+    "trips",
+    "worst_case_stop_ms",
+    "restart_interlock",
+    "worst_case_bridge_ms",
+    "telegrams",
+)
+
+
+def _output_supervision(name: str) -> list[Point]:
+    """What outputs have of a drive's supervision, by the same names."""
+    points = {point.name.rpartition("/")[2]: point for point in _supervision_points(name, False)}
+    return [points[leaf] for leaf in _OF_OUTPUTS]
 
 
 def _status_points(name: str, family: Family) -> list[Point]:

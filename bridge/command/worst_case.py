@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.command.freshness import way_ms
-from bridge.config import IGNORE_ALL_S, BusTable, DriveTable
+from bridge.config import IGNORE_ALL_S, BusTable, DriveTable, OutputsTable
 
 REACTION_BOUND_MS: Final = 20
 """How late the bridge may be itself, or the kernel's timer in its place."""
@@ -84,6 +84,27 @@ def stop_time(
         return StopTime()
     if table.on_expiry == "silence" and own_ms is None:
         return StopTime(unknown="the drive's own time-out has not been read yet")
+    terms = _to_the_wire(table.control, bus, timeout_ms, transmission_type, wire)
+    if isinstance(terms, StopTime):
+        return terms
+    if table.on_expiry == "silence" and own_ms:
+        terms.append(Term("own_ms", own_ms, "the drive's own time-out, which stops it without RPDOs"))
+    return StopTime(tuple(term for term in terms if term.ms))
+
+
+def output_stop_time(table: OutputsTable, bus: BusTable, transmission_type: int, wire: Wire) -> StopTime:
+    """From the owner's last telegram to the first frame with safe values of a node's outputs."""
+    timeout_ms = table.fieldbus_timeout_ms or 0
+    if not timeout_ms:
+        return StopTime()
+    terms = _to_the_wire(table.control, bus, timeout_ms, transmission_type, wire)
+    return terms if isinstance(terms, StopTime) else StopTime(tuple(term for term in terms if term.ms))
+
+
+def _to_the_wire(
+    control: str, bus: BusTable, timeout_ms: int, transmission_type: int, wire: Wire
+) -> list[Term] | StopTime:
+    """Until the node has taken over the first frame that stops; or why that is not known."""
     sync_ms = sync_wait_ms(bus, transmission_type)
     is_synchronous = transmission_type <= _LAST_SYNCHRONOUS
     if is_synchronous and not bus.sync_period_ms:
@@ -94,16 +115,14 @@ def stop_time(
     if wire.before_ms is None:
         return StopTime(unknown="the predicted load of its bus is more than 100 %")
     terms = [
-        *_before_the_bus(table, bus, timeout_ms),
+        *_before_the_bus(control, bus, timeout_ms),
         Term("before_ms", wire.before_ms, "frames that may go first on the bus at the predicted load"),
         Term("frames_ms", wire.frames_ms, "the drive's own RPDOs on the wire"),
     ]
     if is_synchronous:
         terms.append(Term("sync_ms", sync_ms, "until the SYNC that takes the RPDO over"))
         terms.append(Term("sync_late_ms", wire.before_ms, "frames that may go before SYNC"))
-    if table.on_expiry == "silence" and own_ms:
-        terms.append(Term("own_ms", own_ms, "the drive's own time-out, which stops it without RPDOs"))
-    return StopTime(tuple(term for term in terms if term.ms))
+    return terms
 
 
 def sync_wait_ms(bus: BusTable, transmission_type: int) -> int:
@@ -120,10 +139,10 @@ def takeover_ms(bus: BusTable, transmission_type: int) -> int:
     return wait_ms + REACTION_BOUND_MS
 
 
-def _before_the_bus(table: DriveTable, bus: BusTable, timeout_ms: int) -> Iterator[Term]:
+def _before_the_bus(control: str, bus: BusTable, timeout_ms: int) -> Iterator[Term]:
     period_ms = 1000 * bus.rpdo_period_s
     way = "how much older the owner's last telegram may be than the bridge assumes"
-    yield Term("way_ms", way_ms(table.control), way)
+    yield Term("way_ms", way_ms(control), way)
     yield Term("timeout_ms", timeout_ms, "the owner's time-out, fieldbus_timeout_ms")
     yield Term("reaction_ms", REACTION_BOUND_MS, "the bridge's own lateness, or that of the kernel's timer")
     yield Term("burst_ms", period_ms, "the kernel counts frames: the time-out is rounded up to a whole one")

@@ -115,6 +115,8 @@ def _check_drives(node: RawTable, units: _Unique, file: TomlFile) -> None:
         if given == "name" or slot_is_new:
             names.add(drive, given, "drive name")
         _check_control(drive, file)
+    if "outputs" in node.content:
+        _check_control(node.table("outputs"), file)
 
 
 def _check_control(drive: RawTable, file: TomlFile) -> None:

@@ -156,6 +156,23 @@ class DriveTable(Table):
         return 1, min(10 * (self.fieldbus_timeout_ms or LONGEST_TIMEOUT_MS), LONGEST_TIMEOUT_MS)
 
 
+SafeValue = bool | int | float | Literal["hold"]
+
+
+class OutputsTable(Table):
+    """Who commands the outputs of a node that is no drive, and what they get when nobody does."""
+
+    control: Control = Field("none", description="modbus, opcua, zenoh, lease or none")
+    fieldbus_timeout_ms: int | None = Field(
+        None, ge=0, le=LONGEST_TIMEOUT_MS, description="0 (off) or 1…32767 ms, like P151"
+    )
+    stop_by_anyone: bool = True
+    on_expiry: dict[str, SafeValue] = Field(
+        default_factory=dict[str, SafeValue], description='for each output a value, or "hold"'
+    )
+    accepts: AcceptsTable = Field(default_factory=lambda: AcceptsTable.model_validate({}))
+
+
 class IdentityTable(Table):
     device_type: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
     device_type_mask: int | None = Field(None, ge=0, le=0xFFFF_FFFF)
@@ -226,6 +243,10 @@ class NodeTable(Table):
     configure: list[ConfigureTable] = Field(default_factory=list[ConfigureTable])
     unit_id: int | None = Field(
         None, ge=1, le=247, description="a Modbus unit id, 1…247, of a node without drives"
+    )
+    outputs: OutputsTable = Field(
+        default_factory=lambda: OutputsTable.model_validate({}),
+        description="who commands the outputs of a node without drives",
     )
     drive: list[DriveTable] = Field(
         default_factory=list[DriveTable], description="a [[bus.node.drive]] table for each drive"

@@ -168,7 +168,7 @@ def _time(
 ) -> tuple[float | None, str, str]:
     """Time-out in ms (0: nothing is watched, None: not known), the setting in words, and why it is off."""
     if entry.watches == "guarding":
-        factor = raw.get(LIFE_TIME_FACTOR)
+        factor = raw.get(LIFE_TIME_FACTOR) if value else 0
         if factor is None:
             return None, f"{place.name} = {value} ms", "100D:00 is not known"
         setting = f"{place.name} × 100D:00 = {value} ms × {factor}"

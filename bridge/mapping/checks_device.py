@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.mapping.checks_process import twice
+from bridge.mapping.device import Signal
 from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family
 
@@ -14,7 +15,6 @@ _OF_DRIVES: Final = (
     "status_word",
     "meaning",
     "value",
-    "own_supervision",
     "stopping",
 )
 _NEEDED: Final = ("process", "control_word", "status_word")
@@ -28,10 +28,11 @@ def check_kind(family: Family, file: MergedFile) -> None:
                 file.fault(
                     (key,), "is missing", "a family of drives has it; a device without [[slot]] has not"
                 )
-        if family.input:
-            file.fault(
-                ("input",), "has no effect beside [[slot]]", "what drives tell are values of their words"
-            )
+        for key in ("input", "output"):
+            if key in file.data:
+                file.fault(
+                    (key,), "has no effect beside [[slot]]", "what drives take and tell is in [[value]]"
+                )
         return
     for key in _OF_DRIVES:
         if key in file.data:
@@ -39,16 +40,27 @@ def check_kind(family: Family, file: MergedFile) -> None:
 
 
 def check_signals(family: Family, file: MergedFile) -> None:
-    twice(((one.name, ("input", n, "name")) for n, one in enumerate(family.input)), "input", file)
-    objects = ((f"{one.object}", ("input", n, "object")) for n, one in enumerate(family.input))
-    twice(objects, "object of an input,", file)
-    for n, one in enumerate(family.input):
-        if one.factor == 0:
-            file.fault(("input", n, "factor"), "must not be 0")
-        if one.low is not None and one.high is not None and one.low > one.high:
-            file.fault(("input", n, "low"), f"is above high, {one.high:g}")
-        if one.is_scaled and (one.states or one.bits):
-            file.fault(("input", n), "states and bits are of numbers without factor and offset")
-        if len(one.bits) > one.size:
-            file.fault(("input", n, "bits"), f"a {one.data_type} has {one.size} bits")
-        twice(((name, ("input", n, "bits", b)) for b, name in enumerate(one.bits) if name), "bit", file)
+    for kind, signals in (("input", family.input), ("output", family.output)):
+        twice(((one.name, (kind, n, "name")) for n, one in enumerate(signals)), kind, file)
+        objects = ((f"{one.object}", (kind, n, "object")) for n, one in enumerate(signals))
+        twice(objects, f"object of an {kind},", file)
+        for n, one in enumerate(signals):
+            _check_signal(one, (kind, n), file)
+    for n, one in enumerate(family.output):
+        try:
+            if one.on_expiry != "hold":
+                one.encode(one.on_expiry)
+        except ValueError as error:
+            file.fault(("output", n, "on_expiry"), str(error))
+
+
+def _check_signal(one: Signal, key: tuple[str, int], file: MergedFile) -> None:
+    if one.factor == 0:
+        file.fault((*key, "factor"), "must not be 0")
+    if one.low is not None and one.high is not None and one.low > one.high:
+        file.fault((*key, "low"), f"is above high, {one.high:g}")
+    if one.is_scaled and (one.states or one.bits):
+        file.fault(key, "states and bits are of numbers without factor and offset")
+    if len(one.bits) > one.size:
+        file.fault((*key, "bits"), f"a {one.data_type} has {one.size} bits")
+    twice(((name, (*key, "bits", b)) for b, name in enumerate(one.bits) if name), "bit", file)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from typing import Annotated, Final, Literal
 
@@ -64,6 +65,50 @@ class Signal(Table):
         if self.is_scaled:
             return number * self.factor + self.offset
         return float(number) if self.value_type is DataType.FLOAT else number
+
+    def encode(self, value: object) -> int:
+        """The entry of a PDO as an integer without sign. Raises ``ValueError`` with what it takes instead."""
+        if self.data_type == "bool":
+            if value not in (0, 1):
+                raise ValueError(f"takes true or false, not {value!r}")
+            return int(bool(value))
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise ValueError("takes a number")
+        low, high = self.low, self.high
+        if (low is not None and value < low) or (high is not None and value > high):
+            raise ValueError(f"takes {_range(low, high)}, not {value:g}")
+        number = (value - self.offset) / self.factor if self.is_scaled else value
+        real = _REALS.get(self.data_type)
+        if real is not None:
+            return int.from_bytes(real.pack(number), "little")
+        if not self.is_scaled and number != int(number):
+            raise ValueError(f"takes a whole number, not {value:g}")
+        raw, kind = round(number), INTEGERS[self.data_type]
+        if not kind.low <= raw <= kind.high:
+            ends = [kind.low * self.factor + self.offset, kind.high * self.factor + self.offset]
+            raise ValueError(f"takes {_range(min(ends), max(ends))}, not {value:g}")
+        return raw & ((1 << self.size) - 1)
+
+
+OnExpiry = bool | int | float | Literal["hold"]
+
+
+class Output(Signal):
+    """One object of a PDO that the node receives: what is sent = (value − offset) / factor."""
+
+    on_expiry: OnExpiry = Field(
+        0, description='what it gets when its controller falls silent: a value, or "hold" for the last one'
+    )
+    error_mode: Ref | None = Field(
+        None, description="says whether it takes the error value when the node leaves Operational (CiA 401)"
+    )
+    error_value: Ref | None = Field(None, description="the error value")
+
+
+def _range(low: float | None, high: float | None) -> str:
+    if low is None:
+        return f"up to {high:g}"
+    return f"{low:g} and more" if high is None else f"{low:g}…{high:g}"
 
 
 def no_process() -> Process:

@@ -15,7 +15,7 @@ from pydantic import Field
 from bridge.config import DriveTable
 from bridge.config.fields import RegularExpression
 from bridge.mapping.aliases import Aliases
-from bridge.mapping.device import Signal, no_process
+from bridge.mapping.device import Output, Signal, no_process
 from bridge.mapping.faults import EmcyTable, FaultEntry, FaultNumbers
 from bridge.mapping.faults import FaultParameter as FaultParameter
 from bridge.mapping.fields import Bit, Bits, Kind, Name, ObjectRef, Pattern, Ref, Table, Word
@@ -173,6 +173,9 @@ class Family(Table):
     slot: list[Slot] = Field(default_factory=list[Slot], description="one for each drive of the node")
     input: list[Signal] = Field(
         default_factory=list[Signal], description="what the PDOs of a node without drives tell"
+    )
+    output: list[Output] = Field(
+        default_factory=list[Output], description="what the PDOs of a node without drives command"
     )
     meaning: list[Meaning] = Field(default_factory=list[Meaning])
     value: list[ProcessValue] = Field(default_factory=list[ProcessValue])

@@ -29,6 +29,8 @@ class OwnPlace:
     low: int
     high: int
     states: Mapping[int, str]
+    absent: int | None = None
+    """What counts where a node does not have it."""
 
     @property
     def key(self) -> tuple[int, int]:
@@ -50,7 +52,7 @@ def place_of(family: Family, one: OwnObject) -> OwnPlace:
     if one.parameter is None:
         ref = one.object or ObjectRef(0, 0)
         number = INTEGERS[one.data_type]
-        return OwnPlace(str(ref), ref, one.data_type, one.per_drive, number.low, number.high, {})
+        return OwnPlace(str(ref), ref, one.data_type, one.per_drive, number.low, number.high, {}, one.absent)
     parameter = family.parameter_named(one.parameter)
     number = INTEGERS[parameter.data_type]
     low, high = number.low, number.high

@@ -20,6 +20,7 @@ class OwnObject(Table):
     data_type: TypeName = Field("uint16", description="of an object; a parameter has its own")
     per_drive: bool = Field(False, description="true: each drive of the node has its own")
     factory: int | None = Field(None, description="what it holds as delivered, where that is known")
+    absent: int | None = Field(None, description="what counts where a node does not have the object")
 
 
 class OwnReaction(OwnObject):

@@ -93,12 +93,33 @@ def _check_node(node: RawTable, family: Family, file: TomlFile) -> None:
     if not family.is_device and "unit_id" in node.content:
         file.fault((*node.key, "unit_id"), "each drive has its own", "put it into [[bus.node.drive]]")
     for key in ("own_timeout_ms", "enforce"):
-        if family.is_device and key in node.content:
-            file.fault((*node.key, key), f"{facts.name} is no drive: has no effect")
+        if family.is_device and not family.output and key in node.content:
+            file.fault((*node.key, key), f"{facts.name} has no outputs: has no effect")
+    _check_outputs(node, family, file)
     time_ms = node.whole("own_timeout_ms")
     why = impossible(family, time_ms) if time_ms is not None and 1 <= time_ms <= 0xFFFF else ""
     if why:
         file.fault((*node.key, "own_timeout_ms"), why)
+
+
+def _check_outputs(node: RawTable, family: Family, file: TomlFile) -> None:
+    """The names and values of ``[bus.node.outputs]``."""
+    if "outputs" not in node.content:
+        return
+    outputs = node.table("outputs")
+    if not family.output:
+        file.fault(outputs.key, f"{family.family.name} has no outputs", "leave [bus.node.outputs] out")
+        return
+    known = {output.name: output for output in family.output}
+    for name, value in outputs.table("on_expiry").content.items():
+        key = (*outputs.key, "on_expiry", name)
+        if name not in known:
+            file.fault(key, f"there is no output {name!r}", f"there are {', '.join(known)}")
+        elif value != "hold":
+            try:
+                known[name].encode(value)
+            except ValueError as error:
+                file.fault(key, str(error), 'a value, or "hold"')
 
 
 def _check_sdo_channels(node: RawTable, family: Family, file: TomlFile) -> None:

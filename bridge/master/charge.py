@@ -65,9 +65,9 @@ class Charge:
         for node in self._nodes:
             if not node.is_out_of_service:
                 node.say("waiting", now)
-            for drive in node.node.drives:
-                drive.channel.on_bridge_gap(now)
-                drive.refresh(now)
+            for one in node.node.commanded:
+                one.channel.on_bridge_gap(now)
+                one.refresh(now)
 
     def next_deadline(self) -> float | None:
         return self._listening.next_deadline()

@@ -87,7 +87,7 @@ class Intruders:
         connected = node.wire.drives
         known = self._known.get(node.table.id)
         if known is None or known[0] is not connected:
-            commands = commands_of(node.node, connected, node.wire.stop_words)
+            commands = commands_of(node.node, connected, node.wire.stop_words, node.wire.outputs)
             known = self._known[node.table.id] = connected, commands
         return known[1]
 
@@ -183,7 +183,7 @@ class Intruders:
 
 
 def _follows_sync(node: NodeCore) -> bool:
-    return any(pdo.is_synchronous for pdos in node.wire.drives.values() for pdo in (*pdos.rpdos, *pdos.tpdos))
+    return any(pdo.is_synchronous for pdos in node.wire.pdos for pdo in (*pdos.rpdos, *pdos.tpdos))
 
 
 def _answer(stopped: Sequence[NodeCore], nodes: Sequence[NodeCore]) -> str:

@@ -85,7 +85,7 @@ class Repeated:
 
     def _of_node(self, node: NodeCore) -> Iterator[tuple[Repetition, bool]]:
         if node.sends_process_data:
-            for pdos in node.wire.drives.values():
+            for pdos in node.wire.pdos:
                 if not pdos.is_silent:
                     for wanted in pdos.repetitions(self._network.bus.rpdo_period_s):
                         yield wanted, pdos.needs_sync

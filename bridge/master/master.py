@@ -266,9 +266,9 @@ class Master:
             self._plant.report(Event(now, Kind.BUS, line.bus.name, 900, message))
             line.network.came_back(now)
             for node in line.network.nodes:
-                for drive in node.node.drives:
-                    drive.channel.on_bridge_gap(now)
-                    drive.refresh(now)
+                for one in node.node.commanded:
+                    one.channel.on_bridge_gap(now)
+                    one.refresh(now)
 
     def _watch_bus(self, line: Line, now: float) -> None:
         status = line.bus.status

@@ -238,7 +238,7 @@ class Network:
         """Whether another node of the bus has a PDO, or anything else, on this identifier."""
         return any(
             cob_id in other.wire.routes
-            or any(cob_id == rpdo.cob_id for pdos in other.wire.drives.values() for rpdo in pdos.rpdos)
+            or any(cob_id == rpdo.cob_id for pdos in other.wire.pdos for rpdo in pdos.rpdos)
             for other in self.nodes
             if other is not node
         )
@@ -300,7 +300,7 @@ class Network:
 
         self._routes[cobid.SYNC] = window.on_sync
         for node in self.nodes:
-            for tpdo in (tpdo for pdos in node.wire.drives.values() for tpdo in pdos.tpdos):
+            for tpdo in (tpdo for pdos in node.wire.pdos for tpdo in pdos.tpdos):
                 if tpdo.is_synchronous and tpdo.cob_id in self._routes:
                     self._routes[tpdo.cob_id] = judged(self._routes[tpdo.cob_id])
 

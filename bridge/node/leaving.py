@@ -46,7 +46,7 @@ class Leaving:
         if not self._takes_words():
             return 0.0
         known = [takeover_ms(self._node.bus, kind) / 1000 for kind in self._memory.rpdo_types]
-        return max((*known, *(drive.takeover_s for drive in self._node.drives)), default=0.0)
+        return max((*known, *(one.takeover_s for one in self._node.commanded)), default=0.0)
 
     def has_told(self, now: float) -> bool:
         """Every drive that gets process data has had stopped words for long enough to take them over."""

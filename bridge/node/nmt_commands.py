@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 from bridge.canopen.nmt import NmtCommand
 from bridge.command import Action, Code, Drive, Event, Kind, Outcome, Plant, Reply, Request, Role
 from bridge.command.link import NodeState
+from bridge.command.outputs import Outputs
 from bridge.node.put_off import CANCELS_WORDS
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def answer(
     is not started. Where a node has to take over its stopped words first each gets its own.
     """
     is_bus = request.target.startswith("bus/")
-    why = refusal(request, [drive for one in nodes for drive in one.node.drives])
+    why = refusal(request, [commanded for one in nodes for commanded in one.node.commanded])
     if is_bus and request.action not in NMT:
         reply(Outcome(Code.UNKNOWN_TARGET, f"a bus has no {request.action}", forwarded=False))
         return False
@@ -51,7 +52,7 @@ def answer(
     return not each
 
 
-def refusal(request: Request, drives: Sequence[Drive]) -> str | None:
+def refusal(request: Request, commanded: Sequence[Drive | Outputs]) -> str | None:
     """Why this identity may not command the node now, or None if it may.
 
     A command on the node touches all its drives, so nobody gives one while another identity controls
@@ -61,10 +62,10 @@ def refusal(request: Request, drives: Sequence[Drive]) -> str | None:
         return f"{request.identity} may only read"
     if request.identity.role >= Role.ENGINEER:
         return None
-    for drive in drives:
-        owner = drive.channel.owner
+    for one in commanded:
+        owner = one.channel.owner
         if owner is not None and not request.identity.is_same(owner):
-            return f"{drive.name} is controlled by {owner}"
+            return f"{one.name} is controlled by {owner}"
     return None
 
 

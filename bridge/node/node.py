@@ -134,7 +134,7 @@ class NodeCore:
         reaction = self.table.on_loss
         if self.error_control.boot_loop.is_looping:
             return
-        if reaction == "nothing" and self.wire.drives and self.error_control.state is NmtState.OPERATIONAL:
+        if reaction == "nothing" and self.wire.pdos and self.error_control.state is NmtState.OPERATIONAL:
             self.node.on_heard_again()
             self._enter_operation("ok; heard again", now)
         elif reaction != "stop_node":
@@ -249,10 +249,10 @@ class NodeCore:
         self.boot_at = None
         self.set_state(NodeState.OPERATIONAL, now)
         self.wire.start_polling(now)
-        for drive in self.node.drives:
-            if drive.name not in self.wire.drives:
-                drive.channel.on_node(NodeState.CONFIG_ERROR, now)
-                drive.refresh(now)
+        for one in self.node.commanded:
+            if one.name not in self.wire.drives and not self.wire.outputs:
+                one.channel.on_node(NodeState.CONFIG_ERROR, now)
+                one.refresh(now)
         self._view.succeeded(text, now)
 
     def _fail_boot(self, error: boot.BootError, now: float) -> None:
@@ -309,9 +309,9 @@ class NodeCore:
             self._neighbours.stop_others(self, f"{self.node.name} is lost", now)
 
     def stop_drives(self, now: float) -> None:
-        """Every drive of the node has to be enabled anew."""
-        for drive in self.node.drives:
-            drive.channel.start_anew(now)
+        """Every drive of the node has to be enabled anew, and its outputs be written anew."""
+        for one in self.node.commanded:
+            one.channel.start_anew(now)
 
     def leave_operation(self, now: float) -> None:
         self.error_control.stop(now, lost=self.state is NodeState.LOST)

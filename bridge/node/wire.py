@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,6 +18,7 @@ from bridge.node.error_control import ErrorControl, Sign
 from bridge.node.fault_reading import FaultReading
 from bridge.node.meaning_watch import MeaningWatch
 from bridge.node.process.inputs import connect_inputs
+from bridge.node.process.outputs import OutputPdos, connect_outputs
 from bridge.node.process.polling import Polling
 from bridge.node.process.process_data import DrivePdos, connect
 from bridge.node.process.stop_words import StopWords
@@ -59,6 +60,7 @@ class NodeWire:
         self.error_control = ErrorControl(node.table, listener.on_duplicate)
         self.polling = Polling(node.family.poll, self.sdo.for_polls, self._show_poll)
         self.drives: dict[str, DrivePdos] = {}
+        self.outputs: OutputPdos | None = None
         self._emcy_id: int | None = cobid.EMCY + node.table.id
         self.routes: dict[int, Handler] = self._basic_routes()
         self.routes_changed = True
@@ -76,6 +78,11 @@ class NodeWire:
         if self._emcy_id is not None:
             routes[self._emcy_id] = self._on_emcy
         return routes
+
+    @property
+    def pdos(self) -> Sequence[DrivePdos | OutputPdos]:
+        """By which the node is commanded."""
+        return [self.outputs] if self.outputs else [*self.drives.values()]
 
     def take_routes(self) -> dict[int, Handler]:
         """Who gets which identifier; no news any more until it changes."""
@@ -116,6 +123,9 @@ class NodeWire:
 
     def send_stopped(self) -> None:
         self._frames += self.stop_words.frames(self.drives, self._listener.is_foreign)
+        if self.outputs:
+            frames = self.outputs.frames_with_stop()
+            self._frames += [frame for frame in frames if not self._listener.is_foreign(frame.can_id)]
 
     def _on_sdo(self, channel: SdoChannel, frame: Frame) -> None:
         unmatched, late = channel.unmatched, channel.late
@@ -192,6 +202,9 @@ class NodeWire:
         self.routes |= node_tpdos(result.node_tpdos, sync_ms, self.polling.on_pdo, self.reject)
         if self._node.device and result.inputs:
             self.routes |= connect_inputs(self._node.device, result.inputs, sync_ms, self.reject, now)
+        if self._node.device and self._node.device.outputs and result.outputs:
+            outputs = self._node.device.outputs
+            self.outputs = connect_outputs(outputs, result.outputs, result, self._listener.is_taken, now)
         self.routes_changed = True
 
     def _usable_emcy_id(self, result: boot.BootResult) -> int | None:

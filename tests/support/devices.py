@@ -76,3 +76,63 @@ def device_bench(folder: Path, node: PdoNode, mapping: str = ENCODER, more: str 
     path.write_text(SITE.format(node=more), encoding="utf-8")
     site, families = load_site_and_families(path)
     return Bench(site, family=families["acme/encoder"], mapping="acme/encoder", node=node)
+
+
+IO_BLOCK = """\
+extends = "generic/device"
+[family]
+name = "I/O block"
+vendor = "Acme"
+source = "nobody's manual"
+
+[[input]]
+name = "inputs"
+object = "6000:01"
+data_type = "uint8"
+
+[[output]]
+name = "valves"
+object = "6200:01"
+data_type = "uint8"
+error_mode = "6206:01"
+error_value = "6207:01"
+
+[[output]]
+name = "speed"
+object = "6411:01"
+data_type = "int16"
+factor = 0.1
+unit = "Hz"
+on_expiry = 5
+error_mode = "6443:01"
+error_value = "6444:01"
+
+[[output]]
+name = "lamp"
+object = "6411:02"
+data_type = "int16"
+on_expiry = "hold"
+"""
+OUTPUTS = """\
+own_timeout_ms = 300
+[bus.node.outputs]
+control = "modbus"
+fieldbus_timeout_ms = 200
+[modbus]
+listen = "127.0.0.1:1502"
+"""
+
+
+def io_block() -> PdoNode:
+    """Two PDOs to it, digital and analogue; it holds 77 in what the lamp has."""
+    node = PdoNode(20)
+    node.put("6206:01", 1, 0xFF)
+    node.put("6207:01", 1, 0)
+    node.put("6443:01", 1, 1)
+    node.put("6444:01", 4, 50)
+    node.put("1016:01", 4, 127 << 16 | 300)
+    node.pdo("tpdo", 1, 0x180, ["6000:01/8"], event_ms=100)
+    node.pdo("rpdo", 1, 0x200, ["6200:01/8"])
+    node.pdo("rpdo", 2, 0x300, ["6411:01/16", "6411:02/16"])
+    node.put("6411:02", 2, 77)
+    return node

@@ -6,7 +6,6 @@ from bridge.node.boot.actions import Boot as Boot
 from bridge.node.boot.actions import BootResult as BootResult
 from bridge.node.boot.actions import DeviceErrors as DeviceErrors
 from bridge.node.boot.actions import DrivePlan as DrivePlan
-from bridge.node.boot.actions import InputPlan as InputPlan
 from bridge.node.boot.actions import Nmt as Nmt
 from bridge.node.boot.actions import NodePdoPlan as NodePdoPlan
 from bridge.node.boot.actions import Pause as Pause
@@ -14,6 +13,7 @@ from bridge.node.boot.actions import PdoPlan as PdoPlan
 from bridge.node.boot.actions import Read as Read
 from bridge.node.boot.actions import ResetCommunication as ResetCommunication
 from bridge.node.boot.actions import Signal as Signal
+from bridge.node.boot.actions import SignalPlan as SignalPlan
 from bridge.node.boot.actions import Step as Step
 from bridge.node.boot.actions import WordFacts as WordFacts
 from bridge.node.boot.actions import Write as Write

@@ -113,11 +113,11 @@ class DrivePlan:
 
 
 @dataclass(slots=True)
-class InputPlan:
-    """The TPDOs of a device that is no drive; ``unserved`` has the reason for each input that none of them
-    carries."""
+class SignalPlan:
+    """The TPDOs or the RPDOs of a device that is no drive; ``unserved`` has the reason for each input or
+    output that none of them carries."""
 
-    tpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
+    pdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
     unserved: dict[ObjectRef, str] = field(default_factory=dict[ObjectRef, str])
 
 
@@ -138,7 +138,13 @@ class BootResult:
     drives: dict[str, DrivePlan] = field(default_factory=dict[str, DrivePlan])
     words: dict[str, WordFacts] = field(default_factory=dict[str, WordFacts])
     node_tpdos: list[NodePdoPlan] = field(default_factory=list[NodePdoPlan])
-    inputs: InputPlan | None = None
+    inputs: SignalPlan | None = None
+    outputs: SignalPlan | None = None
+    held: dict[str, int] = field(default_factory=dict[str, int])
+    """What outputs hold that are to hold it, as integers without sign, by their names."""
+    bridge_stop: tuple[int, str] = (0, "")
+    """Longest time in ms from the bridge's hang to outputs that the node itself has made safe; 0 with the
+    reason where there is none."""
     notes: list[str] = field(default_factory=list[str])
     emcy_id: int | None = None
     """Where emergency messages come; None where the node sends none."""

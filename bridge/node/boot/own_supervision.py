@@ -12,7 +12,7 @@ from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_supervision import judge
 from bridge.mapping.model import Family
 from bridge.mapping.own_places import OwnPlace, OwnWant, places, wanted
-from bridge.node.boot.actions import BootResult, Do, Step, told_as
+from bridge.node.boot.actions import Action, BootResult, Do, Step, told_as
 from bridge.node.boot.memory import NOT_AGAIN
 from bridge.node.boot.status import BootError
 from bridge.node.sdo_channels import FIRST, channel_of
@@ -27,15 +27,12 @@ def set_own_supervision(node: Node, result: BootResult) -> Do:
 
     Raises BootError J where a value that is enforced is not taken.
     """
-    if not node.family.own_supervision:
+    if node.device or not node.family.own_supervision:
         for drive in node.drives:
             result.own[drive.name] = OwnJudgement(accepted=drive.table.accepts.runs_on or "")
         return
     yield Step("reading the drives' own supervision", "J")
-    of_node = yield from read_places(node, None)
-    for want in wanted(node.family, node.bus, node.table):
-        if not want.place.per_drive:
-            yield from _bring(node, want, of_node, FIRST, node.name, result)
+    of_node = yield from bring_node(node, result)
     for drive in node.drives:
         of_drive = yield from read_places(node, drive)
         channel = channel_of(node, drive.slot)
@@ -46,6 +43,15 @@ def set_own_supervision(node: Node, result: BootResult) -> Do:
         own = judge(node.family, raw, node.bus, node.table, drive.table.accepts.runs_on or "")
         result.own[drive.name] = own
     _note_who_runs_on(node, result)
+
+
+def bring_node(node: Node, result: BootResult) -> Generator[Action, bytes | None, Raws]:
+    """The node's own objects, brought to what is wanted. Raises BootError J."""
+    of_node = yield from read_places(node, None)
+    for want in wanted(node.family, node.bus, node.table):
+        if not want.place.per_drive:
+            yield from _bring(node, want, of_node, FIRST, node.name, result)
+    return of_node
 
 
 def read_places(
@@ -67,6 +73,8 @@ def read_places(
             return raw  # the drive behind the channel may be away while the node itself is there
         if data is not None:
             raw[place.key] = place.number.decode(data)
+        elif place.absent is not None:
+            raw[place.key] = place.absent
     return raw
 
 

@@ -22,10 +22,11 @@ from bridge.node.boot.actions import (
 )
 from bridge.node.boot.configuration import configure
 from bridge.node.boot.device_errors import read_errors, reset_once
+from bridge.node.boot.device_pdos import plan_device
+from bridge.node.boot.device_watch import judge_outputs, read_held
 from bridge.node.boot.emergency import read_emcy_id
 from bridge.node.boot.error_control import set_error_control
 from bridge.node.boot.identity import identify, look_for
-from bridge.node.boot.inputs import plan_inputs
 from bridge.node.boot.listening import find_rpdos
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.own_supervision import set_own_supervision
@@ -71,7 +72,10 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
     refuse_doubles(result)
     yield from plan_node_tpdos(node, result)
     if node.device:
-        yield from plan_inputs(node, result)
+        yield from plan_device(node, result)
+        if node.device.outputs:
+            yield from read_held(node.device.outputs.words, result)
+            yield from judge_outputs(node, node.device.outputs.words, result)
     yield from set_own_supervision(node, result)
     yield Step("reading what the words mean", "J")
     for drive in node.drives:

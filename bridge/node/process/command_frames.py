@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from bridge.command.plant import Node
 from bridge.drive import ControlWords
 from bridge.node.boot import rpdo_plan
+from bridge.node.process.outputs import OutputPdos, OutputRpdo
 from bridge.node.process.process_data import DrivePdos, Rpdo
 from bridge.node.process.stop_words import StopWords
 
@@ -18,7 +19,7 @@ class Command:
 
     label: str
     words: ControlWords
-    rpdo: Rpdo
+    rpdo: Rpdo | OutputRpdo
 
     def said(self, data: bytes) -> str:
         """What ``data`` asks of the drive, in words."""
@@ -26,6 +27,8 @@ class Command:
         word = self.rpdo.control_word(data)
         if word is None:
             return raw
+        if isinstance(self.rpdo, OutputRpdo):
+            return f"{raw}, which leaves {'no output active' if not word else 'outputs active'}"
         does = "enables" if self.words.enables(word) else "does not enable"
         return f"{raw}, control word {word:04X}h, which {does}"
 
@@ -34,7 +37,9 @@ class Command:
         return word is not None and self.words.enables(word)
 
 
-def commands_of(node: Node, connected: Mapping[str, DrivePdos], stop_words: StopWords) -> dict[int, Command]:
+def commands_of(
+    node: Node, connected: Mapping[str, DrivePdos], stop_words: StopWords, outputs: OutputPdos | None = None
+) -> dict[int, Command]:
     """By COB-ID: of drives that are ``connected`` the RPDOs that the node has; of the others those under
     which they may listen; of drives that the site leaves out those of the factory."""
     family = node.family
@@ -57,4 +62,7 @@ def commands_of(node: Node, connected: Mapping[str, DrivePdos], stop_words: Stop
         label = f"RPDO of {drive.name if drive else f'{node.name}, {slot.name}'}"
         for rpdo in rpdos:
             found.setdefault(rpdo.cob_id, Command(label, words, rpdo))
+    if outputs:
+        words = outputs.control_words
+        return {rpdo.cob_id: Command(f"RPDO of {node.name}", words, rpdo) for rpdo in outputs.rpdos}
     return found

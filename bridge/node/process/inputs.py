@@ -9,18 +9,18 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.sync import tpdo_deadline_s
 from bridge.command.device import Device, InputPdo
 from bridge.mapping.fields import ObjectRef
-from bridge.node.boot import InputPlan, PdoPlan
+from bridge.node.boot import PdoPlan, SignalPlan
 
 Reject = Callable[[Frame, str], None]
 
 
 def connect_inputs(
-    device: Device, plan: InputPlan, sync_period_ms: int, reject: Reject, now: float
+    device: Device, plan: SignalPlan, sync_period_ms: int, reject: Reject, now: float
 ) -> dict[int, Callable[[Frame], None]]:
     """Tell ``device`` what the boot-up has found; who takes its TPDOs, by COB-ID."""
-    device.on_pdos([_input_pdo(tpdo, sync_period_ms) for tpdo in plan.tpdos], plan.unserved, now)
+    device.on_pdos([_input_pdo(tpdo, sync_period_ms) for tpdo in plan.pdos], plan.unserved, now)
     return {
-        tpdo.cob_id: partial(_on_frame, device, place, tpdo, reject) for place, tpdo in enumerate(plan.tpdos)
+        tpdo.cob_id: partial(_on_frame, device, place, tpdo, reject) for place, tpdo in enumerate(plan.pdos)
     }
 
 

@@ -1,0 +1,107 @@
+"""The values of a node's outputs as the words that the leg carries, and what they are when they are safe."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final, NamedTuple
+
+from bridge.command.request import Code
+from bridge.command.telegram import Refusal, Telegram
+from bridge.config import SafeValue
+from bridge.image import Value
+from bridge.mapping.device import Output
+
+_BITS: Final = 16
+_MASK: Final = (1 << _BITS) - 1
+ACTIVE: Final = 1
+"""The control word of a telegram by which an output is anything but safe; 0 is that of one that stops."""
+
+
+class Place(NamedTuple):
+    """Where an output stands: ``span`` words from ``word`` on, the low one first."""
+
+    output: Output
+    word: int
+    span: int
+    safe: int | None
+    """What it gets when nobody commands it, as an integer; None: it holds its last value."""
+
+
+class OutputWords:
+    """Knows the outputs of one node, called ``name``. ``held`` are the words that were sent last: what an
+    output holds. Words are 16-bit integers."""
+
+    def __init__(self, name: str, outputs: Sequence[Output], on_expiry: Mapping[str, SafeValue]) -> None:
+        self._name = name
+        self.places: dict[str, Place] = {}
+        word = 0
+        for output in outputs:
+            span = -(-output.size // _BITS)
+            safe = on_expiry.get(output.name, output.on_expiry)
+            raw = None if safe == "hold" else output.encode(safe)
+            self.places[output.name] = Place(output, word, span, raw)
+            word += span
+        self.count = word
+        self.held: tuple[int, ...] = self.safe([0] * word)
+
+    @property
+    def all_hold(self) -> bool:
+        return all(place.safe is None for place in self.places.values())
+
+    def raw(self, words: Sequence[int], place: Place) -> int:
+        """The output's integer without sign among these words."""
+        return sum(words[place.word + n] << n * _BITS for n in range(place.span))
+
+    def value(self, words: Sequence[int], place: Place) -> Value:
+        raw, output = self.raw(words, place), place.output
+        if output.is_signed and raw >> output.size - 1:
+            raw -= 1 << output.size
+        return output.decode(raw)
+
+    def put(self, words: list[int], place: Place, raw: int) -> None:
+        for n in range(place.span):
+            words[place.word + n] = raw >> n * _BITS & _MASK
+
+    def safe(self, held: Sequence[int]) -> tuple[int, ...]:
+        """What the outputs get when nobody commands them, after these words."""
+        words = list(held)
+        for place in self.places.values():
+            if place.safe is not None:
+                self.put(words, place, place.safe)
+        return tuple(words)
+
+    def on_wire(self, words: tuple[int, ...]) -> tuple[int, ...]:
+        """What outputs get by the words of the leg, the control word first."""
+        return words[1:] if words[0] & ACTIVE else self.safe(self.held)
+
+    def decode(self, values: Mapping[str, Value], before: tuple[int, ...], held: int) -> Telegram:
+        """The words of a telegram; outputs that are not written stay as ``before``, and those that hold as
+        they are. A name with a number behind a dot is one bit of an output. A telegram that leaves every
+        output safe or as it is stops. Raises ``Refusal``."""
+        words = list(before)
+        for place in self.places.values():
+            if place.safe is None:
+                self.put(words, place, self.raw(self.held, place))
+        # The whole output first: its bits are written over it.
+        for leaf, value in sorted(values.items(), key=lambda item: "." in item[0]):
+            name, _, bit = leaf.partition(".")
+            place = self.places.get(name)
+            if place is None:
+                known = ", ".join(self.places)
+                raise Refusal(Code.UNKNOWN_POINT, f"{self._name}/output has no {name!r}; it has {known}")
+            try:
+                raw = self._with_bit(words, place, bit, value) if bit else place.output.encode(value)
+            except ValueError as error:
+                message = f"{leaf} {error} {place.output.unit}".rstrip()
+                raise Refusal(Code.OUT_OF_RANGE, message) from None
+            self.put(words, place, raw)
+        return Telegram(0 if tuple(words) == self.safe(self.held) else ACTIVE, tuple(words))
+
+    def _with_bit(self, words: Sequence[int], place: Place, bit: str, value: Value) -> int:
+        if not bit.isdecimal() or int(bit) >= place.output.size:
+            raise ValueError(f"is none of its {place.output.size} bits")
+        if value not in (0, 1):
+            raise ValueError(f"takes true or false, not {value!r}")
+        mask = 1 << int(bit)
+        raw = self.raw(words, place)
+        return raw | mask if value else raw & ~mask

@@ -1,0 +1,252 @@
+"""The outputs of a node that is no drive: commanded by one owner, and safe when nobody does.
+
+They are commanded by the same leg as drives. Its control word has one bit: the telegram of an owner that
+leaves every output safe stops, any other is active. So the rules of a drive hold word by word: who owns them,
+how long an owner may be silent, and that after a trip or a pause of the node nothing is active until the
+owner has acknowledged or has sent the safe values once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
+
+from bridge.command.channel import Channel
+from bridge.command.commanded import Commanded
+from bridge.command.deadlines import NOW
+from bridge.command.event import Event, Kind
+from bridge.command.follow import Verdict
+from bridge.command.leg.settings import LegSettings
+from bridge.command.leg.state import Output as Sent
+from bridge.command.leg.state import Stage
+from bridge.command.link import Link, NodeState
+from bridge.command.output_words import ACTIVE, OutputWords
+from bridge.command.request import Action, Code, Outcome, Reply, Request, Write
+from bridge.command.worst_case import StopTime, Wire, output_stop_time
+from bridge.config import BusTable, NodeTable, OutputsTable
+from bridge.drive import ControlWords
+from bridge.image import Image, Quality, Value
+from bridge.mapping.fields import ObjectRef
+from bridge.mapping.model import ControlWord, Family
+
+_SAFE: Final = {"mask": ACTIVE, "value": 0}
+_CONTROL_WORD: Final = ControlWord.model_validate(
+    {
+        "bits": ["active", "acknowledge"],
+        "enabling": {"mask": ACTIVE, "value": ACTIVE},
+        "stop": _SAFE,
+        "quick_stop": _SAFE,
+        "disable_voltage": _SAFE,
+        "acknowledge_bit": 1,
+        "stopped": 0,
+        "ready": 0,
+        "run": ACTIVE,
+    }
+)
+_SUPERVISION: Final = (
+    "owner",
+    "watchdog_state",
+    "fieldbus_timeout_ms",
+    "trips",
+    "restart_interlock",
+    "refused_writes",
+)
+
+
+class OutputChannel(Channel):
+    """Who commands the outputs of one node. Words are those of the leg, the control word first."""
+
+    def __init__(
+        self,
+        name: str,
+        words: OutputWords,
+        settings: OutputsTable,
+        hold_ms: int,
+        report: Callable[[Event], None],
+        *,
+        settled: Callable[[float], None],
+        tripped: Callable[[float], None],
+        due: Callable[[float], None],
+    ) -> None:
+        self.output_words = words
+        of_leg = LegSettings(
+            words=ControlWords(_CONTROL_WORD),
+            decode=words.decode,
+            setpoints=words.count,
+            control=settings.control,
+            reaction="disable_voltage",
+            timeout_ms=settings.fieldbus_timeout_ms or 0,
+            then_silence_s=0.0,
+            ignores_errors=False,
+            stop_by_anyone=settings.stop_by_anyone,
+            timeout_writable=False,
+            timeout_range_ms=(0, 0),
+            follows=(),
+            handshake=None,
+        )
+        super().__init__(name, of_leg, Link(0.0, hold_ms), report, settled=settled, tripped=tripped, due=due)
+        safe = words.held
+        self.leg = self.leg._replace(rest=safe, setpoints=safe, sent=Sent((0, *safe)))
+
+    def on_wire(self, output: Sent) -> tuple[int, ...]:
+        """What the outputs get by this output of the leg."""
+        return self.output_words.on_wire(output.words)
+
+    def handle(self, request: Request, now: float, reply: Reply) -> None:
+        if request.action is Action.START:
+            self.on_refused(now)
+            message = f"{request.action} by {request.identity} refused: outputs are written"
+            self._tell(now, Kind.REFUSED, 300, message)
+            reply(Outcome(Code.UNKNOWN_POINT, "outputs are written, and not started", forwarded=False))
+            return
+        if request.action is not Action.RESET_FAULT:
+            super().handle(request, now, reply)
+            return
+
+        def acknowledged(outcome: Outcome) -> None:
+            if outcome.ok and outcome.forwarded and self.leg.stage is Stage.INTERLOCKED:
+                # Whoever acknowledges means to go on: nothing is active by that.
+                again = Request(request.identity, request.target, Write())
+                super(OutputChannel, self).handle(again, now, lambda outcome: None)
+            reply(outcome)
+
+        super().handle(request, now, acknowledged)
+
+    def _node_has_changed(self, state: NodeState, now: float) -> None:
+        if state is NodeState.OPERATIONAL:
+            # Nothing comes back of outputs: they are as good as their node is there.
+            self.link.on_pdo(now)
+
+    def _reaction(self) -> str:
+        return "its outputs are safe, acknowledge"
+
+
+class Outputs(Commanded):
+    """The outputs of one node, and where its points stand in the image. Times are monotonic seconds."""
+
+    def __init__(
+        self,
+        node: NodeTable,
+        bus: BusTable,
+        family: Family,
+        image: Image,
+        report: Callable[[Event], None],
+        settled: Callable[[Outputs, float], None],
+        tripped: Callable[[float], None],
+        due: Callable[[float], None],
+    ) -> None:
+        super().__init__(bus)
+        self.name = self.node_name = node.name
+        self.table = node.outputs
+        self.words = OutputWords(node.name, family.output, node.outputs.on_expiry)
+        self.channel = OutputChannel(
+            node.name,
+            self.words,
+            node.outputs,
+            node.hold_ms,
+            report,
+            settled=lambda now: settled(self, now),
+            tripped=tripped,
+            due=due,
+        )
+        self.unserved: dict[ObjectRef, str] = {}
+        """Outputs that no RPDO carries, with the reason."""
+        self.bridge_stop: tuple[int, str] = (0, "has not been read yet")
+        """Longest time in ms from the bridge's hang to outputs that the node itself has made safe, or why
+        there is none."""
+        self._image = image
+        index = image.index
+        self._points = [
+            (place, index[f"{node.name}/output/{name}"]) for name, place in self.words.places.items()
+        ]
+        self._supervision = [index[f"{node.name}/supervision/{leaf}"] for leaf in _SUPERVISION]
+        self._left, self._telegrams, self._stop_ms, self._bridge_ms = (
+            index[f"{node.name}/supervision/{leaf}"]
+            for leaf in ("watchdog_left_ms", "telegrams", "worst_case_stop_ms", "worst_case_bridge_ms")
+        )
+
+    @property
+    def is_active(self) -> bool:
+        """An owner's values are sent."""
+        return bool(self.channel.output.words[0] & ACTIVE)
+
+    def stop_time(self) -> StopTime:
+        """Longest time from the controller's last telegram to safe values on the bus."""
+        if self.words.all_hold:
+            return StopTime()
+        return output_stop_time(self.table, self.bus, self.rpdo_type, self.wire)
+
+    # fed by its node
+
+    def on_pdos(
+        self,
+        rpdo_type: int,
+        unserved: Mapping[ObjectRef, str],
+        held: Mapping[str, int],
+        bridge_stop: tuple[int, str],
+        now: float,
+    ) -> None:
+        """What the boot-up has found: the transmission type of its RPDOs, what none of them carries, what
+        outputs hold, and what the node does by itself when the bridge falls silent."""
+        self.rpdo_type = rpdo_type
+        self.unserved = dict(unserved)
+        self.bridge_stop = bridge_stop
+        words = list(self.words.held)
+        for name, raw in held.items():
+            self.words.put(words, self.words.places[name], raw)
+        self.words.held = tuple(words)
+        self.refresh(now)
+
+    def on_wire(self, wire: Wire, now: float) -> None:
+        """What is predicted of its bus."""
+        self.wire = wire
+        self.refresh(now)
+
+    # time
+
+    def on_time(self, now: float) -> Sequence[Verdict]:
+        """Let everything happen that is due by ``now``. Nothing tells whether outputs have followed."""
+        self.channel.on_time(now)
+        return ()
+
+    def next_deadline(self, now: float) -> float | None:
+        return self.channel.next_deadline(now)
+
+    # into the image
+
+    def refresh(self, now: float) -> None:
+        """Bring every point up to date; called when something has changed."""
+        channel = self.channel
+        channel.due(NOW)
+        if self.is_active:
+            self.words.held = channel.output.words[1:]
+        sent = channel.on_wire(channel.output)
+        quality = channel.link.quality(now)
+        for place, index in self._points:
+            why = self.unserved.get(place.output.object, "")
+            value = self.words.value(sent, place)
+            if why:
+                self._image.set(index, value, now, Quality.CONFIG_ERROR, why)
+            else:
+                self._image.set(index, value, now, quality, channel.link.reason(quality))
+        values: tuple[Value, ...] = (
+            str(channel.owner or ""),
+            int(channel.watchdog_state),
+            channel.timeout_ms,
+            channel.trips,
+            channel.restart_interlock,
+            channel.refused_writes,
+        )
+        for index, value in zip(self._supervision, values, strict=True):
+            self._image.set(index, value, now)
+        stop = self.stop_time()
+        quality = Quality.CONFIG_ERROR if stop.unknown else Quality.GOOD
+        self._image.set(self._stop_ms, stop.ms, now, quality, stop.unknown)
+        ms, why = self.bridge_stop
+        self._image.set(self._bridge_ms, ms, now, Quality.GOOD if ms else Quality.CONFIG_ERROR, why)
+        self.look(now)
+
+    def look(self, now: float) -> None:
+        """Bring to this moment what changes by itself."""
+        self._image.keep(self._left, self.channel.left_ms(now), now)
+        self._image.keep(self._telegrams, self.channel.telegrams, now)

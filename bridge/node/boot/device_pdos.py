@@ -1,0 +1,87 @@
+"""The PDOs of a device that is no drive, as the node has them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Generator, Mapping
+from typing import Final
+
+from bridge.canopen import cobid
+from bridge.canopen.dialogue import optional
+from bridge.canopen.pdo import MappingError, PdoCodec
+from bridge.command.plant import Node
+from bridge.mapping.device import Signal
+from bridge.mapping.fields import ObjectRef
+from bridge.node.boot.actions import Action, BootResult, Do, PdoPlan, SignalPlan, Step, number
+from bridge.node.boot.pdos import read_entries
+
+_BASES: Final = {"TPDO": (0x1800, 0x1A00), "RPDO": (0x1400, 0x1600)}
+_MOST: Final = 512
+_ABSENT_IN_A_ROW: Final = 4
+"""PDOs are numbered from 1; the four of the predefined connection set may be there in part."""
+
+Plan = Generator[Action, bytes | None, SignalPlan]
+
+
+def plan_device(node: Node, result: BootResult) -> Do:
+    """Every PDO that is switched on and carries one of the family's inputs or outputs."""
+    family = node.family
+    yield Step("reading the process data mapping", "J")
+    result.inputs = yield from _plan("TPDO", {one.object: one for one in family.input}, result)
+    if family.output:
+        result.outputs = yield from _plan("RPDO", {one.object: one for one in family.output}, result)
+
+
+def _plan(kind: str, wanted: Mapping[ObjectRef, Signal], result: BootResult) -> Plan:
+    signed = {(ref.index, ref.sub) for ref, signal in wanted.items() if signal.is_signed}
+    plan = SignalPlan()
+    absent = 0
+    for place in range(_MOST if wanted else 0):
+        if absent >= _ABSENT_IN_A_ROW:
+            break
+        parameter, mapping = (base + place for base in _BASES[kind])
+        has_object = yield from optional(parameter, 1)
+        if has_object is None:
+            absent += 1
+            continue
+        absent = 0
+        cob_id = number(has_object, cobid.PDO_DISABLED)
+        name = f"{kind}{place + 1}"
+        try:
+            entries = yield from read_entries(mapping, number((yield from optional(mapping, 0))))
+            codec = PdoCodec(entries, signed)
+        except MappingError as error:
+            result.notes.append(f"{name} is not used: {error}")
+            continue
+        mapped = [ObjectRef(entry.index, entry.sub) for entry in entries if not entry.is_dummy]
+        objects = [ref for ref in mapped if ref in wanted]
+        if not objects:
+            continue
+        if cob_id & cobid.PDO_DISABLED:
+            plan.unserved |= dict.fromkeys(objects, f"{name} is switched off in the node")
+            continue
+        if cob_id & cobid.PDO_EXTENDED or not cobid.is_for_pdos(cob_id & cobid.COB_ID_MASK):
+            result.notes.append(f"{parameter:04X}h:01 is {cob_id:08X}h: no identifier for a PDO")
+            continue
+        if kind == "RPDO" and len(objects) < len(mapped):
+            others = ", ".join(str(ref) for ref in mapped if ref not in wanted)
+            result.notes.append(f"{name} carries {others}, too, which get 0")
+        transmission = number((yield from optional(parameter, 2)), 255)
+        event_ms = 0
+        if kind == "TPDO" and transmission >= 254:
+            event_ms = number((yield from optional(parameter, 5)))
+        places = (None,) * len(entries)
+        plan.pdos.append(
+            PdoPlan(cob_id & cobid.COB_ID_MASK, transmission, event_ms, codec, places, name=name)
+        )
+    _note_unserved(kind, wanted, plan, result)
+    return plan
+
+
+def _note_unserved(kind: str, wanted: Collection[ObjectRef], plan: SignalPlan, result: BootResult) -> None:
+    carried = {ObjectRef(entry.index, entry.sub) for one in plan.pdos for entry in one.codec.entries}
+    for ref in wanted:
+        if ref in carried:
+            plan.unserved.pop(ref, None)
+        else:
+            why = plan.unserved.setdefault(ref, f"no {kind} of the node carries {ref}")
+            result.notes.append(why)

@@ -1,0 +1,80 @@
+"""What a device that is no drive does with its outputs by itself when the bridge falls silent.
+
+It has to notice the silence (1016h or life guarding), to leave the state Operational then (1029h:01, CiA 301
+§7.5.2.29), and each output has to take its error value in that case (CiA 401: 6206h, 6207h and their like for
+digital outputs, 6443h and 6444h for analogue ones). Which objects those are is in the mapping.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import Final
+
+from bridge.canopen.dialogue import optional
+from bridge.command.output_words import OutputWords, Place
+from bridge.command.plant import Node
+from bridge.drive.own_supervision import OwnVerdict, judge
+from bridge.mapping.fields import ObjectRef
+from bridge.node.boot.actions import Action, BootResult, Step, number
+from bridge.node.boot.own_supervision import bring_node
+
+_DIGITAL: Final = range(0x6200, 0x6400)
+"""CiA 401: one bit of error mode and error value for each output. Analogue ones have a number each."""
+
+Reads = Generator[Action, bytes | None, str]
+
+
+def read_held(words: OutputWords, result: BootResult) -> Generator[Action, bytes | None, None]:
+    """What those outputs hold that are to hold it: what is sent first must not change them."""
+    for name, place in words.places.items():
+        if place.safe is None:
+            data = yield from optional(place.output.object.index, place.output.object.sub)
+            if data is not None:
+                result.held[name] = number(data) & ((1 << place.output.size) - 1)
+
+
+def judge_outputs(
+    node: Node, words: OutputWords, result: BootResult
+) -> Generator[Action, bytes | None, None]:
+    """Into ``result.bridge_stop``; what ``own_timeout_ms`` says is written first where ``enforce`` is true
+    and the node holds something else. Raises BootError J where a value that is enforced is not taken."""
+    if words.all_hold:
+        result.bridge_stop = 0, "all of its outputs hold their values"
+        return
+    yield Step("reading the node's own supervision", "J")
+    raws = yield from bring_node(node, result)
+    own = judge(node.family, raws, node.bus, node.table)
+    why = "" if own.verdict is OwnVerdict.STOPS else own.reason
+    for place in words.places.values():
+        if not why and place.safe is not None:
+            why = yield from _why_not_safe(place, place.safe)
+    accepted = node.table.outputs.accepts.runs_on or ""
+    result.bridge_stop = (0, accepted or why) if why else (own.bridge_ms, "")
+    if why and not accepted:
+        result.notes.append(f"outputs are not safe by themselves when the bridge falls silent: {why}")
+
+
+def _why_not_safe(place: Place, safe: int) -> Reads:
+    """Why this output does not take its safe value when the node leaves Operational; empty where it does."""
+    output = place.output
+    if output.error_mode is None or output.error_value is None:
+        return f"what {output.name} does then is not known: the mapping names no error_mode and error_value"
+    mode = yield from _number(output.error_mode)
+    value = yield from _number(output.error_value)
+    if mode is None or value is None:
+        missing = output.error_mode if mode is None else output.error_value
+        return f"what {output.name} does then is not known: {missing} cannot be read"
+    bits = (1 << output.size) - 1
+    if output.object.index in _DIGITAL:
+        if keeps := ~mode & bits:
+            return f"{output.name} keeps {keeps.bit_count()} of its bits: {output.error_mode} is {mode:X}h"
+    elif not mode & 0xFF:
+        return f"{output.name} keeps its value: {output.error_mode} is 0"
+    if value & bits != safe:
+        return f"{output.name} becomes {value & bits:X}h by {output.error_value}, not {safe:X}h"
+    return ""
+
+
+def _number(ref: ObjectRef) -> Generator[Action, bytes | None, int | None]:
+    data = yield from optional(ref.index, ref.sub)
+    return None if data is None else number(data)

@@ -8,8 +8,12 @@ from pathlib import Path
 
 from bridge.can import Bus
 from bridge.config import BusTable
+from bridge.derive import describe
+from bridge.eds import read_whole_device_file
+from bridge.mapping import Family
 from bridge.mapping.loader import lineage, load_family, mapping_folders
-from bridge.sim.catalogue import SIMULATED, simulate_family, simulate_node
+from bridge.mapping.site import described_file
+from bridge.sim.catalogue import SIMULATED, simulate_description, simulate_family, simulate_node
 from bridge.sim.device import SimulatedDevice
 from bridge.sim.shell import Simulation
 
@@ -30,7 +34,10 @@ def simulated_nodes(table: BusTable, site: Path) -> list[SimulatedDevice]:
         for drive in node.drive:
             parameters |= {f"{drive.slot}/{name}": value for name, value in drive.parameters.items()}
         if node.mapping not in makers:
-            makers[node.mapping] = _maker(node.mapping, folders)
+            file = described_file(site, node.mapping)
+            makers[node.mapping] = (
+                _maker(node.mapping, folders) if file is None else _described(file, folders)
+            )
         nodes.append(makers[node.mapping](node.id, parameters))
     return nodes
 
@@ -44,3 +51,16 @@ def _maker(mapping: str, folders: Sequence[Path]) -> _Make:
     if mapping in SIMULATED and family == load_family(mapping):
         return partial(simulate_node, mapping)
     return partial(simulate_family, lineage(mapping, folders), family)
+
+
+def _described(file: Path, folders: Sequence[Path]) -> _Make:
+    """A node of a device description. A drive is played as the mapping that is made of its file."""
+    family = describe(file, folders)
+    if family.is_device:
+        description = read_whole_device_file(file)
+        return lambda node_id, parameters: simulate_description(description, node_id)
+    return partial(simulate_family, [file.name, *_bases(family, folders)], family)
+
+
+def _bases(family: Family, folders: Sequence[Path]) -> list[str]:
+    return lineage(family.extends, folders) if family.extends else []

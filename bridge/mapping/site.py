@@ -28,6 +28,11 @@ Describe = Callable[[Path, Sequence[Path]], Family]
 """The family that a device description gives, with the folders of mappings. Raises ``FileFaults``."""
 
 
+def described_file(site: Path, mapping: str) -> Path | None:
+    """The device description that a node of the site file in ``site`` has in the place of a mapping."""
+    return site.parent / mapping.removeprefix(DESCRIBED) if mapping.startswith(DESCRIBED) else None
+
+
 def load_site_and_families(path: Path, describe: Describe | None = None) -> tuple[Site, dict[str, Family]]:
     """A site file and every mapping it names; ``describe`` makes those of device descriptions. Raises
     ``FileFaults`` with all faults of all files."""
@@ -39,9 +44,10 @@ def load_site_and_families(path: Path, describe: Describe | None = None) -> tupl
         name = node.text("mapping")
         if name is None or name in families:
             continue
-        if describe and name.startswith(DESCRIBED):
+        file_of_it = described_file(path, name)
+        if describe and file_of_it is not None:
             try:
-                families[name] = describe(path.parent / name.removeprefix(DESCRIBED), folders)
+                families[name] = describe(file_of_it, folders)
             except FileFaults as error:
                 of_families += error.faults
             continue

@@ -6,11 +6,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final
 
 from bridge.canopen.datatypes import REALS
+from bridge.eds import Description
 from bridge.errors import OperationFailed
 from bridge.mapping import Family, load_family
 from bridge.sim.adopted import adopt
 from bridge.sim.device import SimulatedDevice
+from bridge.sim.generic_eds import plan_of_description
 from bridge.sim.generic_family import pattern, plan_of_family
+from bridge.sim.generic_inputs import motions_of
 from bridge.sim.generic_node import GenericNode
 from bridge.sim.nord_catalogue import NORD
 from bridge.sim.object_catalogue import MAPPINGS, cia402, lenze_8400_motec
@@ -54,10 +57,17 @@ def simulate_family(
     if kind is None:
         if known:
             raise OperationFailed(f"{', '.join(known)}: the simulated {mappings[0]} has no such parameter")
-        return GenericNode(node_id, plan_of_family(family, node_id).with_numbers(values))
+        plan = plan_of_family(family, node_id).with_numbers(values)
+        return GenericNode(node_id, plan, motions_of(plan))
     node = simulate_node(kind, node_id, known)
     adopt(node, family, values)
     return node
+
+
+def simulate_description(description: Description, node_id: int) -> SimulatedDevice:
+    """A simulated node that is as its device description says, and whose inputs move."""
+    plan = plan_of_description(description, node_id)
+    return GenericNode(node_id, plan, motions_of(plan))
 
 
 def _value(family: Family, name: str, given: float) -> Iterator[tuple[tuple[int, int], int]]:

@@ -9,6 +9,7 @@ from typing import Final
 from bridge.canopen.datatypes import INTEGERS, REALS, Plain, TypeName, encode
 from bridge.image import DataType as PointType
 from bridge.mapping import Family
+from bridge.mapping.device import Signal
 from bridge.mapping.fields import WORD_BITS
 from bridge.mapping.model import (
     IdentityRule,
@@ -22,7 +23,7 @@ from bridge.mapping.model import (
 from bridge.sim.communication_objects import DeviceIdentity
 from bridge.sim.dictionary import DataType
 from bridge.sim.generic_plan import At, AxisPlan, BytesPlan, Copy, NodePlan, NumberPlan, PdoPlan
-from bridge.sim.settings import CobId
+from bridge.sim.settings import RPDO_BASES, TPDO_BASES, CobId
 
 NUMBER_TYPES: Final[dict[TypeName, DataType]] = {
     "bool": DataType.UNSIGNED8,
@@ -59,6 +60,10 @@ _POLLED: Final = {
 MODE_DISPLAY: Final = Copy((0x6060, 0), (0x6061, 0))
 _STAYS: Final = "position"
 """An actual value of this name stays where it is when the drive is not enabled."""
+_PDO_BITS: Final = 64
+_PDO_ENTRIES: Final = 8
+_EVENT_MS: Final = 500
+"""How often the TPDOs of a device come at least whose mapping says nothing of PDOs."""
 
 
 def identity_of(rule: IdentityRule, name: str, *, device_type: int = 0) -> DeviceIdentity:
@@ -86,7 +91,10 @@ def plan_of_family(family: Family, node_id: int) -> NodePlan:
         identity=identity_of(family.identity, family.family.name),
         objects=tuple(objects.values()),
         rpdo=tuple(_pdo(pdo, node_id) for slot in family.slot for pdo in slot.rpdo),
-        tpdo=tuple(_pdo(pdo, node_id) for slot in family.slot for pdo in slot.tpdo),
+        tpdo=(
+            *(_pdo(pdo, node_id) for slot in family.slot for pdo in slot.tpdo),
+            *_input_pdos(family.input, node_id),
+        ),
         axes=axes,
         mirrors=(MODE_DISPLAY,),
     )
@@ -102,6 +110,9 @@ def objects_of_family(family: Family) -> list[NumberPlan | BytesPlan]:
     }
     for at, kind, value in _further(family):
         objects.setdefault(at, NumberPlan(at, kind, value))
+    for signal in family.input:
+        at = (signal.object.index, signal.object.sub)
+        objects[at] = NumberPlan(at, NUMBER_TYPES[signal.data_type], writable=False, in_tpdo=True)
     parts = [part for slot in family.slot for pdo in (*slot.rpdo, *slot.tpdo) for part in _parts(pdo)]
     for at, bits, is_signed in parts:
         there = objects.get(at)
@@ -176,6 +187,22 @@ def _pdo(pdo: Pdo, node_id: int) -> PdoPlan:
     kind = 255 if pdo.transmission_type is None else pdo.transmission_type
     inhibit, event_ms = round((pdo.inhibit_ms or 0) * 10), pdo.event_ms or 0
     return PdoPlan(pdo.number, CobId(pdo.cob_id + node_id), words, kind, inhibit, event_ms)
+
+
+def _input_pdos(inputs: Sequence[Signal], node_id: int) -> Iterator[PdoPlan]:
+    """TPDOs with the inputs of a device, in their order, as many to each as it holds. Beyond the fourth they
+    have the identifiers of the RPDOs, which such a node does not need."""
+    words: list[int] = []
+    runs = [words]
+    for signal in inputs:
+        bits = 8 * NUMBER_TYPES[signal.data_type].size
+        if len(words) == _PDO_ENTRIES or sum(word & 0xFF for word in words) + bits > _PDO_BITS:
+            words = []
+            runs.append(words)
+        words.append(signal.object.index << 16 | signal.object.sub << 8 | bits)
+    for number, (base, run) in enumerate(zip((*TPDO_BASES, *RPDO_BASES), runs, strict=False), 1):
+        if run:
+            yield PdoPlan(number, CobId(base + node_id), tuple(run), event_timer_ms=_EVENT_MS)
 
 
 def _axis(family: Family, slot: Slot) -> AxisPlan:

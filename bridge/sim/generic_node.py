@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -14,6 +15,8 @@ from bridge.sim.device import SimulatedDevice
 from bridge.sim.dictionary import DataType, Dictionary, Domain, Entry, Number, Text, constant
 from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.generic_axis import GenericAxis
+from bridge.sim.generic_inputs import TICK_S, Motion
+from bridge.sim.generic_outputs import behaviour_in_error, outputs_in_error
 from bridge.sim.generic_plan import At, BytesPlan, Copy, NodePlan, NumberPlan, PdoPlan
 from bridge.sim.nmt_slave import NmtCommand, NmtState
 from bridge.sim.pdo_objects import PdoObjects
@@ -28,14 +31,19 @@ _MASTER_LOST: Final = 0x8130
 _CONSUMER: Final = (0x1016, 1)
 _LONGEST: Final = 1 << 16
 _PDO_OBJECTS: Final = range(0x1400, 0x1C00)
+_IN_ERROR: Final = {0: NmtCommand.ENTER_PRE_OPERATIONAL, 2: NmtCommand.STOP}
+"""What 1029h:01 has the node do when it has lost its master."""
 
 
 class GenericNode(SimulatedDevice):
-    """``fail`` happens at the next ``on_time`` or ``on_frame``."""
+    """``fail`` happens at the next ``on_time`` or ``on_frame``. ``motions`` are inputs that move by
+    themselves."""
 
-    def __init__(self, node_id: int, plan: NodePlan) -> None:
+    def __init__(self, node_id: int, plan: NodePlan, motions: Sequence[Motion] = ()) -> None:
         super().__init__(node_id)
         self._plan = plan
+        self._motions = tuple(motions)
+        self._moved_at: float | None = None
         self._communication = Store(lambda: plan.communication(node_id))
         numbers = {one.at: one.value for one in plan.objects if isinstance(one, NumberPlan)}
         contents = {one.at: one.value for one in plan.objects if isinstance(one, BytesPlan)}
@@ -84,9 +92,9 @@ class GenericNode(SimulatedDevice):
     def master_lost(self) -> None:
         self._lose_master()
         self._emcy.report(_MASTER_LOST, 0x11)
-        if self.slave.state is NmtState.OPERATIONAL:
-            command = bytes([NmtCommand.ENTER_PRE_OPERATIONAL, self.node_id])
-            self.slave.on_frame(Frame(0, command), self._now)
+        command = _IN_ERROR.get(behaviour_in_error(self._numbers.current))
+        if command is not None and self.slave.state is NmtState.OPERATIONAL:
+            self.slave.on_frame(Frame(0, bytes([command, self.node_id])), self._now)
 
     def master_back(self) -> None:
         self._emcy.report(0, 0)
@@ -109,6 +117,15 @@ class GenericNode(SimulatedDevice):
     def _pass_time(self) -> None:
         if self._consumer.expired(self._now):
             self.master_lost()
+        if self._motions and (self._moved_at is None or self._now >= self._moved_at + TICK_S):
+            self._move()
+
+    def _move(self) -> None:
+        tick = int(self._now / TICK_S + 0.5)
+        self._moved_at = self._now
+        self.slave.news.is_there = True
+        for motion in self._motions:
+            self._numbers.current.update(motion.values(tick))
 
     def _receive(self, frame: Frame) -> None:
         if self._consumer.node and frame.can_id == _HEARTBEAT + self._consumer.node:
@@ -119,7 +136,8 @@ class GenericNode(SimulatedDevice):
         self._settle()
 
     def _deadlines(self) -> tuple[float | None, ...]:
-        return (self._consumer.next_deadline(),)
+        moves_at = None if self._moved_at is None else self._moved_at + TICK_S
+        return (self._consumer.next_deadline(), moves_at)
 
     def _hears(self) -> frozenset[int]:
         watched = {_HEARTBEAT + self._consumer.node} if self._consumer.node else set[int]()
@@ -129,6 +147,7 @@ class GenericNode(SimulatedDevice):
         return self._numbers.current.get(_CONSUMER, 0)
 
     def _lose_master(self) -> None:
+        self._numbers.current.update(list(outputs_in_error(self._numbers.current)))
         for axis in self.axes:
             axis.master_lost()
         self._settle()

@@ -8,6 +8,8 @@ from bridge.mapping.site import load_site_and_families
 from tests.support.bench import Bench
 from tests.support.pdo_node import PdoNode
 
+DEVICES = Path(__file__).parents[1] / "devices"
+"""Device descriptions of an I/O block and an encoder."""
 ENCODER = """\
 extends = "generic/device"
 [family]

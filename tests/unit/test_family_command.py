@@ -126,3 +126,11 @@ def test_a_mapping_that_extends_nothing_is_simulated(tmp_path: Path) -> None:
     project = load_project(sites.write(tmp_path, sites.bus(sites.node(drive, mapping=NAME))))
     simulated = simulated_nodes(project.site.bus[0], project.path)
     assert [type(one) for one in simulated] == [GenericNode]
+
+
+def test_a_drive_that_has_only_its_eds_is_played_as_the_mapping_made_of_it(tmp_path: Path) -> None:
+    (tmp_path / "spin.eds").write_bytes(eds())
+    node = sites.node(sites.drive("drive", "none", 0, ""), mapping="eds:spin.eds")
+    project = load_project(sites.write(tmp_path, sites.bus(node)))
+    simulated = simulated_nodes(project.site.bus[0], project.path)
+    assert [type(one) for one in simulated] == [Cia402Drive]

@@ -14,7 +14,7 @@ from bridge.eds.pdos import pdos
 GENERIC: Final = "generic/device"
 _PROFILE_IO: Final = 401
 _DIGITAL_INPUTS: Final = range(0x6000, 0x6020)
-"""CiA 401 §6.4.1: eight inputs to an object."""
+"""CiA 401: eight inputs to an object."""
 _DUMMIES: Final = range(0x0001, 0x0008)
 
 

@@ -15,7 +15,7 @@ from bridge.sim.generic_plan import At, NodePlan, NumberPlan
 
 TICK_S: Final = 0.1
 _DIGITAL: Final = {0x6000: 1, 0x6100: 2, 0x6120: 4}
-"""Inputs in groups of 8, 16 and 32 (CiA 401 §6.4.1), with their bytes."""
+"""Inputs in groups of 8, 16 and 32 (CiA 401), with their bytes."""
 _ANALOGUE: Final = {0x6400: 1, 0x6401: 2, 0x6402: 4}
 _POSITION: Final = (0x6004, 0)
 _SPEED: Final = (0x6030, 1)

@@ -8,6 +8,7 @@ import pytest
 
 from bridge.config import Site, load_site
 from bridge.errors import FileFaults
+from bridge.mapping.site import load_site_and_families
 
 CONTRACT = """
 [site]
@@ -388,10 +389,6 @@ class TestWhatDoesNotGoTogether:
             ["3: bus: must be a list (a [[bus]] table for each bus)"],
         ),
         ('bus = 5\n[site]\nname = "a"', ["1: bus: must be a list, not 5 (a [[bus]] table for each bus)"]),
-        (
-            SMALL.split("[[bus.node.drive]]")[0],
-            ["7: bus[0].node[0].drive: is missing (a [[bus.node.drive]] table for each drive)"],
-        ),
     ],
 )
 def test_what_is_missing_is_told_with_what_would_be_right(tmp_path: Path, text: str, told: list[str]):
@@ -399,6 +396,17 @@ def test_what_is_missing_is_told_with_what_would_be_right(tmp_path: Path, text: 
     assert len(found) == len(told)
     for one, start in zip(found, told, strict=True):
         assert one.startswith(start)
+
+
+def test_a_node_of_drives_has_one(tmp_path: Path):
+    path = tmp_path / "site.toml"
+    path.write_text(SMALL.split("[[bus.node.drive]]")[0], encoding="utf-8")
+    with pytest.raises(FileFaults) as told:
+        load_site_and_families(path)
+    assert str(told.value) == (
+        f"{path}:7: bus[0].node[0].drive: is missing "
+        "(a [[bus.node.drive]] for each drive; slots: fu1, fu2, fu3, fu4)"
+    )
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-0.2", "0.09", "100.1", "true", '"0.5"'])

@@ -380,7 +380,7 @@ class TestExtends:
         first, second = folder.told("acme/4000")
         assert "acme/4000.toml:2: without[0]: there is no 'parameter:P5'" in first
         assert "known: P7, P90, P91" in first
-        assert "it is one of value, meaning, parameter, poll, slot, own_supervision" in second
+        assert "it is one of value, meaning, parameter, poll, slot, input, own_supervision" in second
         folder.add("acme/4000", 'extends = "acme/base"\nwithout = ["parameter:P7"]\n')
         assert "there is no parameter 'P7'" in folder.told("acme/4000")[0]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from bridge.config import BusTable
-from bridge.derive import Derived, ProposedBus, ProposedNode, derive_family, propose_site
+from bridge.derive import Derived, ProposedBus, ProposedNode, derive_family, describe, propose_site
 from bridge.derive.toml import file_name
 from bridge.eds import Description, read_device_file, read_whole_device_file
 from bridge.errands.scan import FoundNode
@@ -16,6 +16,7 @@ from bridge.errors import BridgeError, FileFaults, OperationFailed
 from bridge.mapping import Family
 from bridge.mapping.loader import mappings_dir, read_family
 from bridge.mapping.match import Match
+from bridge.mapping.site import DESCRIBED
 
 _SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
 _PROFILE_ONLY: Final = ("device_type",)
@@ -35,7 +36,8 @@ def write_site(
     families: Mapping[str, Family],
 ) -> str:
     """Write the site file, and beside it in ``mappings/`` what was made of the files in ``eds`` for nodes
-    that no mapping is meant for. Returns what was written, in words. Raises ``OperationFailed``."""
+    that no mapping is meant for and that do not name their file itself. Returns what was written, in words.
+    Raises ``OperationFailed``."""
     if path.exists():
         raise OperationFailed(f"{path} is there already")
     files = list(_files(eds)) if eds else []
@@ -49,8 +51,10 @@ def write_site(
             if file is not None:
                 try:
                     derived = derive_family(read_whole_device_file(file.path), file.path.name)
-                    mapping, why = derived.name, ""
-                    if mapping not in known:
+                    mapping, why = _name(path, file, derived), ""
+                    if mapping not in known and mapping.startswith(DESCRIBED):
+                        known[mapping] = describe(file.path)
+                    elif mapping not in known:
                         made[mapping] = derived
                         known[mapping] = _written(path.parent / "mappings", derived)
                 except (OperationFailed, FileFaults) as error:
@@ -63,6 +67,15 @@ def write_site(
     beside = "".join(f", mappings/{name}.toml" for name in made)
     served = sum(node.mapping is not None for node in nodes)
     return f"{path}{beside}: {served} of {len(nodes)} nodes have a mapping"
+
+
+def _name(site: Path, file: _File, derived: Derived) -> str:
+    """What the site file calls the mapping. A device that is no drive has its file itself, where that lies
+    with the site; a drive has a mapping file, because its words want to be looked through."""
+    folder, described = site.resolve().parent, file.path.resolve()
+    if derived.is_drive or not described.is_relative_to(folder):
+        return derived.name
+    return f"{DESCRIBED}{described.relative_to(folder).as_posix()}"
 
 
 def _files(folder: Path) -> Iterator[_File]:

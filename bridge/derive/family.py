@@ -42,6 +42,10 @@ class Derived:
     base: str
     text: str
 
+    @property
+    def is_drive(self) -> bool:
+        return self.base != GENERIC
+
 
 def derive_family(description: Description, source: str, mode: str | None = None) -> Derived:
     """The mapping of a drive of the profile CiA 402, or of a device that is no drive; ``source`` is the name

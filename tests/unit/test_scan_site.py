@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,15 +12,17 @@ import pytest
 from bridge.cli.scan_site import write_site
 from bridge.cli.simulation import simulated_nodes
 from bridge.config import BusTable
+from bridge.eds import read_device_file
 from bridge.errands.scan import FoundNode, Scanner
 from bridge.errors import OperationFailed
 from bridge.mapping import family_names, load_family
 from bridge.mapping.match import Found, Match, best_match
 from bridge.project import load_project
-from bridge.sim.catalogue import simulate_node
+from bridge.sim.catalogue import simulate_description, simulate_node
 from bridge.sim.device import SimulatedDevice
 from bridge.sim.generic_eds import plan_of_description
 from bridge.sim.generic_node import GenericNode
+from tests.support.devices import DEVICES
 from tests.support.invented_eds import BASIC, SPIN, U32, described, eds, var
 
 BUS = BusTable.model_validate({"name": "can0", "interface": "virtual", "bitrate": 500_000})
@@ -107,13 +110,31 @@ def test_half_an_eds_says_why_it_does_not_help(tmp_path: Path) -> None:
     assert not (tmp_path / "mappings").exists()
 
 
-def test_an_eds_of_no_drive_says_why_it_does_not_help(tmp_path: Path) -> None:
-    folder = tmp_path / "eds"
-    folder.mkdir()
-    (folder / "encoder.eds").write_bytes(eds(ENCODER))
-    written(tmp_path, scanned(GenericNode(7, plan_of_description(described(ENCODER), 7))), folder)
-    text = (tmp_path / "hall.toml").read_text(encoding="utf-8")
-    assert re.search(r"1000h in line [0-9]+ has the profile 406, not 402", text)
+def test_nodes_that_are_no_drives_name_their_eds_where_it_lies_with_the_site(tmp_path: Path) -> None:
+    shutil.copytree(DEVICES, tmp_path / "eds")
+    found = scanned(
+        simulate_node("nord/sk-tu4-cao", 5, {}),
+        simulate_node("cia402/velocity", 8, {}),
+        simulate_description(read_device_file(DEVICES / "encoder.eds"), 20),
+        simulate_description(read_device_file(DEVICES / "io16.eds"), 21),
+    )
+    assert written(tmp_path, found, tmp_path / "eds") == "hall.toml: 4 of 4 nodes have a mapping"
+    project = load_project(tmp_path / "hall.toml")
+    (bus,) = project.site.bus
+    assert [(node.name, node.mapping) for node in bus.node[2:]] == [
+        ("shaft_25", "eds:eds/encoder.eds"),
+        ("io_16", "eds:eds/io16.eds"),
+    ]
+    assert len(simulated_nodes(bus, project.path)) == 4
+    assert not (tmp_path / "mappings").exists()
+
+
+def test_an_eds_elsewhere_becomes_a_mapping_beside_the_site(tmp_path: Path) -> None:
+    found = scanned(simulate_description(read_device_file(DEVICES / "encoder.eds"), 20))
+    said = written(tmp_path, found, DEVICES)
+    assert said == "hall.toml, mappings/acme/shaft-25.toml: 1 of 1 nodes have a mapping"
+    project = load_project(tmp_path / "hall.toml")
+    assert [one.name for one in project.families["acme/shaft-25"].input][:1] == ["position_value"]
 
 
 def test_a_node_that_has_the_bridges_own_id_moves_the_bridge(tmp_path: Path) -> None:

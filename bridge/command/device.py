@@ -77,13 +77,14 @@ class Device:
     def on_pdos(self, pdos: Sequence[InputPdo], unserved: Mapping[ObjectRef, str], now: float) -> None:
         """What the boot-up has found; ``unserved`` has the reason for each input that no TPDO carries."""
         self._heard = []
-        for pdo in pdos:
+        in_charge = _in_charge(pdos)
+        for place, pdo in enumerate(pdos):
             link = Link(0.0, self._hold_ms)
             link.on_boot(pdo.deadline_s, ())
             link.on_node(self._node, now)
             heard = _Heard(pdo, link)
             for entry, ref in enumerate(pdo.objects):
-                if ref is not None and ref in self._signals:
+                if ref is not None and ref in self._signals and in_charge[ref] == place:
                     heard.shown.append((entry, self._signals[ref], self._points[ref]))
             self._heard.append(heard)
         self._unserved = {self._points[ref]: why for ref, why in unserved.items()}
@@ -118,11 +119,16 @@ class Device:
     @property
     def quality(self) -> Quality:
         """That of its inputs as a whole: the worst of its TPDOs."""
-        return worst_of([heard.quality[0] for heard in self._heard if heard.quality] or [self._state[0]])
+        return worst_of([heard.quality[0] for heard in self._shown if heard.quality] or [self._state[0]])
 
     def age_ms(self, now: float) -> int:
         """Of the oldest of its TPDOs; FFFFFFFFh where one has never come."""
-        return max((heard.link.age_ms(now) for heard in self._heard), default=0xFFFF_FFFF)
+        return max((heard.link.age_ms(now) for heard in self._shown), default=0xFFFF_FFFF)
+
+    @property
+    def _shown(self) -> list[_Heard]:
+        """The TPDOs that points are shown by."""
+        return [heard for heard in self._heard if heard.shown]
 
     # as whoever has its parameters sees it
 
@@ -192,6 +198,18 @@ class Device:
                 return Quality.CONFIG_ERROR, f"node {self._node.value}"
             case _:
                 return Quality.WAITING, f"node {self._node.value}"
+
+
+def _in_charge(pdos: Sequence[InputPdo]) -> dict[ObjectRef, int]:
+    """By which TPDO each object is shown where several carry it, as encoders have it: the one that comes most
+    often. One that is sent on change only, or waits for a SYNC that is not sent, is the last choice."""
+    chosen: dict[ObjectRef, int] = {}
+    order = sorted(range(len(pdos)), key=lambda place: (pdos[place].deadline_s or float("inf"), place))
+    for place in order:
+        for ref in pdos[place].objects:
+            if ref is not None:
+                chosen.setdefault(ref, place)
+    return chosen
 
 
 _FROM_GOOD_TO_BAD: Final = (

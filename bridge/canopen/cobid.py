@@ -11,6 +11,8 @@ TIME: Final = 0x100
 SDO_REPLY: Final = 0x580  # server to client, + node id
 SDO_REQUEST: Final = 0x600  # client to server, + node id
 ERROR_CONTROL: Final = 0x700  # boot-up, heartbeat, node guarding, + node id
+RPDOS: Final = (0x200, 0x300, 0x400, 0x500)
+"""RPDO1 … RPDO4, + node id."""
 
 PDO_DISABLED: Final = 0x8000_0000
 """Bit 31 of a PDO's COB-ID entry: the PDO does not exist (CiA 301 §7.5.2.35)."""

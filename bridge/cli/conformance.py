@@ -51,7 +51,8 @@ def conformance(
     project = load_project(site)
     bus, table = drop_test.find_node(project, node)
     family = project.families[table.mapping]
-    targets = [find(site, f"{node}/{family.leaf_of(drive)}") for drive in table.drive]
+    names = [f"{node}/{family.leaf_of(drive)}" for drive in table.drive] or [node]
+    targets = [find(site, name) for name in names]
     drop_test.refuse_company(project, bus, table)
     for target in targets:
         check = target.alone(whole=True).check

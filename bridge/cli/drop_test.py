@@ -19,6 +19,7 @@ from bridge.cli.bus import AsJson, Line, carry_out, not_virtual, tell
 from bridge.cli.stopping import until_stopped
 from bridge.command import Plant
 from bridge.config import BusTable, NodeTable, Site
+from bridge.errands.bystander import command_ids
 from bridge.errands.drop_test import DropTest, ForeignMaster, Phase
 from bridge.errands.muted_bus import MutableBus
 from bridge.errors import OperationFailed
@@ -47,6 +48,8 @@ def drop_test(
     """Stop supervising the drives of NODE, measure what they do, and write a report to be signed."""
     project = load_project(site)
     bus, table = find_node(project, node)
+    if project.families[table.mapping].is_device:
+        raise typer.BadParameter(f"{node} is no drive: there is nothing to stop")
     consent = agree(table, at_the_machine=at_the_machine)
     refuse_company(project, bus, table)
     occasion = drop_report.Occasion(
@@ -104,7 +107,7 @@ def agree(node: NodeTable, *, at_the_machine: bool, first: str = "") -> str:
 def refuse_company(project: Project, bus: BusTable, node: NodeTable) -> None:
     """Raises ``OperationFailed`` if another master commands this bus."""
     family = project.families[node.mapping]
-    commands = frozenset(pdo.cob_id + node.id for slot in family.slot for pdo in slot.rpdo)
+    commands = command_ids(node, family)
     listen_s = max(_LISTEN_S, 3 * bus.heartbeat_ms / 1000)
     line = Line(bus, project.families, is_of_site=True)
     heard = carry_out(line, lambda now: ForeignMaster(bus.master_node_id, commands, now, listen_s))

@@ -75,6 +75,10 @@ def exchange(
     """After NODE was exchanged: restore its backups, save, do the drop test, audit, and write a report."""
     project = load_project(site)
     bus, table = drop_test.find_node(project, node)
+    if project.families[table.mapping].is_device:
+        raise typer.BadParameter(
+            f"{node} is no drive, there is nothing to stop: `drivebridge parameters restore` is all it needs"
+        )
     places = _places(project, site, table, files)
     drop_test.refuse_company(project, bus, table)
     identity: dict[str, int] = {}

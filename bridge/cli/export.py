@@ -19,7 +19,6 @@ from bridge.errors import OperationFailed
 from bridge.image import Point
 from bridge.lint import family_dictionaries
 from bridge.lint.bus import view_bus
-from bridge.mapping.loader import mapping_folders
 from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row
 from bridge.northbound.modbus.units import device_maps, drive_maps, units_of
 from bridge.northbound.zenoh.keys import KeySpace
@@ -104,7 +103,7 @@ def dbc(
     if bus is not None and bus not in names:
         raise typer.BadParameter(f"there is no {bus}; the site has {', '.join(names)}", param_hint="--bus")
     place = 0 if bus is None else names.index(bus)
-    dictionaries = family_dictionaries(project.families, mapping_folders(project.path))
+    dictionaries = family_dictionaries(project.families, project.path)
     view = view_bus(
         project.site.bus[place], ("bus", place), project.families, dictionaries, project.downloads
     )

@@ -19,6 +19,7 @@ from bridge.errands.decode import Decoder, Kind, Meaning
 from bridge.errands.errand import Errand
 from bridge.errands.statistics import Statistics
 from bridge.errors import OperationFailed
+from bridge.lint import family_dictionaries
 
 _IDENTIFIER = 0x1FFF_FFFF
 
@@ -77,7 +78,8 @@ def monitor(
     line = choose_line(site, which)
     ids = {line.node_id(text) for text in node or []}
     kinds = set(kind or [])
-    decoder = Decoder(line.table.node, line.families, line.own_id)
+    devices = [name for name, family in line.families.items() if family.is_device]
+    decoder = Decoder(line.table.node, line.families, line.own_id, family_dictionaries(devices, site))
     tally = Statistics(line.table.bitrate)
 
     def wanted(meaning: Meaning) -> bool:

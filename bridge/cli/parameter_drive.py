@@ -24,7 +24,10 @@ from bridge.project import load_project
 
 SiteArgument = Annotated[Path, typer.Argument(metavar="SITE", help="the site file")]
 DriveArgument = Annotated[
-    str, typer.Argument(metavar="DRIVE", help="NODE/DRIVE as in the site file; NODE where it has one drive")
+    str,
+    typer.Argument(
+        metavar="DRIVE", help="NODE/DRIVE as in the site file; NODE where it has one drive or is none"
+    ),
 ]
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="do not ask")]
 Force = Annotated[
@@ -38,12 +41,13 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One drive of a site, with the ledger that counts the writes to it."""
+    """One drive of a site, or a node that is none and has no slot, with the ledger that counts the writes to
+    it."""
 
     line: Line
     node: NodeTable
     family: Family
-    slot: Slot
+    slot: Slot | None
     access: DriveParameters
     ledger: Ledger
     file: LedgerFile
@@ -133,16 +137,19 @@ class Target:
 
 
 def find(site: Path, drive: str) -> Target:
-    """The drive that ``drive`` names. Raises ``BadParameter`` with the names there are."""
+    """The drive, or the node that is none, that ``drive`` names. Raises ``BadParameter`` with the names that
+    there are."""
     project = load_project(site)
     ledger, file = Ledger(), LedgerFile(Path(project.site.site.state_dir))
-    targets: dict[str, tuple[BusTable, NodeTable, Slot]] = {}
+    targets: dict[str, tuple[BusTable, NodeTable, Slot | None]] = {}
     for bus in project.site.bus:
         for node in bus.node:
             family = project.families[node.mapping]
             for table in node.drive:
                 slot = family.slot_named(table.slot)
                 targets[f"{node.name}/{family.leaf_of(table)}"] = (bus, node, slot)
+            if family.is_device:
+                targets[node.name] = (bus, node, None)
     found = [name for name in targets if drive in (name, name.partition("/")[0])]
     if len(found) != 1:
         known = ", ".join(found or targets)
@@ -150,6 +157,7 @@ def find(site: Path, drive: str) -> Target:
     (name,) = found
     bus, node, slot = targets[name]
     family = project.families[node.mapping]
-    on_first = slot.parameters_by_sdo or not any(server.slot == slot.name for server in family.sdo)
+    has_own_channel = slot is not None and any(server.slot == slot.name for server in family.sdo)
+    on_first = slot is None or slot.parameters_by_sdo or not has_own_channel
     access = DriveParameters(name, node.name, family, Names(family), ledger, on_first=on_first)
     return Target(Line(bus, project.families, is_of_site=True), node, family, slot, access, ledger, file)

@@ -46,8 +46,20 @@ def check(
             print(f"  {terms}")
     if errors:
         raise FileFaults([finding.fault for finding in errors])
-    drives, buses = count(len(_drives(project)), "drive"), count(len(project.site.bus), "bus")
-    print(f"{site}: {drives} on {buses}, no faults")
+    print(f"{site}: {_served(project)} on {count(len(project.site.bus), 'bus')}, no faults")
+
+
+def _served(project: Project) -> str:
+    drives, devices = _drives(project), _devices(project)
+    parts = [count(len(drives), "drive")] if drives or not devices else []
+    return " and ".join([*parts, *([count(len(devices), "device")] if devices else [])])
+
+
+def _devices(project: Project) -> list[str]:
+    """The nodes that are no drives."""
+    return [
+        node.name for bus in project.site.bus for node in bus.node if project.families[node.mapping].is_device
+    ]
 
 
 def _drives(project: Project) -> list[str]:
@@ -67,6 +79,7 @@ def _as_json(project: Project, verdict: Verdict) -> dict[str, Any]:
     return {
         "ok": not found[Severity.ERROR],
         "drives": _drives(project),
+        "devices": _devices(project),
         "buses": [asdict(load) for load in verdict.loads],
         "worst_cases": [
             {

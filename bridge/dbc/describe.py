@@ -8,6 +8,7 @@ from typing import Final
 
 from bridge.config import NodeTable, PdoTable
 from bridge.config.model import pdo_table
+from bridge.dbc.device import device_messages
 from bridge.dbc.fields import lay_out
 from bridge.dbc.model import BRIDGE, BusDescription, Message
 from bridge.dbc.protocol import bus_messages, node_messages
@@ -44,6 +45,8 @@ def describe(bus: BusView, *, words: bool = False) -> BusDescription:
                 one = _message(bus, node, drive, slot, view, pdo, words=words)
                 # What is off at factory gives way to what is on.
                 (messages if view.enabled else optional).append(one)
+        if node.family.is_device:
+            messages += device_messages(bus, node, words=words)
     _refuse_doubles(messages)
     taken = {message.cob_id for message in messages}
     messages += [message for message in optional if message.cob_id not in taken]

@@ -1,9 +1,11 @@
-"""What must be known of a drive before it is written to without its bridge. Sans-IO."""
+"""What must be known of a drive, or of a node that is none, before it is written to without its bridge.
+Sans-IO."""
 
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable
 
+from bridge.canopen import cobid
 from bridge.canopen.frame import Frame
 from bridge.config import NodeTable
 from bridge.drive import MOVING, StatusWords
@@ -16,13 +18,15 @@ _LEVELS = ("communication", "while_enabled")
 
 
 class Bystander(ForeignMaster):
-    """Listens for whoever commands this bus; ``status`` is the status word of a TPDO that is heard."""
+    """Listens for whoever commands this bus; ``status`` is the status word of a TPDO that is heard. A node
+    that is no drive has no slot, and no status word."""
 
-    def __init__(self, own_id: int, node: NodeTable, family: Family, slot: Slot, now: float, listen_s: float):
-        commands = frozenset(pdo.cob_id + node.id for each in family.slot for pdo in each.rpdo)
-        super().__init__(own_id, commands, now, listen_s)
+    def __init__(
+        self, own_id: int, node: NodeTable, family: Family, slot: Slot | None, now: float, listen_s: float
+    ):
+        super().__init__(own_id, command_ids(node, family), now, listen_s)
         self.status: int | None = None
-        self._tpdo = slot.tpdo[0].cob_id + node.id
+        self._tpdo = slot.tpdo[0].cob_id + node.id if slot else None
 
     def on_frame(self, frame: Frame) -> None:
         super().on_frame(frame)
@@ -30,8 +34,17 @@ class Bystander(ForeignMaster):
             self.status = int.from_bytes(frame.data[:_WORD_BYTES], "little")
 
 
+def command_ids(node: NodeTable, family: Family) -> frozenset[int]:
+    """On which identifiers the node is commanded: by its mapping, or where that does not say by the
+    pre-defined connection set."""
+    if family.is_device:
+        return frozenset(base + node.id for base in cobid.RPDOS)
+    return frozenset(pdo.cob_id + node.id for slot in family.slot for pdo in slot.rpdo)
+
+
 class Standstill:
-    """Sees to it that what is protected is not written while the drive is enabled.
+    """Sees to it that what is protected is not written while the drive is enabled. A node without a slot
+    moves nothing.
 
     ``heard`` is the status word that it has sent by itself, for a drive that cannot be asked for it. Where
     nobody knows it, only who uses ``force`` writes. ``whole``: nothing else is written while it is known to
@@ -42,15 +55,15 @@ class Standstill:
         self,
         names: Names,
         family: Family,
-        slot: Slot,
+        slot: Slot | None,
         heard: int | None,
         *,
         force: bool,
         whole: bool = False,
     ) -> None:
         self._names = names
-        self._words = StatusWords(family.status_word)
-        self._parts = slot.tpdo[0].objects[0][0].parts
+        self._words = StatusWords(family.status_word) if slot else None
+        self._parts = slot.tpdo[0].objects[0][0].parts if slot else ()
         self._heard = heard
         self._force = force
         self._whole = whole
@@ -60,6 +73,8 @@ class Standstill:
 
     def check(self, entries: Iterable[Entry]) -> Generator[Transfer, tuple[bytes, float], None]:
         """Raises ``ParameterError`` with the names of those that are not written now."""
+        if self._words is None:
+            return
         concerned = ", ".join(entry.name for entry in entries if self.concerns(entry))
         if not concerned and not self._whole:
             return

@@ -19,6 +19,8 @@ from bridge.canopen.frame import EXTENDED, REMOTE, STANDARD_MASK, Frame
 from bridge.canopen.nmt import NmtState
 from bridge.config import NodeTable
 from bridge.drive import EmergencyReader
+from bridge.eds import Description
+from bridge.errands.decode_device import DevicePdoView, device_views
 from bridge.errands.decode_pdo import PdoView, views
 from bridge.mapping import emcy_codes
 from bridge.mapping.model import Family
@@ -70,12 +72,14 @@ class Decoder:
         nodes: Sequence[NodeTable] = (),
         families: Mapping[str, Family] | None = None,
         own_id: int | None = None,
+        descriptions: Mapping[str, Description] | None = None,
     ) -> None:
         """``nodes`` with their ``families`` are those of a site, where there is one; ``own_id`` is the
-        address that the bridge of this site has on the bus."""
+        address that the bridge of this site has on the bus. ``descriptions`` are those of mappings that say
+        nothing of PDOs: of nodes that are no drives."""
         self._names: dict[int, str] = {} if own_id is None else {own_id: "the bridge"}
         self._families: dict[int, Family] = {}
-        self._pdos: dict[int, PdoView] = {}
+        self._pdos: dict[int, PdoView | DevicePdoView] = {}
         self._sdo: dict[int, SdoListener] = {}
         for node in nodes:
             self._names[node.id] = node.name
@@ -83,6 +87,8 @@ class Decoder:
             if family:
                 self._families[node.id] = family
                 self._pdos.update(views(node, family))
+                if family.is_device:
+                    self._pdos.update(device_views(node, family, (descriptions or {}).get(node.mapping)))
 
     def decode(self, frame: Frame) -> Meaning:
         """What ``frame`` says; every frame says something."""

@@ -17,10 +17,16 @@ T = TypeVar("T")
 
 
 class ParameterErrand(SdoErrands, Generic[T]):
-    """``make`` gives the procedure, of now. ``result`` is None until it has ended."""
+    """A node that is no drive has no slot. ``make`` gives the procedure, of now. ``result`` is None until it
+    has ended."""
 
     def __init__(
-        self, node: NodeTable, family: Family, slot: Slot, make: Callable[[float], Procedure[T]], now: float
+        self,
+        node: NodeTable,
+        family: Family,
+        slot: Slot | None,
+        make: Callable[[float], Procedure[T]],
+        now: float,
     ) -> None:
         self.result: T | ParameterError | None = None
         self.is_done = False
@@ -31,7 +37,7 @@ class ParameterErrand(SdoErrands, Generic[T]):
             )
 
         self._first = self._of_drive = channel(cobid.SDO_REQUEST, cobid.SDO_REPLY)
-        if not slot.parameters_by_sdo:
+        if slot and not slot.parameters_by_sdo:
             server = next((server for server in family.sdo if server.slot == slot.name), None)
             if server is not None:
                 self._of_drive = channel(server.request, server.reply)

@@ -280,6 +280,7 @@ def _other_pdo(summary: PdoSummary, key: Key) -> PdoView:
         _FACTORY_TYPE if summary.transmission_type is None else summary.transmission_type,
         summary.inhibit_100us / 10,
         summary.event_timer_ms,
+        number=summary.number,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from bridge.lint.report import LintFinding, LintReport, Severity
 from bridge.lint.times import check_times
 from bridge.mapping import Family
 from bridge.mapping.loader import mapping_folders
+from bridge.mapping.site import described_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,16 +35,19 @@ class Verdict:
         return tuple(finding for finding in self.findings if finding.severity is severity)
 
 
-def family_dictionaries(names: Iterable[str], folders: Sequence[Path] = ()) -> dict[str, Description]:
-    """The object dictionaries that lie beside the mapping files, by family, for those that have one. They
-    are looked up where the mappings are.
+def family_dictionaries(names: Iterable[str], site: Path | None = None) -> dict[str, Description]:
+    """The object dictionaries that lie beside the mapping files, or are there instead of one, by what the
+    site file in ``site`` calls the mapping, for those that have one.
 
     Raises ``FileFaults`` where one cannot be read.
     """
     found: dict[str, Description] = {}
+    folders = mapping_folders(site)
     for name in names:
-        files = (folder / f"{name}.eds" for folder in folders or mapping_folders())
-        file = next((file for file in files if file.is_file()), None)
+        file = described_file(site, name) if site else None
+        if file is None:
+            files = (folder / f"{name}.eds" for folder in folders)
+            file = next((file for file in files if file.is_file()), None)
         if file is not None:
             found[name] = read_device_file(file)
     return found
@@ -60,7 +64,7 @@ def lint(
     ``family_dictionaries``, unless given."""
     known = dictionaries
     if known is None:
-        known = family_dictionaries(families, mapping_folders(path))
+        known = family_dictionaries(families, path)
     report = LintReport(path)
     loads: list[BusLoad] = []
     cases: list[WorstCase] = []

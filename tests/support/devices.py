@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bridge.eds import Description, read_device_file
 from bridge.mapping.site import load_site_and_families
 from tests.support.bench import Bench
 from tests.support.pdo_node import PdoNode
@@ -138,3 +139,8 @@ def io_block() -> PdoNode:
     node.pdo("rpdo", 2, 0x300, ["6411:01/16", "6411:02/16"])
     node.put("6411:02", 2, 77)
     return node
+
+
+def description_of(file: str) -> Description:
+    """One of ``DEVICES``."""
+    return read_device_file(DEVICES / file)

@@ -39,7 +39,7 @@ class Result:
 
 
 def served(folder: Path, name: str, content: bytes) -> Result:
-    """What becomes of a file. What is no drive with CiA 402 ends with the step ``mapping``."""
+    """What becomes of a file: of a drive with CiA 402, or of a device that is no drive."""
     folder.mkdir(parents=True)
     file = folder / "device"
     file.write_bytes(content)
@@ -63,10 +63,22 @@ def served(folder: Path, name: str, content: bytes) -> Result:
     status = str(bench.value("conveyor/node/boot_status"))
     if bench.generic.slave.state is not NmtState.OPERATIONAL:
         return result("boot", status)
-    point = bench.plant.image.read("conveyor/drive/status/status_word")
-    if point.quality is not Quality.GOOD:
-        return result("serve", f"the status word is {point.quality.label}: {status}")
-    return result("served")
+    bad = list(_not_served(bench))
+    return result("serve", f"{'; '.join(bad[:_MOST_SHOWN])}: {status}") if bad else result("served")
+
+
+def _not_served(bench: DerivedBench) -> Iterator[str]:
+    """A drive's status word that is not good; inputs of a device that are not, without a reason."""
+    image = bench.plant.image
+    for name in bench.plant.drives:
+        point = image.read(f"{name}/status/status_word")
+        if point.quality is not Quality.GOOD:
+            yield f"the status word is {point.quality.label}"
+    for device in bench.plant.devices.values():
+        for signal in device.family.input:
+            point = image.read(f"{device.name}/input/{signal.name}")
+            if point.quality is not Quality.GOOD and not point.reason:
+                yield f"{signal.name} is {point.quality.label}"
 
 
 def simulated(description: Description) -> list[str]:
@@ -122,10 +134,11 @@ def table(results: Sequence[Result], *, findings: bool = False) -> str:
             lines.append(f"{one.name}: {one.step}: {one.problem.removeprefix(f'{one.name} ')}")
         if findings:
             lines += [f"{one.name}: {text}" for text in one.findings]
-    drives = [one for one in results if one.is_drive]
-    good = sum(not one.problem for one in drives)
-    lines.append(f"{good} of {len(drives)} drives are booted and served")
-    others = len(results) - len(drives)
-    if others:
-        lines.append(f"{others} files describe no drive")
+    for what, those in (
+        ("drives", [one for one in results if one.is_drive]),
+        ("devices that are no drives", [one for one in results if not one.is_drive]),
+    ):
+        if those:
+            good = sum(not one.problem for one in those)
+            lines.append(f"{good} of {len(those)} {what} are booted and served")
     return "\n".join(lines)

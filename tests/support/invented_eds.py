@@ -136,7 +136,8 @@ class DerivedBench(Bench):
         derived = derive_family(description, source, mode)
         family = family_of(folder, derived)
         self.generic = GenericNode(NODE_ID, plan_of_description(description, NODE_ID))
-        node = sites.node(sites.drive("drive", "modbus", 0, ""), mapping=derived.name, node_id=NODE_ID)
+        drives = [] if family.is_device else [sites.drive("drive", "modbus", 0, "")]
+        node = sites.node(*drives, mapping=derived.name, node_id=NODE_ID)
         site = load_site(sites.write(folder, sites.bus(node), sites.modbus(), name="bench"))
         super().__init__(site, family=family, mapping=derived.name, node=self.generic)
         self.run(1.5)

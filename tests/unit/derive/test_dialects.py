@@ -7,6 +7,7 @@ from pathlib import Path
 from bridge.eds.model import Report
 from bridge.eds.text import decode
 from bridge.mapping.loader import mappings_dir
+from tests.support.devices import DEVICES
 from tests.support.eds_dialects import in_every_dialect
 from tests.support.foreign import Result, served, table
 from tests.support.invented_eds import FIXED, SPIN, eds
@@ -14,6 +15,7 @@ from tests.support.invented_eds import FIXED, SPIN, eds
 FILES = {
     "spin.eds": eds(SPIN),
     "fixed.eds": eds(FIXED),
+    **{name: (DEVICES / name).read_bytes() for name in ("encoder.eds", "io16.eds")},
     **{
         name: (mappings_dir() / name).read_bytes()
         for name in (

@@ -32,7 +32,7 @@ class Reader:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        for name in ("bridge", "deploy", "mappings"):
+        for name in ("bridge", "deploy", "mappings", "tests"):
             (folder / name).symlink_to(REPOSITORY / name)
         (folder / ".venv").symlink_to(sys.prefix)
         self._environment = {

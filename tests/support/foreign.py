@@ -37,6 +37,11 @@ class Result:
     is_drive: bool = True
     findings: tuple[str, ...] = ()
 
+    @property
+    def is_device(self) -> bool:
+        """It is no drive, and not half of one either, of which no mapping is made."""
+        return not self.is_drive and not (self.step == "mapping" and "describes no drive" in self.problem)
+
 
 def served(folder: Path, name: str, content: bytes) -> Result:
     """What becomes of a file: of a drive with CiA 402, or of a device that is no drive."""
@@ -136,9 +141,11 @@ def table(results: Sequence[Result], *, findings: bool = False) -> str:
             lines += [f"{one.name}: {text}" for text in one.findings]
     for what, those in (
         ("drives", [one for one in results if one.is_drive]),
-        ("devices that are no drives", [one for one in results if not one.is_drive]),
+        ("devices that are no drives", [one for one in results if one.is_device]),
     ):
         if those:
             good = sum(not one.problem for one in those)
             lines.append(f"{good} of {len(those)} {what} are booted and served")
+    if half := sum(not one.is_drive and not one.is_device for one in results):
+        lines.append(f"{half} files describe half a drive")
     return "\n".join(lines)

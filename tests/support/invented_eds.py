@@ -137,7 +137,8 @@ class DerivedBench(Bench):
         family = family_of(folder, derived)
         self.generic = GenericNode(NODE_ID, plan_of_description(description, NODE_ID))
         drives = [] if family.is_device else [sites.drive("drive", "modbus", 0, "")]
-        node = sites.node(*drives, mapping=derived.name, node_id=NODE_ID)
+        by = "heartbeat" if description.entry(0x1017) else "guarding" if description.entry(0x100C) else "none"
+        node = sites.node(*drives, mapping=derived.name, node_id=NODE_ID, more=f'supervision = "{by}"')
         site = load_site(sites.write(folder, sites.bus(node), sites.modbus(), name="bench"))
         super().__init__(site, family=family, mapping=derived.name, node=self.generic)
         self.run(1.5)

@@ -163,7 +163,7 @@ def _facts(access: DriveParameters, reading: Reading) -> dict[str, object]:
 def _range(low: float | None, high: float | None, unit: str) -> str:
     if low is None and high is None:
         return unit
-    ends = ["" if end is None else f"{end:g}" for end in (low, high)]
+    ends = ["" if end is None else f"{end:.10g}" for end in (low, high)]
     return f"{'…'.join(ends)} {unit}".rstrip()
 
 

@@ -182,12 +182,13 @@ def _tpdo_ms(table: DriveTable) -> int:
 
 
 def _unit_ids(site: Site) -> dict[tuple[str, int], int]:
-    """As docs/reference/modbus.md says: those of the site file, the others in order from 1."""
+    """As docs/reference/modbus.md says: those of the site file, the others in order from 1. A node without
+    drives has one, too."""
     places = [
         (node.name, place, drive.unit_id)
         for bus in site.bus
         for node in bus.node
-        for place, drive in enumerate(node.drive)
+        for place, drive in enumerate(node.drive or [node])
     ]
     given = {unit for _, _, unit in places if unit}
     free: Iterator[int] = (unit for unit in _FIRST_UNITS if unit not in given)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from bridge.command import Plant
 from bridge.config import load_site
 from bridge.drive import ControlWords, DriveState, StatusWords
 from bridge.lint import lint
@@ -14,6 +15,7 @@ from bridge.mapping.loader import family_names
 from bridge.project import load_project
 from bridge.witness.plan import UnknownFamily, WatchedDrive, plan
 from tests.support import sites
+from tests.support.devices import DEVICES
 
 
 def watched(folder: Path, mapping: str, slot: str, more: str = "") -> WatchedDrive:
@@ -121,3 +123,16 @@ def test_units_are_counted_as_the_reference_says(tmp_path: Path) -> None:
     path = sites.write(tmp_path, sites.bus(sites.node(*drives)), sites.modbus(0))
     (bus,) = plan(load_site(path))
     assert [drive.unit_id for drive in bus.drives] == [2, 1, 3]
+
+
+def test_a_node_without_drives_has_a_unit(tmp_path: Path) -> None:
+    (tmp_path / "encoder.eds").write_bytes((DEVICES / "encoder.eds").read_bytes())
+    shaft = sites.node(name="shaft", node_id=20, mapping="eds:encoder.eds")
+    given = sites.node(name="other", node_id=21, mapping="eds:encoder.eds", more="unit_id = 1")
+    drive = sites.node(sites.drive("fu1", "modbus", 200, sites.SCALED))
+    path = sites.write(tmp_path, sites.bus(shaft, given, drive), sites.modbus(0))
+    (bus,) = plan(load_site(path))
+    project = load_project(path)
+    plant = Plant(project.site, project.families, "0")
+    assert [one.unit_id for one in bus.drives] == list(plant.by_unit) == [3]
+    assert {one.name: one.unit_id for one in plant.devices.values()} == {"shaft": 2, "other": 1}

@@ -1,15 +1,21 @@
-"""Emergency messages of one node: each to the drive it is about, and their history as points."""
+"""Emergency messages of one node: each to the drive it is about, or an event where there is none, and their
+history as points."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
 
 from bridge.canopen import emcy
 from bridge.canopen.frame import Frame
-from bridge.command import Drive, Plant
+from bridge.command import Drive, Event, Kind, Plant
 from bridge.command.plant import Node
 from bridge.drive import EmergencyReader
 from bridge.node.emergency_log import EmergencyLog
+
+_COMES: Final = 700
+_GONE: Final = 100
+"""Severities of an emergency message, as of a drive's."""
 
 
 class Emergencies:
@@ -49,6 +55,10 @@ class Emergencies:
 
     def _tell(self, emergency: emcy.Emergency, number: int | None, at: float) -> None:
         told = self._reader.read(emergency.code, emergency.vendor)
+        if self._node.device:
+            severity = _GONE if told.is_gone else _COMES
+            message = f"emergency {told.code:04X}h: {told.text}"
+            self._plant.report(Event(at, Kind.EMERGENCY, self._node.name, severity, message))
         for drive in self._node.drives:
             if drive.slot.emcy_drive is None or drive.slot.emcy_drive == number:
                 drive.channel.on_emcy(told, at)

@@ -27,6 +27,8 @@ def net_of(bus: BusTable, number: int, nodes: Iterable[Node]) -> Net:
 
 
 def _on_first(node: Node) -> str | None:
-    """The drive whose parameters the node's first SDO channel reaches."""
+    """Whose parameters the node's first SDO channel reaches: a drive's, or those of a node that is none."""
+    if node.device:
+        return node.device.name
     drives = (drive.name for drive in node.drives if drive.slot.parameters_by_sdo)
     return next(drives, None)

@@ -50,7 +50,7 @@ _CODES: Final = {
 @dataclass(frozen=True, slots=True)
 class Net:
     """A bus: its number as clients name it, what NMT for all its nodes is addressed to, and by node id each
-    node and the drive whose SDO channel is the node's first (None where no drive has it)."""
+    node and whose parameters its first SDO channel reaches (None where that is nobody)."""
 
     number: int
     target: str

@@ -8,7 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from bridge.cli.app import make_app
 from bridge.cli.scan_site import write_site
 from bridge.cli.simulation import simulated_nodes
 from bridge.config import BusTable
@@ -127,6 +129,9 @@ def test_nodes_that_are_no_drives_name_their_eds_where_it_lies_with_the_site(tmp
     ]
     assert len(simulated_nodes(bus, project.path)) == 4
     assert not (tmp_path / "mappings").exists()
+    checked = CliRunner().invoke(make_app("check"), ["check", str(tmp_path / "hall.toml")])
+    assert checked.exit_code == 0
+    assert checked.stdout.endswith("5 drives and 2 devices on 1 bus, no faults\n")
 
 
 def test_an_eds_elsewhere_becomes_a_mapping_beside_the_site(tmp_path: Path) -> None:

@@ -105,6 +105,8 @@ class Commands:
     def __init__(self, points: Iterable[Point]) -> None:
         self._points = {point.name: point for point in points}
         self._drives = _owners(self._points, "/command/control_word")
+        self._with_parameters = _owners(self._points, "/supervision/sdo_abort_code")
+        """The drives, and the nodes that are none."""
         self._nodes = _owners(self._points, "/node/nmt_state")
         self._buses = _owners((name for name in self._points if name.startswith("bus/")), "/nmt_state")
 
@@ -144,14 +146,14 @@ class Commands:
         return Request(identity, target, Write({leaf: _decode_value(point, payload)}))
 
     def parameter(self, tail: str) -> tuple[str, str]:
-        """The drive and the parameter's name if ``tail`` is ``<node>/<drive>/parameter/<name>``, else empty
-        texts.
+        """The drive and the parameter's name if ``tail`` is ``<node>/<drive>/parameter/<name>``, a node that
+        is no drive and the name if it is ``<node>/parameter/<name>``, else empty texts.
 
         The name may contain slashes (``C00039/1``); characters that a key cannot have (``* $ ? #``) or a tool
         does not take (``[ ]``) may be percent-encoded.
         """
         drive, found, name = tail.partition(_PARAMETER)
-        return (drive, unquote(name)) if found and drive in self._drives else ("", "")
+        return (drive, unquote(name)) if found and drive in self._with_parameters else ("", "")
 
     def meant(self, tail: str) -> tuple[str, Action]:
         """For a key that is no command: the drive, node or bus it is about, or else the key itself; and the

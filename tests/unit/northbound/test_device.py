@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command import Identity, Source
+from bridge.command import Action, Identity, Outcome, Role, Source
 from bridge.northbound.modbus.device_unit import DeviceUnit
 from bridge.northbound.modbus.pdu import ExceptionCode, Refused
 from bridge.northbound.modbus.registers import Table, Words32
 from bridge.northbound.modbus.units import device_maps
 from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.zenoh.commands import Commands
 from bridge.northbound.zenoh.keys import KeySpace
 from tests.support.bench import Bench
 from tests.support.devices import ENCODER, device_bench, encoder
@@ -104,10 +105,22 @@ def test_opcua_has_its_folders(bench: Bench) -> None:
     assert [folder.id for folder in shaft.objects] == [
         f"shaft/{group}" for group in ("node", "supervision", "input", "parameter")
     ]
-    names = [variable.browse_name for variable in shaft.objects[1].variables]
+    names = [variable.browse_name for variable in shaft.objects[2].variables]
     assert names == ["Position", "Speed", "Alarms", "Switch", "Turns"]
 
 
 def test_zenoh_has_its_keys(bench: Bench) -> None:
     keys = KeySpace("drives", "hall", bench.plant.image.points)
     assert "drives/hall/shaft/input/position" in keys.keys
+
+
+def test_zenoh_reads_and_writes_its_parameters_by_any_name(bench: Bench) -> None:
+    commands = Commands(bench.plant.image.points)
+    engineer = Identity(Source.ZENOH, "desk", Role.ENGINEER)
+    outcomes: list[Outcome] = []
+    bench.view.submit(commands.request("shaft/parameter/6000", b"5", engineer), outcomes.append)
+    bench.run(0.5)
+    bench.view.submit(commands.reading("shaft", "6000:00", engineer, cached=False), outcomes.append)
+    bench.run(0.5)
+    assert [(one.ok, one.value) for one in outcomes] == [(True, 5), (True, 5)]
+    assert commands.meant("shaft/parameter/6000") == ("shaft", Action.WRITE_PARAMETER)

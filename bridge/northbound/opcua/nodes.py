@@ -20,6 +20,8 @@ GROUPS: Final = ("command", "status", "actual", "parameter", "supervision", "ide
 
 DEVICE_GROUPS: Final = ("input", "output", "parameter", "supervision")
 """Of a node that is no drive, beside ``node``."""
+_IN_DEVICE: Final = 3
+"""Words in the name of a point in one of these groups."""
 
 
 class VariableKind(Enum):
@@ -112,6 +114,11 @@ _VALUE: Final = Argument("value", ArgumentType.ANY, "in the parameter's unit")
 
 _Methods = Sequence[tuple[Action, tuple[Argument, ...], tuple[Argument, ...], str]]
 
+_PARAMETER_METHODS: Final[_Methods] = (
+    (Action.READ_PARAMETER, (_PARAMETER,), (_VALUE,), "read a parameter from the drive"),
+    (Action.WRITE_PARAMETER, (_PARAMETER, _VALUE), (), "write a parameter and read it back; for engineers"),
+    (Action.SAVE_PARAMETERS, (), (), "keep the node's parameters in its EEPROM; for engineers"),
+)
 _DRIVE_METHODS: Final[_Methods] = (
     (Action.START, (_DIRECTION,), (), "through the drive's states to operation enabled; takes up to 3 s"),
     (Action.STOP, (), (), "ramp down, then no voltage"),
@@ -121,9 +128,7 @@ _DRIVE_METHODS: Final[_Methods] = (
     (Action.TAKE_CONTROL, (_TTL,), (), "become the controller of the drive"),
     (Action.RELEASE_CONTROL, (), (), "give control back; a running drive is stopped"),
     (Action.KEEP_ALIVE, (), (), "a telegram without a command: restarts the watchdog's timer"),
-    (Action.READ_PARAMETER, (_PARAMETER,), (_VALUE,), "read a parameter from the drive"),
-    (Action.WRITE_PARAMETER, (_PARAMETER, _VALUE), (), "write a parameter and read it back; for engineers"),
-    (Action.SAVE_PARAMETERS, (), (), "keep the node's parameters in its EEPROM; for engineers"),
+    *_PARAMETER_METHODS,
 )
 _NODE_METHODS: Final[_Methods] = (
     (Action.RESET, (), (), "NMT reset node"),
@@ -134,6 +139,8 @@ _NODE_METHODS: Final[_Methods] = (
     (Action.ENABLE, (), (), "put the node in service"),
     (Action.DISABLE, (), (), "take the node out of service"),
 )
+_DEVICE_METHODS: Final[_Methods] = (*_NODE_METHODS, *_PARAMETER_METHODS)
+"""Of a node that is no drive."""
 _BUS_METHODS: Final[_Methods] = (
     (Action.RESET, (), (), "NMT reset node to all nodes"),
     (Action.RESET_COMMUNICATION, (), (), "NMT reset communication to all nodes"),
@@ -159,8 +166,11 @@ def layout(points: Sequence[Point]) -> tuple[ObjectNode, ObjectNode, ObjectNode]
     buses = ObjectNode("Buses", "Buses")
     bridge = ObjectNode("bridge", "Bridge", folder=False, notifier=True)
 
+    devices = {point.path[0] for point in points if len(point.path) == _IN_DEVICE and point.path[1] != "node"}
+
     def node(name: str) -> ObjectNode:
-        return _owner(drives, name, name, _NODE_METHODS, ("node",))
+        methods = _DEVICE_METHODS if name in devices else _NODE_METHODS
+        return _owner(drives, name, name, methods, ("node",))
 
     for index, point in enumerate(points):
         match point.path:

@@ -107,6 +107,9 @@ def test_opcua_has_its_folders(bench: Bench) -> None:
     ]
     names = [variable.browse_name for variable in shaft.objects[2].variables]
     assert names == ["Position", "Speed", "Alarms", "Switch", "Turns"]
+    methods = {method.browse_name: method.target for method in shaft.methods}
+    assert methods.keys() >= {"Reset", "ReadParameter", "WriteParameter", "SaveParameters"}
+    assert set(methods.values()) == {"shaft"}
 
 
 def test_zenoh_has_its_keys(bench: Bench) -> None:

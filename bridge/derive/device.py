@@ -13,15 +13,23 @@ from bridge.eds.pdos import pdos
 
 GENERIC: Final = "generic/device"
 _PROFILE_IO: Final = 401
-_DIGITAL_INPUTS: Final = range(0x6000, 0x6020)
-"""CiA 401: eight inputs to an object."""
+_EIGHT_BITS: Final = (0x6000, 0x6200)
+"""CiA 401: eight inputs or outputs to an element."""
+_ERROR_OBJECTS: Final = {
+    0x6200: (0x6206, 0x6207),
+    0x6300: (0x6306, 0x6307),
+    0x6320: (0x6326, 0x6327),
+    **dict.fromkeys((0x6410, 0x6411, 0x6412), (0x6443, 0x6444)),
+}
+"""CiA 401: error mode and error value of digital outputs in groups of 8, 16 and 32, and of analogue ones."""
 _DUMMIES: Final = range(0x0001, 0x0008)
 
 
 def device_lines(description: Description, source: str) -> Iterator[str]:
     """The mapping, line by line."""
     device = description.device
-    signals = dict(_inputs(description))
+    inputs = dict(_signals(description, receives=False))
+    outputs = dict(_signals(description, receives=True))
     yield f"# Made of {one_line(source)} by `drivebridge family new`. A key behind a # is what the file does"
     yield "# not say: fill it in from the manual, and compare the rest with the device."
     yield f"extends = {string(GENERIC)}"
@@ -32,28 +40,47 @@ def device_lines(description: Description, source: str) -> Iterator[str]:
     yield f"source = {string(source)}"
     yield ""
     yield from identity_lines(description)
-    for name, (entry, kind, title) in signals.items():
+    for name, (entry, kind, title) in inputs.items():
         yield "[[input]]"
-        yield f"name = {string(name)}"
-        yield f'object = "{entry.index:04X}:{entry.sub:02X}"'
-        yield f"data_type = {string(kind)}"
-        if kind in REALS or (kind in INTEGERS and kind != "bool"):
-            yield '# unit = ""'
-        if _is_eight_inputs(description, entry):
-            yield f"bits = {strings([f'bit_{bit}' for bit in range(8)])}"
+        yield from _signal_lines(description, name, entry, kind)
+        yield f"description = {string(title)}"
+        yield ""
+    for name, (entry, kind, title) in outputs.items():
+        yield "[[output]]"
+        yield from _signal_lines(description, name, entry, kind)
+        yield from _error_lines(description, entry)
         yield f"description = {string(title)}"
         yield ""
     commanded = {(one.index, one.sub) for pdo in pdos(description) if pdo.receives for one in pdo.mapped}
-    told = {(entry.index, entry.sub) for entry, _, _ in signals.values()}
+    told = {(entry.index, entry.sub) for entry, _, _ in inputs.values()}
     for name, entry in entries_of(description):
         yield from parameter_lines(name, entry, _title(description, entry), {}, commanded | told)
 
 
-def _inputs(description: Description) -> Iterator[tuple[str, tuple[Entry, str, str]]]:
-    """What the TPDOs carry, in their order: name, and entry, type and title."""
+def _signal_lines(description: Description, name: str, entry: Entry, kind: str) -> Iterator[str]:
+    yield f"name = {string(name)}"
+    yield f'object = "{entry.index:04X}:{entry.sub:02X}"'
+    yield f"data_type = {string(kind)}"
+    if kind in REALS or (kind in INTEGERS and kind != "bool"):
+        yield '# unit = ""'
+    if _is_eight_bits(description, entry):
+        yield f"bits = {strings([f'bit_{bit}' for bit in range(8)])}"
+
+
+def _error_lines(description: Description, entry: Entry) -> Iterator[str]:
+    """Where the device keeps what the output becomes when it leaves Operational, as far as it has that."""
+    indices = _ERROR_OBJECTS.get(entry.index) if _profile(description) == _PROFILE_IO else None
+    keys = ("error_mode", "error_value")
+    for key, index in zip(keys, indices or (), strict=False):
+        if description.entry(index, entry.sub):
+            yield f'{key} = "{index:04X}:{entry.sub:02X}"'
+
+
+def _signals(description: Description, *, receives: bool) -> Iterator[tuple[str, tuple[Entry, str, str]]]:
+    """What the RPDOs or the TPDOs carry, in their order: name, and entry, type and title."""
     found: dict[tuple[int, int], Entry] = {}
     for pdo in pdos(description):
-        for one in () if pdo.receives else pdo.mapped:
+        for one in pdo.mapped if pdo.receives == receives else ():
             entry = description.entry(one.index, one.sub)
             if entry and one.index not in _DUMMIES:
                 found.setdefault((one.index, one.sub), entry)
@@ -82,9 +109,12 @@ def _title(description: Description, entry: Entry) -> str:
     return f"{one.name} {entry.name}"
 
 
-def _is_eight_inputs(description: Description, entry: Entry) -> bool:
-    profile = (description.number(0x1000) or 0) & 0xFFFF
-    return profile == _PROFILE_IO and entry.index in _DIGITAL_INPUTS
+def _is_eight_bits(description: Description, entry: Entry) -> bool:
+    return _profile(description) == _PROFILE_IO and entry.index in _EIGHT_BITS
+
+
+def _profile(description: Description) -> int:
+    return (description.number(0x1000) or 0) & 0xFFFF
 
 
 def identity_lines(description: Description) -> Iterator[str]:

@@ -9,7 +9,7 @@ from typing import Final
 from bridge.canopen.datatypes import INTEGERS, REALS, Plain, TypeName, encode
 from bridge.image import DataType as PointType
 from bridge.mapping import Family
-from bridge.mapping.device import Signal
+from bridge.mapping.device import Output, Signal
 from bridge.mapping.fields import WORD_BITS
 from bridge.mapping.model import (
     IdentityRule,
@@ -62,6 +62,8 @@ _STAYS: Final = "position"
 """An actual value of this name stays where it is when the drive is not enabled."""
 _PDO_BITS: Final = 64
 _PDO_ENTRIES: Final = 8
+_DIGITAL_OUTPUTS: Final = range(0x6200, 0x6400)
+"""CiA 401: a bit of error mode and error value for each of them."""
 _EVENT_MS: Final = 500
 """How often the TPDOs of a device come at least whose mapping says nothing of PDOs."""
 
@@ -84,17 +86,15 @@ def plan_of_family(family: Family, node_id: int) -> NodePlan:
     """A node that is as the mapping says. PDOs, words and parameters are those of the file."""
     objects = {plan.at: plan for plan in objects_of_family(family)}
     axes = tuple(_axis(family, slot) for slot in family.slot)
+    of_device, to_device = _device_pdos(family, node_id)
     for axis in axes:
         for at in (*axis.control, *axis.status):
             objects.pop(at, None)
     return NodePlan(
         identity=identity_of(family.identity, family.family.name),
         objects=tuple(objects.values()),
-        rpdo=tuple(_pdo(pdo, node_id) for slot in family.slot for pdo in slot.rpdo),
-        tpdo=(
-            *(_pdo(pdo, node_id) for slot in family.slot for pdo in slot.tpdo),
-            *_input_pdos(family.input, node_id),
-        ),
+        rpdo=(*(_pdo(pdo, node_id) for slot in family.slot for pdo in slot.rpdo), *to_device),
+        tpdo=(*(_pdo(pdo, node_id) for slot in family.slot for pdo in slot.tpdo), *of_device),
         axes=axes,
         mirrors=(MODE_DISPLAY,),
     )
@@ -113,6 +113,8 @@ def objects_of_family(family: Family) -> list[NumberPlan | BytesPlan]:
     for signal in family.input:
         at = (signal.object.index, signal.object.sub)
         objects[at] = NumberPlan(at, NUMBER_TYPES[signal.data_type], writable=False, in_tpdo=True)
+    for output in family.output:
+        objects |= {plan.at: plan for plan in _output_objects(output)}
     parts = [part for slot in family.slot for pdo in (*slot.rpdo, *slot.tpdo) for part in _parts(pdo)]
     for at, bits, is_signed in parts:
         there = objects.get(at)
@@ -189,20 +191,53 @@ def _pdo(pdo: Pdo, node_id: int) -> PdoPlan:
     return PdoPlan(pdo.number, CobId(pdo.cob_id + node_id), words, kind, inhibit, event_ms)
 
 
-def _input_pdos(inputs: Sequence[Signal], node_id: int) -> Iterator[PdoPlan]:
-    """TPDOs with the inputs of a device, in their order, as many to each as it holds. Beyond the fourth they
-    have the identifiers of the RPDOs, which such a node does not need."""
-    words: list[int] = []
-    runs = [words]
-    for signal in inputs:
+def _device_pdos(family: Family, node_id: int) -> tuple[list[PdoPlan], list[PdoPlan]]:
+    """TPDOs with the inputs of a device and RPDOs with its outputs, in their order, as many to each as it
+    holds. Beyond the fourth they have identifiers that the other direction does not need."""
+    inputs, outputs = _runs(family.input), _runs(family.output)
+    of_bases = (*TPDO_BASES, *RPDO_BASES[len(outputs) :])
+    to_bases = (*RPDO_BASES, *TPDO_BASES[len(inputs) :])
+    return (
+        [
+            PdoPlan(number, CobId(base + node_id), run, event_timer_ms=_EVENT_MS)
+            for number, (base, run) in enumerate(zip(of_bases, inputs, strict=False), 1)
+        ],
+        [
+            PdoPlan(number, CobId(base + node_id), run)
+            for number, (base, run) in enumerate(zip(to_bases, outputs, strict=False), 1)
+        ],
+    )
+
+
+def _runs(signals: Sequence[Signal]) -> list[tuple[int, ...]]:
+    """The mapping words of the signals, for one PDO after the other."""
+    runs: list[list[int]] = []
+    for signal in signals:
         bits = 8 * NUMBER_TYPES[signal.data_type].size
-        if len(words) == _PDO_ENTRIES or sum(word & 0xFF for word in words) + bits > _PDO_BITS:
-            words = []
+        words = runs[-1] if runs else list[int]()
+        is_full = len(words) == _PDO_ENTRIES or sum(word & 0xFF for word in words) + bits > _PDO_BITS
+        if is_full or not runs:
+            words = list[int]()
             runs.append(words)
         words.append(signal.object.index << 16 | signal.object.sub << 8 | bits)
-    for number, (base, run) in enumerate(zip((*TPDO_BASES, *RPDO_BASES), runs, strict=False), 1):
-        if run:
-            yield PdoPlan(number, CobId(base + node_id), tuple(run), event_timer_ms=_EVENT_MS)
+    return [tuple(run) for run in runs]
+
+
+def _output_objects(output: Output) -> Iterator[NumberPlan]:
+    """An output, and what it becomes when the node leaves Operational: 0, as CiA 401 has it at factory."""
+    kind = NUMBER_TYPES[output.data_type]
+    at = (output.object.index, output.object.sub)
+    yield NumberPlan(at, kind, in_rpdo=True)
+    is_digital = output.object.index in _DIGITAL_OUTPUTS
+    if output.error_mode:
+        mode_at = (output.error_mode.index, output.error_mode.sub)
+        if is_digital:
+            yield NumberPlan(mode_at, kind, (1 << 8 * kind.size) - 1)
+        else:
+            yield NumberPlan(mode_at, DataType.UNSIGNED8, 1)
+    if output.error_value:
+        value_at = (output.error_value.index, output.error_value.sub)
+        yield NumberPlan(value_at, kind if is_digital else DataType.INTEGER32)
 
 
 def _axis(family: Family, slot: Slot) -> AxisPlan:

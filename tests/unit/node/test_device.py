@@ -128,7 +128,7 @@ def test_a_mapping_that_contradicts_itself_is_refused(tmp_path: Path, old: str, 
     ("more", "said"),
     [
         ('[[bus.node.drive]]\nslot = "a"', "Encoder is no drive and has none"),
-        ("own_timeout_ms = 100", "Encoder is no drive: has no effect"),
+        ("own_timeout_ms = 100", "Encoder has no outputs: has no effect"),
     ],
 )
 def test_a_site_that_takes_it_for_a_drive_is_refused(tmp_path: Path, more: str, said: str) -> None:

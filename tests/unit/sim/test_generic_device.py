@@ -15,7 +15,7 @@ from bridge.sim.device import SimulatedDevice
 from bridge.sim.generic_node import GenericNode
 from bridge.sim.nmt_slave import NmtState
 from tests.support import sites
-from tests.support.devices import DEVICES, ENCODER
+from tests.support.devices import DEVICES, ENCODER, IO_BLOCK
 
 _ID = 5
 _START, _STOP = (Frame(0, bytes((command, _ID))) for command in (1, 2))
@@ -168,3 +168,14 @@ def test_inputs_that_need_more_than_four_tpdos(tmp_path: Path) -> None:
     node = played(tmp_path, "acme/encoder")
     node.set_value((0x2001, 5), -2)
     assert sent(node, 0x300 + _ID, 1.0, 1.1) == [(-2).to_bytes(8, "little", signed=True)]
+
+
+def test_a_mapping_with_outputs_has_them_in_rpdos(tmp_path: Path) -> None:
+    _family(tmp_path, IO_BLOCK)
+    node = played(tmp_path, "acme/encoder")
+    node.on_frame(Frame(_DIGITAL, b"\x81\x10\x27\xf0\xd8"), 1.0)
+    assert number(node, 0x6200, 1) == 0x81
+    assert [number(node, 0x6411, sub, signed=True) for sub in (1, 2)] == [10_000, -10_000]
+    node.on_frame(_STOP, 1.1)
+    assert number(node, 0x6200, 1) == 0
+    assert [number(node, 0x6411, sub, signed=True) for sub in (1, 2)] == [0, -10_000], "has no error mode"

@@ -85,10 +85,8 @@ def _kinds(annotation: Any) -> tuple[str, str]:
         return f"list of {plural}", ""
     if origin is dict:
         inner = _kinds(arguments[1])[0]
-        return (
-            f"table of {inner.replace('list of', 'lists of', 1) if 'list of' in inner else f'{inner}s'}",
-            "",
-        )
+        plural = inner.replace("list of", "lists of", 1) if "list of" in inner else f"{inner}s"
+        return f"table of {plural.replace(' or ', 's or ')}", ""
     if isinstance(annotation, type) and issubclass(annotation, Enum):
         return "string", ", ".join(f'"{member.value}"' for member in annotation)
     names = {str: "string", int: "integer", float: "number", bool: "boolean"}

@@ -118,7 +118,7 @@ WAYS: Final = {
         _WRITTEN,
         (
             Rest("command/leg/step.py", "_take"),
-            Rest("command/channel.py", "DriveChannel._take_in"),
+            Rest("command/channel.py", "Channel._take_in"),
             Rest("can/softbus.py", "SoftBus.burst"),
         ),
     ),

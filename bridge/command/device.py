@@ -144,6 +144,15 @@ class Device:
         return f"{identity} may only read" if identity.role < Role.OPERATOR else ""
 
     @property
+    def control(self) -> str:
+        """Who may command its outputs."""
+        return self.outputs.table.control if self.outputs else "none"
+
+    @property
+    def stop_by_anyone(self) -> bool:
+        return self.outputs is not None and self.outputs.table.stop_by_anyone
+
+    @property
     def refused_writes(self) -> int:
         return self.outputs.channel.refused_writes if self.outputs else self._refused_count
 

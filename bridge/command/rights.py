@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.command.device import Device
 from bridge.command.drive import Drive
 from bridge.command.plant import Plant
 from bridge.command.request import Source
@@ -25,32 +26,37 @@ class Rights:
         """Whether a write of this point is ever carried out."""
         owner, _, _ = point.name.rpartition("/")
         name, _, group = owner.rpartition("/")
-        drive = plant.drives.get(name)
-        if not point.writable or drive is None:
+        one = plant.drives.get(name) or plant.devices.get(name)
+        if not point.writable or one is None:
             return point.writable
         if group == "parameter":
-            return self._may_set(plant, drive, point.name.removeprefix(f"{name}/parameter/"))
-        return self.may_command(drive)
+            return self._may_set(plant, one, point.name.removeprefix(f"{name}/parameter/"))
+        return self.may_command(one)
 
-    def may_command(self, drive: Drive) -> bool:
-        control = drive.table.control
+    def may_command(self, one: Drive | Device) -> bool:
+        """Whether clients may command a drive, or the outputs of a node that is none."""
+        control = one.table.control if isinstance(one, Drive) else one.control
         return control == self.source.label or (control == "lease" and self.source in _TAKES_LEASES)
 
-    def may_stop(self, drive: Drive) -> bool:
-        return drive.table.stop_by_anyone or self.may_command(drive)
+    def may_stop(self, one: Drive | Device) -> bool:
+        by_anyone = one.table.stop_by_anyone if isinstance(one, Drive) else one.stop_by_anyone
+        return by_anyone or self.may_command(one)
 
-    def _may_set(self, plant: Plant, drive: Drive, leaf: str) -> bool:
-        node = plant.nodes[drive.node_name]
+    def _may_set(self, plant: Plant, one: Drive | Device, leaf: str) -> bool:
+        node = plant.nodes[one.node_name if isinstance(one, Drive) else one.name]
         names = node.names
         entry = next((entry for entry in names.points() if entry.leaf == leaf), None)
-        if entry is None or drive.family.sdo_channel(drive.slot, node.table.sdo_channels) is None:
+        if entry is None:
+            return False
+        if isinstance(one, Drive) and one.family.sdo_channel(one.slot, node.table.sdo_channels) is None:
             return False
         if names.protection.why_never(entry):
             return False
         if self.has_engineers:
             return True
         is_open = names.protection.level(entry.address) != "communication"
-        return is_open and self.sets_parameters and self.may_command(drive)
+        may_command = self.may_command(one) if isinstance(one, Drive) or one.outputs else True
+        return is_open and self.sets_parameters and may_command
 
 
 def rights_of(plant: Plant, source: Source) -> Rights:

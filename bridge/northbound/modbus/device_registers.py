@@ -2,16 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
 from bridge.command.device import Device
 from bridge.image import DataType, Point, Quality
-from bridge.northbound.modbus.registers import VALUES, VALUES_NOT_GOOD, Row, Table
+from bridge.mapping.device import Signal
+from bridge.northbound.modbus.registers import (
+    ABORT_CODE,
+    ACKNOWLEDGE,
+    KEEP_ALIVE,
+    PARAMETERS,
+    STOP,
+    TELEGRAMS,
+    VALUES,
+    VALUES_NOT_GOOD,
+    Allows,
+    Row,
+    Table,
+    row_maker,
+    value_rows,
+)
 
+WATCHDOG: Final = 14
 QUALITY: Final = 11
 AGE: Final = 16
+ABORT: Final = 18
+OWNER: Final = 20
 _WIDTHS: Final = {
     "bool": ("bool", 1),
     "uint8": ("uint16", 1),
@@ -25,8 +43,8 @@ _WIDTHS: Final = {
 
 
 @dataclass(frozen=True, slots=True)
-class InputBit:
-    """One discrete input: a point that is true or false, or a bit of one."""
+class SignalBit:
+    """One discrete input or coil: a point that is true or false, or a bit of one."""
 
     leaf: str
     name: str
@@ -34,39 +52,98 @@ class InputBit:
 
 
 class DeviceMap:
-    """The map of one device. ``texts`` is what device identification knows, by object id."""
+    """The map of one device. ``bits`` and ``inputs`` are its discrete inputs and input registers, ``coils``
+    and ``outputs`` its coils and holding registers, ``parameters`` those from register 1000 on. ``texts`` is
+    what device identification knows, by object id."""
 
-    def __init__(self, device: Device, points: Mapping[str, Point]) -> None:
+    def __init__(self, device: Device, points: Mapping[str, Point], allows: Allows | None = None) -> None:
+        """``allows`` is for the access column; without it, the access is what the mapping offers."""
+        allows = allows or Allows()
+        self._allows = allows
         family = device.family
         self.unit_id = device.unit_id
         self.device_name = device.name
         self.texts = {0: family.family.vendor, 1: family.family.name, 6: device.name}
-        self.bits: list[InputBit] = []
-        self.inputs: list[Row] = []
-        address = VALUES
-        for signal in family.input:
-            leaf = f"input/{signal.name}"
-            point = points[f"{device.name}/{leaf}"]
-            if point.data_type is DataType.BOOL:
-                self.bits.append(InputBit(leaf, leaf, None))
-                continue
-            self.bits += [InputBit(leaf, f"{leaf}/{name or bit}", bit) for bit, name in enumerate(point.bits)]
-            kind, size = ("float32", 2)
-            if point.data_type is not DataType.FLOAT:
-                kind, size = _WIDTHS[signal.data_type]
-            row = Row(Table.INPUT_REGISTER, address, leaf, kind, "r", point.unit, point.description)
-            self.inputs.append(row)
-            address += size
-        self.end = address
+        self.has_outputs = device.outputs is not None
+        own = {
+            name[len(device.name) + 1 :]: point
+            for name, point in points.items()
+            if name.startswith(f"{device.name}/")
+        }
+        self.bits, self.inputs = _signals("input", family.input, own, "r")
+        access = "rw" if allows.may_command else "r"
+        self.coils, self.outputs = _signals("output", family.output, own, access)
+        writable = [
+            leaf
+            for leaf, point in own.items()
+            if leaf.startswith("parameter/") and point.writable and point.data_type is not DataType.STRING
+        ]
+        self.parameters = value_rows(Table.HOLDING_REGISTER, writable, own, allows, PARAMETERS)
+
+    def end(self, table: Table) -> int:
+        """Where its inputs or outputs end."""
+        rows = self.inputs if table is Table.INPUT_REGISTER else self.outputs
+        return rows[-1].address + rows[-1].size if rows else VALUES
 
     @property
     def rows(self) -> Iterator[Row]:
+        row = row_maker(Table.INPUT_REGISTER, "r")
         qualities = ", ".join(f"{quality.value} {quality.label}" for quality in Quality)
-        yield Row(Table.INPUT_REGISTER, QUALITY, "quality", "uint16", "r", "", qualities)
+        yield row(QUALITY, "quality", "uint16", "", qualities)
+        if self.has_outputs:
+            states = "0 off, 1 idle, 2 running, 3 tripped"
+            yield row(WATCHDOG, "supervision/watchdog_state", "uint16", "", states)
+            left = "time left on the watchdog"
+            yield row(WATCHDOG + 1, "supervision/watchdog_left_ms", "uint16", "ms", left)
         age = "age of the oldest PDO; FFFFFFFFh: one never came"
-        yield Row(Table.INPUT_REGISTER, AGE, "node/pdo_age_ms", "uint32", "r", "ms", age)
+        yield row(AGE, "node/pdo_age_ms", "uint32", "ms", age)
+        abort = "why the node last refused an SDO of a client; 0: never"
+        yield row(ABORT, ABORT_CODE.rpartition("/")[2], "uint32", "", abort)
+        if self.has_outputs:
+            owners = "0 none, 1 opcua, 2 modbus, 3 zenoh, 4 local"
+            yield row(OWNER, "supervision/owner", "uint16", "", owners)
         not_good = f"bit 0: the first value from {VALUES} on is not good, and so on, up to the 32nd"
-        yield Row(Table.INPUT_REGISTER, VALUES_NOT_GOOD, "values_not_good", "uint32", "r", "", not_good)
+        yield row(VALUES_NOT_GOOD, "values_not_good", "uint32", "", not_good)
+        if self.has_outputs:
+            yield row(TELEGRAMS, "supervision/telegrams", "uint16", "", "counts the owner's valid telegrams")
         yield from self.inputs
+        yield from self._command_rows()
+        yield from self.outputs
+        yield from self.parameters
         for address, bit in enumerate(self.bits):
             yield Row(Table.DISCRETE_INPUT, address, bit.name, "bool", "r")
+        for address, bit in enumerate(self.coils):
+            yield Row(Table.COIL, address, bit.name, "bool", "rw" if self._allows.may_command else "r")
+
+    def _command_rows(self) -> Iterator[Row]:
+        if not self.has_outputs:
+            return
+        row = row_maker(Table.HOLDING_REGISTER, "rw" if self._allows.may_command else "r")
+        stop = row_maker(Table.HOLDING_REGISTER, "rw" if self._allows.may_stop else "r")
+        alive = "not 0: a telegram; 0: release; reads 1 for the owner"
+        yield row(KEEP_ALIVE, "keep_alive", "uint16", "", alive)
+        yield row(ACKNOWLEDGE, "acknowledge", "uint16", "", "write 1 to acknowledge a trip; reads 0")
+        yield stop(STOP, "stop", "uint16", "", "1, 2 or 3: make every output safe; reads 0")
+
+
+def _signals(
+    group: str, signals: Iterable[Signal], points: Mapping[str, Point], access: str
+) -> tuple[list[SignalBit], list[Row]]:
+    """The bits and the registers of inputs or outputs, in the order of the mapping."""
+    table = Table.INPUT_REGISTER if group == "input" else Table.HOLDING_REGISTER
+    bits: list[SignalBit] = []
+    rows: list[Row] = []
+    address = VALUES
+    for signal in signals:
+        leaf = f"{group}/{signal.name}"
+        point = points[leaf]
+        if point.data_type is DataType.BOOL:
+            bits.append(SignalBit(leaf, leaf, None))
+            continue
+        bits += [SignalBit(leaf, f"{leaf}/{name or bit}", bit) for bit, name in enumerate(point.bits)]
+        kind, size = ("float32", 2)
+        if point.data_type is not DataType.FLOAT:
+            kind, size = _WIDTHS[signal.data_type]
+        rows.append(Row(table, address, leaf, kind, access, point.unit, point.description))
+        address += size
+    return bits, rows

@@ -44,6 +44,7 @@ from bridge.northbound.modbus.registers import (
     Words32,
 )
 from bridge.northbound.modbus.unit import Unit, refuse_quality, state_code
+from bridge.northbound.modbus.values32 import Values32
 from bridge.northbound.view import View
 
 _WORD_BITS: Final = 16
@@ -77,8 +78,8 @@ class DriveUnit(Unit):
         def place(leaf: str) -> int:
             return view.image.index[f"{drive_map.drive_name}/{leaf}"]
 
-        def places(rows: Iterable[Row]) -> list[tuple[Row, int]]:
-            return [(row, place(row.name)) for row in rows]
+        def values(rows: Sequence[Row], first: int = VALUES) -> Values32:
+            return Values32(rows, drive_map.drive_name, view.image, words32, first)
 
         self._status: Final = place("status/status_word")
         self._words: Final = {
@@ -94,10 +95,10 @@ class DriveUnit(Unit):
         self._commands: Final = {0: place("command/control_word"), **self._words[Table.HOLDING_REGISTER]}
         self._owner, self._timeout = place("supervision/owner"), place("supervision/fieldbus_timeout_ms")
         self._identity: Final = [place(f"identity/{leaf}") for leaf in _IDENTITY]
-        self._inputs: Final = places(drive_map.inputs)
-        self._flagged: Final = [index for _, index in self._inputs[:_FLAGS]]
-        self._setpoints: Final = places(drive_map.setpoints)
-        self._parameters: Final = places(drive_map.parameters)
+        self._inputs: Final = values(drive_map.inputs)
+        self._flagged: Final = self._inputs.indices[:_FLAGS]
+        self._setpoints: Final = values(drive_map.setpoints)
+        self._parameters: Final = values(drive_map.parameters, PARAMETERS)
         self._halves: Final = {table: drive_map.second_halves(table) for table in Table}
 
     # reading
@@ -124,19 +125,19 @@ class DriveUnit(Unit):
         end = start + count
         self._check_range(table, start, end)
         if start >= PARAMETERS and not is_input:
-            return self._values(self._parameters, start, end, PARAMETERS)
+            return self._parameters.read(start, end)
         if is_input:
             quality = self._look()
             if quality.has_value:
                 self._check_words(table, start, end)
             words = self._input_words(start, end, quality)
             if end > VALUES:
-                words += self._values(self._inputs, start, end)
+                words += self._inputs.read(start, end)
         else:
             self._check_words(table, start, end)
             words = self._holding_words(caller)[start:end] if start < VALUES else []
             if end > VALUES:
-                words += self._values(self._setpoints, start, end)
+                words += self._setpoints.read(start, end)
         return words
 
     def _check_range(self, table: Table, start: int, end: int) -> None:
@@ -199,18 +200,6 @@ class DriveUnit(Unit):
             words += from_int(self._not_good(range(_FLAGS), self._flagged))
             words.append(int(telegrams))
         return words + [0] * (VALUES - DIAGNOSTICS - len(words))
-
-    def _values(self, values: list[tuple[Row, int]], start: int, end: int, first: int = VALUES) -> list[int]:
-        """The 32-bit values in the range, which begins and ends between values."""
-        words: list[int] = []
-        for row, index in values[max(start - first, 0) // 2 : (end - first) // 2]:
-            reading = self._image[index]
-            refuse_quality(reading.quality)
-            if row.type == "float32":
-                words += self._words32.from_float(float(reading.value))
-            else:
-                words += self._words32.from_int(int(reading.value))
-        return words
 
     def _not_good(self, bits: Iterable[int], indices: Iterable[int]) -> int:
         """The bits of those points that are not good."""
@@ -327,26 +316,14 @@ class DriveUnit(Unit):
         return values
 
     def _setpoint_values(self, start: int, words: Sequence[int]) -> dict[str, Value]:
-        first = (start - VALUES) // 2
-        pairs = zip(words[::2], words[1::2], strict=True)
-        rows = self._map.setpoints[first : first + len(words) // 2]
-        return {
-            row.name.removeprefix("command/"): self._value(row, pair)
-            for row, pair in zip(rows, pairs, strict=True)
-        }
-
-    def _value(self, row: Row, pair: Sequence[int]) -> Value:
-        """The value of two written registers, by its type."""
-        if row.type == "float32":
-            return self._words32.to_float(*pair)
-        return self._words32.to_int(*pair, signed=row.type == "int32")
+        written = self._setpoints.written(start, words)
+        return {row.name.removeprefix("command/"): value for row, value in written}
 
     def _parameter(self, start: int, words: Sequence[int], caller: Identity) -> Request:
         """One parameter only: a write of several could be carried out in part."""
         if len(words) != 2:
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
-        row = self._map.parameters[(start - PARAMETERS) // 2]
-        value = self._value(row, words)
+        ((row, value),) = self._parameters.written(start, words)
         name = row.name.removeprefix("parameter/")
         return Request(caller, self._map.drive_name, WriteParameter(name, value))
 

@@ -143,15 +143,15 @@ class DriveMap:
         first = [leaf for name in scaled if (leaf := f"actual/{name}") not in unusual]
         last = [leaf for leaf in unusual if leaf.startswith("actual/")]
         chosen = first + [leaf for leaf in more if leaf not in first and leaf not in last] + last
-        self.inputs = _value_rows(Table.INPUT_REGISTER, chosen, points, _NOTHING)
+        self.inputs = value_rows(Table.INPUT_REGISTER, chosen, points, _NOTHING)
         commands = [value.leaf for value in values if value.group == "command"]
-        self.setpoints = _value_rows(Table.HOLDING_REGISTER, commands, points, allows)
+        self.setpoints = value_rows(Table.HOLDING_REGISTER, commands, points, allows)
         writable = [
             leaf
             for leaf, point in points.items()
             if leaf.startswith("parameter/") and point.writable and point.data_type is not DataType.STRING
         ]
-        self.parameters = _value_rows(Table.HOLDING_REGISTER, writable, points, allows, PARAMETERS)
+        self.parameters = value_rows(Table.HOLDING_REGISTER, writable, points, allows, PARAMETERS)
         self.rows: tuple[Row, ...] = (
             *(row for row in fixed if row.table is Table.INPUT_REGISTER),
             *self.inputs,
@@ -233,7 +233,7 @@ def _holding_rows(setpoints: Mapping[int, str], allows: Allows, *, may_set: bool
     ]
 
 
-def _value_rows(
+def value_rows(
     table: Table, leaves: Iterable[str], points: dict[str, Point], allows: Allows, first: int = VALUES
 ) -> tuple[Row, ...]:
     """Two registers for each of ``leaves``; integers are not turned into floats, so that no digit is lost."""

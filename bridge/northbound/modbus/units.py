@@ -7,6 +7,7 @@ from functools import partial
 from typing import Final
 
 from bridge.command import Drive, Plant, Source
+from bridge.command.device import Device
 from bridge.command.rights import rights_of
 from bridge.northbound.modbus.device_registers import DeviceMap
 from bridge.northbound.modbus.registers import Allows, DriveMap, Row, Table, row_maker
@@ -21,20 +22,20 @@ _MODULE_STATE: Final = (
 
 def drive_maps(plant: Plant) -> tuple[DriveMap, ...]:
     """The maps of all drives, by unit id, with the access that this site gives."""
+    return tuple(DriveMap(drive, _allows(plant, drive)) for _, drive in sorted(plant.by_unit.items()))
+
+
+def _allows(plant: Plant, one: Drive | Device) -> Allows:
     rights = rights_of(plant, Source.MODBUS)
-
-    def allows(drive: Drive) -> Allows:
-        write = partial(rights.may_write, plant)
-        return Allows(write, may_command=rights.may_command(drive), may_stop=rights.may_stop(drive))
-
-    return tuple(DriveMap(drive, allows(drive)) for _, drive in sorted(plant.by_unit.items()))
+    write = partial(rights.may_write, plant)
+    return Allows(write, may_command=rights.may_command(one), may_stop=rights.may_stop(one))
 
 
 def device_maps(plant: Plant) -> tuple[DeviceMap, ...]:
-    """The maps of all nodes that are no drives, by unit id."""
+    """The maps of all nodes that are no drives, by unit id, with the access that this site gives."""
     points = {point.name: point for point in plant.image.points}
     devices = sorted(plant.devices.values(), key=lambda device: device.unit_id)
-    return tuple(DeviceMap(device, points) for device in devices)
+    return tuple(DeviceMap(device, points, _allows(plant, device)) for device in devices)
 
 
 @dataclass(frozen=True, slots=True)

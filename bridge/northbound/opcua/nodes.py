@@ -141,6 +141,15 @@ _NODE_METHODS: Final[_Methods] = (
 )
 _DEVICE_METHODS: Final[_Methods] = (*_NODE_METHODS, *_PARAMETER_METHODS)
 """Of a node that is no drive."""
+_OUTPUT_METHODS: Final[_Methods] = (
+    (Action.STOP, (), (), "make every output safe"),
+    (Action.RESET_FAULT, (), (), "acknowledge a watchdog trip; the outputs stay safe"),
+    (Action.TAKE_CONTROL, (_TTL,), (), "become the controller of the outputs"),
+    (Action.RELEASE_CONTROL, (), (), "give control back; the outputs become safe"),
+    (Action.KEEP_ALIVE, (), (), "a telegram without a value: restarts the watchdog's timer"),
+    *_DEVICE_METHODS,
+)
+"""Of one that has outputs."""
 _BUS_METHODS: Final[_Methods] = (
     (Action.RESET, (), (), "NMT reset node to all nodes"),
     (Action.RESET_COMMUNICATION, (), (), "NMT reset communication to all nodes"),
@@ -168,8 +177,11 @@ def layout(points: Sequence[Point]) -> tuple[ObjectNode, ObjectNode, ObjectNode]
 
     devices = {point.path[0] for point in points if len(point.path) == _IN_DEVICE and point.path[1] != "node"}
 
+    with_outputs = {point.path[0] for point in points if point.path[1:2] == ("output",)}
+
     def node(name: str) -> ObjectNode:
         methods = _DEVICE_METHODS if name in devices else _NODE_METHODS
+        methods = _OUTPUT_METHODS if name in with_outputs else methods
         return _owner(drives, name, name, methods, ("node",))
 
     for index, point in enumerate(points):

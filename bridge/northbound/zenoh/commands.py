@@ -36,6 +36,14 @@ METHODS: Final = (
     Action.KEEP_ALIVE,
     Action.SAVE_PARAMETERS,
 )
+OUTPUT_METHODS: Final = (
+    Action.STOP,
+    Action.RESET_FAULT,
+    Action.TAKE_CONTROL,
+    Action.RELEASE_CONTROL,
+    Action.KEEP_ALIVE,
+)
+"""Of the outputs of a node that is no drive."""
 _WITHOUT_PAYLOAD: Final = (Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE, Action.RELEASE_CONTROL)
 """These need no payload. Everything else does, so that reading a key with a plain get cannot start or
 acknowledge anything."""
@@ -107,6 +115,11 @@ class Commands:
         self._drives = _owners(self._points, "/command/control_word")
         self._with_parameters = _owners(self._points, "/supervision/sdo_abort_code")
         """The drives, and the nodes that are none."""
+        self._with_outputs = frozenset(
+            point.path[0] for point in self._points.values() if point.path[1:2] == ("output",)
+        )
+        """The nodes among them that somebody commands."""
+        self._commanded = self._drives | self._with_outputs
         self._nodes = _owners(self._points, "/node/nmt_state")
         self._buses = _owners((name for name in self._points if name.startswith("bus/")), "/nmt_state")
 
@@ -116,6 +129,8 @@ class Commands:
         target, _, group = owner.rpartition("/")
         if group == "command" and target in self._drives:
             return leaf in METHODS
+        if group == "command" and target in self._with_outputs:
+            return leaf in OUTPUT_METHODS
         if owner in self._buses:
             return leaf in BUS_METHODS
         return group == "node" and target in self._nodes and leaf in NODE_METHODS
@@ -132,7 +147,7 @@ class Commands:
             return Request(identity, drive, WriteParameter(name, _decode_parameter(name, payload)))
         owner, _, leaf = tail.rpartition("/")
         target, _, group = owner.rpartition("/")
-        if leaf == "command" and owner in self._drives:
+        if leaf == ("output" if owner in self._with_outputs else "command") and owner in self._commanded:
             return Request(identity, owner, Write(_decode_telegram(owner, payload)))
         if self.is_method(tail):
             return _call(identity, owner if owner in self._buses else target, Action(leaf), payload)
@@ -163,7 +178,7 @@ class Commands:
             return drive, Action.WRITE_PARAMETER
         action = Action(tail.rpartition("/")[2]) if self.is_method(tail) else Action.WRITE
         target = tail
-        while target and not (target in self._drives or target in self._nodes or target in self._buses):
+        while target and not (target in self._commanded or target in self._nodes or target in self._buses):
             target = target.rpartition("/")[0]
         return target or tail, action
 

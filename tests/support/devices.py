@@ -97,6 +97,7 @@ data_type = "uint8"
 name = "valves"
 object = "6200:01"
 data_type = "uint8"
+bits = ["inlet", "outlet"]
 error_mode = "6206:01"
 error_value = "6207:01"
 

@@ -148,7 +148,7 @@ class Commands:
         owner, _, leaf = tail.rpartition("/")
         target, _, group = owner.rpartition("/")
         if leaf == ("output" if owner in self._with_outputs else "command") and owner in self._commanded:
-            return Request(identity, owner, Write(_decode_telegram(owner, payload)))
+            return Request(identity, owner, Write(_decode_telegram(tail, payload)))
         if self.is_method(tail):
             return _call(identity, owner if owner in self._buses else target, Action(leaf), payload)
         point = self._points.get(tail)
@@ -194,6 +194,12 @@ class Commands:
             ]
             known = ", ".join((*leaves, *METHODS))
             return BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}; {target}/command has {known}")
+        if target in self._with_outputs and group in ("command", "output"):
+            outputs = [
+                name.rpartition("/")[2] for name in self._points if name.startswith(f"{target}/output/")
+            ]
+            known = ", ".join(OUTPUT_METHODS if group == "command" else outputs)
+            return BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}; {target}/{group} has {known}")
         if group == "node" and target in self._nodes:
             known = ", ".join(NODE_METHODS)
             return BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}; a node takes {known}")
@@ -247,11 +253,11 @@ def _decode_parameter(name: str, payload: bytes) -> Value:
     return _bounded(name, decoded.v if isinstance(decoded, _One) else decoded)
 
 
-def _decode_telegram(drive: str, payload: bytes) -> dict[str, Value]:
-    wanted = f'{drive}/command takes an object such as {{"control_word": 1151}}'
+def _decode_telegram(tail: str, payload: bytes) -> dict[str, Value]:
+    wanted = f'{tail} takes an object such as {{"control_word": 1151}}'
     values = _decoded(_telegram, payload, wanted)
     if not values:
-        raise BadCommand(MALFORMED, f"the object for {drive}/command names no point")
+        raise BadCommand(MALFORMED, f"the object for {tail} names no point")
     return {leaf: _bounded(leaf, value) for leaf, value in values.items()}
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command import Action, Identity, Outcome, Role, Source
+from bridge.command import Action, Identity, Outcome, Role, Source, WriteParameter
 from bridge.northbound.modbus.device_unit import DeviceUnit
 from bridge.northbound.modbus.pdu import ExceptionCode, Refused
 from bridge.northbound.modbus.registers import Table, Words32
@@ -88,11 +88,19 @@ class TestModbus:
         for write in (
             lambda: unit.plan_words(32, [1], CALLER),
             lambda: unit.plan_bits(0, [True], CALLER),
-            lambda: unit.read_words(Table.HOLDING_REGISTER, 32, 1, CALLER),
+            lambda: unit.read_bits(Table.COIL, 0, 1),
         ):
             with pytest.raises(Refused) as told:
                 write()
             assert told.value.code is ExceptionCode.ILLEGAL_FUNCTION
+
+    def test_its_parameters_stand_from_1000_on(self, bench: Bench, unit: DeviceUnit) -> None:
+        assert unit.read_words(Table.HOLDING_REGISTER, 1000, 2, CALLER) == [0, 4]
+        (request,) = unit.plan_words(1000, [0, 5], CALLER)
+        assert request.command == WriteParameter("6000", 5)
+        for start, count in ((1001, 1), (1000, 1), (1000, 4)):
+            with pytest.raises(Refused):
+                unit.plan_words(start, [0] * count, CALLER)
 
     def test_who_it_is(self, bench: Bench) -> None:
         (device,) = device_maps(bench.plant)

@@ -200,15 +200,16 @@ class Service:
 
     def _say_what_is_doubtful(self) -> None:
         """A site with a doubtful prediction is run all the same: stopping a plant over it would be worse. The
-        prediction for each bus becomes part of its drives' published times."""
+        prediction for each bus becomes part of the published times of what is commanded there."""
         verdict = lint(self.project.site, self.project.families, self.project.path, self.project.downloads)
         for finding in verdict.findings:
             level = logging.ERROR if finding.severity is Severity.ERROR else logging.WARNING
             _log.log(level, "%s", finding.fault)
         for load in verdict.loads:
             _log.info("%s", load)
+        commanded = {one.name: one for node in self.plant.nodes.values() for one in node.commanded}
         for case in verdict.worst_cases:
-            self.plant.drives[case.drive].on_wire(case.wire, clock.now())
+            commanded[case.drive].on_wire(case.wire, clock.now())
 
     async def _stop(self) -> None:
         self.halt()

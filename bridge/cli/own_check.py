@@ -69,7 +69,7 @@ def audit(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Show what each drive would do if the bridge fell silent; exit code 1 where one would run on."""
+    """Show what drives and outputs would do if the bridge fell silent; exit code 1 where one would run on."""
     project = load_project(site)
     names = [table.name for table in project.site.bus]
     if bus is not None and bus not in names:
@@ -110,8 +110,10 @@ def audit_drives(
         elif not offline:
             answers = _ask(Line(table, project.families, is_of_site=True), nodes, unavailable)
         for node in nodes:
-            for drive in node.drives:
-                case = cases[drive.name]
+            for drive in node.commanded:
+                case = cases.get(drive.name)
+                if case is None:  # nobody commands it
+                    continue
                 if answers is None:
                     yield Audited(node, case, was_read=False)
                     continue
@@ -177,8 +179,8 @@ def _explain(found: list[Audited], site: Path) -> None:
 
 
 def _tell(one: Audited) -> None:
-    runs_on = one.own.verdict is OwnVerdict.RUNS_ON
-    would = "would run on" if runs_on else "may run on"
+    runs_on = "keep its outputs" if one.node.device else "run on"
+    would = f"{'would' if one.own.verdict is OwnVerdict.RUNS_ON else 'may'} {runs_on}"
     word, why = ("accepted", one.own.accepted) if one.own.accepted else ("error", one.own.reason)
     print(f"{word}: {one.case.drive} {would} when the bridge falls silent: {why}")
 

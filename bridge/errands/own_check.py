@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 
 from bridge.canopen import dialogue
 from bridge.canopen.dialogue import Dialogue, Read
 from bridge.canopen.sdo import SdoError
+from bridge.command.outputs import Outputs
 from bridge.command.plant import Node
 from bridge.drive import OwnJudgement
 from bridge.drive.own_supervision import judge
 from bridge.errands.errand import SdoErrands
 from bridge.node.boot import BootError
+from bridge.node.boot.device_watch import keeps_outputs, read_why_not_safe
 from bridge.node.boot.own_supervision import read_places
 from bridge.node.sdo_channels import SdoChannels
 
@@ -19,14 +21,26 @@ Judgements = dict[str, OwnJudgement]
 
 
 def ask(node: Node) -> Generator[Read, bytes | None, Judgements]:
-    """What each drive of the node would do, by the drive's name."""
+    """What each drive of the node would do, by the drive's name, or the node itself with its outputs."""
     of_node = yield from read_places(node, None, link=True)
     found: Judgements = {}
     for drive in node.drives:
         of_drive = yield from read_places(node, drive, link=True)
         accepted = drive.table.accepts.runs_on or ""
         found[drive.name] = judge(node.family, {**of_node, **of_drive}, node.bus, node.table, accepted)
+    if node.device and node.device.outputs:
+        found[node.name] = yield from _of_outputs(node, node.device.outputs, of_node)
     return found
+
+
+def _of_outputs(
+    node: Node, outputs: Outputs, of_node: Mapping[tuple[int, int], int]
+) -> Generator[Read, bytes | None, OwnJudgement]:
+    own = judge(node.family, of_node, node.bus, node.table, outputs.table.accepts.runs_on or "")
+    for place in outputs.words.places.values():
+        if place.safe is not None and (why := (yield from read_why_not_safe(place, place.safe))):
+            return keeps_outputs(own, why)
+    return own
 
 
 class OwnCheck(SdoErrands):

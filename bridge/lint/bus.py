@@ -18,7 +18,7 @@ from bridge.config.download import Download
 from bridge.eds import Description
 from bridge.eds.pdos import PdoSummary, pdos
 from bridge.lint.settings import RPDO, TPDO, Settings, pdo_cob_id
-from bridge.mapping.model import Family, Pdo
+from bridge.mapping.model import Family, ObjectRef, Pdo
 from bridge.node.boot import factory_entries
 from bridge.tomlfile import Key
 
@@ -164,8 +164,8 @@ def _node(
         if drive:
             name = f"{table.name}/{family.leaf_of(drive)}"
             drives.append(DriveView(drive, drive_key, name, tuple(views[True]), tuple(views[False])))
-    # PDOs that the bridge does not use may still collide.
-    others = {place: _other_pdo(one, key) for place, one in known.items() if place not in used}
+    # PDOs that no drive uses may still collide, and are those of a node that is no drive.
+    others = {place: _other_pdo(one, key, family) for place, one in known.items() if place not in used}
     for place in settings.pdos():
         if place not in used:
             others.setdefault(place, _unknown_pdo(*place, key))
@@ -268,8 +268,10 @@ def _either(own: int | None, other: int) -> int:
     return other if own is None else own
 
 
-def _other_pdo(summary: PdoSummary, key: Key) -> PdoView:
-    """A PDO that the family's dictionary has and the bridge does not use."""
+def _other_pdo(summary: PdoSummary, key: Key, family: Family) -> PdoView:
+    """A PDO that the family's dictionary has and no drive uses. The bridge sends those with outputs."""
+    outputs = {output.object for output in family.output}
+    is_sent = summary.receives and any(ObjectRef(one.index, one.sub) in outputs for one in summary.mapped)
     return PdoView(
         summary.name,
         key,
@@ -281,6 +283,7 @@ def _other_pdo(summary: PdoSummary, key: Key) -> PdoView:
         summary.inhibit_100us / 10,
         summary.event_timer_ms,
         number=summary.number,
+        sent=summary.enabled and is_sent,
     )
 
 

@@ -13,6 +13,7 @@ from bridge.lint.contradictions import check_contradictions
 from bridge.lint.decisions import check_decisions
 from bridge.lint.identifiers import check_identifiers
 from bridge.lint.load import BusLoad, check_load
+from bridge.lint.outputs import check_outputs, output_cases
 from bridge.lint.own import WorstCase, check_own_supervision, worst_cases
 from bridge.lint.pdos import check_pdos
 from bridge.lint.report import LintFinding, LintReport, Severity
@@ -75,7 +76,8 @@ def lint(
         check_times(bus, report)
         check_own_supervision(bus, report)
         check_contradictions(bus, report)
-        cases += worst_cases(bus)
+        check_outputs(bus, report)
+        cases += [*worst_cases(bus), *output_cases(bus)]
         loads.append(check_load(bus, report))
     check_decisions(site, families, report)
     return Verdict(report.findings(), tuple(loads), tuple(cases))

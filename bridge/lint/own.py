@@ -60,7 +60,7 @@ def worst_cases(bus: BusView) -> Iterator[WorstCase]:
         for drive in node.drives:
             timeout_ms = drive.table.fieldbus_timeout_ms or 0
             kind = drive.rpdos[0].transmission_type
-            wire = wire_of(bus, drive, busy)
+            wire = wire_of(bus, drive.rpdos, busy)
             own = judged(bus, node, drive)
             of_time = partial(_stop_time, bus, drive, kind, wire, own.process_data_ms)
             writable = drive.table.fieldbus_timeout_writable and drive.table.control != "none"

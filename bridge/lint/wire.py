@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 from bridge.command.worst_case import Wire
-from bridge.lint.bus import BusView, DriveView
+from bridge.lint.bus import BusView, PdoView
 from bridge.lint.load import longest_bits, streams
 
 _LONGEST_BYTES: Final = 8
@@ -14,11 +15,11 @@ _LONGEST_S: Final = 10.0
 """A bus that is busy for this long without a pause is full."""
 
 
-def wire_of(bus: BusView, drive: DriveView, busy_bits: int | None) -> Wire:
-    """``busy_bits`` is that of the bus."""
+def wire_of(bus: BusView, rpdos: Sequence[PdoView], busy_bits: int | None) -> Wire:
+    """For what ``rpdos`` command; ``busy_bits`` is that of the bus."""
     rate = bus.table.bitrate
-    own_bits = sum(longest_bits(pdo.length) for pdo in drive.rpdos if pdo.sent)
-    # The drive's own RPDOs are among them.
+    own_bits = sum(longest_bits(pdo.length) for pdo in rpdos if pdo.sent)
+    # These RPDOs are among them.
     before_ms = None if busy_bits is None else 1000 * max(0, busy_bits - own_bits) / rate
     return Wire(1000 * own_bits / rate, before_ms)
 

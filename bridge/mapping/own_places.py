@@ -135,20 +135,21 @@ def impossible(family: Family, time_ms: int) -> str:
 
 
 def offline(
-    family: Family, settings: Raw, bus: BusTable, node: NodeTable, slot: Slot
+    family: Family, settings: Raw, bus: BusTable, node: NodeTable, slot: Slot | None
 ) -> dict[tuple[int, int], int]:
-    """What the drive in ``slot`` will hold, by the site file and the factory alone.
+    """What the drive in ``slot`` will hold, or a node that is no drive, by the site file and the factory
+    alone.
 
     ``settings`` are the node's downloads; they reach a drive's own objects where the first SDO channel
     does. ``enforce`` reaches them over an opened one, too.
     """
-    channel = family.sdo_channel(slot, node.sdo_channels)
+    channel = family.sdo_channel(slot, node.sdo_channels) if slot else 1
     raw: dict[tuple[int, int], int] = {}
     for one in _objects(family.own_supervision):
         place = place_of(family, one)
         if one.factory is not None:
             raw[place.key] = one.factory
-        reaches = not place.per_drive or slot.parameters_by_sdo
+        reaches = not place.per_drive or slot is None or slot.parameters_by_sdo
         if place.key in settings and reaches:
             raw[place.key] = place.number.from_word(place.number.to_word(settings[place.key]))
     guards = node.supervision == "guarding"

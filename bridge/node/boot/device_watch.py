@@ -8,20 +8,19 @@ digital outputs, 6443h and 6444h for analogue ones). Which objects those are is 
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import replace
 from typing import Final
 
-from bridge.canopen.dialogue import optional
+from bridge.canopen.dialogue import Read, optional
 from bridge.command.output_words import OutputWords, Place
 from bridge.command.plant import Node
-from bridge.drive.own_supervision import OwnVerdict, judge
+from bridge.drive.own_supervision import OwnJudgement, OwnVerdict, judge
 from bridge.mapping.fields import ObjectRef
 from bridge.node.boot.actions import Action, BootResult, Step, number
 from bridge.node.boot.own_supervision import bring_node
 
 _DIGITAL: Final = range(0x6200, 0x6400)
 """CiA 401: one bit of error mode and error value for each output. Analogue ones have a number each."""
-
-Reads = Generator[Action, bytes | None, str]
 
 
 def read_held(words: OutputWords, result: BootResult) -> Generator[Action, bytes | None, None]:
@@ -47,20 +46,26 @@ def judge_outputs(
     why = "" if own.verdict is OwnVerdict.STOPS else own.reason
     for place in words.places.values():
         if not why and place.safe is not None:
-            why = yield from _why_not_safe(place, place.safe)
+            why = yield from read_why_not_safe(place, place.safe)
     accepted = node.table.outputs.accepts.runs_on or ""
     result.bridge_stop = (0, accepted or why) if why else (own.bridge_ms, "")
     if why and not accepted:
         result.notes.append(f"outputs are not safe by themselves when the bridge falls silent: {why}")
 
 
-def _why_not_safe(place: Place, safe: int) -> Reads:
-    """Why this output does not take its safe value when the node leaves Operational; empty where it does."""
+def read_why_not_safe(place: Place, safe: int) -> Generator[Read, bytes | None, str]:
+    """As ``why_not_safe``, by what the node holds."""
+    mode = yield from _number(place.output.error_mode)
+    value = yield from _number(place.output.error_value)
+    return why_not_safe(place, safe, mode, value)
+
+
+def why_not_safe(place: Place, safe: int, mode: int | None, value: int | None) -> str:
+    """Why this output does not take its safe value when the node leaves Operational; empty where it does.
+    ``mode`` and ``value`` are what error mode and error value hold, None where that is not known."""
     output = place.output
     if output.error_mode is None or output.error_value is None:
         return f"what {output.name} does then is not known: the mapping names no error_mode and error_value"
-    mode = yield from _number(output.error_mode)
-    value = yield from _number(output.error_value)
     if mode is None or value is None:
         missing = output.error_mode if mode is None else output.error_value
         return f"what {output.name} does then is not known: {missing} cannot be read"
@@ -75,6 +80,18 @@ def _why_not_safe(place: Place, safe: int) -> Reads:
     return ""
 
 
-def _number(ref: ObjectRef) -> Generator[Action, bytes | None, int | None]:
+def keeps_outputs(own: OwnJudgement, why: str, *, is_known: bool = True) -> OwnJudgement:
+    """The same for a node that notices a silent bridge, and does not make all of its outputs safe."""
+    verdict = OwnVerdict.RUNS_ON if is_known else OwnVerdict.UNKNOWN
+    watches = [
+        replace(watch, verdict=verdict, why=why) if watch.verdict is OwnVerdict.STOPS else watch
+        for watch in own.watches
+    ]
+    return replace(own, watches=tuple(watches))
+
+
+def _number(ref: ObjectRef | None) -> Generator[Read, bytes | None, int | None]:
+    if ref is None:
+        return None
     data = yield from optional(ref.index, ref.sub)
     return None if data is None else number(data)

@@ -1,0 +1,112 @@
+"""Outputs of nodes that are no drives: what becomes of them when their controller or the bridge is silent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from bridge.command.output_words import OutputWords
+from bridge.command.worst_case import StopTime, output_stop_time
+from bridge.drive import OwnJudgement, OwnVerdict
+from bridge.drive.own_supervision import judge
+from bridge.lint.bus import BusView, NodeView, PdoView
+from bridge.lint.own import WorstCase
+from bridge.lint.report import LintReport
+from bridge.lint.wire import busy_bits, wire_of
+from bridge.mapping.fields import ObjectRef
+from bridge.mapping.own_places import offline
+from bridge.node.boot.device_watch import keeps_outputs, why_not_safe
+
+_ASYNCHRONOUS = 255
+
+
+def output_cases(bus: BusView) -> Iterator[WorstCase]:
+    """Every node of the bus whose outputs somebody commands, with what is known without asking it."""
+    busy = busy_bits(bus)
+    for node in bus.nodes:
+        if not _is_commanded(node):
+            continue
+        rpdos = _rpdos(node)
+        wire = wire_of(bus, rpdos, busy)
+        kind = min((pdo.transmission_type for pdo in rpdos), default=_ASYNCHRONOUS)
+        stop = StopTime()
+        if not _words(node).all_hold:
+            stop = output_stop_time(node.table.outputs, bus.table, kind, wire)
+        yield WorstCase(node.table.name, stop, judged_outputs(bus, node), wire)
+
+
+def check_outputs(bus: BusView, report: LintReport) -> None:
+    for node in bus.nodes:
+        if not _is_commanded(node):
+            continue
+        name, table = node.table.name, node.table.outputs
+        if table.fieldbus_timeout_ms == 0:
+            message = f"is 0: the outputs of {name} stay as they are when their controller is silent"
+            report.warning((*node.key, "outputs", "fieldbus_timeout_ms"), message)
+        if _words(node).all_hold:
+            continue
+        own = judged_outputs(bus, node)
+        if own.verdict is not OwnVerdict.STOPS and not own.accepted:
+            stay = "stay" if own.verdict is OwnVerdict.RUNS_ON else "may stay"
+            report.warning(
+                node.key,
+                f"{name}: its outputs {stay} as they are when the bridge falls silent: {own.reason}",
+                'own_timeout_ms and enforce = true; or say why they may, accepts = { runs_on = "…" } of '
+                "[bus.node.outputs]",
+            )
+
+
+def judged_outputs(bus: BusView, node: NodeView) -> OwnJudgement:
+    """What the node does with its outputs by itself, by site file and factory settings."""
+    raw = {**_factory(node), **offline(node.family, node.settings.values, bus.table, node.table, None)}
+    accepted = node.table.outputs.accepts.runs_on or ""
+    own = judge(node.family, raw, bus.table, node.table, accepted)
+    for place in _words(node).places.values():
+        if place.safe is None:
+            continue
+        output = place.output
+        mode, value = (_number(node, ref) for ref in (output.error_mode, output.error_value))
+        if why := why_not_safe(place, place.safe, mode, value):
+            return keeps_outputs(own, why, is_known=mode is not None and value is not None)
+    return own
+
+
+def _is_commanded(node: NodeView) -> bool:
+    is_used = node.table.enabled and node.table.outputs.control != "none"
+    return bool(node.family.output) and is_used
+
+
+def _words(node: NodeView) -> OutputWords:
+    return OutputWords(node.table.name, node.family.output, node.table.outputs.on_expiry)
+
+
+def _rpdos(node: NodeView) -> list[PdoView]:
+    return [pdo for pdo in node.pdos if pdo.receives and pdo.sent]
+
+
+def _factory(node: NodeView) -> dict[tuple[int, int], int]:
+    """What its device description says of the objects that decide."""
+    found: dict[tuple[int, int], int] = {}
+    for own in node.family.own_supervision:
+        for one in (own, own.reaction):
+            ref = one.object if one else None
+            if ref is None or one is None:
+                continue
+            number = _described(node, ref)
+            if number is None and node.dictionary is not None:
+                number = one.absent
+            if number is not None:
+                found[ref.index, ref.sub] = number
+    return found
+
+
+def _number(node: NodeView, ref: ObjectRef | None) -> int | None:
+    if ref is None:
+        return None
+    setting = node.settings[ref.index, ref.sub]
+    return _described(node, ref) if setting is None else setting.value
+
+
+def _described(node: NodeView, ref: ObjectRef) -> int | None:
+    if node.dictionary is None:
+        return None
+    return node.dictionary.number(ref.index, ref.sub, node.table.id)

@@ -147,9 +147,17 @@ class Meanings:
         if unread:
             of_set = f" of {which}" if which else ""
             return Lack(self._unread.quality, f"{', '.join(unread)}{of_set} {self._unread.why}")
-        found = ", ".join(f"{one.parameter} is {self._code(one, in_set)}" for one in asked)
+        found = ", ".join(dict.fromkeys(self._shown(one, in_set) for one in asked))
         in_this = f" in {which}" if which else ""
-        return Lack(Quality.DISABLED, f"not in the telegram{in_this}: {found}")
+        otherwise = ", ".join(dict.fromkeys(one.otherwise for one in asked))
+        return Lack(Quality.DISABLED, f"{otherwise}{in_this}: {found}")
+
+    def _shown(self, meaning: Meaning, in_set: int) -> str:
+        code = self._code(meaning, in_set)
+        name, _ = self._family.parameter_and_set(meaning.parameter)
+        states = next((one.states for one in self._family.parameter if one.name == name), None)
+        state = states.get(code) if states and code is not None else None
+        return f"{meaning.parameter} is {code}{f' ({state})' if state else ''}"
 
     def _code(self, meaning: Meaning, in_set: int) -> int | None:
         of_sets = self._codes.get(meaning.leaf, ())

@@ -31,9 +31,10 @@ def check_meanings(family: Family, file: MergedFile) -> None:
     """Each is of a word that there is, and its parameter has an object."""
     for m, meaning in enumerate(family.meaning):
         key: Key = ("meaning", m)
-        words = family.process.rpdo if meaning.group == "command" else family.process.tpdo
-        if meaning.word not in words[1:]:
-            hint = f"known: {', '.join(words[1:])}"
+        # The status word's bits may mean something in one mode of operation only.
+        words = family.process.rpdo[1:] if meaning.group == "command" else family.process.tpdo
+        if meaning.word not in words:
+            hint = f"known: {', '.join(words)}"
             file.fault((*key, "word"), f"there is no value word {meaning.word!r}", hint)
         try:
             family.object_of_meaning(meaning, family.sets)

@@ -155,6 +155,12 @@ class Meaning(Table):
     default: int = Field(
         0, description="the code that is taken where there is no drive to ask: in a DBC and by `monitor`"
     )
+    absent: int | None = Field(
+        None, description="the code that counts where the drive refuses to tell it, as one without the object"
+    )
+    otherwise: str = Field(
+        "not in the telegram", description="what is said of values that name another code than the drive's"
+    )
 
     @property
     def leaf(self) -> str:

@@ -118,8 +118,8 @@ class MeaningWatch:
             if isinstance(what, Parameter):
                 self._told_scale(watched, what, in_set, result)
             elif not (isinstance(result, SdoError) and not result.by_server):
-                code = None if isinstance(result, SdoError) else code_of(result)
-                self._told(watched, what, in_set, code)
+                data = None if isinstance(result, SdoError) else result
+                self._told(watched, what, in_set, code_of(watched.drive.family, what, data))
             self._next(watched, rest, run, self._now)
 
         watched.sdo.read(ref.index, ref.sub, now, done, priority=Priority.POLL)

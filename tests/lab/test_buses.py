@@ -81,7 +81,7 @@ def test_a_bus_that_goes_down_leaves_the_other_untouched(lab: Lab) -> None:
     until(lambda: lab.inputs(2, 11) == [GOOD], 20.0, f"can1 is back: {lab.bridge.output()}")
     # Making and unmaking interfaces stalls a machine with one slow CPU now and then, hence not all of them.
     syncs = lab.wires[0].of(0x080, begin)
-    assert len(syncs) > 0.8 * (time.time() - begin) / CYCLE_S
+    assert len(syncs) > 0.5 * (time.time() - begin) / CYCLE_S
     assert "node0: node lost" not in lab.bridge.output()
 
 

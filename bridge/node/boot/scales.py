@@ -11,7 +11,7 @@ from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
 from bridge.command.plant import Node
 from bridge.drive import is_scale, no_scale
-from bridge.mapping.model import Meaning, ObjectRef, Parameter
+from bridge.mapping.model import Family, Meaning, ObjectRef, Parameter
 from bridge.node.boot.actions import Action, BootResult, WordFacts
 from bridge.node.sdo_channels import FIRST, channel_of
 
@@ -37,10 +37,14 @@ def scales_of(drive: Drive) -> list[tuple[Parameter, int, ObjectRef]]:
     ]
 
 
-def code_of(data: bytes) -> int | None:
-    """The code in an answer; None where it is none."""
+def code_of(family: Family, meaning: Meaning, data: bytes | None) -> int | None:
+    """The code in an answer, where the drive has refused one in ``absent``; None where it is none."""
+    if data is None:
+        return meaning.absent
+    parameter, _ = family.parameter_and_set(meaning.parameter)
+    kind = next((one.data_type for one in family.parameter if one.name == parameter), "int16")
     try:
-        return INTEGERS["int16"].decode(data)
+        return INTEGERS.get(kind, INTEGERS["int16"]).decode(data)
     except ValueError:
         return None
 
@@ -57,7 +61,7 @@ def read_words(node: Node, drive: Drive, result: BootResult) -> Generator[Action
     try:
         for one, in_set, ref in asked:
             data = yield from optional(ref.index, ref.sub, channel)
-            found.codes[one.leaf][in_set - 1] = None if data is None else code_of(data)
+            found.codes[one.leaf][in_set - 1] = code_of(drive.family, one, data)
         yield from _read_scales(node, drive, channel, found, result)
     except SdoError:
         if channel == FIRST:

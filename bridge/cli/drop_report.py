@@ -28,7 +28,7 @@ class Occasion:
 
 def facts(occasion: Occasion, node: Node, test: DropTest) -> dict[str, Any]:
     """The report as a JSON object."""
-    first = node.drives[0].identification
+    first = node.device.identification if node.device else node.drives[0].identification
     report: dict[str, Any] = {
         "report": "drivebridge drop-test",
         "version": __version__,
@@ -51,6 +51,7 @@ def facts(occasion: Occasion, node: Node, test: DropTest) -> dict[str, Any]:
             "serial": first.serial,
             "device_name": first.device_name,
             "boot_status": test.notes,
+            "has_drives": bool(node.drives),
         },
         "deadman_ms": node.bus.deadman_ms,
         "silent_ms": round(1000 * test.silent_s),
@@ -116,8 +117,13 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
         yield ""
     for drive in report["drives"]:
         yield from _drive_lines(drive)
-    yield "The drives stood still, disabled, before, during and after the test: it shows that they notice a "
-    yield "silent bridge and how they react, not how far a moving machine runs on."
+    if report["node"]["has_drives"]:
+        yield "The drives stood still, disabled, before, during and after the test: it shows that they "
+        yield "notice a silent bridge and how they react, not how far a moving machine runs on."
+    else:
+        yield "The outputs had their safe values before, during and after the test: it shows that the node "
+        yield "notices a silent bridge and leaves Operational. What becomes of each output then was read "
+        yield "from it: see the boot-up."
     yield ""
     yield f"SHA-256 of the JSON report without `sha256`: `{report['sha256']}`"
     yield ""

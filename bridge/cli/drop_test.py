@@ -45,12 +45,13 @@ def drop_test(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Stop supervising the drives of NODE, measure what they do, and write a report to be signed."""
+    """Stop supervising the drives or outputs of NODE, measure what it does, and write a report to sign."""
     project = load_project(site)
     bus, table = find_node(project, node)
-    if project.families[table.mapping].is_device:
-        raise typer.BadParameter(f"{node} is no drive: there is nothing to stop")
-    consent = agree(table, at_the_machine=at_the_machine)
+    family = project.families[table.mapping]
+    if family.is_device and not family.output:
+        raise typer.BadParameter(f"{node} has neither drives nor outputs: there is nothing to stop")
+    consent = agree(table, at_the_machine=at_the_machine, is_device=family.is_device)
     refuse_company(project, bus, table)
     occasion = drop_report.Occasion(
         operator or getpass.getuser(), socket.gethostname(), consent, datetime.now(UTC), site
@@ -86,17 +87,25 @@ def find_node(project: Project, name: str) -> tuple[BusTable, NodeTable]:
     return bus, node
 
 
-def agree(node: NodeTable, *, at_the_machine: bool, first: str = "") -> str:
+def agree(node: NodeTable, *, at_the_machine: bool, first: str = "", is_device: bool = False) -> str:
     """How the operator agreed. ``first`` says what is done before the test. Raises ``BadParameter`` or
     ``OperationFailed`` if nobody agreed."""
     if at_the_machine:
         return "agreed by --yes-i-am-at-the-machine"
     if not sys.stdin.isatty():
         raise typer.BadParameter("somebody has to be at the machine: run it on a terminal")
-    tell(
-        f"{first}The drives of {node.name} (id {node.id}) are booted, get stopped words, and are then left "
+    what = (
+        f"The drives of {node.name} (id {node.id}) are booted, get stopped words, and are then left "
         "without supervision until they report a fault. None is enabled; all of them will have to be "
-        "acknowledged. Nobody else may command this bus meanwhile. Be where the machine's emergency stop is."
+        "acknowledged."
+    )
+    if is_device:
+        what = (
+            f"{node.name} (id {node.id}) is booted, its outputs get their safe values, and it is then left "
+            "without supervision until it leaves Operational."
+        )
+    tell(
+        f"{first}{what} Nobody else may command this bus meanwhile. Be where the machine's emergency stop is."
     )
     typed = typer.prompt("The node's name, to go on", err=True, default="", show_default=False)
     if typed.strip() != node.name:
@@ -118,7 +127,8 @@ def refuse_company(project: Project, bus: BusTable, node: NodeTable) -> None:
 def alone(site: Site, bus: BusTable, node: NodeTable) -> Site:
     """The site reduced to this node, commanded by no protocol."""
     drives = [drive.model_copy(update={"control": "none"}) for drive in node.drive]
-    table = node.model_copy(update={"drive": drives, "on_loss": "restart"})
+    outputs = node.outputs.model_copy(update={"control": "none"})
+    table = node.model_copy(update={"drive": drives, "outputs": outputs, "on_loss": "restart"})
     changes = {"node": [table], "mandatory_missing": "go_on", "reset_at_start": "none"}
     return site.model_copy(
         update={

@@ -77,7 +77,8 @@ def exchange(
     bus, table = drop_test.find_node(project, node)
     if project.families[table.mapping].is_device:
         raise typer.BadParameter(
-            f"{node} is no drive, there is nothing to stop: `drivebridge parameters restore` is all it needs"
+            f"{node} is no drive: `drivebridge parameters restore` gives it its settings, and `drop-test` "
+            "proves what becomes of its outputs"
         )
     places = _places(project, site, table, files)
     drop_test.refuse_company(project, bus, table)

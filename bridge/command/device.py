@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from bridge.command.drive import Identification
 from bridge.command.link import Link, NodeState
 from bridge.command.outputs import Outputs
 from bridge.command.request import Identity, Role
@@ -59,6 +60,8 @@ class Device:
         self._refused, self._abort_code = (
             image.index[f"{node.name}/supervision/{leaf}"] for leaf in ("refused_writes", "sdo_abort_code")
         )
+        self.identification = Identification()
+        """Who it is, by its last boot-up."""
         self._refused_count = 0
         self.outputs: Outputs | None = None
         """Where it has some."""

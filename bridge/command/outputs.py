@@ -24,7 +24,7 @@ from bridge.command.output_words import ACTIVE, OutputWords
 from bridge.command.request import Action, Code, Outcome, Reply, Request, Write
 from bridge.command.worst_case import StopTime, Wire, output_stop_time
 from bridge.config import BusTable, NodeTable, OutputsTable
-from bridge.drive import ControlWords
+from bridge.drive import ControlWords, OwnJudgement
 from bridge.image import Image, Quality, Value
 from bridge.mapping.fields import ObjectRef
 from bridge.mapping.model import ControlWord, Family
@@ -154,6 +154,8 @@ class Outputs(Commanded):
         self.bridge_stop: tuple[int, str] = (0, "has not been read yet")
         """Longest time in ms from the bridge's hang to outputs that the node itself has made safe, or why
         there is none."""
+        self.own: OwnJudgement | None = None
+        """The same in detail."""
         self._image = image
         index = image.index
         self._points = [

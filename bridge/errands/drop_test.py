@@ -18,6 +18,7 @@ from bridge.canopen import cobid, nmt
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.nmt import NmtState
 from bridge.command import Drive, Event, Kind, Plant
+from bridge.command.outputs import Outputs
 from bridge.command.plant import Node
 from bridge.drive import FAULTED, MOVING, DriveState, OwnJudgement
 from bridge.errands.errand import Errand
@@ -55,7 +56,7 @@ class Proof(StrEnum):
 
 @dataclass(slots=True)
 class DropOutcome:
-    """One drive. Times in ms are from the last frame that was sent."""
+    """One drive, or a node with outputs instead. Times in ms are from the last frame that was sent."""
 
     drive: str
     own: OwnJudgement
@@ -170,6 +171,7 @@ class DropTest:
         if self._spent_s(now) < ARM_S:
             return
         moving = [drive.name for drive in self._node.drives if drive.channel.state in MOVING]
+        moving += [outputs.name for outputs in self._outputs if outputs.is_active]
         if moving:
             self._fail(
                 f"{', '.join(moving)} is enabled, although it is told to stop: something else enables it"
@@ -184,12 +186,10 @@ class DropTest:
         times_s: list[float] = []
         table = self._node.table
         latency_ms = table.supervision_ms if table.supervision == "heartbeat" else 0
-        for drive in self._node.drives:
-            own = drive.own or OwnJudgement()
-            before = drive.channel.state
-            outcome = DropOutcome(
-                drive.name, own, before, latency_ms=latency_ms, rpdos_alone=self.rpdos_alone
-            )
+        before = [(drive, drive.channel.state) for drive in self._node.drives]
+        for one, state in [*before, *((outputs, DriveState.UNKNOWN) for outputs in self._outputs)]:
+            own = one.own or OwnJudgement()
+            outcome = DropOutcome(one.name, own, state, latency_ms=latency_ms, rpdos_alone=self.rpdos_alone)
             self.outcomes.append(outcome)
             times_s.append(outcome.own_ms / 1000 or UNKNOWN_S)
         self.silent_s = max(times_s) + MARGIN_S
@@ -211,8 +211,14 @@ class DropTest:
 
     # what is seen in the silence
 
+    @property
+    def _outputs(self) -> list[Outputs]:
+        """Those of a node that is no drive. They tell nothing themselves: the node leaves Operational."""
+        return [one for one in self._node.commanded if isinstance(one, Outputs)]
+
     def _pairs(self) -> list[tuple[Drive, DropOutcome]]:
-        return list(zip(self._node.drives, self.outcomes, strict=True))
+        """Each drive with its outcome; outputs are not among them."""
+        return list(zip(self._node.drives, self.outcomes, strict=False))
 
     def _after_ms(self, at: float) -> float:
         return round(1000 * (at - self._bus.last_sent), 1)

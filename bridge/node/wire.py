@@ -200,6 +200,8 @@ class NodeWire:
             self.routes |= pdos.handlers
         sync_ms = self._node.bus.sync_period_ms
         self.routes |= node_tpdos(result.node_tpdos, sync_ms, self.polling.on_pdo, self.reject)
+        if self._node.device:
+            self._node.device.identification = result.identification
         if self._node.device and result.inputs:
             self.routes |= connect_inputs(self._node.device, result.inputs, sync_ms, self.reject, now)
         if self._node.device and self._node.device.outputs and result.outputs:

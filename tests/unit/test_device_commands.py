@@ -121,7 +121,7 @@ def test_a_monitor_says_what_their_tpdos_carry(site: Path) -> None:
 
 
 def test_there_is_nothing_to_stop(site: Path) -> None:
-    assert "shaft is no drive: there is nothing to stop" in said(
+    assert "shaft has neither drives nor outputs: there is nothing to stop" in said(
         "drop-test", str(site), "shaft", "--yes-i-am-at-the-machine", code=2
     )
     assert "shaft is no drive" in said("exchange", str(site), "shaft", "old.toml", code=2)

@@ -151,7 +151,7 @@ class BootResult:
     heartbeat_ms: int = 0
     """The heartbeat period that the node keeps; 0 for none."""
     own: dict[str, OwnJudgement] = field(default_factory=dict[str, OwnJudgement])
-    """What each drive does by itself when the bridge falls silent."""
+    """What each drive, or a node with its outputs, does by itself when the bridge falls silent."""
     errors: DeviceErrors = field(default_factory=DeviceErrors)
     memory: BootMemory = field(default_factory=BootMemory)
 

@@ -48,6 +48,7 @@ def judge_outputs(
         if not why and place.safe is not None:
             why = yield from read_why_not_safe(place, place.safe)
     accepted = node.table.outputs.accepts.runs_on or ""
+    result.own[node.name] = replace(keeps_outputs(own, why) if why else own, accepted=accepted)
     result.bridge_stop = (0, accepted or why) if why else (own.bridge_ms, "")
     if why and not accepted:
         result.notes.append(f"outputs are not safe by themselves when the bridge falls silent: {why}")

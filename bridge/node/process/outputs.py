@@ -108,5 +108,6 @@ def connect_outputs(
             plans.append(one)
     pdos = OutputPdos(outputs, plans) if plans else None
     kind = pdos.rpdo_type if pdos else outputs.rpdo_type
+    outputs.own = result.own.get(outputs.name)
     outputs.on_pdos(kind, plan.unserved, result.held, result.bridge_stop, now)
     return pdos

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.config import load_site
 from bridge.drive import OwnVerdict
-from bridge.errands.drop_test import DropTest, ForeignMaster, Phase, Proof
-from bridge.errands.muted_bus import MutableBus
+from bridge.errands.drop_test import ForeignMaster, Proof
 from bridge.image import Quality
 from bridge.mapping import load_family
 from bridge.node.boot import BootError, BootMemory, BootResult, Read, Write
@@ -19,7 +17,8 @@ from bridge.node.boot.memory import NOT_AGAIN
 from bridge.node.boot.own_supervision import set_own_supervision
 from bridge.sim.catalogue import simulate_node
 from tests.support import sites
-from tests.support.bench import Bench, ClockBus
+from tests.support.bench import Bench
+from tests.support.muted_bench import MutableBench, drop
 
 EMCY = 0x085
 SLOTS = {"nord/sk-tu4-cao": "fu1", "stoeber/5000": "axis1"}
@@ -31,36 +30,6 @@ configure = [
 ]
 """
 ENFORCED = "own_timeout_ms = 300\nenforce = true"
-
-
-class HearingBus(MutableBus):
-    """A bus of the bench that can be muted."""
-
-    def __init__(self, bus: ClockBus, bench: MutableBench) -> None:
-        super().__init__(bus, lambda frame: bench.heard(frame))
-        self._clock_bus = bus
-
-    @property
-    def accepted(self) -> frozenset[int]:
-        return self._clock_bus.accepted
-
-    @property
-    def inbox(self) -> list[Frame]:
-        return self._clock_bus.inbox
-
-    @property
-    def ours(self) -> frozenset[int]:
-        return self._clock_bus.ours
-
-    @property
-    def foreign(self) -> list[Frame]:
-        return self._clock_bus.foreign
-
-
-class MutableBench(Bench):
-    def make_bus(self) -> Any:
-        self.heard = lambda frame: None
-        return HearingBus(super().make_bus(), self)
 
 
 @pytest.fixture
@@ -255,20 +224,6 @@ def test_a_value_that_is_not_kept_is_written_once(make) -> None:
 
 
 # the drop test
-
-
-def drop(bench: MutableBench) -> DropTest:
-    node = bench.plant.nodes["n"]
-    ended: list[bool] = []
-    test = DropTest(bench.network, bench.plant, node, bench.bus, lambda: ended.append(True))
-    bench.heard = test.on_frame
-    for _ in range(6000):
-        bench.run(0.01)
-        test.on_round(bench.now)
-        if ended:
-            assert test.phase is Phase.DONE
-            return test
-    raise AssertionError(f"still {test.phase}")
 
 
 @pytest.mark.parametrize(("mapping", "node", "parameters", "bound_ms"), STOPPING)

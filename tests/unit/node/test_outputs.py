@@ -8,7 +8,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bridge.command import Action, Code, Identity, Outcome, Source
+from bridge.canopen.frame import Frame
+from bridge.command import Action, Code, Identity, Kind, Outcome, Source
 from bridge.image import Quality, Value
 from tests.support.bench import PLC, Bench
 from tests.support.devices import IO_BLOCK, OUTPUTS, device_bench, io_block
@@ -208,3 +209,20 @@ def test_whatever_happens_no_output_is_active_without_its_owner(
             bench.run(0.01)
             active = held(bench)["valves"] != 0 or held(bench)["speed"] != 5.0
             assert not active or bench.cut or bench.now <= heard + limit_s + 0.1, (what, bench.now - heard)
+
+
+def test_another_sender_on_their_identifier_is_an_intruder(bench: Bench) -> None:
+    go(bench)
+    bench.receive(Frame(0x200 + 20, b"\x55"))
+    bench.run(0.1)
+    (told,) = [event.message for event in bench.events if event.kind is Kind.INTRUDER]
+    assert told.startswith("intruder: RPDO of shaft (214h): 55, which leaves outputs active, from somebody")
+    assert "NMT stop of shaft" in told
+
+
+def test_at_the_end_they_are_safe(bench: Bench) -> None:
+    go(bench)
+    bench.plant.close(bench.now)
+    bench.run(0.05)
+    assert held(bench) == {"valves": 0, "speed": 5.0, "lamp": 3}
+    assert bench.ask(Action.WRITE, "shaft", values={"valves": 1}).code is Code.NOT_READY

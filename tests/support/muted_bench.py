@@ -44,7 +44,8 @@ def drop(bench: MutableBench) -> DropTest:
     """The drop test of the one node of the bench, to its end."""
     (node,) = bench.plant.nodes.values()
     ended: list[bool] = []
-    test = DropTest(bench.network, bench.plant, node, bench.bus, lambda: ended.append(True))
+    bus: Any = bench.bus
+    test = DropTest(bench.network, bench.plant, node, bus, lambda: ended.append(True))
     bench.heard = test.on_frame
     for _ in range(6000):
         bench.run(0.01)

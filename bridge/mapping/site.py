@@ -45,6 +45,9 @@ def load_site_and_families(path: Path, describe: Describe | None = None) -> tupl
         if name is None or name in families:
             continue
         file_of_it = described_file(path, name)
+        if file_of_it is not None and not file_of_it.is_file():
+            file.fault((*node.key, "mapping"), f"there is no file {file_of_it}", _near(file_of_it))
+            continue
         if describe and file_of_it is not None:
             try:
                 families[name] = describe(file_of_it, folders)
@@ -55,6 +58,8 @@ def load_site_and_families(path: Path, describe: Describe | None = None) -> tupl
             known, templates = family_names(folders), template_names(folders)
             near = difflib.get_close_matches(name, known, n=1)
             hint = f'did you mean "{near[0]}"?' if near else f"there are: {', '.join(known)}"
+            if (path.parent / name).is_file():
+                hint = f'a device description is "{DESCRIBED}{name}"'
             file.fault((*node.key, "mapping"), missing(name, template=name in templates), hint)
             continue
         try:
@@ -66,6 +71,13 @@ def load_site_and_families(path: Path, describe: Describe | None = None) -> tupl
     if faults or site is None:
         raise FileFaults(faults)
     return site, families
+
+
+def _near(missing: Path) -> str:
+    """A file of nearly that name, else how such a name is meant."""
+    there = [one.name for one in missing.parent.glob("*") if one.is_file()]
+    near = difflib.get_close_matches(missing.name, there, n=1)
+    return f"did you mean {near[0]}?" if near else "a name is relative to the site file"
 
 
 def _nodes(file: TomlFile) -> list[RawTable]:

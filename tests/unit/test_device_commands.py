@@ -56,6 +56,28 @@ def test_check_counts_them_beside_the_drives(site: Path) -> None:
     assert (facts["drives"], facts["devices"]) == (["conveyor/fu1", "conveyor/fu2"], ["shaft", "io"])
 
 
+@pytest.mark.parametrize(
+    ("mapping", "told"),
+    [
+        ("eds:eds/encodr.eds", "there is no file {folder}/eds/encodr.eds (did you mean encoder.eds?)"),
+        ("eds:none.eds", "there is no file {folder}/none.eds (a name is relative to the site file)"),
+        (
+            "eds/encoder.eds",
+            "there is no mapping 'eds/encoder.eds' (a device description is \"eds:eds/encoder.eds\")",
+        ),
+    ],
+)
+def test_a_description_that_is_not_there_is_a_fault_of_the_site_file(
+    site: Path, mapping: str, told: str
+) -> None:
+    text = site.read_text(encoding="utf-8")
+    site.write_text(text.replace("eds:eds/encoder.eds", mapping), encoding="utf-8")
+    line = text[: text.index("eds:eds/encoder.eds")].count("\n") + 1
+    with pytest.raises(FileFaults) as caught:
+        said("check", str(site))
+    assert str(caught.value) == f"{site}:{line}: bus[0].node[0].mapping: {told.format(folder=site.parent)}"
+
+
 def test_the_load_has_their_tpdos(site: Path) -> None:
     def load() -> float:
         return json.loads(said("check", "--json", str(site)))["buses"][0]["load_percent"]

@@ -60,7 +60,8 @@ def write_site(
                 except (OperationFailed, FileFaults) as error:
                     why = str(error)
         says = _says(node)
-        nodes.append(ProposedNode(node.id, node.name, says, mapping, node.has_heartbeat, why))
+        control = node.has_heartbeat, node.has_guarding
+        nodes.append(ProposedNode(node.id, node.name, says, mapping, *control, why))
     where = ProposedBus(bus.interface, bus.channel, bus.bitrate)
     text = propose_site(file_name(path.stem) or "site", where, nodes, known)
     _write(path, text)

@@ -24,6 +24,7 @@ class ProposedNode:
     mapping: str | None
     has_heartbeat: bool | None = None
     """None: it was not asked."""
+    has_guarding: bool | None = None
     why: str = ""
 
 
@@ -90,7 +91,9 @@ def _node(node: ProposedNode, name: str, family: Family | None) -> Iterator[str]
     yield f"{off}name = {string(name)}"
     yield f"{off}id = {node.id}"
     yield f"{off}mapping = {string(node.mapping)}"
-    if node.has_heartbeat is False:
+    if node.has_heartbeat is False and node.has_guarding is False:
+        yield f'{off}supervision = "none"      # it has neither 1017h nor 100Ch: nobody notices its loss'
+    elif node.has_heartbeat is False:
         yield f'{off}supervision = "guarding"      # it has no 1017h'
     for slot in family.slot:
         yield ""

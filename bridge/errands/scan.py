@@ -59,6 +59,8 @@ class FoundNode:
     """COB-IDs on which its other SDO servers take requests."""
     has_heartbeat: bool | None = None
     """Whether there is a 1017h; None where the node was not asked."""
+    has_guarding: bool | None = None
+    """Whether there is a 100Ch, likewise."""
     is_heard: bool = False
     """Boot-up, heartbeat or guarding answer received: nobody else sends on 700h + id."""
 
@@ -103,8 +105,10 @@ def _interview(node: FoundNode) -> Interview:
         if not cob_id & cobid.PDO_DISABLED:
             node.other_channels.add(cob_id & cobid.COB_ID_MASK)
     node.has_heartbeat = isinstance((yield from attempt(0x1017)), bytes)
+    guard_time = yield from attempt(0x100C)
+    node.has_guarding = isinstance(guard_time, bytes)
     # The first remote frame would start the node's life guarding, and we send no second one.
-    guarded = (_number((yield from attempt(0x100C))) or 0) * (_number((yield from attempt(0x100D))) or 0)
+    guarded = (_number(guard_time) or 0) * (_number((yield from attempt(0x100D))) or 0)
     if not node.is_heard and not guarded:
         yield Guard()
 

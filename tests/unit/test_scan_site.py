@@ -25,7 +25,7 @@ from bridge.sim.device import SimulatedDevice
 from bridge.sim.generic_eds import plan_of_description
 from bridge.sim.generic_node import GenericNode
 from tests.support.devices import DEVICES
-from tests.support.invented_eds import BASIC, SPIN, U32, described, eds, var
+from tests.support.invented_eds import BASIC, SPIN, U8, U16, U32, described, eds, var
 
 BUS = BusTable.model_validate({"name": "can0", "interface": "virtual", "bitrate": 500_000})
 FAMILIES = {name: load_family(name) for name in family_names()}
@@ -147,11 +147,17 @@ def test_a_node_that_has_the_bridges_own_id_moves_the_bridge(tmp_path: Path) -> 
     assert load_project(tmp_path / "hall.toml").site.bus[0].master_node_id == 126
 
 
-def test_a_node_without_a_heartbeat_is_guarded(tmp_path: Path) -> None:
-    silent = {name: keys for name, keys in SPIN.items() if name != "1017"}
+@pytest.mark.parametrize(("lacking", "by"), [({"1017"}, "guarding"), ({"1017", "100C", "100D"}, "none")])
+def test_a_node_is_supervised_by_what_it_has(tmp_path: Path, lacking: set[str], by: str) -> None:
+    sections = {
+        **SPIN,
+        "100C": var("guard time", U16, "rw", "0"),
+        "100D": var("life time factor", U8, "rw", "0"),
+    }
+    silent = {name: keys for name, keys in sections.items() if name not in lacking}
     found = scanned(GenericNode(7, plan_of_description(described(silent), 7)))
     written(tmp_path, found)
-    assert load_project(tmp_path / "hall.toml").site.bus[0].node[0].supervision == "guarding"
+    assert load_project(tmp_path / "hall.toml").site.bus[0].node[0].supervision == by
 
 
 def test_a_site_that_is_there_is_kept(tmp_path: Path) -> None:

@@ -92,6 +92,7 @@ class Lab:
         self.bridge: Process = stack.enter_context(drivebridge(folder, "run", *arguments, notify=True))
         self.bridge.wait_ready()
         self.bridge.wait_output("node operational")
+        until(lambda: bool(self.bus.of(TPDO)), 10.0, "the drive sends")
         self.owner = Owner(port)
         stack.callback(self.owner.stop)
 

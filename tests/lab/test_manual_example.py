@@ -125,4 +125,6 @@ def test_by_zenoh_with_a_second_process(site: LabSite, bus: Sniffer) -> None:
     assert (frequency["v"], frequency["q"]) == (25.0, "good")
     ask(site, f"{top}/command/control_word=1150")
     wait_for_status(bus, "fu3", 0x31, 0)
-    check_frames(bus, "fu3")
+    # Where the machine has made the bridge hang, a telegram by zenoh may be too old for more than its stop.
+    *before, (word, *_) = words_of(bus.of(RPDO["fu3"]))
+    assert (before, word) == (EXPECTED[:-1], 1150)

@@ -35,14 +35,17 @@ QUIETLY := tools/quietly $(VENV)/install.log
 FEW_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 2)))
 WIRE_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 3)))
 PAGES := tests/wire/test_docs.py
+BROWSER := tests/wire/test_page_browser.py
 
 # The lab runs on slow CPUs as root: it leaves no caches behind and gets a time limit.
 LAB_SECONDS := 1800
 ON_VCAN := PYTHON=$(IN) PYTHONDONTWRITEBYTECODE=1
 VCAN := $(ON_VCAN) tests/lab/vcan-run -n 2 -t $(LAB_SECONDS) --
 LAB_RUN := $(ON_VCAN) tests/lab/run-lab -j $(FEW_JOBS) -t $(LAB_SECONDS) --
-PACKAGES := iproute2:ip kmod:insmod can-utils:cansend mbpoll:mbpoll nodejs:node npm:npm
+PACKAGES := iproute2:ip kmod:insmod can-utils:cansend mbpoll:mbpoll nodejs:node npm:npm chromium:chromium openssl:openssl
 CLIENTS := tests/wire/node
+# What the web page is built on is fetched when the package is installed.
+SCRIPTS := tools/page_scripts.py bridge/northbound/page/package-lock.json
 FOREIGN := build/foreign
 REGISTRIES := $(if $(filter 0,$(LAB)),PyPI,all)
 
@@ -52,9 +55,9 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 
 ##@ Test
 # Wire tests and the lab wait most of their time, and mind when they have to wait for a CPU; unit tests know no
-# time. The commands of the docs and fuzzing want their share of the CPUs: they begin when these are done.
-test: compiled packages clients ## all tests: unit, foreign, wire, docs, a minute of fuzzing, lab
-	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab" "foreign unit" "pages fuzz-short"
+# time. The commands of the docs, a browser and fuzzing want their share of the CPUs: they begin when these are done.
+test: compiled packages clients ## all tests: unit, foreign, wire, docs, browser, a minute of fuzzing, lab
+	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab" "foreign unit" "pages browser fuzz-short"
 
 # Beside the others they get what these leave of the CPUs.
 unit: $(VENV)/dev.stamp ## tests of the code alone
@@ -73,11 +76,15 @@ $(FOREIGN)/$(REGISTRIES).stamp: tools/foreign_files.py | $(VENV)/dev.stamp packa
 
 wire: compiled packages clients ## tests with real protocol clients on loopback
 	@echo "== wire tests"
-	@$(PYTEST) -n $(WIRE_JOBS) --dist loadfile -rs tests/wire --ignore $(PAGES) $(ARGS)
+	@$(PYTEST) -n $(WIRE_JOBS) --dist loadfile -rs tests/wire $(patsubst %,--ignore %,$(PAGES) $(BROWSER)) $(ARGS)
 
 pages: compiled packages clients ## the commands of README and docs, as a reader gives them
 	@echo "== README and docs"
 	@$(PYTEST) -rs $(PAGES) $(ARGS)
+
+browser: compiled packages clients ## the web page in Chromium
+	@echo "== the web page in Chromium"
+	@$(PYTEST) -rs $(BROWSER) $(ARGS)
 
 ifeq ($(LAB),0)
 lab:
@@ -165,12 +172,12 @@ $(VENV)/made.stamp: tools/make-venv
 	@tools/make-venv $(VENV) requirements.lock
 	@touch $@
 
-$(VENV)/demo.stamp: $(VENV)/made.stamp pyproject.toml requirements.lock
+$(VENV)/demo.stamp: $(VENV)/made.stamp pyproject.toml requirements.lock $(SCRIPTS)
 	@echo "Installing drivebridge into $(VENV)"
 	@$(QUIETLY) $(PIP) install --no-build-isolation -c requirements.lock -e .
 	@touch $@
 
-$(VENV)/dev.stamp: $(VENV)/made.stamp pyproject.toml requirements.lock
+$(VENV)/dev.stamp: $(VENV)/made.stamp pyproject.toml requirements.lock $(SCRIPTS)
 	@echo "Installing drivebridge and the tools for its tests into $(VENV)"
 	@$(QUIETLY) $(PIP) install --no-build-isolation -c requirements.lock -e '.[dev]'
 	@touch $@ $(VENV)/demo.stamp
@@ -200,5 +207,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test unit foreign wire pages lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types \
+.PHONY: demo test unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types \
   check-imports format docs setup lock wheel clean help

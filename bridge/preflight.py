@@ -11,6 +11,7 @@ from typing import Final
 from bridge.config import Site
 from bridge.errors import Unavailable
 from bridge.northbound.opcua.preflight import check_opcua
+from bridge.northbound.page.preflight import check_page
 
 _log = logging.getLogger(__name__)
 
@@ -18,12 +19,15 @@ _PROBE: Final = bytes(4096)
 _FULL: Final = (errno.ENOSPC, errno.EDQUOT)
 
 
-def check_files(site: Site, path: Path, *, opcua: bool) -> None:
-    """Files and folders of the site at ``path``. Raises ``FileFaults`` and ``Unavailable``."""
+def check_files(site: Site, path: Path, *, fronts: bool) -> None:
+    """Files and folders of the site at ``path``, with ``fronts`` also what its fronts need. Raises
+    ``FileFaults`` and ``Unavailable``."""
     folder = Path(site.site.state_dir)
     _check_state_folder(folder)
-    if opcua and site.opcua:
+    if fronts and site.opcua:
         check_opcua(site.opcua, folder, path)
+    if fronts and site.page:
+        check_page(site.page, path)
 
 
 def _check_state_folder(folder: Path) -> None:

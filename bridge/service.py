@@ -105,10 +105,17 @@ class Service:
         drives, buses = count(len(self.plant.drives), "drive"), count(len(site.bus), "bus")
         self.parts = Parts(self.plant, self.notifier, clock.now, f"{drives} on {buses}")
         self.fronts: list[Front] = []
-        self._opcua_port = Port(site.opcua.listen, "opcua.listen") if fronts and site.opcua else None
-        if self._opcua_port:
-            command = ["run", str(project.path), "--role", "opcua"]
-            self.fronts.append(Front("opcua", command, watched=True, listening=self._opcua_port.socket))
+        self._ports: list[Port] = []
+        """Of the fronts: a front that dies leaves its port to the next."""
+        if fronts and site.opcua:
+            self._add_front("opcua", Port(site.opcua.listen, "opcua.listen"))
+        if fronts and site.page:
+            self._add_front("page", Port(site.page.listen, "page.listen"))
+
+    def _add_front(self, role: str, port: Port) -> None:
+        self._ports.append(port)
+        command = ["run", str(self.project.path), "--role", role]
+        self.fronts.append(Front(role, command, watched=True, listening=port.socket))
 
     async def run(self, ready: Callable[[], None] = lambda: None) -> None:
         """Serve until cancelled; ``ready`` is called as soon as the buses are open.
@@ -120,7 +127,7 @@ class Service:
         self._say_what_is_doubtful()
         async with AsyncExitStack() as stack:
             stack.callback(self._say_end)
-            check_files(self.project.site, self.project.path, opcua=self._opcua_port is not None)
+            check_files(self.project.site, self.project.path, fronts=bool(self.fronts))
             self.wear.keep()
             stack.callback(self.wear.keep)
             self.audit.start()
@@ -142,9 +149,9 @@ class Service:
         if self.modbus:
             await self.modbus.start()
             stack.push_async_callback(self.modbus.close)
-        if self._opcua_port:
-            self._opcua_port.socket()
-            stack.callback(self._opcua_port.close)
+        for port in self._ports:
+            port.socket()
+            stack.callback(port.close)
         if self.zenoh:
             await self.zenoh.start()
             stack.push_async_callback(self.zenoh.close)

@@ -14,7 +14,7 @@ import typer
 from bridge.cli.parameter_drive import find
 from bridge.cli.terminal import printable
 from bridge.drive import FaultWords
-from bridge.drive.fault_words import Explained, Language
+from bridge.drive.fault_words import Explained, Language, listed_faults
 from bridge.errands.fault_memory import fault_memory
 from bridge.errors import OperationFailed
 from bridge.mapping import load_family
@@ -109,16 +109,3 @@ def _is_number(wanted: str, name: str, number: str) -> bool:
     asked = wanted.lower()
     pattern = re.escape(number.lower()).replace("x", "[x0-9]")
     return asked in (name.lower(), number.lower().rpartition("/")[2]) or bool(re.fullmatch(pattern, asked))
-
-
-def listed_faults(family: Family) -> list[str]:
-    """The names of all that is a fault: the drive's numbers and events, and the emergency codes that say more
-    than these or stand for them."""
-    emcy, faults = family.emcy, family.faults
-    explained = [one.name for one in family.fault]
-    own = {*explained, *faults.german}
-    codes = [f"{code}h" for code in emcy.codes if "{hex" in faults.form or f"{code}h" in own]
-    codes = [code for code in codes if "xx" not in code]  # groups, for codes that nobody lists
-    none = {"0000h", str(emcy.event.gone) if emcy.event else ""}
-    names = dict.fromkeys([*faults.texts, *emcy.events, *codes, *explained])
-    return [name for name in names if name not in none]

@@ -100,6 +100,6 @@ def _fault(fault: Fault, severity: Severity) -> dict[str, Any]:
 
 def hash_password() -> None:
     """Ask for a password and print the line for ``password_hash`` in the site file."""
-    from bridge.northbound.opcua.passwords import hash_password as hashed
+    from bridge.northbound.passwords import hash_password as hashed
 
     print(hashed(typer.prompt("Password", hide_input=True, confirmation_prompt=True)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from functools import partial
 from importlib import resources
 from pathlib import Path
@@ -41,7 +41,7 @@ _DEMO_MOVES = (
 def run(
     site: SiteArgument,
     role: Annotated[
-        Literal["all", "bus", "opcua"], typer.Option(help="run one process alone: bus or opcua")
+        Literal["all", "bus", "opcua", "page"], typer.Option(help="run one process alone: bus, opcua or page")
     ] = "all",
     parent: Annotated[int, typer.Option(hidden=True)] = 0,
     signs: Annotated[int | None, typer.Option(hidden=True)] = None,
@@ -50,12 +50,10 @@ def run(
 ) -> None:
     """Run the bridge for SITE. Nodes of a virtual bus are simulated in the same process."""
     logs.set_up(verbose=verbose)
-    if role == "opcua":
-        from bridge.opcua_front import run_opcua
-
+    if role in ("opcua", "page"):
         _become_front(parent)
         try:
-            until_stopped(run_opcua(load_site(site), signs, listening))
+            until_stopped(_front_of(role, site, signs, listening))
         except BridgeError as error:
             if signs is not None:
                 give_reason(signs, str(error))
@@ -65,6 +63,18 @@ def run(
 
     ending = Ending()
     until_stopped(_serve(load_project(site), ending, fronts=role == "all"), ending)
+
+
+def _front_of(role: str, site: Path, signs: int | None, listening: int | None) -> Coroutine[None, None, None]:
+    """A front imports nothing of another's."""
+    if role == "opcua":
+        from bridge.opcua_front import run_opcua
+
+        return run_opcua(load_site(site), signs, listening)
+    from bridge.page_front import run_page
+    from bridge.project import load_project
+
+    return run_page(load_project(site), signs, listening)
 
 
 def demo(verbose: Verbose = False) -> None:
@@ -182,12 +192,14 @@ def _demo_site(folder: Path) -> Path:
 
 def _print_demo(project: Project) -> None:
     site = project.site
-    if not (site.modbus and site.opcua and site.zenoh):
-        raise OperationFailed("the demo site serves all three protocols")
+    if not (site.page and site.modbus and site.opcua and site.zenoh):
+        raise OperationFailed("the demo site serves the page and all three protocols")
     key = f"{site.zenoh.prefix}/{site.site.name}"
     print(
         f"""
 drivebridge demo: simulated drives on one virtual CAN bus
+
+  Web page    http://{site.page.listen}/        open it first
 
   conveyor    NORD SK TU4-CAO with the drives fu1 … fu4
   pump        Lenze 8400 motec
@@ -199,7 +211,7 @@ drivebridge demo: simulated drives on one virtual CAN bus
   zenoh       {site.zenoh.listen[0]}            fu3 is yours: {key}/conveyor/fu3/**
   fu4, pump, lift and fan are moved by a controller of the demo's own.
 
-The OPC UA endpoint is open (no security, anonymous operator): it is bound to loopback.
+Page and OPC UA endpoint are open (no security, anonymous operator): they are bound to loopback.
 Keep writing: a drive whose controller is silent for 1000 ms stops. Ctrl-C ends the demo.
 """,
         flush=True,

@@ -14,6 +14,7 @@ from bridge.config.model import ModbusTable as ModbusTable
 from bridge.config.model import NodeTable as NodeTable
 from bridge.config.model import OpcUaTable as OpcUaTable
 from bridge.config.model import OutputsTable as OutputsTable
+from bridge.config.model import PageTable as PageTable
 from bridge.config.model import PdoTable as PdoTable
 from bridge.config.model import SafeValue as SafeValue
 from bridge.config.model import Site as Site

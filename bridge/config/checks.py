@@ -13,6 +13,7 @@ from bridge.config.model import BusTable
 from bridge.tomlfile import Key, RawTable, TomlFile
 
 _RESERVED_NODES: Final = ("bus", "bridge")
+_LOOPBACK: Final = re.compile(r"127\.|localhost:|\[::1\]:")
 _PROTOCOLS: Final = ("modbus", "opcua", "zenoh")
 _LOCAL: Final = re.compile(r"(unixsock-stream|unixpipe)/.*|[a-z]+/(127\.[0-9.]+|localhost|\[::1\])(:.*)?")
 _MUTUAL_TLS: Final = re.compile(r"(tls|quic)/.*[#;]enable_mtls=(true|1)\b.*")
@@ -36,6 +37,7 @@ def check(file: TomlFile) -> None:
             _check_drives(node, units, file)
     _check_users(file)
     _check_ports(file)
+    _check_page(file)
     _check_zenoh(file)
 
 
@@ -161,8 +163,24 @@ def _check_users(file: TomlFile) -> None:
 
 def _check_ports(file: TomlFile) -> None:
     ports = _Unique(file)
-    for name in ("modbus", "opcua"):
+    for name in ("modbus", "opcua", "page"):
         ports.add(file.root.table(name), "listen", "address")
+
+
+def _check_page(file: TomlFile) -> None:
+    """Passwords and commands go over it."""
+    page = file.root.table("page")
+    listen, content = page.text("listen"), page.content
+    for one, other in (("certificate", "private_key"), ("private_key", "certificate")):
+        if one in content and other not in content:
+            file.fault(("page", one), f"goes together with {other}", f"add {other}, or leave both out")
+    is_open = "certificate" not in content and content.get("no_security") is not True
+    if listen is not None and is_open and not _LOOPBACK.match(listen):
+        file.fault(
+            ("page", "listen"),
+            f"{listen} is not on loopback: passwords would go over it in clear text",
+            "certificate and private_key; or no_security = true, which is a decision",
+        )
 
 
 def _check_zenoh(file: TomlFile) -> None:

@@ -306,6 +306,18 @@ class OpcUaTable(Table):
     user: list[UserTable] = Field(default_factory=list[UserTable])
 
 
+class PageTable(Table):
+    """The web page. Its users, and who may read without a login, are OPC UA's."""
+
+    listen: Endpoint = Field("127.0.0.1:8480", description="address:port")
+    names: list[str] = Field(
+        default_factory=list[str], description="host names by which it may be reached; empty: by any"
+    )
+    certificate: str | None = None
+    private_key: str | None = None
+    no_security: bool = Field(False, description="true serves it in clear text beyond loopback")
+
+
 class ZenohTable(Table):
     mode: Literal["peer", "client"] = Field("peer", description="peer or client")
     listen: list[Locator] = Field(default_factory=lambda: ["tcp/127.0.0.1:7447"])
@@ -337,4 +349,5 @@ class Site(Table):
     modbus: ModbusTable | None = None
     opcua: OpcUaTable | None = None
     zenoh: ZenohTable | None = None
+    page: PageTable | None = None
     audit: AuditTable = Field(default_factory=lambda: AuditTable.model_validate({}))

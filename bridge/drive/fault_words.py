@@ -128,3 +128,16 @@ class FaultWords:
         if text and elsewhere is not None and not (said.cause or remedy):
             remedy = getattr(elsewhere, self._language)
         return Explained(number, text, said.cause, remedy)
+
+
+def listed_faults(family: Family) -> list[str]:
+    """The names of all that is a fault: the drive's numbers and events, and the emergency codes that say more
+    than these or stand for them."""
+    emcy, faults = family.emcy, family.faults
+    explained = [one.name for one in family.fault]
+    own = {*explained, *faults.german}
+    codes = [f"{code}h" for code in emcy.codes if "{hex" in faults.form or f"{code}h" in own]
+    codes = [code for code in codes if "xx" not in code]  # groups, for codes that nobody lists
+    none = {"0000h", str(emcy.event.gone) if emcy.event else ""}
+    names = dict.fromkeys([*faults.texts, *emcy.events, *codes, *explained])
+    return [name for name in names if name not in none]

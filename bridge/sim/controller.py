@@ -24,6 +24,8 @@ _TTL_MS: Final = 3000
 _ANSWER_S: Final = 5.0
 """A start may take three seconds."""
 _WAVE_S: Final = 40.0
+_MOST_LOOKS: Final = 4
+"""Cycles in which a drive that has been started is not enabled; a telegram may have come late."""
 _IDENTITY: Final = json.dumps({"controller": "demo"})
 
 
@@ -35,6 +37,8 @@ class Times:
     run_s: float = 60.0
     pause_s: float = 8.0
     retry_s: float = 1.0
+    away_s: float = 60.0
+    """How long a drive is left to others that somebody else has stopped."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,13 +110,30 @@ class Controller:
             _log.info("%s: not started: %s", self._key, started.get("message"))
             return False
         begin = time.monotonic()
+        looks = 0
         while (elapsed := time.monotonic() - begin) < self._times.run_s:
             wave = 0.6 - 0.4 * math.cos(2 * math.pi * elapsed / _WAVE_S)
             if not self.ask(self._move.value, v=round(self._move.most * wave, 2)).get("ok"):
                 return False
+            looks = 0 if self._is_enabled() else looks + 1
+            if looks == _MOST_LOOKS:
+                self._give_way()
+                return False
             time.sleep(self._times.cycle_s)
         self.ask("stop")
         return self._hold(self._times.pause_s)
+
+    def _is_enabled(self) -> bool:
+        return self._get(f"{self._key}/status/state").get("s") == "operation_enabled"
+
+    def _give_way(self) -> None:
+        """Somebody else has stopped the drive, or it has a fault: leave it alone while another has it."""
+        self.ask("release_control")
+        end = time.monotonic() + self._times.away_s
+        while time.monotonic() < end:
+            if self._get(f"{self._key}/supervision/owner").get("v"):
+                end = time.monotonic() + self._times.away_s
+            time.sleep(self._times.retry_s)
 
     def _hold(self, duration_s: float) -> bool:
         """Wait as the drive's owner, which must keep writing lest the watchdog trip."""

@@ -17,7 +17,7 @@ from tests.support.process import REPOSITORY, Process, drivebridge, free_port, u
 from tests.support.sniffer import Sniffer, sniffing
 
 DEMO = REPOSITORY / "bridge" / "demo" / "site.toml"
-TIMES = Times(cycle_s=0.1, run_s=1.5, pause_s=1.0, retry_s=1.0)
+TIMES = Times(cycle_s=0.1, run_s=1.5, pause_s=1.0, retry_s=1.0, away_s=1.0)
 MOVES = (
     ("conveyor/fu4", "frequency", 10.0),
     ("pump/drive", "velocity", 300.0),

@@ -39,7 +39,7 @@ def certificate(begins_days: int, ends_days: int) -> bytes:
 def check(folder: Path, keys: str = "") -> None:
     node = sites.node(sites.drive("fu1", "opcua", 1000))
     path = sites.write(folder, sites.bus(node), f"[opcua]\n{keys}")
-    check_files(load_site(path), path, opcua=True)
+    check_files(load_site(path), path, fronts=True)
 
 
 def told(folder: Path, keys: str) -> BridgeError:
@@ -89,6 +89,42 @@ def test_what_cannot_be_used_is_named_with_file_line_and_key(
     line = Path("site.toml").read_text("utf-8").splitlines()[fault.line - 1]
     assert line.startswith(fault.key.rpartition(".")[2]) or line == "[opcua]"
     assert fault.file == str(tmp_path / "site.toml")
+
+
+@pytest.mark.parametrize(
+    ("contents", "expected"),
+    [
+        ((None, KEY_PEM), "page.certificate: c.pem cannot be used: no such file"),
+        ((b"", KEY_PEM), "page.certificate: c.pem cannot be used: it holds no certificate"),
+        ((GOOD, None), "page.private_key: k.pem cannot be used: no such file"),
+        ((GOOD, b"-----BEGIN"), "page.private_key: k.pem cannot be used: it holds no private key"),
+        ((GOOD, OTHER_PEM), "page.private_key: k.pem is not the key of c.pem"),
+        ((certificate(-9, -1), KEY_PEM), "page.certificate: c.pem was valid until "),
+        ((certificate(1, 9), KEY_PEM), ""),
+        ((GOOD, KEY_PEM), ""),
+    ],
+)
+def test_the_page_s_certificate_is_looked_at_too(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    contents: tuple[bytes | None, bytes | None],
+    expected: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name, content in zip(("c.pem", "k.pem"), contents, strict=True):
+        if content is not None:
+            Path(name).write_bytes(content)
+    node = sites.node(sites.drive("fu1", "none", 0))
+    path = sites.write(tmp_path, sites.bus(node), f"[page]\n{PAIR}")
+    if not expected:
+        check_files(load_site(path), path, fronts=True)
+        return
+    with pytest.raises(FileFaults) as raised:
+        check_files(load_site(path), path, fronts=True)
+    [fault] = raised.value.faults
+    assert f"{fault.key}: {fault.message}".startswith(expected)
+    line = path.read_text("utf-8").splitlines()[fault.line - 1]
+    assert line.startswith(fault.key.rpartition(".")[2])
 
 
 @pytest.mark.parametrize("begins", [-1, 1], ids=["valid", "of a box whose clock is not set yet"])

@@ -22,6 +22,7 @@ from bridge.northbound.modbus.registers import DriveMap, Row
 from bridge.sim.catalogue import SIMULATED
 from tests.support.families import FamilyBridge, family_bridge, setpoint_of, speed_of
 from tests.support.process import until
+from tests.support.telegrams import answered
 
 PROTOCOLS = ("modbus", "opcua", "zenoh")
 _LIMIT_S = 8.0
@@ -154,7 +155,7 @@ class ZenohController(Controller):
         return self._ask(leaf)["v"]
 
     def _command(self, leaf: str, payload: str = "{}") -> None:
-        answer = self._ask(f"command/{leaf}", payload)
+        answer = answered(lambda: self._ask(f"command/{leaf}", payload))
         assert answer["ok"], answer
 
     def start(self) -> None:

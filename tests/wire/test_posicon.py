@@ -24,6 +24,7 @@ from pymodbus.client import ModbusTcpClient
 from tests.support import sites
 from tests.support.families import FamilyBridge, FamilySite
 from tests.support.process import free_port, until
+from tests.support.telegrams import answered
 
 READY, ENABLE, ACKNOWLEDGE = 0x047E, 0x047F, 0x0080
 FAULT = 0x0008
@@ -159,7 +160,8 @@ class ZenohAxis(Axis):
         return json.loads(answer.payload.to_string())
 
     def write(self, word: int, hz: float, revolutions: float) -> None:
-        told = self._ask("command", {"control_word": word, "frequency": hz, "position": revolutions})
+        command = {"control_word": word, "frequency": hz, "position": revolutions}
+        told = answered(lambda: self._ask("command", command))
         assert told["ok"], told
 
     def status(self) -> int:

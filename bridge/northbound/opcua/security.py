@@ -12,11 +12,11 @@ from cryptography.hazmat.primitives.hashes import SHA1, SHA256
 
 from bridge.command.request import Identity, Role, Source
 from bridge.config import OpcUaTable
+from bridge.northbound.logins import PasswordChecks
 from bridge.northbound.opcua.certificates import TrustedCertificates, fingerprint
 from bridge.northbound.opcua.library import ServiceError, StatusCodes, first_certificate, get, ua
-from bridge.northbound.opcua.logins import PasswordChecks
 from bridge.northbound.opcua.notices import tell
-from bridge.northbound.opcua.passwords import ANONYMOUS, check_users
+from bridge.northbound.passwords import ANONYMOUS, check_users
 from bridge.northbound.sources import source_of
 
 _LONGEST_NAME: Final = 64

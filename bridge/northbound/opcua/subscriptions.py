@@ -16,10 +16,10 @@ from asyncua.server.address_space import AddressSpace
 from bridge.beat import cycle_by
 from bridge.northbound.opcua.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.northbound.opcua.monitoring import MonitoredItems, code_of, loop_time
-from bridge.northbound.opcua.passwords import ANONYMOUS
 from bridge.northbound.opcua.publishing import PublishRequest
 from bridge.northbound.opcua.shares import MOST_SUBSCRIPTIONS, room_for_items
 from bridge.northbound.opcua.subscription import Owner, Subscription, terms
+from bridge.northbound.passwords import ANONYMOUS
 
 _T = TypeVar("_T")
 

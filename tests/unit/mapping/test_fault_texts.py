@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.cli.faults import listed_faults
+from bridge.drive.fault_words import listed_faults
 from bridge.errors import FileFaults
 from bridge.mapping import load_family
 from bridge.mapping.loader import family_names, mappings_dir, read_family

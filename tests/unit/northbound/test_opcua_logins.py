@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from bridge.northbound.opcua.logins import PasswordChecks
+from bridge.northbound.logins import PasswordChecks
 
 RIGHT = "swordfish"
 ATTACKER, CLIENT = "10.0.0.9", "10.0.0.1"

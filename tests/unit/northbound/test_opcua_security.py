@@ -19,9 +19,9 @@ from bridge.command import Role
 from bridge.config import OpcUaTable, UserTable
 from bridge.errors import FileFaults, Unavailable
 from bridge.northbound.opcua.certificates import OwnCertificate, TrustedCertificates, load_own, own_or_new
-from bridge.northbound.opcua.passwords import hash_password, verify_password
 from bridge.northbound.opcua.security import Users, read_password, security_policies
 from bridge.northbound.opcua.transport import Processor
+from bridge.northbound.passwords import hash_password, verify_password
 
 URI = "urn:test:drivebridge"
 Policy = ua.SecurityPolicyType

@@ -25,8 +25,8 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from bridge.config import OpcUaTable, UserTable
-from bridge.northbound.opcua.passwords import hash_password
 from bridge.northbound.opcua.server import OpcUaServer
+from bridge.northbound.passwords import hash_password
 from tests.support.opcua_site import LocalView, break_off, connected, namespace, serving
 from tests.support.quiet import quiet_log
 

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-from bridge.northbound.opcua.passwords import verify_password
+from bridge.northbound.passwords import verify_password
 
 Verify = Callable[[str | None, str], bool]
 

@@ -1,0 +1,1 @@
+"""The web page: the plant for people, served by a front of its own."""

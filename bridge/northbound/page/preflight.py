@@ -1,0 +1,55 @@
+"""What the page needs of the disk, looked at before a bus is opened."""
+
+from __future__ import annotations
+
+import ssl
+from pathlib import Path
+from typing import Final
+
+from cryptography import x509
+
+from bridge.config import PageTable
+from bridge.errors import Fault, FileFaults
+from bridge.northbound.certificatefiles import check_validity, placed
+
+_PEM: Final = "a PEM file; of a certificate with those between it and its authority behind it"
+
+
+def check_page(table: PageTable, site: Path) -> None:
+    """Raises ``FileFaults`` for a certificate or key that cannot be used."""
+    if table.certificate is None or table.private_key is None:
+        return
+    keys: dict[str | None, str] = {
+        table.certificate: "page.certificate",
+        table.private_key: "page.private_key",
+    }
+    try:
+        _check_pair(table.certificate, table.private_key)
+    except FileFaults as error:
+        raise FileFaults([placed(fault, keys, site) for fault in error.faults]) from None
+
+
+def _check_pair(certificate: str, private_key: str) -> None:
+    contents: list[bytes] = []
+    for file in (certificate, private_key):
+        try:
+            contents.append(Path(file).read_bytes())
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            raise FileFaults([Fault(file, 0, "", f"cannot be used: {reason}", _PEM)]) from None
+    try:
+        loaded = x509.load_pem_x509_certificate(contents[0])
+    except ValueError:
+        raise FileFaults(
+            [Fault(certificate, 0, "", "cannot be used: it holds no certificate", _PEM)]
+        ) from None
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, private_key, password="")
+    except ssl.SSLError as error:
+        if error.reason == "KEY_VALUES_MISMATCH":
+            message = f"is not the key of {certificate}"
+        else:
+            message = "cannot be used: it holds no private key without a password"
+        raise FileFaults([Fault(private_key, 0, "", message, "a PEM file")]) from None
+    hint = "renew it, or leave out certificate and private_key and serve the page on loopback"
+    check_validity(certificate, loaded, hint)

@@ -1,0 +1,127 @@
+"""The page's HTTP server: uvicorn on a socket that is bound already, with the limits that it lacks."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+import ssl
+from collections.abc import Generator
+from typing import Any, Final
+
+import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
+
+from bridge.errors import OperationFailed
+from bridge.northbound.listening import until_deaf
+from bridge.northbound.page.guards import MOST_HEAD
+from bridge.northbound.page.viewer import MOST_BYTES
+from bridge.northbound.page.web import Page
+
+_HEADERS_S: Final = 10.0
+"""How long the head of a request may take to come, the first of a connection included."""
+_IDLE_S: Final = 30
+_MOST_CONNECTIONS: Final = 256
+
+
+class _Protocol(H11Protocol):
+    """uvicorn waits for ever for the head of a request that has begun, or never begins."""
+
+    _deadline: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: Any) -> None:
+        super().connection_made(transport)
+        self._expect_head()
+
+    def data_received(self, data: bytes) -> None:
+        before = self._request
+        super().data_received(data)
+        if self._request is not before or self.transport.get_protocol() is not self:
+            self._forget()  # its head is here, or that of a WebSocket, which another protocol serves
+
+    def on_response_complete(self) -> None:
+        super().on_response_complete()
+        if not self.transport.is_closing() and (self._request is None or self._request.response_complete):
+            self._expect_head(_IDLE_S + _HEADERS_S)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._forget()
+        super().connection_lost(exc)
+
+    @property
+    def _request(self) -> RequestResponseCycle | None:
+        """The newest, None before the first."""
+        return self.cycle
+
+    def _expect_head(self, limit_s: float = _HEADERS_S) -> None:
+        self._forget()
+        self._deadline = asyncio.get_running_loop().call_later(limit_s, self.transport.close)
+
+    def _forget(self) -> None:
+        deadline, self._deadline = self._deadline, None
+        if deadline:
+            deadline.cancel()
+
+
+class _Server(uvicorn.Server):
+    @contextlib.contextmanager
+    def capture_signals(self) -> Generator[None]:
+        """Signals are our process's own."""
+        yield
+
+
+class PageServer:
+    """Serves ``page`` on ``bound``. ``certificate`` and ``private_key`` are files; without them in clear."""
+
+    def __init__(
+        self, page: Page, bound: socket.socket, certificate: str | None = None, private_key: str | None = None
+    ) -> None:
+        self._bound = bound
+        config = uvicorn.Config(
+            page.app,
+            http=_Protocol,
+            ws="websockets-sansio",
+            ws_max_size=MOST_BYTES,
+            ws_ping_interval=20.0,
+            ws_ping_timeout=20.0,
+            lifespan="on",
+            log_config=None,
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+            date_header=False,
+            proxy_headers=False,
+            limit_concurrency=_MOST_CONNECTIONS,
+            timeout_keep_alive=_IDLE_S,
+            timeout_graceful_shutdown=2,
+            h11_max_incomplete_event_size=MOST_HEAD,
+            ssl_certfile=certificate,
+            ssl_keyfile=private_key,
+            ssl_version=ssl.PROTOCOL_TLS_SERVER,
+        )
+        self._server = _Server(config)
+        self._serving: asyncio.Task[None] | None = None
+
+    @property
+    def port(self) -> int:
+        return self._bound.getsockname()[1]
+
+    async def start(self) -> None:
+        """Raises ``OperationFailed`` where it cannot be started."""
+        serving = self._serving = asyncio.create_task(
+            self._server.serve(sockets=[self._bound]), name="page server"
+        )
+        while not self._server.started:
+            if serving.done():
+                raise OperationFailed("the page cannot be served")
+            await asyncio.sleep(0.02)
+
+    async def close(self) -> None:
+        self._server.should_exit = True
+        if self._serving:
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._serving
+
+    async def failed(self) -> None:
+        """Wait until closed, or raise ``OperationFailed`` where it serves no more."""
+        await until_deaf(self._bound, "page.listen")

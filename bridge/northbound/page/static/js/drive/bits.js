@@ -1,0 +1,43 @@
+// Control word and status word, bit by bit.
+
+import { classes, html } from "../ui.js";
+import { has, nature } from "../site.js";
+import { value } from "../values.js";
+import { word } from "../format.js";
+import { maybe, t } from "../texts.js";
+
+export function Bits({ drive }) {
+  const sent = `${drive.name}/supervision/sent_control_word`;
+  const own = `${drive.name}/status/drive_status_word`;
+  return html`
+    <section class="words" aria-label=${t("drive.words")}>
+      <${Word} title=${t("drive.control_word")} point=${sent} bits=${bitsOf(`${drive.name}/command/control_word`, sent)} />
+      <${Word} title=${t("drive.status_word")} point=${own} bits=${bitsOf(`${drive.name}/status/status_word`, own)} />
+    </section>
+  `;
+}
+
+const bitsOf = (...points) => points.map((name) => nature(name).bits).find(Boolean) ?? [];
+
+function Word({ title, point, bits }) {
+  if (!has(point)) return null;
+  const present = value(point);
+  return html`
+    <table class="bits">
+      <caption>${title} <code>${word(present)}</code></caption>
+      <tbody>
+        ${bits.map((name, bit) => {
+          if (!name) return null;
+          const isSet = present !== null && Boolean(present & (1 << bit));
+          return html`
+            <tr class=${classes({ set: isSet })}>
+              <td class="bit">${bit}</td>
+              <td>${maybe(`bit.${name}`) || name.replaceAll("_", " ")}</td>
+              <td class="is">${present === null ? "–" : isSet ? "1" : "0"}</td>
+            </tr>
+          `;
+        })}
+      </tbody>
+    </table>
+  `;
+}

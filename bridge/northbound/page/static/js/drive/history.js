@@ -1,0 +1,29 @@
+// What a trend has seen, the oldest forgotten first: as much memory after ten hours as after ten minutes.
+
+const KEPT = 6000; // five minutes of twenty rows a second
+
+export class History {
+  constructor(width) {
+    this._columns = Array.from({ length: width + 1 }, () => []);
+  }
+
+  /** `row` is [time in ms, value, …]; null for a value that is not good. */
+  add(row) {
+    if (row.length !== this._columns.length) return; // of the choice before
+    row.forEach((held, index) => this._columns[index].push(held));
+    if (this._columns[0].length > KEPT + 600) for (const column of this._columns) column.splice(0, 600);
+  }
+
+  get last() {
+    return this._columns[0].at(-1) ?? Date.now();
+  }
+
+  /** Times in s, and a column for each value, as uPlot wants them. */
+  columns() {
+    return [this._columns[0].map((ms) => ms / 1000), ...this._columns.slice(1)];
+  }
+
+  rows() {
+    return this._columns[0].map((_, index) => this._columns.map((column) => column[index]));
+  }
+}

@@ -1,0 +1,49 @@
+// Numbers and times as people read them.
+
+import { language, t } from "./texts.js";
+
+const DECIMALS = { Hz: 1, A: 1, V: 0, "%": 0, ms: 0, s: 1, rpm: 0, "1/min": 0, rev: 3, "°C": 0, Nm: 1, kW: 2 };
+const formats = new Map();
+
+function format(decimals) {
+  const key = `${language.value} ${decimals}`;
+  if (!formats.has(key)) {
+    const digits = { minimumFractionDigits: decimals, maximumFractionDigits: decimals };
+    formats.set(key, new Intl.NumberFormat(language.value, digits));
+  }
+  return formats.get(key);
+}
+
+/** A number without its unit; with as many decimals as are usual for that unit. */
+export function number(value, unit = "") {
+  if (typeof value !== "number") return value === null || value === undefined ? "–" : String(value);
+  const decimals = DECIMALS[unit] ?? (Number.isInteger(value) ? 0 : Math.abs(value) < 10 ? 2 : 1);
+  const shown = format(decimals).format(value);
+  return /^-0([.,]0*)?$/.test(shown) ? shown.slice(1) : shown;
+}
+
+/** A number with its unit, kept on one line. */
+export function quantity(value, unit = "") {
+  const shown = number(value, unit);
+  return unit && shown !== "–" ? `${shown}\u202f${unit}` : shown;
+}
+
+/** A time span in its largest units: 8 s, 3 min 20 s, 2 h 5 min. */
+export function span(ms) {
+  const s = Math.max(0, Math.round(ms / 1000));
+  if (s < 60) return t("span.s", { s });
+  if (s < 3600) return t("span.min", { min: Math.floor(s / 60), s: s % 60 });
+  if (s < 86400) return t("span.h", { h: Math.floor(s / 3600), min: Math.floor((s % 3600) / 60) });
+  return t("span.d", { d: Math.floor(s / 86400), h: Math.floor((s % 86400) / 3600) });
+}
+
+/** Time of day of an epoch time in ms; with the date where it is not today's. */
+export function clock(ms) {
+  const time = new Date(ms);
+  const isToday = time.toDateString() === new Date().toDateString();
+  return time.toLocaleString(language.value, { ...(isToday ? {} : { dateStyle: "short" }), timeStyle: "medium", hourCycle: "h23" });
+}
+
+export function word(value) {
+  return typeof value === "number" ? `${value.toString(16).toUpperCase().padStart(4, "0")}h` : "–";
+}

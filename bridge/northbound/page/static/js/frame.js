@@ -1,0 +1,89 @@
+// What is around every page: the site's name, the menu, who is logged in, and what is wrong, in a sentence.
+
+import { classes, html, useEffect } from "./ui.js";
+import { connect, disconnect, isConnected, leave, show, troubles } from "./live.js";
+import { logout, session, siteName } from "./session.js";
+import { Login } from "./login.js";
+import { menu, pageOf } from "./pages.js";
+import { address, route } from "./route.js";
+import { language, t } from "./texts.js";
+import { theme } from "./theme.js";
+import { Icon } from "./icons.js";
+import { sentence, worst } from "./trouble.js";
+
+export function Frame() {
+  const who = session.value;
+  if (who === undefined) return html`<p class="waiting">${t("frame.loading")}</p>`;
+  if (who === null) return html`<${Login} />`;
+  return html`<${Inside} key=${who.token} />`;
+}
+
+function Inside() {
+  const page = pageOf(route.value);
+  const topics = page.topics(route.value);
+  useEffect(() => {
+    connect();
+    document.addEventListener("visibilitychange", onVisibility);
+    return () => {
+      document.removeEventListener("visibilitychange", onVisibility);
+      disconnect();
+    };
+  }, []);
+  useEffect(() => show(topics), [topics.join()]);
+  useEffect(() => {
+    const place = route.value.slice(1).join("/");
+    document.title = [place || t(`page.${page.path}`), siteName.value].join(" · ");
+  });
+  return html`
+    <a class="skip" href="#main">${t("frame.skip")}</a>
+    <header class="top">
+      <a class="site" href=${address("plant")}><span class="product">drivebridge</span> ${siteName}</a>
+      <nav aria-label=${t("frame.menu")}>
+        ${menu.map(
+          (one) => html`<a href=${address(one.path)} aria-current=${one === page ? "page" : undefined}>
+            ${t(`page.${one.path}`)}
+          </a>`,
+        )}
+      </nav>
+      <${Tools} />
+    </header>
+    <${Sentence} />
+    <main id="main" tabindex="-1"><${page.View} route=${route.value} /></main>
+  `;
+}
+
+function onVisibility() {
+  if (document.hidden) leave();
+}
+
+// The one line that says how the plant is.
+function Sentence() {
+  const rank = isConnected.value ? worst(troubles.value) : "unknown";
+  return html`
+    <p class=${classes("sentence", `is-${rank}`)} role="status">
+      <${Icon} name=${rank === "none" ? "ok" : rank} />
+      <span>${isConnected.value ? sentence(troubles.value) : t("frame.disconnected")}</span>
+    </p>
+  `;
+}
+
+function Tools() {
+  const who = session.value;
+  return html`
+    <div class="tools">
+      <button class="plain" onClick=${() => (language.value = language.value === "en" ? "de" : "en")}
+        lang=${language.value === "en" ? "de" : "en"}>${language.value === "en" ? "Deutsch" : "English"}</button>
+      <button class="plain" onClick=${nextTheme} aria-label=${t("frame.theme", { theme: t(`theme.${theme.value}`) })}
+        title=${t("frame.theme", { theme: t(`theme.${theme.value}`) })}><${Icon} name=${theme.value} /></button>
+      <span class="who">${who.user || t("frame.visitor")} <small>${t(`role.${who.role}`)}</small></span>
+      ${who.user
+        ? html`<button onClick=${logout}>${t("frame.logout")}</button>`
+        : html`<button onClick=${() => (session.value = null)}>${t("frame.login")}</button>`}
+    </div>
+  `;
+}
+
+function nextTheme() {
+  const all = ["system", "light", "dark"];
+  theme.value = all[(all.indexOf(theme.value) + 1) % all.length];
+}

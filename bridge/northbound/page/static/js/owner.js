@@ -1,0 +1,15 @@
+// Who controls a drive, as people call them.
+
+import { self } from "./live.js";
+import { t } from "./texts.js";
+
+/** "you", "admin (web page)", "192.168.1.20 (Modbus)"; "nobody". */
+export function ownerName(owner) {
+  if (!owner) return t("plant.nobody");
+  if (owner === self.value) return t("owner.you");
+  const [source, ...rest] = owner.split(":");
+  const user = rest.join(":");
+  const [name, tab] = user.split("#");
+  if (source === "local" && tab) return t("owner.page", { name: name === "visitor" ? t("frame.visitor") : name });
+  return t("owner.other", { name: user, source: t(`source.${source}`) });
+}

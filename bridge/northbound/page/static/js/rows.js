@@ -1,0 +1,54 @@
+// A long table with a search. Only the first rows of what is found are drawn.
+
+import { html, useEffect, useMemo, useState } from "./ui.js";
+import { t } from "./texts.js";
+import { Copy } from "./copy.js";
+
+const DRAWN = 200;
+
+/** The rows at `address`, a JSON list of objects; the column `copied` gets a button that copies it. */
+export function Rows({ address, copied }) {
+  const [rows, setRows] = useState(null);
+  const [failure, setFailure] = useState("");
+  const [wanted, setWanted] = useState("");
+  useEffect(() => {
+    load(address).then(setRows, (error) => setFailure(error.message));
+  }, [address]);
+  const found = useMemo(() => matching(rows ?? [], wanted), [rows, wanted]);
+  if (failure) return html`<p class="failure">${t("integration.failed", { why: failure })}</p>`;
+  if (!rows) return html`<p class="quiet">${t("frame.loading")}</p>`;
+  const columns = Object.keys(rows[0] ?? {});
+  return html`
+    <p class="search">
+      <input type="search" aria-label=${t("integration.search", { count: rows.length })}
+        placeholder=${t("integration.search", { count: rows.length })} onInput=${(event) => setWanted(event.target.value)} />
+      <small role="status">${t("integration.shown", { shown: Math.min(found.length, DRAWN), count: found.length })}</small>
+    </p>
+    <div class="scroll" tabindex="0" role="group" aria-label=${address}>
+      <table class="rows">
+        <thead><tr>${columns.map((name) => html`<th scope="col">${t(`column.${name}`)}</th>`)}</tr></thead>
+        <tbody>
+          ${found.slice(0, DRAWN).map((row) => html`<tr>${columns.map((name) => html`<td>
+            ${name === copied ? html`<code>${row[name]}</code> <${Copy} text=${String(row[name])} />` : row[name]}</td>`)}</tr>`)}
+        </tbody>
+      </table>
+    </div>
+  `;
+}
+
+async function load(address) {
+  const answer = await fetch(address);
+  const told = await answer.json();
+  if (!answer.ok) throw new Error(told.error);
+  return told;
+}
+
+// Every word has to be somewhere in the row.
+function matching(rows, wanted) {
+  const words = wanted.toLowerCase().split(/\s+/).filter(Boolean);
+  if (!words.length) return rows;
+  return rows.filter((row) => {
+    const text = Object.values(row).join(" ").toLowerCase();
+    return words.every((word) => text.includes(word));
+  });
+}

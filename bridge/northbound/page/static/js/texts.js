@@ -1,0 +1,57 @@
+// Texts in the reader's language.
+
+import { computed, effect, signal } from "./ui.js";
+import { kept } from "./store.js";
+import { en } from "./texts/en.js";
+import { de } from "./texts/de.js";
+
+const TEXTS = { en, de };
+const browsers = navigator.language.toLowerCase().startsWith("de") ? ["de", "en"] : ["en", "de"];
+
+export const language = kept("language", browsers);
+const texts = computed(() => TEXTS[language.value]);
+
+effect(() => {
+  document.documentElement.lang = language.value;
+});
+
+/** The text called `key`, with `{name}` replaced by what `filled` has. A word of the bridge that has no text here is
+ * shown as it is. */
+export function t(key, filled = {}) {
+  const text = texts.value[key] ?? en[key];
+  if (text === undefined) return key.slice(key.indexOf(".") + 1).replaceAll("_", " ");
+  return fill(text, filled);
+}
+
+/** As `t`; empty where there is no such text. */
+export function maybe(key, filled = {}) {
+  return fill(texts.value[key] ?? "", filled);
+}
+
+function fill(text, filled) {
+  return text.replace(/\{(\w+)\}/g, (whole, name) => filled[name] ?? whole);
+}
+
+const faults = signal({});
+
+/** {text, cause, remedy} of a family's fault in the reader's language, or {} where they stay as they are. */
+export function faultIn(family, number) {
+  if (language.value === "en" || !family || !number) return {};
+  load(language.value);
+  return faults.value[language.value]?.[family]?.[number] ?? {};
+}
+
+const loading = new Set();
+
+async function load(wanted) {
+  if (loading.has(wanted)) return;
+  loading.add(wanted);
+  const answer = await fetch(`api/faults/${wanted}`);
+  if (answer.ok) faults.value = { ...faults.value, [wanted]: await answer.json() };
+  else loading.delete(wanted);
+}
+
+/** The text for a number of things: `key.one` or `key.other`. */
+export function many(key, count, filled = {}) {
+  return t(`${key}.${count === 1 ? "one" : "other"}`, { count, ...filled });
+}

@@ -1,0 +1,32 @@
+// The points as they are now, a signal for each: what shows one is drawn again when that one changes, and not else.
+
+import { batch, signal } from "./ui.js";
+
+const NOTHING = Object.freeze([null, "waiting", "", 0]);
+const points = new Map();
+
+/** The signal of a point: [value, quality, reason, time in ms since 1970]. */
+export function point(name) {
+  let found = points.get(name);
+  if (!found) points.set(name, (found = signal(NOTHING)));
+  return found;
+}
+
+export const value = (name) => point(name).value[0];
+export const quality = (name) => point(name).value[1];
+export const reason = (name) => point(name).value[2];
+export const time = (name) => point(name).value[3];
+
+/** Takes what the server has told: an object of readings by the points' names. */
+export function take(readings) {
+  batch(() => {
+    for (const name in readings) point(name).value = readings[name];
+  });
+}
+
+/** Nobody tells anything any more: no value is good. */
+export function lose() {
+  batch(() => {
+    for (const one of points.values()) one.value = [one.value[0], "dead", "", one.value[3]];
+  });
+}

@@ -1,0 +1,180 @@
+"""One tab that shows the page: what it asks, and what it owns. Sans-IO.
+
+A tab is a controller like any other. It commands under an identity of its own, so that two tabs of one person
+are two controllers; it renews its leases itself, by messages that it sends while it is in the foreground; and
+what it leaves behind is given back. Nothing here renews anything.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable
+from typing import Any, Final
+
+import msgspec
+
+from bridge.command import Action, Code, Do, Identity, Outcome, Request, Role, Source
+from bridge.command.request import COMMANDS
+from bridge.northbound.view import View
+from bridge.ratelimit import RateLimit
+
+MOST_BYTES: Final = 16_384
+"""Of one message."""
+_MESSAGES, _EVERY_S = 100, 0.02
+"""So many messages may come at once, and one in every so many seconds after that."""
+_MOST_TOPICS: Final = 16
+MOST_FOLLOWED: Final = 12
+_FIELDS: Final[dict[Action, tuple[str, ...]]] = {
+    Action.WRITE: ("values",),
+    Action.START: ("direction",),
+    Action.TAKE_CONTROL: ("ttl_ms",),
+    Action.SET_TIMEOUT: ("timeout_ms",),
+    Action.READ_PARAMETER: ("parameter", "max_age_ms"),
+    Action.WRITE_PARAMETER: ("parameter", "value"),
+}
+"""The fields that a message may give for an action; all others have none."""
+
+
+class BadMessage(Exception):
+    """What the tab sent is no message of ours: the connection ends with this reason."""
+
+
+class _Show(msgspec.Struct, forbid_unknown_fields=True):
+    """The topics that are shown from now on."""
+
+    show: list[str]
+
+
+class _Trend(msgspec.Struct, forbid_unknown_fields=True):
+    """The points whose course is followed from now on."""
+
+    trend: list[str]
+
+
+class _Ask(msgspec.Struct, forbid_unknown_fields=True):
+    """A request with a number, by which its outcome is known."""
+
+    ask: int
+    target: str
+    action: str
+    fields: dict[str, Any] = {}
+
+
+class _Hidden(msgspec.Struct, forbid_unknown_fields=True):
+    """The tab is not in the foreground any more: what it owns is given back."""
+
+    hidden: bool
+
+
+_decode_show = msgspec.json.Decoder(_Show).decode
+_decode_trend = msgspec.json.Decoder(_Trend).decode
+_decode_ask = msgspec.json.Decoder(_Ask).decode
+_decode_hidden = msgspec.json.Decoder(_Hidden).decode
+_decode_any = msgspec.json.Decoder(dict[str, msgspec.Raw]).decode
+_encode = msgspec.json.Encoder().encode
+
+
+class Viewer:
+    """One tab of ``user``. ``tell`` gets messages for it; ``topics`` is what it shows at present,
+    ``followed`` are the points whose course it draws, by their places in the image."""
+
+    def __init__(
+        self, view: View, user: str, role: Role, address: str, tell: Callable[[bytes], None]
+    ) -> None:
+        self.identity = Identity(Source.LOCAL, f"{user or 'visitor'}#{secrets.token_hex(3)}", role, address)
+        self.topics: tuple[str, ...] = ()
+        self.followed: tuple[int, ...] = ()
+        self._places = {point.name: place for place, point in enumerate(view.image.points)}
+        self._view = view
+        self._tell = tell
+        self._owned: dict[str, None] = {}
+        """What it has taken and not given back, as far as outcomes say."""
+        self._left = 0
+        """How often it has let go of everything."""
+        self._limit = RateLimit(_MESSAGES, _EVERY_S)
+
+    def on_message(self, data: bytes, now: float, known: Callable[[str], bool]) -> None:
+        """One message of the tab; ``known`` says which topics there are. Raises ``BadMessage``."""
+        if len(data) > MOST_BYTES:
+            raise BadMessage(f"a message has at most {MOST_BYTES} bytes")
+        if not self._limit.allows(now):
+            raise BadMessage("too many messages")
+        try:
+            keys = _decode_any(data)
+            if "show" in keys:
+                self._show(_decode_show(data).show, known)
+            elif "trend" in keys:
+                self._follow(_decode_trend(data).trend)
+            elif "ask" in keys:
+                self._ask(_decode_ask(data))
+            elif _decode_hidden(data).hidden:
+                self.leave()
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise BadMessage(f"no message of this page: {error}") from None
+
+    def _show(self, topics: list[str], known: Callable[[str], bool]) -> None:
+        unknown = next((topic for topic in topics if not known(topic)), None)
+        if unknown is not None or len(topics) > _MOST_TOPICS:
+            raise BadMessage(f"there is no topic {str(unknown)[:80]!r}")
+        self.topics = tuple(dict.fromkeys(topics))
+
+    def _follow(self, names: list[str]) -> None:
+        unknown = next((name for name in names if name not in self._places), None)
+        if unknown is not None or len(names) > MOST_FOLLOWED:
+            raise BadMessage(f"there is no point {str(unknown)[:80]!r}, or it is one too many")
+        self.followed = tuple(self._places[name] for name in names)
+
+    def _ask(self, ask: _Ask) -> None:
+        left = self._left
+
+        def answered(outcome: Outcome) -> None:
+            self._on_outcome(ask, outcome, has_left=left != self._left)
+            shown = {
+                "outcome": ask.ask,
+                "ok": outcome.ok,
+                "code": str(outcome.code),
+                "message": outcome.message,
+                "forwarded": outcome.forwarded,
+                "value": outcome.value,
+            }
+            self._tell(_encode(shown))
+
+        try:
+            action = Action(ask.action)
+        except ValueError:
+            answered(Outcome(Code.UNKNOWN_POINT, f"there is no {ask.action[:80]!r}", forwarded=False))
+            return
+        fields = {name: value for name, value in ask.fields.items() if name in _FIELDS.get(action, ())}
+        if len(fields) != len(ask.fields):
+            message = f"{action} takes {', '.join(_FIELDS.get(action, ())) or 'no fields'}"
+            answered(Outcome(Code.OUT_OF_RANGE, message, forwarded=False))
+            return
+        try:
+            kind = COMMANDS.get(action)
+            command = Do(action) if kind is None else msgspec.convert(fields, kind)
+        except (msgspec.ValidationError, TypeError) as error:
+            answered(Outcome(Code.OUT_OF_RANGE, f"{action}: {error}", forwarded=False))
+            return
+        self._view.submit(Request(self.identity, ask.target, command), answered)
+
+    def _on_outcome(self, ask: _Ask, outcome: Outcome, *, has_left: bool) -> None:
+        if not outcome.ok:
+            return
+        if ask.action == Action.TAKE_CONTROL:
+            if has_left:
+                self._give_back(ask.target)
+            else:
+                self._owned[ask.target] = None
+        elif ask.action == Action.RELEASE_CONTROL:
+            self._owned.pop(ask.target, None)
+
+    def leave(self) -> None:
+        """Give back what it owns: the tab is hidden, closed or cut off. What is not given back because the
+        bus process does not answer ends with its lease."""
+        self._left += 1
+        owned, self._owned = self._owned, {}
+        for target in owned:
+            self._give_back(target)
+
+    def _give_back(self, target: str) -> None:
+        self._view.submit(Request(self.identity, target, Do(Action.RELEASE_CONTROL)), lambda outcome: None)

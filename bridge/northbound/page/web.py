@@ -1,0 +1,215 @@
+"""The page as a web application: files, login, and one WebSocket for each tab."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncGenerator, Callable, Mapping
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.middleware.gzip import GZipMiddleware
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import FileResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket
+
+from bridge.command import Role
+from bridge.config import PageTable, Site
+from bridge.mapping import Family
+from bridge.northbound.logins import PasswordChecks
+from bridge.northbound.page.describe import described, layout_of
+from bridge.northbound.page.guards import MOST_BODY, Guards
+from bridge.northbound.page.integration import Export, Integration
+from bridge.northbound.page.sessions import Session, Sessions
+from bridge.northbound.page.tabs import Tabs
+from bridge.northbound.page.throttle import Throttle
+from bridge.northbound.sources import source_of
+from bridge.northbound.view import View
+
+_log = logging.getLogger(__name__)
+
+STATIC: Final = Path(__file__).parent / "static"
+_COOKIE: Final = "session"
+_BODY_S: Final = 5.0
+_ROLES: Final = {"observer": Role.OBSERVER, "operator": Role.OPERATOR, "engineer": Role.ENGINEER}
+_encode = msgspec.json.Encoder().encode
+
+
+FaultTexts = Mapping[str, Mapping[str, Mapping[str, Mapping[str, str]]]]
+"""Texts, causes and remedies of faults, by language, family and the fault's number."""
+
+
+class _Login(msgspec.Struct, forbid_unknown_fields=True):
+    user: str
+    password: str
+
+
+_decode_login = msgspec.json.Decoder(_Login).decode
+
+
+class Page:
+    """The application. Its users, and who may read without a login, are those of OPC UA."""
+
+    def __init__(
+        self,
+        view: View,
+        site: Site,
+        families: dict[str, Family],
+        fault_texts: FaultTexts,
+        exports: Mapping[str, Export],
+        clock: Callable[[], float],
+    ) -> None:
+        settings, table = site.opcua, site.page or PageTable.model_validate({})
+        self._clock = clock
+        self._fault_texts = fault_texts
+        self._site_name = site.site.name
+        self._users = {user.name: user for user in settings.user} if settings else {}
+        self._anonymous = _ROLES.get(settings.anonymous) if settings else None
+        self._sessions = Sessions()
+        self._throttle = Throttle()
+        self._checks = PasswordChecks()
+        self._tabs = Tabs(view, layout_of(site, families), self._sessions, clock)
+        self._description = _encode(described(view.image, site, families))
+        self._is_encrypted = table.certificate is not None
+        self._cookie = f"__Host-{_COOKIE}" if self._is_encrypted else _COOKIE
+        routes = [
+            Route("/", _index),
+            Route("/api/session", self._session),
+            Route("/api/site", self._site),
+            Route("/api/faults/{language}", self._faults),
+            Route("/api/login", self._login, methods=["POST"]),
+            Route("/api/logout", self._logout, methods=["POST"]),
+            *Integration(site, exports, self._is_inside).routes,
+            WebSocketRoute("/live", self._live),
+            Mount("/static", StaticFiles(directory=STATIC)),
+        ]
+        self.app = Starlette(
+            routes=routes,
+            middleware=[
+                Middleware(Guards, names=table.names, is_encrypted=self._is_encrypted),
+                Middleware(GZipMiddleware, minimum_size=1024),
+            ],
+            lifespan=self._life,
+        )
+
+    @asynccontextmanager
+    async def _life(self, app: Starlette) -> AsyncGenerator[None]:
+        async with self._tabs.serving():
+            yield
+        self._checks.close()
+
+    # who asks
+
+    def _session_of(self, connection: HTTPConnection) -> Session | None:
+        session_id = connection.cookies.get(self._cookie)
+        return self._sessions.find(session_id, self._clock()) if session_id else None
+
+    def _is_inside(self, connection: HTTPConnection) -> bool:
+        return self._session_of(connection) is not None
+
+    def _begin(self, user: str, role: Role) -> tuple[Session, dict[str, Any]]:
+        session = self._sessions.begin(user, role, self._clock())
+        return session, self._shown(session)
+
+    def _shown(self, session: Session) -> dict[str, Any]:
+        return {"user": session.user, "role": session.role.name.lower(), "token": session.token}
+
+    def _with_cookie(self, body: Mapping[str, Any], session: Session) -> Response:
+        response = Response(_encode(body), media_type="application/json")
+        response.set_cookie(
+            self._cookie, session.id, path="/", httponly=True, samesite="strict", secure=self._is_encrypted
+        )
+        response.headers["cache-control"] = "no-store"
+        return response
+
+    async def _session(self, request: Request) -> Response:
+        """Who this browser is; where anybody may read, it becomes a visitor by asking."""
+        session = self._session_of(request)
+        if session is not None:
+            return self._json(self._shown(session))
+        if self._anonymous is None:
+            return self._json({"user": None, "site": self._site_name}, 401)
+        session, shown = self._begin("", self._anonymous)
+        return self._with_cookie(shown, session)
+
+    async def _login(self, request: Request) -> Response:
+        address = source_of(request.client.host if request.client else "")
+        now = self._clock()
+        pause_s = self._throttle.pause_s(address, now)
+        if pause_s:
+            response = self._json({"error": "throttled", "pause_s": round(pause_s, 1)}, 429)
+            response.headers["retry-after"] = str(round(pause_s + 0.5))
+            return response
+        try:
+            login = _decode_login(await _body(request))
+        except (msgspec.DecodeError, TimeoutError, ValueError):
+            return self._json({"error": "malformed"}, 400)
+        user = self._users.get(login.user)
+        is_right = await self._checks.is_right(user.password_hash if user else None, login.password, address)
+        if not is_right or user is None:
+            self._throttle.failed(address, self._clock())
+            _log.warning("page: login of %r from %s refused", login.user[:64], address)
+            return self._json({"error": "wrong"}, 403)
+        self._throttle.succeeded(address)
+        before = self._session_of(request)
+        if before:
+            self._sessions.end(before)
+            await self._tabs.end(before)
+        session, shown = self._begin(user.name, _ROLES[user.role])
+        _log.info("page: %s logged in from %s", user.name, address)
+        return self._with_cookie(shown, session)
+
+    async def _logout(self, request: Request) -> Response:
+        session = self._session_of(request)
+        if session is None or not session.has(request.headers.get("x-token", "")):
+            return self._json({"error": "token"}, 403)
+        self._sessions.end(session)
+        await self._tabs.end(session)
+        response = self._json({})
+        response.delete_cookie(self._cookie, path="/")
+        return response
+
+    async def _site(self, request: Request) -> Response:
+        if self._session_of(request) is None:
+            return self._json({"error": "login"}, 401)
+        return Response(
+            self._description, media_type="application/json", headers={"cache-control": "no-cache"}
+        )
+
+    async def _faults(self, request: Request) -> Response:
+        """What the families call their faults in another language."""
+        if self._session_of(request) is None:
+            return self._json({"error": "login"}, 401)
+        language = request.path_params["language"]
+        if language not in self._fault_texts:
+            return self._json({"error": "language"}, 404)
+        headers = {"cache-control": "no-cache"}
+        return Response(_encode(self._fault_texts[language]), headers=headers, media_type="application/json")
+
+    def _json(self, body: Mapping[str, Any], status: int = 200) -> Response:
+        headers = {"cache-control": "no-store"}
+        return Response(_encode(body), status, headers, media_type="application/json")
+
+    async def _live(self, socket: WebSocket) -> None:
+        await self._tabs.serve(socket, self._session_of(socket))
+
+
+async def _index(request: Request) -> Response:
+    return FileResponse(STATIC / "index.html", headers={"cache-control": "no-cache"})
+
+
+async def _body(request: Request) -> bytes:
+    """Raises ``TimeoutError`` for one that dribbles, ``ValueError`` for one that is too long."""
+    body = b""
+    async with asyncio.timeout(_BODY_S):
+        async for chunk in request.stream():
+            body += chunk
+            if len(body) > MOST_BODY:
+                raise ValueError("too long")
+    return body

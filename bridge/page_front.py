@@ -1,0 +1,82 @@
+"""Composition root of the page's front: a web server on the mirror image, and nothing else."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+from contextlib import AsyncExitStack
+from pathlib import Path
+
+from bridge import clock
+from bridge.drive import FaultWords
+from bridge.drive.fault_words import listed_faults
+from bridge.errors import OperationFailed
+from bridge.exports import dbc_file, modbus_table, opcua_table, zenoh_table
+from bridge.front_process import give_signs
+from bridge.mapping import Family
+from bridge.mirror.client import MirrorClient
+from bridge.mirror.endpoint import socket_endpoint
+from bridge.northbound.listening import listen
+from bridge.northbound.page.integration import Export
+from bridge.northbound.page.server import PageServer
+from bridge.northbound.page.web import FaultTexts, Page
+from bridge.project import Project
+
+_log = logging.getLogger(__name__)
+
+
+def fault_texts(families: dict[str, Family]) -> FaultTexts:
+    """In German; English is what the points say."""
+    return {"de": {name: _in_german(family) for name, family in families.items()}}
+
+
+def exports_of(project: Project) -> dict[str, Export]:
+    """What ``drivebridge export`` prints, by the names of files."""
+    tables = {"modbus": modbus_table, "opcua": opcua_table, "zenoh": zenoh_table}
+    if project.site.zenoh is None:
+        del tables["zenoh"]
+    exports: dict[str, Export] = {}
+    for name, table in tables.items():
+        exports[f"{name}.csv"] = lambda table=table: table(project).as_csv()
+        exports[f"{name}.json"] = lambda table=table: table(project).as_json()
+    for place, bus in enumerate(project.site.bus):
+        exports[f"{bus.name}.dbc"] = lambda place=place: dbc_file(project, place)
+    return exports
+
+
+def _in_german(family: Family) -> dict[str, dict[str, str]]:
+    words = FaultWords(family, "de")
+    listed = [words.listed(name) for name in listed_faults(family)]
+    return {one.number: {"text": str(one), "cause": one.cause, "remedy": one.remedy} for one in listed}
+
+
+async def run_page(project: Project, signs: int | None = None, listening: int | None = None) -> None:
+    """Serve until cancelled, with signs of life on the pipe ``signs`` as soon as it serves; on the socket
+    ``listening`` where the bus process holds the port.
+
+    Raises ``PointsChanged`` where the bus process comes back with other points: this front has to start anew
+    then.
+    """
+    site = project.site
+    if site.page is None:
+        raise OperationFailed("the site file has no [page] table")
+    async with AsyncExitStack() as stack:
+        mirror = MirrorClient(socket_endpoint(Path(site.site.runtime_dir), site.site.name), clock.now)
+        await mirror.open()
+        stack.push_async_callback(mirror.close)
+        table = site.page
+        bound = listen(table.listen, "page.listen") if listening is None else socket.socket(fileno=listening)
+        texts = fault_texts(project.families)
+        page = Page(mirror, site, project.families, texts, exports_of(project), clock.now)
+        server = PageServer(page, bound, table.certificate, table.private_key)
+        await server.start()
+        stack.push_async_callback(server.close)
+        scheme = "http" if table.certificate is None else "https"
+        _log.info("the page is served on %s://%s", scheme, table.listen)
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(mirror.run(), name="mirror")
+            tasks.create_task(mirror.failed(), name="mirror link")
+            tasks.create_task(server.failed(), name="listening socket")
+            if signs is not None:
+                tasks.create_task(give_signs(signs), name="signs of life")

@@ -1,0 +1,86 @@
+"""Who is logged in to the page, and how often a password may be guessed; on a virtual clock."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.command import Role
+from bridge.northbound.page.sessions import IDLE_S, LONGEST_S, MOST, MOST_OF_ONE, Sessions
+from bridge.northbound.page.throttle import FREE, LONGEST_PAUSE_S, Throttle
+
+
+def test_each_login_has_secrets_of_its_own() -> None:
+    sessions = Sessions()
+    made = [sessions.begin("ann", Role.OPERATOR, 0.0) for _ in range(10)]
+    assert len({one.id for one in made} | {one.token for one in made}) == 20
+    assert all(len(one.id) >= 40 for one in made)
+
+
+def test_a_session_is_over_when_nobody_uses_it_and_in_any_case_in_the_end() -> None:
+    sessions = Sessions()
+    idle = sessions.begin("ann", Role.OPERATOR, 0.0)
+    assert sessions.find(idle.id, IDLE_S - 1) is idle
+    assert sessions.find(idle.id, 2 * IDLE_S - 2) is idle, "each use counts"
+    assert sessions.find(idle.id, 4 * IDLE_S) is None
+    assert sessions.find(idle.id, 0.0) is None, "it does not come back"
+    used = sessions.begin("ann", Role.OPERATOR, 0.0)
+    now = 0.0
+    while sessions.find(used.id, now) is not None:
+        now += IDLE_S / 2
+    assert LONGEST_S <= now <= LONGEST_S + IDLE_S
+
+
+def test_an_id_that_nobody_has_made_is_nobodys() -> None:
+    sessions = Sessions()
+    assert sessions.find("brought along", 0.0) is None
+    assert len(sessions) == 0
+
+
+@given(st.text())
+def test_only_its_own_token_is_its_token(token: str) -> None:
+    session = Sessions().begin("ann", Role.OPERATOR, 0.0)
+    assert not session.has(token)
+    assert session.has(session.token)
+
+
+def test_one_user_pushes_out_its_own_sessions_first() -> None:
+    sessions = Sessions()
+    other = sessions.begin("bob", Role.OPERATOR, 0.0)
+    made = [sessions.begin("ann", Role.OPERATOR, 1.0 + number) for number in range(3 * MOST_OF_ONE)]
+    assert sessions.find(other.id, 100.0) is other
+    assert [one for one in made if sessions.find(one.id, 100.0)] == made[-MOST_OF_ONE:]
+
+
+@given(st.lists(st.tuples(st.integers(0, 40), st.floats(0, 100)), max_size=400))
+def test_there_are_never_more_than_there_is_room_for(logins: list[tuple[int, float]]) -> None:
+    sessions, now = Sessions(), 0.0
+    for user, later in logins:
+        now += later
+        sessions.begin(str(user), Role.OBSERVER, now)
+        assert len(sessions) <= MOST
+
+
+def test_wrong_passwords_cost_more_and_more() -> None:
+    throttle, now = Throttle(), 0.0
+    for _ in range(FREE):
+        assert throttle.pause_s("1.2.3.4", now) == 0
+        throttle.failed("1.2.3.4", now)
+    pauses: list[float] = []
+    for _ in range(12):
+        throttle.failed("1.2.3.4", now)
+        pauses.append(throttle.pause_s("1.2.3.4", now))
+        now += pauses[-1]
+        assert throttle.pause_s("1.2.3.4", now) == 0
+    assert pauses == [min(2.0**n, LONGEST_PAUSE_S) for n in range(12)]
+    assert throttle.pause_s("1.2.3.5", now) == 0, "others do not pay for it"
+    throttle.succeeded("1.2.3.4")
+    throttle.failed("1.2.3.4", now)
+    assert throttle.pause_s("1.2.3.4", now) == 0
+
+
+def test_a_flood_of_addresses_takes_no_more_than_its_room() -> None:
+    throttle = Throttle()
+    for number in range(10_000):
+        throttle.failed(f"address {number}", float(number))
+    assert len(throttle) <= 4096

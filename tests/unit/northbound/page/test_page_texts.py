@@ -1,0 +1,78 @@
+"""The texts of the page: every language has every text, and each is asked for by somebody."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from bridge.northbound.page.troubles import Rank
+
+JS = Path("bridge/northbound/page/static/js")
+_WRITES_HTML = ("innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval(", "dangerously")
+_KEY = re.compile(r'  "?([\w.]+)"?: ')
+_SLOT = re.compile(r"\{(\w+)\}")
+_ASKED = re.compile(r'\b(?:t|maybe)\(\s*"([\w.]+)"')
+_MANY = re.compile(r'\bmany\(\s*"([\w.]+)"')
+_KINDS = re.compile(r'Trouble\(\s*Rank\.\w+,\s*"(\w+)"')
+
+
+def texts(language: str) -> dict[str, str]:
+    lines = (JS / f"texts/{language}.js").read_text(encoding="utf-8").splitlines()
+    found = {match[1]: line[match.end() :] for line in lines if (match := _KEY.match(line))}
+    assert len(found) > 150
+    return found
+
+
+def scripts() -> dict[str, str]:
+    return {str(path): path.read_text(encoding="utf-8") for path in JS.rglob("*.js")}
+
+
+def test_german_has_what_english_has_with_the_same_slots() -> None:
+    english, german = texts("en"), texts("de")
+    assert english.keys() - german.keys() == set()
+    for key, text in english.items():
+        assert set(_SLOT.findall(text)) == set(_SLOT.findall(german[key])), key
+
+
+def test_what_german_has_beside_it_names_what_comes_from_the_bridge() -> None:
+    more = texts("de").keys() - texts("en").keys()
+    assert {key.partition(".")[0] for key in more} == {"point", "bit"}
+
+
+def test_each_text_that_is_asked_for_is_there() -> None:
+    english = texts("en")
+    for name, script in scripts().items():
+        for key in _ASKED.findall(script):
+            assert key in english, f"{name}: {key}"
+        for key in _MANY.findall(script):
+            assert {f"{key}.one", f"{key}.other"} <= english.keys(), f"{name}: {key}"
+
+
+def test_each_kind_of_trouble_says_what_it_is_why_and_what_to_do() -> None:
+    server = Path("bridge/northbound/page/troubles.py").read_text(encoding="utf-8")
+    kinds = {*_KINDS.findall(server), "bus_off", "bus_down"}
+    assert len(kinds) >= 17
+    english = texts("en")
+    for kind in kinds:
+        assert {f"trouble.{kind}", f"trouble.{kind}.why", f"trouble.{kind}.remedy"} <= english.keys(), kind
+
+
+@pytest.mark.parametrize("rank", list(Rank))
+def test_each_rank_has_a_shape(rank: Rank) -> None:
+    assert f"  {rank.name.lower()}: html`" in (JS / "icons.js").read_text(encoding="utf-8")
+
+
+def test_no_script_of_ours_is_longer_than_one_sitting_or_writes_html() -> None:
+    for name, script in scripts().items():
+        assert "/texts/" in name or script.count("\n") <= 300, name
+        for word in (
+            "innerHTML",
+            "outerHTML",
+            "insertAdjacentHTML",
+            "document.write",
+            "eval(",
+            "dangerously",
+        ):
+            assert word not in script, name

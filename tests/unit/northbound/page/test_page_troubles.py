@@ -1,0 +1,183 @@
+"""What is wrong on a plant, by its points alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from bridge.command import Plant
+from bridge.image import Image, Quality, Value
+from bridge.mapping import Family, load_family
+from bridge.northbound.page.describe import described, layout_of
+from bridge.northbound.page.topics import topics_of
+from bridge.northbound.page.troubles import Troubles
+from tests.support import sites
+
+DRIVE, NODE, BUS = "conveyor/fu1", "conveyor", "bus/can0"
+_SITE = sites.site(
+    sites.bus(sites.node(sites.drive("fu1", "lease", 1000), sites.drive("fu2", "lease", 1000)))
+)
+
+
+def families_of(plant: Plant) -> dict[str, Family]:
+    return {node.mapping: load_family(node.mapping) for bus in plant.site.bus for node in bus.node}
+
+
+class Case:
+    def __init__(self) -> None:
+        plant = sites.plant_of(_SITE)
+        self.image: Image = plant.image
+        self.now_ms = 1_000_000.0
+        self.layout = layout_of(plant.site, families_of(plant))
+        self.troubles = Troubles(self.image, self.layout, lambda: self.now_ms)
+        for name in (BUS, f"{NODE}/node"):
+            self.set(f"{name}/state", 0 if name == BUS else 2)
+        for drive in self.layout.drives:
+            self.set(f"{drive}/status/state", 4)
+        self.set("bridge/audit_lost", 0)
+        self.set(f"{BUS}/intruders", 0)
+        self.troubles.beat()
+
+    def set(self, name: str, value: Value, quality: Quality = Quality.GOOD, reason: str = "") -> None:
+        self.image.set(self.image.index[name], value, self.now_ms / 1000, quality, reason)
+
+    def later(self, ms: float = 10_000.0) -> list[dict[str, Any]]:
+        self.now_ms += ms
+        self.troubles.beat()
+        return self.troubles.shown
+
+    def kinds(self) -> list[tuple[str, str]]:
+        return [(one["kind"], one["place"]) for one in self.later()]
+
+
+def test_a_plant_in_order_has_none() -> None:
+    assert Case().kinds() == []
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "kind", "rank"),
+    [
+        (f"{BUS}/state", 4, "bus_down", "alarm"),
+        (f"{BUS}/state", 3, "bus_off", "alarm"),
+        (f"{BUS}/state", 2, "bus_errors", "warning"),
+        (f"{BUS}/duplicate_ids", "5", "duplicate_ids", "alarm"),
+        (f"{BUS}/second_master", True, "second_master", "alarm"),
+        (f"{BUS}/unexpected_nodes", "12", "unexpected_nodes", "warning"),
+        (f"{BUS}/held_by", "lift", "held", "alarm"),
+        (f"{BUS}/intruders", 3, "intruder", "alarm"),
+        (f"{NODE}/node/state", 0, "node_absent", "alarm"),
+        (f"{NODE}/node/state", 3, "node_lost", "alarm"),
+        (f"{NODE}/node/state", 4, "node_stopped", "warning"),
+        (f"{NODE}/node/state", 6, "not_as_configured", "alarm"),
+        (f"{DRIVE}/supervision/follows", False, "ignores_stop", "danger"),
+        (f"{DRIVE}/supervision/watchdog_state", 3, "controller_silent", "alarm"),
+        (f"{DRIVE}/status/fault_text", "E010", "drive_fault", "alarm"),
+        ("bridge/fronts_failing", "opcua: its key", "fronts_failing", "warning"),
+        ("bridge/audit_lost", 7, "log_lost", "warning"),
+    ],
+)
+def test_each_is_told_with_its_place_and_when_it_began(name: str, value: Value, kind: str, rank: str) -> None:
+    case = Case()
+    case.later()
+    case.set(name, value)
+    (trouble,) = case.later(500.0)
+    place = name.rpartition("/")[0]
+    assert place.startswith(trouble["place"])
+    assert (trouble["kind"], trouble["rank"]) == (kind, rank)
+    assert trouble["since"] == case.now_ms
+    assert "or_longer" not in trouble
+    (still,) = case.later(500.0)
+    assert still == trouble, "it goes on, and has begun when it began"
+
+
+@pytest.mark.parametrize(
+    ("quality", "kind"),
+    [
+        (Quality.LOST, "drive_lost"),
+        (Quality.DEAD, "drive_lost"),
+        (Quality.STALE, "drive_stale"),
+        (Quality.CONFIG_ERROR, "drive_not_as_configured"),
+    ],
+)
+def test_a_drive_that_is_not_heard_as_it_should_be(quality: Quality, kind: str) -> None:
+    case = Case()
+    case.set(f"{DRIVE}/status/state", 4, quality, "why")
+    (trouble,) = case.later()
+    assert (trouble["kind"], trouble["place"], trouble["facts"]) == (kind, DRIVE, {"why": "why"})
+
+
+def test_what_follows_from_another_trouble_is_left_out() -> None:
+    case = Case()
+    case.set(f"{BUS}/state", 4)
+    case.set(f"{NODE}/node/state", 3)
+    for drive in case.layout.drives:
+        case.set(f"{drive}/status/state", 4, Quality.LOST)
+    assert case.kinds() == [("bus_down", BUS)]
+    case.set(f"{BUS}/state", 0)
+    assert case.kinds() == [("node_lost", NODE)]
+
+
+def test_the_worst_comes_first() -> None:
+    case = Case()
+    case.set(f"{BUS}/state", 1)
+    case.set(f"{DRIVE}/status/fault_text", "E010")
+    case.set("conveyor/fu2/supervision/follows", False)
+    assert [kind for kind, _ in case.kinds()] == ["ignores_stop", "drive_fault", "bus_errors"]
+
+
+def test_a_fault_is_told_with_its_cause_and_what_to_do() -> None:
+    case = Case()
+    facts = {"text": "E010 bus", "number": "E010/10.3", "cause": "silence", "remedy": "speak"}
+    for leaf, text in facts.items():
+        case.set(f"{DRIVE}/status/fault_{leaf}", text)
+    (trouble,) = case.later()
+    assert trouble["facts"] == facts
+
+
+def test_what_was_there_when_the_front_began_may_be_older() -> None:
+    case = Case()
+    case.set(f"{DRIVE}/status/fault_text", "E010")
+    assert case.later(100.0)[0]["or_longer"] is True
+
+
+@pytest.mark.parametrize("name", ["bridge/audit_lost", f"{BUS}/intruders"])
+def test_what_only_happens_is_shown_for_ten_minutes(name: str) -> None:
+    case = Case()
+    case.set(name, 5)
+    assert case.kinds()
+    assert case.later(580_000.0)
+    case.set(name, 6)
+    assert case.later(10_000.0)
+    assert case.later(590_000.0), "it has happened again"
+    assert not case.later(20_000.0)
+
+
+def test_a_beat_says_whether_anything_is_new() -> None:
+    case = Case()
+    assert not case.troubles.beat()
+    case.set(f"{DRIVE}/status/fault_text", "E010")
+    assert case.troubles.beat()
+    assert not case.troubles.beat()
+
+
+def test_each_point_is_in_the_topics_of_its_place() -> None:
+    case = Case()
+    points = case.image.points
+    topics = topics_of(points, case.layout)
+    shown = {index for indices in topics.values() for index in indices}
+    assert shown == set(range(len(points)))
+    assert {points[index].name for index in topics[f"drive {DRIVE}"]} == {
+        point.name for point in points if point.name.startswith(f"{DRIVE}/")
+    }
+    assert set(topics) == {"plant", "bus can0", "node conveyor", f"drive {DRIVE}", "drive conveyor/fu2"}
+
+
+def test_the_site_is_described_by_the_names_of_its_points() -> None:
+    plant = sites.plant_of(_SITE)
+    told = described(plant.image, plant.site, families_of(plant))
+    assert [one["name"] for one in told["drives"]] == [DRIVE, "conveyor/fu2"]
+    assert all(one["main"] == "frequency" and one["stops_in"] == "ready" for one in told["drives"])
+    for drive in told["drives"]:
+        assert f"{drive['name']}/actual/{drive['main']}" in told["points"]
+    assert set(told["points"]) == {point.name for point in plant.image.points}

@@ -14,13 +14,17 @@ from bridge.drive.fault_words import listed_faults
 from bridge.errors import OperationFailed
 from bridge.exports import dbc_file, modbus_table, opcua_table, zenoh_table
 from bridge.front_process import give_signs
+from bridge.lint import dictionary_files
 from bridge.mapping import Family
 from bridge.mirror.client import MirrorClient
 from bridge.mirror.endpoint import socket_endpoint
 from bridge.northbound.listening import listen
 from bridge.northbound.page.integration import Export
 from bridge.northbound.page.server import PageServer
-from bridge.northbound.page.web import FaultTexts, Page
+from bridge.northbound.page.web import Backstage, FaultTexts, Page
+from bridge.page_buses import Buses
+from bridge.page_system import SystemOf
+from bridge.parameter.ledger_file import LedgerFile
 from bridge.project import Project
 
 _log = logging.getLogger(__name__)
@@ -45,6 +49,21 @@ def exports_of(project: Project) -> dict[str, Export]:
     return exports
 
 
+def backstage_of(project: Project) -> Backstage:
+    """What the page shows of the files, the buses and the system of ``project``."""
+    buses = Buses(project, clock.epoch_ns)
+    return Backstage(
+        fault_texts(project.families),
+        exports_of(project),
+        buses.ears(),
+        buses.layouts(),
+        buses.capture,
+        LedgerFile(Path(project.site.site.state_dir)).totals,
+        dictionary_files(project.families, project.path),
+        SystemOf(project),
+    )
+
+
 def _in_german(family: Family) -> dict[str, dict[str, str]]:
     words = FaultWords(family, "de")
     listed = [words.listed(name) for name in listed_faults(family)]
@@ -67,8 +86,7 @@ async def run_page(project: Project, signs: int | None = None, listening: int | 
         stack.push_async_callback(mirror.close)
         table = site.page
         bound = listen(table.listen, "page.listen") if listening is None else socket.socket(fileno=listening)
-        texts = fault_texts(project.families)
-        page = Page(mirror, site, project.families, texts, exports_of(project), clock.now)
+        page = Page(mirror, site, project.families, backstage_of(project), clock.now)
         server = PageServer(page, bound, table.certificate, table.private_key)
         await server.start()
         stack.push_async_callback(server.close)

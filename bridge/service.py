@@ -13,9 +13,11 @@ from typing import Final
 from bridge import __version__, clock
 from bridge.auditlog import AuditLog
 from bridge.can import Bus, open_bus
+from bridge.can.softbus import SoftBus
+from bridge.can.wiretap import Wiretap
 from bridge.command import Plant, PlantView
 from bridge.config import BusTable
-from bridge.errors import BridgeError, OperationFailed
+from bridge.errors import BridgeError, OperationFailed, Unavailable
 from bridge.eventlog import log_event
 from bridge.front_process import Front
 from bridge.lint import Severity, lint
@@ -23,7 +25,7 @@ from bridge.master.ending import Ending
 from bridge.master.master import Master
 from bridge.master.network import Network
 from bridge.master.standstill import Alarm
-from bridge.mirror.endpoint import socket_endpoint
+from bridge.mirror.endpoint import socket_endpoint, tap_path
 from bridge.mirror.publisher import MirrorPublisher
 from bridge.northbound.gateway.nets import net_of
 from bridge.northbound.gateway.server import GatewayServer
@@ -100,6 +102,12 @@ class Service:
             for number, table in enumerate(site.bus, 1)
             if table.gateway
         }
+        self._taps = [
+            Wiretap(bus, tap_path(Path(site.site.runtime_dir), site.site.name, bus.name))
+            for bus, _ in networks
+            if site.page and isinstance(bus, SoftBus)
+        ]
+        """For the page, of buses that no other process can listen to."""
         self._tasks: list[asyncio.Task[None]] = []
         self._ending: Ending | None = None
         drives, buses = count(len(self.plant.drives), "drive"), count(len(site.bus), "bus")
@@ -161,6 +169,12 @@ class Service:
         for gateway in self.gateways.values():
             await gateway.start()
             stack.push_async_callback(gateway.close)
+        for tap in self._taps:
+            stack.push_async_callback(tap.close)
+            try:
+                await tap.start()
+            except Unavailable as error:
+                _log.warning("the page will not show the traffic of a bus: %s", error)
 
     def halt(self) -> None:
         """Stop all drives now, and take no command any more but stops. ``run`` is to be cancelled next."""

@@ -91,7 +91,7 @@ class PythonCanBus(SoftBus):
             return
         flags = (EXTENDED if message.is_extended_id else 0) | (REMOTE if message.is_remote_frame else 0)
         frame = Frame(message.arbitration_id | flags, bytes(message.data), time.monotonic())
-        self._bits.add(frame)
+        self._passes(frame)
         if frame.can_id in self._ours:
             # python-can gives no bus its own frames.
             self._foreign.append(frame)
@@ -146,7 +146,7 @@ class PythonCanBus(SoftBus):
             )
             try:
                 bus.send(message, timeout=max(0.0, deadline - time.monotonic()))
-                self._bits.add(frame)
+                self._passes(frame._replace(time=time.monotonic()))
             except (can.CanError, OSError, ValueError):
                 self._status.frames_expired += 1
 

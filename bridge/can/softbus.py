@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable
 from typing import Final
 
@@ -15,6 +16,7 @@ from bridge.canopen.frame import Frame
 
 _WITHIN_S: Final = 0.05
 """A frame of a burst that cannot be sent within this time is dropped."""
+_MOST_OVERHEARD: Final = 1 << 14
 
 
 class SoftBus(ABC):
@@ -25,6 +27,7 @@ class SoftBus(ABC):
         self._status = BusStatus()
         self._bursts = SoftBursts(in_step=bursts_in_step)
         self._bits = WireBits()
+        self._overheard: deque[Frame] | None = None
         self._accepted: frozenset[int] | None = None
         self._ours: frozenset[int] = frozenset()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -45,6 +48,27 @@ class SoftBus(ABC):
 
     def watch(self, can_ids: frozenset[int]) -> None:
         self._ours = can_ids
+
+    def overhear(self, *, is_on: bool) -> None:
+        """Whether all that passes on the bus is kept for ``take_overheard``, at most 16,384 frames of it."""
+        if is_on and self._overheard is None:
+            self._overheard = deque(maxlen=_MOST_OVERHEARD)
+        elif not is_on:
+            self._overheard = None
+
+    def take_overheard(self) -> list[Frame]:
+        """What has passed since, ours and everybody's, with its time."""
+        frames: list[Frame] = []
+        while self._overheard:
+            frames.append(self._overheard.popleft())
+        return frames
+
+    def _passes(self, frame: Frame) -> None:
+        """A frame is on the wire, whoever sends it. May be called in any thread."""
+        self._bits.add(frame)
+        overheard = self._overheard
+        if overheard is not None:
+            overheard.append(frame)
 
     @abstractmethod
     def send(self, frame: Frame, now: float, deadline: float) -> None: ...

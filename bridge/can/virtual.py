@@ -65,7 +65,7 @@ class VirtualBus(SoftBus):
 
     def pass_by(self, frame: Frame, now: float) -> None:
         """Somebody else's frame is on the wire."""
-        self._bits.add(frame)
+        self._passes(frame)
         if frame.can_id in self._ours and self._wake and len(self._foreign) < _MOST_WAITING:
             self._foreign.append(frame)
             self._rouse(frame.time - now)
@@ -115,7 +115,7 @@ class VirtualBus(SoftBus):
         if self._wake is None:
             self._status.frames_expired += 1
             return
-        self._bits.add(frame)
+        self._passes(frame._replace(time=now))
         self._wire.put(frame, self, now)
 
     def close(self) -> None:

@@ -17,7 +17,6 @@ from bridge import __version__
 from bridge.cli import drop_report, drop_test, exchange_report
 from bridge.cli.bus import AsJson, Line, carry_out, tell
 from bridge.cli.exchange_report import Exchange
-from bridge.cli.factory import DESCRIPTIONS
 from bridge.cli.own_check import audit_drives, audit_facts
 from bridge.cli.parameter_backup import (
     Wait,
@@ -35,6 +34,7 @@ from bridge.errands.open_channels import OpenChannels
 from bridge.errors import OperationFailed
 from bridge.parameter import backups
 from bridge.parameter.backup_file import BackupFile
+from bridge.parameter.factory import DESCRIPTIONS
 from bridge.project import Project, load_project
 
 _ALL_BITS = 0xFFFF_FFFF

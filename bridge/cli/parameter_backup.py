@@ -13,15 +13,16 @@ import typer
 
 from bridge import clock
 from bridge.cli.bus import AsJson, print_table, tell
-from bridge.cli.factory import DESCRIPTIONS, described, factory
 from bridge.cli.parameter_drive import DriveArgument, Force, SiteArgument, Target, Yes, find
 from bridge.cli.parameter_sets import read_all, write_all
-from bridge.errors import Fault, FileFaults, OperationFailed
+from bridge.errors import FileFaults, OperationFailed
 from bridge.image import Value
 from bridge.mapping.model import Parameter
 from bridge.parameter import backups
-from bridge.parameter.backup_file import BackupFile, read_backup
+from bridge.parameter.backup_file import BackupFile
 from bridge.parameter.codec import shown
+from bridge.parameter.factory import DESCRIPTIONS, described
+from bridge.parameter.set_file import fault_of, read_set
 
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="a parameter set, TOML")]
 Wait = Annotated[
@@ -162,34 +163,16 @@ def restore(
 def content_for(target: Target, file: Path) -> BackupFile:
     """A file that fits this drive, or the factory settings of a device description. Raises ``FileFaults``
     where it does not fit."""
-    if file.suffix.lower() in DESCRIPTIONS:
-        objects = factory(file, target.access.names, target.node.id)
-        if not objects:
-            raise typer.BadParameter(f"{file} has no factory settings of {target.name}")
-        return BackupFile(target.node.mapping, target.name, "", {}, {}, objects=objects)
-    content = read_backup(file)
-    wanted = target.node.mapping
-    if content.mapping != wanted:
-        message = f"the file is of {content.mapping}, and {target.name} has {wanted}"
-        raise FileFaults([_fault(file, content, "mapping", message, "a backup of such a drive")])
-    faults = [
-        _fault(file, content, name, str(error))
-        for name, error in backups.misfits(target.access.names, content.all)
-    ]
-    if faults:
-        raise FileFaults(faults)
-    return content
+    return read_set(file, target.access.names, target.node.mapping, target.name, target.node.id)
 
 
 def refuse_another(file: Path, content: BackupFile, identity: Mapping[str, int]) -> None:
     """Raises ``FileFaults`` where the file is of another kind of node than has told ``identity``."""
     if found := backups.why_another(content.identity, identity):
         name, why = found
-        raise FileFaults([_fault(file, content, name, f"{why}; nothing written", "a backup of such a node")])
-
-
-def _fault(file: Path, content: BackupFile, name: str, message: str, hint: str = "") -> Fault:
-    return Fault(str(file), content.lines.get(name, 0), name, message, hint)
+        raise FileFaults(
+            [fault_of(file, content, name, f"{why}; nothing written", "a backup of such a node")]
+        )
 
 
 def differences(target: Target, values: Mapping[str, Value]) -> backups.Comparison:

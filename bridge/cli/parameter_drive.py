@@ -157,7 +157,7 @@ def find(site: Path, drive: str) -> Target:
     (name,) = found
     bus, node, slot = targets[name]
     family = project.families[node.mapping]
-    has_own_channel = slot is not None and any(server.slot == slot.name for server in family.sdo)
-    on_first = slot is None or slot.parameters_by_sdo or not has_own_channel
-    access = DriveParameters(name, node.name, family, Names(family), ledger, on_first=on_first)
+    access = DriveParameters(
+        name, node.name, family, Names(family), ledger, on_first=family.is_on_first(slot)
+    )
     return Target(Line(bus, project.families, is_of_site=True), node, family, slot, access, ledger, file)

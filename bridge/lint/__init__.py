@@ -5,6 +5,7 @@ uses which COB-ID, how full the bus gets, which times cannot work together.
 """
 
 from bridge.lint.lint import Verdict as Verdict
+from bridge.lint.lint import dictionary_files as dictionary_files
 from bridge.lint.lint import family_dictionaries as family_dictionaries
 from bridge.lint.lint import lint as lint
 from bridge.lint.own import WorstCase as WorstCase

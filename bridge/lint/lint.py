@@ -42,7 +42,12 @@ def family_dictionaries(names: Iterable[str], site: Path | None = None) -> dict[
 
     Raises ``FileFaults`` where one cannot be read.
     """
-    found: dict[str, Description] = {}
+    return {name: read_device_file(file) for name, file in dictionary_files(names, site).items()}
+
+
+def dictionary_files(names: Iterable[str], site: Path | None = None) -> dict[str, Path]:
+    """The files of ``family_dictionaries``."""
+    found: dict[str, Path] = {}
     folders = mapping_folders(site)
     for name in names:
         file = described_file(site, name) if site else None
@@ -50,7 +55,7 @@ def family_dictionaries(names: Iterable[str], site: Path | None = None) -> dict[
             files = (folder / f"{name}.eds" for folder in folders)
             file = next((file for file in files if file.is_file()), None)
         if file is not None:
-            found[name] = read_device_file(file)
+            found[name] = file
     return found
 
 

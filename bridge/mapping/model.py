@@ -205,6 +205,11 @@ class Family(Table):
                 return slot
         raise KeyError(name)
 
+    def is_on_first(self, slot: Slot | None) -> bool:
+        """Whether the node's first SDO channel, which has the node's own parameters, reaches this drive."""
+        has_own_channel = slot is not None and any(server.slot == slot.name for server in self.sdo)
+        return slot is None or slot.parameters_by_sdo or not has_own_channel
+
     def sdo_channel(self, slot: Slot, opened: Sequence[int]) -> int | None:
         """The number of the SDO server that reaches a drive's parameters, with these opened beside the
         first; None where none does."""

@@ -23,6 +23,11 @@ def socket_endpoint(runtime_dir: Path, site: str) -> str:
     return f"unixsock-stream/{path}"
 
 
+def tap_path(runtime_dir: Path, site: str, bus: str) -> Path:
+    """Where the bus process passes on the frames of a bus that only it can hear."""
+    return runtime_dir.absolute() / f"{site}-{bus}.frames"
+
+
 def prepare_folder(endpoint: str) -> None:
     """See that the socket's folder is there and that only we can put something into it.
 

@@ -34,7 +34,7 @@ class _File(msgspec.Struct):
 
 
 class LedgerFile:
-    """One site's file. Every method raises OSError where the folder cannot be used."""
+    """One site's file. What adds to it raises OSError where the folder cannot be used."""
 
     def __init__(self, state_dir: Path) -> None:
         self.path = state_dir / NAME
@@ -54,6 +54,18 @@ class LedgerFile:
             ledger.put_back(unsaved)
             raise
         ledger.restore(totals, epoch_s, now)
+
+    def totals(self) -> dict[Key, int]:
+        """How often each was written, as the file says now; empty where there is none that can be read."""
+        try:
+            kept = msgspec.json.decode(self.path.read_bytes(), type=_File)
+        except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
+            return {}
+        return {
+            (owner, address): one.writes
+            for owner, objects in kept.writes.items()
+            for address, one in objects.items()
+        }
 
     def merge(self, writes: Mapping[Key, list[float]]) -> dict[Key, Saved]:
         """Add ``writes``, times in seconds since 1970, to the file; all that is in it."""

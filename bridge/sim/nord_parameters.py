@@ -126,8 +126,10 @@ class DriveParameters:
                 self._ram[number, one, parameter_set] = raw
 
     def at_keypad(self, number: int, raw: int, *, element: int = 1, parameter_set: int = 1) -> None:
-        """Somebody sets it at the drive itself."""
+        """Somebody sets it at the drive itself: it goes to the EEPROM, unless P560 says RAM only."""
         self._ram[number, element, parameter_set] = raw
+        if self.raw(_SAVE_TO_EEPROM) == 1:
+            self._eeprom[number, element, parameter_set] = raw
 
     def write(self, parameter: Parameter, element: int, parameter_set: int, raw: int) -> None:
         """A write over the bus: to the EEPROM too, unless P560 says RAM only (§6.6: 100 000 cycles)."""

@@ -23,6 +23,18 @@ from tests.support.process import Process, drivebridge, free_port, until
 
 DRIVE = "conveyor/fu1"
 TIMEOUT_S = 5.0
+GUARDED = (
+    "site",
+    "faults/de",
+    "integration",
+    "export/modbus.csv",
+    f"parameters/{DRIVE}",
+    "bus/can0",
+    "bus/can0/capture?seconds=1",
+    "system",
+    "system/site",
+    "system/audit",
+)
 Json = dict[str, Any]
 
 
@@ -96,6 +108,7 @@ class Browser:
             origin=origin or self.origin,  # type: ignore[arg-type]
             additional_headers={"Cookie": self.cookie},
             open_timeout=TIMEOUT_S,
+            legacy=True,
         )
 
 
@@ -138,7 +151,7 @@ def browser(bridge: tuple[Process, int]) -> Browser:
 
 def test_nothing_is_told_without_a_login(browser: Browser) -> None:
     assert browser.request("GET", "/api/session").status == 401
-    for path in ("site", "faults/de", "integration", "export/modbus.csv"):
+    for path in GUARDED:
         assert browser.request("GET", f"/api/{path}").status == 401, path
     assert browser.request("GET", "/").status == 200
     with pytest.raises(InvalidStatus):
@@ -329,6 +342,114 @@ def test_a_logout_closes_the_tabs_of_its_session(browser: Browser) -> None:
         tab.until(lambda message: False)
     assert closed.value.rcvd is not None
     assert closed.value.rcvd.code == 4401
+
+
+def test_parameters_are_listed_read_and_written_by_whom_may(browser: Browser) -> None:
+    browser.login("operator")
+    told = browser.request("GET", f"/api/parameters/{DRIVE}").json
+    assert "P102.1" in [one["name"] for one in told["parameters"]]
+    assert browser.request("GET", "/api/parameters/conveyor/fu9").status == 404
+    tab = Tab(browser)
+    assert tab.ask("read_parameter", parameter="P102.1")["value"] == 2.0
+    missing = tab.ask("read_parameter", parameter="2F00:00")
+    assert (missing["ok"], missing["abort_code"]) == (False, 0x0602_0000)
+    assert tab.ask("write_parameter", parameter="P102.1", value=3.0)["code"] == "not_allowed"
+    tab.socket.close()
+    engineer = Browser(browser.port)
+    engineer.login("engineer")
+    tab = Tab(engineer)
+    assert tab.ask("write_parameter", parameter="P102.1", value=3.0)["value"] == 3.0
+    assert tab.ask("write_parameter", parameter="P102.1", value=999.0)["code"] == "out_of_range"
+    assert tab.ask("write_parameter", parameter="P102.1", value=2.0)["value"] == 2.0
+    tab.socket.close()
+
+    def writes() -> int:
+        listed = engineer.request("GET", f"/api/parameters/{DRIVE}").json["parameters"]
+        return next(one.get("writes", 0) for one in listed if one["name"] == "P102.1")
+
+    until(lambda: writes() == 2, TIMEOUT_S, "both writes are counted")
+
+
+def test_a_set_becomes_a_file_and_a_file_a_set(browser: Browser) -> None:
+    browser.login("operator")
+    values = {"values": {"P102.1": 2.5}, "missing": ["P113.1"], "identity": {"vendor": 56}}
+    assert browser.request("POST", f"/api/backup/{DRIVE}", values).status == 403, "without the token"
+    token = {"X_Token": browser.token}
+    made = browser.request("POST", f"/api/backup/{DRIVE}", values, **token)
+    assert 'filename="conveyor-fu1.toml"' in made.headers["content-disposition"]
+    read = browser.request("POST", f"/api/set/{DRIVE}?name=monday.toml", made.body, **token)
+    assert (read.json["values"], read.json["identity"]) == ({"P102.1": 2.5}, {"vendor": 56})
+    for name, body, said in (
+        ("monday.toml", made.body[:-20], "monday.toml"),
+        ("../../etc/passwd", made.body, "a file that ends with"),
+        ("fu1.eds", b"nonsense", "fu1.eds"),
+        ("fu1.xdd", b"<a>" * 1000, "fu1.xdd"),
+    ):
+        wrong = browser.request("POST", f"/api/set/{DRIVE}?name={name}", body, **token)
+        assert wrong.status == 422, name
+        assert said in wrong.json["error"]
+        assert "/tmp" not in wrong.json["error"], "nobody is told where files lie on the box"
+    for body in (b"", b"[]", b'{"values": 1}', b'{"values": {"P102.1": [1]}}'):
+        assert browser.request("POST", f"/api/backup/{DRIVE}", body, **token).status == 400
+    assert browser.request("POST", f"/api/set/{DRIVE}?name=a.toml", b"x" * (5 << 20), **token).status == 400
+    assert browser.request("GET", "/").status == 200, "and it still serves"
+
+
+def test_a_tab_hears_the_bus_decoded(browser: Browser) -> None:
+    browser.login("observer")
+    tab = Tab(browser)
+    tab.say({"hear": {"bus": "can0", "kinds": ["pdo"], "nodes": [5]}})
+    rows = tab.until(lambda message: message.get("frames"))["frames"]
+    assert {row[3] for row in rows} == {"pdo"}
+    assert {row[4] for row in rows} == {5}
+    assert abs(rows[-1][0] / 1000 - time.time()) < TIMEOUT_S
+    tab.say({"hear": {"bus": "can0", "view": "identifiers"}})
+    counted = tab.until(lambda message: message.get("identifiers"))["identifiers"]
+    assert "080" in [row[0] for row in counted]
+    tab.say({"hear": None})
+    assert tab.ask("take_control", "nowhere", ttl_ms=1000)["code"] == "unknown_target", "the tab is served"
+    tab.socket.close()
+
+
+@pytest.mark.parametrize(("form", "begins"), [("candump", b"("), ("asc", b"date ")])
+def test_a_second_of_the_bus_is_captured(browser: Browser, form: str, begins: bytes) -> None:
+    browser.login("observer")
+    answer = browser.request("GET", f"/api/bus/can0/capture?seconds=1&format={form}")
+    assert answer.status == 200
+    assert answer.body.startswith(begins)
+    assert answer.body.count(b"\n") > 5
+    assert "hall-can0." in answer.headers["content-disposition"]
+
+
+@pytest.mark.parametrize(
+    "query", ["", "seconds=0", "seconds=61", "seconds=1e9", "seconds=1&format=exe", "seconds=-1"]
+)
+def test_no_capture_is_endless_or_of_another_form(browser: Browser, query: str) -> None:
+    browser.login("observer")
+    assert browser.request("GET", f"/api/bus/can0/capture?{query}").status == 422
+    assert browser.request("GET", "/api/bus/can9/capture?seconds=1").status == 404
+
+
+def test_the_system_is_for_everybody_and_its_files_for_engineers(browser: Browser) -> None:
+    browser.login("operator")
+    told = browser.request("GET", "/api/system").json
+    assert told["versions"]["drivebridge"]
+    assert told["clients"]["page"] >= 1
+    assert "tabs" not in told
+    assert [one["of"] for one in told["certificates"]] == ["opcua"]
+    for path in ("site", "audit"):
+        assert browser.request("GET", f"/api/system/{path}").status == 403
+    engineer = Browser(browser.port)
+    engineer.login("engineer")
+    tab = Tab(engineer)
+    tab.until(lambda message: "you" in message)
+    assert "engineer" in [one["role"] for one in engineer.request("GET", "/api/system").json["tabs"]]
+    file = engineer.request("GET", "/api/system/site").json
+    assert "password_hash" in file["text"]
+    assert "argon2" not in file["text"]
+    assert [one for one in file["findings"] if one["severity"] == "error"] == []
+    until(lambda: engineer.request("GET", "/api/system/audit").json != [], TIMEOUT_S, "what was asked for")
+    tab.socket.close()
 
 
 def test_by_tls_the_cookie_is_bound_to_it(tmp_path: Path) -> None:

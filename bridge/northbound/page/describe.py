@@ -49,17 +49,20 @@ def described(image: Image, site: Site, families: dict[str, Family]) -> dict[str
     }
 
 
-def layout_of(site: Site, families: dict[str, Family]) -> Layout:
-    """Which drives are where."""
+def layout_of(image: Image, site: Site, families: dict[str, Family]) -> Layout:
+    """Which drives are where, and what moves them."""
+    points = {point.name: _point(point) for point in image.points}
     nodes = [(bus.name, node) for bus in site.bus for node in bus.node]
+    drives = {
+        f"{node.name}/{families[node.mapping].leaf_of(drive)}": node.name
+        for _, node in nodes
+        for drive in node.drive
+    }
     return Layout(
-        drives={
-            f"{node.name}/{families[node.mapping].leaf_of(drive)}": node.name
-            for _, node in nodes
-            for drive in node.drive
-        },
+        drives=drives,
         nodes={node.name: bus for bus, node in nodes},
         buses=tuple(bus.name for bus in site.bus),
+        mains={drive: main for drive in drives if (main := _main(drive, points))},
     )
 
 

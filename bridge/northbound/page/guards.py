@@ -12,6 +12,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 MOST_BODY: Final = 65_536
 """Bytes of a request's body."""
+MOST_FILE: Final = 4 << 20
+"""Bytes of a file that is sent."""
+_FILES: Final = ("/api/set/", "/api/backup/")
+"""Paths to which files are sent."""
 MOST_HEAD: Final = 16_384
 """Bytes of its head."""
 _POLICY: Final = "; ".join(
@@ -85,8 +89,9 @@ class Guards:
         if scope["type"] == "websocket" and origin is None:
             return "only from a page"
         length = headers.get("content-length", "0")
-        if not length.isdecimal() or int(length) > MOST_BODY or "transfer-encoding" in headers:
-            return f"a body has at most {MOST_BODY} bytes, and says so"
+        most = MOST_FILE if scope["path"].startswith(_FILES) else MOST_BODY
+        if not length.isdecimal() or int(length) > most or "transfer-encoding" in headers:
+            return f"a body has at most {most} bytes, and says so"
         return ""
 
 

@@ -16,6 +16,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from bridge.command import Event
 from bridge.guard import Guard
 from bridge.image import Image
+from bridge.northbound.page.hearing import Hearings
 from bridge.northbound.page.sessions import Session, Sessions
 from bridge.northbound.page.topics import Topics
 from bridge.northbound.page.troubles import Layout, Troubles
@@ -43,9 +44,17 @@ _encode = msgspec.json.Encoder().encode
 class Tabs:
     """Has each open tab shown what it asks for. ``clock`` is monotonic."""
 
-    def __init__(self, view: View, layout: Layout, sessions: Sessions, clock: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        view: View,
+        layout: Layout,
+        sessions: Sessions,
+        hearings: Hearings,
+        clock: Callable[[], float],
+    ) -> None:
         self._view = view
         self._sessions = sessions
+        self._hearings = hearings
         self._clock = clock
         self._topics = Topics(view, layout)
         self._troubles = Troubles(view.image, layout, self._epoch_ms)
@@ -65,6 +74,7 @@ class Tabs:
             beating.cancel()
             with suppress(asyncio.CancelledError):
                 await beating
+            self._hearings.close()
             self._topics.close()
 
     async def serve(self, socket: WebSocket, session: Session | None) -> None:
@@ -81,7 +91,7 @@ class Tabs:
         if not session.has(token):
             await socket.close(_NO_TOKEN)
             return
-        tab = _Tab(socket, session, self._view)
+        tab = _Tab(socket, session, self._view, self._epoch_ms())
         self._tabs.append(tab)
         sending = asyncio.create_task(tab.send_all(), name="messages to a tab")
         try:
@@ -100,6 +110,20 @@ class Tabs:
             tab.viewer.leave()
             with suppress(RuntimeError):
                 await tab.socket.close(SESSION_OVER)
+
+    @property
+    def shown(self) -> list[dict[str, Any]]:
+        """For JSON: who has the page open, from where, since when in ms since 1970, and what it shows."""
+        return [
+            {
+                "who": str(tab.viewer.identity),
+                "role": tab.session.role.name.lower(),
+                "address": tab.viewer.identity.address,
+                "since": tab.since_ms,
+                "shows": list(tab.viewer.topics),
+            }
+            for tab in self._tabs
+        ]
 
     def _greet(self, tab: _Tab) -> None:
         tab.tell(_encode({"you": str(tab.viewer.identity)}))
@@ -132,6 +156,7 @@ class Tabs:
                 self._sample()
                 if tick % _BEAT == 0:
                     self._beat()
+                    self._hear(counts=tick % _LOOK == 0)
                 if tick % _LOOK == 0:
                     await self._look_at_sessions()
 
@@ -157,6 +182,10 @@ class Tabs:
             for topic in tab.viewer.topics:
                 if topic in changes:
                     tab.show(changes[topic])
+
+    def _hear(self, *, counts: bool) -> None:
+        wishes = [(tab.viewer.wish, tab.show) for tab in self._tabs if tab.viewer.wish is not None]
+        self._hearings.beat(wishes, self._clock(), counts=counts)
 
     async def _look_at_sessions(self) -> None:
         """A tab that is open uses its session."""
@@ -184,7 +213,8 @@ class Tabs:
 class _Tab:
     """A WebSocket with what waits to be sent on it."""
 
-    def __init__(self, socket: WebSocket, session: Session, view: View) -> None:
+    def __init__(self, socket: WebSocket, session: Session, view: View, since_ms: float) -> None:
+        self.since_ms = round(since_ms)
         self.socket = socket
         self.session = session
         address = socket.client.host if socket.client else ""

@@ -7,7 +7,7 @@ trouble is left out: a bus that is down says more than each of its nodes being l
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, Final
 
@@ -45,6 +45,8 @@ class Layout:
     drives: Mapping[str, str]
     nodes: Mapping[str, str]
     buses: tuple[str, ...]
+    mains: Mapping[str, str] = field(default_factory=dict[str, str])
+    """What each drive is moved by, such as ``frequency``, as far as it has that."""
 
 
 class Troubles:
@@ -121,6 +123,8 @@ class Troubles:
                 yield trouble
         for drive, node in self._layout.drives.items():
             yield from _of_drive(self._look, drive, is_heard=node not in gone)
+            if node not in gone and drive in self._layout.mains:
+                yield from _of_meaning(self._look, drive, self._layout.mains[drive])
         yield from _of_bridge(self._look)
         if self._has_risen("bridge/audit_lost", now_ms):
             yield Trouble(
@@ -217,6 +221,14 @@ def _of_drive(look: _Look, drive: str, *, is_heard: bool) -> Iterator[Trouble]:
         yield Trouble(Rank.ALARM, "drive_fault", drive, facts)
     elif quality is Quality.STALE:
         yield Trouble(Rank.WARNING, "drive_stale", drive, (("why", reason),))
+
+
+def _of_meaning(look: _Look, drive: str, main: str) -> Iterator[Trouble]:
+    """The drive's words do not carry what moves it: its parameters say so."""
+    for group in ("command", "actual"):
+        quality, reason = look.quality(f"{drive}/{group}/{main}")
+        if quality is Quality.DISABLED and reason:
+            yield Trouble(Rank.WARNING, f"no_{group}", drive, (("value", main), ("why", reason)))
 
 
 def _of_bridge(look: _Look) -> Iterator[Trouble]:

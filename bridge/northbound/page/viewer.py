@@ -15,6 +15,7 @@ import msgspec
 
 from bridge.command import Action, Code, Do, Identity, Outcome, Request, Role, Source
 from bridge.command.request import COMMANDS
+from bridge.northbound.page.hearing import Wish
 from bridge.northbound.view import View
 from bridge.ratelimit import RateLimit
 
@@ -60,6 +61,12 @@ class _Ask(msgspec.Struct, forbid_unknown_fields=True):
     fields: dict[str, Any] = {}
 
 
+class _Hear(msgspec.Struct, forbid_unknown_fields=True):
+    """What of the traffic on a bus is shown from now on; null: nothing."""
+
+    hear: Wish | None
+
+
 class _Hidden(msgspec.Struct, forbid_unknown_fields=True):
     """The tab is not in the foreground any more: what it owns is given back."""
 
@@ -69,6 +76,7 @@ class _Hidden(msgspec.Struct, forbid_unknown_fields=True):
 _decode_show = msgspec.json.Decoder(_Show).decode
 _decode_trend = msgspec.json.Decoder(_Trend).decode
 _decode_ask = msgspec.json.Decoder(_Ask).decode
+_decode_hear = msgspec.json.Decoder(_Hear).decode
 _decode_hidden = msgspec.json.Decoder(_Hidden).decode
 _decode_any = msgspec.json.Decoder(dict[str, msgspec.Raw]).decode
 _encode = msgspec.json.Encoder().encode
@@ -84,6 +92,8 @@ class Viewer:
         self.identity = Identity(Source.LOCAL, f"{user or 'visitor'}#{secrets.token_hex(3)}", role, address)
         self.topics: tuple[str, ...] = ()
         self.followed: tuple[int, ...] = ()
+        self.wish: Wish | None = None
+        """What it wants to hear of a bus."""
         self._places = {point.name: place for place, point in enumerate(view.image.points)}
         self._view = view
         self._tell = tell
@@ -94,7 +104,8 @@ class Viewer:
         self._limit = RateLimit(_MESSAGES, _EVERY_S)
 
     def on_message(self, data: bytes, now: float, known: Callable[[str], bool]) -> None:
-        """One message of the tab; ``known`` says which topics there are. Raises ``BadMessage``."""
+        """One message of the tab; ``known`` says which topics there are, of buses ``bus <bus>``. Raises
+        ``BadMessage``."""
         if len(data) > MOST_BYTES:
             raise BadMessage(f"a message has at most {MOST_BYTES} bytes")
         if not self._limit.allows(now):
@@ -107,6 +118,8 @@ class Viewer:
                 self._follow(_decode_trend(data).trend)
             elif "ask" in keys:
                 self._ask(_decode_ask(data))
+            elif "hear" in keys:
+                self._hear(_decode_hear(data).hear, known)
             elif _decode_hidden(data).hidden:
                 self.leave()
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
@@ -124,6 +137,11 @@ class Viewer:
             raise BadMessage(f"there is no point {str(unknown)[:80]!r}, or it is one too many")
         self.followed = tuple(self._places[name] for name in names)
 
+    def _hear(self, wish: Wish | None, known: Callable[[str], bool]) -> None:
+        if wish is not None and not known(f"bus {wish.bus}"):
+            raise BadMessage(f"there is no bus {wish.bus[:80]!r}")
+        self.wish = wish
+
     def _ask(self, ask: _Ask) -> None:
         left = self._left
 
@@ -136,6 +154,7 @@ class Viewer:
                 "message": outcome.message,
                 "forwarded": outcome.forwarded,
                 "value": outcome.value,
+                "abort_code": outcome.abort_code,
             }
             self._tell(_encode(shown))
 

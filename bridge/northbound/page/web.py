@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncGenerator, Callable, Mapping
+from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,10 +24,14 @@ from bridge.command import Role
 from bridge.config import PageTable, Site
 from bridge.mapping import Family
 from bridge.northbound.logins import PasswordChecks
+from bridge.northbound.page.bus import Bus, Capture
 from bridge.northbound.page.describe import described, layout_of
 from bridge.northbound.page.guards import MOST_BODY, Guards
+from bridge.northbound.page.hearing import Ear, Hearings
 from bridge.northbound.page.integration import Export, Integration
+from bridge.northbound.page.parameters import Counts, Parameters, holders_of
 from bridge.northbound.page.sessions import Session, Sessions
+from bridge.northbound.page.system import System, SystemFacts
 from bridge.northbound.page.tabs import Tabs
 from bridge.northbound.page.throttle import Throttle
 from bridge.northbound.sources import source_of
@@ -45,6 +50,22 @@ FaultTexts = Mapping[str, Mapping[str, Mapping[str, Mapping[str, str]]]]
 """Texts, causes and remedies of faults, by language, family and the fault's number."""
 
 
+@dataclass(frozen=True, slots=True)
+class Backstage:
+    """What the page shows beside the points: made by who may look at files, buses and the system."""
+
+    fault_texts: FaultTexts
+    exports: Mapping[str, Export]
+    ears: Sequence[tuple[str, int, Ear]]
+    """Of each bus its name, bit rate and an ear."""
+    layouts: Mapping[str, Any]
+    capture: Capture
+    counts: Counts
+    dictionaries: Mapping[str, Path]
+    """The makers' descriptions of devices, by mapping."""
+    system: SystemFacts
+
+
 class _Login(msgspec.Struct, forbid_unknown_fields=True):
     user: str
     password: str
@@ -61,20 +82,20 @@ class Page:
         view: View,
         site: Site,
         families: dict[str, Family],
-        fault_texts: FaultTexts,
-        exports: Mapping[str, Export],
+        backstage: Backstage,
         clock: Callable[[], float],
     ) -> None:
         settings, table = site.opcua, site.page or PageTable.model_validate({})
         self._clock = clock
-        self._fault_texts = fault_texts
+        self._fault_texts = backstage.fault_texts
         self._site_name = site.site.name
         self._users = {user.name: user for user in settings.user} if settings else {}
         self._anonymous = _ROLES.get(settings.anonymous) if settings else None
         self._sessions = Sessions()
         self._throttle = Throttle()
         self._checks = PasswordChecks()
-        self._tabs = Tabs(view, layout_of(site, families), self._sessions, clock)
+        layout = layout_of(view.image, site, families)
+        self._tabs = Tabs(view, layout, self._sessions, Hearings(backstage.ears), clock)
         self._description = _encode(described(view.image, site, families))
         self._is_encrypted = table.certificate is not None
         self._cookie = f"__Host-{_COOKIE}" if self._is_encrypted else _COOKIE
@@ -85,7 +106,17 @@ class Page:
             Route("/api/faults/{language}", self._faults),
             Route("/api/login", self._login, methods=["POST"]),
             Route("/api/logout", self._logout, methods=["POST"]),
-            *Integration(site, exports, self._is_inside).routes,
+            *Integration(site, backstage.exports, self._is_inside).routes,
+            *Parameters(
+                holders_of(site, families),
+                backstage.counts,
+                backstage.dictionaries,
+                body_of,
+                self._is_inside,
+                self._has_token,
+            ).routes,
+            *Bus(site.site.name, backstage.layouts, backstage.capture, self._is_inside).routes,
+            *System(backstage.system, lambda: self._tabs.shown, self._session_of).routes,
             WebSocketRoute("/live", self._live),
             Mount("/static", StaticFiles(directory=STATIC)),
         ]
@@ -112,6 +143,11 @@ class Page:
 
     def _is_inside(self, connection: HTTPConnection) -> bool:
         return self._session_of(connection) is not None
+
+    def _has_token(self, connection: HTTPConnection) -> bool:
+        """Whether it comes from our page, and not only with its cookie."""
+        session = self._session_of(connection)
+        return session is not None and session.has(connection.headers.get("x-token", ""))
 
     def _begin(self, user: str, role: Role) -> tuple[Session, dict[str, Any]]:
         session = self._sessions.begin(user, role, self._clock())
@@ -147,7 +183,7 @@ class Page:
             response.headers["retry-after"] = str(round(pause_s + 0.5))
             return response
         try:
-            login = _decode_login(await _body(request))
+            login = _decode_login(await body_of(request, MOST_BODY))
         except (msgspec.DecodeError, TimeoutError, ValueError):
             return self._json({"error": "malformed"}, 400)
         user = self._users.get(login.user)
@@ -204,12 +240,12 @@ async def _index(request: Request) -> Response:
     return FileResponse(STATIC / "index.html", headers={"cache-control": "no-cache"})
 
 
-async def _body(request: Request) -> bytes:
-    """Raises ``TimeoutError`` for one that dribbles, ``ValueError`` for one that is too long."""
-    body = b""
+async def body_of(request: Request, most: int) -> bytes:
+    """Raises ``TimeoutError`` for one that dribbles, ``ValueError`` for one of more than ``most`` bytes."""
+    body = bytearray()
     async with asyncio.timeout(_BODY_S):
         async for chunk in request.stream():
             body += chunk
-            if len(body) > MOST_BODY:
+            if len(body) > most:
                 raise ValueError("too long")
-    return body
+    return bytes(body)

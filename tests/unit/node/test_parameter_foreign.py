@@ -7,13 +7,13 @@ from collections.abc import Callable
 import canopen
 
 from bridge.canopen.frame import Frame
-from bridge.cli.factory import described, factory
 from bridge.config import NodeTable
 from bridge.errands.parameter import ParameterErrand
 from bridge.image import Value
 from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
 from bridge.parameter import DriveParameters, Ledger, Names, ParameterError, backups
+from bridge.parameter.factory import described, factory
 
 FAMILY = load_family("cia402/velocity")
 EDS = mappings_dir() / "cia402" / "cia402.eds"

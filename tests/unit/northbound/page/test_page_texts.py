@@ -76,3 +76,27 @@ def test_no_script_of_ours_is_longer_than_one_sitting_or_writes_html() -> None:
             "dangerously",
         ):
             assert word not in script, name
+
+
+def _imports(script: Path) -> list[Path]:
+    """What it imports as soon as it is loaded."""
+    found = re.findall(
+        r'^(?:import|export)\b[^;]*?\bfrom "([^"]+)"|^import "([^"]+)"', script.read_text("utf-8"), re.M
+    )
+    return [(script.parent / (one or other)).resolve() for one, other in found]
+
+
+def test_the_first_screen_fetches_its_scripts_at_once() -> None:
+    """Without a list of them a browser finds each only in the one before."""
+    static = JS.parent.resolve()
+    needed: set[Path] = set()
+    todo = [static / "js/main.js"]
+    while todo:
+        script = todo.pop()
+        if script not in needed:
+            needed.add(script)
+            todo += _imports(script)
+    page = (static / "index.html").read_text(encoding="utf-8")
+    named = {static / one for one in re.findall(r'rel="modulepreload" href="static/([^"]+)"', page)}
+    assert named == needed - {static / "js/main.js"}
+    assert not [one for one in named if one.name.startswith("uplot")], "a trend is on another page"

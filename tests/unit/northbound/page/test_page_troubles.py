@@ -29,7 +29,7 @@ class Case:
         plant = sites.plant_of(_SITE)
         self.image: Image = plant.image
         self.now_ms = 1_000_000.0
-        self.layout = layout_of(plant.site, families_of(plant))
+        self.layout = layout_of(plant.image, plant.site, families_of(plant))
         self.troubles = Troubles(self.image, self.layout, lambda: self.now_ms)
         for name in (BUS, f"{NODE}/node"):
             self.set(f"{name}/state", 0 if name == BUS else 2)

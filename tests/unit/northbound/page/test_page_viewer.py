@@ -37,7 +37,7 @@ class Seen:
 
 
 def say(viewer: Viewer, message: Any, now: float = 0.0) -> None:
-    viewer.on_message(json.dumps(message).encode(), now, {"plant", f"drive {DRIVE}"}.__contains__)
+    viewer.on_message(json.dumps(message).encode(), now, {"plant", f"drive {DRIVE}", "bus can0"}.__contains__)
 
 
 def ask(viewer: Viewer, action: str, target: str = DRIVE, **fields: Any) -> None:
@@ -183,3 +183,16 @@ def test_an_observer_is_refused_by_the_plant_itself() -> None:
     for request in seen.requests:
         seen.plant.submit(request, 0.0, outcomes.append)
     assert [one.code for one in outcomes] == [Code.NOT_ALLOWED] * 3
+
+
+def test_a_tab_hears_one_bus_at_a_time_until_it_has_heard_enough() -> None:
+    viewer = Seen().viewer()
+    assert viewer.wish is None
+    say(viewer, {"hear": {"bus": "can0", "view": "identifiers", "kinds": ["pdo"], "nodes": [5]}})
+    assert viewer.wish is not None
+    assert (viewer.wish.bus, viewer.wish.view, viewer.wish.kinds) == ("can0", "identifiers", ["pdo"])
+    say(viewer, {"hear": None})
+    assert viewer.wish is None
+    for wrong in ({"bus": "can9"}, {"bus": "can0", "colour": 1}, {}, 1, {"bus": 1}):
+        with pytest.raises(BadMessage):
+            say(viewer, {"hear": wrong})

@@ -4,7 +4,7 @@ import { classes, html, useEffect } from "./ui.js";
 import { connect, disconnect, isConnected, leave, show, troubles } from "./live.js";
 import { logout, session, siteName } from "./session.js";
 import { Login } from "./login.js";
-import { menu, pageOf } from "./pages.js";
+import { menu, pageOf, pathOf } from "./pages.js";
 import { address, route } from "./route.js";
 import { language, t } from "./texts.js";
 import { theme } from "./theme.js";
@@ -19,8 +19,9 @@ export function Frame() {
 }
 
 function Inside() {
-  const page = pageOf(route.value);
-  const topics = page.topics(route.value);
+  const path = pathOf(route.value);
+  const page = pageOf(path);
+  const topics = page ? page.topics(route.value) : [];
   useEffect(() => {
     connect();
     document.addEventListener("visibilitychange", onVisibility);
@@ -32,7 +33,7 @@ function Inside() {
   useEffect(() => show(topics), [topics.join()]);
   useEffect(() => {
     const place = route.value.slice(1).join("/");
-    document.title = [place || t(`page.${page.path}`), siteName.value].join(" · ");
+    document.title = [place || t(`page.${path}`), siteName.value].join(" · ");
   });
   return html`
     <a class="skip" href="#main">${t("frame.skip")}</a>
@@ -40,15 +41,17 @@ function Inside() {
       <a class="site" href=${address("plant")}><span class="product">drivebridge</span> ${siteName}</a>
       <nav aria-label=${t("frame.menu")}>
         ${menu.map(
-          (one) => html`<a href=${address(one.path)} aria-current=${one === page ? "page" : undefined}>
-            ${t(`page.${one.path}`)}
+          (one) => html`<a href=${address(one)} aria-current=${one === path ? "page" : undefined}>
+            ${t(`page.${one}`)}
           </a>`,
         )}
       </nav>
       <${Tools} />
     </header>
     <${Sentence} />
-    <main id="main" tabindex="-1"><${page.View} route=${route.value} /></main>
+    <main id="main" tabindex="-1">
+      ${page ? html`<${page.View} route=${route.value} />` : html`<p class="waiting">${t("frame.loading")}</p>`}
+    </main>
   `;
 }
 

@@ -22,6 +22,7 @@ const SHAPES = {
   warning: html`<path d="M8 1.5l6.6 12.4H1.4z" /><path d="M8 6v4M8 11.4v1" />`,
   none: html`<circle cx="8" cy="8" r="6" />`,
   // of the page
+  download: html`<path d="M8 2v8M4.5 7L8 10.5 11.5 7M3 13.5h10" />`,
   light: html`<circle cx="8" cy="8" r="3" /><path d="M8 1v2M8 13v2M1 8h2M13 8h2M3 3l1.4 1.4M11.6 11.6L13 13M3 13l1.4-1.4M11.6 4.4L13 3" />`,
   dark: html`<path d="M13 9.5A5.5 5.5 0 0 1 6.5 3a5.5 5.5 0 1 0 6.5 6.5z" />`,
   system: html`<circle cx="8" cy="8" r="5.5" /><path class="fill" d="M8 2.5a5.5 5.5 0 0 1 0 11z" />`,

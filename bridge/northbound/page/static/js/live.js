@@ -1,7 +1,7 @@
 // The connection of this tab: what it shows arrives here, and what it asks goes out.
 //
 // The server sends {topic, state} once for each topic that is shown, {topic, changes} after that, {troubles},
-// {trend: [[time, value, ...], ...]}, {event} and {outcome}. Whatever came is drawn once a frame at most.
+// {trend: [[time, value, ...], ...]}, {heard}, {event} and {outcome}. Whatever came is drawn once a frame at most.
 
 import { signal } from "./ui.js";
 import { ended, session } from "./session.js";
@@ -24,6 +24,8 @@ let topics = [];
 let trended = [];
 let pending = null;
 let onRows = () => {};
+let wish = null;
+let onHeard = () => {};
 const asked = new Map();
 let lastNumber = 0;
 
@@ -57,6 +59,13 @@ export function follow(names, listener) {
   send({ trend: names });
 }
 
+/** What is heard of a bus: {bus, view, kinds, nodes}, or null for nothing; `listener` gets the messages. */
+export function hear(wanted, listener = () => {}) {
+  wish = wanted;
+  onHeard = listener;
+  send({ hear: wanted });
+}
+
 /** One request; the promise is its outcome: {ok, code, message, forwarded, value}. */
 export function ask(target, action, fields = {}) {
   const number = ++lastNumber;
@@ -83,6 +92,7 @@ function onOpen() {
   isConnected.value = true;
   send({ show: topics });
   if (trended.length) send({ trend: trended });
+  if (wish) send({ hear: wish });
 }
 
 function onClose(event) {
@@ -106,6 +116,7 @@ function onMessage(message) {
   } else if ("you" in message) self.value = message.you;
   else if ("troubles" in message) troubles.value = message.troubles;
   else if ("trend" in message) onRows(message.trend);
+  else if ("heard" in message) onHeard(message);
   else if ("event" in message) events.value = [message.event, ...events.value].slice(0, MOST_EVENTS);
   else keep(message.state ?? message.changes);
 }

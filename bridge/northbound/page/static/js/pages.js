@@ -1,13 +1,43 @@
-// The pages there are, in the order of the menu. A page is {path, topics(route), View}; its text is "page.<path>".
+// The pages there are. A page is {path, topics(route), View}; its text is "page.<path>". The plant is there from the
+// beginning, any other is loaded when it is opened first.
 
+import { signal } from "./ui.js";
 import { plant } from "./pages/plant.js";
-import { drive } from "./pages/drive.js";
-import { integration } from "./pages/integration.js";
 
-export const pages = [plant, drive, integration];
+const OTHERS = {
+  drive: () => import("./pages/drive.js"),
+  parameters: () => import("./pages/parameters.js"),
+  bus: () => import("./pages/bus.js"),
+  integration: () => import("./pages/integration.js"),
+  system: () => import("./pages/system.js"),
+};
+const RETRY_MS = 2000;
+
 /** What the menu shows; the page of a drive is opened from the plant. */
-export const menu = pages.filter((page) => page.inMenu !== false);
+export const menu = ["plant", "parameters", "bus", "integration", "system"];
 
-export function pageOf(route) {
-  return pages.find((page) => page.path === route[0]) ?? plant;
+const loaded = signal({ plant });
+const loading = new Set();
+
+/** Which page a route is of. */
+export function pathOf(route) {
+  return route[0] in OTHERS ? route[0] : "plant";
+}
+
+/** The page called `path`; null until it is loaded. */
+export function pageOf(path) {
+  if (!(path in loaded.value)) load(path);
+  return loaded.value[path] ?? null;
+}
+
+async function load(path) {
+  if (loading.has(path)) return;
+  loading.add(path);
+  try {
+    const module = await OTHERS[path]();
+    loaded.value = { ...loaded.value, [path]: module[path] };
+  } catch {
+    setTimeout(() => load(path), RETRY_MS); // the bridge is being started again
+  }
+  loading.delete(path);
 }

@@ -43,12 +43,12 @@ async function load(address) {
   return told;
 }
 
-// Every word has to be somewhere in the row.
-function matching(rows, wanted) {
+/** The rows in which every word of `wanted` is somewhere in `text(row)`. */
+export function matching(rows, wanted, text = (row) => Object.values(row).join(" ")) {
   const words = wanted.toLowerCase().split(/\s+/).filter(Boolean);
   if (!words.length) return rows;
   return rows.filter((row) => {
-    const text = Object.values(row).join(" ").toLowerCase();
-    return words.every((word) => text.includes(word));
+    const shown = text(row).toLowerCase();
+    return words.every((word) => shown.includes(word));
   });
 }

@@ -59,9 +59,9 @@ function said(trouble) {
 /** The address of the page that shows the place. */
 export function pageOfPlace(place) {
   if (drives.value.some((one) => one.name === place)) return address("drive", ...place.split("/"));
-  const first = drives.value.find((one) => one.node === place);
-  if (first && nodes.value.some((one) => one.name === place)) return address("drive", ...first.name.split("/"));
-  return address("plant");
+  if (place === "bridge") return address("system");
+  const bus = place.startsWith("bus/") ? place.slice(4) : nodes.value.find((one) => one.name === place)?.bus;
+  return bus ? address("bus", bus) : address("plant");
 }
 
 function withDefaults(trouble) {

@@ -8,19 +8,21 @@ export class History {
   }
 
   /** `row` is [time in ms, value, …]; null for a value that is not good. */
-  add(row) {
-    if (row.length !== this._columns.length) return; // of the choice before
-    row.forEach((held, index) => this._columns[index].push(held));
+  add([ms, ...held]) {
+    if (held.length + 1 !== this._columns.length) return; // of the choice before
+    this._columns[0].push(ms / 1000);
+    held.forEach((one, index) => this._columns[index + 1].push(one));
     if (this._columns[0].length > KEPT + 600) for (const column of this._columns) column.splice(0, 600);
   }
 
+  /** The newest time, in s. */
   get last() {
-    return this._columns[0].at(-1) ?? Date.now();
+    return this._columns[0].at(-1) ?? Date.now() / 1000;
   }
 
   /** Times in s, and a column for each value, as uPlot wants them. */
   columns() {
-    return [this._columns[0].map((ms) => ms / 1000), ...this._columns.slice(1)];
+    return this._columns;
   }
 
   rows() {

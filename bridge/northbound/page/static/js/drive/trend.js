@@ -28,13 +28,14 @@ export function Trend({ drive }) {
     const draw = () => {
       isDue = false;
       if (!plot || state.current.isPaused) return;
-      const until = kept.last / 1000;
+      const until = kept.last;
       plot.setData(kept.columns(), false);
       plot.setScale("x", { min: until - state.current.spanS, max: until });
     };
     follow(names, (rows) => {
       for (const row of rows) kept.add(row);
-      if (!isDue && !document.hidden) requestAnimationFrame(draw);
+      // In the frame after the one in which what came with it changes the texts: one at a time is in time.
+      if (!isDue && !document.hidden) requestAnimationFrame(() => requestAnimationFrame(draw));
       isDue = true;
     });
     // Colours are read from the style sheet when the plot is made.
@@ -146,11 +147,6 @@ function sizeOf(box) {
 
 function save(drive, names, history) {
   const head = ["time", ...names.map((name) => `${name}${nature(name).unit ? ` [${nature(name).unit}]` : ""}`)];
-  const rows = history.rows().map(([ms, ...held]) => [new Date(ms).toISOString(), ...held.map((one) => one ?? "")].join(","));
-  const file = new Blob([[head.map((one) => `"${one}"`).join(","), ...rows, ""].join("\r\n")], { type: "text/csv" });
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(file);
-  link.download = `${drive.replaceAll("/", "-")}.csv`;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  const rows = history.rows().map(([s, ...held]) => [new Date(s * 1000).toISOString(), ...held.map((one) => one ?? "")].join(","));
+  download(`${drive.replaceAll("/", "-")}.csv`, [head.map((one) => `"${one}"`).join(","), ...rows, ""].join("\r\n"), "text/csv");
 }

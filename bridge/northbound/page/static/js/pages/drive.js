@@ -38,6 +38,8 @@ function Drive({ drive }) {
       <h1>${drive.name}</h1>
       <span class="state"><${Icon} name=${state} /> ${t(`state.${state}`)}</span>
       <span class="fact">${drive.family}</span>
+      <a href=${address("parameters", ...drive.name.split("/"))}>${t("page.parameters")}</a>
+      <a href=${address("bus", drive.bus)}>${t("page.bus")} ${drive.bus}</a>
       <${Actuals} drive=${drive} />
     </header>
     ${own.length > 0 && html`<section class="attention" aria-label=${t("plant.attention")}><ol>

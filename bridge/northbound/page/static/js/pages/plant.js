@@ -3,7 +3,7 @@
 import { classes, html } from "../ui.js";
 import { troubles } from "../live.js";
 import { address } from "../route.js";
-import { buses, drives, label, nature, nodes } from "../site.js";
+import { below, buses, drives, label, leafOf, nature, nodes } from "../site.js";
 import { quality, value } from "../values.js";
 import { number, quantity } from "../format.js";
 import { maybe, t } from "../texts.js";
@@ -56,7 +56,7 @@ function Bus({ bus }) {
   return html`
     <section class="bus" aria-labelledby=${`bus-${bus.name}`}>
       <header>
-        <h2 id=${`bus-${bus.name}`}>${bus.name}</h2>
+        <h2 id=${`bus-${bus.name}`}><a href=${address("bus", bus.name)}>${bus.name}</a></h2>
         <span class=${classes("busstate", `is-${state}`)}>
           <${Icon} name=${{ ok: "ok", warning: "warning", passive: "warning" }[state] ?? "alarm"} /> ${t(`bus.${state}`)}
         </span>
@@ -141,13 +141,25 @@ function Control({ drive }) {
   `;
 }
 
+// A node that is no drive, with what its inputs say and its outputs are.
 function NodeTile({ node }) {
   const state = label(`${node.name}/node/state`, value(`${node.name}/node/state`));
   return html`
-    <div class="tile">
+    <a class="tile" href=${address("bus", node.bus)}>
       <span class="name">${node.name}</span>
       <span class="state"><${Icon} name=${state === "operational" ? "ok" : "lost"} /> ${t(`node.${state}`)}</span>
       <span class="family">${node.family}</span>
-    </div>
+      <span class="signals">${signals(node).map((name) => html`<span class=${classes({ old: quality(name) !== "good" })}>
+        ${leafOf(name)} ${quality(name) === "good" ? shownSignal(name) : "–"}</span>`)}</span>
+    </a>
   `;
+}
+
+const signals = (node) => [...below(`${node.name}/input`), ...below(`${node.name}/output`)];
+
+function shownSignal(name) {
+  const held = value(name);
+  if (typeof held === "boolean") return t(held ? "signal.on" : "signal.off");
+  const state = nature(name).states?.[held];
+  return state ?? quantity(held, nature(name).unit);
 }

@@ -10,8 +10,10 @@ from bridge.canopen.sdo import COMMANDS
 from bridge.eds import Description, Entry, read_whole_device_file
 from bridge.eds.values import BadValue, encode
 from bridge.image import Value
-from bridge.parameter import Names, ObjectRef, ParameterError
+from bridge.mapping.model import ObjectRef
 from bridge.parameter.codec import decode, encode_value
+from bridge.parameter.error import ParameterError
+from bridge.parameter.names import Names
 
 DESCRIPTIONS: Final = (".eds", ".dcf", ".xdd", ".xdc")
 _APPLICATION: Final = range(0x2000, 0x10000)

@@ -1,0 +1,222 @@
+"""What a tab is shown of the traffic on a bus: frame by frame as it filters them, or counted by identifier.
+Sans-IO.
+
+Each frame is decoded once for all tabs. A tab that asks for all of a busy bus gets the first of each beat,
+and how many were left out. Messages are JSON: ``{"heard": bus, "lost": n, "frames": [[time in ms since 1970,
+identifier, data, kind, node, label, text], …], "more": n}``, or ``"identifiers"`` in place of the frames, or
+``"failure"`` with the reason why nothing is heard.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+import msgspec
+
+from bridge.errors import OperationFailed
+
+MOST_ROWS: Final = 100
+"""Frames in one message."""
+_WINDOW_S: Final = 5.0
+"""Rates and loads are those of about so long."""
+_MOST_IDENTIFIERS: Final = 2048
+_encode = msgspec.json.Encoder().encode
+
+
+class Heard(msgspec.Struct, frozen=True, array_like=True):
+    """One frame with what it says. ``at_ms`` is in ms since 1970; ``bits`` is what it took of the bus."""
+
+    at_ms: float
+    identifier: str
+    data: str
+    kind: str
+    node: int
+    label: str
+    text: str
+    bits: int = 0
+
+
+class Ear(Protocol):
+    """Listens to one bus while it is open, and says what it hears."""
+
+    def open(self) -> None:
+        """Raises ``OperationFailed``."""
+        ...
+
+    def take(self) -> list[Heard]:
+        """Raises ``OperationFailed`` where nothing is heard any more."""
+        ...
+
+    @property
+    def lost(self) -> int: ...
+
+    def close(self) -> None: ...
+
+
+class Wish(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """What a tab wants to hear; an empty list of kinds or nodes is all of them."""
+
+    bus: str
+    view: str = "frames"
+    kinds: list[str] = []
+    nodes: list[int] = []
+
+    def takes(self, heard: Heard) -> bool:
+        return (not self.kinds or heard.kind in self.kinds) and (not self.nodes or heard.node in self.nodes)
+
+
+@dataclass(slots=True)
+class _Count:
+    last: Heard
+    frames: int = 0
+    frames_before: int = 0
+    bits: int = 0
+    shortest_ms: float = 0.0
+    longest_ms: float = 0.0
+    rate_hz: float = 0.0
+    load: float = 0.0
+
+
+class Hearing:
+    """One bus of ``bitrate`` bit/s, heard by whoever wants to."""
+
+    def __init__(self, bus: str, bitrate: int, ear: Ear) -> None:
+        self._bus = bus
+        self._bitrate = bitrate
+        self._ear = ear
+        self._is_open = False
+        self._failure = ""
+        self._counts: dict[str, _Count] = {}
+        self._measured = 0.0
+        self._new: list[Heard] = []
+
+    def listen(self, now: float, *, is_wanted: bool) -> None:
+        """Take what has come. ``now`` is monotonic; while nobody wants to hear, the ear is closed."""
+        self._new = []
+        if not is_wanted:
+            self.close()
+            return
+        try:
+            if not self._is_open:
+                self._open(now)
+            self._new = self._ear.take()
+            self._failure = ""
+        except OperationFailed as error:
+            self.close()
+            self._failure = str(error)
+        for heard in self._new:
+            self._count(heard)
+        if now - self._measured >= 1.0:
+            self._measure(now)
+
+    def close(self) -> None:
+        if self._is_open:
+            self._is_open = False
+            self._ear.close()
+
+    def _open(self, now: float) -> None:
+        self._ear.open()
+        self._is_open = True
+        self._counts.clear()
+        self._measured = now
+
+    def frames_for(self, wish: Wish) -> bytes | None:
+        """The message about what is new for this tab; None where nothing is."""
+        if self._failure:
+            return self._told({"failure": self._failure})
+        wanted = [heard for heard in self._new if wish.takes(heard)]
+        if not wanted:
+            return None
+        rows = [_row(heard) for heard in wanted[:MOST_ROWS]]
+        return self._told({"frames": rows, "more": len(wanted) - len(rows)})
+
+    def identifiers_for(self, wish: Wish) -> bytes:
+        """The message with a row for each identifier so far: identifier, label, frames, frames a second, load
+        in percent, shortest and longest gap in ms, newest data and its text."""
+        if self._failure:
+            return self._told({"failure": self._failure})
+        rows = [
+            [
+                key,
+                one.last.label,
+                one.frames,
+                round(one.rate_hz, 1),
+                round(one.load, 2),
+                round(one.shortest_ms, 1),
+                round(one.longest_ms, 1),
+                one.last.data,
+                one.last.text,
+            ]
+            for key, one in sorted(self._counts.items(), key=lambda pair: (len(pair[0]), pair[0]))
+            if wish.takes(one.last)
+        ]
+        return self._told({"identifiers": rows})
+
+    def _told(self, facts: dict[str, Any]) -> bytes:
+        return _encode({"heard": self._bus, "lost": self._ear.lost, **facts})
+
+    def _count(self, heard: Heard) -> None:
+        one = self._counts.get(heard.identifier)
+        if one is None:
+            if len(self._counts) >= _MOST_IDENTIFIERS:
+                return
+            one = self._counts[heard.identifier] = _Count(heard)
+        else:
+            gap_ms = heard.at_ms - one.last.at_ms
+            one.shortest_ms = min(one.shortest_ms, gap_ms) if one.frames > 1 else gap_ms
+            one.longest_ms = max(one.longest_ms, gap_ms)
+            one.last = heard
+        one.frames += 1
+        one.bits += heard.bits
+
+    def _measure(self, now: float) -> None:
+        """Once a second: rates, smoothed over some seconds."""
+        elapsed_s, self._measured = now - self._measured, now
+        share = min(1.0, elapsed_s / _WINDOW_S)
+        for one in self._counts.values():
+            rate_hz = (one.frames - one.frames_before) / elapsed_s
+            load = 100 * one.bits / (self._bitrate * elapsed_s)
+            is_first = not one.frames_before
+            one.rate_hz = rate_hz if is_first else one.rate_hz + share * (rate_hz - one.rate_hz)
+            one.load = load if is_first else one.load + share * (load - one.load)
+            one.frames_before, one.bits = one.frames, 0
+
+
+def _row(heard: Heard) -> list[Any]:
+    return [heard.at_ms, heard.identifier, heard.data, heard.kind, heard.node, heard.label, heard.text]
+
+
+class Hearings:
+    """All buses of a site, by name."""
+
+    def __init__(self, buses: Iterable[tuple[str, int, Ear]]) -> None:
+        self._hearings = {name: Hearing(name, bitrate, ear) for name, bitrate, ear in buses}
+
+    def __contains__(self, bus: object) -> bool:
+        return bus in self._hearings
+
+    def beat(
+        self,
+        wishes: Iterable[tuple[Wish, Callable[[bytes], None]]],
+        now: float,
+        *,
+        counts: bool,
+    ) -> None:
+        """Tell each tab what it wants to hear; ``counts``: those who look at identifiers, too."""
+        wanted = list(wishes)
+        for name, hearing in self._hearings.items():
+            own = [(wish, show) for wish, show in wanted if wish.bus == name]
+            hearing.listen(now, is_wanted=bool(own))
+            for wish, show in own:
+                if wish.view == "identifiers":
+                    message = hearing.identifiers_for(wish) if counts else None
+                else:
+                    message = hearing.frames_for(wish)
+                if message is not None:
+                    show(message)
+
+    def close(self) -> None:
+        for hearing in self._hearings.values():
+            hearing.close()

@@ -1,0 +1,271 @@
+"""Parameters of a drive or node, for a page that reads and writes them by its tab: which there are, how often
+each was written, and sets of them as files."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import tempfile
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path, PurePath
+from typing import Any, Final
+
+import msgspec
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+
+from bridge.config import NodeTable, Site
+from bridge.errors import FileFaults
+from bridge.image import Value
+from bridge.mapping import Family
+from bridge.northbound.page.guards import MOST_FILE
+from bridge.parameter import Entry, Names, backups
+from bridge.parameter.backup_file import BackupFile
+from bridge.parameter.factory import DESCRIPTIONS, factory
+from bridge.parameter.set_file import read_set
+
+Counts = Callable[[], Mapping[tuple[str, str], int]]
+"""How often the EEPROM was written, by the drive's or node's name and the object."""
+ReadBody = Callable[[Request, int], Awaitable[bytes]]
+"""The body of a request, of so many bytes at most; raises ``ValueError`` or ``TimeoutError``."""
+
+_log = logging.getLogger(__name__)
+
+_SETS: Final = (".toml", *DESCRIPTIONS)
+_encode = msgspec.json.Encoder().encode
+
+
+class _Set(msgspec.Struct, forbid_unknown_fields=True):
+    """What a tab has read of a drive. ``values`` are by name, ``unreadable`` says why others were not
+    read."""
+
+    values: dict[str, bool | int | float | str]
+    missing: list[str] = []
+    unreadable: dict[str, str] = {}
+    identity: dict[str, int] = {}
+
+
+_decode_set = msgspec.json.Decoder(_Set).decode
+
+
+@dataclass(frozen=True, slots=True)
+class Holder:
+    """A drive, or a node that is none, with what its family says of its parameters."""
+
+    name: str
+    node: NodeTable
+    family: Family
+    names: Names
+    on_first: bool
+
+
+def holders_of(site: Site, families: Mapping[str, Family]) -> dict[str, Holder]:
+    """By the names that commands have for them."""
+    known = {name: Names(family) for name, family in families.items()}
+    found: dict[str, Holder] = {}
+    for bus in site.bus:
+        for node in bus.node:
+            family, names = families[node.mapping], known[node.mapping]
+            if family.is_device:
+                found[node.name] = Holder(node.name, node, family, names, on_first=True)
+            for drive in node.drive:
+                name = f"{node.name}/{family.leaf_of(drive)}"
+                on_first = family.is_on_first(family.slot_named(drive.slot))
+                found[name] = Holder(name, node, family, names, on_first)
+    return found
+
+
+class Parameters:
+    """``dictionaries`` are the makers' descriptions, by mapping. ``is_inside`` says whether a request may
+    read, ``has_token`` whether it comes from our page."""
+
+    def __init__(
+        self,
+        holders: Mapping[str, Holder],
+        counts: Counts,
+        dictionaries: Mapping[str, Path],
+        read_body: ReadBody,
+        is_inside: Callable[[Request], bool],
+        has_token: Callable[[Request], bool],
+    ) -> None:
+        self._holders = holders
+        self._counts = counts
+        self._dictionaries = dictionaries
+        self._factories: dict[str, dict[str, Value]] = {}
+        self._read_body = read_body
+        self._is_inside = is_inside
+        self._has_token = has_token
+        self._reading = asyncio.Semaphore(1)
+        self.routes = [
+            Route("/api/parameters/{holder:path}", self._list),
+            Route("/api/backup/{holder:path}", self._backup, methods=["POST"]),
+            Route("/api/set/{holder:path}", self._set, methods=["POST"]),
+        ]
+
+    def _refusal(self, request: Request) -> Response | None:
+        if not self._is_inside(request):
+            return JSONResponse({"error": "login"}, 401)
+        if request.method == "POST" and not self._has_token(request):
+            return JSONResponse({"error": "token"}, 403)
+        if request.path_params["holder"] not in self._holders:
+            return JSONResponse({"error": f"there is {', '.join(self._holders)}"}, 404)
+        return None
+
+    async def _list(self, request: Request) -> Response:
+        """Which parameters there are, with the range and the wear of each."""
+        if refusal := self._refusal(request):
+            return refusal
+        holder = self._holders[request.path_params["holder"]]
+        async with self._reading:
+            told = await asyncio.to_thread(lambda: listed(holder, self._counts(), self._factory(holder)))
+        headers = {"cache-control": "no-store"}
+        return Response(_encode(told), headers=headers, media_type="application/json")
+
+    def _factory(self, holder: Holder) -> dict[str, Value]:
+        """The factory settings that the maker's description has, as far as there is one."""
+        if holder.name not in self._factories:
+            file = self._dictionaries.get(holder.node.mapping)
+            try:
+                found = factory(file, holder.names, holder.node.id) if file else {}
+            except FileFaults as error:
+                _log.warning("page: no factory settings of %s: %s", holder.name, error)
+                found = {}
+            self._factories[holder.name] = found
+        return self._factories[holder.name]
+
+    async def _backup(self, request: Request) -> Response:
+        """What a tab has read, as a file that ``drivebridge parameters`` reads."""
+        if refusal := self._refusal(request):
+            return refusal
+        holder = self._holders[request.path_params["holder"]]
+        try:
+            read = _decode_set(await self._read_body(request, MOST_FILE))
+        except (msgspec.DecodeError, TimeoutError, ValueError) as error:
+            return JSONResponse({"error": str(error)}, 400)
+        text = backup_of(holder, read.values, read.missing, read.unreadable, read.identity)
+        name = f"{holder.name.replace('/', '-')}.toml"
+        headers = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
+        return Response(text, headers=headers, media_type="application/toml")
+
+    async def _set(self, request: Request) -> Response:
+        """The values in a backup or in a device description, which fit this drive."""
+        if refusal := self._refusal(request):
+            return refusal
+        holder = self._holders[request.path_params["holder"]]
+        name = PurePath(request.query_params.get("name", "").replace("\\", "/")).name or "file.toml"
+        if PurePath(name).suffix.lower() not in _SETS:
+            return JSONResponse({"error": f"{name[:80]}: a file that ends with {', '.join(_SETS)}"}, 422)
+        try:
+            content = await self._read_body(request, MOST_FILE)
+        except (TimeoutError, ValueError) as error:
+            return JSONResponse({"error": str(error)}, 400)
+        async with self._reading:
+            try:
+                found = await asyncio.to_thread(_read, content, name, holder)
+            except FileFaults as error:
+                return JSONResponse({"error": "\n".join(map(str, error.faults[:20]))}, 422)
+        return Response(_encode(found), headers={"cache-control": "no-store"}, media_type="application/json")
+
+
+def listed(
+    holder: Holder, counts: Mapping[tuple[str, str], int], factory: Mapping[str, Value]
+) -> dict[str, Any]:
+    """For JSON: the parameters in the order of the mapping file, and what the family has for all of them."""
+    settings = {entry.name for entry in backups.settings(holder.names, on_first=holder.on_first)}
+    eeprom = holder.family.eeprom
+    ram_only = eeprom.ram_only if eeprom else None
+    return {
+        "mapping": holder.node.mapping,
+        "cycles": eeprom.cycles if eeprom else None,
+        "can_save": bool(eeprom and eeprom.can_save),
+        "on_save_only": bool(eeprom and eeprom.written_on_save_only),
+        "ram_only": ram_only and {"parameter": ram_only.parameter, "value": ram_only.value},
+        "parameters": [
+            _entry(holder, entry, counts)
+            | ({"setting": True} if entry.name in settings else {})
+            | ({"factory": factory[entry.name]} if entry.name in factory else {})
+            for entry in holder.names.entries()
+            if holder.on_first or not (entry.definition and entry.definition.of_node)
+        ],
+    }
+
+
+def backup_of(
+    holder: Holder,
+    values: Mapping[str, Value],
+    missing: list[str],
+    unreadable: Mapping[str, str],
+    identity: Mapping[str, int],
+) -> str:
+    """The text of a file with those of ``values`` that belong into one, in the mapping file's order."""
+    entries = backups.settings(holder.names, on_first=holder.on_first)
+    saved = datetime.now(UTC).isoformat(timespec="seconds")
+    content = BackupFile(
+        holder.node.mapping,
+        holder.name,
+        saved,
+        {entry.name: _as_held(entry, values[entry.name]) for entry in entries if entry.name in values},
+        {entry.name: _comment(entry) for entry in entries},
+        [entry.name for entry in entries if entry.name in missing],
+        identity,
+        {},
+        {entry.name: unreadable[entry.name] for entry in entries if entry.name in unreadable},
+    )
+    return content.text()
+
+
+def _as_held(entry: Entry, value: Value) -> Value:
+    """JSON as browsers write it has no 2.0."""
+    is_whole = isinstance(value, int) and not isinstance(value, bool)
+    return (
+        float(value)
+        if is_whole and entry.definition and not entry.definition.value_type.is_integer
+        else value
+    )
+
+
+def _comment(entry: Entry) -> str:
+    title = entry.definition.title if entry.definition else ""
+    return f"{entry.unit}, {title}" if entry.unit else title
+
+
+def _entry(holder: Holder, entry: Entry, counts: Mapping[tuple[str, str], int]) -> dict[str, Any]:
+    """What is empty is left out."""
+    definition = entry.definition
+    if definition is None:
+        return {"name": entry.name, "object": str(entry.address)}
+    owner = holder.node.name if definition.of_node else holder.name
+    facts: dict[str, Any] = {
+        "name": entry.name,
+        "title": definition.title,
+        "object": str(entry.address),
+        "type": definition.data_type,
+        "unit": definition.unit,
+        "low": definition.low,
+        "high": definition.high,
+        "states": {str(code): text for code, text in definition.states.items()},
+        "write_only": not definition.readable,
+        "read_only": not definition.writable,
+        "why_never": holder.names.protection.why_never(entry) if definition.writable else "",
+        "protected": holder.names.protection.level(entry.address),
+        "volatile": definition.volatile,
+        "command": definition.command,
+        "writes": counts.get((owner, str(entry.address)), 0),
+    }
+    return {name: fact for name, fact in facts.items() if fact not in ("", None, {}) and fact is not False}
+
+
+def _read(content: bytes, name: str, holder: Holder) -> dict[str, Any]:
+    """Raises ``FileFaults``, which name the file as it is called at the reader's."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / f"set{PurePath(name).suffix.lower()}"
+        file.write_bytes(content)
+        try:
+            found = read_set(file, holder.names, holder.node.mapping, holder.name, holder.node.id)
+        except FileFaults as error:
+            raise FileFaults([replace(fault, file=name) for fault in error.faults]) from None
+    values = {entry.name: value for entry, value in backups.in_order(holder.names, found.all)}
+    return {"drive": found.drive, "saved": found.saved, "identity": dict(found.identity), "values": values}

@@ -1,0 +1,37 @@
+// Some seconds of a bus as a file.
+
+import { html, useState } from "../ui.js";
+import { save } from "../download.js";
+import { siteName } from "../session.js";
+import { t } from "../texts.js";
+import { Icon } from "../icons.js";
+
+const ENDINGS = { candump: "log", asc: "asc" };
+const LONGEST_S = 60;
+
+export function Capture({ bus }) {
+  const [state, setState] = useState({});
+  const onSubmit = async (event) => {
+    event.preventDefault();
+    const { seconds, format } = Object.fromEntries(new FormData(event.target));
+    setState({ busy: t("capture.runs", { seconds }) });
+    const answer = await fetch(`api/bus/${encodeURIComponent(bus.name)}/capture?seconds=${seconds}&format=${format}`).catch(() => null);
+    if (!answer?.ok) return setState({ failure: (await answer?.json())?.error ?? t("login.unreachable") });
+    save(`${siteName.value}-${bus.name}.${ENDINGS[format]}`, await answer.text());
+    setState({});
+  };
+  return html`
+    <section class="panel" aria-labelledby="capture">
+      <h2 id="capture">${t("capture.title")}</h2>
+      <form class="search" onSubmit=${onSubmit}>
+        <label for="seconds">${t("capture.seconds")}</label>
+        <input id="seconds" name="seconds" type="number" min="1" max=${LONGEST_S} defaultValue="10" required />
+        <label for="format">${t("capture.format")}</label>
+        <select id="format" name="format"><option value="candump">candump -L (.log)</option><option value="asc">Vector ASC (.asc)</option></select>
+        <button disabled=${state.busy}><${Icon} name="download" /> ${t("capture.start")}</button>
+        <small role="status">${state.busy ?? ""}</small>
+      </form>
+      ${state.failure && html`<p class="failure" role="alert">${state.failure}</p>`}
+    </section>
+  `;
+}

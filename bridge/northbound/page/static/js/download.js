@@ -1,0 +1,9 @@
+// Has the browser keep a text, or what the server answers, as a file.
+
+export function save(name, content, type = "text/plain") {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([content], { type }));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}

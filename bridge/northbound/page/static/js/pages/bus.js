@@ -1,0 +1,54 @@
+// One bus: its condition, its nodes and how far each has come, the layout of their PDOs, and what passes on it.
+
+import { html, useEffect, useState } from "../ui.js";
+import { troubles } from "../live.js";
+import { address } from "../route.js";
+import { buses, nodes } from "../site.js";
+import { t } from "../texts.js";
+import { Condition } from "../bus/condition.js";
+import { Capture } from "../bus/capture.js";
+import { Layout } from "../bus/layout.js";
+import { Nodes } from "../bus/nodes.js";
+import { Traffic } from "../bus/traffic.js";
+import { TroubleRow } from "./plant.js";
+
+export const bus = { path: "bus", topics, View };
+
+const named = (route) => buses.value.find((one) => one.name === route[1]) ?? buses.value[0];
+
+function topics(route) {
+  return named(route) ? [`bus ${named(route).name}`] : [];
+}
+
+function View({ route }) {
+  const one = named(route);
+  if (!one) return null;
+  return html`
+    <h1>${t("page.bus")} ${one.name}</h1>
+    ${buses.value.length > 1 && html`<nav class="tabs" aria-label=${t("page.bus")}>
+      ${buses.value.map((other) => html`<a href=${address("bus", other.name)} aria-current=${other === one ? "page" : undefined}>${other.name}</a>`)}
+    </nav>`}
+    <${Bus} key=${one.name} bus=${one} />
+  `;
+}
+
+function Bus({ bus }) {
+  const [told, setTold] = useState(null);
+  useEffect(() => {
+    fetch(`api/bus/${encodeURIComponent(bus.name)}`)
+      .then((answer) => answer.json())
+      .then(setTold);
+  }, [bus.name]);
+  const places = [`bus/${bus.name}`, ...nodes.value.filter((node) => node.bus === bus.name).map((node) => node.name)];
+  const own = (troubles.value ?? []).filter((one) => places.includes(one.place));
+  return html`
+    <${Condition} bus=${bus} />
+    ${own.length > 0 && html`<section class="attention" aria-label=${t("plant.attention")}><ol>
+      ${own.map((trouble) => html`<${TroubleRow} key=${trouble.kind + trouble.place} trouble=${trouble} />`)}
+    </ol></section>`}
+    <${Nodes} bus=${bus} />
+    <${Traffic} bus=${bus} nodes=${told?.nodes ?? []} />
+    <${Capture} bus=${bus} />
+    ${told && html`<${Layout} nodes=${told.nodes} />`}
+  `;
+}

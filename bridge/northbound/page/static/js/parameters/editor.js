@@ -1,0 +1,54 @@
+// Changes one parameter, within its range, and says what that costs the EEPROM.
+
+import { html, useState } from "../ui.js";
+import { number } from "../format.js";
+import { t } from "../texts.js";
+import { held, write } from "./held.js";
+import { range, shown, typed } from "./value.js";
+
+export function Editor({ holder, entry, described, onWritten }) {
+  const [said, setSaid] = useState(null);
+  const one = held(holder, entry.name).value;
+  const onSubmit = async (event) => {
+    event.preventDefault();
+    const value = typed(entry, event.target.elements.value.value);
+    setSaid({ text: t("parameters.writing") });
+    const outcome = await write(holder, entry.name, value);
+    setSaid(outcome.ok
+      ? { text: outcome.message || t("parameters.written", { value: shown(entry, outcome.value) }) }
+      : { isFailure: true, text: t("outcome.refused", { what: entry.name, message: outcome.message || outcome.code }) });
+    if (outcome.ok) onWritten();
+  };
+  return html`
+    <form class="editor" onSubmit=${onSubmit}>
+      <label for="value">${t("parameters.new_value", { name: entry.name })}</label>
+      <${Field} entry=${entry} value=${one?.value} /> ${entry.unit}
+      <button class="main">${t("parameters.write")}</button>
+      <small>${range(entry)}</small>
+      ${entry.factory !== undefined && html`<small>${t("parameters.factory_is", { value: shown(entry, entry.factory) })}</small>`}
+      <small>${wear(entry, described)}</small>
+      ${entry.protected && html`<p class="quiet">${t(`parameters.protected.${entry.protected}`)}</p>`}
+      <p role="status" class=${said?.isFailure ? "failure" : ""}>${said?.text ?? ""}</p>
+    </form>
+  `;
+}
+
+function Field({ entry, value }) {
+  if (entry.states || entry.type === "bool") {
+    const choices = entry.states ?? { true: "true", false: "false" };
+    return html`<select id="value" name="value">${Object.entries(choices).map(([code, text]) => html`
+      <option value=${code} selected=${String(value) === code}>${entry.states ? `${code} (${text})` : text}</option>`)}</select>`;
+  }
+  const isText = entry.type === "string" || entry.type === "bytes";
+  return html`<input id="value" name="value" required type=${isText ? "text" : "number"} step="any" min=${entry.low} max=${entry.high}
+    defaultValue=${value ?? ""} />`;
+}
+
+// What a write costs.
+function wear(entry, described) {
+  if (entry.command) return t("parameters.wear.command");
+  if (entry.volatile) return t("parameters.wear.volatile");
+  if (!described.cycles) return t("parameters.wear.unknown");
+  if (described.on_save_only) return t("parameters.wear.on_save");
+  return t("parameters.wear", { writes: number(entry.writes ?? 0), cycles: number(described.cycles) });
+}

@@ -1,0 +1,40 @@
+// Values of parameters as people read and type them.
+
+import { number } from "../format.js";
+
+const BARE = ["string", "bytes"];
+
+/** "1.03 s", "1 (automatic)". */
+export function shown(entry, value) {
+  if (value === null || value === undefined) return "–";
+  if (typeof value !== "number") return String(value);
+  const state = entry.states?.[value];
+  if (state) return `${value} (${state})`;
+  const digits = Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(10)));
+  return entry.unit ? `${digits}\u202f${entry.unit}` : digits;
+}
+
+/** "0 … 320 s"; empty where there is none. */
+export function range(entry) {
+  if (entry.low === undefined && entry.high === undefined) return "";
+  return `${number(entry.low ?? null)} … ${number(entry.high ?? null)}${entry.unit ? ` ${entry.unit}` : ""}`;
+}
+
+/** What was typed, as it is sent. */
+export function typed(entry, text) {
+  if (entry.type === "bool") return text === "true";
+  return BARE.includes(entry.type) ? text : Number(text);
+}
+
+/** Whether two values are the same; a state may be given by its text. */
+export function same(entry, one, other) {
+  const [a, b] = [coded(entry, one), coded(entry, other)];
+  if (typeof a === "number" && typeof b === "number") return Math.abs(a - b) <= 1e-9 * Math.max(1, Math.abs(a));
+  return typeof a === "string" && typeof b === "string" ? a.trimEnd() === b.trimEnd() : a === b;
+}
+
+function coded(entry, value) {
+  if (typeof value !== "string" || !entry.states) return value;
+  const found = Object.entries(entry.states).find(([, text]) => text.toLowerCase() === value.trim().toLowerCase());
+  return found ? Number(found[0]) : value;
+}

@@ -1,0 +1,34 @@
+// The site file as it lies on the box, without its secrets, and what a check of it finds.
+
+import { html, useState, useEffect } from "../ui.js";
+import { many, t } from "../texts.js";
+import { Icon } from "../icons.js";
+
+export function SiteFile() {
+  const [file, setFile] = useState(null);
+  const [isBusy, setBusy] = useState(false);
+  const check = async () => {
+    setBusy(true);
+    const answer = await fetch("api/system/site").catch(() => null);
+    if (answer?.ok) setFile(await answer.json());
+    setBusy(false);
+  };
+  useEffect(() => void check(), []);
+  return html`
+    <section class="panel" aria-labelledby="sitefile"><h2 id="sitefile">${t("system.site_file")}</h2>
+      <p class="search">${file && html`<code>${file.path}</code>`}
+        <button onClick=${check} disabled=${isBusy}>${t(isBusy ? "system.checking" : "system.check")}</button>
+        ${file && html`<strong role="status">${file.findings.length ? many("system.findings", file.findings.length) : t("system.no_findings")}</strong>`}</p>
+      ${file?.changed && html`<p class="is-warning"><${Icon} name="warning" /> ${t("system.changed")}</p>`}
+      ${file && html`<ul class="findings">${file.findings.map((one) => html`<li class=${one.severity === "error" ? "is-alarm" : "is-warning"}>
+        <${Icon} name=${one.severity === "error" ? "alarm" : "warning"} /> <span>${one.text}</span></li>`)}</ul>
+        <details><summary>${t("system.text")}</summary>
+          <pre class="file" tabindex="0"><code>${lines(file.text, file.findings)}</code></pre></details>`}
+    </section>
+  `;
+}
+
+function lines(text, findings) {
+  const marked = new Set(findings.map((one) => one.line));
+  return text.split("\n").map((line, place) => html`<span class=${marked.has(place + 1) ? "marked" : ""}><i>${String(place + 1).padStart(4)}</i> ${line}${"\n"}</span>`);
+}

@@ -1,0 +1,111 @@
+"""What the page says of the service: no secret of the site file, and no failure for want of a file."""
+
+from __future__ import annotations
+
+import json
+import socket
+import tomllib
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge import page_system
+from bridge.northbound.passwords import hash_password
+from bridge.page_system import SystemOf, without_secrets
+from bridge.project import load_project
+from tests.support import sites
+
+HASH = "$argon2id$v=19$m=8,t=1,p=1$c2FsdHNhbHRzYWx0$C2zIbrBy8FoEh1bQ+nS6cg"
+_QUOTES = ('"{}"', "'{}'", '"""{}"""', "'''\n{}'''", '"""\\\n  {}"""')
+
+
+@pytest.mark.parametrize("quoted", _QUOTES)
+@pytest.mark.parametrize("key", ["password_hash", '"password_hash"', "password_hash  "])
+def test_no_way_to_write_a_hash_shows_it(quoted: str, key: str) -> None:
+    text = f"[[opcua.user]]\nname = 'ann'\n{key} = {quoted.format(HASH)}\nrole = 'operator'\n"
+    shown = without_secrets(text)
+    assert "argon2" not in shown
+    assert HASH[-10:] not in shown
+    assert "operator" in shown
+    assert tomllib.loads(shown)["opcua"]["user"][0]["name"] == "ann"
+    assert shown.count("\n") == text.count("\n"), "findings name lines"
+
+
+@given(
+    st.text(alphabet=st.characters(exclude_categories=["Cs"], exclude_characters="\"'\\\n\r \t"), min_size=1)
+)
+def test_what_stands_in_place_of_a_hash_is_not_shown_either(secret: str) -> None:
+    marked = f"s3cr3t{secret}s3cr3t"
+    assert "s3cr3t" not in without_secrets(f'password_hash = "{marked}"')
+
+
+def test_a_key_within_a_locator_is_not_shown() -> None:
+    text = 'listen = ["tls/[::]:7447#listen_private_key_base64=QUJD;listen_certificate=/etc/c.pem"]'
+    shown = without_secrets(text)
+    assert "QUJD" not in shown
+    assert "/etc/c.pem" in shown
+
+
+def test_a_file_is_named_and_not_its_content() -> None:
+    text = 'private_key = "/etc/drivebridge/key.pem"\npassword_file = "/etc/drivebridge/zenoh.users"'
+    assert without_secrets(text) == text
+
+
+def system(folder: Path, *parts: str) -> SystemOf:
+    node = sites.node(sites.drive("fu1", "lease", 1000))
+    path = sites.write(folder, sites.bus(node), *parts)
+    return SystemOf(load_project(path))
+
+
+def test_the_site_file_is_checked_as_it_is_now(tmp_path: Path) -> None:
+    facts = system(tmp_path)
+    assert "changed" not in facts.site_file()
+    assert [one for one in facts.check() if one["severity"] == "error"] == []
+    path = Path(facts.site_file()["path"])
+    path.write_text(path.read_text(encoding="utf-8").replace("fu1", "fu9"), encoding="utf-8")
+    assert "changed" in facts.site_file()
+    (finding, *_) = facts.check()
+    assert finding["severity"] == "error"
+    assert finding["line"] > 0
+    assert "fu9" in finding["text"]
+    path.unlink()
+    assert "cannot be read" in facts.site_file()["text"]
+    assert facts.check()[0]["severity"] == "error"
+
+
+def test_the_audit_log_is_read_from_its_end(tmp_path: Path) -> None:
+    log = tmp_path / "audit.jsonl"
+    facts = system(tmp_path, f'[audit]\nfile = "{log}"\n')
+    assert facts.audit(10) == []
+    written = [json.dumps({"t": f"2026-11-24T12:00:{n:02d}"}) for n in range(0, 30, 2)]
+    refused = [json.dumps({"t": f"2026-11-24T12:00:{n:02d}"}) for n in range(1, 30, 2)]
+    log.write_text("\n".join([*written, '{"t": "2026']), encoding="utf-8")
+    (tmp_path / "audit-refused.jsonl").write_text("\n".join([*refused, ""]), encoding="utf-8")
+    assert [one["t"][-2:] for one in facts.audit(3)] == ["29", "28", "27"], "what was refused, too"
+    off = system(tmp_path, "[audit]\nenabled = false\n")
+    assert off.audit(3) == []
+
+
+def test_clients_are_those_of_the_ports_that_are_served(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        facts = system(tmp_path, sites.modbus(port))
+        assert facts.connections() == {"modbus": []}
+        with socket.create_connection(("127.0.0.1", port)) as client:
+            host, own = client.getsockname()
+            assert facts.connections() == {"modbus": [f"{host}:{own}"]}
+
+
+def test_addresses_are_read_as_the_kernel_writes_them() -> None:
+    assert page_system._address("0100007F:1F90") == "127.0.0.1:8080"
+    assert page_system._address("00000000000000000000000001000000:0050") == "[::1]:80"
+    assert page_system._address("0000000000000000FFFF00000100A8C0:0050") == "192.168.0.1:80"
+
+
+def test_versions_are_there_and_what_is_no_certificate_is_left_out(tmp_path: Path) -> None:
+    facts = system(tmp_path, f'[opcua]\nlisten = "127.0.0.1:4840"\ntrusted_dir = "{tmp_path}"\n')
+    assert {"drivebridge", "Python", "asyncua"} <= facts.versions().keys()
+    assert facts.certificates() == []
+    assert hash_password("x").startswith("$argon2"), "what is looked for"

@@ -1,0 +1,146 @@
+"""Six faults, as somebody sees them who has never seen the plant: the first screen says which drive, what,
+since when, and what to do."""
+
+from __future__ import annotations
+
+import re
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from tests.support import sites
+from tests.support.desk import Desk, browser
+from tests.support.process import Process, free_port, peer, until
+from tests.wire.test_page import DRIVE, users
+
+SHOTS = Path("build/page")
+SINCE = re.compile(r"since (before )?\d\d:\d\d:\d\d \(\d+ s\)")
+
+
+class BrokenPlant:
+    """A bridge whose plant breaks as it is told to, and somebody who looks at the page."""
+
+    def __init__(self, process: Process, port: int, page: Page, modbus: int) -> None:
+        self._process, self._port = process, port
+        self.page, self.modbus = page, modbus
+
+    def tell(self, what: str) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as teller:
+            teller.sendto(what.encode(), ("127.0.0.1", self._port))
+        self._process.wait_output(f"done: {what}")
+
+    def says(self, place: str, *texts: str) -> Locator:
+        """The trouble of ``place`` on the first screen, which says all of this."""
+        trouble = self.page.locator(".trouble", has=self.page.get_by_role("link", name=place, exact=True))
+        for text in texts:
+            expect(trouble.first).to_contain_text(text)
+        expect(trouble.first).to_contain_text(SINCE)
+        expect(trouble.first.locator(".remedy")).not_to_have_text("What to do")
+        expect(trouble.first).to_be_in_viewport()
+        expect(self.page.locator(".sentence")).to_contain_text(place)
+        return trouble.first
+
+    def shot(self, name: str) -> None:
+        SHOTS.mkdir(parents=True, exist_ok=True)
+        self.page.screenshot(path=SHOTS / f"trouble-{name}.png")
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    with browser() as started:
+        yield started
+
+
+@contextmanager
+def broken(folder: Path, chromium: Browser, more: str = "", control: str = "lease") -> Iterator[BrokenPlant]:
+    """The page's first screen of a plant that is in order as yet."""
+    port, modbus, commands = free_port(), free_port(), free_port()
+    drives = (
+        sites.drive("fu1", control, 1000, f"unit_id = 1\n{sites.SCALED}"),
+        sites.drive("fu2", "none", 0),
+    )
+    site = sites.write(
+        folder,
+        sites.bus(sites.node(*drives)),
+        sites.modbus(modbus),
+        f'[opcua]\nlisten = "127.0.0.1:{free_port()}"\n{users()}',
+        f'[page]\nlisten = "127.0.0.1:{port}"\n{more}\n',
+    )
+    with peer(folder, "broken_plant", str(site), str(commands)) as process:
+        process.wait_output("is served on")
+        until(lambda: "node operational" in process.output(), 30.0, "the node is operational")
+        desk = Desk(chromium, port)
+        with desk.sits("operator", viewport={"width": 1280, "height": 720}) as page:
+            expect(page.locator(".sentence")).to_contain_text("Everything is in order")
+            yield BrokenPlant(process, commands, page, modbus)
+        assert not desk.complaints
+
+
+def test_a_cable_is_pulled(tmp_path: Path, chromium: Browser) -> None:
+    with broken(tmp_path, chromium) as plant:
+        plant.tell("cut_cable")
+        trouble = plant.says("conveyor", "not heard any more", "look at its CAN cable and connectors")
+        expect(plant.page.locator(".tile", has_text=DRIVE)).to_contain_text("not heard")
+        plant.shot("cable")
+        trouble.get_by_role("link", name="conveyor").click()
+        expect(plant.page.locator(".busnode")).to_contain_text("not heard")
+        plant.tell("mend_cable")
+        expect(plant.page.locator(".sentence")).to_contain_text("Everything is in order")
+
+
+def test_a_drive_has_a_fault_and_is_acknowledged(tmp_path: Path, chromium: Browser) -> None:
+    with broken(tmp_path, chromium) as plant:
+        page = plant.page
+        plant.tell("fail_drive")
+        trouble = plant.says(DRIVE, "fault E003/3.0", "overcurrent")
+        plant.shot("fault")
+        trouble.get_by_role("link", name=DRIVE).click()
+        expect(page.locator(".drivehead .state")).to_contain_text("fault")
+        page.get_by_role("button", name="Take control").click()
+        page.get_by_role("button", name="Reset fault").click()
+        expect(page.locator(".sentence")).to_contain_text("Everything is in order")
+        expect(page.locator(".drivehead .state")).not_to_contain_text("fault")
+
+
+def test_a_plc_falls_silent(tmp_path: Path, chromium: Browser) -> None:
+    with broken(tmp_path, chromium, control="modbus") as plant:
+        words = (str(plant.modbus), "1", "0.1", str(tmp_path / "stamps"), "0x047F", "0x1000")
+        with peer(tmp_path, "modbus_owner", *words) as plc:
+            plc.wait_output("it runs")
+        plant.says(
+            DRIVE,
+            "its controller fell silent",
+            "127.0.0.1 (Modbus)",
+            "1000 ms",
+            "See that the controller runs",
+        )
+        expect(plant.page.locator(".tile", has_text=DRIVE)).to_contain_text("stopped by the watchdog")
+        plant.shot("silent-plc")
+
+
+def test_somebody_else_commands_a_drive(tmp_path: Path, chromium: Browser) -> None:
+    with broken(tmp_path, chromium) as plant:
+        plant.tell("intrude")
+        plant.says("can0", "somebody else commands drives", "205", DRIVE, "take it off the bus")
+        plant.shot("intruder")
+
+
+def test_a_drive_has_another_parameter_set(tmp_path: Path, chromium: Browser) -> None:
+    with broken(tmp_path, chromium) as plant:
+        plant.tell("set_otherwise")
+        plant.says(DRIVE, "no setpoint is taken as frequency", "P546[1]", "Set the drive's parameter back")
+        plant.shot("parameter-set")
+
+
+def test_the_disk_is_full(tmp_path: Path, chromium: Browser) -> None:
+    with broken(tmp_path, chromium, '[audit]\nfile = "/dev/full"') as plant:
+        page = plant.page
+        page.get_by_role("link", name=DRIVE).first.click()
+        page.get_by_role("button", name="Take control").click()
+        page.get_by_role("link", name="Plant", exact=True).click()
+        plant.says("Bridge", "the audit log cannot be written", "Make room on the disk")
+        plant.shot("full-disk")

@@ -34,8 +34,11 @@ QUIETLY := tools/quietly $(VENV)/install.log
 # Unit tests know no time. The others do: few of them run at a time, a module of them in one place.
 FEW_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 2)))
 WIRE_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 3)))
+# What takes real time is tried once more where it fails: a machine that others use, too, may have stood still. The
+# summary names it, and AGAIN= turns it off. Unit tests have no such excuse.
+AGAIN ?= --reruns 1 -rR
 PAGES := tests/wire/test_docs.py
-BROWSER := tests/wire/test_page_browser.py
+BROWSER := tests/wire/test_page_browser.py tests/wire/test_page_troubles.py
 
 # The lab runs on slow CPUs as root: it leaves no caches behind and gets a time limit.
 LAB_SECONDS := 1800
@@ -76,15 +79,15 @@ $(FOREIGN)/$(REGISTRIES).stamp: tools/foreign_files.py | $(VENV)/dev.stamp packa
 
 wire: compiled packages clients ## tests with real protocol clients on loopback
 	@echo "== wire tests"
-	@$(PYTEST) -n $(WIRE_JOBS) --dist loadfile -rs tests/wire $(patsubst %,--ignore %,$(PAGES) $(BROWSER)) $(ARGS)
+	@$(PYTEST) -n $(WIRE_JOBS) --dist loadfile -rs $(AGAIN) tests/wire $(patsubst %,--ignore %,$(PAGES) $(BROWSER)) $(ARGS)
 
 pages: compiled packages clients ## the commands of README and docs, as a reader gives them
 	@echo "== README and docs"
-	@$(PYTEST) -rs $(PAGES) $(ARGS)
+	@$(PYTEST) -rs $(AGAIN) $(PAGES) $(ARGS)
 
 browser: compiled packages clients ## the web page in Chromium
 	@echo "== the web page in Chromium"
-	@$(PYTEST) -rs $(BROWSER) $(ARGS)
+	@$(PYTEST) -n $(FEW_JOBS) --dist loadfile -rs $(AGAIN) $(BROWSER) $(ARGS)
 
 ifeq ($(LAB),0)
 lab:
@@ -95,7 +98,7 @@ packages clients:
 else
 lab: compiled packages ## tests on real SocketCAN: vcan, or a user-mode kernel that has it
 	@echo "== lab tests ($$(PYTHON=$(IN) tests/lab/vcan-run -w | sed 's/here/on vcan of this kernel/;s/uml/in a user-mode kernel: this one has no vcan/'))"
-	@$(LAB_RUN) $(PYTEST) -rs -p no:cacheprovider --timeout=120 tests/lab $(ARGS)
+	@$(LAB_RUN) $(PYTEST) -rs $(AGAIN) -p no:cacheprovider --timeout=120 tests/lab $(ARGS)
 
 packages: $(VENV)/dev.stamp ## install the Debian packages that the tests need
 	@tools/need-packages "the tests (LAB=0 leaves those on a CAN bus out)" $(PACKAGES)

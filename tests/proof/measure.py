@@ -98,8 +98,9 @@ class Sample:
 
 def bus_stop(rig: Rig, drive: Drive, since: float, *, silent: bool) -> tuple[float, Run] | None:
     """When the bus began to stop the drive, after ``since``, and the last words that enabled it: the first
-    RPDO that does not enable; with ``silent``, where nobody is there to send one, the last that does. None
-    while the bus goes on enabling."""
+    RPDO that does not enable; with ``silent``, where nobody is there to send one, the last that does. So it
+    is, too, where a drive that stops by silence is left alone meanwhile: a slow machine may have kept its
+    controller from writing in time beside any fault. None while the bus goes on enabling."""
     enabling = None
     for run in rig.told.runs(drive.rpdo, since - _BEFORE_S):
         if drive.enabling(run.data):
@@ -109,7 +110,8 @@ def bus_stop(rig: Rig, drive: Drive, since: float, *, silent: bool) -> tuple[flo
             enabling = run
         elif enabling is not None:
             if run.first >= since:
-                return (enabling.last if silent else run.first), enabling
+                is_left = drive.reaction == "silence" and run.first - enabling.last > _SILENT_S
+                return (enabling.last if silent or is_left else run.first), enabling
             enabling = None
     if not silent or enabling is None or rig.now() - enabling.last <= 2 * _SILENT_S:
         return None

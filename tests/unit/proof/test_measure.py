@@ -69,6 +69,16 @@ def test_a_bus_that_goes_on_enabling_has_not_stopped() -> None:
     assert bus_stop(scene(told=[Run(9.0, 20.0, ENABLE)]), FU1, 10.0, silent=True) is None
 
 
+def test_a_drive_that_stops_by_silence_is_stopped_when_it_is_left_alone_beside_any_fault() -> None:
+    silenced = replace(FU1, reaction="silence")
+    last = Run(9.0, 10.1, ENABLE)
+    left = scene(told=[last, Run(11.5, 12.0, STOP)])
+    assert bus_stop(left, silenced, 10.0, silent=False) == (10.1, last)
+    assert bus_stop(left, FU1, 10.0, silent=False) == (11.5, last), "no other drive is"
+    at_once = scene(told=[last, Run(10.15, 12.0, STOP)])
+    assert bus_stop(at_once, silenced, 10.0, silent=False) == (10.15, last)
+
+
 def test_a_gap_before_the_fault_is_not_its_silence() -> None:
     last = Run(9.9, 10.3, ENABLE)
     found = bus_stop(scene(told=[Run(9.0, 9.2, ENABLE), last]), FU1, 10.0, silent=True)

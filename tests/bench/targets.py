@@ -138,6 +138,27 @@ TARGETS: Sequence[Target] = (
         unit=" s",
     ),
     Target("126 nodes operational", _number("126 nodes operational, s"), most=10, unit=" s"),
+    Target("page: first paint", _number("page, first paint, s"), most=0.8, unit=" s"),
+    Target("page: loaded for it", _number("page, loaded, kB"), most=600, unit=" kB"),
+    Target(
+        "page: a value on the screen, p95", _number("page, value on the screen p95, ms"), most=250, unit=" ms"
+    ),
+    Target(
+        "page: frames dropped in 10 s, 500 values at 5 Hz",
+        _number("page, frames dropped with 500 values"),
+        most=0,
+    ),
+    Target(
+        "page: frames dropped in 10 s, six trends at 20 Hz",
+        _number("page, frames dropped with six trends"),
+        most=0,
+    ),
+    Target(
+        "page: CPU of its front with 5 viewers",
+        _number("page, front with 5 viewers, % of a core"),
+        most=20,
+        unit=" %",
+    ),
     Target("PDO → Modbus register at 8,000 PDO/s, p99", _ours(FAST, _p99("modbus")), most=5, unit=" ms"),
     Target(
         "PDO → OPC UA subscriber at 8,000 PDO/s, publishing 50 ms, p99",

@@ -23,9 +23,9 @@ let tries = 0;
 let topics = [];
 let trended = [];
 let pending = null;
-let onRows = () => {};
+let onRows = (rows) => {};
 let wish = null;
-let onHeard = () => {};
+let onHeard = (message) => {};
 const asked = new Map();
 let lastNumber = 0;
 
@@ -60,13 +60,14 @@ export function follow(names, listener) {
 }
 
 /** What is heard of a bus: {bus, view, kinds, nodes}, or null for nothing; `listener` gets the messages. */
-export function hear(wanted, listener = () => {}) {
+export function hear(wanted, listener = (message) => {}) {
   wish = wanted;
   onHeard = listener;
   send({ hear: wanted });
 }
 
-/** One request; the promise is its outcome: {ok, code, message, forwarded, value}. */
+/** One request.
+ * @returns {Promise<{ok: boolean, code: string, message: string, forwarded: boolean, value?: any, abort_code?: number}>} */
 export function ask(target, action, fields = {}) {
   const number = ++lastNumber;
   return new Promise((resolve) => {

@@ -10,6 +10,7 @@ import { Icon } from "../icons.js";
 
 const STAGES = ["found", "identity", "configuration", "pdos", "supervision", "start"];
 // Which stage the words of a step belong to (bridge/node/boot), the later ones first.
+/** @type {[string, RegExp][]} */
 const WORDS = [
   ["start", /^starting/],
   ["supervision", /^waiting for|own supervision|error control/],

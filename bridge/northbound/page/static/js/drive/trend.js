@@ -3,7 +3,8 @@
 import uPlot from "../../vendor/uplot.mjs";
 import { effect, html, useEffect, useRef, useState } from "../ui.js";
 import { follow } from "../live.js";
-import { below, leafOf, nature } from "../site.js";
+import { save } from "../download.js";
+import { below, nature } from "../site.js";
 import { language, t } from "../texts.js";
 import { isDark } from "../theme.js";
 import { History } from "./history.js";
@@ -68,7 +69,7 @@ export function Trend({ drive }) {
             ${SPANS_S.map((one) => html`<option value=${one}>${one} s</option>`)}
           </select>
         </label>
-        <button onClick=${() => save(drive.name, names, history.current)}>${t("trend.csv")}</button>
+        <button onClick=${() => keep(drive.name, names, history.current)}>${t("trend.csv")}</button>
         <small>${t("trend.hint")}</small>
       </header>
       <div class="plot" ref=${box}></div>
@@ -145,8 +146,8 @@ function sizeOf(box) {
   return { width: Math.max(200, box.clientWidth), height: 260 };
 }
 
-function save(drive, names, history) {
+function keep(drive, names, history) {
   const head = ["time", ...names.map((name) => `${name}${nature(name).unit ? ` [${nature(name).unit}]` : ""}`)];
   const rows = history.rows().map(([s, ...held]) => [new Date(s * 1000).toISOString(), ...held.map((one) => one ?? "")].join(","));
-  download(`${drive.replaceAll("/", "-")}.csv`, [head.map((one) => `"${one}"`).join(","), ...rows, ""].join("\r\n"), "text/csv");
+  save(`${drive.replaceAll("/", "-")}.csv`, [head.map((one) => `"${one}"`).join(","), ...rows, ""].join("\r\n"), "text/csv");
 }

@@ -7,6 +7,7 @@ import { signal } from "../ui.js";
 const PAUSE_MS = 25;
 const MISSING = [0x06020000, 0x06090011];
 const known = new Map();
+/** @type {Promise<any>} */
 let last = Promise.resolve();
 
 /** The signal of a parameter: null before it was asked for, else {value}, or {failure, isMissing}. */
@@ -31,7 +32,7 @@ export async function write(holder, name, value) {
 }
 
 /** Reads all of `names`, until `isOver()`; `onRead` is called with the number that has been read. */
-export async function readAll(holder, names, onRead = () => {}, isOver = () => false) {
+export async function readAll(holder, names, onRead = (count) => {}, isOver = () => false) {
   let count = 0;
   for (const name of names) {
     if (isOver()) return false;

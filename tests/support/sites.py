@@ -45,6 +45,10 @@ mapping = "{mapping}"
 {"".join(drives)}"""
 
 
+BESIDE_A_BROWSER = "deadman_ms = 1000"
+"""A browser that starts leaves the bridge without a CPU for longer than the default lets it hang."""
+
+
 def bus(*nodes: str, name: str = "can0", interface: str = "virtual", more: str = "") -> str:
     return f"""
 [[bus]]

@@ -51,7 +51,7 @@ def write_site(folder: Path, port: int, page: str = "", opcua: str = "") -> Path
     table = f'[opcua]\nlisten = "127.0.0.1:{free_port()}"\n{opcua}\n{users()}'
     return sites.write(
         folder,
-        sites.bus(node),
+        sites.bus(node, more=sites.BESIDE_A_BROWSER),
         sites.modbus(free_port()),
         table,
         f'[page]\nlisten = "127.0.0.1:{port}"\n{page}\n',

@@ -65,7 +65,7 @@ def broken(folder: Path, chromium: Browser, more: str = "", control: str = "leas
     )
     site = sites.write(
         folder,
-        sites.bus(sites.node(*drives)),
+        sites.bus(sites.node(*drives), more=sites.BESIDE_A_BROWSER),
         sites.modbus(modbus),
         f'[opcua]\nlisten = "127.0.0.1:{free_port()}"\n{users()}',
         f'[page]\nlisten = "127.0.0.1:{port}"\n{more}\n',

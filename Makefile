@@ -143,7 +143,7 @@ mutants: compiled ## change the code and see whether unit tests notice: hours, o
 	@$(IN) -m tools.mutants --jobs $(FEW_JOBS) $(ARGS)
 
 ##@ Check
-check: check-style check-format check-types check-imports ## style, format, types, import rules (-k: all of them even if one fails)
+check: check-style check-format check-types check-scripts check-imports ## style, format, types, import rules (-k: all of them even if one fails)
 
 check-style: $(VENV)/dev.stamp
 	@echo "== ruff check"
@@ -156,6 +156,15 @@ check-format: $(VENV)/dev.stamp
 check-types: $(VENV)/dev.stamp
 	@echo "== pyright, strict"
 	@$(IN) -m pyright
+
+# tsc comes from npm, with the clients of the wire tests.
+check-scripts: $(VENV)/dev.stamp clients
+ifeq ($(LAB),0)
+	@echo "LAB=0: the page's scripts were NOT checked"
+else
+	@echo "== tsc, the page's scripts"
+	@$(CLIENTS)/node_modules/.bin/tsc -p bridge/northbound/page
+endif
 
 check-imports: $(VENV)/dev.stamp
 	@echo "== import rules"
@@ -210,5 +219,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types \
+.PHONY: demo test unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types check-scripts \
   check-imports format docs setup lock wheel clean help

@@ -69,7 +69,7 @@ def registry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Registry:
 def test_what_the_lock_pins_is_placed_with_its_licence(registry: Registry) -> None:
     place(registry.root)
     vendor = registry.root / VENDOR
-    assert (vendor / "preact.mjs").read_text() == "// preact\n"
+    assert (vendor / "preact.mjs").read_text() == "// @ts-nocheck\n// preact\n"
     assert (vendor / "licenses" / "@preact+signals.txt").read_text() == "licence of @preact/signals"
     assert registry.asked[0] == "https://registry.npmjs.org/preact/-/preact-1.2.3.tgz"
     assert "https://registry.npmjs.org/@preact/signals/-/signals-1.2.3.tgz" in registry.asked

@@ -92,6 +92,16 @@ def _number(name: str) -> Callable[[Found], float | None]:
     return lambda found: found.numbers.get(name)
 
 
+def _beside_viewers(name: str) -> Callable[[Found], float | None]:
+    """What five viewers of the page add, in parts of what it is without."""
+
+    def of(found: Found) -> float | None:
+        without, beside = (found.numbers.get(f"{name}, {viewers} viewers") for viewers in (0, 5))
+        return beside / without if beside is not None and without else None
+
+    return of
+
+
 def _evener(than: str) -> Callable[[Found], float | None]:
     def of(found: Found) -> float | None:
         kernel = found.numbers.get("SYNC error p99, kernel, as the bridge uses it, µs")
@@ -158,6 +168,18 @@ TARGETS: Sequence[Target] = (
         _number("page, front with 5 viewers, % of a core"),
         most=20,
         unit=" %",
+    ),
+    Target(
+        "page: SYNC's period error with 5 viewers beside none, p99",
+        _beside_viewers("SYNC error p99"),
+        most=1.25,
+        unit=" ×",
+    ),
+    Target(
+        "page: a silent controller's drive is stopped, with 5 viewers beside none",
+        _beside_viewers("stop after silence"),
+        most=1.02,
+        unit=" ×",
     ),
     Target("PDO → Modbus register at 8,000 PDO/s, p99", _ours(FAST, _p99("modbus")), most=5, unit=" ms"),
     Target(

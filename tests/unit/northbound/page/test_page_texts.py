@@ -51,7 +51,7 @@ def test_each_text_that_is_asked_for_is_there() -> None:
 
 
 def test_each_kind_of_trouble_says_what_it_is_why_and_what_to_do() -> None:
-    server = Path("bridge/northbound/page/troubles.py").read_text(encoding="utf-8")
+    server = "".join(path.read_text(encoding="utf-8") for path in Path("bridge/northbound/page").glob("*.py"))
     kinds = {*_KINDS.findall(server), "bus_off", "bus_down"}
     assert len(kinds) >= 17
     english = texts("en")

@@ -1,0 +1,134 @@
+"""What the points of one bus, node or drive say of a trouble with it. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+from bridge.image import Image, Quality, Value
+
+DOWN: Final = ("bus_off", "down")
+
+
+class Rank(IntEnum):
+    """How much a trouble matters; people may be in danger, something stands still, or it may soon."""
+
+    DANGER = 0
+    ALARM = 1
+    WARNING = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """``place`` is ``<node>/<drive>``, ``<node>``, ``bus/<bus>`` or ``bridge``."""
+
+    rank: Rank
+    kind: str
+    place: str
+    facts: tuple[tuple[str, Value], ...] = ()
+
+
+class Look:
+    """Points by their names; None where there is none, or it has no value."""
+
+    def __init__(self, image: Image) -> None:
+        self._image = image
+        self._places = {point.name: place for place, point in enumerate(image.points)}
+        self._labels = {point.name: dict(point.states) for point in image.points if point.states}
+
+    def __call__(self, name: str) -> Value | None:
+        place = self._places.get(name)
+        if place is None:
+            return None
+        value, quality, _, _ = self._image[place]
+        return value if quality.has_value else None
+
+    def label(self, name: str) -> str:
+        code = self(name)
+        return self._labels[name].get(code, "") if isinstance(code, int) else ""
+
+    def quality(self, name: str) -> tuple[Quality, str]:
+        place = self._places.get(name)
+        if place is None:
+            return Quality.GOOD, ""
+        _, quality, _, reason = self._image[place]
+        return quality, reason
+
+
+def of_bus(look: Look, bus: str, *, is_down: bool) -> Iterator[Trouble]:
+    place = f"bus/{bus}"
+    if look(f"{place}/passive"):
+        return
+    if is_down:
+        why = look(f"{place}/last_error") or ""
+        kind = "bus_off" if look.label(f"{place}/state") == "bus_off" else "bus_down"
+        yield Trouble(Rank.ALARM, kind, place, (("why", why),))
+        return
+    state = look.label(f"{place}/state")
+    if state in ("warning", "passive"):
+        yield Trouble(Rank.WARNING, "bus_errors", place, (("why", look(f"{place}/last_error") or ""),))
+    if ids := look(f"{place}/duplicate_ids"):
+        yield Trouble(Rank.ALARM, "duplicate_ids", place, (("ids", ids),))
+    if look(f"{place}/second_master"):
+        yield Trouble(Rank.ALARM, "second_master", place)
+    if ids := look(f"{place}/unexpected_nodes"):
+        yield Trouble(Rank.WARNING, "unexpected_nodes", place, (("ids", ids),))
+    if held_by := look(f"{place}/held_by"):
+        yield Trouble(Rank.ALARM, "held", place, (("nodes", held_by),))
+
+
+def of_node(look: Look, node: str) -> Iterator[Trouble]:
+    state = look.label(f"{node}/node/state")
+    status = look(f"{node}/node/boot_status") or ""
+    if state == "config_error":
+        yield Trouble(Rank.ALARM, "not_as_configured", node, (("why", status),))
+    elif state == "lost":
+        how = look(f"{node}/node/supervision_state") or ""
+        yield Trouble(Rank.ALARM, "node_lost", node, (("how", how),))
+    elif state == "absent":
+        yield Trouble(Rank.ALARM, "node_absent", node)
+    elif state == "stopped":
+        yield Trouble(Rank.WARNING, "node_stopped", node)
+
+
+def of_drive(look: Look, drive: str, *, is_heard: bool) -> Iterator[Trouble]:
+    if look(f"{drive}/supervision/follows") is False:
+        yield Trouble(Rank.DANGER, "ignores_stop", drive)
+    is_tripped = look.label(f"{drive}/supervision/watchdog_state") == "tripped"
+    if is_tripped:
+        owner = look(f"{drive}/supervision/owner") or ""
+        timeout = look(f"{drive}/supervision/fieldbus_timeout_ms") or 0
+        yield Trouble(Rank.ALARM, "controller_silent", drive, (("owner", owner), ("timeout_ms", timeout)))
+    if not is_heard:
+        return
+    quality, reason = look.quality(f"{drive}/status/state")
+    if quality is Quality.CONFIG_ERROR:
+        yield Trouble(Rank.ALARM, "drive_not_as_configured", drive, (("why", reason),))
+    elif quality in (Quality.LOST, Quality.DEAD):
+        yield Trouble(Rank.ALARM, "drive_lost", drive, (("why", reason),))
+    # The fault that is shown after a trip is the bridge's own, and says the same.
+    elif (text := look(f"{drive}/status/fault_text")) and not is_tripped:
+        facts = (
+            ("text", text),
+            ("number", look(f"{drive}/status/fault_number") or ""),
+            ("cause", look(f"{drive}/status/fault_cause") or ""),
+            ("remedy", look(f"{drive}/status/fault_remedy") or ""),
+        )
+        yield Trouble(Rank.ALARM, "drive_fault", drive, facts)
+    elif quality is Quality.STALE:
+        yield Trouble(Rank.WARNING, "drive_stale", drive, (("why", reason),))
+
+
+def of_meaning(look: Look, drive: str, main: str) -> Iterator[Trouble]:
+    """The drive's words do not carry what moves it: its parameters say so."""
+    for group in ("command", "actual"):
+        quality, reason = look.quality(f"{drive}/{group}/{main}")
+        if quality is Quality.DISABLED and reason:
+            yield Trouble(Rank.WARNING, f"no_{group}", drive, (("value", main), ("why", reason)))
+
+
+def of_bridge(look: Look) -> Iterator[Trouble]:
+    if failing := look("bridge/fronts_failing"):
+        yield Trouble(Rank.WARNING, "fronts_failing", "bridge", (("fronts", failing),))

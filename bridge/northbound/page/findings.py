@@ -36,6 +36,7 @@ class Look:
     def __init__(self, image: Image) -> None:
         self._image = image
         self._places = {point.name: place for place, point in enumerate(image.points)}
+        self.of_bridge = [point.name for point in image.points if point.path[0] == "bridge"]
         self._labels = {point.name: dict(point.states) for point in image.points if point.states}
 
     def __call__(self, name: str) -> Value | None:
@@ -55,6 +56,12 @@ class Look:
             return Quality.GOOD, ""
         _, quality, _, reason = self._image[place]
         return quality, reason
+
+
+def is_bridge_dead(look: Look) -> bool:
+    """The mirror gives every point the quality *dead* while the bus process does not answer. The bridge's own
+    points have it at no other time."""
+    return bool(look.of_bridge) and all(look.quality(name)[0] is Quality.DEAD for name in look.of_bridge)
 
 
 def of_bus(look: Look, bus: str, *, is_down: bool) -> Iterator[Trouble]:

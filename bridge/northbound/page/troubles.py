@@ -1,7 +1,8 @@
 """What is wrong on the plant at present, the worst first, each with what it is about and since when. Sans-IO.
 
 A trouble is a kind, a place and what its text needs; the browser has the texts. What follows from another
-trouble is left out: a bus that is down says more than each of its nodes being lost.
+trouble is left out: a bus that is down says more than each of its nodes being lost, and where the bus process
+does not answer nothing is known at all.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from bridge.northbound.page.findings import (
     Look,
     Rank,
     Trouble,
+    is_bridge_dead,
     of_bridge,
     of_bus,
     of_drive,
@@ -94,6 +96,9 @@ class Troubles:
         return now_ms - risen_ms < _RECENT_MS
 
     def _found(self, now_ms: float) -> Iterator[Trouble]:
+        if is_bridge_dead(self._look):
+            yield Trouble(Rank.ALARM, "bridge_dead", "bridge")
+            return
         down = {bus for bus in self._layout.buses if self._look.label(f"bus/{bus}/state") in DOWN}
         for bus in self._layout.buses:
             yield from of_bus(self._look, bus, is_down=bus in down)

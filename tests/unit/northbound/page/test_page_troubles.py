@@ -118,6 +118,19 @@ def test_what_follows_from_another_trouble_is_left_out() -> None:
     assert case.kinds() == [("node_lost", NODE)]
 
 
+def test_a_bus_process_that_does_not_answer_says_nothing_of_the_drives() -> None:
+    case = Case()
+    case.set("conveyor/fu2/supervision/follows", False)
+    case.later()
+    case.image.judge(range(len(case.image.points)), Quality.DEAD, 1.0, "bus process not reachable")
+    (trouble,) = case.later(500.0)
+    assert (trouble["kind"], trouble["place"], trouble["rank"]) == ("bridge_dead", "bridge", "alarm")
+    assert trouble["since"] == case.now_ms
+    assert case.kinds() == [("bridge_dead", "bridge")]
+    case.set("bridge/audit_lost", 0)
+    assert "bridge_dead" not in [kind for kind, _ in case.kinds()], "it answers again"
+
+
 def test_the_worst_comes_first() -> None:
     case = Case()
     case.set(f"{BUS}/state", 1)

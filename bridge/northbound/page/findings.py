@@ -98,6 +98,8 @@ def of_node(look: Look, node: str) -> Iterator[Trouble]:
         yield Trouble(Rank.ALARM, "node_absent", node)
     elif state == "stopped":
         yield Trouble(Rank.WARNING, "node_stopped", node)
+    elif state == "disabled":
+        yield Trouble(Rank.WARNING, "node_disabled", node)
 
 
 def of_drive(look: Look, drive: str, *, is_heard: bool) -> Iterator[Trouble]:

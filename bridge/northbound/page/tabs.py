@@ -127,9 +127,12 @@ class Tabs:
 
     def _greet(self, tab: _Tab) -> None:
         tab.tell(_encode({"you": str(tab.viewer.identity)}))
-        tab.tell(_encode({"troubles": self._troubles.shown}))
+        tab.tell(self._troubles_told())
         for event in self._events:
             tab.tell(_encode({"event": event}))
+
+    def _troubles_told(self) -> bytes:
+        return _encode({"troubles": self._troubles.shown, "waiting": self._troubles.waiting})
 
     async def _listen(self, tab: _Tab) -> None:
         viewer, known = tab.viewer, self._topics.places.__contains__
@@ -168,7 +171,7 @@ class Tabs:
 
     def _beat(self) -> None:
         changes = self._topics.beat({topic for tab in self._tabs for topic in tab.viewer.topics})
-        troubles = _encode({"troubles": self._troubles.shown}) if self._troubles.beat() else None
+        troubles = self._troubles_told() if self._troubles.beat() else None
         for tab in self._tabs:
             if troubles:
                 tab.tell(troubles)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from bridge.image import Image
+from bridge.image import Image, Quality
 from bridge.northbound.page.findings import (
     DOWN,
     Look,
@@ -25,6 +25,8 @@ from bridge.northbound.page.findings import (
     of_node,
 )
 
+BOOTING_MS: Final = 10_000.0
+"""A node may boot for this long before it is a trouble."""
 _BEGINNING_MS: Final = 2000.0
 """What is there so soon after the front has begun may have been there before."""
 _RECENT_MS: Final = 600_000.0
@@ -53,25 +55,32 @@ class Troubles:
         self._since: dict[tuple[str, str], float] = {}
         self._counts: dict[str, tuple[int, float]] = {}
         """Counters, and when they rose last."""
-        self._shown: list[dict[str, Any]] | None = None
+        self._booting: dict[str, float] = {}
+        """The nodes that boot, and since when."""
+        self._shown: list[dict[str, Any]] = []
+        self._waiting = 0
 
     def beat(self) -> bool:
-        """Look again; whether ``shown`` is another list now."""
+        """Look again; whether ``shown`` or ``waiting`` is another one now."""
         now_ms = self._epoch_ms()
-        troubles = sorted(self._found(now_ms), key=lambda one: one.rank)
+        before = self._shown, self._waiting
+        troubles = sorted(self._find(now_ms), key=lambda one: one.rank)
         self._since = {
             (one.kind, one.place): self._since.get((one.kind, one.place), now_ms) for one in troubles
         }
-        shown = [self._said(one) for one in troubles]
-        has_changed = shown != self._shown
-        self._shown = shown
-        return has_changed
+        self._shown = [self._said(one) for one in troubles]
+        return (self._shown, self._waiting) != before
 
     @property
     def shown(self) -> list[dict[str, Any]]:
         """For JSON: rank, kind, place, since in ms since 1970, what else its text needs; ``or_longer`` where
         it may have begun before this front did."""
-        return self._shown or []
+        return self._shown
+
+    @property
+    def waiting(self) -> int:
+        """How many drives do not tell their state yet, though nothing is wrong with them: they start up."""
+        return self._waiting
 
     def _said(self, trouble: Trouble) -> dict[str, Any]:
         since_ms = self._since[trouble.kind, trouble.place]
@@ -95,34 +104,59 @@ class Troubles:
         self._counts[name] = count, risen_ms
         return now_ms - risen_ms < _RECENT_MS
 
-    def _found(self, now_ms: float) -> Iterator[Trouble]:
-        if is_bridge_dead(self._look):
-            yield Trouble(Rank.ALARM, "bridge_dead", "bridge")
-            return
-        down = {bus for bus in self._layout.buses if self._look.label(f"bus/{bus}/state") in DOWN}
-        for bus in self._layout.buses:
-            yield from of_bus(self._look, bus, is_down=bus in down)
-            if self._has_risen(f"bus/{bus}/intruders", now_ms):
-                yield Trouble(
-                    Rank.ALARM,
-                    "intruder",
-                    f"bus/{bus}",
-                    (("who", self._look(f"bus/{bus}/last_intruder") or ""),),
-                )
+    def _find(self, now_ms: float) -> list[Trouble]:
+        """All of them; counts the drives that are waiting."""
+        look, layout = self._look, self._layout
+        self._waiting = 0
+        if is_bridge_dead(look):
+            return [Trouble(Rank.ALARM, "bridge_dead", "bridge")]
+        found: list[Trouble] = []
+        down = {bus for bus in layout.buses if look.label(f"bus/{bus}/state") in DOWN}
+        for bus in layout.buses:
+            found += of_bus(look, bus, is_down=bus in down)
+            found += self._of_intruders(bus, now_ms)
         gone: set[str] = set()
-        for node, bus in self._layout.nodes.items():
-            if bus in down:
+        for node, bus in layout.nodes.items():
+            own = [] if bus in down else [*of_node(look, node), *self._of_booting(node, bus, now_ms)]
+            if own or bus in down:
                 gone.add(node)
-                continue
-            for trouble in of_node(self._look, node):
-                gone.add(node)
-                yield trouble
-        for drive, node in self._layout.drives.items():
-            yield from of_drive(self._look, drive, is_heard=node not in gone)
-            if node not in gone and drive in self._layout.mains:
-                yield from of_meaning(self._look, drive, self._layout.mains[drive])
-        yield from of_bridge(self._look)
+            found += own
+        for drive, node in layout.drives.items():
+            own = list(self._of_drive(drive, is_heard=node not in gone))
+            if not own and node not in gone and self._is_waiting(drive, layout.nodes[node]):
+                self._waiting += 1
+            found += own
+        return [*found, *of_bridge(look), *self._of_log(now_ms)]
+
+    def _of_intruders(self, bus: str, now_ms: float) -> Iterator[Trouble]:
+        if self._has_risen(f"bus/{bus}/intruders", now_ms):
+            who = self._look(f"bus/{bus}/last_intruder") or ""
+            yield Trouble(Rank.ALARM, "intruder", f"bus/{bus}", (("who", who),))
+
+    def _of_booting(self, node: str, bus: str, now_ms: float) -> Iterator[Trouble]:
+        """Its time runs only while it may boot: neither before mandatory nodes, nor under another bridge."""
+        look = self._look
+        may_boot = not look(f"bus/{bus}/held_by") and not look(f"bus/{bus}/passive")
+        if look.label(f"{node}/node/state") != "booting" or not may_boot:
+            self._booting.pop(node, None)
+            return
+        began_ms = self._booting.setdefault(node, now_ms)
+        if now_ms - began_ms >= BOOTING_MS:
+            self._since.setdefault(("node_booting", node), began_ms)
+            why = look(f"{node}/node/boot_status") or ""
+            yield Trouble(Rank.WARNING, "node_booting", node, (("why", why),))
+
+    def _of_drive(self, drive: str, *, is_heard: bool) -> Iterator[Trouble]:
+        main = self._layout.mains.get(drive)
+        yield from of_drive(self._look, drive, is_heard=is_heard)
+        if is_heard and main is not None:
+            yield from of_meaning(self._look, drive, main)
+
+    def _is_waiting(self, drive: str, bus: str) -> bool:
+        quality, _ = self._look.quality(f"{drive}/status/state")
+        return quality is not Quality.GOOD and not self._look(f"bus/{bus}/held_by")
+
+    def _of_log(self, now_ms: float) -> Iterator[Trouble]:
         if self._has_risen("bridge/audit_lost", now_ms):
-            yield Trouble(
-                Rank.WARNING, "log_lost", "bridge", (("lines", self._look("bridge/audit_lost") or 0),)
-            )
+            lines = self._look("bridge/audit_lost") or 0
+            yield Trouble(Rank.WARNING, "log_lost", "bridge", (("lines", lines),))

@@ -69,6 +69,7 @@ def test_a_plant_in_order_has_none() -> None:
         (f"{NODE}/node/state", 0, "node_absent", "alarm"),
         (f"{NODE}/node/state", 3, "node_lost", "alarm"),
         (f"{NODE}/node/state", 4, "node_stopped", "warning"),
+        (f"{NODE}/node/state", 5, "node_disabled", "warning"),
         (f"{NODE}/node/state", 6, "not_as_configured", "alarm"),
         (f"{DRIVE}/supervision/follows", False, "ignores_stop", "danger"),
         (f"{DRIVE}/supervision/watchdog_state", 3, "controller_silent", "alarm"),
@@ -129,6 +130,50 @@ def test_a_bus_process_that_does_not_answer_says_nothing_of_the_drives() -> None
     assert case.kinds() == [("bridge_dead", "bridge")]
     case.set("bridge/audit_lost", 0)
     assert "bridge_dead" not in [kind for kind, _ in case.kinds()], "it answers again"
+
+
+def test_a_node_that_boots_for_ever_is_a_trouble_after_ten_seconds() -> None:
+    case = Case()
+    case.later()
+    began_ms = case.now_ms
+    case.set(f"{NODE}/node/state", 1)
+    case.set(f"{NODE}/node/boot_status", "reads 1018h")
+    for drive in case.layout.drives:
+        case.set(f"{drive}/status/state", 0, Quality.WAITING)
+    case.troubles.beat()
+    assert case.later(9000.0) == []
+    assert case.troubles.waiting == 2, "nothing is wrong yet, nor is all in order"
+    (trouble,) = case.later(1500.0)
+    assert (trouble["kind"], trouble["place"], trouble["rank"]) == ("node_booting", NODE, "warning")
+    assert trouble["facts"] == {"why": "reads 1018h"}
+    assert trouble["since"] == began_ms
+    assert case.troubles.waiting == 0, "the trouble says it"
+    case.set(f"{NODE}/node/state", 2)
+    assert case.later() == []
+    case.set(f"{NODE}/node/state", 1)
+    case.troubles.beat()
+    assert case.later(9000.0) == [], "it boots anew"
+
+
+def test_nodes_that_wait_for_a_mandatory_one_do_not_boot_for_ever() -> None:
+    case = Case()
+    case.set(f"{BUS}/held_by", "lift")
+    case.set(f"{NODE}/node/state", 1)
+    case.set(f"{DRIVE}/status/state", 0, Quality.WAITING)
+    case.later()
+    assert case.kinds() == [("held", BUS)]
+    assert case.troubles.waiting == 0
+
+
+def test_a_drive_that_says_nothing_yet_is_counted_as_waiting() -> None:
+    case = Case()
+    assert case.troubles.waiting == 0
+    case.set(f"{DRIVE}/status/state", 0, Quality.WAITING)
+    assert case.troubles.beat()
+    assert (case.troubles.shown, case.troubles.waiting) == ([], 1)
+    case.set(f"{DRIVE}/supervision/watchdog_state", 3)
+    case.troubles.beat()
+    assert case.troubles.waiting == 0
 
 
 def test_the_worst_comes_first() -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final
 
+from bridge.drive import Explained
 from bridge.image import Image, Quality, Value
 
+OwnFault = Callable[[int, int], Explained | None]
+"""The fault that a drive's own status word and its last emergency code tell; None where there is none."""
 DOWN: Final = ("bus_off", "down")
 
 
@@ -102,7 +105,7 @@ def of_node(look: Look, node: str) -> Iterator[Trouble]:
         yield Trouble(Rank.WARNING, "node_disabled", node)
 
 
-def of_drive(look: Look, drive: str, *, is_heard: bool) -> Iterator[Trouble]:
+def of_drive(look: Look, drive: str, own_fault: OwnFault | None, *, is_heard: bool) -> Iterator[Trouble]:
     if look(f"{drive}/supervision/follows") is False:
         yield Trouble(Rank.DANGER, "ignores_stop", drive)
     is_tripped = look.label(f"{drive}/supervision/watchdog_state") == "tripped"
@@ -117,17 +120,32 @@ def of_drive(look: Look, drive: str, *, is_heard: bool) -> Iterator[Trouble]:
         yield Trouble(Rank.ALARM, "drive_not_as_configured", drive, (("why", reason),))
     elif quality in (Quality.LOST, Quality.DEAD):
         yield Trouble(Rank.ALARM, "drive_lost", drive, (("why", reason),))
-    # The fault that is shown after a trip is the bridge's own, and says the same.
-    elif (text := look(f"{drive}/status/fault_text")) and not is_tripped:
-        facts = (
-            ("text", text),
-            ("number", look(f"{drive}/status/fault_number") or ""),
-            ("cause", look(f"{drive}/status/fault_cause") or ""),
-            ("remedy", look(f"{drive}/status/fault_remedy") or ""),
-        )
+    elif facts := _own(look, drive, own_fault) if is_tripped else _shown(look, drive):
         yield Trouble(Rank.ALARM, "drive_fault", drive, facts)
     elif quality is Quality.STALE:
         yield Trouble(Rank.WARNING, "drive_stale", drive, (("why", reason),))
+
+
+def _shown(look: Look, drive: str) -> tuple[tuple[str, Value], ...]:
+    """The facts of the fault that the points show; none where there is none."""
+    text = look(f"{drive}/status/fault_text")
+    if not text:
+        return ()
+    rest = ((leaf, look(f"{drive}/status/fault_{leaf}") or "") for leaf in ("number", "cause", "remedy"))
+    return (("text", text), *rest)
+
+
+def _own(look: Look, drive: str, own_fault: OwnFault | None) -> tuple[tuple[str, Value], ...]:
+    """The facts of the drive's own fault. After a trip the points show the bridge's, which says no more than
+    that the controller is silent."""
+    word = look(f"{drive}/status/drive_status_word")
+    code = look(f"{drive}/status/emcy_code")
+    if own_fault is None or not isinstance(word, int):
+        return ()
+    fault = own_fault(word, code if isinstance(code, int) else 0)
+    if fault is None:
+        return ()
+    return (("text", str(fault)), ("number", fault.number), ("cause", fault.cause), ("remedy", fault.remedy))
 
 
 def of_meaning(look: Look, drive: str, main: str) -> Iterator[Trouble]:

@@ -15,6 +15,7 @@ from bridge.image import Image, Quality
 from bridge.northbound.page.findings import (
     DOWN,
     Look,
+    OwnFault,
     Rank,
     Trouble,
     is_bridge_dead,
@@ -42,6 +43,7 @@ class Layout:
     buses: tuple[str, ...]
     mains: Mapping[str, str] = field(default_factory=dict[str, str])
     """What each drive is moved by, such as ``frequency``, as far as it has that."""
+    own_faults: Mapping[str, OwnFault] = field(default_factory=dict[str, OwnFault])
 
 
 class Troubles:
@@ -148,7 +150,7 @@ class Troubles:
 
     def _of_drive(self, drive: str, *, is_heard: bool) -> Iterator[Trouble]:
         main = self._layout.mains.get(drive)
-        yield from of_drive(self._look, drive, is_heard=is_heard)
+        yield from of_drive(self._look, drive, self._layout.own_faults.get(drive), is_heard=is_heard)
         if is_heard and main is not None:
             yield from of_meaning(self._look, drive, main)
 

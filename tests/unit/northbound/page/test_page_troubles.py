@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -10,6 +11,7 @@ from bridge.command import Plant
 from bridge.image import Image, Quality, Value
 from bridge.mapping import Family, load_family
 from bridge.northbound.page.describe import described, layout_of
+from bridge.northbound.page.own_faults import own_faults
 from bridge.northbound.page.topics import topics_of
 from bridge.northbound.page.troubles import Troubles
 from tests.support import sites
@@ -29,7 +31,9 @@ class Case:
         plant = sites.plant_of(_SITE)
         self.image: Image = plant.image
         self.now_ms = 1_000_000.0
-        self.layout = layout_of(plant.image, plant.site, families_of(plant))
+        families = families_of(plant)
+        layout = layout_of(plant.image, plant.site, families)
+        self.layout = replace(layout, own_faults=own_faults(plant.site, families))
         self.troubles = Troubles(self.image, self.layout, lambda: self.now_ms)
         for name in (BUS, f"{NODE}/node"):
             self.set(f"{name}/state", 0 if name == BUS else 2)
@@ -191,6 +195,23 @@ def test_a_fault_is_told_with_its_cause_and_what_to_do() -> None:
         case.set(f"{DRIVE}/status/fault_{leaf}", text)
     (trouble,) = case.later()
     assert trouble["facts"] == facts
+
+
+def test_a_drive_with_a_fault_of_its_own_has_it_beside_a_silent_controller() -> None:
+    """After a trip the points show the bridge's fault; what the drive sent says more (BU 2500 §6.5.3)."""
+    case = Case()
+    case.set(f"{DRIVE}/supervision/watchdog_state", 3)
+    case.set(f"{DRIVE}/status/fault_text", "E010/10.3")
+    case.set(f"{DRIVE}/status/drive_status_word", 0x0631)
+    assert case.kinds() == [("controller_silent", DRIVE)], "the drive itself has none"
+    case.set(f"{DRIVE}/status/drive_status_word", 0x0638)
+    case.set(f"{DRIVE}/status/emcy_code", 0x2310)
+    _, fault = case.later()
+    assert (fault["kind"], fault["place"]) == ("drive_fault", DRIVE)
+    assert fault["facts"]["number"] == "2310h"
+    assert "10.3" not in fault["facts"]["text"]
+    case.set(f"{DRIVE}/status/emcy_code", 0)
+    assert case.later()[1]["facts"]["text"] == "fault"
 
 
 def test_what_was_there_when_the_front_began_may_be_older() -> None:

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from bridge.errors import OperationFailed
 from bridge.northbound.listening import until_deaf
@@ -21,6 +22,11 @@ from bridge.northbound.page.web import Page
 _HEADERS_S: Final = 10.0
 """How long the head of a request may take to come, the first of a connection included."""
 _IDLE_S: Final = 30
+_STALLED_S: Final = 20.0
+"""How long a tab may take nothing while its connection's buffers are full."""
+_CLOSING_S: Final = 12.0
+"""How long a tab's connection may last when nothing is served on it any more: uvicorn waits 10 s for the
+client's part of closing it."""
 _MOST_CONNECTIONS: Final = 256
 
 
@@ -63,6 +69,42 @@ class _Protocol(H11Protocol):
             deadline.cancel()
 
 
+class _LiveProtocol(WebSocketsSansIOProtocol):
+    """uvicorn waits for ever for a client that takes nothing, even to close its connection."""
+
+    _deadline: asyncio.TimerHandle | None = None
+    _is_ending = False
+
+    def pause_writing(self) -> None:
+        super().pause_writing()
+        if not self._is_ending:
+            self._abort_in(_STALLED_S)
+
+    def resume_writing(self) -> None:
+        super().resume_writing()
+        if not self._is_ending:
+            self._forget()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._forget()
+        super().connection_lost(exc)
+
+    async def run_asgi(self) -> None:
+        await super().run_asgi()
+        self._is_ending = True
+        if self in self.connections:
+            self._abort_in(_CLOSING_S)
+
+    def _abort_in(self, limit_s: float) -> None:
+        self._forget()
+        self._deadline = asyncio.get_running_loop().call_later(limit_s, self.transport.abort)
+
+    def _forget(self) -> None:
+        deadline, self._deadline = self._deadline, None
+        if deadline:
+            deadline.cancel()
+
+
 class _Server(uvicorn.Server):
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None]:
@@ -80,7 +122,7 @@ class PageServer:
         config = uvicorn.Config(
             page.app,
             http=_Protocol,
-            ws="websockets-sansio",
+            ws=_LiveProtocol,
             ws_max_size=MOST_BYTES,
             ws_ping_interval=20.0,
             ws_ping_timeout=20.0,

@@ -117,7 +117,7 @@ class Page:
                 self._has_token,
             ).routes,
             *Bus(site.site.name, backstage.layouts, backstage.capture, self._is_inside).routes,
-            *System(backstage.system, lambda: self._tabs.shown, self._session_of).routes,
+            *System(backstage.system, lambda: self.shown, self._session_of).routes,
             WebSocketRoute("/live", self._live),
             Mount("/static", StaticFiles(directory=STATIC)),
         ]
@@ -135,6 +135,11 @@ class Page:
         async with self._tabs.serving():
             yield
         self._checks.close()
+
+    @property
+    def shown(self) -> list[dict[str, Any]]:
+        """Who has the page open, as ``Tabs.shown``."""
+        return self._tabs.shown
 
     # who asks
 
@@ -197,7 +202,7 @@ class Page:
         before = self._session_of(request)
         if before:
             self._sessions.end(before)
-            await self._tabs.end(before)
+            self._tabs.end(before)
         session, shown = self._begin(user.name, _ROLES[user.role])
         _log.info("page: %s logged in from %s", user.name, address)
         return self._with_cookie(shown, session)
@@ -207,7 +212,7 @@ class Page:
         if session is None or not session.has(request.headers.get("x-token", "")):
             return self._json({"error": "token"}, 403)
         self._sessions.end(session)
-        await self._tabs.end(session)
+        self._tabs.end(session)
         response = self._json({})
         response.delete_cookie(self._cookie, path="/")
         return response

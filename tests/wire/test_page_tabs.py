@@ -1,0 +1,128 @@
+"""Tabs under clients that stall, leave or say nothing; the server runs in this process."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import socket
+import struct
+import time
+from collections.abc import AsyncGenerator
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+
+from bridge.command import Event, Kind
+from bridge.northbound.page import server as page_server
+from tests.support.page import Served, Stalled, message, until
+
+DRIVE = "conveyor/fu1"
+_MOST = 40
+"""Enough to fill what lies between server and client."""
+
+
+@pytest.fixture
+async def served() -> AsyncGenerator[Served]:
+    page = Served()
+    page.bound.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+    async with page.serving():
+        yield page
+
+
+async def fill(tab: Stalled) -> None:
+    """Until everything is full for this tab: its connection, and what waits behind that."""
+    with contextlib.suppress(OSError):  # it may be cut off meanwhile
+        await tab.say({"ask": 1, "target": DRIVE, "action": "take_control", "fields": {"ttl_ms": 1000}})
+        for _ in range(_MOST):
+            await tab.say({"show": []})
+            await tab.say({"show": ["plant", f"drive {DRIVE}", "bus can0"]})
+            await asyncio.sleep(0.05)
+
+
+def given_back(served: Served) -> bool:
+    return "release_control" in [str(one.action) for one in served.view.requests]
+
+
+@pytest.mark.parametrize("how", ["logout", "expiry"])
+async def test_a_client_that_takes_nothing_holds_up_no_other_tab(served: Served, how: str) -> None:
+    cookie, token = await served.login("operator")
+    async with served.stalled(cookie, token) as tab:
+        await fill(tab)
+        if how == "logout":
+            began = time.monotonic()
+            answer = await served.ask("POST", "/api/logout", Cookie=cookie, X_Token=token)
+            assert (answer.status, time.monotonic() - began < 1.0) == (200, True)
+        else:
+            served.later_s = 3600.0
+            await asyncio.sleep(1.2)
+        await until(lambda: given_back(served))
+        assert await beat_s(served) < 1.0
+        await until(lambda: not served.page.shown)
+
+
+async def beat_s(served: Served) -> float:
+    """How long another tab waits for what changes."""
+    cookie, token = await served.login("engineer")
+    async with served.live(cookie) as tab:
+        await tab.send(token)
+        await tab.send(json.dumps({"show": ["plant"]}))
+        await message(tab, "state")
+        began = time.monotonic()
+        served.view.image.set(served.view.image.index["bridge/audit_lost"], 2, time.time())
+        await message(tab, "changes")
+        return time.monotonic() - began
+
+
+async def test_a_connection_whose_client_takes_nothing_does_not_last(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(page_server, "_STALLED_S", 0.5)
+    cookie, token = await served.login("operator")
+    async with served.stalled(cookie, token) as tab:
+        await fill(tab)
+        await until(lambda: not served.page.shown)
+        await asyncio.sleep(0.1)
+        assert await tab.is_gone()
+
+
+async def test_a_tab_that_would_miss_an_outcome_is_closed_instead(served: Served) -> None:
+    cookie, token = await served.login("observer")
+    async with served.live(cookie) as tab:
+        await tab.send(token)
+        await message(tab, "you")
+        for number in range(1100):
+            served.view.happen(Event(0.0, Kind.WATCHDOG, DRIVE, 500, f"event {number}"))
+        with pytest.raises(ConnectionClosed) as closed:
+            await message(tab, "nothing")
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 1013
+
+
+async def test_a_client_that_leaves_at_any_moment_is_no_failure(
+    served: Served, caplog: pytest.LogCaptureFixture
+) -> None:
+    cookie, token = await served.login("operator")
+    for first in ("guessed", token):
+        async with served.stalled(cookie, first) as tab:
+            tab.sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    async with served.live(cookie) as leaving:
+        await leaving.send(token)
+        await message(leaving, "you")
+        leaving.transport.abort()
+        answer = await served.ask("POST", "/api/logout", Cookie=cookie, X_Token=token)
+    assert answer.status == 200
+    await until(lambda: not served.page.shown)
+    assert not [one for one in caplog.records if one.levelname == "ERROR"]
+
+
+async def test_a_logout_closes_the_tabs_of_its_session_with_a_code(served: Served) -> None:
+    cookie, token = await served.login("operator")
+    async with served.live(cookie) as tab:
+        await tab.send(token)
+        await message(tab, "you")
+        await served.ask("POST", "/api/logout", Cookie=cookie, X_Token=token)
+        with pytest.raises(ConnectionClosed) as closed:
+            await message(tab, "nothing")
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 4401

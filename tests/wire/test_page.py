@@ -154,8 +154,10 @@ def test_nothing_is_told_without_a_login(browser: Browser) -> None:
     for path in GUARDED:
         assert browser.request("GET", f"/api/{path}").status == 401, path
     assert browser.request("GET", "/").status == 200
-    with pytest.raises(InvalidStatus):
-        browser.live()
+    with browser.live() as socket, pytest.raises(ConnectionClosed) as closed:
+        socket.recv(timeout=TIMEOUT_S)
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 4401
 
 
 def test_a_login_gives_what_the_role_may_see(browser: Browser) -> None:

@@ -99,6 +99,49 @@ async def test_a_tab_that_would_miss_an_outcome_is_closed_instead(served: Served
     assert closed.value.rcvd.code == 1013
 
 
+async def closing_code(served: Served, cookie: str, token: str = "") -> int:
+    async with served.live(cookie) as tab:
+        if token:
+            await tab.send(token)
+        with pytest.raises(ConnectionClosed) as closed:
+            await message(tab, "you")
+    return closed.value.rcvd.code if closed.value.rcvd else 0
+
+
+async def test_a_tab_that_is_refused_is_told_why(served: Served) -> None:
+    """A browser shows no code of a connection that was never opened, and its page would try for ever."""
+    assert await closing_code(served, "") == 4401
+    assert await closing_code(served, "session=nobodys") == 4401
+    cookie, _ = await served.login("operator")
+    assert await closing_code(served, cookie, "guessed") == 4403
+
+
+async def test_the_tabs_of_one_session_leave_room_for_others(served: Served) -> None:
+    cookie, token = await served.login("operator")
+    own, own_token = await served.login("observer")
+    async with contextlib.AsyncExitStack() as stack:
+        for _ in range(16):
+            tab = await stack.enter_async_context(served.live(cookie))
+            await tab.send(token)
+            await message(tab, "you")
+        assert await closing_code(served, cookie, "guessed") == 4403, "its token comes first"
+        assert await closing_code(served, cookie, token) == 4429
+        other = await stack.enter_async_context(served.live(own))
+        await other.send(own_token)
+        await message(other, "you")
+
+
+async def test_a_session_that_ends_before_its_token_comes_is_over(served: Served) -> None:
+    cookie, token = await served.login("operator")
+    async with served.live(cookie) as tab:
+        await served.ask("POST", "/api/logout", Cookie=cookie, X_Token=token)
+        await tab.send(token)
+        with pytest.raises(ConnectionClosed) as closed:
+            await message(tab, "you")
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 4401
+
+
 async def test_a_client_that_leaves_at_any_moment_is_no_failure(
     served: Served, caplog: pytest.LogCaptureFixture
 ) -> None:

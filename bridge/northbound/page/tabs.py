@@ -31,6 +31,7 @@ _BEAT: Final = 2
 _LOOK: Final = 20
 """Ticks from one look at the sessions of the tabs to the next."""
 _MOST_TABS: Final = 64
+MOST_OF_SESSION: Final = 16
 _EVENTS_KEPT: Final = 200
 _TOKEN_S: Final = 5.0
 _encode = msgspec.json.Encoder().encode
@@ -73,14 +74,15 @@ class Tabs:
             self._topics.close()
 
     async def serve(self, socket: WebSocket, session: Session | None) -> None:
-        """Serve one tab until it is closed; ``session`` is that of its cookie."""
-        if session is None or len(self._tabs) >= _MOST_TABS:
-            await close(socket, SESSION_OVER if session is None else TOO_MANY)
-            return
+        """Serve one tab until it is closed; ``session`` is that of its cookie.
+
+        Who is refused is let in before, because a browser tells its page no code otherwise.
+        """
         with suppress(*GONE):
             await socket.accept()
-        if not session.has(await _token(socket)):
-            await close(socket, NO_TOKEN)
+        code = await self._refusal(socket, session)
+        if code or session is None:
+            await close(socket, code)
             return
         tab = Tab(socket, session, self._view, self._epoch_ms())
         self._tabs.append(tab)
@@ -89,6 +91,17 @@ class Tabs:
             await tab.serve(lambda data: self._on_message(tab, data))
         finally:
             self._tabs.remove(tab)
+
+    async def _refusal(self, socket: WebSocket, session: Session | None) -> int:
+        """The code with which a tab is closed at once; 0 where it is served."""
+        if session is None:
+            return SESSION_OVER
+        if not session.has(await _token(socket)):
+            return NO_TOKEN
+        if self._sessions.find(session.id, self._clock()) is None:
+            return SESSION_OVER  # while its token was awaited
+        own = sum(tab.session is session for tab in self._tabs)
+        return TOO_MANY if len(self._tabs) >= _MOST_TABS or own >= MOST_OF_SESSION else 0
 
     def end(self, session: Session) -> None:
         """Close the tabs of this session, which is over."""

@@ -142,6 +142,16 @@ async def test_a_session_that_ends_before_its_token_comes_is_over(served: Served
     assert closed.value.rcvd.code == 4401
 
 
+async def test_a_tab_is_told_the_time_once_a_second(served: Served) -> None:
+    cookie, token = await served.login("observer")
+    async with served.live(cookie) as tab:
+        await tab.send(token)
+        await message(tab, "you")
+        first, second = [(await message(tab, "now"))["now"] for _ in range(2)]
+    assert second - first == pytest.approx(1000, abs=300)
+    assert abs(time.time() * 1000 - second) < 1000
+
+
 async def test_a_client_that_leaves_at_any_moment_is_no_failure(
     served: Served, caplog: pytest.LogCaptureFixture
 ) -> None:

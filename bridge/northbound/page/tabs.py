@@ -29,7 +29,7 @@ _TICK_S: Final = 0.05
 _BEAT: Final = 2
 """Ticks from one message to the next."""
 _LOOK: Final = 20
-"""Ticks from one look at the sessions of the tabs to the next."""
+"""Ticks from one look at the sessions of the tabs to the next, and from one time that tabs are told."""
 _MOST_TABS: Final = 64
 MOST_OF_SESSION: Final = 16
 _EVENTS_KEPT: Final = 200
@@ -158,6 +158,7 @@ class Tabs:
                     self._hear(counts=tick % _LOOK == 0)
                 if tick % _LOOK == 0:
                     self._look_at_sessions()
+                    self._tell_time()
 
     def _sample(self) -> None:
         now_ms = round(self._epoch_ms())
@@ -191,6 +192,12 @@ class Tabs:
         for session in {tab.session for tab in self._tabs}:
             if self._sessions.find(session.id, self._clock()) is None:
                 self.end(session)
+
+    def _tell_time(self) -> None:
+        """A tab that is told nothing for some seconds knows by this that its connection or we hang."""
+        now = _encode({"now": round(self._epoch_ms())})
+        for tab in self._tabs:
+            tab.show(now)
 
     def _on_event(self, event: Event) -> None:
         shown = {

@@ -152,6 +152,18 @@ async def test_a_tab_is_told_the_time_once_a_second(served: Served) -> None:
     assert abs(time.time() * 1000 - second) < 1000
 
 
+async def test_a_new_tab_gets_what_has_happened_in_one_message(served: Served) -> None:
+    for number in range(250):
+        served.view.happen(Event(0.0, Kind.WATCHDOG, DRIVE, 500, f"event {number}"))
+    cookie, token = await served.login("observer")
+    async with served.live(cookie) as tab:
+        await tab.send(token)
+        told = (await message(tab, "events"))["events"]
+        assert [one["message"] for one in told] == [f"event {number}" for number in range(50, 250)]
+        served.view.happen(Event(0.0, Kind.WATCHDOG, DRIVE, 500, "one more"))
+        assert (await message(tab, "event"))["event"]["message"] == "one more"
+
+
 async def test_a_client_that_leaves_at_any_moment_is_no_failure(
     served: Served, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -126,8 +126,7 @@ class Tabs:
     def _greet(self, tab: Tab) -> None:
         tab.tell(_encode({"you": str(tab.viewer.identity)}))
         tab.tell(self._troubles_told())
-        for event in self._events:
-            tab.tell(_encode({"event": event}))
+        tab.tell(_encode({"events": list(self._events)}))
 
     def _troubles_told(self) -> bytes:
         return _encode({"troubles": self._troubles.shown, "waiting": self._troubles.waiting})

@@ -164,6 +164,22 @@ async def test_a_new_tab_gets_what_has_happened_in_one_message(served: Served) -
         assert (await message(tab, "event"))["event"]["message"] == "one more"
 
 
+async def test_rows_of_a_trend_have_the_number_of_their_choice(served: Served) -> None:
+    cookie, token = await served.login("observer")
+    async with served.live(cookie) as tab:
+        await tab.send(token)
+        names = ["bridge/audit_lost", f"{DRIVE}/supervision/trips", f"{DRIVE}/supervision/last_fault"]
+        for number in range(1, 30):
+            chosen = names[: number % 3 + 1]
+            await tab.send(json.dumps({"trend": chosen, "number": number}))
+            await asyncio.sleep(0.03)
+        widths = [await message(tab, "trend") for _ in range(8)]
+        assert all(len(row) == one["number"] % 3 + 2 for one in widths for row in one["trend"])
+        await tab.send(json.dumps({"trend": names}))
+        while (await message(tab, "trend"))["number"]:
+            pass
+
+
 async def test_a_client_that_leaves_at_any_moment_is_no_failure(
     served: Served, caplog: pytest.LogCaptureFixture
 ) -> None:

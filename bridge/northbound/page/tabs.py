@@ -133,12 +133,14 @@ class Tabs:
 
     def _on_message(self, tab: Tab, data: str) -> None:
         viewer, known = tab.viewer, self._topics.places.__contains__
-        before = viewer.topics
+        before, followed = viewer.topics, (viewer.choice, viewer.followed)
         try:
             viewer.on_message(data.encode("utf-8", "replace"), self._clock(), known)
         except BadMessage as error:
             tab.close(BAD_MESSAGE, str(error)[:100])
             return
+        if (viewer.choice, viewer.followed) != followed:
+            tab.rows.clear()  # they are those of the choice before
         for topic in viewer.topics:
             if topic not in before:
                 tab.tell(self._topics.state(topic))
@@ -173,7 +175,7 @@ class Tabs:
                 tab.tell(troubles)
             if tab.rows:
                 rows, tab.rows = tab.rows, []
-                tab.show(_encode({"trend": rows}))
+                tab.show(_encode({"trend": rows, "number": tab.viewer.choice}))
             if tab.has_caught_up():
                 for topic in tab.viewer.topics:
                     tab.tell(self._topics.state(topic))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import msgspec
 
@@ -25,6 +25,8 @@ _MESSAGES, _EVERY_S = 100, 0.02
 """So many messages may come at once, and one in every so many seconds after that."""
 _MOST_TOPICS: Final = 16
 MOST_FOLLOWED: Final = 12
+_HIGHEST: Final = 2**53 - 1
+"""The highest whole number that JavaScript counts to."""
 _FIELDS: Final[dict[Action, tuple[str, ...]]] = {
     Action.WRITE: ("values",),
     Action.START: ("direction",),
@@ -47,9 +49,10 @@ class _Show(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class _Trend(msgspec.Struct, forbid_unknown_fields=True):
-    """The points whose course is followed from now on."""
+    """The points whose course is followed from now on. ``number`` comes back with their rows."""
 
     trend: list[str]
+    number: Annotated[int, msgspec.Meta(ge=0, le=_HIGHEST)] = 0
 
 
 class _Ask(msgspec.Struct, forbid_unknown_fields=True):
@@ -92,6 +95,8 @@ class Viewer:
         self.identity = Identity(Source.LOCAL, f"{user or 'visitor'}#{secrets.token_hex(3)}", role, address)
         self.topics: tuple[str, ...] = ()
         self.followed: tuple[int, ...] = ()
+        self.choice = 0
+        """The tab's own number for what it follows."""
         self.wish: Wish | None = None
         """What it wants to hear of a bus."""
         self._places = {point.name: place for place, point in enumerate(view.image.points)}
@@ -115,7 +120,7 @@ class Viewer:
             if "show" in keys:
                 self._show(_decode_show(data).show, known)
             elif "trend" in keys:
-                self._follow(_decode_trend(data).trend)
+                self._follow(_decode_trend(data))
             elif "ask" in keys:
                 self._ask(_decode_ask(data))
             elif "hear" in keys:
@@ -131,11 +136,13 @@ class Viewer:
             raise BadMessage(f"there is no topic {str(unknown)[:80]!r}")
         self.topics = tuple(dict.fromkeys(topics))
 
-    def _follow(self, names: list[str]) -> None:
+    def _follow(self, trend: _Trend) -> None:
+        names = trend.trend
         unknown = next((name for name in names if name not in self._places), None)
         if unknown is not None or len(names) > MOST_FOLLOWED:
             raise BadMessage(f"there is no point {str(unknown)[:80]!r}, or it is one too many")
         self.followed = tuple(self._places[name] for name in names)
+        self.choice = trend.number
 
     def _hear(self, wish: Wish | None, known: Callable[[str], bool]) -> None:
         if wish is not None and not known(f"bus {wish.bus}"):

@@ -122,7 +122,12 @@ def test_a_tab_shows_what_there_is() -> None:
         say(viewer, {"show": ["cellar"]})
     name = f"{DRIVE}/actual/value_1"
     say(viewer, {"trend": [name]})
-    assert viewer.followed == (Seen().image.index[name],)
+    assert (viewer.followed, viewer.choice) == ((Seen().image.index[name],), 0)
+    say(viewer, {"trend": [name], "number": 7})
+    assert viewer.choice == 7
+    for number in (-1, 2**60, 1.5, "7"):
+        with pytest.raises(BadMessage):
+            say(viewer, {"trend": [name], "number": number})
     for names in (["cellar"], [name] * (MOST_FOLLOWED + 1)):
         with pytest.raises(BadMessage, match="there is no point"):
             say(viewer, {"trend": names})

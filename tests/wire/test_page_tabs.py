@@ -180,6 +180,25 @@ async def test_rows_of_a_trend_have_the_number_of_their_choice(served: Served) -
             pass
 
 
+async def test_a_trouble_is_told_soon_and_has_the_time_when_nobody_looked(served: Served) -> None:
+    place = served.view.image.index[f"{DRIVE}/supervision/follows"]
+    cookie, token = await served.login("observer")
+    served.view.image.set(place, False, 1.0)
+    began_ms = time.time() * 1000
+    await asyncio.sleep(2.5)
+    async with served.live(cookie) as tab:
+        await tab.send(token)
+        trouble = (await message(tab, "troubles"))["troubles"][0]
+        assert trouble["kind"] == "ignores_stop"
+        assert trouble["since"] == pytest.approx(began_ms + 500, abs=600)
+        served.view.image.set(place, True, 1.0)
+        began = time.monotonic()
+        told = await message(tab, "troubles")
+        assert time.monotonic() - began < 0.6
+        assert "ignores_stop" not in [one["kind"] for one in told["troubles"]]
+        assert isinstance(told["waiting"], int)
+
+
 async def test_a_client_that_leaves_at_any_moment_is_no_failure(
     served: Served, caplog: pytest.LogCaptureFixture
 ) -> None:

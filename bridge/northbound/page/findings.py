@@ -38,7 +38,7 @@ class Look:
 
     def __init__(self, image: Image) -> None:
         self._image = image
-        self._places = {point.name: place for place, point in enumerate(image.points)}
+        self._places = image.index
         self.of_bridge = [point.name for point in image.points if point.path[0] == "bridge"]
         self._labels = {point.name: dict(point.states) for point in image.points if point.states}
 

@@ -28,6 +28,8 @@ _TICK_S: Final = 0.05
 """A trend has a row for each tick."""
 _BEAT: Final = 2
 """Ticks from one message to the next."""
+_TROUBLES: Final = 10
+"""Ticks from one look for troubles to the next while a tab is open: it goes through all drives."""
 _LOOK: Final = 20
 """Ticks from one look at the sessions of the tabs to the next, and from one time that tabs are told."""
 _MOST_TABS: Final = 64
@@ -62,6 +64,7 @@ class Tabs:
     async def serving(self) -> AsyncGenerator[None]:
         """While this lasts, tabs are told what changes."""
         self._view.on_event(self._on_event)
+        self._troubles.beat()
         beating = asyncio.create_task(self._run(), name="beat of the page")
         try:
             yield
@@ -154,6 +157,8 @@ class Tabs:
             tick += 1
             with self._guard:
                 self._sample()
+                if tick % (_TROUBLES if self._tabs else _LOOK) == 0:
+                    self._look_for_troubles()
                 if tick % _BEAT == 0:
                     self._beat()
                     self._hear(counts=tick % _LOOK == 0)
@@ -167,12 +172,16 @@ class Tabs:
             if tab.viewer.followed:
                 tab.rows.append([now_ms, *_values(self._view.image, tab.viewer.followed)])
 
+    def _look_for_troubles(self) -> None:
+        """Also while nobody looks, because each has the time when it began."""
+        if self._troubles.beat():
+            told = self._troubles_told()
+            for tab in self._tabs:
+                tab.tell(told)
+
     def _beat(self) -> None:
         changes = self._topics.beat({topic for tab in self._tabs for topic in tab.viewer.topics})
-        troubles = self._troubles_told() if self._troubles.beat() else None
         for tab in self._tabs:
-            if troubles:
-                tab.tell(troubles)
             if tab.rows:
                 rows, tab.rows = tab.rows, []
                 tab.show(_encode({"trend": rows, "number": tab.viewer.choice}))

@@ -99,7 +99,7 @@ class Viewer:
         """The tab's own number for what it follows."""
         self.wish: Wish | None = None
         """What it wants to hear of a bus."""
-        self._places = {point.name: place for place, point in enumerate(view.image.points)}
+        self._places = view.image.index
         self._view = view
         self._tell = tell
         self._owned: dict[str, None] = {}

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Annotated, Any, Final, Protocol
 
 import msgspec
 
@@ -22,6 +22,10 @@ MOST_ROWS: Final = 100
 _WINDOW_S: Final = 5.0
 """Rates and loads are those of about so long."""
 _MOST_IDENTIFIERS: Final = 2048
+_MOST_KINDS: Final = 16
+_MOST_NODES: Final = 127
+_RETRY_S: Final = 1.0
+"""How long a bus that could not be heard is left alone."""
 _encode = msgspec.json.Encoder().encode
 
 
@@ -56,12 +60,12 @@ class Ear(Protocol):
 
 
 class Wish(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """What a tab wants to hear; an empty list of kinds or nodes is all of them."""
+    """What a tab wants to hear; no kinds or no nodes are all of them."""
 
     bus: str
     view: str = "frames"
-    kinds: list[str] = []
-    nodes: list[int] = []
+    kinds: Annotated[frozenset[str], msgspec.Meta(max_length=_MOST_KINDS)] = frozenset()
+    nodes: Annotated[frozenset[int], msgspec.Meta(max_length=_MOST_NODES)] = frozenset()
 
     def takes(self, heard: Heard) -> bool:
         return (not self.kinds or heard.kind in self.kinds) and (not self.nodes or heard.node in self.nodes)
@@ -88,6 +92,7 @@ class Hearing:
         self._ear = ear
         self._is_open = False
         self._failure = ""
+        self._retry_at = float("-inf")
         self._counts: dict[str, _Count] = {}
         self._measured = 0.0
         self._new: list[Heard] = []
@@ -100,12 +105,15 @@ class Hearing:
             return
         try:
             if not self._is_open:
+                if now < self._retry_at:
+                    return
                 self._open(now)
             self._new = self._ear.take()
             self._failure = ""
         except OperationFailed as error:
             self.close()
             self._failure = str(error)
+            self._retry_at = now + _RETRY_S
         for heard in self._new:
             self._count(heard)
         if now - self._measured >= 1.0:

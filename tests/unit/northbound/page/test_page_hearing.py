@@ -22,11 +22,12 @@ def frame(at_ms: float, identifier: str = "185", kind: str = "pdo", node: int = 
 class Ear:
     def __init__(self) -> None:
         self.waiting: list[Heard] = []
-        self.openings = self.lost = 0
+        self.openings = self.lost = self.tries = 0
         self.is_open = False
         self.failure = ""
 
     def open(self) -> None:
+        self.tries += 1
         if self.failure:
             raise OperationFailed(self.failure)
         self.is_open, self.openings = True, self.openings + 1
@@ -83,7 +84,7 @@ def test_a_tab_gets_what_it_asks_for_in_order(
     kinds: list[str], nodes: list[int], frames: list[tuple[str, int]]
 ) -> None:
     bench = Bench()
-    wish = Wish(BUS, "frames", kinds, nodes)
+    wish = Wish(BUS, "frames", frozenset(kinds), frozenset(nodes))
     bench.beat(wish)
     bench.ear.waiting = [frame(float(n), kind=kind, node=node) for n, (kind, node) in enumerate(frames)]
     (shown,) = bench.beat(wish)
@@ -124,7 +125,7 @@ def test_identifiers_are_counted_with_rates_loads_and_gaps() -> None:
 
 def test_identifiers_are_told_once_a_second_and_filtered() -> None:
     bench = Bench()
-    wish = Wish(BUS, "identifiers", ["sync"])
+    wish = Wish(BUS, "identifiers", frozenset({"sync"}))
     bench.beat(wish)
     bench.ear.waiting = [frame(0.0), frame(1.0, "080", "sync", 0)]
     assert bench.beat(wish) == [[]]
@@ -140,12 +141,22 @@ def test_a_bus_that_cannot_be_heard_says_why_and_is_tried_again() -> None:
     ((message,),) = bench.beat(Wish(BUS, "identifiers"), counts=True)
     assert message["failure"] == bench.ear.failure
     bench.ear.failure = ""
-    bench.beat(Wish(BUS))
+    bench.beat(Wish(BUS), after_s=1.0)
     bench.ear.waiting = [frame(0.0)]
     assert "frames" in bench.beat(Wish(BUS))[0][0]
     bench.ear.failure = "the process that has the bus has ended"
     assert bench.beat(Wish(BUS))[0][0]["failure"] == bench.ear.failure
     assert not bench.ear.is_open
+
+
+def test_a_bus_that_cannot_be_heard_is_tried_once_a_second() -> None:
+    bench = Bench()
+    bench.ear.failure = "can0 cannot be listened to: no such device"
+    for beat in range(50):
+        wishes = [Wish(BUS)] if beat % 2 else [Wish(BUS), Wish(BUS)]
+        assert all(shown[0]["failure"] for shown in bench.beat(*wishes))
+        bench.beat(after_s=0.0)  # nobody wants to hear, and then somebody again
+    assert bench.ear.tries == 5
 
 
 def test_a_flood_of_identifiers_takes_no_more_memory_than_a_bus_has() -> None:

@@ -133,6 +133,16 @@ def test_a_tab_shows_what_there_is() -> None:
             say(viewer, {"trend": names})
 
 
+def test_a_wish_has_no_more_kinds_and_nodes_than_there_are() -> None:
+    viewer = Seen().viewer()
+    say(viewer, {"hear": {"bus": "can0", "kinds": ["pdo", "pdo"], "nodes": list(range(1, 128))}})
+    assert viewer.wish is not None
+    assert (viewer.wish.kinds, len(viewer.wish.nodes)) == ({"pdo"}, 127)
+    for wish in ({"kinds": [str(n) for n in range(17)]}, {"nodes": list(range(129))}):
+        with pytest.raises(BadMessage):
+            say(viewer, {"hear": {"bus": "can0", **wish}})
+
+
 def test_long_and_frequent_messages_end_the_connection() -> None:
     viewer = Seen().viewer()
     with pytest.raises(BadMessage, match="at most"):
@@ -195,7 +205,7 @@ def test_a_tab_hears_one_bus_at_a_time_until_it_has_heard_enough() -> None:
     assert viewer.wish is None
     say(viewer, {"hear": {"bus": "can0", "view": "identifiers", "kinds": ["pdo"], "nodes": [5]}})
     assert viewer.wish is not None
-    assert (viewer.wish.bus, viewer.wish.view, viewer.wish.kinds) == ("can0", "identifiers", ["pdo"])
+    assert (viewer.wish.bus, viewer.wish.view, viewer.wish.kinds) == ("can0", "identifiers", {"pdo"})
     say(viewer, {"hear": None})
     assert viewer.wish is None
     for wrong in ({"bus": "can9"}, {"bus": "can0", "colour": 1}, {}, 1, {"bus": 1}):

@@ -41,15 +41,20 @@ class _Queue:
         return check
 
 
+class TooManyChecks(Exception):
+    """So many passwords wait to be checked that no further one may."""
+
+
 class PasswordChecks:
-    """Checks passwords, the addresses in turn.
+    """Checks passwords, the addresses in turn; ``most`` may wait at a time, None: any number.
 
     One that was right before is known again without waiting, by a keyed digest that lives as long as the
     process.
     """
 
-    def __init__(self, verify: Verify = verify_password) -> None:
+    def __init__(self, verify: Verify = verify_password, *, most: int | None = None) -> None:
         self._verify = verify
+        self._most = most
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="password")
         self._queues: dict[str, _Queue] = {}
         self._is_busy = self._is_closed = False
@@ -62,10 +67,15 @@ class PasswordChecks:
         self._worker.shutdown(wait=False, cancel_futures=True)
 
     async def is_right(self, password_hash: str | None, password: str, address: str) -> bool:
-        """Whether ``password`` is the one behind the hash; None stands for a user that does not exist."""
+        """Whether ``password`` is the one behind the hash; None stands for a user that does not exist.
+
+        Raises ``TooManyChecks``.
+        """
         digest = hmac.digest(self._key, password.encode("utf-8", "surrogatepass"), hashlib.sha256)
         if password_hash and hmac.compare_digest(self._right.get(password_hash, b""), digest):
             return True
+        if self._most is not None and sum(len(one.checks) for one in self._queues.values()) >= self._most:
+            raise TooManyChecks
         check = _Check(password_hash, password, asyncio.get_running_loop().create_future())
         self._queues.setdefault(address, _Queue(deque())).checks.append(check)
         self._begin_next()

@@ -23,7 +23,7 @@ from starlette.websockets import WebSocket
 from bridge.command import Role
 from bridge.config import PageTable, Site
 from bridge.mapping import Family
-from bridge.northbound.logins import PasswordChecks
+from bridge.northbound.logins import PasswordChecks, TooManyChecks
 from bridge.northbound.page.bus import Bus, Capture
 from bridge.northbound.page.describe import described, layout_of
 from bridge.northbound.page.guards import MOST_BODY, Guards
@@ -34,7 +34,7 @@ from bridge.northbound.page.parameters import Counts, Parameters, holders_of
 from bridge.northbound.page.sessions import Session, Sessions
 from bridge.northbound.page.system import System, SystemFacts
 from bridge.northbound.page.tabs import Tabs
-from bridge.northbound.page.throttle import Throttle
+from bridge.northbound.page.throttle import FIRST_PAUSE_S, Throttle
 from bridge.northbound.sources import source_of
 from bridge.northbound.view import View
 
@@ -42,6 +42,8 @@ _log = logging.getLogger(__name__)
 
 STATIC: Final = Path(__file__).parent / "static"
 _COOKIE: Final = "session"
+_MOST_CHECKS: Final = 8
+"""Passwords that wait to be checked at a time."""
 _BODY_S: Final = 5.0
 _ROLES: Final = {"observer": Role.OBSERVER, "operator": Role.OPERATOR, "engineer": Role.ENGINEER}
 _encode = msgspec.json.Encoder().encode
@@ -94,7 +96,7 @@ class Page:
         self._anonymous = _ROLES.get(settings.anonymous) if settings else None
         self._sessions = Sessions()
         self._throttle = Throttle()
-        self._checks = PasswordChecks()
+        self._checks = PasswordChecks(most=_MOST_CHECKS)
         layout = replace(layout_of(view.image, site, families), own_faults=own_faults(site, families))
         self._tabs = Tabs(view, layout, self._sessions, Hearings(backstage.ears), clock)
         self._description = _encode(described(view.image, site, families))
@@ -182,23 +184,24 @@ class Page:
 
     async def _login(self, request: Request) -> Response:
         address = source_of(request.client.host if request.client else "")
-        now = self._clock()
-        pause_s = self._throttle.pause_s(address, now)
-        if pause_s:
-            response = self._json({"error": "throttled", "pause_s": round(pause_s, 1)}, 429)
-            response.headers["retry-after"] = str(round(pause_s + 0.5))
-            return response
         try:
             login = _decode_login(await body_of(request, MOST_BODY))
         except (msgspec.DecodeError, TimeoutError, ValueError):
             return self._json({"error": "malformed"}, 400)
+        pause_s = self._throttle.begin(address, login.user, self._clock())
+        if pause_s:
+            return self._throttled(pause_s)
         user = self._users.get(login.user)
-        is_right = await self._checks.is_right(user.password_hash if user else None, login.password, address)
+        password_hash = user.password_hash if user else None
+        try:
+            is_right = await self._checks.is_right(password_hash, login.password, address)
+        except TooManyChecks:
+            self._throttle.withdrawn(address, login.user)
+            return self._throttled(FIRST_PAUSE_S)
         if not is_right or user is None:
-            self._throttle.failed(address, self._clock())
             _log.warning("page: login of %r from %s refused", login.user[:64], address)
             return self._json({"error": "wrong"}, 403)
-        self._throttle.succeeded(address)
+        self._throttle.succeeded(address, login.user)
         before = self._session_of(request)
         if before:
             self._sessions.end(before)
@@ -206,6 +209,11 @@ class Page:
         session, shown = self._begin(user.name, _ROLES[user.role])
         _log.info("page: %s logged in from %s", user.name, address)
         return self._with_cookie(shown, session)
+
+    def _throttled(self, pause_s: float) -> Response:
+        response = self._json({"error": "throttled", "pause_s": round(pause_s, 1)}, 429)
+        response.headers["retry-after"] = str(round(pause_s + 0.5))
+        return response
 
     async def _logout(self, request: Request) -> Response:
         session = self._session_of(request)

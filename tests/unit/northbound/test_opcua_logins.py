@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from bridge.northbound.logins import PasswordChecks
+from bridge.northbound.logins import PasswordChecks, TooManyChecks
 
 RIGHT = "swordfish"
 ATTACKER, CLIENT = "10.0.0.9", "10.0.0.1"
@@ -131,3 +131,17 @@ async def test_a_check_that_fails_is_a_wrong_password_and_the_next_one_has_its_t
     await bench.end(2)
     assert not await broken
     assert await right
+
+
+async def test_no_more_wait_than_may_and_a_known_one_never_does(bench: Bench) -> None:
+    bench.checks._most = 8
+    right = bench.ask(RIGHT)
+    await bench.end(1)
+    assert await right
+    waiting = [bench.ask(f"wrong {n}") for n in range(9)]  # one of them is being checked
+    await bench.begins()
+    with pytest.raises(TooManyChecks):
+        await bench.checks.is_right("hash", "one too many", CLIENT)
+    assert await bench.checks.is_right("hash", RIGHT, CLIENT)
+    await bench.end(9)
+    assert [await one for one in waiting] == [False] * 9

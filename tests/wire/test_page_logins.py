@@ -9,7 +9,7 @@ from collections.abc import AsyncGenerator
 
 import pytest
 
-from tests.support.page import Answer, Served
+from tests.support.page import Answer, Served, message
 
 
 @pytest.fixture
@@ -38,3 +38,17 @@ async def test_a_login_of_ones_own_does_not_help_to_guess_another(served: Served
             looked_at += (await guess(served, "engineer", f"guess {n} {guessed}")).status == 403
         assert (await guess(served, "observer", "observer!")).status == 200
     assert looked_at <= 7
+
+
+async def test_visitors_without_a_cookie_end_no_tab_that_is_open() -> None:
+    async with Served("operator").serving() as served:
+        first = await served.ask("GET", "/api/session")
+        cookie, token = first.headers["set-cookie"].partition(";")[0], first.json["token"]
+        async with served.live(cookie) as tab:
+            await tab.send(token)
+            await message(tab, "you")
+            for _ in range(40):
+                await served.ask("GET", "/api/session")
+            for _ in range(3):
+                await message(tab, "now")
+            assert (await served.ask("GET", "/api/site", Cookie=cookie)).status == 200

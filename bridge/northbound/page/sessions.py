@@ -19,13 +19,15 @@ IDLE_S: Final = 1800.0
 LONGEST_S: Final = 12 * 3600.0
 MOST: Final = 256
 MOST_OF_ONE: Final = 16
-"""Sessions of one user; the one that has been idle longest makes room."""
+"""Sessions of one user, or of visitors from one address, beside those with an open tab."""
+MOST_VISITORS: Final = 128
+"""Anybody may become one by asking: they leave room for who logs in."""
 _BYTES: Final = 32
 
 
 @dataclass(slots=True, eq=False)
 class Session:
-    """``user`` is empty for who reads without a login."""
+    """``user`` is empty for who reads without a login, from ``address``; ``tabs`` are those that are open."""
 
     id: str
     token: str
@@ -33,6 +35,8 @@ class Session:
     role: Role
     began: float
     used: float
+    address: str = ""
+    tabs: int = 0
 
     def is_over(self, now: float) -> bool:
         return now >= self.used + IDLE_S or now >= self.began + LONGEST_S
@@ -51,17 +55,18 @@ class Sessions:
     def __len__(self) -> int:
         return len(self._sessions)
 
-    def begin(self, user: str, role: Role, now: float) -> Session:
-        """A new one; where there are too many, the one goes that has been idle longest, of the same user
-        first."""
+    def begin(self, user: str, role: Role, now: float, address: str = "") -> Session:
+        """A new one; where there are too many, the one goes that has been idle longest, of the same user or
+        visitor's address first. One with an open tab never goes: it may control a drive."""
         self._drop_old(now)
-        own = [one for one in self._sessions.values() if one.user == user]
-        if len(own) >= MOST_OF_ONE:
-            self.end(_longest_idle(own))
-        elif len(self._sessions) >= MOST:
-            self.end(_longest_idle(list(self._sessions.values())))
-        session = Session(secrets.token_urlsafe(_BYTES), secrets.token_urlsafe(_BYTES), user, role, now, now)
-        self._sessions[session.id] = session
+        everybody = list(self._sessions.values())
+        own = [one for one in everybody if one.user == user and (user or one.address == address)]
+        visitors = [] if user else [one for one in everybody if not one.user]
+        for sessions, most in ((own, MOST_OF_ONE), (visitors, MOST_VISITORS), (everybody, MOST)):
+            if len(sessions) >= most and self._drop_idle(sessions):
+                break
+        session_id, token = (secrets.token_urlsafe(_BYTES) for _ in range(2))
+        session = self._sessions[session_id] = Session(session_id, token, user, role, now, now, address)
         return session
 
     def find(self, session_id: str, now: float) -> Session | None:
@@ -83,6 +88,9 @@ class Sessions:
         for session in [one for one in self._sessions.values() if one.is_over(now)]:
             self.end(session)
 
-
-def _longest_idle(sessions: list[Session]) -> Session:
-    return min(sessions, key=lambda one: one.used)
+    def _drop_idle(self, sessions: list[Session]) -> bool:
+        """End the one that has been idle longest; False where each of them has an open tab."""
+        idle = [one for one in sessions if not one.tabs]
+        if idle:
+            self.end(min(idle, key=lambda one: one.used))
+        return bool(idle)

@@ -89,11 +89,13 @@ class Tabs:
             return
         tab = Tab(socket, session, self._view, self._epoch_ms())
         self._tabs.append(tab)
+        tab.session.tabs += 1
         try:
             self._greet(tab)
             await tab.serve(lambda data: self._on_message(tab, data))
         finally:
             self._tabs.remove(tab)
+            tab.session.tabs -= 1
 
     async def _refusal(self, socket: WebSocket, session: Session | None) -> int:
         """The code with which a tab is closed at once; 0 where it is served."""
@@ -103,8 +105,7 @@ class Tabs:
             return NO_TOKEN
         if self._sessions.find(session.id, self._clock()) is None:
             return SESSION_OVER  # while its token was awaited
-        own = sum(tab.session is session for tab in self._tabs)
-        return TOO_MANY if len(self._tabs) >= _MOST_TABS or own >= MOST_OF_SESSION else 0
+        return TOO_MANY if len(self._tabs) >= _MOST_TABS or session.tabs >= MOST_OF_SESSION else 0
 
     def end(self, session: Session) -> None:
         """Close the tabs of this session, which is over."""

@@ -157,9 +157,10 @@ class Page:
         session = self._session_of(connection)
         return session is not None and session.has(connection.headers.get("x-token", ""))
 
-    def _begin(self, user: str, role: Role) -> tuple[Session, dict[str, Any]]:
-        session = self._sessions.begin(user, role, self._clock())
-        return session, self._shown(session)
+    def _begin(self, request: Request, user: str, role: Role) -> Response:
+        """A new session, and who that is."""
+        session = self._sessions.begin(user, role, self._clock(), _address_of(request))
+        return self._with_cookie(self._shown(session), session)
 
     def _shown(self, session: Session) -> dict[str, Any]:
         return {"user": session.user, "role": session.role.name.lower(), "token": session.token}
@@ -179,11 +180,10 @@ class Page:
             return self._json(self._shown(session))
         if self._anonymous is None:
             return self._json({"user": None, "site": self._site_name}, 401)
-        session, shown = self._begin("", self._anonymous)
-        return self._with_cookie(shown, session)
+        return self._begin(request, "", self._anonymous)
 
     async def _login(self, request: Request) -> Response:
-        address = source_of(request.client.host if request.client else "")
+        address = _address_of(request)
         try:
             login = _decode_login(await body_of(request, MOST_BODY))
         except (msgspec.DecodeError, TimeoutError, ValueError):
@@ -206,9 +206,8 @@ class Page:
         if before:
             self._sessions.end(before)
             self._tabs.end(before)
-        session, shown = self._begin(user.name, _ROLES[user.role])
         _log.info("page: %s logged in from %s", user.name, address)
-        return self._with_cookie(shown, session)
+        return self._begin(request, user.name, _ROLES[user.role])
 
     def _throttled(self, pause_s: float) -> Response:
         response = self._json({"error": "throttled", "pause_s": round(pause_s, 1)}, 429)
@@ -248,6 +247,10 @@ class Page:
 
     async def _live(self, socket: WebSocket) -> None:
         await self._tabs.serve(socket, self._session_of(socket))
+
+
+def _address_of(request: Request) -> str:
+    return source_of(request.client.host if request.client else "")
 
 
 async def _index(request: Request) -> Response:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.command import Role
-from bridge.northbound.page.sessions import IDLE_S, LONGEST_S, MOST, MOST_OF_ONE, Sessions
+from bridge.northbound.page.sessions import IDLE_S, LONGEST_S, MOST, MOST_OF_ONE, MOST_VISITORS, Sessions
 from bridge.northbound.page.throttle import FORGOTTEN_S, FREE, FREE_OF_ADDRESS, LONGEST_PAUSE_S, Throttle
 
 
@@ -50,6 +51,36 @@ def test_one_user_pushes_out_its_own_sessions_first() -> None:
     made = [sessions.begin("ann", Role.OPERATOR, 1.0 + number) for number in range(3 * MOST_OF_ONE)]
     assert sessions.find(other.id, 100.0) is other
     assert [one for one in made if sessions.find(one.id, 100.0)] == made[-MOST_OF_ONE:]
+
+
+def test_visitors_push_out_those_from_their_own_address() -> None:
+    sessions = Sessions()
+    other = sessions.begin("", Role.OBSERVER, 0.0, "1.2.3.5")
+    made = [sessions.begin("", Role.OBSERVER, 1.0 + n, "1.2.3.4") for n in range(3 * MOST_OF_ONE)]
+    assert sessions.find(other.id, 100.0) is other
+    assert [one for one in made if sessions.find(one.id, 100.0)] == made[-MOST_OF_ONE:]
+
+
+def test_a_crowd_of_visitors_pushes_out_nobody_who_has_logged_in() -> None:
+    sessions = Sessions()
+    ann = sessions.begin("ann", Role.OPERATOR, 0.0, "1.2.3.4")
+    for n in range(1000):
+        sessions.begin("", Role.OBSERVER, 1.0 + n / 10, f"10.0.{n % 250}.{n // 250}")
+    assert sessions.find(ann.id, 200.0) is ann
+    assert len(sessions) == MOST_VISITORS + 1
+
+
+@pytest.mark.parametrize("user", ["ann", ""])
+def test_a_session_with_an_open_tab_is_never_pushed_out(user: str) -> None:
+    sessions = Sessions()
+    shown = [sessions.begin(user, Role.OPERATOR, float(n), "1.2.3.4") for n in range(MOST_OF_ONE)]
+    for one in shown:
+        one.tabs = 1
+    for n in range(300):
+        sessions.begin(user, Role.OPERATOR, 100.0 + n, "1.2.3.4")
+        sessions.begin(f"user {n}", Role.OPERATOR, 100.0 + n, "1.2.3.4")
+    assert all(sessions.find(one.id, 500.0) is one for one in shown)
+    assert len(sessions) <= MOST
 
 
 @given(st.lists(st.tuples(st.integers(0, 40), st.floats(0, 100)), max_size=400))

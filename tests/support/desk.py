@@ -36,9 +36,11 @@ class Desk:
         self.complaints: list[str] = []
 
     @contextmanager
-    def sits(self, user: str, **options: Any) -> Iterator[Page]:
+    def sits(self, user: str, script: str = "", **options: Any) -> Iterator[Page]:
+        """Logged in; ``script`` runs before those of the page."""
         context = self._chromium.new_context(bypass_csp=False, **options)
         context.set_default_timeout(WAIT_MS)
+        context.add_init_script(script)
         try:
             yield self._open(context, user)
         finally:

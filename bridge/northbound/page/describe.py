@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
+
+import msgspec
 
 from bridge.config import Site
 from bridge.image import Image, Point
@@ -11,11 +14,15 @@ from bridge.northbound.page.troubles import Layout
 
 _MOVES_BY: Final = ("velocity", "frequency", "speed", "position", "torque")
 """What a drive is moved by, the most telling first."""
+_encode = msgspec.json.Encoder().encode
 
 
 def described(image: Image, site: Site, families: dict[str, Family]) -> dict[str, Any]:
-    """For JSON. What is empty is left out of a point."""
-    points = {point.name: _point(point) for point in image.points}
+    """For JSON. ``places`` has for each drive, bus, node and the bridge which of ``natures`` has its points,
+    by their names there. Drives of a kind have one in common, so that a plant of hundreds is loaded as soon
+    as a small one. What is empty is left out of a point."""
+    layout = layout_of(image, site, families)
+    places, natures = _natures(image.points, layout)
     nodes: list[dict[str, Any]] = []
     drives: list[dict[str, Any]] = []
     for bus in site.bus:
@@ -37,7 +44,7 @@ def described(image: Image, site: Site, families: dict[str, Family]) -> dict[str
                         "on_expiry": drive.on_expiry,
                         "states": list(dict.fromkeys(state.name for state in family.status_word.state)),
                         "stops_in": _stops_in(family),
-                        "main": _main(name, points),
+                        "main": layout.mains.get(name, ""),
                     }
                 )
     return {
@@ -45,13 +52,14 @@ def described(image: Image, site: Site, families: dict[str, Family]) -> dict[str
         "buses": [{"name": bus.name, "bitrate": bus.bitrate, "interface": bus.interface} for bus in site.bus],
         "nodes": nodes,
         "drives": drives,
-        "points": points,
+        "places": places,
+        "natures": natures,
     }
 
 
 def layout_of(image: Image, site: Site, families: dict[str, Family]) -> Layout:
     """Which drives are where, and what moves them."""
-    points = {point.name: _point(point) for point in image.points}
+    units = {point.name: point.unit for point in image.points}
     nodes = [(bus.name, node) for bus in site.bus for node in bus.node]
     drives = {
         f"{node.name}/{families[node.mapping].leaf_of(drive)}": node.name
@@ -62,8 +70,26 @@ def layout_of(image: Image, site: Site, families: dict[str, Family]) -> Layout:
         drives=drives,
         nodes={node.name: bus for bus, node in nodes},
         buses=tuple(bus.name for bus in site.bus),
-        mains={drive: main for drive in drives if (main := _main(drive, points))},
+        mains=_mains(drives, units),
     )
+
+
+def _natures(
+    points: Sequence[Point], layout: Layout
+) -> tuple[dict[str, int], list[dict[str, dict[str, Any]]]]:
+    by_place: dict[str, dict[str, dict[str, Any]]] = {}
+    for point in points:
+        longer = "/".join(point.path[:2])
+        place = longer if point.path[0] == "bus" or longer in layout.drives else point.path[0]
+        by_place.setdefault(place, {})[point.name[len(place) + 1 :]] = _point(point)
+    kinds: dict[bytes, int] = {}
+    natures: list[dict[str, dict[str, Any]]] = []
+    places: dict[str, int] = {}
+    for place, of_place in by_place.items():
+        kind = places[place] = kinds.setdefault(_encode(of_place), len(natures))
+        if kind == len(natures):
+            natures.append(of_place)
+    return places, natures
 
 
 def _point(point: Point) -> dict[str, Any]:
@@ -88,13 +114,15 @@ def _stops_in(family: Family) -> str:
     return "ready" if word & 0xF == control.ready & 0xF else "switched_on"
 
 
-def _main(drive: str, points: dict[str, Any]) -> str:
-    """The leaf of setpoint and actual value that tell most of the drive; empty where it has no such pair."""
-    pairs = [
-        name.rpartition("/")[2]
-        for name in points
-        if name.startswith(f"{drive}/command/")
-        and points[name].get("unit")
-        and name.replace("/command/", "/actual/", 1) in points
-    ]
-    return next((leaf for leaf in _MOVES_BY if leaf in pairs), pairs[0] if pairs else "")
+def _mains(drives: Iterable[str], units: Mapping[str, str]) -> dict[str, str]:
+    """The leaf of setpoint and actual value that tell most of each drive that has such a pair."""
+    pairs: dict[str, list[str]] = {}
+    for name, unit in units.items():
+        drive, command, leaf = name.rpartition("/command/")
+        if command and unit and f"{drive}/actual/{leaf}" in units:
+            pairs.setdefault(drive, []).append(leaf)
+    return {
+        drive: next((leaf for leaf in _MOVES_BY if leaf in pairs[drive]), pairs[drive][0])
+        for drive in drives
+        if drive in pairs
+    }

@@ -8,7 +8,6 @@ with the bus process.
 from __future__ import annotations
 
 import os
-import signal
 import statistics
 import sys
 import time
@@ -17,13 +16,15 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from pymodbus.client import ModbusTcpClient
 
 from tests.bench.figures import record, show
 from tests.lab.sites import LabSite, lab_site, values
 from tests.lab.test_dead_man import RPDO1, SYNC, Lab
 from tests.support.process import Process, free_port, peer, running, until
 
-ROUNDS, TRIPS = 2, 3
+ROUNDS, TRIPS = 2, 5
+SETPOINT = 0x2000
 LIMIT_S = 600
 VIEWERS = 5
 PERIOD_S = 0.010
@@ -70,20 +71,40 @@ def lateness(folder: Path, viewers: int) -> tuple[list[float], list[float], list
         begin = time.time()
         time.sleep(LOOKED_S)
         times = [frame.time for frame in lab.bus.of(SYNC, begin)]
-        stops = [stop_of_a_silent_owner(lab) for _ in range(TRIPS)]
+        plc = ModbusTcpClient("127.0.0.1", port=lab.site.modbus_port, timeout=10)
+        stack.callback(plc.close)
+        assert plc.connect()
+        stops = [stop_of_a_silent_owner(lab, plc) for _ in range(TRIPS)]
         own = [float(str(one)) for one in values(lab.site, *OWN_ACCOUNT)]
     return [abs(b - a - PERIOD_S) for a, b in pairwise(times)], stops, own
 
 
-def stop_of_a_silent_owner(lab: Lab) -> float:
-    owner = lab.run_drive()
-    owner.signal(signal.SIGSTOP)
+def stop_of_a_silent_owner(lab: Lab, plc: ModbusTcpClient) -> float:
+    """How much later than the time-out the stop is on the bus, from before the owner's last write."""
+    last = run_drive(lab, plc)
     until(lambda: lab.turns_at(0), 10.0, "the drive stands still")
-    last = lab.last_telegram()
     reaction = next(frame for frame in lab.bus.of(RPDO1, last) if not frame.word & 0x0002)
-    owner.signal(signal.SIGKILL)
-    owner.popen.wait()
     return reaction.time - last - TIMEOUT_S
+
+
+def run_drive(lab: Lab, plc: ModbusTcpClient) -> float:
+    """The wall-clock time before the write with which it was left alone, at its setpoint."""
+    end = time.monotonic() + 30.0
+    while time.monotonic() < end:
+        for word in (0x04FE, 0x047E):
+            write(plc, word, 0)
+        for _ in range(20):
+            last = time.time()
+            write(plc, 0x047F, SETPOINT)
+            time.sleep(0.05)
+            if lab.turns_at(SETPOINT):
+                return last
+    raise AssertionError(f"the drive does not run:\n{lab.bridge.output()}")
+
+
+def write(plc: ModbusTcpClient, word: int, setpoint: int) -> None:
+    answer = plc.write_registers(0, [word, setpoint], device_id=1)
+    assert not answer.isError(), answer
 
 
 @pytest.mark.timeout(LIMIT_S)

@@ -81,7 +81,7 @@ def test_no_script_of_ours_is_longer_than_one_sitting_or_writes_html() -> None:
 def _imports(script: Path) -> list[Path]:
     """What it imports as soon as it is loaded."""
     found = re.findall(
-        r'^(?:import|export)\b[^;]*?\bfrom "([^"]+)"|^import "([^"]+)"', script.read_text("utf-8"), re.M
+        r'\b(?:import|export)\b[^;]*?\bfrom *"([^"]+)"|^import "([^"]+)"', script.read_text("utf-8"), re.M
     )
     return [(script.parent / (one or other)).resolve() for one, other in found]
 

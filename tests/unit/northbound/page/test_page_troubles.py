@@ -257,6 +257,8 @@ def test_the_site_is_described_by_the_names_of_its_points() -> None:
     told = described(plant.image, plant.site, families_of(plant))
     assert [one["name"] for one in told["drives"]] == [DRIVE, "conveyor/fu2"]
     assert all(one["main"] == "frequency" and one["stops_in"] == "ready" for one in told["drives"])
+    names = {f"{place}/{leaf}" for place, kind in told["places"].items() for leaf in told["natures"][kind]}
+    assert names == {point.name for point in plant.image.points}
     for drive in told["drives"]:
-        assert f"{drive['name']}/actual/{drive['main']}" in told["points"]
-    assert set(told["points"]) == {point.name for point in plant.image.points}
+        assert f"actual/{drive['main']}" in told["natures"][told["places"][drive["name"]]]
+    assert all(told["natures"].count(one) == 1 for one in told["natures"]), "each kind is described once"

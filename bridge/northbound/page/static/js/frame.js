@@ -6,6 +6,7 @@ import { logout, session, siteName } from "./session.js";
 import { Login } from "./login.js";
 import { menu, pageOf, pathOf } from "./pages.js";
 import { address, route } from "./route.js";
+import { onRoute, toMain } from "./focus.js";
 import { language, t } from "./texts.js";
 import { theme } from "./theme.js";
 import { Icon } from "./icons.js";
@@ -31,12 +32,13 @@ function Inside() {
     };
   }, []);
   useEffect(() => show(topics), [topics.join()]);
+  useEffect(() => onRoute(), [route.value.join("/")]);
   useEffect(() => {
     const place = route.value.slice(1).join("/");
     document.title = [place || t(`page.${path}`), siteName.value].join(" · ");
   });
   return html`
-    <a class="skip" href="#main">${t("frame.skip")}</a>
+    <a class="skip" href="#main" onClick=${toMain}>${t("frame.skip")}</a>
     <header class="top">
       <a class="site" href=${address("plant")}><span class="product">drivebridge</span> ${siteName}</a>
       <nav aria-label=${t("frame.menu")}>

@@ -1,123 +1,97 @@
-// The connection of this tab: what it shows arrives here, and what it asks goes out.
+// What this tab shows arrives here.
 //
-// The server sends {topic, state} once for each topic that is shown, {topic, changes} after that, {troubles},
-// {trend: [[time, value, ...], ...]}, {heard}, {event} and {outcome}. Whatever came is drawn once a frame at most.
+// The server sends {topic, state} once for each topic that is shown and {topic, changes} after that, {troubles,
+// waiting}, {events} once and each {event} after that, {trend: [[time, value, ...], ...], number}, {heard}, and each
+// second {now}. Whatever came is drawn once a frame at most.
 
-import { signal } from "./ui.js";
-import { ended, session } from "./session.js";
+import { batch, signal } from "./ui.js";
+import * as connection from "./connection.js";
+import { inOwnFrame } from "./frames.js";
 import { lose, take } from "./values.js";
 
-const RETRY_MS = [500, 1000, 2000, 4000];
 const MOST_EVENTS = 200;
-const UNREACHABLE = Object.freeze({ ok: false, code: "not_connected", message: "", forwarded: false });
 
-export const isConnected = signal(false);
+export { ask, isConnected } from "./connection.js";
 /** What is wrong, the worst first; null until the server has told. */
 export const troubles = signal(null);
+/** How many drives are not ready yet, without anything being wrong. */
+export const waiting = signal(0);
+/** The newest first. */
 export const events = signal([]);
 /** Who this tab is as a controller: what `owner` says of a drive that it has taken. */
 export const self = signal("");
 
-let socket = null;
-let tries = 0;
 let topics = [];
-let trended = [];
-let pending = null;
-let onRows = (rows) => {};
+let trend = { names: [], number: 0, onRows: (rows) => {}, onLost: () => {} };
 let wish = null;
 let onHeard = (message) => {};
-const asked = new Map();
-let lastNumber = 0;
+let pending = null;
+let aheadMs = 0;
 
-/** Connects, and again whenever the connection is lost, until the session ends. */
 export function connect() {
-  const address = new URL("live", document.baseURI);
-  address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
-  socket = new WebSocket(address);
-  socket.onopen = onOpen;
-  socket.onmessage = (message) => onMessage(JSON.parse(message.data));
-  socket.onclose = onClose;
+  connection.connect({ onReady, onMessage, onLost });
 }
 
-export function disconnect() {
-  if (socket) socket.onclose = null;
-  socket?.close();
-  socket = null;
-  onLost();
+export const disconnect = connection.disconnect;
+
+/** The time on the box, in ms since 1970: what it says of times is told by its clock. */
+export function now() {
+  return Date.now() + aheadMs;
 }
 
 /** The topics that are shown from now on. */
 export function show(wanted) {
   topics = wanted;
-  send({ show: topics });
+  connection.send({ show: topics });
 }
 
-/** The points whose course is followed; `listener` gets rows of [time in ms, value, ...]. */
-export function follow(names, listener) {
-  trended = names;
-  onRows = listener;
-  send({ trend: names });
+/** The points whose course is followed; `onRows` gets rows of [time in ms, value, ...], `onLost` is called where the
+ * course breaks off. */
+export function follow(names, onRows = (rows) => {}, onLost = () => {}) {
+  trend = { names, number: trend.number + 1, onRows, onLost };
+  sendTrend();
 }
 
 /** What is heard of a bus: {bus, view, kinds, nodes}, or null for nothing; `listener` gets the messages. */
 export function hear(wanted, listener = (message) => {}) {
   wish = wanted;
   onHeard = listener;
-  send({ hear: wanted });
-}
-
-/** One request.
- * @returns {Promise<{ok: boolean, code: string, message: string, forwarded: boolean, value?: any, abort_code?: number}>} */
-export function ask(target, action, fields = {}) {
-  const number = ++lastNumber;
-  return new Promise((resolve) => {
-    if (send({ ask: number, target, action, fields })) asked.set(number, resolve);
-    else resolve(UNREACHABLE);
-  });
+  connection.send({ hear: wanted });
 }
 
 /** Whoever hides a tab has let go of what it controls: nobody looks at it any more. */
 export function leave() {
-  send({ hidden: true });
+  connection.send({ hidden: true });
 }
 
-function send(message) {
-  if (socket?.readyState !== WebSocket.OPEN) return false;
-  socket.send(JSON.stringify(message));
-  return true;
+function sendTrend() {
+  connection.send({ trend: trend.names, number: trend.number });
 }
 
-function onOpen() {
-  socket.send(session.value.token);
-  tries = 0;
-  isConnected.value = true;
-  send({ show: topics });
-  if (trended.length) send({ trend: trended });
-  if (wish) send({ hear: wish });
-}
-
-function onClose(event) {
-  onLost();
-  if (event.code === 4401 || event.code === 4403) return ended();
-  setTimeout(connect, RETRY_MS[Math.min(tries++, RETRY_MS.length - 1)]);
+function onReady() {
+  connection.send({ show: topics });
+  if (trend.names.length) sendTrend();
+  if (wish) connection.send({ hear: wish });
 }
 
 function onLost() {
-  isConnected.value = false;
   pending = null;
-  for (const resolve of asked.values()) resolve(UNREACHABLE);
-  asked.clear();
+  trend.onLost();
   lose();
 }
 
 function onMessage(message) {
-  if ("outcome" in message) {
-    asked.get(message.outcome)?.(message);
-    asked.delete(message.outcome);
-  } else if ("you" in message) self.value = message.you;
-  else if ("troubles" in message) troubles.value = message.troubles;
-  else if ("trend" in message) onRows(message.trend);
-  else if ("heard" in message) onHeard(message);
+  if ("you" in message) self.value = message.you;
+  else if ("now" in message) aheadMs = message.now - Date.now();
+  else if ("troubles" in message) {
+    batch(() => {
+      troubles.value = message.troubles;
+      waiting.value = message.waiting ?? 0;
+    });
+  } else if ("trend" in message) {
+    if (message.number === trend.number) trend.onRows(message.trend); // else of a choice before
+  } else if ("heard" in message) onHeard(message);
+  else if ("events" in message) events.value = message.events.reverse();
   else if ("event" in message) events.value = [message.event, ...events.value].slice(0, MOST_EVENTS);
   else keep(message.state ?? message.changes);
 }
@@ -126,7 +100,7 @@ function onMessage(message) {
 function keep(readings) {
   if (pending) return void Object.assign(pending, readings);
   pending = readings;
-  requestAnimationFrame(() => {
+  inOwnFrame(() => {
     if (pending) take(pending);
     pending = null;
   });

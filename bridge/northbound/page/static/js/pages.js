@@ -21,12 +21,12 @@ const loading = new Set();
 
 /** Which page a route is of. */
 export function pathOf(route) {
-  return route[0] in OTHERS ? route[0] : "plant";
+  return Object.hasOwn(OTHERS, route[0]) ? route[0] : "plant";
 }
 
 /** The page called `path`; null until it is loaded. */
 export function pageOf(path) {
-  if (!(path in loaded.value)) load(path);
+  if (!loaded.value[path]) load(path);
   return loaded.value[path] ?? null;
 }
 

@@ -4,10 +4,13 @@ import { signal } from "./ui.js";
 
 /** `undefined` until the server has told; null where a login is needed; else {user, role, token}. */
 export const session = signal(undefined);
-/** What the site has, as /api/site tells it: {site, version, points, drives, …}. */
+/** What the site has, as /api/site tells it: {site, buses, nodes, drives, places, natures}. */
 export const described = signal(null);
 export const siteName = signal("");
+/** Whether the site lets people read who have not logged in. */
+export const hasVisitors = signal(false);
 
+const RETRY_MS = 1000;
 const ROLES = ["observer", "operator", "engineer"];
 
 /** Whether this tab's user has at least this role. */
@@ -15,11 +18,13 @@ export function may(role) {
   return Boolean(session.value) && ROLES.indexOf(session.value.role) >= ROLES.indexOf(role);
 }
 
-/** Ask the server who we are, and what there is to show. */
+/** Ask the server who we are, and what there is to show; again and again while it does not answer. */
 export async function begin() {
-  const answer = await fetch("api/session");
-  const told = await answer.json();
+  const answer = await fetch("api/session").catch(() => null);
+  const told = await answer?.json().catch(() => null);
+  if (!told) return void setTimeout(begin, RETRY_MS); // it is being started again
   if (told.site) siteName.value = told.site;
+  hasVisitors.value = answer.ok ? hasVisitors.value || !told.user : false;
   await become(told.token ? told : null);
 }
 
@@ -33,22 +38,24 @@ export async function login(user, password) {
 }
 
 export async function logout() {
-  await post("api/logout", {});
+  await post("api/logout", {}).catch(() => null); // a server that is gone has no session of ours either
   session.value = null;
   await begin();
 }
 
-/** The session has ended on the server. */
+/** The session has ended on the server: a visitor gets another, all others log in again. */
 export function ended() {
   session.value = null;
+  begin();
 }
 
 async function become(told) {
   if (told) {
-    const answer = await fetch("api/site");
-    if (!answer.ok) return void (session.value = null);
-    described.value = await answer.json();
-    siteName.value = described.value.site;
+    const answer = await fetch("api/site").catch(() => null);
+    const site = answer?.ok ? await answer.json() : null;
+    if (!site) return void setTimeout(begin, RETRY_MS);
+    described.value = site;
+    siteName.value = site.site;
   }
   session.value = told;
 }

@@ -15,6 +15,12 @@ export class History {
     if (this._columns[0].length > KEPT + 600) for (const column of this._columns) column.splice(0, 600);
   }
 
+  copy() {
+    const same = new History(this._columns.length - 1);
+    same._columns = this._columns.map((column) => [...column]);
+    return same;
+  }
+
   /** The newest time, in s. */
   get last() {
     return this._columns[0].at(-1) ?? Date.now() / 1000;

@@ -1,5 +1,5 @@
-// What this tab controls. It renews its leases itself, and only while it is in the foreground: hidden, closed or cut
-// off it falls silent as any controller may, and the drive stops in its published time.
+// What this tab controls. It renews its leases itself, and only while it is in sight: hidden, closed or cut off it
+// falls silent as any controller may, and the drive stops in its published time.
 
 import { effect, signal } from "../ui.js";
 import { ask, isConnected, self } from "../live.js";
@@ -7,55 +7,76 @@ import { value } from "../values.js";
 
 const LEASE_MS = 3000;
 const LONGEST_PERIOD_MS = 750;
+/** A browser's timers, and what a tab may send in a second, are too coarse for less. */
+const SHORTEST_TIMEOUT_MS = 200;
+/** The drives that this tab means to control. */
+const wanted = new Set();
 const timers = new Map();
+/** Drives whose latest renewal has no answer yet. */
+const underway = new Set();
 
 /** The last thing that went wrong, by drive: {action, outcome}. */
 export const refusals = signal({});
 
 /** Whether this tab controls `drive`. */
 export function isOurs(drive) {
-  return self.value !== "" && value(`${drive}/supervision/owner`) === self.value;
+  return isConnected.value && self.value !== "" && value(`${drive}/supervision/owner`) === self.value;
 }
 
 export async function take(drive) {
-  const outcome = await request(drive, "take_control", { ttl_ms: LEASE_MS });
-  if (!outcome.ok) return outcome;
-  stop(drive);
   // What takes longer than this to come back has not come back in time for the watchdog either.
   const timeout = value(`${drive}/supervision/fieldbus_timeout_ms`) || LEASE_MS;
-  const period = Math.min(Math.min(timeout, LEASE_MS) / 4, LONGEST_PERIOD_MS);
-  timers.set(drive, setInterval(() => renew(drive), period));
+  if (timeout < SHORTEST_TIMEOUT_MS) return refuse(drive, "take_control", { code: "too_short", message: "" });
+  wanted.add(drive);
+  const outcome = await request(drive, "take_control", { ttl_ms: LEASE_MS });
+  if (!outcome.ok) return wanted.delete(drive);
+  if (!wanted.has(drive)) return ask(drive, "release_control"); // its page was left meanwhile
+  stop(drive);
+  timers.set(drive, setInterval(() => renew(drive), Math.min(timeout / 4, LONGEST_PERIOD_MS)));
   renew(drive);
-  return outcome;
 }
 
 export function giveBack(drive) {
-  if (!timers.has(drive)) return;
-  stop(drive);
-  ask(drive, "release_control");
+  wanted.delete(drive);
+  refuse(drive, "", null);
+  if (stop(drive)) ask(drive, "release_control");
 }
 
 /** One request whose refusal is shown. */
 export async function request(drive, action, fields = {}) {
   const outcome = await ask(drive, action, fields);
-  refusals.value = { ...refusals.value, [drive]: outcome.ok && outcome.forwarded ? null : { action, outcome } };
+  refuse(drive, action, outcome.ok && outcome.forwarded ? null : outcome);
   return outcome;
 }
 
+function refuse(drive, action, outcome) {
+  refusals.value = { ...refusals.value, [drive]: outcome && { action, outcome } };
+}
+
+// One at a time: what waits in a slow connection must not go on renewing when the tab has gone.
 async function renew(drive) {
   if (document.hidden) return stop(drive);
+  if (underway.has(drive)) return;
+  underway.add(drive);
   const outcome = await ask(drive, "keep_alive");
-  if (outcome.code === "not_allowed" || outcome.code === "not_connected") stop(drive);
+  underway.delete(drive);
+  if (!["not_allowed", "not_connected", "timed_out"].includes(outcome.code) || !stop(drive)) return;
+  wanted.delete(drive);
+  refuse(drive, "keep_alive", outcome);
 }
 
+/** Whether it had been renewed until now. */
 function stop(drive) {
   clearInterval(timers.get(drive));
-  timers.delete(drive);
+  return timers.delete(drive);
 }
 
-document.addEventListener("visibilitychange", () => {
-  if (document.hidden) for (const drive of [...timers.keys()]) stop(drive);
-});
+function stopAll() {
+  wanted.clear();
+  for (const drive of [...timers.keys()]) stop(drive);
+}
+
+document.addEventListener("visibilitychange", () => document.hidden && stopAll());
 effect(() => {
-  if (!isConnected.value) for (const drive of [...timers.keys()]) stop(drive);
+  if (!isConnected.value) stopAll();
 });

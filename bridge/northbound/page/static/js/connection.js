@@ -1,0 +1,109 @@
+// The WebSocket of this tab: opened again whenever it is lost, and taken as lost when nothing comes on it any more.
+
+import { signal } from "./ui.js";
+import { ended, session } from "./session.js";
+
+const RETRY_MS = [500, 1000, 2000, 4000];
+/** The server says something every second. A link that is half open, or a server that hangs, does not. */
+const SILENCE_MS = 3500;
+const LOOK_MS = 500;
+/** Longer than the bridge takes for the slowest of its answers. */
+const ANSWER_MS = 15_000;
+const SESSION_OVER = [4401, 4403];
+const UNREACHABLE = Object.freeze({ ok: false, code: "not_connected", message: "", forwarded: false });
+const UNANSWERED = Object.freeze({ ok: false, code: "timed_out", message: "", forwarded: false });
+
+export const isConnected = signal(false);
+
+let socket = null;
+let tries = 0;
+let retry = 0;
+let watch = 0;
+let heardAt = 0;
+let lastNumber = 0;
+const asked = new Map();
+let listeners = { onReady() {}, onMessage(message) {}, onLost() {} };
+
+/** Connects, and again whenever the connection is lost, until `disconnect` or the end of the session. */
+export function connect(given) {
+  listeners = given;
+  open();
+  watch = setInterval(look, LOOK_MS);
+}
+
+export function disconnect() {
+  clearTimeout(retry);
+  clearInterval(watch);
+  drop();
+}
+
+/** Whether it could be sent. */
+export function send(message) {
+  if (socket?.readyState !== WebSocket.OPEN) return false;
+  socket.send(JSON.stringify(message));
+  return true;
+}
+
+/** One request.
+ * @returns {Promise<{ok: boolean, code: string, message: string, forwarded: boolean, value?: any, abort_code?: number}>} */
+export function ask(target, action, fields = {}) {
+  const number = ++lastNumber;
+  return new Promise((resolve) => {
+    if (!send({ ask: number, target, action, fields })) return resolve(UNREACHABLE);
+    const late = setTimeout(() => answer(number, UNANSWERED), ANSWER_MS);
+    asked.set(number, { resolve, late });
+  });
+}
+
+function open() {
+  const address = new URL("live", document.baseURI);
+  address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
+  const mine = (socket = new WebSocket(address));
+  heardAt = performance.now();
+  // What one socket still says when another has been opened counts no more.
+  const own = (act) => (event) => mine === socket && act(event);
+  mine.onopen = own(onOpen);
+  mine.onmessage = own(onMessage);
+  mine.onclose = own(onClose);
+}
+
+function onOpen() {
+  socket.send(session.value.token);
+  heardAt = performance.now();
+  isConnected.value = true;
+  listeners.onReady();
+}
+
+function onMessage(event) {
+  tries = 0;
+  heardAt = performance.now();
+  const message = JSON.parse(event.data);
+  if ("outcome" in message) answer(message.outcome, message);
+  else listeners.onMessage(message);
+}
+
+function onClose(event) {
+  drop();
+  if (SESSION_OVER.includes(event.code)) return void ended();
+  retry = setTimeout(open, RETRY_MS[Math.min(tries++, RETRY_MS.length - 1)]);
+}
+
+function look() {
+  if (socket && performance.now() - heardAt > SILENCE_MS) onClose({ code: 0 });
+}
+
+function drop() {
+  socket?.close();
+  socket = null;
+  isConnected.value = false;
+  for (const number of [...asked.keys()]) answer(number, UNREACHABLE);
+  listeners.onLost();
+}
+
+function answer(number, outcome) {
+  const waiting = asked.get(number);
+  if (!waiting) return;
+  clearTimeout(waiting.late);
+  asked.delete(number);
+  waiting.resolve(outcome);
+}

@@ -1,0 +1,120 @@
+// The plot of a trend: it follows the newest values, unless it is paused or part of it is looked at.
+
+import uPlot from "../../vendor/uplot.mjs";
+import { effect } from "../ui.js";
+import { inOwnFrame } from "../frames.js";
+import { follow, now } from "../live.js";
+import { nature } from "../site.js";
+import { language, t } from "../texts.js";
+import { isDark } from "../theme.js";
+import { History } from "./history.js";
+
+const DASHES = [[], [8, 3], [2, 3], [8, 3, 2, 3], [14, 4], [4, 6]];
+/** @type {any} A class, whatever its script looks like to a type checker. */
+const Plot = uPlot;
+
+export class Course {
+  /** Follows the points `names` in the element `box`; `onZoom` is told whether part of it is looked at. */
+  constructor(box, names, onZoom) {
+    this._history = new History(names.length);
+    this._frozen = null;
+    this._state = { spanS: 60, isPaused: false, isZoomed: false };
+    this._isDue = false;
+    follow(names, (rows) => this._take(rows), () => this._take([[now(), ...names.map(() => null)]]));
+    // Colours are read from the style sheet when the plot is made.
+    this._end = effect(() => {
+      void [isDark.value, language.value];
+      this._plot?.destroy();
+      this._plot = new Plot(options(names, box, onZoom), this.shown.columns(), box);
+      this._draw();
+    });
+    this._sizes = new ResizeObserver(() => this._plot.setSize(sizeOf(box)));
+    this._sizes.observe(box);
+  }
+
+  close() {
+    follow([]);
+    this._sizes.disconnect();
+    this._end();
+    this._plot.destroy();
+  }
+
+  /** `spanS` is what of the newest is shown; paused, what is there stays, and so does what is zoomed to. */
+  show(state) {
+    this._state = state;
+    this._frozen = state.isPaused ? (this._frozen ?? this._history.copy()) : null;
+    this._draw();
+  }
+
+  /** What is drawn, as a History. */
+  get shown() {
+    return this._frozen ?? this._history;
+  }
+
+  _take(rows) {
+    for (const row of rows) this._history.add(row);
+    if (this._isDue || this._frozen) return;
+    this._isDue = true;
+    inOwnFrame(() => {
+      this._isDue = false;
+      this._draw();
+    });
+  }
+
+  _draw() {
+    if (!this._plot) return;
+    this._plot.setData(this.shown.columns(), false);
+    if (this._state.isZoomed) return;
+    const until = this.shown.last;
+    this._plot.setScale("x", { min: until - this._state.spanS, max: until });
+  }
+}
+
+/** The name of a value with its unit. */
+export function titleOf(name) {
+  const { unit } = nature(name);
+  const [group, leaf] = name.split("/").slice(-2);
+  return `${t(`group.${group}`)}: ${t(`point.${leaf}`)}${unit ? ` [${unit}]` : ""}`;
+}
+
+function options(names, box, onZoom) {
+  const units = [...new Set(names.map((name) => nature(name).unit ?? ""))];
+  const axis = { stroke: colourOf("--text"), grid: { stroke: colourOf("--line"), width: 1 }, ticks: { stroke: colourOf("--line"), width: 1 } };
+  const number = new Intl.NumberFormat(language.value, { maximumFractionDigits: 2 });
+  return {
+    ...sizeOf(box),
+    cursor: { drag: { x: true, y: false }, bind: { dblclick: () => () => onZoom(false) } },
+    hooks: { setSelect: [(plot) => plot.select.width > 0 && onZoom(true)] },
+    series: [
+      { label: t("trend.time"), value: (_, at) => (at === null ? "–" : new Date(at * 1000).toLocaleTimeString(language.value, { hour12: false })) },
+      ...names.map((name, index) => ({
+        label: titleOf(name),
+        scale: nature(name).unit ?? "",
+        stroke: colourOf(`--series-${index}`),
+        dash: DASHES[index],
+        width: 1.75,
+        points: { show: false },
+        spanGaps: false,
+        value: (_, held) => (held === null || held === undefined ? "–" : number.format(held)),
+      })),
+    ],
+    axes: [
+      { ...axis, values: (_, ticks) => ticks.map((at) => new Date(at * 1000).toLocaleTimeString(language.value, { hour12: false })) },
+      ...units.slice(0, 3).map((unit, index) => ({ ...axis, scale: unit, label: unit, labelSize: 18, size: 54, side: index ? 1 : 3, grid: index ? { show: false } : axis.grid, values: (_, ticks) => ticks.map((one) => number.format(one)) })),
+    ],
+  };
+}
+
+// A colour of the style sheet as it is at present: a canvas does not know custom properties.
+function colourOf(name) {
+  const probe = document.createElement("span");
+  probe.style.color = `var(${name})`;
+  document.body.append(probe);
+  const colour = getComputedStyle(probe).color;
+  probe.remove();
+  return colour;
+}
+
+function sizeOf(box) {
+  return { width: Math.max(200, box.clientWidth), height: 260 };
+}

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import io
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, Final
 
 from bridge.can.listener import Listener, listener_of
 from bridge.can.wirebits import exact_bits
-from bridge.canopen.frame import EXTENDED, REMOTE, STANDARD_MASK, Frame
+from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.config import BusTable
 from bridge.errands.decode import Decoder
 from bridge.errands.decode_device import DevicePdoView, device_views
@@ -19,12 +18,14 @@ from bridge.errands.decode_pdo import PdoView, views
 from bridge.errors import OperationFailed
 from bridge.lint import family_dictionaries
 from bridge.mirror.endpoint import tap_path
+from bridge.northbound.page.bus import Captured, IsGone
 from bridge.northbound.page.hearing import Ear, Heard
+from bridge.page_capture import CaptureFile
 from bridge.project import Project
 
 _IDENTIFIER: Final = 0x1FFF_FFFF
 _PERIOD_S: Final = 0.1
-_MOST_CAPTURED: Final = 1_000_000
+MOST_CAPTURED: Final = 270_000
 Epoch = Callable[[float], int]
 """Turns monotonic seconds into ns since 1970."""
 
@@ -56,24 +57,27 @@ class Buses:
             for name, table in self._tables.items()
         }
 
-    async def capture(self, bus: str, seconds: float, form: str) -> str:
-        """The text of a file, ``candump`` or ``asc``, with what passes in the next ``seconds``. Raises
-        ``OperationFailed``."""
+    async def capture(self, bus: str, seconds: float, form: str, is_gone: IsGone) -> Captured:
+        """A file, ``candump`` or ``asc``, with what passes in the next ``seconds``, or until ``is_gone``: so
+        many frames at most as a minute of a half-full bus at 1 Mbit/s has. Raises ``OperationFailed``."""
         table = self._tables[bus]
         listener = self._listener(table)
+        file = await asyncio.to_thread(CaptureFile, table.channel or bus, form, self._epoch_ns)
         _open(listener, table)
-        frames: list[Frame] = []
         loop = asyncio.get_running_loop()
         until = loop.time() + seconds
+        is_cut = False
         try:
-            while not listener.failure and loop.time() < until and len(frames) < _MOST_CAPTURED:
+            while not listener.failure and not is_cut and loop.time() < until and not await is_gone():
                 await asyncio.sleep(min(_PERIOD_S, max(0.0, until - loop.time())))
-                frames += listener.take()
+                frames = listener.take()
+                is_cut = file.frames + len(frames) > MOST_CAPTURED
+                await asyncio.to_thread(file.add, frames[: MOST_CAPTURED - file.frames])
         finally:
             listener.close()
         if listener.failure:
             raise OperationFailed(f"{bus}: {listener.failure}")
-        return await asyncio.to_thread(_written, frames, table.channel or bus, form, self._epoch_ns)
+        return Captured(await asyncio.to_thread(file.content), is_cut)
 
     def _ear(self, table: BusTable) -> Ear:
         return _BusEar(table, lambda: self._listener(table), self._decoder(table), self._epoch_ns)
@@ -191,31 +195,3 @@ def _signals(view: DevicePdoView) -> list[dict[str, Any]]:
             parts.append({"from": begin, "bits": entry.bits, "name": name})
         begin += entry.bits
     return parts
-
-
-def _written(frames: Sequence[Frame], channel: str, form: str, epoch_ns: Epoch) -> str:
-    """As python-can writes such a file. It is imported where somebody wants one."""
-    import can
-    from can.io.asc import ASCWriter
-    from can.io.canutils import CanutilsLogWriter
-
-    file = io.StringIO()
-    writer = ASCWriter(file) if form == "asc" else CanutilsLogWriter(file, channel)
-    kept: Any = file.close
-    file.close = lambda: None  # type: ignore[method-assign]  # the writer closes what it has written
-    for frame in frames:
-        is_remote, is_extended = bool(frame.can_id & REMOTE), bool(frame.can_id & EXTENDED)
-        message = can.Message(
-            timestamp=epoch_ns(frame.time) / 1e9,
-            arbitration_id=frame.can_id & (_IDENTIFIER if is_extended else STANDARD_MASK),
-            is_extended_id=is_extended,
-            is_remote_frame=is_remote,
-            data=None if is_remote else frame.data,
-            dlc=len(frame.data),
-            channel=channel if form == "candump" else 1,
-        )
-        writer.on_message_received(message)
-    writer.stop()
-    text = file.getvalue()
-    kept()
-    return text

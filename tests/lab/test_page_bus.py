@@ -66,13 +66,17 @@ async def test_frames_that_the_kernel_drops_are_counted() -> None:
     listener.close()
 
 
+async def waits() -> bool:
+    return False
+
+
 async def test_a_capture_of_the_page_is_read_by_python_can(tmp_path: Path) -> None:
     path = sites.write(tmp_path, sites.socketcan(sites.node(sites.drive("fu1", "lease", 1000))))
     buses = Buses(load_project(path), lambda at: round(at * 1e9))
-    capturing = asyncio.create_task(buses.capture("can0", 1.0, "candump"))
+    capturing = asyncio.create_task(buses.capture("can0", 1.0, "candump", waits))
     await asyncio.sleep(0.3)
     send(Frame(0x205, bytes(8)), Frame(0x80))
-    text = await capturing
+    text = (await capturing).content.decode()
     assert [one.arbitration_id for one in can.CanutilsLogReader(io.StringIO(text))] == [0x205, 0x80]
     ((_, _, ear),) = buses.ears()
     ear.open()

@@ -12,7 +12,8 @@ import pytest
 
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.errors import OperationFailed
-from bridge.page_buses import Buses, _written
+from bridge.page_buses import Buses
+from bridge.page_capture import CaptureFile
 from bridge.project import load_project
 from tests.support import sites
 
@@ -68,14 +69,21 @@ FRAMES = [
 
 @pytest.mark.parametrize(("form", "reader"), [("candump", can.CanutilsLogReader), ("asc", can.ASCReader)])
 def test_what_was_captured_is_read_by_others(form: str, reader: Any) -> None:
-    text = _written(FRAMES, "can0", form, epoch_ns)
-    read = list(reader(io.StringIO(text)))
+    file = CaptureFile("can0", form, epoch_ns)
+    file.add(FRAMES[:1])
+    file.add(FRAMES[1:])
+    assert file.frames == 4
+    read = list(reader(io.StringIO(file.content().decode())))
     assert [one.arbitration_id for one in read] == [0x205, 0x80, 0x705, 0x18FF1234]
     assert [bytes(one.data) for one in read] == [frame.data for frame in FRAMES]
     assert [one.is_remote_frame for one in read] == [False, False, True, False]
     assert [one.is_extended_id for one in read] == [False, False, False, True]
     gaps = [later.timestamp - one.timestamp for one, later in pairwise(read)]
     assert gaps == pytest.approx([0.25, 0.25, 0.25], abs=1e-5)
+
+
+async def waits() -> bool:
+    return False
 
 
 async def test_a_bus_that_nobody_drives_cannot_be_listened_to(tmp_path: Path) -> None:
@@ -87,4 +95,4 @@ async def test_a_bus_that_nobody_drives_cannot_be_listened_to(tmp_path: Path) ->
     assert ear.take() == []
     ear.close()
     with pytest.raises(OperationFailed, match="can0 cannot be listened to"):
-        await buses(path).capture("can0", 1.0, "asc")
+        await buses(path).capture("can0", 1.0, "asc", waits)

@@ -424,7 +424,16 @@ def test_a_second_of_the_bus_is_captured(browser: Browser, form: str, begins: by
 
 
 @pytest.mark.parametrize(
-    "query", ["", "seconds=0", "seconds=61", "seconds=1e9", "seconds=1&format=exe", "seconds=-1"]
+    "query",
+    [
+        "",
+        "seconds=0",
+        "seconds=61",
+        "seconds=1e9",
+        "seconds=1&format=exe",
+        "seconds=-1",
+        "seconds=" + "9" * 5000,
+    ],
 )
 def test_no_capture_is_endless_or_of_another_form(browser: Browser, query: str) -> None:
     browser.login("observer")

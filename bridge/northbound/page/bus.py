@@ -2,47 +2,62 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
 import msgspec
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from bridge.errors import OperationFailed
+from bridge.northbound.page.sessions import Session
 
 LONGEST_S: Final = 60
 _MOST_AT_ONCE: Final = 4
 _MEDIA: Final = {"candump": "log", "asc": "asc"}
+_PART: Final = 65_536
 _encode = msgspec.json.Encoder().encode
 
-Capture = Callable[[str, float, str], Awaitable[str]]
-"""Listens to this bus for so many seconds; the text of a file in this format. Raises ``OperationFailed``."""
+
+@dataclass(frozen=True, slots=True)
+class Captured:
+    """The content of a file. ``is_cut``: there was more than is kept, and the file ends before its time."""
+
+    content: bytes
+    is_cut: bool = False
+
+
+IsGone = Callable[[], Awaitable[bool]]
+"""Whether nobody waits any more."""
+Capture = Callable[[str, float, str, IsGone], Awaitable[Captured]]
+"""Listens to this bus for so many seconds, and makes a file in this format. Raises ``OperationFailed``."""
 
 
 class Bus:
-    """``layouts`` has for each bus what ``layout`` of the page draws; ``is_inside`` says who may read."""
+    """``layouts`` has for each bus what ``layout`` of the page draws; ``session_of`` says who asks."""
 
     def __init__(
         self,
         site: str,
         layouts: Mapping[str, Any],
         capture: Capture,
-        is_inside: Callable[[Request], bool],
+        session_of: Callable[[Request], Session | None],
     ) -> None:
         self._site = site
         self._layouts = layouts
         self._capture = capture
-        self._is_inside = is_inside
-        self._captures = 0
+        self._session_of = session_of
+        self._capturing: list[Session] = []
         self.routes = [
             Route("/api/bus/{bus}", self._layout),
             Route("/api/bus/{bus}/capture", self._captured),
         ]
 
     def _refusal(self, request: Request) -> Response | None:
-        if not self._is_inside(request):
+        if self._session_of(request) is None:
             return JSONResponse({"error": "login"}, 401)
         if request.path_params["bus"] not in self._layouts:
             return JSONResponse({"error": f"there is {', '.join(self._layouts)}"}, 404)
@@ -55,24 +70,44 @@ class Bus:
         return Response(layout, headers={"cache-control": "no-cache"}, media_type="application/json")
 
     async def _captured(self, request: Request) -> Response:
-        """``seconds`` of the bus, 1 … 60, as a file in ``format``: candump or asc."""
-        if refusal := self._refusal(request):
-            return refusal
+        """``seconds`` of the bus, 1 … 60, as a file in ``format``: candump or asc. One of each session at a
+        time. ``-cut`` in the file's name, and ``x-cut``, say that it ends early, being too long."""
+        session = self._session_of(request)
+        refusal = self._refusal(request)
+        if session is None or refusal:
+            return refusal or JSONResponse({"error": "login"}, 401)
         form = request.query_params.get("format", "candump")
-        seconds = request.query_params.get("seconds", "")
-        if form not in _MEDIA or not seconds.isdecimal() or not 1 <= int(seconds) <= LONGEST_S:
+        seconds = _seconds(request.query_params.get("seconds", ""))
+        if form not in _MEDIA or not 1 <= seconds <= LONGEST_S:
             allowed = f"seconds = 1…{LONGEST_S}, format = {' or '.join(_MEDIA)}"
             return JSONResponse({"error": allowed}, 422)
-        if self._captures >= _MOST_AT_ONCE:
+        if len(self._capturing) >= _MOST_AT_ONCE or session in self._capturing:
             return JSONResponse({"error": "too many captures at a time"}, 429)
         bus = request.path_params["bus"]
-        self._captures += 1
+        self._capturing.append(session)
         try:
-            text = await self._capture(bus, float(seconds), form)
+            captured = await self._capture(bus, seconds, form, request.is_disconnected)
         except OperationFailed as error:
             return JSONResponse({"error": str(error)}, 503)
         finally:
-            self._captures -= 1
-        name = f"{self._site}-{bus}.{_MEDIA[form]}"
+            self._capturing.remove(session)
+        return self._file(captured, bus, _MEDIA[form])
+
+    def _file(self, captured: Captured, bus: str, suffix: str) -> Response:
+        name = f"{self._site}-{bus}{'-cut' if captured.is_cut else ''}.{suffix}"
         headers = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
-        return Response(text, headers=headers, media_type="text/plain")
+        if captured.is_cut:
+            headers["x-cut"] = "yes"
+        return StreamingResponse(_parts(captured.content), headers=headers, media_type="text/plain")
+
+
+def _seconds(text: str) -> int:
+    """0 where it is no such number."""
+    return int(text) if text.isdecimal() and len(text) <= len(str(LONGEST_S)) else 0
+
+
+async def _parts(content: bytes) -> AsyncIterator[bytes]:
+    """Compressed as a whole, a long file would hold up every tab."""
+    for begin in range(0, len(content), _PART):
+        yield content[begin : begin + _PART]
+        await asyncio.sleep(0)

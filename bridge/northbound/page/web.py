@@ -118,7 +118,7 @@ class Page:
                 self._is_inside,
                 self._has_token,
             ).routes,
-            *Bus(site.site.name, backstage.layouts, backstage.capture, self._is_inside).routes,
+            *Bus(site.site.name, backstage.layouts, backstage.capture, self._session_of).routes,
             *System(backstage.system, lambda: self.shown, self._session_of).routes,
             WebSocketRoute("/live", self._live),
             Mount("/static", StaticFiles(directory=STATIC)),

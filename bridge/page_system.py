@@ -9,16 +9,17 @@ import socket
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from cryptography import x509
+from cryptography.exceptions import UnsupportedAlgorithm
 from cryptography.hazmat.primitives.hashes import SHA256
 
 from bridge import __version__
 from bridge.config import Site
 from bridge.errors import BridgeError, FileFaults
 from bridge.lint import Severity, lint
-from bridge.northbound.page.system import CertificateFacts
+from bridge.northbound.page.system import CertificateFacts, Unreadable
 from bridge.project import Project, load_project
 
 _LIBRARIES: Final = ("asyncua", "pymodbus", "eclipse-zenoh", "python-can", "canopen", "starlette", "uvicorn")
@@ -35,6 +36,8 @@ _HASHES: Final = re.compile(
 """What a key for a hash has for a value, whatever that is."""
 _TABLES: Final = ("/proc/self/net/tcp", "/proc/self/net/tcp6")
 _ESTABLISHED: Final = "01"
+_MALFORMED: Final = (ValueError, TypeError, OverflowError, x509.InvalidVersion, UnsupportedAlgorithm)
+"""What a file raises that is no certificate, or one that is broken in any of its parts."""
 _TAIL_BYTES: Final = 1 << 20
 
 
@@ -45,15 +48,18 @@ class SystemOf:
         self._path = project.path
         self._site = project.site
         self._began_with = _read(project.path)
+        self._versions: dict[str, str] = {}
 
     def versions(self) -> dict[str, str]:
-        system = f"{platform.system()} {platform.release()}"
-        return {
-            "drivebridge": __version__,
-            "Python": platform.python_version(),
-            "system": system,
-            **{name: found for name in _LIBRARIES if (found := _version(name))},
-        }
+        """They stay while the process runs, and are looked for in many files."""
+        if not self._versions:
+            self._versions = {
+                "drivebridge": __version__,
+                "Python": platform.python_version(),
+                "system": f"{platform.system()} {platform.release()}",
+                **{name: found for name in _LIBRARIES if (found := _version(name))},
+            }
+        return self._versions
 
     def connections(self) -> dict[str, list[str]]:
         ports = dict(_ports(self._site))
@@ -63,7 +69,7 @@ class SystemOf:
                 found[ports[local]].append(remote)
         return {name: sorted(addresses) for name, addresses in found.items()}
 
-    def certificates(self) -> list[CertificateFacts]:
+    def certificates(self) -> list[CertificateFacts | Unreadable]:
         return list(_certificates(self._site))
 
     def site_file(self) -> dict[str, str]:
@@ -101,9 +107,11 @@ def _entries(path: Path, most: int) -> list[dict[str, Any]]:
     entries: list[dict[str, Any]] = []
     for line in reversed(_tail(path)):
         try:
-            entries.append(json.loads(line))
-        except ValueError:
+            entry = json.loads(line)
+        except (ValueError, RecursionError):
             continue  # cut off at the beginning, or being written
+        if isinstance(entry, dict):
+            entries.append(cast("dict[str, Any]", entry))
         if len(entries) == most:
             break
     return entries
@@ -165,27 +173,45 @@ def _address(text: str) -> str:
     return f"[{shown}]:{int(port, 16)}" if ":" in shown else f"{shown}:{int(port, 16)}"
 
 
-def _certificates(site: Site) -> Iterator[CertificateFacts]:
+def _certificates(site: Site) -> Iterator[CertificateFacts | Unreadable]:
     opcua, page = site.opcua, site.page
     if opcua:
         own = Path(site.site.state_dir) / "opcua" / "own_certificate.der"
         yield from _certificate("opcua", Path(opcua.certificate) if opcua.certificate else own)
-        if opcua.trusted_dir and Path(opcua.trusted_dir).is_dir():
-            for file in sorted(Path(opcua.trusted_dir).iterdir()):
-                yield from _certificate(file.name, file)
+        if opcua.trusted_dir:
+            yield from _trusted(Path(opcua.trusted_dir))
     if page and page.certificate:
         yield from _certificate("page", Path(page.certificate))
 
 
-def _certificate(of: str, file: Path) -> Iterator[CertificateFacts]:
+def _trusted(folder: Path) -> Iterator[CertificateFacts | Unreadable]:
+    try:
+        files = sorted(folder.iterdir())
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        yield Unreadable(folder.name, error.strerror or str(error))
+        return
+    for file in files:
+        yield from _certificate(file.name, file)
+
+
+def _certificate(of: str, file: Path) -> Iterator[CertificateFacts | Unreadable]:
+    """Nothing where there is no file."""
     try:
         content = file.read_bytes()
         is_text = content.lstrip().startswith(b"-----")
         one = x509.load_pem_x509_certificate(content) if is_text else x509.load_der_x509_certificate(content)
-    except (OSError, ValueError):
+        print_ = one.fingerprint(SHA256()).hex(":").upper()
+        subject, until = one.subject.rfc4514_string(), one.not_valid_after_utc.timestamp()
+    except FileNotFoundError:
         return
-    print_ = one.fingerprint(SHA256()).hex(":").upper()
-    yield CertificateFacts(of, one.subject.rfc4514_string(), one.not_valid_after_utc.timestamp(), print_)
+    except OSError as error:
+        yield Unreadable(of, error.strerror or str(error))
+    except _MALFORMED as error:
+        yield Unreadable(of, f"no certificate: {error}")
+    else:
+        yield CertificateFacts(of, subject, until, print_)
 
 
 def _tail(path: Path) -> list[bytes]:

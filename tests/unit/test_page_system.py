@@ -5,13 +5,20 @@ from __future__ import annotations
 import json
 import socket
 import tomllib
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.hashes import SHA256
+from cryptography.hazmat.primitives.serialization import Encoding
+from cryptography.x509.oid import NameOID
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge import page_system
+from bridge.northbound.page.system import CertificateFacts, Unreadable
 from bridge.northbound.passwords import hash_password
 from bridge.page_system import SystemOf, without_secrets
 from bridge.project import load_project
@@ -104,8 +111,50 @@ def test_addresses_are_read_as_the_kernel_writes_them() -> None:
     assert page_system._address("0000000000000000FFFF00000100A8C0:0050") == "192.168.0.1:80"
 
 
-def test_versions_are_there_and_what_is_no_certificate_is_left_out(tmp_path: Path) -> None:
-    facts = system(tmp_path, f'[opcua]\nlisten = "127.0.0.1:4840"\ntrusted_dir = "{tmp_path}"\n')
+def test_versions_are_there_and_looked_for_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    facts = system(tmp_path)
     assert {"drivebridge", "Python", "asyncua"} <= facts.versions().keys()
-    assert facts.certificates() == []
+    monkeypatch.setattr(page_system, "version", lambda _: pytest.fail("it is known"))
+    assert "asyncua" in facts.versions()
     assert hash_password("x").startswith("$argon2"), "what is looked for"
+
+
+def certificate(subject: x509.Name) -> bytes:
+    key = ec.generate_private_key(ec.SECP256R1())
+    begin = datetime(2026, 1, 1, tzinfo=UTC)
+    made = x509.CertificateBuilder(subject, subject, key.public_key(), 7, begin, begin + timedelta(days=9))
+    return made.sign(key, SHA256()).public_bytes(Encoding.DER)
+
+
+def test_each_certificate_is_told_whatever_the_others_are(tmp_path: Path) -> None:
+    trusted = tmp_path / "trusted"
+    facts = system(tmp_path, f'[opcua]\nlisten = "127.0.0.1:4840"\ntrusted_dir = "{trusted}"\n')
+    assert facts.certificates() == [], "there is no such folder"
+    trusted.mkdir()
+    good = certificate(x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "box")]))
+    (trusted / "a-malformed.der").write_bytes(good.replace(b"box", b"\xff\xfe\xff"))
+    (trusted / "b.txt").write_text("no certificate", encoding="utf-8")
+    (trusted / "c-folder").mkdir()
+    (trusted / "d-good.der").write_bytes(good)
+    told = {one.of: one for one in facts.certificates()}
+    assert isinstance(told["d-good.der"], CertificateFacts)
+    assert told["d-good.der"].subject == "CN=box"
+    unread = {name for name, one in told.items() if isinstance(one, Unreadable) and one.text}
+    assert unread == {"a-malformed.der", "b.txt", "c-folder"}
+
+
+def test_a_folder_that_may_not_be_read_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    facts = system(tmp_path, f'[opcua]\nlisten = "127.0.0.1:4840"\ntrusted_dir = "{tmp_path / "trusted"}"\n')
+
+    def refused(self: Path) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "iterdir", refused)
+    assert facts.certificates() == [Unreadable("trusted", "Permission denied")]
+
+
+def test_lines_of_the_log_that_are_no_entries_are_left_out(tmp_path: Path) -> None:
+    log = tmp_path / "audit.jsonl"
+    facts = system(tmp_path, f'[audit]\nfile = "{log}"\n')
+    log.write_text('[1]\n7\nnull\n"t"\n{"t": "2026"}\n' + "[" * 100_000 + "\n", encoding="utf-8")
+    assert facts.audit(10) == [{"t": "2026"}]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import msgspec
 from starlette.requests import Request
@@ -13,10 +13,12 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from bridge.command import Role
+from bridge.guard import Guard
 from bridge.northbound.page.sessions import Session
 
 MOST_LINES = 500
 """Of the audit log."""
+_Told = TypeVar("_Told")
 _encode = msgspec.json.Encoder().encode
 
 
@@ -30,6 +32,14 @@ class CertificateFacts:
     fingerprint: str
 
 
+@dataclass(frozen=True, slots=True)
+class Unreadable:
+    """``of`` as in ``CertificateFacts``, or the name of a part of the system; ``text`` is why."""
+
+    of: str
+    text: str
+
+
 class SystemFacts(Protocol):
     """What the page shows of the service. All of it may take a moment, and is asked for in a thread."""
 
@@ -39,7 +49,7 @@ class SystemFacts(Protocol):
         """Addresses of the clients that are connected, by protocol."""
         ...
 
-    def certificates(self) -> list[CertificateFacts]: ...
+    def certificates(self) -> list[CertificateFacts | Unreadable]: ...
 
     def site_file(self) -> dict[str, str]:
         """``path`` and ``text``, without anything secret; ``changed`` where it is not what is run."""
@@ -68,6 +78,7 @@ class System:
         self._tabs = tabs
         self._session_of = session_of
         self._checking = asyncio.Semaphore(1)
+        self._guard = Guard("page: system")
         self.routes = [
             Route("/api/system", self._system),
             Route("/api/system/site", self._site),
@@ -75,16 +86,19 @@ class System:
         ]
 
     async def _system(self, request: Request) -> Response:
+        """``faults`` has what cannot be told, and why: of each certificate, or of a whole part."""
         session = self._session_of(request)
         if session is None:
             return JSONResponse({"error": "login"}, 401)
-        facts = self._facts
+        facts, faults = self._facts, list[Unreadable]()
         versions, certificates, connections = await asyncio.gather(
-            asyncio.to_thread(facts.versions),
-            asyncio.to_thread(facts.certificates),
-            asyncio.to_thread(facts.connections),
+            self._asked(facts.versions, {}, faults),
+            self._asked(facts.certificates, [], faults),
+            self._asked(facts.connections, {}, faults),
         )
-        told: dict[str, Any] = {"versions": versions, "certificates": certificates}
+        faults += [one for one in certificates if isinstance(one, Unreadable)]
+        readable = [one for one in certificates if isinstance(one, CertificateFacts)]
+        told: dict[str, Any] = {"versions": versions, "certificates": readable, "faults": faults}
         told["clients"] = {protocol: len(addresses) for protocol, addresses in connections.items()}
         if session.role >= Role.ENGINEER:
             told |= {"connections": connections, "tabs": self._tabs()}
@@ -93,14 +107,27 @@ class System:
     async def _site(self, request: Request) -> Response:
         if refusal := self._for_engineers(request):
             return refusal
+        faults = list[Unreadable]()
         async with self._checking:
-            file = await asyncio.to_thread(self._facts.site_file)
-            return _fresh(file | {"findings": await asyncio.to_thread(self._facts.check)})
+            file = await self._asked(self._facts.site_file, {"path": "", "text": ""}, faults)
+            findings = await self._asked(self._facts.check, [], faults)
+        failed = [{"severity": "error", "line": 0, "text": f"{one.of}: {one.text}"} for one in faults]
+        return _fresh(file | {"findings": failed + findings})
 
     async def _audit(self, request: Request) -> Response:
         if refusal := self._for_engineers(request):
             return refusal
-        return _fresh(await asyncio.to_thread(self._facts.audit, MOST_LINES))
+        return _fresh(await self._asked(self._latest, [], []))
+
+    def _latest(self) -> list[dict[str, Any]]:
+        return self._facts.audit(MOST_LINES)
+
+    async def _asked(self, ask: Callable[[], _Told], nothing: _Told, faults: list[Unreadable]) -> _Told:
+        """What ``ask`` says; where it fails ``nothing``, and one more of ``faults``: the rest is told."""
+        with self._guard:
+            return await asyncio.to_thread(ask)
+        faults.append(Unreadable(ask.__name__, "this failed: the log of the service has more"))
+        return nothing
 
     def _for_engineers(self, request: Request) -> Response | None:
         session = self._session_of(request)

@@ -170,7 +170,7 @@ def test_a_login_gives_what_the_role_may_see(browser: Browser) -> None:
 
 
 def test_a_login_begins_another_session_and_a_logout_ends_it(browser: Browser) -> None:
-    browser.cookie = "session=brought-along-by-somebody"
+    browser.cookie = f"session-{browser.port}=brought-along-by-somebody"
     browser.login("operator")
     first = browser.cookie
     assert "brought" not in first
@@ -181,7 +181,9 @@ def test_a_login_begins_another_session_and_a_logout_ends_it(browser: Browser) -
     assert browser.request("GET", "/api/site").status == 401, "the session before is over"
     browser.cookie = second
     assert browser.request("POST", "/api/logout").status == 403, "without the token"
-    assert browser.request("POST", "/api/logout", X_Token=browser.token).status == 200
+    gone = browser.request("POST", "/api/logout", X_Token=browser.token)
+    assert gone.status == 200
+    assert f"session-{browser.port}=" in gone.cookies[0]
     browser.cookie = second
     assert browser.request("GET", "/api/site").status == 401
 
@@ -493,8 +495,15 @@ def test_by_tls_the_cookie_is_bound_to_it(tmp_path: Path) -> None:
         connection.request("GET", "/api/session")
         answer = connection.getresponse()
         cookie = answer.getheader("set-cookie") or ""
-        assert json.loads(answer.read())["role"] == "observer", "the site file lets anybody read"
+        body = answer.read()
+        assert json.loads(body)["role"] == "observer", "the site file lets anybody read"
+        token = json.loads(body)["token"]
+        own = cookie.partition(";")[0]
+        connection.request("POST", "/api/logout", headers={"Cookie": own, "X-Token": token})
+        gone = connection.getresponse().getheader("set-cookie") or ""
         connection.close()
-    assert cookie.startswith("__Host-")
+    assert cookie.startswith(f"__Host-session-{port}=")
     assert "Secure" in cookie
+    assert gone.startswith(f"__Host-session-{port}=")
+    assert {"Secure", "Path=/", "Max-Age=0"} <= {part.strip() for part in gone.split(";")}, "or it stays"
     assert "max-age" in (answer.getheader("strict-transport-security") or "")

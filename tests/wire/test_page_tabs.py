@@ -111,7 +111,7 @@ async def closing_code(served: Served, cookie: str, token: str = "") -> int:
 async def test_a_tab_that_is_refused_is_told_why(served: Served) -> None:
     """A browser shows no code of a connection that was never opened, and its page would try for ever."""
     assert await closing_code(served, "") == 4401
-    assert await closing_code(served, "session=nobodys") == 4401
+    assert await closing_code(served, "session-8480=nobodys") == 4401
     cookie, _ = await served.login("operator")
     assert await closing_code(served, cookie, "guessed") == 4403
 

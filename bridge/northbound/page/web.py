@@ -8,7 +8,7 @@ from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal, TypedDict
 
 import msgspec
 from starlette.applications import Starlette
@@ -41,7 +41,6 @@ from bridge.northbound.view import View
 _log = logging.getLogger(__name__)
 
 STATIC: Final = Path(__file__).parent / "static"
-_COOKIE: Final = "session"
 _MOST_CHECKS: Final = 8
 """Passwords that wait to be checked at a time."""
 _BODY_S: Final = 5.0
@@ -67,6 +66,15 @@ class Backstage:
     dictionaries: Mapping[str, Path]
     """The makers' descriptions of devices, by mapping."""
     system: SystemFacts
+
+
+class _OfCookie(TypedDict):
+    """Without its attributes a browser does not take that a cookie is deleted."""
+
+    path: str
+    httponly: bool
+    samesite: Literal["strict"]
+    secure: bool
 
 
 class _Login(msgspec.Struct, forbid_unknown_fields=True):
@@ -101,7 +109,15 @@ class Page:
         self._tabs = Tabs(view, layout, self._sessions, Hearings(backstage.ears), clock)
         self._description = _encode(described(view.image, site, families))
         self._is_encrypted = table.certificate is not None
-        self._cookie = f"__Host-{_COOKIE}" if self._is_encrypted else _COOKIE
+        # The port: cookies know none, and two pages of one host would log each other out.
+        name = f"session-{table.listen.rpartition(':')[2]}"
+        self._cookie = f"__Host-{name}" if self._is_encrypted else name
+        self._of_cookie: _OfCookie = {
+            "path": "/",
+            "httponly": True,
+            "samesite": "strict",
+            "secure": self._is_encrypted,
+        }
         routes = [
             Route("/", _index),
             Route("/api/session", self._session),
@@ -167,9 +183,7 @@ class Page:
 
     def _with_cookie(self, body: Mapping[str, Any], session: Session) -> Response:
         response = Response(_encode(body), media_type="application/json")
-        response.set_cookie(
-            self._cookie, session.id, path="/", httponly=True, samesite="strict", secure=self._is_encrypted
-        )
+        response.set_cookie(self._cookie, session.id, **self._of_cookie)
         response.headers["cache-control"] = "no-store"
         return response
 
@@ -221,7 +235,7 @@ class Page:
         self._sessions.end(session)
         self._tabs.end(session)
         response = self._json({})
-        response.delete_cookie(self._cookie, path="/")
+        response.delete_cookie(self._cookie, **self._of_cookie)
         return response
 
     async def _site(self, request: Request) -> Response:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
 from tests.support.page import NoSystem, Served
 
 
@@ -26,3 +28,29 @@ async def test_what_is_known_of_the_system_is_told_where_a_part_fails() -> None:
         assert (told["certificates"], [one["of"] for one in told["faults"]]) == ([], ["certificates"])
         (finding,) = (await served.ask("GET", "/api/system/site", Cookie=cookie)).json["findings"]
         assert finding["severity"] == "error"
+
+
+async def broken(*asked: Any) -> Any:
+    raise RuntimeError("what nobody has thought of")
+
+
+async def test_an_answer_to_our_own_failure_names_the_browsers_rules(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async with Served(capture=broken).serving() as served:
+        cookie, _ = await served.login("observer")
+        answer = await served.ask("GET", "/api/bus/can0/capture?seconds=1", Cookie=cookie)
+    assert answer.status == 500
+    assert "default-src 'none'" in answer.headers["content-security-policy"]
+    assert answer.headers["x-content-type-options"] == "nosniff"
+    assert b"thought of" not in answer.body
+    assert "thought of" in caplog.text
+
+
+async def test_a_browser_asks_whether_a_file_is_still_the_same() -> None:
+    async with Served().serving() as served:
+        first = await served.ask("GET", "/static/js/main.js")
+        assert first.headers["cache-control"] == "no-cache"
+        again = await served.ask("GET", "/static/js/main.js", If_None_Match=first.headers["etag"])
+        assert (again.status, again.body) == (304, b"")
+        assert again.headers["cache-control"] == "no-cache"

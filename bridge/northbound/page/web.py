@@ -18,6 +18,7 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket
 
 from bridge.command import Role
@@ -66,6 +67,16 @@ class Backstage:
     dictionaries: Mapping[str, Path]
     """The makers' descriptions of devices, by mapping."""
     system: SystemFacts
+
+
+class _Files(StaticFiles):
+    """A browser asks each time whether a file is still the same: after an update no module of before may be
+    loaded beside new ones."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        response.headers["cache-control"] = "no-cache"
+        return response
 
 
 class _OfCookie(TypedDict):
@@ -137,16 +148,15 @@ class Page:
             *Bus(site.site.name, backstage.layouts, backstage.capture, self._session_of).routes,
             *System(backstage.system, lambda: self.shown, self._session_of).routes,
             WebSocketRoute("/live", self._live),
-            Mount("/static", StaticFiles(directory=STATIC)),
+            Mount("/static", _Files(directory=STATIC)),
         ]
-        self.app = Starlette(
+        served = Starlette(
             routes=routes,
-            middleware=[
-                Middleware(Guards, names=table.names, is_encrypted=self._is_encrypted),
-                Middleware(GZipMiddleware, minimum_size=1024),
-            ],
+            middleware=[Middleware(GZipMiddleware, minimum_size=1024)],
             lifespan=self._life,
         )
+        # Not as middleware: Starlette's own answer to an exception would go round it.
+        self.app: ASGIApp = Guards(served, table.names, is_encrypted=self._is_encrypted)
 
     @asynccontextmanager
     async def _life(self, app: Starlette) -> AsyncGenerator[None]:

@@ -56,8 +56,14 @@ def chromium() -> Iterator[Browser]:
 
 
 @contextmanager
-def broken(folder: Path, chromium: Browser, more: str = "", control: str = "lease") -> Iterator[BrokenPlant]:
-    """The page's first screen of a plant that is in order as yet."""
+def broken(
+    folder: Path,
+    chromium: Browser,
+    more: str = "",
+    control: str = "lease",
+    at_first: str = "Everything is in order",
+) -> Iterator[BrokenPlant]:
+    """The page's first screen of a plant that is in order as yet, or where ``at_first`` is wrong."""
     port, modbus, commands = free_port(), free_port(), free_port()
     drives = (
         sites.drive("fu1", control, 1000, f"unit_id = 1\n{sites.SCALED}"),
@@ -75,7 +81,7 @@ def broken(folder: Path, chromium: Browser, more: str = "", control: str = "leas
         until(lambda: "node operational" in process.output(), 30.0, "the node is operational")
         desk = Desk(chromium, port)
         with desk.sits("operator", viewport={"width": 1280, "height": 720}) as page:
-            expect(page.locator(".sentence")).to_contain_text("Everything is in order")
+            expect(page.locator(".sentence")).to_contain_text(at_first)
             yield BrokenPlant(process, commands, page, modbus)
         assert not desk.complaints
 
@@ -137,10 +143,7 @@ def test_a_drive_has_another_parameter_set(tmp_path: Path, chromium: Browser) ->
 
 
 def test_the_disk_is_full(tmp_path: Path, chromium: Browser) -> None:
-    with broken(tmp_path, chromium, '[audit]\nfile = "/dev/full"') as plant:
-        page = plant.page
-        page.get_by_role("link", name=DRIVE).first.click()
-        page.get_by_role("button", name="Take control").click()
-        page.get_by_role("link", name="Plant", exact=True).click()
-        plant.says("Bridge", "the audit log cannot be written", "Make room on the disk")
+    what = "the audit log cannot be written"
+    with broken(tmp_path, chromium, '[audit]\nfile = "/dev/full"', at_first=what) as plant:
+        plant.says("Bridge", what, "Make room on the disk")
         plant.shot("full-disk")

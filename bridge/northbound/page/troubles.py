@@ -95,12 +95,14 @@ class Troubles:
         }
         return said | ({"or_longer": True} if since_ms - self._began_ms < _BEGINNING_MS else {})
 
-    def _has_risen(self, name: str, now_ms: float) -> bool:
-        """Whether the counter ``name`` rose lately. What it had when the front began is nobody's news."""
+    def _has_risen(self, name: str, now_ms: float, *, is_news_at_first: bool = False) -> bool:
+        """Whether the counter ``name`` rose lately; with ``is_news_at_first`` what it had when the front began
+        counts as well."""
         count = self._look(name)
         if not isinstance(count, int):
             return False
-        before, risen_ms = self._counts.get(name, (count, float("-inf")))
+        at_first = 0 if is_news_at_first else count
+        before, risen_ms = self._counts.get(name, (at_first, float("-inf")))
         if count > before:
             risen_ms = now_ms
         self._counts[name] = count, risen_ms
@@ -159,6 +161,7 @@ class Troubles:
         return quality is not Quality.GOOD and not self._look(f"bus/{bus}/held_by")
 
     def _of_log(self, now_ms: float) -> Iterator[Trouble]:
-        if self._has_risen("bridge/audit_lost", now_ms):
+        # A disk that is full already when the service starts is as bad.
+        if self._has_risen("bridge/audit_lost", now_ms, is_news_at_first=True):
             lines = self._look("bridge/audit_lost") or 0
             yield Trouble(Rank.WARNING, "log_lost", "bridge", (("lines", lines),))

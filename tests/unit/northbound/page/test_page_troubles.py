@@ -136,6 +136,17 @@ def test_a_bus_process_that_does_not_answer_says_nothing_of_the_drives() -> None
     assert "bridge_dead" not in [kind for kind, _ in case.kinds()], "it answers again"
 
 
+def test_lines_lost_before_the_front_began_are_a_trouble_and_old_intruders_are_not() -> None:
+    case = Case()
+    case.set("bridge/audit_lost", 3)
+    case.set(f"{BUS}/intruders", 3)
+    case.troubles = Troubles(case.image, case.layout, lambda: case.now_ms)
+    case.troubles.beat()
+    (trouble,) = case.troubles.shown
+    assert (trouble["kind"], trouble["or_longer"]) == ("log_lost", True)
+    assert case.later(11 * 60_000.0) == [], "nothing was lost for ten minutes"
+
+
 def test_a_node_that_boots_for_ever_is_a_trouble_after_ten_seconds() -> None:
     case = Case()
     case.later()

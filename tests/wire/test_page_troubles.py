@@ -66,8 +66,8 @@ def broken(
     """The page's first screen of a plant that is in order as yet, or where ``at_first`` is wrong."""
     port, modbus, commands = free_port(), free_port(), free_port()
     drives = (
-        sites.drive("fu1", control, 1000, f"unit_id = 1\n{sites.SCALED}"),
         sites.drive("fu2", "none", 0),
+        sites.drive("fu1", control, 1000, f"unit_id = 1\n{sites.SCALED}"),
     )
     site = sites.write(
         folder,
@@ -101,8 +101,15 @@ def test_a_cable_is_pulled(tmp_path: Path, chromium: Browser) -> None:
 def test_a_drive_has_a_fault_and_is_acknowledged(tmp_path: Path, chromium: Browser) -> None:
     with broken(tmp_path, chromium) as plant:
         page = plant.page
+        expect(page.locator(".tile").first).to_contain_text("conveyor/fu2")
         plant.tell("fail_drive")
-        trouble = plant.says(DRIVE, "fault E003/3.0", "overcurrent")
+        trouble = plant.says(DRIVE, "fault E003/3.0", "Overcurrent of the inverter.")
+        expect(page.locator(".tile").first).to_contain_text(DRIVE)
+        expect(page.locator(".tile").first).to_contain_text("E003/3.0 Overcurrent of the inverter")
+        expect(page.locator(".tile").get_by_role("link", name=DRIVE, exact=True)).to_have_count(1)
+        page.get_by_role("button", name="Deutsch").click()
+        expect(page.locator(".tile").first).to_contain_text("Überstrom")
+        page.get_by_role("button", name="English").click()
         plant.shot("fault")
         trouble.get_by_role("link", name=DRIVE).click()
         expect(page.locator(".drivehead .state")).to_contain_text("fault")

@@ -15,6 +15,8 @@ const SHAPES = {
   tripped: html`<path class="fill" d="M5 1h6l4 4v6l-4 4H5l-4-4V5z" /><path class="on" d="M8 4v4.5l2.5 2" />`,
   lost: html`<path d="M3 3l10 10M13 3L3 13" />`,
   unknown: html`<circle cx="8" cy="8" r="5.5" stroke-dasharray="1 2.4" />`,
+  disabled: html`<rect x="3" y="3" width="10" height="10" stroke-dasharray="2 2" />`,
+  booting: html`<path d="M13.5 8A5.5 5.5 0 1 1 8 2.5" /><path class="fill" d="M8 0l4 2.5L8 5z" />`,
   // of the plant
   ok: html`<circle cx="8" cy="8" r="6" /><path d="M5 8.2l2.2 2.2L11 6" />`,
   danger: html`<path class="fill" d="M8 1l7 13.5H1z" /><path class="on" d="M8 5.5v4.5M8 11.8v1" />`,
@@ -27,6 +29,13 @@ const SHAPES = {
   dark: html`<path d="M13 9.5A5.5 5.5 0 0 1 6.5 3a5.5 5.5 0 1 0 6.5 6.5z" />`,
   system: html`<circle cx="8" cy="8" r="5.5" /><path class="fill" d="M8 2.5a5.5 5.5 0 0 1 0 11z" />`,
 };
+
+const OF_NODES = { operational: "ok", booting: "booting", stopped: "warning", disabled: "disabled", config_error: "alarm", unknown: "unknown" };
+const OF_BUSES = { ok: "ok", warning: "warning", passive: "warning", unknown: "unknown" };
+
+/** The shape for the state of a node, and of a bus. */
+export const shapeOfNode = (state) => OF_NODES[state] ?? "lost";
+export const shapeOfBus = (state) => OF_BUSES[state] ?? "alarm";
 
 /** A shape without a text: beside it stands the word for it. */
 export function Icon({ name }) {

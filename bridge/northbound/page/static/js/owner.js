@@ -2,6 +2,13 @@
 
 import { self } from "./live.js";
 import { t } from "./texts.js";
+import { good } from "./drivestate.js";
+
+/** Who controls `drive`, as people call them. */
+export function ownerOf(drive) {
+  const owner = good(`${drive}/supervision/owner`);
+  return owner === null ? t("unknown") : ownerName(owner);
+}
 
 /** "you", "admin (web page)", "192.168.1.20 (Modbus)"; "nobody". */
 export function ownerName(owner) {

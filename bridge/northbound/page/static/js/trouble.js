@@ -1,23 +1,36 @@
 // What is wrong, in words. The server finds the troubles; here they get their texts.
 
+import { effect, signal } from "./ui.js";
+import { troubles } from "./live.js";
 import { address } from "./route.js";
 import { clock, span } from "./format.js";
 import { drives, nodes } from "./site.js";
 import { ownerName } from "./owner.js";
 import { faultIn, many, maybe, t } from "./texts.js";
 
-/** The rank of the worst of `troubles`; "none" where there is none, "unknown" before the server has told. */
-export function worst(troubles) {
-  if (troubles === null) return "unknown";
-  return troubles[0]?.rank ?? "none";
+const TICK_MS = 10_000;
+const now = signal(Date.now());
+
+// How long a trouble has lasted goes on while there is one, and nothing has to be drawn where there is none.
+effect(() => {
+  if (!troubles.value?.length) return;
+  now.value = Date.now();
+  const ticking = setInterval(() => (now.value = Date.now()), TICK_MS);
+  return () => clearInterval(ticking);
+});
+
+/** The rank of the worst of `all`; "none" where there is none, "unknown" before the server has told. */
+export function worst(all) {
+  if (all === null) return "unknown";
+  return all[0]?.rank ?? "none";
 }
 
 /** How the plant is, in one sentence. */
-export function sentence(troubles) {
-  if (troubles === null) return t("frame.loading");
-  if (!troubles.length) return many("plant.fine", drives.value.length);
-  const first = `${nameOf(troubles[0].place)}: ${headline(troubles[0])}, ${since(troubles[0])}`;
-  const others = troubles.length - 1;
+export function sentence(all) {
+  if (all === null) return t("frame.loading");
+  if (!all.length) return many("plant.fine", drives.value.length);
+  const first = `${nameOf(all[0].place)}: ${headline(all[0])}, ${since(all[0])}`;
+  const others = all.length - 1;
   return others ? `${first}. ${many("plant.others", others)}` : `${first}.`;
 }
 
@@ -26,9 +39,31 @@ export function headline(trouble) {
   return t(`trouble.${trouble.kind}`, said(trouble));
 }
 
+/** The present fault of a drive in the reader's language, with its number; empty where it has none of its own. */
+export function faultText(drive) {
+  const found = (troubles.value ?? []).find((one) => one.kind === "drive_fault" && one.place === drive);
+  return found ? `${found.facts.number} ${said(found).text}`.trim() : "";
+}
+
+const RANKS = ["danger", "alarm", "warning"];
+
+/** How much is wrong at one of `places`: 0 is the worst, 3 nothing. */
+export function rankAt(places) {
+  const found = (troubles.value ?? []).find((one) => places.includes(one.place));
+  return found ? RANKS.indexOf(found.rank) : RANKS.length;
+}
+
 /** What it means and where it comes from; empty where the headline says it all. */
 export function explanation(trouble) {
-  return maybe(`trouble.${trouble.kind}.why`, withDefaults(trouble));
+  return maybe(`trouble.${trouble.kind}.why${variant(trouble)}`, withDefaults(trouble));
+}
+
+// What is true of some only: a fault without a cause, and a watchdog that stops nothing.
+function variant(trouble) {
+  if (trouble.kind === "drive_fault") return said(trouble).cause ? "_and_cause" : "";
+  if (trouble.kind !== "controller_silent") return "";
+  const reaction = driveAt(trouble.place)?.on_expiry;
+  return reaction === "hold" || reaction === "silence" ? `_${reaction}` : "";
 }
 
 /** What to do. */
@@ -41,7 +76,7 @@ export function since(trouble) {
 }
 
 export function lasting(trouble) {
-  return span(Date.now() - trouble.since);
+  return span(now.value - trouble.since);
 }
 
 /** What people call the place. */
@@ -50,15 +85,26 @@ export function nameOf(place) {
   return place.replace(/^bus\//, "");
 }
 
+const driveAt = (place) => drives.value.find((one) => one.name === place);
+
 // The facts in the reader's language, as far as the drive's family has its faults in it.
 function said(trouble) {
-  const family = drives.value.find((one) => one.name === trouble.place)?.mapping;
-  return { ...trouble.facts, ...faultIn(family, trouble.facts.number) };
+  const { number, value } = trouble.facts;
+  const facts = { ...trouble.facts, ...faultIn(driveAt(trouble.place)?.mapping, number) };
+  if (value) facts.value = t(`point.${value}`);
+  if (facts.text) facts.text = withoutNumber(facts.text, number);
+  return facts;
+}
+
+// The headline has the number already.
+function withoutNumber(text, number) {
+  const words = number && text.startsWith(`${number} `) ? text.slice(number.length + 1) : text;
+  return words.charAt(0).toUpperCase() + words.slice(1);
 }
 
 /** The address of the page that shows the place. */
 export function pageOfPlace(place) {
-  if (drives.value.some((one) => one.name === place)) return address("drive", ...place.split("/"));
+  if (driveAt(place)) return address("drive", ...place.split("/"));
   if (place === "bridge") return address("system");
   const bus = place.startsWith("bus/") ? place.slice(4) : nodes.value.find((one) => one.name === place)?.bus;
   return bus ? address("bus", bus) : address("plant");
@@ -67,6 +113,6 @@ export function pageOfPlace(place) {
 function withDefaults(trouble) {
   const facts = { ...said(trouble) };
   if ("owner" in facts) facts.owner = ownerName(facts.owner);
-  for (const name of ["why", "how", "who", "owner", "cause"]) facts[name] ||= t("unknown");
+  for (const name of ["why", "how", "who", "owner"]) facts[name] ||= t("unknown");
   return facts;
 }

@@ -3,15 +3,15 @@
 import { classes, html } from "../ui.js";
 import { troubles } from "../live.js";
 import { address } from "../route.js";
-import { below, buses, drives, label, leafOf, nature, nodes } from "../site.js";
-import { quality, value } from "../values.js";
+import { below, buses, drives, leafOf, nature, nodes } from "../site.js";
+import { quality } from "../values.js";
 import { number, quantity } from "../format.js";
 import { maybe, t } from "../texts.js";
-import { Icon } from "../icons.js";
+import { Icon, shapeOfBus, shapeOfNode } from "../icons.js";
 import { Meter } from "../meter.js";
-import { ownerName } from "../owner.js";
-import { explanation, headline, lasting, nameOf, pageOfPlace, remedy, since } from "../trouble.js";
-import { stateOf } from "../drivestate.js";
+import { ownerOf } from "../owner.js";
+import { explanation, faultText, headline, lasting, nameOf, pageOfPlace, rankAt, remedy, since } from "../trouble.js";
+import { good, goodLabel, stateKey, stateOf } from "../drivestate.js";
 
 export const plant = { path: "plant", topics: () => ["plant"], View: Plant };
 
@@ -51,40 +51,52 @@ export function TroubleRow({ trouble }) {
 }
 
 function Bus({ bus }) {
-  const point = `bus/${bus.name}`;
-  const state = label(`${point}/state`, value(`${point}/state`));
   return html`
     <section class="bus" aria-labelledby=${`bus-${bus.name}`}>
-      <header>
-        <h2 id=${`bus-${bus.name}`}><a href=${address("bus", bus.name)}>${bus.name}</a></h2>
-        <span class=${classes("busstate", `is-${state}`)}>
-          <${Icon} name=${{ ok: "ok", warning: "warning", passive: "warning" }[state] ?? "alarm"} /> ${t(`bus.${state}`)}
-        </span>
-        <span class="fact">${t("plant.load")} <${Meter} share=${(value(`${point}/load`) ?? 0) / 100} warn=${0.8} />
-          ${quantity(value(`${point}/load`), "%")}</span>
-        <span class="fact">${t("plant.errors")} ${number(value(`${point}/error_frames`))}</span>
-      </header>
+      <${BusHead} bus=${bus} />
       <ul class="tiles">
-        ${drives.value
-          .filter((one) => one.bus === bus.name)
-          .map((one) => html`<li key=${one.name}><${DriveTile} drive=${one} /></li>`)}
-        ${nodes.value
-          .filter((one) => one.bus === bus.name && !drives.value.some((drive) => drive.node === one.name))
-          .map((one) => html`<li key=${one.name}><${NodeTile} node=${one} /></li>`)}
+        ${tilesOf(bus).map(({ drive, node }) => html`<li key=${(drive ?? node).name}>
+          ${drive ? html`<${DriveTile} drive=${drive} />` : html`<${NodeTile} node=${node} />`}</li>`)}
       </ul>
     </section>
   `;
 }
 
+// What is in trouble first, the worst before; everything else stays where it is.
+function tilesOf(bus) {
+  const ofDrives = drives.value.filter((one) => one.bus === bus.name).map((drive) => ({ drive, rank: rankAt([drive.name, drive.node]) }));
+  const ofNodes = nodes.value
+    .filter((one) => one.bus === bus.name && !drives.value.some((drive) => drive.node === one.name))
+    .map((node) => ({ node, rank: rankAt([node.name]) }));
+  return [...ofDrives, ...ofNodes].sort((one, other) => one.rank - other.rank);
+}
+
+function BusHead({ bus }) {
+  const point = `bus/${bus.name}`;
+  const state = goodLabel(`${point}/state`);
+  const load = good(`${point}/load`);
+  return html`
+    <header>
+      <h2 id=${`bus-${bus.name}`}><a href=${address("bus", bus.name)}>${bus.name}</a></h2>
+      <span class=${classes("busstate", `is-${state}`)}><${Icon} name=${shapeOfBus(state)} /> ${t(`bus.${state}`)}</span>
+      <span class="fact">${t("plant.load")} <${Meter} share=${(load ?? 0) / 100} warn=${0.8} /> ${quantity(load, "%")}</span>
+      <span class="fact">${t("plant.errors")} ${number(good(`${point}/error_frames`))}</span>
+    </header>
+  `;
+}
+
+// Only the name is the link, so that it does not read out what changes; the style sheet stretches it over the tile.
 function DriveTile({ drive }) {
   const state = stateOf(drive.name);
+  const hasFault = state === "fault" || state === "fault_reaction_active";
   return html`
-    <a class=${classes("tile", `in-${state}`)} href=${address("drive", ...drive.name.split("/"))}>
-      <span class="name">${drive.name}</span>
-      <span class="state"><${Icon} name=${state} /> ${t(`state.${state}`)}</span>
+    <div class=${classes("tile", `in-${state}`)}>
+      <a class="name" href=${address("drive", ...drive.name.split("/"))}>${drive.name}</a>
+      <span class="state"><${Icon} name=${state} /> ${t(stateKey(state, drive))}</span>
+      ${hasFault && html`<span class="fault">${faultText(drive.name) || good(`${drive.name}/status/fault_text`)}</span>`}
       <${Speed} drive=${drive} />
       <${Control} drive=${drive} />
-    </a>
+    </div>
   `;
 }
 
@@ -94,13 +106,13 @@ function Speed({ drive }) {
   const command = `${drive.name}/command/${drive.main}`;
   const { unit, low, high } = nature(command);
   const most = Math.max(Math.abs(low ?? 0), Math.abs(high ?? 0)) || 1;
-  const isGood = quality(actual) === "good";
+  const [is, wanted] = [good(actual), good(command)];
   return html`
-    <span class=${classes("speed", { old: !isGood })}>
-      <span class="big">${isGood ? number(value(actual), unit) : "–"}</span> ${unit}
-      <span class="setpoint">${t("plant.setpoint", { value: quantity(value(command), unit) })}</span>
-      ${isGood
-        ? html`<${Course} actual=${(value(actual) ?? 0) / most} setpoint=${(value(command) ?? 0) / most} />`
+    <span class=${classes("speed", { old: is === null })}>
+      <span class="big">${number(is, unit)}</span> ${unit}
+      <span class="setpoint">${t("plant.setpoint", { value: quantity(wanted, unit) })}</span>
+      ${is !== null
+        ? html`<${Course} actual=${is / most} setpoint=${wanted === null ? null : wanted / most} />`
         : html`<span class="reason">${maybe(`quality.${quality(actual)}`)}</span>`}
     </span>
   `;
@@ -115,20 +127,19 @@ function Course({ actual, setpoint }) {
       <rect class="track" x="0" y="3" width="120" height="4" />
       <rect class="fill" x=${from} y="3" width=${Math.abs(x(actual) - x(0))} height="4" />
       <rect class="middle" x="59.5" y="1" width="1" height="8" />
-      <path class="mark" d=${`M${x(setpoint)} 3l-3-3h6zM${x(setpoint)} 7l-3 3h6z`} />
+      ${setpoint !== null && html`<path class="mark" d=${`M${x(setpoint)} 3l-3-3h6zM${x(setpoint)} 7l-3 3h6z`} />`}
     </svg>
   `;
 }
 
 function Control({ drive }) {
   const point = `${drive.name}/supervision`;
-  const owner = value(`${point}/owner`);
-  const timeout = value(`${point}/fieldbus_timeout_ms`) ?? 0;
-  const state = label(`${point}/watchdog_state`, value(`${point}/watchdog_state`));
-  const left = value(`${point}/watchdog_left_ms`) ?? 0;
+  const timeout = good(`${point}/fieldbus_timeout_ms`);
+  const state = goodLabel(`${point}/watchdog_state`);
+  const left = good(`${point}/watchdog_left_ms`) ?? 0;
   return html`
     <span class="control">
-      <span class="label">${t("plant.owner")}</span> <span class="owner">${ownerName(owner)}</span>
+      <span class="label">${t("plant.owner")}</span> <span class="owner">${ownerOf(drive.name)}</span>
     </span>
     <span class="margin">
       <span class="label">${t("plant.margin")}</span>
@@ -143,22 +154,23 @@ function Control({ drive }) {
 
 // A node that is no drive, with what its inputs say and its outputs are.
 function NodeTile({ node }) {
-  const state = label(`${node.name}/node/state`, value(`${node.name}/node/state`));
+  const state = goodLabel(`${node.name}/node/state`);
   return html`
-    <a class="tile" href=${address("bus", node.bus)}>
-      <span class="name">${node.name}</span>
-      <span class="state"><${Icon} name=${state === "operational" ? "ok" : "lost"} /> ${t(`node.${state}`)}</span>
+    <div class=${classes("tile", `of-${state}`)}>
+      <a class="name" href=${address("bus", node.bus)}>${node.name}</a>
+      <span class="state"><${Icon} name=${shapeOfNode(state)} /> ${t(`node.${state}`)}</span>
       <span class="family">${node.family}</span>
       <span class="signals">${signals(node).map((name) => html`<span class=${classes({ old: quality(name) !== "good" })}>
-        ${leafOf(name)} ${quality(name) === "good" ? shownSignal(name) : "–"}</span>`)}</span>
-    </a>
+        ${leafOf(name)} ${shownSignal(name)}</span>`)}</span>
+    </div>
   `;
 }
 
 const signals = (node) => [...below(`${node.name}/input`), ...below(`${node.name}/output`)];
 
 function shownSignal(name) {
-  const held = value(name);
+  const held = good(name);
+  if (held === null) return "–";
   if (typeof held === "boolean") return t(held ? "signal.on" : "signal.off");
   const state = nature(name).states?.[held];
   return state ?? quantity(held, nature(name).unit);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,9 +12,10 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from tests.support import sites
 from tests.support.desk import Desk, browser
 from tests.support.process import Process, drivebridge, free_port, until
-from tests.wire.test_page import DRIVE, Tab, write_site
+from tests.wire.test_page import DRIVE, Tab, users, write_site
 from tests.wire.test_page import Browser as Client
 
 AXE = Path("tests/wire/node/node_modules/axe-core/axe.min.js")
@@ -62,6 +64,18 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Process, 
         process.wait_ready()
         until(lambda: "is served on" in process.output(), 30.0, "the page is served")
         yield process, port
+
+
+@contextmanager
+def serving(folder: Path, *nodes: str) -> Iterator[int]:
+    """The page of a site with these nodes on a simulated bus; its port."""
+    port = free_port()
+    tables = f'[opcua]\nlisten = "127.0.0.1:{free_port()}"\n{users()}', f'[page]\nlisten = "127.0.0.1:{port}"\n'
+    site = sites.write(folder, sites.bus(*nodes), *tables)
+    with drivebridge(folder, "run", "run", str(site), notify=True) as process:
+        process.wait_ready()
+        until(lambda: "is served on" in process.output(), 30.0, "the page is served")
+        yield port
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +166,7 @@ def test_a_tab_that_hangs_is_a_controller_that_fell_silent(desk: Desk) -> None:
             expect(watcher.locator(".sentence")).to_contain_text("its controller fell silent")
         expect(watcher.locator(".trouble")).to_contain_text("(web page)")
         expect(watcher.locator(".trouble .remedy")).to_contain_text("acknowledge")
-        page.get_by_role("button", name="Reset fault").click()
+        page.get_by_role("button", name="Acknowledge fault").click()
         expect(watcher.locator(".sentence")).to_contain_text("Everything is in order")
         state(page).not_to_have_text(re.compile("running"))
 
@@ -166,6 +180,37 @@ def test_a_second_browser_takes_no_drive_from_an_operator_and_an_engineer_does(d
         expect(other.get_by_role("alert")).to_contain_text("is controlled by")
         take(engineer)
         expect(owner.locator(".ownership")).to_contain_text("engineer (web page)")
+
+
+def positioner() -> str:
+    """A drive that is told where to go, how fast and how hard."""
+    drive = sites.drive("axis1", "lease", 1000, "telegram_downtime_s = 0")
+    more = 'supervision = "guarding"\nsupervision_ms = 2000'
+    return sites.node(drive, name="winder", node_id=7, mapping="stoeber/5000-posi", more=more)
+
+
+def test_setpoints_are_sent_together_and_empty_ones_are_not(tmp_path: Path, chromium: Browser) -> None:
+    with serving(tmp_path, positioner()) as port:
+        desk = Desk(chromium, port)
+        with desk.sits("operator") as page:
+            sent: list[str] = []
+            page.on("websocket", lambda socket: socket.on("framesent", lambda text: sent.append(str(text))))
+            page.reload()
+            to(page, "drive/winder/drive")
+            page.get_by_role("button", name="Take control").click()
+            expect(page.locator(".ownership")).to_contain_text("you, in this tab")
+            labels = page.locator("form.setpoint label")
+            expect(labels).to_have_count(4)
+            expect(labels.first).to_contain_text("velocity")
+            page.get_by_role("button", name="Send").click()
+            page.locator("#setpoint").fill("120")
+            page.locator("#setpoint-acceleration").fill("300")
+            page.get_by_role("button", name="Send").click()
+            expect(page.locator("form.setpoint .field").first).to_contain_text("now 120")
+            expect(page.locator("#setpoint")).to_have_value("")
+            written = [json.loads(one)["fields"]["values"] for one in sent if '"write"' in one]
+            assert written == [{"velocity": 120, "acceleration": 300}]
+        assert not desk.complaints
 
 
 def test_an_observer_is_told_that_it_may_read(desk: Desk) -> None:

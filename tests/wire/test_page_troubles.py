@@ -114,7 +114,7 @@ def test_a_drive_has_a_fault_and_is_acknowledged(tmp_path: Path, chromium: Brows
         trouble.get_by_role("link", name=DRIVE).click()
         expect(page.locator(".drivehead .state")).to_contain_text("fault")
         page.get_by_role("button", name="Take control").click()
-        page.get_by_role("button", name="Reset fault").click()
+        page.get_by_role("button", name="Acknowledge fault").click()
         expect(page.locator(".sentence")).to_contain_text("Everything is in order")
         expect(page.locator(".drivehead .state")).not_to_contain_text("fault")
 

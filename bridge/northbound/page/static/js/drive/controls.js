@@ -1,55 +1,52 @@
 // Setpoints and commands, for who controls the drive; stopping is everybody's who may command at all.
 
-import { html, useEffect, useRef } from "../ui.js";
+import { html, useEffect } from "../ui.js";
 import { may } from "../session.js";
-import { nature } from "../site.js";
-import { value } from "../values.js";
-import { quantity } from "../format.js";
 import { t } from "../texts.js";
-import { ownerName } from "../owner.js";
+import { told } from "../outcome.js";
+import { ownerOf } from "../owner.js";
+import { Setpoints } from "./setpoints.js";
 import { giveBack, isOurs, refusals, request, take } from "./ownership.js";
 
 export function Controls({ drive }) {
   const name = drive.name;
   const isHeld = isOurs(name);
-  useEffect(() => () => giveBack(name), [name]);
+  useEffect(() => {
+    forgetRefusal(name);
+    return () => {
+      giveBack(name);
+      forgetRefusal(name);
+    };
+  }, [name]);
   const takes = drive.control === "lease";
   return html`
     <section class="controls" aria-labelledby="controls">
       <h2 id="controls">${t("drive.control")}</h2>
       <p class="ownership">
-        <span class="label">${t("plant.owner")}</span> <strong>${ownerName(value(`${name}/supervision/owner`))}</strong>
+        <span class="label">${t("plant.owner")}</span> <strong>${ownerOf(name)}</strong>
         ${may("operator") && takes && !isHeld && html`<button onClick=${() => take(name)}>${t("drive.take")}</button>`}
         ${isHeld && html`<button onClick=${() => giveBack(name)}>${t("drive.give_back")}</button>`}
       </p>
       ${!may("operator") && html`<p class="quiet">${t("drive.observer")}</p>`}
       ${may("operator") && !takes && html`<p class="quiet">${t("drive.fixed", { control: t(`control.${drive.control}`) })}</p>`}
+      ${may("operator") && !isHeld && html`<p class="quiet"><${Stopping} drive=${drive} takes=${takes} /></p>`}
       ${isHeld && html`<p class="quiet">${t("drive.foreground")}</p>`}
-      ${may("operator") && takes && html`<${Setpoint} drive=${drive} isHeld=${isHeld} />`}
+      ${may("operator") && takes && html`<${Setpoints} drive=${drive} isHeld=${isHeld} />`}
       ${may("operator") && html`<${Buttons} drive=${drive} isHeld=${isHeld} />`}
       <${Refusal} drive=${name} />
     </section>
   `;
 }
 
-function Setpoint({ drive, isHeld }) {
-  const field = useRef();
-  if (!drive.main) return null;
-  const point = `${drive.name}/command/${drive.main}`;
-  const { unit, low, high } = nature(point);
-  const onSubmit = (event) => {
-    event.preventDefault();
-    request(drive.name, "write", { values: { [drive.main]: Number(field.current.value) } });
-  };
-  return html`
-    <form class="setpoint" onSubmit=${onSubmit}>
-      <label for="setpoint">${t("drive.setpoint", { name: t(`point.${drive.main}`) })}</label>
-      <input id="setpoint" ref=${field} type="number" step="any" min=${low} max=${high} required disabled=${!isHeld}
-        placeholder=${value(point) ?? ""} /> ${unit}
-      <button disabled=${!isHeld}>${t("drive.send")}</button>
-      <small>${t("drive.now", { value: quantity(value(point), unit) })}</small>
-    </form>
-  `;
+// Whether this tab may stop a drive that is not its own.
+function Stopping({ drive, takes }) {
+  if (!drive.stop_by_anyone) return t("drive.stop_by_owner");
+  return takes ? null : t("drive.stop_only");
+}
+
+// A refusal is about what was just asked, and not about what somebody asked before this page was left.
+function forgetRefusal(drive) {
+  if (refusals.value[drive]) refusals.value = { ...refusals.value, [drive]: null };
 }
 
 function Buttons({ drive, isHeld }) {
@@ -75,5 +72,5 @@ function Refusal({ drive }) {
 function text({ action, outcome }) {
   const what = t(`action.${action}`);
   if (outcome.ok) return t("outcome.not_forwarded", { what, message: outcome.message });
-  return t("outcome.refused", { what, message: outcome.message || t(`outcome.${outcome.code}`) });
+  return t("outcome.refused", { what, message: told(outcome) });
 }

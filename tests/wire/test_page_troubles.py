@@ -18,7 +18,7 @@ from tests.support.process import Process, free_port, peer, until
 from tests.wire.test_page import DRIVE, users
 
 SHOTS = Path("build/page")
-SINCE = re.compile(r"since (before )?\d\d:\d\d:\d\d \(\d+ s\)")
+SINCE = re.compile(r"since \d\d:\d\d:\d\d (or earlier )?\(\d+ s\)")
 
 
 class BrokenPlant:
@@ -145,7 +145,7 @@ def test_somebody_else_commands_a_drive(tmp_path: Path, chromium: Browser) -> No
 def test_a_drive_has_another_parameter_set(tmp_path: Path, chromium: Browser) -> None:
     with broken(tmp_path, chromium) as plant:
         plant.tell("set_otherwise")
-        plant.says(DRIVE, "no setpoint is taken as frequency", "P546[1]", "Set the drive's parameter back")
+        plant.says(DRIVE, "the frequency setpoint does not reach the drive", "P546[1]", "Set the drive's parameter back")
         plant.shot("parameter-set")
 
 

@@ -22,6 +22,23 @@ export function number(value, unit = "") {
   return /^-0([.,]0*)?$/.test(shown) ? shown.slice(1) : shown;
 }
 
+/** A number as it is, with all of its decimals, at least `least`; without groups, which may be read as decimals. */
+export function exact(value, least = 0) {
+  if (typeof value !== "number") return value === null || value === undefined ? "–" : String(value);
+  const [digits, exponent] = String(shortest(value)).split("e");
+  const decimals = Math.max(least, (digits.split(".")[1] ?? "").length);
+  const shown = exponent ? { maximumSignificantDigits: 15 } : { minimumFractionDigits: decimals, maximumFractionDigits: decimals };
+  return new Intl.NumberFormat(language.value, { ...shown, useGrouping: false }).format(shortest(value));
+}
+
+/** The shortest number that is the same in the drive, which may keep it in 32 bits: 0.1 and not 0.10000000149. */
+export function shortest(value) {
+  if (Number.isInteger(value)) return value;
+  if (Math.fround(value) !== value) return Number(value.toPrecision(12));
+  const found = [6, 7, 8, 9].map((digits) => Number(value.toPrecision(digits))).find((one) => Math.fround(one) === value);
+  return found ?? value;
+}
+
 /** A number with its unit, kept on one line. */
 export function quantity(value, unit = "") {
   const shown = number(value, unit);

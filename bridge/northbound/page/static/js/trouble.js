@@ -42,7 +42,13 @@ export function headline(trouble) {
 /** The present fault of a drive in the reader's language, with its number; empty where it has none of its own. */
 export function faultText(drive) {
   const found = (troubles.value ?? []).find((one) => one.kind === "drive_fault" && one.place === drive);
-  return found ? `${found.facts.number} ${said(found).text}`.trim() : "";
+  return found ? inWords(driveAt(drive), found.facts.text, found.facts.number) : "";
+}
+
+/** A fault in the reader's language with its number, as its maker writes it: "E003/3.0 overcurrent". */
+export function inWords(drive, text, number) {
+  const own = faultIn(drive?.mapping, number).text;
+  return own ? `${number} ${withoutNumber(own, number)}` : text;
 }
 
 const RANKS = ["danger", "alarm", "warning"];

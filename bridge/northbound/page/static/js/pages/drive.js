@@ -4,24 +4,26 @@ import { classes, html } from "../ui.js";
 import { troubles } from "../live.js";
 import { address } from "../route.js";
 import { drives, has, nature } from "../site.js";
-import { quality, value } from "../values.js";
+import { quality } from "../values.js";
 import { number } from "../format.js";
 import { t } from "../texts.js";
 import { Icon } from "../icons.js";
-import { stateOf } from "../drivestate.js";
+import { good, stateKey, stateOf } from "../drivestate.js";
 import { Bits } from "../drive/bits.js";
 import { Chain } from "../drive/chain.js";
 import { Controls } from "../drive/controls.js";
+import { Faults } from "../drive/faults.js";
 import { StateDiagram } from "../drive/states.js";
 import { Trend } from "../drive/trend.js";
 import { TroubleRow } from "./plant.js";
 
-export const drive = { path: "drive", inMenu: false, topics, View };
+export const drive = { path: "drive", topics, View };
 
 const nameIn = (route) => route.slice(1).join("/");
 
 function topics(route) {
-  return drives.value.some((one) => one.name === nameIn(route)) ? [`drive ${nameIn(route)}`] : [];
+  const one = drives.value.find((found) => found.name === nameIn(route));
+  return one ? [`drive ${one.name}`, `node ${one.node}`] : [];
 }
 
 function View({ route }) {
@@ -36,7 +38,7 @@ function Drive({ drive }) {
   return html`
     <header class=${classes("drivehead", `in-${state}`)}>
       <h1>${drive.name}</h1>
-      <span class="state"><${Icon} name=${state} /> ${t(`state.${state}`)}</span>
+      <span class="state"><${Icon} name=${state} /> ${t(stateKey(state, drive))}</span>
       <span class="fact">${drive.family}</span>
       <a href=${address("parameters", ...drive.name.split("/"))}>${t("page.parameters")}</a>
       <a href=${address("bus", drive.bus)}>${t("page.bus")} ${drive.bus}</a>
@@ -49,6 +51,7 @@ function Drive({ drive }) {
       <${Controls} drive=${drive} />
       <${Chain} drive=${drive} />
     </div>
+    <${Faults} drive=${drive} />
     <${StateDiagram} drive=${drive} />
     <${Trend} drive=${drive} />
     <${Bits} drive=${drive} />
@@ -64,7 +67,7 @@ function Actuals({ drive }) {
         .filter((name) => has(name) && quality(name) !== "disabled")
         .map((name) => html`
           <div><dt>${t(`point.${name.split("/").at(-1)}`)}</dt>
-            <dd>${quality(name) === "good" ? number(value(name), nature(name).unit) : "–"} <small>${nature(name).unit}</small></dd></div>
+            <dd>${number(good(name), nature(name).unit)} <small>${nature(name).unit}</small></dd></div>
         `)}
     </dl>
   `;

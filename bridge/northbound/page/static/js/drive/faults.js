@@ -1,0 +1,91 @@
+// The faults of a drive: the present one with its cause and remedy, what was before, and what its node has told.
+
+import { html, useState } from "../ui.js";
+import { below, has, label, nature } from "../site.js";
+import { exact, number } from "../format.js";
+import { faultIn, t } from "../texts.js";
+import { good } from "../drivestate.js";
+import { ask } from "../live.js";
+import { told } from "../outcome.js";
+import { inWords } from "../trouble.js";
+
+export function Faults({ drive }) {
+  const status = (leaf) => good(`${drive.name}/status/${leaf}`);
+  const text = status("fault_text");
+  const own = faultIn(drive.mapping, status("fault_number"));
+  const [cause, remedy] = [own.cause || status("fault_cause"), own.remedy || status("fault_remedy")];
+  return html`
+    <section class="faults" aria-labelledby="faults">
+      <h2 id="faults">${t("faults.title")}</h2>
+      <dl class="facts">
+        <dt>${t("faults.present")}</dt>
+        <dd>${text ? html`<strong class="is-alarm">${inWords(drive, text, status("fault_number"))}</strong>` : text === null ? "–" : t("faults.none")}</dd>
+        ${text && cause && html`<dt>${t("faults.cause")}</dt><dd>${cause}</dd>`}
+        ${text && remedy && html`<dt>${t("plant.what_to_do")}</dt><dd>${remedy}</dd>`}
+        <${Before} drive=${drive} />
+      </dl>
+      <${Memory} drive=${drive} />
+      <${Emergencies} node=${drive.node} />
+    </section>
+  `;
+}
+
+// The text of the last fault begins with its number.
+const BEFORE = {
+  last_fault_text: (text, drive) => (text ? inWords(drive, text, text.split(" ", 1)[0]) : t("faults.none")),
+  trips: (count) => number(count),
+  last_stop: (code, drive) => t(`stop.${label(`${drive.name}/supervision/last_stop`, code)}`),
+};
+
+function Before({ drive }) {
+  const point = (leaf) => `${drive.name}/supervision/${leaf}`;
+  const shown = (leaf) => (good(point(leaf)) === null ? "–" : BEFORE[leaf](good(point(leaf)), drive));
+  return Object.keys(BEFORE)
+    .filter((leaf) => has(point(leaf)))
+    .map((leaf) => html`<dt>${t(`faults.${leaf}`)}</dt><dd>${shown(leaf)}</dd>`);
+}
+
+// The faults that the drive itself keeps are parameters; they are read when somebody asks for them.
+function Memory({ drive }) {
+  const entries = memoryOf(drive.name);
+  const [read, setRead] = useState({ rows: [] });
+  if (!entries.length) return null;
+  const onRead = async () => {
+    setRead({ rows: [], isBusy: true });
+    const rows = [];
+    for (const { name, title } of entries) {
+      const outcome = await ask(drive.name, "read_parameter", { parameter: name });
+      rows.push({ name, title, value: outcome.ok ? exact(outcome.value, 1) : told(outcome) });
+      if (!outcome.ok) break;
+    }
+    setRead({ rows });
+  };
+  return html`
+    <p class="search"><button onClick=${onRead} disabled=${read.isBusy}>${t("faults.read")}</button>
+      <span class="hidden" role="status">${read.isBusy ? t("frame.loading") : ""}</span></p>
+    ${read.rows.length > 0 && html`<dl class="facts">
+      ${read.rows.map((row) => html`<dt>${row.name} ${row.title}</dt><dd>${row.value}</dd>`)}</dl>`}
+  `;
+}
+
+// A point of a parameter is described by the parameter's name and title: "P701[1] last fault".
+function memoryOf(drive) {
+  return below(`${drive}/parameter`)
+    .map((point) => /^(\S+) (last fault( but \d+)?)$/.exec(nature(point).description ?? ""))
+    .filter(Boolean)
+    .map(([, name, title]) => ({ name, title }));
+}
+
+function Emergencies({ node }) {
+  const history = good(`${node}/node/emcy_history`);
+  if (history === null) return null;
+  const all = JSON.parse(history || "[]");
+  return html`
+    <h3>${t("faults.emergencies", { node })}</h3>
+    ${all.length === 0 && html`<p class="quiet">${t("faults.no_emergencies")}</p>`}
+    ${all.length > 0 && html`<div class="scroll" tabindex="0" role="group" aria-label=${t("faults.emergencies", { node })}><table class="rows">
+      <thead><tr>${["code", "register", "vendor", "text"].map((name) => html`<th scope="col">${t(`emcy.${name}`)}</th>`)}</tr></thead>
+      <tbody>${all.map((one) => html`<tr><td><code>${one.code}</code></td><td><code>${one.register}</code></td><td><code>${one.vendor}</code></td><td>${one.text}</td></tr>`)}</tbody>
+    </table></div>`}
+  `;
+}

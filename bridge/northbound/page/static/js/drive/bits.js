@@ -2,9 +2,9 @@
 
 import { classes, html } from "../ui.js";
 import { has, nature } from "../site.js";
-import { value } from "../values.js";
 import { word } from "../format.js";
 import { maybe, t } from "../texts.js";
+import { good } from "../drivestate.js";
 
 export function Bits({ drive }) {
   const sent = `${drive.name}/supervision/sent_control_word`;
@@ -21,10 +21,11 @@ const bitsOf = (...points) => points.map((name) => nature(name).bits).find(Boole
 
 function Word({ title, point, bits }) {
   if (!has(point)) return null;
-  const present = value(point);
+  const present = good(point);
   return html`
     <table class="bits">
       <caption>${title} <code>${word(present)}</code></caption>
+      <thead><tr>${["bit", "name", "value"].map((name) => html`<th scope="col">${t(`bits.${name}`)}</th>`)}</tr></thead>
       <tbody>
         ${bits.map((name, bit) => {
           if (!name) return null;
@@ -32,7 +33,7 @@ function Word({ title, point, bits }) {
           return html`
             <tr class=${classes({ set: isSet })}>
               <td class="bit">${bit}</td>
-              <td>${maybe(`bit.${name}`) || name.replaceAll("_", " ")}</td>
+              <th scope="row">${maybe(`bit.${name}`) || name.replaceAll("_", " ")}</th>
               <td class="is">${present === null ? "–" : isSet ? "1" : "0"}</td>
             </tr>
           `;

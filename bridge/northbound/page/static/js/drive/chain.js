@@ -1,58 +1,92 @@
 // The supervision chain: who watches whom, how much time is left, and what happens when one of them falls silent.
+// What is not good is not known: an arrow is dashed then, and no time is shown as if it were left.
 
-import { classes, html } from "../ui.js";
-import { has, label } from "../site.js";
-import { quality, reason, value } from "../values.js";
+import { html } from "../ui.js";
+import { isConnected, troubles } from "../live.js";
+import { has } from "../site.js";
+import { quality, reason } from "../values.js";
 import { quantity } from "../format.js";
 import { t } from "../texts.js";
-import { ownerName } from "../owner.js";
+import { good, goodLabel, ownState } from "../drivestate.js";
+import { ownerOf } from "../owner.js";
 import { Meter } from "../meter.js";
 
+const NEVER_MS = 0xffffffff;
+
 export function Chain({ drive }) {
-  const point = (leaf) => `${drive.name}/supervision/${leaf}`;
-  const timeout = value(point("fieldbus_timeout_ms"));
-  const left = value(point("watchdog_left_ms"));
-  const watchdog = label(point("watchdog_state"), value(point("watchdog_state")));
-  const downtimeMs = (value(point("telegram_downtime_s")) ?? 0) * 1000;
-  const age = value(point("pdo_age_ms"));
   return html`
     <section class="chain" aria-labelledby="chain">
       <h2 id="chain">${t("chain.title")}</h2>
       <ol>
-        <li class="link">
-          <div class="end"><strong>${t("chain.controller")}</strong> ${ownerName(value(point("owner")))}</div>
-          <${Arrow} text=${t("chain.telegrams")} isBroken=${watchdog === "tripped"}>
-            <${Margin} time=${watchdog === "running" ? left : null} of=${timeout} text=${t(`watchdog.${watchdog}`)} />
-          <//>
-          <p class="break">
-            ${timeout
-              ? html`${t("chain.controller.silent", { timeout: quantity(timeout, "ms"), reaction: t(`reaction.${drive.on_expiry}`) })}${" "}
-                  <${Worst} name=${point("worst_case_stop_ms")} />`
-              : t("chain.controller.unwatched")}
-          </p>
-        </li>
-        <li class="link">
-          <div class="end"><strong>${t("chain.bridge")}</strong> drivebridge</div>
-          <${Arrow} text=${t("chain.frames")} isBroken=${false} />
-          <p class="break"><${BridgeBreak} name=${point("worst_case_bridge_ms")} /></p>
-        </li>
-        <li class="link">
-          <div class="end"><strong>${t("chain.drive")}</strong> ${drive.name} <small>${drive.family}</small></div>
-          <${Arrow} text=${t("chain.answers")} isBack isBroken=${["lost", "dead"].includes(quality(`${drive.name}/status/state`))}>
-            ${has(point("pdo_age_ms")) &&
-            html`<${Margin} time=${age === null || age > 0xfffffff0 ? null : Math.max(0, downtimeMs - age)} of=${downtimeMs}
-              text=${t("chain.unheard")} />`}
-          <//>
-          <p class="break">${downtimeMs > 0 ? t("chain.drive.silent", { time: quantity(downtimeMs, "ms") }) : t("chain.drive.unwatched")}</p>
-        </li>
+        <${OfController} drive=${drive} />
+        <${OfBridge} drive=${drive} />
+        <${OfDrive} drive=${drive} />
       </ol>
     </section>
   `;
 }
 
-function Arrow({ text, isBroken, isBack, children }) {
+function OfController({ drive }) {
+  const point = (leaf) => `${drive.name}/supervision/${leaf}`;
+  const watchdog = goodLabel(point("watchdog_state"));
+  const timeout = good(point("fieldbus_timeout_ms"));
   return html`
-    <div class=${classes("arrow", { broken: isBroken })}>
+    <li class="link">
+      <div class="end"><strong>${t("chain.controller")}</strong> ${ownerOf(drive.name)}</div>
+      <${Arrow} text=${t("chain.telegrams")} is=${{ tripped: "broken", unknown: "unsure" }[watchdog]}>
+        <${Margin} time=${watchdog === "running" ? good(point("watchdog_left_ms")) : null} of=${timeout} text=${t(`watchdog.${watchdog}`)} />
+      <//>
+      <p class="break"><${ControllerBreak} drive=${drive} timeout=${timeout} worst=${point("worst_case_stop_ms")} /></p>
+    </li>
+  `;
+}
+
+function ControllerBreak({ drive, timeout, worst }) {
+  if (timeout === null) return t("chain.unknown");
+  if (!timeout) return t("chain.controller.unwatched");
+  const filled = { timeout: quantity(timeout, "ms"), reaction: t(`reaction.${drive.on_expiry}`) };
+  if (drive.on_expiry === "hold") return html`<strong class="is-alarm">${t("chain.controller.hold", filled)}</strong>`;
+  return html`${t("chain.controller.silent", filled)}${" "}<${Worst} name=${worst} />`;
+}
+
+function OfBridge({ drive }) {
+  const isDown = (troubles.value ?? []).some((one) => one.place === `bus/${drive.bus}` && ["bus_down", "bus_off"].includes(one.kind));
+  return html`
+    <li class="link">
+      <div class="end"><strong>${t("chain.bridge")}</strong> drivebridge</div>
+      <${Arrow} text=${t("chain.frames")} is=${!isConnected.value ? "unsure" : isDown ? "broken" : ""} />
+      <p class="break"><${BridgeBreak} name=${`${drive.name}/supervision/worst_case_bridge_ms`} /></p>
+    </li>
+  `;
+}
+
+function OfDrive({ drive }) {
+  const point = (leaf) => `${drive.name}/supervision/${leaf}`;
+  const downtimeS = good(point("telegram_downtime_s"));
+  const state = ownState(drive.name);
+  return html`
+    <li class="link">
+      <div class="end"><strong>${t("chain.drive")}</strong> ${drive.name} <small>${drive.family}</small></div>
+      <${Arrow} text=${t("chain.answers")} isBack is=${{ lost: "broken", unknown: "unsure", disabled: "unsure" }[state]}>
+        ${has(point("pdo_age_ms")) && html`<${Answers} age=${good(point("pdo_age_ms"))} downtimeMs=${downtimeS === null ? null : downtimeS * 1000} isHeard=${state !== "lost"} />`}
+      <//>
+      <p class="break">${downtimeS === null ? t("chain.unknown")
+        : downtimeS > 0 ? t("chain.drive.silent", { time: quantity(downtimeS * 1000, "ms") }) : t("chain.drive.unwatched")}</p>
+    </li>
+  `;
+}
+
+// Whether anything came, and how long the next may take.
+function Answers({ age, downtimeMs, isHeard }) {
+  if (age === null || downtimeMs === null) return html`<span class="quiet">${t("unknown")}</span>`;
+  if (age === NEVER_MS) return html`<span class="quiet">${t("chain.unheard")}</span>`;
+  if (!isHeard) return html`<span class="quiet">${t("state.lost")}</span>`;
+  return html`<${Margin} time=${downtimeMs > 0 ? Math.max(0, downtimeMs - age) : null} of=${downtimeMs} text=${t("chain.unwatched")} />`;
+}
+
+function Arrow({ text, is = "", isBack, children }) {
+  return html`
+    <div class=${`arrow ${is}`}>
       <span class="way">${text}</span>
       <svg viewBox="0 0 100 12" preserveAspectRatio="none" aria-hidden="true">
         <path d=${isBack ? "M100 6H6M12 1L4 6l8 5" : "M0 6h94M88 1l8 5-8 5"} />
@@ -70,6 +104,7 @@ function Margin({ time, of, text }) {
 
 // What the drive does by itself is read from it: it may be that it would run on.
 function BridgeBreak({ name }) {
+  if (!isConnected.value) return t("chain.unknown");
   if (quality(name) === "config_error") return html`<strong class="is-alarm">${t("chain.bridge.doubt", { why: reason(name) })}</strong>`;
   return html`${t("chain.bridge.silent")}${" "}<${Worst} name=${name} />`;
 }
@@ -77,8 +112,8 @@ function BridgeBreak({ name }) {
 // A published worst case, or why there is none.
 function Worst({ name }) {
   if (!has(name)) return null;
-  const time = value(name);
-  if (quality(name) !== "good") return html`<strong class="is-alarm">${t("chain.not_known", { why: reason(name) || t("unknown") })}</strong>`;
+  const time = good(name);
+  if (time === null) return html`<strong class="is-alarm">${t("chain.not_known", { why: reason(name) || t("unknown") })}</strong>`;
   if (!time) return html`<strong class="is-alarm">${t("chain.never")}</strong>`;
   return html`<strong>${t("chain.within", { time: quantity(time, "ms") })}</strong>`;
 }

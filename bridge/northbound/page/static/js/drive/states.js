@@ -2,9 +2,8 @@
 // (CiA 402 §7.2; NORD BU 2500 §6.5; the families name their states alike).
 
 import { classes, html } from "../ui.js";
-import { label } from "../site.js";
-import { value } from "../values.js";
 import { t } from "../texts.js";
+import { ownState } from "../drivestate.js";
 
 const WIDTH = 132;
 const HEIGHT = 40;
@@ -33,13 +32,12 @@ const STEPS = [
 ];
 
 export function StateDiagram({ drive }) {
-  const point = `${drive.name}/status/state`;
-  const present = value(point) === null ? "unknown" : label(point, value(point));
+  const present = ownState(drive.name);
   const there = Object.keys(PLACES).filter((name) => drive.states.includes(name));
   const all = STEPS.map(([from, to, command]) => [from, command === "stop" ? drive.stops_in : to, command]);
   const steps = all.filter(([from, to]) => there.includes(from) && there.includes(to) && isDirect(from, to, there));
   return html`
-    <section class="diagram" aria-labelledby="diagram">
+    <section class=${classes("diagram", { unsure: !(present in PLACES) })} aria-labelledby="diagram">
       <h2 id="diagram">${t("drive.states")}</h2>
       <div class="scroll" tabindex="0" role="group" aria-label=${t("drive.states")}>
       <svg viewBox="0 0 720 140" role="img" aria-label=${t("drive.states.now", { state: t(`state.${present}`) })}>
@@ -105,7 +103,7 @@ function Possible({ steps, present }) {
       <span class="label">${t("drive.steps")}</span>${" "}
       ${commands.map((command) => t(`step.${command}`, { to: ends(steps, command) })).join(" · ")}
       ${waits && ` ${t("step.itself", { to: ends(steps, "itself") })}`}
-      ${!steps.length && t(present === "unknown" ? "step.unknown" : "step.none")}
+      ${!steps.length && t(present in PLACES ? "step.none" : "step.unknown")}
     </p>
   `;
 }

@@ -1,4 +1,4 @@
-// Has the browser keep a text, or what the server answers, as a file.
+// Has the browser keep a text as a file.
 
 export function save(name, content, type = "text/plain") {
   const link = document.createElement("a");

@@ -1,21 +1,19 @@
 // A long table with a search. Only the first rows of what is found are drawn.
 
-import { html, useEffect, useMemo, useState } from "./ui.js";
+import { html, useMemo, useState } from "./ui.js";
 import { t } from "./texts.js";
+import { Failure, useFetched } from "./fetched.js";
 import { Copy } from "./copy.js";
 
 const DRAWN = 200;
 
 /** The rows at `address`, a JSON list of objects; the column `copied` gets a button that copies it. */
 export function Rows({ address, copied }) {
-  const [rows, setRows] = useState(null);
-  const [failure, setFailure] = useState("");
+  const told = useFetched(address);
+  const rows = told.value;
   const [wanted, setWanted] = useState("");
-  useEffect(() => {
-    load(address).then(setRows, (error) => setFailure(error.message));
-  }, [address]);
   const found = useMemo(() => matching(rows ?? [], wanted), [rows, wanted]);
-  if (failure) return html`<p class="failure">${t("integration.failed", { why: failure })}</p>`;
+  if (told.failure) return html`<${Failure} told=${told} />`;
   if (!rows) return html`<p class="quiet">${t("frame.loading")}</p>`;
   const columns = Object.keys(rows[0] ?? {});
   return html`
@@ -34,13 +32,6 @@ export function Rows({ address, copied }) {
       </table>
     </div>
   `;
-}
-
-async function load(address) {
-  const answer = await fetch(address);
-  const told = await answer.json();
-  if (!answer.ok) throw new Error(told.error);
-  return told;
 }
 
 /** The rows in which every word of `wanted` is somewhere in `text(row)`. */

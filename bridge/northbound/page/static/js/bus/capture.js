@@ -2,12 +2,14 @@
 
 import { html, useState } from "../ui.js";
 import { save } from "../download.js";
+import { fetched } from "../fetched.js";
 import { siteName } from "../session.js";
 import { t } from "../texts.js";
 import { Icon } from "../icons.js";
 
 const ENDINGS = { candump: "log", asc: "asc" };
 const LONGEST_S = 60;
+const ANSWERS_S = 15;
 
 export function Capture({ bus }) {
   const [state, setState] = useState({});
@@ -15,9 +17,10 @@ export function Capture({ bus }) {
     event.preventDefault();
     const { seconds, format } = Object.fromEntries(new FormData(event.target));
     setState({ busy: t("capture.runs", { seconds }) });
-    const answer = await fetch(`api/bus/${encodeURIComponent(bus.name)}/capture?seconds=${seconds}&format=${format}`).catch(() => null);
-    if (!answer?.ok) return setState({ failure: (await answer?.json())?.error ?? t("login.unreachable") });
-    save(`${siteName.value}-${bus.name}.${ENDINGS[format]}`, await answer.text());
+    const address = `api/bus/${encodeURIComponent(bus.name)}/capture?seconds=${seconds}&format=${format}`;
+    const { value, failure } = await fetched(address, { limitMs: (Number(seconds) + ANSWERS_S) * 1000, read: (answer) => answer.text() });
+    if (failure) return setState({ failure });
+    save(`${siteName.value}-${bus.name}.${ENDINGS[format]}`, value);
     setState({});
   };
   return html`

@@ -1,10 +1,11 @@
 // One bus: its condition, its nodes and how far each has come, the layout of their PDOs, and what passes on it.
 
-import { html, useEffect, useState } from "../ui.js";
+import { html } from "../ui.js";
 import { troubles } from "../live.js";
 import { address } from "../route.js";
 import { buses, nodes } from "../site.js";
 import { t } from "../texts.js";
+import { Failure, useFetched } from "../fetched.js";
 import { Condition } from "../bus/condition.js";
 import { Capture } from "../bus/capture.js";
 import { Layout } from "../bus/layout.js";
@@ -33,12 +34,7 @@ function View({ route }) {
 }
 
 function Bus({ bus }) {
-  const [told, setTold] = useState(null);
-  useEffect(() => {
-    fetch(`api/bus/${encodeURIComponent(bus.name)}`)
-      .then((answer) => answer.json())
-      .then(setTold);
-  }, [bus.name]);
+  const told = useFetched(`api/bus/${encodeURIComponent(bus.name)}`);
   const places = [`bus/${bus.name}`, ...nodes.value.filter((node) => node.bus === bus.name).map((node) => node.name)];
   const own = (troubles.value ?? []).filter((one) => places.includes(one.place));
   return html`
@@ -47,8 +43,9 @@ function Bus({ bus }) {
       ${own.map((trouble) => html`<${TroubleRow} key=${trouble.kind + trouble.place} trouble=${trouble} />`)}
     </ol></section>`}
     <${Nodes} bus=${bus} />
-    <${Traffic} bus=${bus} nodes=${told?.nodes ?? []} />
+    <${Traffic} bus=${bus} nodes=${told.value?.nodes ?? []} />
     <${Capture} bus=${bus} />
-    ${told && html`<${Layout} nodes=${told.nodes} />`}
+    <${Failure} told=${told} />
+    ${told.value && html`<${Layout} nodes=${told.value.nodes} />`}
   `;
 }

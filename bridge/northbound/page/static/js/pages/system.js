@@ -1,11 +1,12 @@
 // The service itself: versions, who is connected, certificates, the site file with its check, events and log.
 
-import { html, useEffect, useState } from "../ui.js";
+import { html } from "../ui.js";
 import { events } from "../live.js";
 import { may } from "../session.js";
-import { value } from "../values.js";
 import { clock, number, quantity } from "../format.js";
 import { t } from "../texts.js";
+import { good } from "../drivestate.js";
+import { Failure, useFetched } from "../fetched.js";
 import { Audit } from "../system/audit.js";
 import { Certificates } from "../system/certificates.js";
 import { SiteFile } from "../system/sitefile.js";
@@ -16,19 +17,11 @@ const REFRESH_MS = 5000;
 const HEALTH = { worst_round_lateness_ms: "ms", worst_trip_lateness_ms: "ms", missed_deadlines: "", audit_lost: "", refused_writes: "" };
 
 function View() {
-  const [told, setTold] = useState(null);
-  useEffect(() => {
-    const load = () =>
-      document.hidden ||
-      fetch("api/system")
-        .then((answer) => answer.ok && answer.json().then(setTold))
-        .catch(() => {});
-    load();
-    const timer = setInterval(load, REFRESH_MS);
-    return () => clearInterval(timer);
-  }, []);
+  const answer = useFetched("api/system", REFRESH_MS);
+  const told = answer.value;
   return html`
     <h1>${t("page.system")}</h1>
+    <${Failure} told=${answer} />
     ${told && html`
       <div class="columns">
         <${Versions} versions=${told.versions} />
@@ -55,7 +48,7 @@ function Health() {
   return html`
     <section class="panel" aria-labelledby="health"><h2 id="health">${t("system.health")}</h2>
       <dl class="facts">${Object.entries(HEALTH).map(([leaf, unit]) => html`
-        <dt>${t(`system.${leaf}`)}</dt><dd>${unit ? quantity(value(`bridge/${leaf}`), unit) : number(value(`bridge/${leaf}`))}</dd>`)}</dl>
+        <dt>${t(`system.${leaf}`)}</dt><dd>${unit ? quantity(good(`bridge/${leaf}`), unit) : number(good(`bridge/${leaf}`))}</dd>`)}</dl>
     </section>
   `;
 }

@@ -1,29 +1,27 @@
 // Who commanded what: the latest entries of the audit log.
 
-import { html, useEffect, useMemo, useState } from "../ui.js";
+import { html, useMemo, useState } from "../ui.js";
 import { clock } from "../format.js";
 import { t } from "../texts.js";
+import { Failure, useFetched } from "../fetched.js";
 import { matching } from "../rows.js";
 
 const DRAWN = 100;
 
 export function Audit() {
-  const [entries, setEntries] = useState(null);
+  const told = useFetched("api/system/audit");
+  const entries = told.value;
   const [wanted, setWanted] = useState("");
-  const load = () =>
-    fetch("api/system/audit")
-      .then((answer) => answer.ok && answer.json().then(setEntries))
-      .catch(() => {});
-  useEffect(() => void load(), []);
   const found = useMemo(() => matching(entries ?? [], wanted, JSON.stringify), [entries, wanted]);
-  if (!entries) return null;
+  if (!entries) return html`<${Failure} told=${told} />`;
   return html`
     <section class="panel" aria-labelledby="audit"><h2 id="audit">${t("system.audit")}</h2>
       <p class="search">
         <input type="search" aria-label=${t("integration.search", { count: entries.length })} placeholder=${t("integration.search", { count: entries.length })}
           onInput=${(event) => setWanted(event.target.value)} />
-        <button onClick=${load}>${t("parameters.read_again")}</button>
+        <button onClick=${told.again} disabled=${told.isBusy}>${t("parameters.read_again")}</button>
       </p>
+      <${Failure} told=${told} />
       <div class="scroll log" tabindex="0" role="group" aria-label=${t("system.audit")}><table class="rows">
         <thead><tr>${["time", "who", "target", "action", "result"].map((name) => html`<th scope="col">${t(`system.${name}`)}</th>`)}</tr></thead>
         <tbody>${found.slice(0, DRAWN).map((one) => html`<tr>

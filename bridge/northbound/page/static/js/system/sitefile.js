@@ -1,24 +1,19 @@
 // The site file as it lies on the box, without its secrets, and what a check of it finds.
 
-import { html, useState, useEffect } from "../ui.js";
+import { html } from "../ui.js";
 import { many, t } from "../texts.js";
+import { Failure, useFetched } from "../fetched.js";
 import { Icon } from "../icons.js";
 
 export function SiteFile() {
-  const [file, setFile] = useState(null);
-  const [isBusy, setBusy] = useState(false);
-  const check = async () => {
-    setBusy(true);
-    const answer = await fetch("api/system/site").catch(() => null);
-    if (answer?.ok) setFile(await answer.json());
-    setBusy(false);
-  };
-  useEffect(() => void check(), []);
+  const told = useFetched("api/system/site");
+  const file = told.value;
   return html`
     <section class="panel" aria-labelledby="sitefile"><h2 id="sitefile">${t("system.site_file")}</h2>
       <p class="search">${file && html`<code>${file.path}</code>`}
-        <button onClick=${check} disabled=${isBusy}>${t(isBusy ? "system.checking" : "system.check")}</button>
-        ${file && html`<strong role="status">${file.findings.length ? many("system.findings", file.findings.length) : t("system.no_findings")}</strong>`}</p>
+        <button onClick=${told.again} disabled=${told.isBusy}>${t(told.isBusy ? "system.checking" : "system.check")}</button>
+        ${file && !told.failure && html`<strong role="status">${file.findings.length ? many("system.findings", file.findings.length) : t("system.no_findings")}</strong>`}</p>
+      <${Failure} told=${told} />
       ${file?.changed && html`<p class="is-warning"><${Icon} name="warning" /> ${t("system.changed")}</p>`}
       ${file && html`<ul class="findings">${file.findings.map((one) => html`<li class=${one.severity === "error" ? "is-alarm" : "is-warning"}>
         <${Icon} name=${one.severity === "error" ? "alarm" : "warning"} /> <span>${one.text}</span></li>`)}</ul>

@@ -7,7 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from bridge.command import Code
+from bridge.image import DataType, Point
+from bridge.mapping import family_names, load_family
 from bridge.northbound.page.troubles import Rank
+from tests.support import sites
 
 JS = Path("bridge/northbound/page/static/js")
 _WRITES_HTML = ("innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval(", "dangerously")
@@ -41,6 +45,26 @@ def test_what_german_has_beside_it_names_what_comes_from_the_bridge() -> None:
     assert {key.partition(".")[0] for key in more} == {"point", "bit"}
 
 
+def points_of(mapping: str) -> list[Point]:
+    """Those of the first drive of a family."""
+    slot = load_family(mapping).slot[0].name
+    text = sites.site(sites.bus(sites.node(sites.drive(slot, "lease", 1000, ""), mapping=mapping)))
+    return list(sites.plant_of(text, mapping).image.points)
+
+
+def is_trendable(point: Point) -> bool:
+    """As ``trendable`` of trend.js has it."""
+    is_number = point.data_type not in (DataType.STRING, DataType.BOOL) and not point.states and not point.bits
+    return is_number and point.path[-2] in ("actual", "command", "supervision")
+
+
+@pytest.mark.parametrize("mapping", [name for name in family_names() if load_family(name).slot])
+def test_german_names_whatever_a_trend_or_a_setpoint_can_show(mapping: str) -> None:
+    german = texts("de")
+    shown = {point.path[-1] for point in points_of(mapping) if is_trendable(point)}
+    assert {f"point.{leaf}" for leaf in shown} <= german.keys()
+
+
 def test_each_text_that_is_asked_for_is_there() -> None:
     english = texts("en")
     for name, script in scripts().items():
@@ -57,6 +81,13 @@ def test_each_kind_of_trouble_says_what_it_is_why_and_what_to_do() -> None:
     english = texts("en")
     for kind in kinds:
         assert {f"trouble.{kind}", f"trouble.{kind}.why", f"trouble.{kind}.remedy"} <= english.keys(), kind
+
+
+def test_each_outcome_of_a_request_is_a_sentence_and_no_code() -> None:
+    english = texts("en")
+    assert {f"outcome.{code}" for code in Code if code is not Code.OK} <= english.keys()
+    for name, script in scripts().items():
+        assert "outcome.message || outcome.code" not in script, name
 
 
 @pytest.mark.parametrize("rank", list(Rank))

@@ -1,47 +1,53 @@
 // Changes one parameter, within its range, and says what that costs the EEPROM.
 
 import { html, useState } from "../ui.js";
-import { number } from "../format.js";
+import { number, shortest } from "../format.js";
 import { t } from "../texts.js";
+import { told } from "../outcome.js";
 import { held, write } from "./held.js";
 import { range, shown, typed } from "./value.js";
 
 export function Editor({ holder, entry, described, onWritten }) {
-  const [said, setSaid] = useState(null);
+  const [said, setSaid] = useState({ text: "" });
   const one = held(holder, entry.name).value;
   const onSubmit = async (event) => {
     event.preventDefault();
+    if (said.isBusy) return; // a write costs the EEPROM one of its cycles
     const value = typed(entry, event.target.elements.value.value);
-    setSaid({ text: t("parameters.writing") });
+    if (Number.isNaN(value)) return;
+    setSaid({ text: t("parameters.writing"), isBusy: true });
     const outcome = await write(holder, entry.name, value);
     setSaid(outcome.ok
       ? { text: outcome.message || t("parameters.written", { value: shown(entry, outcome.value) }) }
-      : { isFailure: true, text: t("outcome.refused", { what: entry.name, message: outcome.message || outcome.code }) });
+      : { isFailure: true, text: t("outcome.refused", { what: entry.name, message: told(outcome) }) });
     if (outcome.ok) onWritten();
   };
   return html`
     <form class="editor" onSubmit=${onSubmit}>
       <label for="value">${t("parameters.new_value", { name: entry.name })}</label>
-      <${Field} entry=${entry} value=${one?.value} /> ${entry.unit}
-      <button class="main">${t("parameters.write")}</button>
+      <${Field} entry=${entry} value=${one?.value} isBusy=${said.isBusy} /> ${entry.unit}
+      <button class="main" disabled=${said.isBusy}>${t("parameters.write")}</button>
       <small>${range(entry)}</small>
       ${entry.factory !== undefined && html`<small>${t("parameters.factory_is", { value: shown(entry, entry.factory) })}</small>`}
       <small>${wear(entry, described)}</small>
       ${entry.protected && html`<p class="quiet">${t(`parameters.protected.${entry.protected}`)}</p>`}
-      <p role="status" class=${said?.isFailure ? "failure" : ""}>${said?.text ?? ""}</p>
+      <p role="status" class=${said.isFailure ? "failure" : ""}>${said.text}</p>
     </form>
   `;
 }
 
-function Field({ entry, value }) {
+function Field({ entry, value, isBusy }) {
   if (entry.states || entry.type === "bool") {
     const choices = entry.states ?? { true: "true", false: "false" };
-    return html`<select id="value" name="value">${Object.entries(choices).map(([code, text]) => html`
-      <option value=${code} selected=${String(value) === code}>${entry.states ? `${code} (${text})` : text}</option>`)}</select>`;
+    const isKnown = String(value) in choices;
+    return html`<select id="value" name="value" required disabled=${isBusy}>
+      ${!isKnown && html`<option value="" selected>${t("parameters.choose")}</option>`}
+      ${Object.entries(choices).map(([code, text]) => html`
+        <option value=${code} selected=${String(value) === code}>${entry.states ? `${code} (${text})` : text}</option>`)}</select>`;
   }
   const isText = entry.type === "string" || entry.type === "bytes";
-  return html`<input id="value" name="value" required type=${isText ? "text" : "number"} step="any" min=${entry.low} max=${entry.high}
-    defaultValue=${value ?? ""} />`;
+  return html`<input id="value" name="value" required disabled=${isBusy} type=${isText ? "text" : "number"} step="any" min=${entry.low} max=${entry.high}
+    defaultValue=${typeof value === "number" ? shortest(value) : (value ?? "")} />`;
 }
 
 // What a write costs.

@@ -1,14 +1,17 @@
 // What drives hold, as far as this tab has asked: a signal for each parameter.
 
-import { ask } from "../live.js";
-import { signal } from "../ui.js";
+import { ask, isConnected } from "../live.js";
+import { session } from "../session.js";
+import { batch, effect, signal } from "../ui.js";
+import { told } from "../outcome.js";
 
 /** The server lets a tab say fifty things a second. */
 const PAUSE_MS = 25;
 const MISSING = [0x06020000, 0x06090011];
 const known = new Map();
-/** @type {Promise<any>} */
-let last = Promise.resolve();
+/** @type {Map<string, Promise<any>>} */
+const queues = new Map();
+let free = 0;
 
 /** The signal of a parameter: null before it was asked for, else {value}, or {failure, isMissing}. */
 export function held(holder, name) {
@@ -17,16 +20,30 @@ export function held(holder, name) {
   return known.get(key);
 }
 
+/** What was read of `holder`, or of all, is not known any more. */
+export function forget(holder = "") {
+  batch(() => {
+    for (const [key, one] of known) if (!holder || key.startsWith(`${holder} `)) one.value = null;
+  });
+}
+
+// Whoever was cut off does not know what others have changed meanwhile, nor does whoever has just come.
+effect(() => {
+  void [isConnected.value, session.value?.token];
+  forget();
+});
+
 /** Reads it anew. */
 export async function read(holder, name) {
-  const outcome = await inTurn(() => ask(holder, "read_parameter", { parameter: name }));
-  held(holder, name).value = found(outcome);
-  return held(holder, name).value;
+  const outcome = await inTurn(holder, () => ask(holder, "read_parameter", { parameter: name }));
+  const one = found(outcome);
+  held(holder, name).value = one;
+  return one;
 }
 
 /** Writes it; the outcome is {ok, code, message, value}. */
 export async function write(holder, name, value) {
-  const outcome = await inTurn(() => ask(holder, "write_parameter", { parameter: name, value }));
+  const outcome = await inTurn(holder, () => ask(holder, "write_parameter", { parameter: name, value }));
   if (outcome.ok) held(holder, name).value = { value: outcome.value };
   return outcome;
 }
@@ -53,15 +70,23 @@ export async function identity(holder) {
   return told;
 }
 
-// One after the other: the node has one channel for them.
-function inTurn(work) {
-  const mine = last.then(work);
-  last = mine.then(() => new Promise((resolve) => setTimeout(resolve, PAUSE_MS)));
+// One after the other at each node, which has one channel for them; what is asked of another waits for none of it.
+function inTurn(holder, work) {
+  const [node] = holder.split("/");
+  const mine = (queues.get(node) ?? Promise.resolve()).then(pause).then(work);
+  queues.set(node, mine.catch(() => {}));
   return mine;
+}
+
+// Until the server takes the next.
+function pause() {
+  const now = Date.now();
+  free = Math.max(now, free + PAUSE_MS);
+  return new Promise((resolve) => setTimeout(resolve, free - now));
 }
 
 function found(outcome) {
   if (outcome.ok) return { value: outcome.value };
   const isSilent = ["timed_out", "not_ready", "not_connected", "unknown_target"].includes(outcome.code);
-  return { failure: outcome.message || outcome.code, isMissing: MISSING.includes(outcome.abort_code), isSilent };
+  return { failure: told(outcome), isMissing: MISSING.includes(outcome.abort_code), isSilent };
 }

@@ -1,9 +1,10 @@
 // All parameters of a drive with a search; what is shown is read.
 
-import { html, useEffect, useMemo, useState } from "../ui.js";
+import { html, useEffect, useMemo, useRef, useState } from "../ui.js";
 import { may } from "../session.js";
-import { ask } from "../live.js";
+import { ask, isConnected } from "../live.js";
 import { t } from "../texts.js";
+import { told } from "../outcome.js";
 import { matching } from "../rows.js";
 import { Editor } from "./editor.js";
 import { held, read, readAll } from "./held.js";
@@ -19,7 +20,10 @@ export function List({ holder, described, onWritten }) {
   const all = described.parameters;
   const found = useMemo(() => matching(all, wanted, words), [all, wanted]);
   const drawn = found.slice(0, count);
-  useEffect(() => readWhatIsShown(holder, drawn), [holder, wanted, count]);
+  const isOver = useRef(false);
+  useEffect(() => isConnected.value ? readWhatIsShown(holder, drawn) : undefined, [holder, wanted, count, isConnected.value]);
+  useEffect(() => () => (isOver.current = true), []);
+  const onReadAgain = () => readAll(holder, drawn.filter(isReadable).map((one) => one.name), undefined, () => isOver.current);
   return html`
     <section class="panel" aria-labelledby="list">
       <h2 id="list">${t("parameters.list")}</h2>
@@ -28,7 +32,7 @@ export function List({ holder, described, onWritten }) {
           placeholder=${t("parameters.search", { count: all.length })}
           onInput=${(event) => (setWanted(event.target.value), setCount(AT_ONCE))} />
         <small role="status">${t("integration.shown", { shown: drawn.length, count: found.length })}</small>
-        <button onClick=${() => readAll(holder, drawn.filter(isReadable).map((one) => one.name))}>${t("parameters.read_again")}</button>
+        <button onClick=${onReadAgain} disabled=${!isConnected.value}>${t("parameters.read_again")}</button>
         ${described.can_save && may("engineer") && html`<${Save} holder=${holder} />`}
       </p>
       ${described.on_save_only && html`<p class="quiet">${t("parameters.on_save_only")}</p>`}
@@ -64,32 +68,43 @@ function readWhatIsShown(holder, entries) {
 }
 
 function Row({ holder, entry, isEdited, onEdit, described, onWritten }) {
-  const one = held(holder, entry.name).value;
-  const isFixed = entry.read_only || entry.why_never;
   return html`
     <tr>
       <td><code>${entry.name}</code> <small>${entry.object}</small></td>
       <td>${entry.title}</td>
-      <td class="value">${entry.write_only ? t("parameters.write_only") : !one ? "…" : one.failure
-        ? html`<span class="quiet" title=${one.failure}>${t(one.isMissing ? "parameters.missing" : "parameters.unread")}</span>`
-        : shown(entry, one.value)}</td>
+      <td class="value"><${Held} holder=${holder} entry=${entry} /></td>
       <td>${range(entry)}</td>
-      <td>${isFixed
-        ? html`<small title=${entry.why_never}>${t(entry.read_only ? "parameters.read_only" : "parameters.never")}</small>`
-        : may("engineer")
-          ? html`<button onClick=${onEdit} aria-expanded=${isEdited} aria-label=${t("parameters.change_one", { name: entry.name })}>${t("parameters.change")}</button>`
-          : html`<small>${t("parameters.engineer")}</small>`}</td>
+      <td><${Change} entry=${entry} isEdited=${isEdited} onEdit=${onEdit} /></td>
     </tr>
     ${isEdited && html`<tr><td colspan="5"><${Editor} holder=${holder} entry=${entry} described=${described}
       onWritten=${() => (read(holder, entry.name), onWritten())} /></td></tr>`}
   `;
 }
 
+// What the drive holds, or why that is not known.
+function Held({ holder, entry }) {
+  const one = held(holder, entry.name).value;
+  if (entry.write_only) return t("parameters.write_only");
+  if (!one) return isConnected.value ? "…" : "–";
+  if (!one.failure) return shown(entry, one.value);
+  if (one.isMissing) return html`<span class="quiet">${t("parameters.missing")}</span>`;
+  return html`<span class="quiet">${t("parameters.unread")} <small class="why">${one.failure}</small></span>`;
+}
+
+// How it is changed, or why it is not.
+function Change({ entry, isEdited, onEdit }) {
+  if (entry.read_only) return html`<small>${t("parameters.read_only")}</small>`;
+  if (entry.why_never) return html`<small class="why">${t("parameters.never")}: ${entry.why_never}</small>`;
+  if (!may("engineer")) return html`<small>${t("parameters.engineer")}</small>`;
+  return html`<button onClick=${onEdit} aria-expanded=${isEdited} aria-label=${t("parameters.change_one", { name: entry.name })}>${t("parameters.change")}</button>`;
+}
+
 function Save({ holder }) {
-  const [said, setSaid] = useState("");
+  const [said, setSaid] = useState({ text: "" });
   const onClick = async () => {
+    setSaid({ text: t("parameters.writing"), isBusy: true });
     const outcome = await ask(holder, "save_parameters");
-    setSaid(outcome.ok ? t("parameters.saved") : outcome.message || outcome.code);
+    setSaid({ text: outcome.ok ? t("parameters.saved") : t("outcome.refused", { what: t("parameters.save"), message: told(outcome) }) });
   };
-  return html`<button onClick=${onClick}>${t("parameters.save")}</button> <small role="status">${said}</small>`;
+  return html`<button onClick=${onClick} disabled=${said.isBusy}>${t("parameters.save")}</button> <small role="status">${said.text}</small>`;
 }

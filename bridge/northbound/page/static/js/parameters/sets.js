@@ -1,47 +1,57 @@
 // Sets of parameters: backed up, compared with the factory, a file or another drive, and restored from what differs.
 
-import { html, useRef, useState } from "../ui.js";
+import { html, useEffect, useRef, useState } from "../ui.js";
 import { may, session } from "../session.js";
 import { save } from "../download.js";
+import { fetched } from "../fetched.js";
 import { t } from "../texts.js";
 import { held, identity, readAll } from "./held.js";
 import { Differences } from "./differences.js";
 import { same } from "./value.js";
 
+/** The address at which the server has something of a drive or node. */
+export const placeOf = (what, holder) => `api/${what}/${holder.split("/").map(encodeURIComponent).join("/")}`;
+
 export function Sets({ holder, described, others }) {
   const [state, setState] = useState({});
   const [source, setSource] = useState("factory");
   const file = useRef();
+  const turn = useRef({ isOver: true });
   const settings = described.parameters.filter((one) => one.setting);
-  const busy = (text) => setState({ busy: text });
+  const names = settings.map((one) => one.name);
+  const end = () => (turn.current.isOver = true);
+  useEffect(() => end, []);
+  // What was stopped, or left, says nothing more.
   const run = (work) => async () => {
-    try {
-      await work();
-    } catch (error) {
-      setState({ failure: error.message });
-    }
+    const mine = (turn.current = { isOver: false });
+    const say = (one) => mine.isOver || setState(one);
+    await work(mine, say).then(say, (error) => say({ failure: error.message }));
   };
-  const read = async (whose) => {
-    const onRead = (count) => busy(t("parameters.reading", { name: whose, count, all: settings.length }));
+  const onStop = () => {
+    end();
+    setState({ done: t("parameters.stopped") });
+  };
+  const read = async (whose, mine, say) => {
+    const onRead = (count) => say({ begun: t("parameters.reads", { name: whose }), busy: t("parameters.reading", { name: whose, count, all: names.length }) });
     onRead(0);
-    if (!(await readAll(whose, settings.map((one) => one.name), onRead)))
-      throw new Error(t("parameters.silent", { name: whose }));
-    return Object.fromEntries(settings.map((one) => [one.name, held(whose, one.name).value]));
+    if (!(await readAll(whose, names, onRead, () => mine.isOver))) throw new Error(t("parameters.silent", { name: whose }));
+    return Object.fromEntries(names.map((name) => [name, held(whose, name).value]));
   };
-  const backUp = run(async () => {
-    const found = await read(holder);
+  const backUp = run(async (mine, say) => {
+    const found = await read(holder, mine, say);
     const text = await backup(holder, found, await identity(holder));
-    save(`${holder.replace("/", "-")}.toml`, text, "application/toml");
-    setState({ done: t("parameters.backed_up", { count: Object.values(found).filter((one) => !one.failure).length }) });
+    if (!mine.isOver) save(`${holder.replace("/", "-")}.toml`, text, "application/toml");
+    return { done: t("parameters.backed_up", { count: Object.values(found).filter((one) => !one.failure).length }) };
   });
-  const compare = run(async () => {
+  const compare = run(async (mine, say) => {
+    say({ begun: t("frame.loading"), busy: t("frame.loading") });
     const other = source.startsWith("drive ") && source.slice(6);
     const set = other
-      ? { name: other, values: plain(await read(other)) }
+      ? { name: other, values: plain(await read(other, mine, say)), identity: await identity(other), mapping: await mappingOf(other) }
       : await SOURCES[source]({ holder, settings, file: file.current?.files[0] });
-    const found = await read(holder);
-    const refusal = set.identity && (await whyAnother(holder, set.identity));
-    setState({ result: { ...differences(described, found, set.values), refusal, source: set.name } });
+    const found = await read(holder, mine, say);
+    const refusal = await whyAnother(holder, described, set);
+    return { done: t("parameters.compared"), result: { ...differences(described, found, set.values), refusal, source: set.name } };
   });
   return html`
     <section class="panel" aria-labelledby="sets">
@@ -49,14 +59,16 @@ export function Sets({ holder, described, others }) {
       <p class="search">
         <button onClick=${backUp} disabled=${state.busy}>${t("parameters.back_up")}</button>
         <label for="source">${t("parameters.compare_with")}</label>
-        <select id="source" value=${source} onChange=${(event) => setSource(event.target.value)}>
+        <select id="source" value=${source} disabled=${state.busy} onChange=${(event) => setSource(event.target.value)}>
           <option value="factory">${t("parameters.source.factory")}</option>
           <option value="file">${t("parameters.source.file")}</option>
           ${others.map((name) => html`<option value=${`drive ${name}`}>${t("parameters.source.drive", { name })}</option>`)}
         </select>
         ${source === "file" && html`<input type="file" ref=${file} accept=".toml,.eds,.dcf,.xdd,.xdc" aria-label=${t("parameters.source.file")} />`}
         <button onClick=${compare} disabled=${state.busy}>${t("parameters.compare")}</button>
-        <small role="status">${state.busy ?? state.done ?? ""}</small>
+        ${state.busy && html`<button onClick=${onStop}>${t("parameters.stop")}</button>`}
+        <small>${state.busy ?? state.done ?? ""}</small>
+        <span class="hidden" role="status">${state.begun ?? state.done ?? ""}</span>
       </p>
       ${state.failure && html`<pre class="failure" role="alert">${state.failure}</pre>`}
       ${state.result && html`<${Differences} holder=${holder} result=${state.result} mayWrite=${may("engineer")} />`}
@@ -73,8 +85,8 @@ const SOURCES = {
   },
   file: async ({ holder, file }) => {
     if (!file) throw new Error(t("parameters.no_file"));
-    const told = await post(`api/set/${holder}?name=${encodeURIComponent(file.name)}`, file);
-    return { ...(await told.json()), name: file.name };
+    const told = await post(`${placeOf("set", holder)}?name=${encodeURIComponent(file.name)}`, file, (answer) => answer.json());
+    return { ...told, name: file.name };
   },
 };
 
@@ -98,10 +110,18 @@ function plain(found) {
 }
 
 // Why a set is not of a drive of this kind; empty where it is.
-async function whyAnother(holder, ofSet) {
+async function whyAnother(holder, described, { name, mapping, identity: ofSet }) {
+  if (mapping && mapping !== described.mapping) return t("parameters.another", { source: name, name: t("parameters.mapping") });
+  if (!ofSet) return "";
   const own = await identity(holder);
-  const name = ["vendor", "product"].find((one) => one in ofSet && ofSet[one] !== own[one]);
-  return name ? t("parameters.another", { name: t(`parameters.${name}`) }) : "";
+  const found = ["vendor", "product"].find((one) => one in ofSet && ofSet[one] !== own[one]);
+  return found ? t("parameters.another", { source: name, name: t(`parameters.${found}`) }) : "";
+}
+
+async function mappingOf(holder) {
+  const { value, failure } = await fetched(placeOf("parameters", holder));
+  if (failure) throw new Error(failure);
+  return value.mapping;
 }
 
 async function backup(holder, found, identity) {
@@ -112,11 +132,11 @@ async function backup(holder, found, identity) {
     unreadable: Object.fromEntries(failed.filter(([, one]) => !one.isMissing).map(([name, one]) => [name, one.failure])),
     identity,
   };
-  return (await post(`api/backup/${holder}`, JSON.stringify(set))).text();
+  return post(placeOf("backup", holder), JSON.stringify(set), (answer) => answer.text());
 }
 
-async function post(path, body) {
-  const answer = await fetch(path, { method: "POST", headers: { "x-token": session.value.token }, body });
-  if (!answer.ok) throw new Error((await answer.json().catch(() => ({}))).error ?? String(answer.status));
-  return answer;
+async function post(address, body, read) {
+  const { value, failure } = await fetched(address, { method: "POST", headers: { "x-token": session.value?.token ?? "" }, body, read });
+  if (failure) throw new Error(failure);
+  return value;
 }

@@ -1,6 +1,6 @@
-// Values of parameters as people read and type them.
+// Values of parameters as people read and type them: as they are in the drive, in the reader's number format.
 
-import { number } from "../format.js";
+import { exact } from "../format.js";
 
 const BARE = ["string", "bytes"];
 
@@ -10,14 +10,13 @@ export function shown(entry, value) {
   if (typeof value !== "number") return String(value);
   const state = entry.states?.[value];
   if (state) return `${value} (${state})`;
-  const digits = Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(10)));
-  return entry.unit ? `${digits}\u202f${entry.unit}` : digits;
+  return entry.unit ? `${exact(value)}\u202f${entry.unit}` : exact(value);
 }
 
 /** "0 … 320 s"; empty where there is none. */
 export function range(entry) {
   if (entry.low === undefined && entry.high === undefined) return "";
-  return `${number(entry.low ?? null)} … ${number(entry.high ?? null)}${entry.unit ? ` ${entry.unit}` : ""}`;
+  return `${exact(entry.low)} … ${exact(entry.high)}${entry.unit ? ` ${entry.unit}` : ""}`;
 }
 
 /** What was typed, as it is sent. */

@@ -12,8 +12,8 @@ export function Copy({ text }) {
     setDone(true);
     setTimeout(() => setDone(false), SHOWN_MS);
   };
-  return html`<button class="copy" onClick=${onClick} aria-label=${`${t("integration.copy")} ${text}`}>
-    ${t(isDone ? "integration.copied" : "integration.copy")}</button>`;
+  return html`<button class="copy" onClick=${onClick}>
+    <span aria-live="polite">${t(isDone ? "integration.copied" : "integration.copy")}</span> <span class="hidden">${text}</span></button>`;
 }
 
 // Browsers have a clipboard for pages by TLS or on loopback; elsewhere a field is selected and copied from.

@@ -7,17 +7,18 @@ import { t } from "../texts.js";
 
 const KINDS = ["nmt", "sync", "time", "emcy", "pdo", "sdo", "heartbeat", "lss", "other"];
 const KEPT = 200;
+const NOTHING = { rows: [], lost: 0, more: 0 };
 
 export function Traffic({ bus, nodes }) {
   const [isOn, setOn] = useState(false);
   const [view, setView] = useState("frames");
   const [kinds, setKinds] = useState([]);
   const [node, setNode] = useState("");
-  const [heard, setHeard] = useState({ rows: [], lost: 0, more: 0 });
-  const kept = useRef({ rows: [], lost: 0, more: 0 });
+  const [heard, setHeard] = useState(NOTHING);
+  const kept = useRef(NOTHING);
   useEffect(() => {
     if (!isOn) return;
-    kept.current = { rows: [], lost: 0, more: 0 };
+    kept.current = NOTHING;
     let drawing = 0;
     hear({ bus: bus.name, view, kinds, nodes: node ? [Number(node)] : [] }, (message) => {
       kept.current = taken(kept.current, message);
@@ -36,7 +37,8 @@ export function Traffic({ bus, nodes }) {
     <section class="panel traffic" aria-labelledby="traffic">
       <h2 id="traffic">${t("traffic.title")}</h2>
       <p class="search">
-        <button class="main" onClick=${() => setOn(!isOn)}>${t(isOn ? "traffic.pause" : "traffic.listen")}</button>
+        <button class="main" onClick=${() => setOn(!isOn)}>${t(isOn ? "traffic.pause" : heard === NOTHING ? "traffic.listen" : "traffic.resume")}</button>
+        <span class="hidden" role="status">${heard === NOTHING && !isOn ? "" : t(isOn ? "traffic.is_on" : "traffic.is_off")}</span>
         <label for="view">${t("traffic.view")}</label>
         <select id="view" value=${view} onChange=${(event) => setView(event.target.value)}>
           ${["frames", "identifiers"].map((one) => html`<option value=${one}>${t(`traffic.${one}`)}</option>`)}
@@ -46,7 +48,7 @@ export function Traffic({ bus, nodes }) {
           <option value="">${t("traffic.all")}</option>
           ${nodes.map((one) => html`<option value=${one.id}>${one.name}</option>`)}
         </select>
-        <small role="status">${heard.failure ? "" : lacking(heard)}</small>
+        <small>${heard.failure ? "" : lacking(heard)}</small>
       </p>
       <fieldset class="kinds"><legend>${t("traffic.kinds")}</legend>
         ${KINDS.map((kind) => html`<label><input type="checkbox" checked=${kinds.includes(kind)} onChange=${() => toggle(kind)} /> ${t(`kind.${kind}`)}</label>`)}

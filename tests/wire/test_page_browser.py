@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -189,28 +189,185 @@ def positioner() -> str:
     return sites.node(drive, name="winder", node_id=7, mapping="stoeber/5000-posi", more=more)
 
 
-def test_setpoints_are_sent_together_and_empty_ones_are_not(tmp_path: Path, chromium: Browser) -> None:
-    with serving(tmp_path, positioner()) as port:
-        desk = Desk(chromium, port)
+def pair(name: str, node_id: int) -> str:
+    """Of two drives one is left as it is when its controller falls silent, and one is its owner's alone."""
+    drives = (
+        sites.drive("fu1", "lease", 1000, f'on_expiry = "hold"\ntelegram_downtime_s = 0\n{sites.SCALED}'),
+        sites.drive("fu2", "lease", 1000, f"stop_by_anyone = false\n{sites.SCALED}"),
+    )
+    return sites.node(*drives, name=name, node_id=node_id)
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+    with serving(tmp_path_factory.mktemp("workshop"), pair("a", 5), pair("b", 6), positioner()) as port:
+        yield port
+
+
+@pytest.fixture
+def bench(chromium: Browser, workshop: int) -> Iterator[Desk]:
+    desk = Desk(chromium, workshop)
+    yield desk
+    assert not desk.complaints
+
+
+def asked(page: Page, action: str) -> list[Any]:
+    """The fields of each request for ``action`` that the page makes from now on."""
+    found: list[Any] = []
+
+    def on_frame(text: str | bytes) -> None:
+        if f'"action":"{action}"' in str(text):
+            found.append(json.loads(text)["fields"])
+
+    page.on("websocket", lambda socket: socket.on("framesent", on_frame))
+    page.reload()
+    expect(page.locator(".sentence")).to_contain_text("in order")
+    return found
+
+
+def test_setpoints_are_sent_together_and_empty_ones_are_not(bench: Desk) -> None:
+    with bench.sits("operator") as page:
+        written = asked(page, "write")
+        to(page, "drive/winder/drive")
+        take(page)
+        labels = page.locator("form.setpoint label")
+        expect(labels).to_have_count(4)
+        expect(labels.first).to_contain_text("velocity")
+        page.get_by_role("button", name="Send").click()
+        page.locator("#setpoint").fill("120")
+        page.locator("#setpoint-acceleration").fill("300")
+        page.get_by_role("button", name="Send").click()
+        expect(page.locator("form.setpoint .field").first).to_contain_text("now 120")
+        expect(page.locator("#setpoint")).to_have_value("")
+        assert written == [{"values": {"velocity": 120, "acceleration": 300}}]
+
+
+def test_nobody_is_said_to_watch_or_to_stop_who_does_not(bench: Desk) -> None:
+    with bench.sits("operator") as page:
+        to(page, "drive/a/fu1")
+        chain = page.locator(".chain")
+        expect(chain).to_contain_text("the bridge leaves the drive as it is: it may run on")
+        expect(chain).to_contain_text("nobody watches")
+        expect(chain).not_to_contain_text("nothing heard yet")
+        to(page, "drive/a/fu2")
+        expect(page.locator(".controls")).to_contain_text("Only who controls it can stop it")
+        expect(page.get_by_role("button", name="Stop", exact=True)).to_be_disabled()
+
+
+def test_a_refusal_is_not_told_again_on_return(bench: Desk) -> None:
+    with bench.sits("operator") as owner, bench.sits("operator") as other:
+        for page in (owner, other):
+            to(page, "drive/b/fu2")
+        take(owner)
+        other.get_by_role("button", name="Take control").click()
+        expect(other.get_by_role("alert")).to_contain_text("is controlled by")
+        other.get_by_role("link", name="Plant", exact=True).click()
+        to(other, "drive/b/fu2")
+        expect(other.get_by_role("alert")).to_have_text("")
+
+
+def test_a_drive_is_compared_with_its_like_until_that_is_stopped_or_left(bench: Desk) -> None:
+    with bench.sits("engineer") as page:
+        read = asked(page, "read_parameter")
+        to(page, "parameters/a/fu1")
+        options = page.locator("#source option")
+        expect(options).to_have_text(["factory settings", "a backup, EDS or XDD file", "a/fu2", "b/fu1", "b/fu2"])
+        expect(parameter(page, "P102.1")).to_contain_text("2\u202fs")
+        page.get_by_label("Compare with").select_option("drive b/fu1")
+        compare = page.get_by_role("button", name="Compare", exact=True)
+        compare.click()
+        page.get_by_role("button", name="Stop reading").click()
+        expect(page.get_by_role("status").filter(has_text="Ended before")).to_have_count(1)
+        compare.click()
+        expect(page.get_by_text("Reading b/fu1: 1")).to_be_visible()
+        page.get_by_role("link", name="Plant", exact=True).click()
+        page.wait_for_timeout(100)
+        count = len(read)
+        page.wait_for_timeout(500)
+        assert len(read) == count
+        to(page, "parameters/a/fu1")
+        page.get_by_label("Compare with").select_option("drive b/fu1")
+        compare.click()
+        expect(page.get_by_text("0 parameters differ from b/fu1")).to_be_visible()
+
+
+def test_a_double_click_writes_once(bench: Desk) -> None:
+    with bench.sits("engineer") as page:
+        written = asked(page, "write_parameter")
+        to(page, "parameters/a/fu1")
+        expect(parameter(page, "P102.1")).to_contain_text("2\u202fs")
+        page.get_by_role("button", name="Change P102.1", exact=True).click()
+        page.get_by_label("New value of P102.1").fill("2.01")
+        page.get_by_role("button", name="Write", exact=True).dblclick()
+        expect(page.locator(".editor")).to_contain_text("read back: 2.01")
+        assert written == [{"parameter": "P102.1", "value": 2.01}]
+        page.get_by_role("button", name="Deutsch").click()
+        expect(parameter(page, "P102.1")).to_contain_text("2,01\u202fs")
+
+
+@pytest.mark.parametrize(
+    ("place", "api"),
+    [
+        ("bus/can0", "bus/can0"),
+        ("integration/opcua", "integration"),
+        ("integration/opcua", "export/opcua.json"),
+        ("parameters/a/fu1", "parameters/a/fu1"),
+        ("system", "system"),
+        ("system", "system/site"),
+        ("system", "system/audit"),
+    ],
+)
+def test_what_fails_to_load_is_told_and_tried_again(bench: Desk, place: str, api: str) -> None:
+    with bench.sits("engineer") as page:
+        address = f"{bench.address}api/{api}"
+        page.route(address, lambda route: route.fulfill(status=503, json={"error": "out of order"}))
+        to(page, place)
+        failure = page.locator(".failure", has_text="out of order")
+        expect(failure).to_be_visible()
+        page.unroute(address)
+        failure.get_by_role("button", name="Try again").click()
+        expect(failure).to_have_count(0)
+        bench.complaints[:] = [one for one in bench.complaints if "503" not in one]
+
+
+def test_an_address_to_copy_is_one_that_can_be_reached(bench: Desk) -> None:
+    with bench.sits("observer") as page:
+        facts = {
+            "modbus": {"listen": "[::]:502", "word_order": "big"},
+            "opcua": {"url": "opc.tcp://0.0.0.0:4840", "no_security": False, "anonymous": "none", "users": 1},
+            "zenoh": {"mode": "peer", "listen": ["tcp/0.0.0.0:7447"], "prefix": "x"},
+            "exports": [],
+        }
+        page.route("**/api/integration", lambda route: route.fulfill(json=facts))
+        page.route("**/api/export/*", lambda route: route.fulfill(json=[]))
+        for name, shown in {
+            "modbus": "-c 4 -1 127.0.0.1",
+            "opcua": "opc.tcp://127.0.0.1:4840",
+            "zenoh": "tcp/127.0.0.1:7447",
+        }.items():
+            to(page, f"integration/{name}")
+            expect(page.locator(".facts")).to_contain_text(shown)
+
+
+def test_without_its_bridge_a_page_knows_nothing(tmp_path: Path, chromium: Browser) -> None:
+    with ExitStack() as site:
+        desk = Desk(chromium, site.enter_context(serving(tmp_path, pair("a", 5))))
         with desk.sits("operator") as page:
-            sent: list[str] = []
-            page.on("websocket", lambda socket: socket.on("framesent", lambda text: sent.append(str(text))))
-            page.reload()
-            to(page, "drive/winder/drive")
-            page.get_by_role("button", name="Take control").click()
-            expect(page.locator(".ownership")).to_contain_text("you, in this tab")
-            labels = page.locator("form.setpoint label")
-            expect(labels).to_have_count(4)
-            expect(labels.first).to_contain_text("velocity")
-            page.get_by_role("button", name="Send").click()
-            page.locator("#setpoint").fill("120")
-            page.locator("#setpoint-acceleration").fill("300")
-            page.get_by_role("button", name="Send").click()
-            expect(page.locator("form.setpoint .field").first).to_contain_text("now 120")
-            expect(page.locator("#setpoint")).to_have_value("")
-            written = [json.loads(one)["fields"]["values"] for one in sent if '"write"' in one]
-            assert written == [{"velocity": 120, "acceleration": 300}]
-        assert not desk.complaints
+            to(page, "drive/a/fu2")
+            take(page)
+            expect(page.locator(".chain .left")).to_have_count(2)
+            expect(page.locator(".diagram .present")).to_have_count(1)
+            site.close()
+            expect(page.locator(".sentence")).to_contain_text("No connection")
+            expect(page.locator(".drivehead .state")).to_have_text(re.compile("unknown"))
+            expect(page.locator(".diagram .present")).to_have_count(0)
+            expect(page.locator(".chain .left")).to_have_count(0)
+            expect(page.locator(".chain .unsure")).to_have_count(3)
+            expect(page.locator(".bits .set")).to_have_count(0)
+            page.screenshot(path=SHOTS / "drive-without-bridge.png", full_page=True)
+            to(page, "plant")
+            expect(page.locator(".busstate")).to_have_text(re.compile("unknown"))
+            page.screenshot(path=SHOTS / "plant-without-bridge.png", full_page=True)
 
 
 def test_an_observer_is_told_that_it_may_read(desk: Desk) -> None:
@@ -345,29 +502,63 @@ def test_log_out(desk: Desk) -> None:
     with desk.sits("operator") as page:
         page.get_by_role("button", name="Log out").click()
         expect(page.locator('input[name="user"]')).to_be_visible()
+        expect(page.get_by_role("button", name="Back")).to_have_count(0)
         page.reload()
         expect(page.locator('input[name="user"]')).to_be_visible()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing_serious_and_nothing_is_wider_than_a_phone(desk: Desk, scheme: Any) -> None:
+PHONE = {"width": 360, "height": 740}
+DESKTOP = {"width": 1280, "height": 900}
+
+
+@pytest.mark.parametrize(
+    ("scheme", "language", "user"),
+    [
+        ("light", "de-DE", "operator"),
+        ("dark", "de-DE", "operator"),
+        ("light", "en-GB", "engineer"),
+    ],
+)
+def test_axe_finds_nothing_serious_and_nothing_is_wider_than_a_phone(
+    desk: Desk, scheme: Any, language: str, user: str
+) -> None:
     SHOTS.mkdir(parents=True, exist_ok=True)
-    phone = {"width": 360, "height": 740}
-    with desk.sits("operator", color_scheme=scheme, locale="de-DE", viewport=phone) as page:
+    with desk.sits(user, color_scheme=scheme, locale=language, viewport=PHONE) as page:
         for shown, there in PAGES.items():
             page.goto(f"{desk.address}#/{shown}")
             name = f"{shown.replace('/', '-')}-{scheme}"
             expect(page.locator(there).first).to_be_attached()
-            assert page.evaluate("document.documentElement.scrollWidth") <= phone["width"]
-            page.screenshot(path=SHOTS / f"{name}-phone-german.png", full_page=True)
-            page.evaluate(AXE.read_text(encoding="utf-8") + "; 0")
-            found = page.evaluate("axe.run().then((one) => one.violations)")
-            serious = [
-                (one["id"], [node["target"] for node in one["nodes"]])
-                for one in found
-                if one["impact"] in ("serious", "critical")
-            ]
-            assert not serious
-            page.set_viewport_size({"width": 1280, "height": 900})
-            page.screenshot(path=SHOTS / f"{name}-german.png", full_page=True)
-            page.set_viewport_size({"width": 360, "height": 740})
+            assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+            page.screenshot(path=SHOTS / f"{name}-phone-{language}.png", full_page=True)
+            assert not serious(page)
+            page.set_viewport_size(DESKTOP)
+            page.screenshot(path=SHOTS / f"{name}-{language}.png", full_page=True)
+            page.set_viewport_size(PHONE)
+
+
+def serious(page: Page) -> list[Any]:
+    """What axe finds that keeps people from using the page, each with where."""
+    page.evaluate(AXE.read_text(encoding="utf-8") + "; 0")
+    found = page.evaluate("axe.run().then((one) => one.violations)")
+    return [
+        (one["id"], [node["target"] for node in one["nodes"]])
+        for one in found
+        if one["impact"] in ("serious", "critical")
+    ]
+
+
+def test_axe_finds_nothing_serious_in_what_an_engineer_opens(desk: Desk) -> None:
+    with desk.sits("engineer") as page:
+        to(page, f"drive/{DRIVE}")
+        page.locator(".trend summary").click()
+        assert not serious(page)
+        to(page, f"parameters/{DRIVE}")
+        page.get_by_role("button", name="Change P102.1", exact=True).click()
+        assert not serious(page)
+        to(page, "bus/can0")
+        page.locator("details", has_text="NMT commands").locator("summary").click()
+        page.get_by_role("button", name="Listen").click()
+        expect(page.locator(".log tbody tr").first).to_be_visible()
+        page.get_by_role("button", name="Pause").click()
+        expect(page.get_by_role("button", name="Continue")).to_be_visible()
+        assert not serious(page)

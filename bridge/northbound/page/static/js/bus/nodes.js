@@ -89,8 +89,7 @@ function isOfPdos(detail) {
 }
 
 function Stage({ stage, is }) {
-  return html`<li class=${`stage ${is}`}><${Icon} name=${{ done: "ok", now: "ready", failed: "alarm", open: "unknown" }[is]} />
-    ${t(`boot.${stage}`)} <span class="hidden">${t(`boot.is.${is}`)}</span></li>`;
+  return html`<li class=${`stage ${is}`}><${Icon} name=${{ done: "ok", now: "ready", failed: "alarm", open: "unknown" }[is]} /> ${t(`boot.${stage}`)} <span class="hidden">${t(`boot.is.${is}`)}</span></li>`;
 }
 
 const COMMANDS = ["start_node", "stop_node", "enter_pre_operational", "reset_communication", "reset"];

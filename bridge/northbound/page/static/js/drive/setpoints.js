@@ -2,7 +2,7 @@
 
 import { html, useRef } from "../ui.js";
 import { below, leafOf, nature } from "../site.js";
-import { quality } from "../values.js";
+import { quality, reason } from "../values.js";
 import { quantity } from "../format.js";
 import { t } from "../texts.js";
 import { good } from "../drivestate.js";
@@ -51,11 +51,13 @@ function Setpoint({ name, isMain, isHeld }) {
   const { unit, low, high, type } = nature(name);
   const leaf = leafOf(name);
   const id = isMain ? "setpoint" : `setpoint-${leaf}`;
+  const cannot = quality(name) === "config_error";
   return html`
     <p class="field">
       <label for=${id}>${t("drive.setpoint", { name: t(`point.${leaf}`) })}</label>
-      <input id=${id} name=${leaf} type="number" step=${type === "float" ? "any" : 1} min=${low} max=${high} disabled=${!isHeld} /> ${unit}
-      <small>${t("drive.now", { value: quantity(good(name), unit) })}</small>
+      <input id=${id} name=${leaf} type="number" step=${type === "float" ? "any" : 1} min=${low} max=${high} disabled=${!isHeld || cannot} />
+      <span>${unit}</span>
+      <small>${cannot ? reason(name) || t("quality.config_error") : t("drive.now", { value: quantity(good(name), unit) })}</small>
     </p>
   `;
 }

@@ -110,10 +110,9 @@ function Speed({ drive }) {
   return html`
     <span class=${classes("speed", { old: is === null })}>
       <span class="big">${number(is, unit)}</span> ${unit}
+      ${is === null && html`<span class="reason">${maybe(`quality.${quality(actual)}`)}</span>`}
       <span class="setpoint">${t("plant.setpoint", { value: quantity(wanted, unit) })}</span>
-      ${is !== null
-        ? html`<${Course} actual=${is / most} setpoint=${wanted === null ? null : wanted / most} />`
-        : html`<span class="reason">${maybe(`quality.${quality(actual)}`)}</span>`}
+      ${is !== null && html`<${Course} actual=${is / most} setpoint=${wanted === null ? null : wanted / most} />`}
     </span>
   `;
 }

@@ -254,6 +254,22 @@ def test_nobody_is_said_to_watch_or_to_stop_who_does_not(bench: Desk) -> None:
         expect(page.get_by_role("button", name="Stop", exact=True)).to_be_disabled()
 
 
+def test_a_hold_is_told_as_what_it_is(bench: Desk) -> None:
+    with bench.sits("operator") as page, bench.sits("operator") as watcher:
+        for one in (page, watcher):
+            to(one, "drive/a/fu1")
+        take(page)
+        page.get_by_role("button", name="Start", exact=True).click()
+        state(page).to_have_text(re.compile("running"))
+        with hanging(page):
+            state(watcher).to_have_text(re.compile("its controller is silent"))
+            expect(watcher.locator(".trouble")).to_contain_text("it may run on")
+            expect(watcher.locator(".trouble")).to_contain_text("until the lease ended, and then stopped it")
+        take(page)
+        page.get_by_role("button", name="Acknowledge fault").click()
+        expect(watcher.locator(".sentence")).to_contain_text("in order")
+
+
 def test_a_refusal_is_not_told_again_on_return(bench: Desk) -> None:
     with bench.sits("operator") as owner, bench.sits("operator") as other:
         for page in (owner, other):

@@ -69,7 +69,8 @@ function variant(trouble) {
   if (trouble.kind === "drive_fault") return said(trouble).cause ? "_and_cause" : "";
   if (trouble.kind !== "controller_silent") return "";
   const reaction = driveAt(trouble.place)?.on_expiry;
-  return reaction === "hold" || reaction === "silence" ? `_${reaction}` : "";
+  if (reaction === "hold") return trouble.facts.owner ? "_hold" : "_hold_over";
+  return reaction === "silence" ? "_silence" : "";
 }
 
 /** What to do. */
@@ -118,7 +119,8 @@ export function pageOfPlace(place) {
 
 function withDefaults(trouble) {
   const facts = { ...said(trouble) };
-  if ("owner" in facts) facts.owner = ownerName(facts.owner);
-  for (const name of ["why", "how", "who", "owner"]) facts[name] ||= t("unknown");
+  // Whoever has lost its lease controls nothing any more.
+  if ("owner" in facts) facts.owner = facts.owner ? ownerName(facts.owner) : t("owner.gone");
+  for (const name of ["why", "how", "who"]) facts[name] ||= t("unknown");
   return facts;
 }

@@ -45,9 +45,12 @@ function ControllerBreak({ drive, timeout, worst }) {
   if (timeout === null) return t("chain.unknown");
   if (!timeout) return t("chain.controller.unwatched");
   const filled = { timeout: quantity(timeout, "ms"), reaction: t(`reaction.${drive.on_expiry}`) };
-  if (drive.on_expiry === "hold") return html`<strong class="is-alarm">${t("chain.controller.hold", filled)}</strong>`;
+  if (drive.on_expiry === "hold") return html`<strong class="is-alarm">${t(holdKey(drive), filled)}</strong>`;
   return html`${t("chain.controller.silent", filled)}${" "}<${Worst} name=${worst} />`;
 }
+
+// A hold does not outlive the one who holds: the end of its lease stops the drive.
+const holdKey = (drive) => (drive.control === "lease" ? "chain.controller.hold_lease" : "chain.controller.hold");
 
 function OfBridge({ drive }) {
   const isDown = (troubles.value ?? []).some((one) => one.place === `bus/${drive.bus}` && ["bus_down", "bus_off"].includes(one.kind));

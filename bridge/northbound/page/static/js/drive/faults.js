@@ -1,13 +1,12 @@
 // The faults of a drive: the present one with its cause and remedy, what was before, and what its node has told.
 
-import { html, useState } from "../ui.js";
-import { below, has, label, nature } from "../site.js";
-import { exact, number } from "../format.js";
+import { html } from "../ui.js";
+import { has, label } from "../site.js";
+import { number } from "../format.js";
 import { faultIn, t } from "../texts.js";
 import { good } from "../drivestate.js";
-import { ask } from "../live.js";
-import { told } from "../outcome.js";
 import { inWords } from "../trouble.js";
+import { Memory } from "./memory.js";
 
 export function Faults({ drive }) {
   const status = (leaf) => good(`${drive.name}/status/${leaf}`);
@@ -43,37 +42,6 @@ function Before({ drive }) {
   return Object.keys(BEFORE)
     .filter((leaf) => has(point(leaf)))
     .map((leaf) => html`<dt>${t(`faults.${leaf}`)}</dt><dd>${shown(leaf)}</dd>`);
-}
-
-// The faults that the drive itself keeps are parameters; they are read when somebody asks for them.
-function Memory({ drive }) {
-  const entries = memoryOf(drive.name);
-  const [read, setRead] = useState({ rows: [] });
-  if (!entries.length) return null;
-  const onRead = async () => {
-    setRead({ rows: [], isBusy: true });
-    const rows = [];
-    for (const { name, title } of entries) {
-      const outcome = await ask(drive.name, "read_parameter", { parameter: name });
-      rows.push({ name, title, value: outcome.ok ? exact(outcome.value, 1) : told(outcome) });
-      if (!outcome.ok) break;
-    }
-    setRead({ rows });
-  };
-  return html`
-    <p class="search"><button onClick=${onRead} disabled=${read.isBusy}>${t("faults.read")}</button>
-      <span class="hidden" role="status">${read.isBusy ? t("frame.loading") : ""}</span></p>
-    ${read.rows.length > 0 && html`<dl class="facts">
-      ${read.rows.map((row) => html`<dt>${row.name} ${row.title}</dt><dd>${row.value}</dd>`)}</dl>`}
-  `;
-}
-
-// A point of a parameter is described by the parameter's name and title: "P701[1] last fault".
-function memoryOf(drive) {
-  return below(`${drive}/parameter`)
-    .map((point) => /^(\S+) (last fault( but \d+)?)$/.exec(nature(point).description ?? ""))
-    .filter(Boolean)
-    .map(([, name, title]) => ({ name, title }));
 }
 
 function Emergencies({ node }) {

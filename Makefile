@@ -38,7 +38,7 @@ WIRE_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 3)))
 # summary names it, and AGAIN= turns it off. Unit tests have no such excuse.
 AGAIN ?= --reruns 1 -rR
 PAGES := tests/wire/test_docs.py
-BROWSER := tests/wire/test_page_browser.py tests/wire/test_page_troubles.py
+BROWSER := tests/wire/test_page_browser.py tests/wire/test_page_tab.py tests/wire/test_page_troubles.py
 
 # The lab runs on slow CPUs as root: it leaves no caches behind and gets a time limit.
 LAB_SECONDS := 1800

@@ -1,7 +1,7 @@
 // What is around every page: the site's name, the menu, who is logged in, and what is wrong, in a sentence.
 
 import { classes, html, useEffect } from "./ui.js";
-import { connect, disconnect, isConnected, leave, show, troubles } from "./live.js";
+import { connect, disconnect, isConnected, leave, show, troubles, waiting } from "./live.js";
 import { logout, session, siteName } from "./session.js";
 import { Login } from "./login.js";
 import { menu, pageOf, pathOf } from "./pages.js";
@@ -63,7 +63,8 @@ function onVisibility() {
 
 // The one line that says how the plant is.
 function Sentence() {
-  const rank = isConnected.value ? worst(troubles.value) : "unknown";
+  const isKnown = isConnected.value && (troubles.value?.length || !waiting.value);
+  const rank = isKnown ? worst(troubles.value) : "unknown";
   return html`
     <p class=${classes("sentence", `is-${rank}`)} role="status">
       <${Icon} name=${rank === "none" ? "ok" : rank} />

@@ -1,16 +1,13 @@
 // Who are you?
 
-import { html, useEffect, useRef, useState } from "./ui.js";
-import { begin, login, siteName } from "./session.js";
+import { html, useRef, useState } from "./ui.js";
+import { begin, hasVisitors, login, siteName } from "./session.js";
 import { t } from "./texts.js";
 
 export function Login() {
   const [failure, setFailure] = useState("");
   const [isBusy, setBusy] = useState(false);
-  const [mayVisit, setMayVisit] = useState(false);
   const form = useRef();
-  // Without a login there is something to go back to only where visitors may look.
-  useEffect(() => void fetch("api/session").then((answer) => setMayVisit(answer.ok), () => {}), []);
   const onSubmit = async (event) => {
     event.preventDefault();
     setBusy(true);
@@ -29,7 +26,7 @@ export function Login() {
         </label>
         <p class="failure" role="alert">${failure}</p>
         <button class="main" disabled=${isBusy}>${t("login.enter")}</button>
-        ${mayVisit && html`<button type="button" class="plain" onClick=${begin}>${t("login.back")}</button>`}
+        ${hasVisitors.value && html`<button type="button" class="plain" onClick=${begin}>${t("login.back")}</button>`}
       </form>
     </main>
   `;

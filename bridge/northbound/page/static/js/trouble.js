@@ -1,7 +1,7 @@
 // What is wrong, in words. The server finds the troubles; here they get their texts.
 
 import { effect, signal } from "./ui.js";
-import { troubles } from "./live.js";
+import { now as boxNow, troubles, waiting } from "./live.js";
 import { address } from "./route.js";
 import { clock, span } from "./format.js";
 import { drives, nodes } from "./site.js";
@@ -9,13 +9,13 @@ import { ownerName } from "./owner.js";
 import { faultIn, many, maybe, t } from "./texts.js";
 
 const TICK_MS = 10_000;
-const now = signal(Date.now());
+const now = signal(boxNow());
 
 // How long a trouble has lasted goes on while there is one, and nothing has to be drawn where there is none.
 effect(() => {
   if (!troubles.value?.length) return;
-  now.value = Date.now();
-  const ticking = setInterval(() => (now.value = Date.now()), TICK_MS);
+  now.value = boxNow();
+  const ticking = setInterval(() => (now.value = boxNow()), TICK_MS);
   return () => clearInterval(ticking);
 });
 
@@ -28,7 +28,7 @@ export function worst(all) {
 /** How the plant is, in one sentence. */
 export function sentence(all) {
   if (all === null) return t("frame.loading");
-  if (!all.length) return many("plant.fine", drives.value.length);
+  if (!all.length) return waiting.value ? many("plant.waiting", waiting.value) : many("plant.fine", drives.value.length);
   const first = `${nameOf(all[0].place)}: ${headline(all[0])}, ${since(all[0])}`;
   const others = all.length - 1;
   return others ? `${first}. ${many("plant.others", others)}` : `${first}.`;

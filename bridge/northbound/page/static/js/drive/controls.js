@@ -11,13 +11,7 @@ import { giveBack, isOurs, refusals, request, take } from "./ownership.js";
 export function Controls({ drive }) {
   const name = drive.name;
   const isHeld = isOurs(name);
-  useEffect(() => {
-    forgetRefusal(name);
-    return () => {
-      giveBack(name);
-      forgetRefusal(name);
-    };
-  }, [name]);
+  useEffect(() => () => giveBack(name), [name]);
   const takes = drive.control === "lease";
   return html`
     <section class="controls" aria-labelledby="controls">
@@ -44,11 +38,6 @@ function Stopping({ drive, takes }) {
   return takes ? null : t("drive.stop_only");
 }
 
-// A refusal is about what was just asked, and not about what somebody asked before this page was left.
-function forgetRefusal(drive) {
-  if (refusals.value[drive]) refusals.value = { ...refusals.value, [drive]: null };
-}
-
 function Buttons({ drive, isHeld }) {
   const does = (action, fields) => () => request(drive.name, action, fields);
   const mayStop = isHeld || drive.stop_by_anyone;
@@ -70,6 +59,7 @@ function Refusal({ drive }) {
 }
 
 function text({ action, outcome }) {
+  if (action === "keep_alive") return t("outcome.lost", { message: told(outcome) });
   const what = t(`action.${action}`);
   if (outcome.ok) return t("outcome.not_forwarded", { what, message: outcome.message });
   return t("outcome.refused", { what, message: told(outcome) });

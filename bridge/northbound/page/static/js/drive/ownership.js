@@ -36,6 +36,7 @@ export async function take(drive) {
   renew(drive);
 }
 
+/** What was refused is forgotten: it is about what was asked before. */
 export function giveBack(drive) {
   wanted.delete(drive);
   refuse(drive, "", null);

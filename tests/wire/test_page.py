@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import signal
 import socket
 import ssl
 import subprocess
@@ -463,6 +464,29 @@ def test_the_system_is_for_everybody_and_its_files_for_engineers(browser: Browse
     assert [one for one in file["findings"] if one["severity"] == "error"] == []
     until(lambda: engineer.request("GET", "/api/system/audit").json != [], TIMEOUT_S, "what was asked for")
     tab.socket.close()
+
+
+def test_a_bus_process_that_hangs_is_told_alone(tmp_path: Path) -> None:
+    port = free_port()
+    with drivebridge(tmp_path, "run", "run", str(write_site(tmp_path, port)), notify=True) as process:
+        process.wait_ready()
+        until(lambda: "is served on" in process.output(), 30.0, "the page is served")
+        browser = Browser(port)
+        browser.login("observer")
+        tab = Tab(browser)
+
+        def is_dead(message: Json) -> bool:
+            return "bridge_dead" in [one["kind"] for one in message["troubles"]]
+
+        assert not is_dead(tab.until(lambda message: "troubles" in message))
+        process.signal(signal.SIGSTOP)
+        try:
+            told = tab.until(lambda message: "troubles" in message and is_dead(message))
+        finally:
+            process.signal(signal.SIGCONT)
+        assert (len(told["troubles"]), told["waiting"]) == (1, 0)
+        tab.until(lambda message: "troubles" in message and not is_dead(message))
+        tab.socket.close()
 
 
 def test_by_tls_the_cookie_is_bound_to_it(tmp_path: Path) -> None:

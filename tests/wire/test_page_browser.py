@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, ViewportSize, expect
 
 from tests.support import sites
 from tests.support.desk import Desk, browser
@@ -70,8 +70,9 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Process, 
 def serving(folder: Path, *nodes: str) -> Iterator[int]:
     """The page of a site with these nodes on a simulated bus; its port."""
     port = free_port()
-    tables = f'[opcua]\nlisten = "127.0.0.1:{free_port()}"\n{users()}', f'[page]\nlisten = "127.0.0.1:{port}"\n'
-    site = sites.write(folder, sites.bus(*nodes), *tables)
+    opcua = f'[opcua]\nlisten = "127.0.0.1:{free_port()}"\n{users()}'
+    page = f'[page]\nlisten = "127.0.0.1:{port}"\n'
+    site = sites.write(folder, sites.bus(*nodes), opcua, page)
     with drivebridge(folder, "run", "run", str(site), notify=True) as process:
         process.wait_ready()
         until(lambda: "is served on" in process.output(), 30.0, "the page is served")
@@ -287,7 +288,8 @@ def test_a_drive_is_compared_with_its_like_until_that_is_stopped_or_left(bench: 
         read = asked(page, "read_parameter")
         to(page, "parameters/a/fu1")
         options = page.locator("#source option")
-        expect(options).to_have_text(["factory settings", "a backup, EDS or XDD file", "a/fu2", "b/fu1", "b/fu2"])
+        files = ["factory settings", "a backup, EDS or XDD file"]
+        expect(options).to_have_text([*files, "a/fu2", "b/fu1", "b/fu2"])
         expect(page.locator("td.value", has_text="…")).to_have_count(0)
         page.get_by_label("Compare with").select_option("drive b/fu1")
         compare = page.get_by_role("button", name="Compare", exact=True)
@@ -326,6 +328,7 @@ def test_a_double_click_writes_once(bench: Desk) -> None:
         assert written == [{"parameter": "P102.1", "value": 2.01}]
         page.get_by_role("button", name="Deutsch").click()
         expect(parameter(page, "P102.1")).to_contain_text("2,01\u202fs")
+        expect(parameter(page, "P105.1")).to_contain_text("0,1 … 400 Hz")
 
 
 @pytest.mark.parametrize(
@@ -530,8 +533,8 @@ def test_log_out(desk: Desk) -> None:
         expect(page.locator('input[name="user"]')).to_be_visible()
 
 
-PHONE = {"width": 360, "height": 740}
-DESKTOP = {"width": 1280, "height": 900}
+PHONE: ViewportSize = {"width": 360, "height": 740}
+DESKTOP: ViewportSize = {"width": 1280, "height": 900}
 
 
 @pytest.mark.parametrize(

@@ -154,7 +154,12 @@ def test_somebody_else_commands_a_drive(tmp_path: Path, chromium: Browser) -> No
 def test_a_drive_has_another_parameter_set(tmp_path: Path, chromium: Browser) -> None:
     with broken(tmp_path, chromium) as plant:
         plant.tell("set_otherwise")
-        plant.says(DRIVE, "the frequency setpoint does not reach the drive", "P546[1]", "Set the drive's parameter back")
+        plant.says(
+            DRIVE,
+            "the frequency setpoint does not reach the drive",
+            "P546[1]",
+            "Set the drive's parameter back",
+        )
         plant.shot("parameter-set")
 
 

@@ -54,8 +54,8 @@ def points_of(mapping: str) -> list[Point]:
 
 def is_trendable(point: Point) -> bool:
     """As ``trendable`` of trend.js has it."""
-    is_number = point.data_type not in (DataType.STRING, DataType.BOOL) and not point.states and not point.bits
-    return is_number and point.path[-2] in ("actual", "command", "supervision")
+    is_word = point.data_type in (DataType.STRING, DataType.BOOL) or point.states or point.bits
+    return not is_word and point.path[-2] in ("actual", "command", "supervision")
 
 
 @pytest.mark.parametrize("mapping", [name for name in family_names() if load_family(name).slot])

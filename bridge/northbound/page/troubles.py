@@ -96,8 +96,8 @@ class Troubles:
         return said | ({"or_longer": True} if since_ms - self._began_ms < _BEGINNING_MS else {})
 
     def _has_risen(self, name: str, now_ms: float, *, is_news_at_first: bool = False) -> bool:
-        """Whether the counter ``name`` rose lately; with ``is_news_at_first`` what it had when the front began
-        counts as well."""
+        """Whether the counter ``name`` rose lately; with ``is_news_at_first`` what it had when the front
+        began counts as well."""
         count = self._look(name)
         if not isinstance(count, int):
             return False

@@ -10,10 +10,13 @@ const LOOK_MS = 500;
 /** Longer than the bridge takes for the slowest of its answers. */
 const ANSWER_MS = 15_000;
 const SESSION_OVER = [4401, 4403];
+const TOO_MANY = 4429;
 const UNREACHABLE = Object.freeze({ ok: false, code: "not_connected", message: "", forwarded: false });
 const UNANSWERED = Object.freeze({ ok: false, code: "timed_out", message: "", forwarded: false });
 
 export const isConnected = signal(false);
+/** Whether the server has no room for this tab. */
+export const isOneTooMany = signal(false);
 
 let socket = null;
 let tries = 0;
@@ -70,12 +73,13 @@ function open() {
 function onOpen() {
   socket.send(session.value.token);
   heardAt = performance.now();
-  isConnected.value = true;
   listeners.onReady();
 }
 
+// Only who is let in hears something: a tab that is refused is told by how its socket is closed.
 function onMessage(event) {
   tries = 0;
+  isConnected.value = true;
   heardAt = performance.now();
   const message = JSON.parse(event.data);
   if ("outcome" in message) answer(message.outcome, message);
@@ -85,6 +89,7 @@ function onMessage(event) {
 function onClose(event) {
   drop();
   if (SESSION_OVER.includes(event.code)) return void ended();
+  isOneTooMany.value = event.code === TOO_MANY;
   retry = setTimeout(open, RETRY_MS[Math.min(tries++, RETRY_MS.length - 1)]);
 }
 

@@ -1,6 +1,7 @@
 // What is around every page: the site's name, the menu, who is logged in, and what is wrong, in a sentence.
 
 import { classes, html, useEffect } from "./ui.js";
+import { isOneTooMany } from "./connection.js";
 import { connect, disconnect, isConnected, leave, show, troubles, waiting } from "./live.js";
 import { logout, session, siteName } from "./session.js";
 import { Login } from "./login.js";
@@ -68,7 +69,7 @@ function Sentence() {
   return html`
     <p class=${classes("sentence", `is-${rank}`)} role="status">
       <${Icon} name=${rank === "none" ? "ok" : rank} />
-      <span>${isConnected.value ? sentence(troubles.value) : t("frame.disconnected")}</span>
+      <span>${isConnected.value ? sentence(troubles.value) : t(isOneTooMany.value ? "frame.too_many" : "frame.disconnected")}</span>
     </p>
   `;
 }

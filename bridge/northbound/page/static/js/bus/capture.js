@@ -11,6 +11,9 @@ const ENDINGS = { candump: "log", asc: "asc" };
 const LONGEST_S = 60;
 const ANSWERS_S = 15;
 
+// The server keeps as many frames as it has room for.
+const taken = async (answer) => ({ text: await answer.text(), isCut: answer.headers.has("x-cut") });
+
 export function Capture({ bus }) {
   const [state, setState] = useState({});
   const onSubmit = async (event) => {
@@ -18,10 +21,10 @@ export function Capture({ bus }) {
     const { seconds, format } = Object.fromEntries(new FormData(event.target));
     setState({ busy: t("capture.runs", { seconds }) });
     const address = `api/bus/${encodeURIComponent(bus.name)}/capture?seconds=${seconds}&format=${format}`;
-    const { value, failure } = await fetched(address, { limitMs: (Number(seconds) + ANSWERS_S) * 1000, read: (answer) => answer.text() });
+    const { value, failure } = await fetched(address, { limitMs: (Number(seconds) + ANSWERS_S) * 1000, read: taken });
     if (failure) return setState({ failure });
-    save(`${siteName.value}-${bus.name}.${ENDINGS[format]}`, value);
-    setState({});
+    save(`${siteName.value}-${bus.name}.${ENDINGS[format]}`, value.text);
+    setState(value.isCut ? { failure: t("capture.cut") } : {});
   };
   return html`
     <section class="panel" aria-labelledby="capture">

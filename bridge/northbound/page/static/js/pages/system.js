@@ -4,9 +4,10 @@ import { html } from "../ui.js";
 import { events } from "../live.js";
 import { may } from "../session.js";
 import { clock, number, quantity } from "../format.js";
-import { t } from "../texts.js";
+import { maybe, t } from "../texts.js";
 import { good } from "../drivestate.js";
 import { Failure, useFetched } from "../fetched.js";
+import { Icon } from "../icons.js";
 import { Audit } from "../system/audit.js";
 import { Certificates } from "../system/certificates.js";
 import { SiteFile } from "../system/sitefile.js";
@@ -23,6 +24,7 @@ function View() {
     <h1>${t("page.system")}</h1>
     <${Failure} told=${answer} />
     ${told && html`
+      <${Unreadable} faults=${told.faults} />
       <div class="columns">
         <${Versions} versions=${told.versions} />
         <${Health} />
@@ -42,6 +44,12 @@ function Versions({ versions }) {
       <dl class="facts">${Object.entries(versions).map(([name, version]) => html`<dt>${name}</dt><dd>${version}</dd>`)}</dl>
     </section>
   `;
+}
+
+// What could not be told, of a page on which the rest stands.
+function Unreadable({ faults }) {
+  return html`<ul class="findings">${faults.map((one) => html`<li class="is-warning"><${Icon} name="warning" />
+    <span>${maybe(`system.${one.of}`) || one.of}: ${one.text}</span></li>`)}</ul>`;
 }
 
 function Health() {

@@ -3,6 +3,7 @@
 export const de = {
   unknown: "nicht bekannt",
   "frame.loading": "Lädt …",
+  "frame.too_many": "Zu viele Tabs dieser Seite sind offen; sie wartet, bis einer geschlossen wird.",
   "frame.disconnected": "Keine Verbindung zur Bridge. Was Sie sehen, ist alt; die Seite verbindet sich von selbst neu.",
   "frame.skip": "Zum Inhalt",
   "frame.menu": "Seiten",
@@ -492,6 +493,7 @@ export const de = {
   "capture.seconds": "Sekunden",
   "capture.format": "Format",
   "capture.start": "Aufzeichnen und herunterladen",
+  "capture.cut": "Es kam mehr, als aufgehoben wird: die Datei endet vor der Zeit.",
   "capture.runs": "Hört {seconds} s mit …",
   "layout.title": "Aufbau der PDOs",
   "layout.as_in_mapping": "Wie in der Mapping-Datei, Byte für Byte; das niedrigste Bit steht links.",

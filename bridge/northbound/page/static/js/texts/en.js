@@ -3,6 +3,7 @@
 export const en = {
   unknown: "not known",
   "frame.loading": "Loading …",
+  "frame.too_many": "Too many tabs of this page are open; it waits for one to be closed.",
   "frame.disconnected": "No connection to the bridge. What you see is old; it connects again by itself.",
   "frame.skip": "Skip to the content",
   "frame.menu": "Pages",
@@ -492,6 +493,7 @@ export const en = {
   "capture.seconds": "Seconds",
   "capture.format": "Format",
   "capture.start": "Capture and download",
+  "capture.cut": "More came than is kept: the file ends before the time was over.",
   "capture.runs": "Listening for {seconds} s …",
   "layout.title": "Layout of the PDOs",
   "layout.as_in_mapping": "As the mapping file has it, byte by byte; the lowest bit is on the left.",

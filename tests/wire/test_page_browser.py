@@ -279,7 +279,9 @@ def test_a_refusal_is_not_told_again_on_return(bench: Desk) -> None:
         other.get_by_role("button", name="Take control").click()
         expect(other.get_by_role("alert")).to_contain_text("is controlled by")
         other.get_by_role("link", name="Plant", exact=True).click()
+        expect(other.locator(".tile").first).to_be_visible()
         to(other, "drive/b/fu2")
+        expect(other.locator(".ownership")).to_be_visible()
         expect(other.get_by_role("alert")).to_have_text("")
 
 

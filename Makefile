@@ -38,7 +38,7 @@ WIRE_JOBS := $(shell echo $$(($(JOBS) < 2 ? $(JOBS) : 3)))
 # summary names it, and AGAIN= turns it off. Unit tests have no such excuse.
 AGAIN ?= --reruns 1 -rR
 PAGES := tests/wire/test_docs.py
-BROWSER := tests/wire/test_page_browser.py tests/wire/test_page_tab.py tests/wire/test_page_troubles.py
+BROWSER := tests/browser
 
 # The lab runs on slow CPUs as root: it leaves no caches behind and gets a time limit.
 LAB_SECONDS := 1800
@@ -79,7 +79,7 @@ $(FOREIGN)/$(REGISTRIES).stamp: tools/foreign_files.py | $(VENV)/dev.stamp packa
 
 wire: compiled packages clients ## tests with real protocol clients on loopback
 	@echo "== wire tests"
-	@$(PYTEST) -n $(WIRE_JOBS) --dist loadfile -rs $(AGAIN) tests/wire $(patsubst %,--ignore %,$(PAGES) $(BROWSER)) $(ARGS)
+	@$(PYTEST) -n $(WIRE_JOBS) --dist loadfile -rs $(AGAIN) tests/wire $(patsubst %,--ignore %,$(PAGES)) $(ARGS)
 
 pages: compiled packages clients ## the commands of README and docs, as a reader gives them
 	@echo "== README and docs"

@@ -47,8 +47,8 @@ def users() -> str:
     return "\n".join(entries)
 
 
-def write_site(folder: Path, port: int, page: str = "", opcua: str = "") -> Path:
-    node = sites.node(sites.drive("fu1", "lease", 1000))
+def write_site(folder: Path, port: int, page: str = "", opcua: str = "", timeout_ms: int = 1000) -> Path:
+    node = sites.node(sites.drive("fu1", "lease", timeout_ms))
     table = f'[opcua]\nlisten = "127.0.0.1:{free_port()}"\n{opcua}\n{users()}'
     return sites.write(
         folder,

@@ -8,16 +8,14 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import expect
 
 from tests.bench.processes import children
-from tests.support.desk import Desk, browser
-from tests.support.process import Process, drivebridge, free_port, until
-from tests.wire.test_page import DRIVE, write_site
-from tests.wire.test_page_browser import start, state, take, to, to_drive
+from tests.browser.hands import owner, start, state, take, to, to_drive
+from tests.support.desk import Desk
+from tests.support.process import Process
+from tests.wire.test_page import DRIVE
 
 SLOW_ANSWER = """
     // Outcomes come a second late.
@@ -30,32 +28,6 @@ SLOW_ANSWER = """
     };
 """
 DRAWN = "document.querySelector('.trend canvas').toDataURL()"
-
-
-@pytest.fixture(scope="module")
-def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Process, int]]:
-    folder, port = tmp_path_factory.mktemp("tab"), free_port()
-    with drivebridge(folder, "run", "run", str(write_site(folder, port)), notify=True) as process:
-        process.wait_ready()
-        until(lambda: "is served on" in process.output(), 30.0, "the page is served")
-        yield process, port
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
-    with browser() as started:
-        yield started
-
-
-@pytest.fixture
-def desk(chromium: Browser, bridge: tuple[Process, int]) -> Iterator[Desk]:
-    desk = Desk(chromium, bridge[1])
-    yield desk
-    assert not desk.complaints
-
-
-def owner(page: Page) -> Any:
-    return expect(page.locator(".ownership"))
 
 
 def front_of(bridge: Process) -> int:
@@ -129,9 +101,8 @@ def test_whoever_comes_back_after_the_session_is_over_logs_in_again(desk: Desk) 
 def test_a_trend_is_paused_zoomed_and_kept_as_a_file(desk: Desk, tmp_path: Path) -> None:
     with desk.sits("operator") as page:
         to_drive(page)
-        take(page)
-        start(page, "15")
         pause = page.locator(".trend header button").first
+        page.wait_for_timeout(1000)
         pause.click()
         before = page.evaluate(DRAWN)
         page.wait_for_timeout(500)

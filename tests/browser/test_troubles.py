@@ -9,15 +9,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
+from tests.browser.hands import SHOTS
 from tests.support import sites
-from tests.support.desk import Desk, browser
+from tests.support.desk import Desk
 from tests.support.process import Process, free_port, peer, until
 from tests.wire.test_page import DRIVE, users
 
-SHOTS = Path("build/page")
 SINCE = re.compile(r"since \d\d:\d\d:\d\d (or earlier )?\(\d+ s\)")
 
 
@@ -47,12 +46,6 @@ class BrokenPlant:
     def shot(self, name: str) -> None:
         SHOTS.mkdir(parents=True, exist_ok=True)
         self.page.screenshot(path=SHOTS / f"trouble-{name}.png")
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
-    with browser() as started:
-        yield started
 
 
 @contextmanager

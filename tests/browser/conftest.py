@@ -1,0 +1,65 @@
+"""Bridges for all of these tests, a browser for each module, and the desks at which people sit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser
+
+from tests.browser.hands import pair, serving
+from tests.support import sites
+from tests.support.desk import Desk, browser
+from tests.support.process import Process, drivebridge, free_port, until
+from tests.wire.test_page import write_site
+
+PATIENT_MS = 2000
+"""A tab beside other browsers may be silent for longer than a controller would be. Its lease is longer."""
+
+
+@pytest.fixture(scope="session")
+def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Process, int]]:
+    folder, port = tmp_path_factory.mktemp("page"), free_port()
+    site = write_site(folder, port, timeout_ms=PATIENT_MS)
+    with drivebridge(folder, "run", "run", str(site), notify=True) as process:
+        process.wait_ready()
+        until(lambda: "is served on" in process.output(), 30.0, "the page is served")
+        yield process, port
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    with browser() as started:
+        yield started
+
+
+@pytest.fixture
+def desk(chromium: Browser, bridge: tuple[Process, int]) -> Iterator[Desk]:
+    desk = Desk(chromium, bridge[1])
+    yield desk
+    assert not desk.complaints
+
+
+def positioner() -> str:
+    """A drive that is told where to go, how fast and how hard."""
+    drive = sites.drive("axis1", "lease", PATIENT_MS, "telegram_downtime_s = 0")
+    more = 'supervision = "guarding"\nsupervision_ms = 2000'
+    return sites.node(drive, name="winder", node_id=7, mapping="stoeber/5000-posi", more=more)
+
+
+@pytest.fixture(scope="session")
+def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+    with serving(tmp_path_factory.mktemp("workshop"), pair("a", 5), pair("b", 6), positioner()) as port:
+        yield port
+
+
+@pytest.fixture
+def bench(chromium: Browser, workshop: int) -> Iterator[Desk]:
+    desk = Desk(chromium, workshop)
+    yield desk
+    assert not desk.complaints
+
+
+@pytest.fixture(scope="session", autouse=True)
+def started(bridge: tuple[Process, int], workshop: int) -> None:
+    """Before the first module: what it leaves behind is what it has begun itself."""

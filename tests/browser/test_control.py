@@ -1,0 +1,149 @@
+"""A drive is moved from the page, and stops when its tab goes."""
+
+from __future__ import annotations
+
+import re
+
+from playwright.sync_api import expect
+
+from tests.browser.hands import (
+    asked,
+    hanging,
+    start,
+    state,
+    take,
+    to,
+    to_drive,
+)
+from tests.support.desk import Desk
+
+
+def test_a_drive_is_taken_started_stopped_and_given_back(desk: Desk) -> None:
+    with desk.sits("operator") as page:
+        to_drive(page)
+        take(page)
+        start(page, "25")
+        expect(page.locator(".actuals")).to_contain_text("25.0")
+        expect(page.locator(".diagram .present")).to_have_text("running")
+        expect(page.locator(".bits").last).to_contain_text("operation enabled")
+        page.get_by_role("button", name="Stop", exact=True).click()
+        state(page).not_to_have_text(re.compile("running"))
+        page.get_by_role("button", name="Give back").click()
+        expect(page.locator(".ownership")).to_contain_text("nobody")
+
+
+def test_a_tab_that_is_closed_stops_its_drive_in_the_published_time(desk: Desk) -> None:
+    with desk.sits("operator") as watcher:
+        to_drive(watcher)
+        expect(watcher.locator(".chain")).to_contain_text("At most")
+        published = re.search(r"At most ([\d,]+)", watcher.locator(".chain").inner_text())
+        assert published
+        with desk.sits("operator") as page:
+            to_drive(page)
+            take(page)
+            start(page, "30")
+            state(watcher).to_have_text(re.compile("running"))
+        limit_ms = float(published[1].replace(",", ""))
+        expect(watcher.locator(".drivehead .state")).not_to_have_text(
+            re.compile("running"), timeout=limit_ms + 2000
+        )
+
+
+def test_a_tab_that_hangs_is_a_controller_that_fell_silent(desk: Desk) -> None:
+    with desk.sits("operator") as page, desk.sits("operator") as watcher:
+        to_drive(page)
+        take(page)
+        start(page, "20")
+        with hanging(page):
+            expect(watcher.locator(".sentence")).to_contain_text("its controller fell silent")
+        expect(watcher.locator(".trouble")).to_contain_text("(web page)")
+        expect(watcher.locator(".trouble .remedy")).to_contain_text("acknowledge")
+        page.get_by_role("button", name="Acknowledge fault").click()
+        expect(watcher.locator(".sentence")).to_contain_text("Everything is in order")
+        state(page).not_to_have_text(re.compile("running"))
+
+
+def test_a_second_browser_takes_no_drive_from_an_operator_and_an_engineer_does(desk: Desk) -> None:
+    with desk.sits("operator") as owner, desk.sits("operator") as other, desk.sits("engineer") as engineer:
+        for page in (owner, other, engineer):
+            to_drive(page)
+        take(owner)
+        other.get_by_role("button", name="Take control").click()
+        expect(other.get_by_role("alert")).to_contain_text("is controlled by")
+        take(engineer)
+        expect(owner.locator(".ownership")).to_contain_text("engineer (web page)")
+
+
+def test_setpoints_are_sent_together_and_empty_ones_are_not(bench: Desk) -> None:
+    with bench.sits("operator") as page:
+        written = asked(page, "write")
+        to(page, "drive/winder/drive")
+        take(page)
+        labels = page.locator("form.setpoint label")
+        expect(labels).to_have_count(4)
+        expect(labels.first).to_contain_text("velocity")
+        page.get_by_role("button", name="Send").click()
+        page.locator("#setpoint").fill("120")
+        page.locator("#setpoint-acceleration").fill("300")
+        page.get_by_role("button", name="Send").click()
+        expect(page.locator("form.setpoint .field").first).to_contain_text("now 120")
+        expect(page.locator("#setpoint")).to_have_value("")
+        assert written == [{"values": {"velocity": 120, "acceleration": 300}}]
+
+
+def test_nobody_is_said_to_watch_or_to_stop_who_does_not(bench: Desk) -> None:
+    with bench.sits("operator") as page:
+        to(page, "drive/a/fu1")
+        chain = page.locator(".chain")
+        expect(chain).to_contain_text("the bridge leaves the drive as it is: it may run on")
+        expect(chain).to_contain_text("nobody watches")
+        expect(chain).not_to_contain_text("nothing heard yet")
+        to(page, "drive/a/fu2")
+        expect(page.locator(".controls")).to_contain_text("Only who controls it can stop it")
+        expect(page.get_by_role("button", name="Stop", exact=True)).to_be_disabled()
+
+
+def test_a_hold_is_told_as_what_it_is(bench: Desk) -> None:
+    with bench.sits("operator") as page, bench.sits("operator") as watcher:
+        for one in (page, watcher):
+            to(one, "drive/a/fu1")
+        take(page)
+        page.get_by_role("button", name="Start", exact=True).click()
+        state(page).to_have_text(re.compile("running"))
+        with hanging(page):
+            state(watcher).to_have_text(re.compile("its controller is silent"))
+            expect(watcher.locator(".trouble")).to_contain_text("it may run on")
+            expect(watcher.locator(".trouble")).to_contain_text("until the lease ended, and then stopped it")
+        take(page)
+        page.get_by_role("button", name="Acknowledge fault").click()
+        expect(watcher.locator(".sentence")).to_contain_text("in order")
+
+
+def test_a_refusal_is_not_told_again_on_return(bench: Desk) -> None:
+    with bench.sits("operator") as owner, bench.sits("operator") as other:
+        for page in (owner, other):
+            to(page, "drive/b/fu2")
+        take(owner)
+        other.get_by_role("button", name="Take control").click()
+        expect(other.get_by_role("alert")).to_contain_text("is controlled by")
+        other.get_by_role("link", name="Plant", exact=True).click()
+        expect(other.locator(".tile").first).to_be_visible()
+        to(other, "drive/b/fu2")
+        expect(other.locator(".ownership")).to_be_visible()
+        expect(other.get_by_role("alert")).to_have_text("")
+
+
+def test_an_observer_is_told_that_it_may_read(desk: Desk) -> None:
+    with desk.sits("observer") as page:
+        to_drive(page)
+        expect(page.locator(".controls")).to_contain_text("As an observer")
+        expect(page.get_by_role("button", name="Stop", exact=True)).to_have_count(0)
+
+
+def test_log_out(desk: Desk) -> None:
+    with desk.sits("operator") as page:
+        page.get_by_role("button", name="Log out").click()
+        expect(page.locator('input[name="user"]')).to_be_visible()
+        expect(page.get_by_role("button", name="Back")).to_have_count(0)
+        page.reload()
+        expect(page.locator('input[name="user"]')).to_be_visible()

@@ -23,7 +23,7 @@ export function Capture({ bus }) {
     const address = `api/bus/${encodeURIComponent(bus.name)}/capture?seconds=${seconds}&format=${format}`;
     const { value, failure } = await fetched(address, { limitMs: (Number(seconds) + ANSWERS_S) * 1000, read: taken });
     if (failure) return setState({ failure });
-    save(`${siteName.value}-${bus.name}.${ENDINGS[format]}`, value.text);
+    save(`${siteName.value}-${bus.name}${value.isCut ? "-cut" : ""}.${ENDINGS[format]}`, value.text);
     setState(value.isCut ? { failure: t("capture.cut") } : {});
   };
   return html`

@@ -637,4 +637,8 @@ export const de = {
   "bit.halt": "Halt",
   "bit.parameter_set_bit_0": "Parametersatz Bit 0",
   "bit.parameter_set_bit_1": "Parametersatz Bit 1",
+  "bit.function_480_11": "wie P480 [-11] es einstellt",
+  "bit.function_480_12": "wie P480 [-12] es einstellt",
+  "bit.function_481_9": "wie P481 [-09] es einstellt",
+  "bit.function_481_10": "wie P481 [-10] es einstellt",
 };

@@ -565,4 +565,9 @@ export const en = {
   "trouble.no_actual": "the actual {value} does not come from the drive",
   "trouble.no_actual.why": "{why}.",
   "trouble.no_actual.remedy": "Set the drive's parameter back, or correct the mapping of the site.",
+
+  "bit.function_480_11": "as P480 [-11] sets it",
+  "bit.function_480_12": "as P480 [-12] sets it",
+  "bit.function_481_9": "as P481 [-09] sets it",
+  "bit.function_481_10": "as P481 [-10] sets it",
 };

@@ -41,6 +41,27 @@ export function faultIn(family, number) {
   return faults.value[language.value]?.[family]?.[number] ?? {};
 }
 
+const book = signal(null);
+let isOpening = false;
+
+/** What the bridge says, in the reader's language: English until that is there, and where there is no phrase. */
+export function told(text) {
+  if (language.value === "en" || !text) return text;
+  if (book.value) return book.value.said(text, language.value);
+  openBook();
+  return text;
+}
+
+async function openBook() {
+  if (isOpening) return;
+  isOpening = true;
+  try {
+    book.value = await import("./texts/said.js");
+  } catch {
+    setTimeout(() => (isOpening = false), 10000);
+  }
+}
+
 const loading = new Set();
 
 async function load(wanted) {

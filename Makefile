@@ -186,7 +186,7 @@ $(VENV)/made.stamp: tools/make-venv
 
 $(VENV)/demo.stamp: $(VENV)/made.stamp pyproject.toml requirements.lock $(SCRIPTS)
 	@echo "Installing drivebridge into $(VENV)"
-	@$(QUIETLY) $(PIP) install --no-build-isolation -c requirements.lock -e .
+	@$(QUIETLY) $(PIP) install --no-build-isolation -c requirements.lock -e '.[dbc]'
 	@touch $@
 
 $(VENV)/dev.stamp: $(VENV)/made.stamp pyproject.toml requirements.lock $(SCRIPTS)

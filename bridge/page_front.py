@@ -6,6 +6,7 @@ import asyncio
 import logging
 import socket
 from contextlib import AsyncExitStack
+from importlib.util import find_spec
 from pathlib import Path
 
 from bridge import clock
@@ -44,7 +45,8 @@ def exports_of(project: Project) -> dict[str, Export]:
     for name, table in tables.items():
         exports[f"{name}.csv"] = lambda table=table: table(project).as_csv()
         exports[f"{name}.json"] = lambda table=table: table(project).as_json()
-    for place, bus in enumerate(project.site.bus):
+    # The library for them is an extra: what cannot be made is not offered.
+    for place, bus in enumerate(project.site.bus if find_spec("cantools") else ()):
         exports[f"{bus.name}.dbc"] = lambda place=place: dbc_file(project, place)
     return exports
 

@@ -15,6 +15,7 @@ from tests.browser.hands import (
     serving,
     take,
     to,
+    to_drive,
 )
 from tests.support.desk import Desk
 from tests.support.process import Process
@@ -90,6 +91,16 @@ def test_texts_of_others_are_shown_as_texts(desk: Desk, bridge: tuple[Process, i
         expect(page.get_by_role("region", name="Audit log")).to_contain_text(INJECTED)
         expect(page.locator('img[src="x"]')).to_have_count(0)
         assert "owned" not in page.title()
+
+
+def test_what_the_bridge_says_is_german_on_the_german_page(desk: Desk) -> None:
+    with desk.sits("operator") as page:
+        to_drive(page)
+        expect(page.locator(".chain")).to_contain_text("the drive runs on: P151 is 0 (off)")
+        page.get_by_role("button", name="Deutsch").click()
+        expect(page.locator(".chain")).to_contain_text("der Antrieb läuft weiter: P151 ist 0 (aus)")
+        page.get_by_role("button", name="English").click()
+        expect(page.locator(".chain")).to_contain_text("the drive runs on: P151 is 0 (off)")
 
 
 def test_the_system_shows_the_file_without_its_secrets(desk: Desk) -> None:

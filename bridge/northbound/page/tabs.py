@@ -133,7 +133,8 @@ class Tabs:
         tab.tell(_encode({"events": list(self._events)}))
 
     def _troubles_told(self) -> bytes:
-        return _encode({"troubles": self._troubles.shown, "waiting": self._troubles.waiting})
+        found = self._troubles
+        return _encode({"troubles": found.shown, "waiting": found.waiting, "recent": found.recent})
 
     def _on_message(self, tab: Tab, data: str) -> None:
         viewer, known = tab.viewer, self._topics.places.__contains__

@@ -25,6 +25,7 @@ from bridge.northbound.page.findings import (
     of_meaning,
     of_node,
 )
+from bridge.northbound.page.recent import Recent
 
 BOOTING_MS: Final = 10_000.0
 """A node may boot for this long before it is a trouble."""
@@ -61,23 +62,30 @@ class Troubles:
         """The nodes that boot, and since when."""
         self._shown: list[dict[str, Any]] = []
         self._waiting = 0
+        self._recent = Recent()
 
     def beat(self) -> bool:
-        """Look again; whether ``shown`` or ``waiting`` is another one now."""
+        """Look again; whether ``shown``, ``waiting`` or ``recent`` is another one now."""
         now_ms = self._epoch_ms()
-        before = self._shown, self._waiting
+        before = self._shown, self._waiting, self.recent
         troubles = sorted(self._find(now_ms), key=lambda one: one.rank)
         self._since = {
             (one.kind, one.place): self._since.get((one.kind, one.place), now_ms) for one in troubles
         }
         self._shown = [self._said(one) for one in troubles]
-        return (self._shown, self._waiting) != before
+        self._recent.see(self._shown, now_ms)
+        return (self._shown, self._waiting, self.recent) != before
 
     @property
     def shown(self) -> list[dict[str, Any]]:
         """For JSON: rank, kind, place, since in ms since 1970, what else its text needs; ``or_longer`` where
         it may have begun before this front did."""
         return self._shown
+
+    @property
+    def recent(self) -> list[dict[str, Any]]:
+        """As ``Recent.shown``."""
+        return self._recent.shown
 
     @property
     def waiting(self) -> int:

@@ -189,7 +189,12 @@ class Page:
         return self._with_cookie(self._shown(session), session)
 
     def _shown(self, session: Session) -> dict[str, Any]:
-        return {"user": session.user, "role": session.role.name.lower(), "token": session.token}
+        return {
+            "user": session.user,
+            "role": session.role.name.lower(),
+            "token": session.token,
+            "has_users": bool(self._users),
+        }
 
     def _with_cookie(self, body: Mapping[str, Any], session: Session) -> Response:
         response = Response(_encode(body), media_type="application/json")

@@ -69,9 +69,14 @@ function Sentence() {
   return html`
     <p class=${classes("sentence", `is-${rank}`)} role="status">
       <${Icon} name=${rank === "none" ? "ok" : rank} />
-      <span>${isConnected.value ? sentence(troubles.value) : t(isOneTooMany.value ? "frame.too_many" : "frame.disconnected")}</span>
+      <span>${said()}</span>
     </p>
   `;
+}
+
+function said() {
+  if (isConnected.value || troubles.value === null) return sentence(troubles.value);
+  return t(isOneTooMany.value ? "frame.too_many" : "frame.disconnected");
 }
 
 function Tools() {
@@ -83,9 +88,8 @@ function Tools() {
       <button class="plain" onClick=${nextTheme} aria-label=${t("frame.theme", { theme: t(`theme.${theme.value}`) })}
         title=${t("frame.theme", { theme: t(`theme.${theme.value}`) })}><${Icon} name=${theme.value} /></button>
       <span class="who">${who.user || t("frame.visitor")} <small>${t(`role.${who.role}`)}</small></span>
-      ${who.user
-        ? html`<button onClick=${logout}>${t("frame.logout")}</button>`
-        : html`<button onClick=${() => (session.value = null)}>${t("frame.login")}</button>`}
+      ${who.user && html`<button onClick=${logout}>${t("frame.logout")}</button>`}
+      ${!who.user && who.has_users && html`<button onClick=${() => (session.value = null)}>${t("frame.login")}</button>`}
     </div>
   `;
 }

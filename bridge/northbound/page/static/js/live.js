@@ -1,7 +1,7 @@
 // What this tab shows arrives here.
 //
 // The server sends {topic, state} once for each topic that is shown and {topic, changes} after that, {troubles,
-// waiting}, {events} once and each {event} after that, {trend: [[time, value, ...], ...], number}, {heard}, and each
+// waiting, recent}, {events} once and each {event} after that, {trend: [[time, value, ...], ...], number}, {heard}, and each
 // second {now}. Whatever came is drawn once a frame at most.
 
 import { batch, signal } from "./ui.js";
@@ -14,6 +14,8 @@ const MOST_EVENTS = 200;
 export { ask, isConnected } from "./connection.js";
 /** What is wrong, the worst first; null until the server has told. */
 export const troubles = signal(null);
+/** What was wrong and is over, the latest first: troubles with `until` and `times`. */
+export const recent = signal([]);
 /** How many drives are not ready yet, without anything being wrong. */
 export const waiting = signal(0);
 /** The newest first. */
@@ -86,7 +88,8 @@ function onMessage(message) {
   else if ("troubles" in message) {
     batch(() => {
       troubles.value = message.troubles;
-      waiting.value = message.waiting ?? 0;
+      waiting.value = message.waiting;
+      recent.value = message.recent;
     });
   } else if ("trend" in message) {
     if (message.number === trend.number) trend.onRows(message.trend); // else of a choice before

@@ -1,8 +1,8 @@
 // How a request ended, in words.
 
-import { t } from "./texts.js";
+import { t, translated } from "./texts.js";
 
 /** The bridge's own sentence; where it has none, what its code means. */
 export function told(outcome) {
-  return outcome.message || t(`outcome.${outcome.code}`);
+  return translated(outcome.message) || t(`outcome.${outcome.code}`);
 }

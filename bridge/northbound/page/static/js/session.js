@@ -2,7 +2,7 @@
 
 import { signal } from "./ui.js";
 
-/** `undefined` until the server has told; null where a login is needed; else {user, role, token}. */
+/** `undefined` until the server has told; null where a login is needed; else {user, role, token, has_users}. */
 export const session = signal(undefined);
 /** What the site has, as /api/site tells it: {site, buses, nodes, drives, places, natures}. */
 export const described = signal(null);

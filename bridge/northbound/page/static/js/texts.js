@@ -45,7 +45,7 @@ const book = signal(null);
 let isOpening = false;
 
 /** What the bridge says, in the reader's language: English until that is there, and where there is no phrase. */
-export function told(text) {
+export function translated(text) {
   if (language.value === "en" || !text) return text;
   if (book.value) return book.value.said(text, language.value);
   openBook();

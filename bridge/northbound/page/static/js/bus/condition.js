@@ -4,7 +4,7 @@ import { classes, html } from "../ui.js";
 import { isConnected } from "../live.js";
 import { nature } from "../site.js";
 import { number, quantity } from "../format.js";
-import { t } from "../texts.js";
+import { t, translated } from "../texts.js";
 import { good, goodLabel } from "../drivestate.js";
 import { Icon, shapeOfBus } from "../icons.js";
 import { Meter } from "../meter.js";
@@ -25,7 +25,7 @@ export function Condition({ bus }) {
         <div><dt>${t("bus.bitrate")}</dt><dd>${quantity(bus.bitrate / 1000, "kbit/s")}</dd></div>
         ${COUNTERS.map((leaf) => html`<div><dt>${t(`bus.${leaf}`)}</dt><dd>${number(good(point(leaf)))}</dd></div>`)}
       </dl>
-      ${good(point("last_error")) && html`<p><span class="label">${t("bus.last_error")}</span> ${good(point("last_error"))}</p>`}
+      ${good(point("last_error")) && html`<p><span class="label">${t("bus.last_error")}</span> ${translated(good(point("last_error")))}</p>`}
       ${good(point("second_master")) && html`<p class="is-alarm"><${Icon} name="alarm" /> ${t("trouble.second_master")}</p>`}
       <${Strangers} point=${point} />
       ${good(point("passive")) && html`<p>${nature(point("passive")).description}</p>`}

@@ -4,7 +4,7 @@ import { classes, html, useState } from "../ui.js";
 import { may } from "../session.js";
 import { ask } from "../live.js";
 import { nodes } from "../site.js";
-import { many, t } from "../texts.js";
+import { many, t, translated } from "../texts.js";
 import { good, goodLabel } from "../drivestate.js";
 import { Icon, shapeOfNode } from "../icons.js";
 import { told } from "../outcome.js";
@@ -48,8 +48,8 @@ function Node({ node }) {
       <ol class="stages" aria-label=${t("bus.boot")}>
         ${STAGES.map((stage, place) => html`<${Stage} stage=${stage} is=${standing(place, state, status, error)} />`)}
       </ol>
-      ${error ? html`<p class="is-alarm"><strong>${error[1]}</strong> ${error[2]}</p>` : html`<${Found} status=${status} />`}
-      ${good(point("device_errors")) && html`<p><span class="label">${t("bus.device_errors")}</span> ${good(point("device_errors"))}</p>`}
+      ${error ? html`<p class="is-alarm"><strong>${error[1]}</strong> ${translated(error[2])}</p>` : html`<${Found} status=${status} />`}
+      ${good(point("device_errors")) && html`<p><span class="label">${t("bus.device_errors")}</span> ${translated(good(point("device_errors")))}</p>`}
       ${may("engineer") && html`<${Commands} node=${node.name} />`}
     </li>
   `;
@@ -58,9 +58,9 @@ function Node({ node }) {
 // The present step; or what was found and set, one line each.
 function Found({ status }) {
   const [first, ...notes] = status.split("; ");
-  if (!notes.length) return html`<p class="quiet">${first}</p>`;
+  if (!notes.length) return html`<p class="quiet">${translated(first)}</p>`;
   return html`<details><summary>${many("bus.notes", notes.length)}</summary>
-    <ul class="notes">${notes.map((note) => html`<li>${note}</li>`)}</ul></details>`;
+    <ul class="notes">${notes.map((note) => html`<li>${translated(note)}</li>`)}</ul></details>`;
 }
 
 // "done", "now", "failed" or "open".

@@ -1,12 +1,12 @@
 // The plant: what is in trouble first, then each bus with its drives as tiles.
 
 import { classes, html } from "../ui.js";
-import { troubles } from "../live.js";
+import { isConnected, recent, troubles } from "../live.js";
 import { address } from "../route.js";
 import { below, buses, drives, leafOf, nature, nodes } from "../site.js";
 import { quality } from "../values.js";
-import { number, quantity } from "../format.js";
-import { maybe, t } from "../texts.js";
+import { clock, number, quantity } from "../format.js";
+import { many, maybe, t } from "../texts.js";
 import { Icon, shapeOfBus, shapeOfNode } from "../icons.js";
 import { Meter } from "../meter.js";
 import { ownerOf } from "../owner.js";
@@ -19,6 +19,7 @@ function Plant() {
   return html`
     <h1 class="hidden">${t("page.plant")}</h1>
     <${Attention} />
+    <${Over} />
     ${buses.value.map((bus) => html`<${Bus} key=${bus.name} bus=${bus} />`)}
   `;
 }
@@ -27,12 +28,27 @@ function Attention() {
   const all = troubles.value ?? [];
   if (!all.length) return null;
   return html`
-    <section class="attention" aria-labelledby="attention">
+    <section class=${classes("attention", { old: !isConnected.value })} aria-labelledby="attention">
       <h2 id="attention">${t("plant.attention")}</h2>
       <ol>
         ${all.map((one) => html`<${TroubleRow} key=${one.kind + one.place} trouble=${one} />`)}
       </ol>
     </section>
+  `;
+}
+
+// What comes and goes leaves a trace for a while.
+function Over() {
+  const all = recent.value;
+  if (!all.length) return null;
+  return html`
+    <details class="recent"><summary>${many("plant.over", all.length)}</summary>
+      <ul>
+        ${all.map((one) => html`<li key=${one.kind + one.place}>
+          <a href=${pageOfPlace(one.place)}>${nameOf(one.place)}</a> ${headline(one)},
+          ${" "}${many("plant.times", one.times, { time: clock(one.until) })}</li>`)}
+      </ul>
+    </details>
   `;
 }
 

@@ -55,11 +55,10 @@ def take(page: Page) -> None:
 
 
 def start(page: Page, frequency: str) -> None:
+    page.locator("#setpoint").fill(frequency)
     page.get_by_role("button", name="Start", exact=True).click()
     expect(page.locator(".drivehead .state")).to_have_text(re.compile("running"))
-    page.locator("#setpoint").fill(frequency)
-    page.get_by_role("button", name="Send").click()
-    expect(page.locator("form.setpoint")).to_contain_text(f"now {frequency}.0")
+    expect(page.locator("form.setpoint")).to_contain_text(f"sent {frequency}.0")
 
 
 @contextmanager

@@ -83,10 +83,11 @@ def test_setpoints_are_sent_together_and_empty_ones_are_not(bench: Desk) -> None
         expect(labels).to_have_count(4)
         expect(labels.first).to_contain_text("velocity")
         page.get_by_role("button", name="Send").click()
+        expect(page.locator("form.setpoint")).to_contain_text("nothing to send")
         page.locator("#setpoint").fill("120")
         page.locator("#setpoint-acceleration").fill("300")
         page.get_by_role("button", name="Send").click()
-        expect(page.locator("form.setpoint .field").first).to_contain_text("now 120")
+        expect(page.locator("form.setpoint .field").first).to_contain_text("sent 120")
         expect(page.locator("#setpoint")).to_have_value("")
         assert written == [{"values": {"velocity": 120, "acceleration": 300}}]
 

@@ -45,6 +45,20 @@ export function quantity(value, unit = "") {
   return unit && shown !== "–" ? `${shown}\u202f${unit}` : shown;
 }
 
+/** What is allowed, with its unit: "-100 … 100 Hz"; the unit alone where nothing is limited. */
+export function range(low, high, unit = "") {
+  const has = (one) => typeof one === "number";
+  if (has(low) && has(high)) return `${limit(low, unit)} … ${limit(high, unit)} ${unit}`.trimEnd();
+  if (has(low) || has(high)) return `${has(low) ? `≥ ${limit(low, unit)}` : `≤ ${limit(high, unit)}`} ${unit}`.trimEnd();
+  return unit;
+}
+
+// A limit comes from the bits of a word, such as 199.994: its decimals tell nobody anything.
+function limit(value, unit) {
+  const decimals = Number.isInteger(value) ? 0 : DECIMALS[unit] ?? 2;
+  return exact(Number(value.toFixed(decimals)));
+}
+
 /** A time span in its largest units: 8 s, 3 min 20 s, 2 h 5 min. */
 export function span(ms) {
   const s = Math.max(0, Math.round(ms / 1000));

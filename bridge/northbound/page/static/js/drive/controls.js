@@ -1,16 +1,17 @@
 // Setpoints and commands, for who controls the drive; stopping is everybody's who may command at all.
 
-import { html, useEffect } from "../ui.js";
+import { html, useEffect, useRef } from "../ui.js";
 import { may } from "../session.js";
 import { t } from "../texts.js";
 import { told } from "../outcome.js";
 import { ownerOf } from "../owner.js";
-import { Setpoints } from "./setpoints.js";
+import { sendTyped, Setpoints } from "./setpoints.js";
 import { giveBack, isOurs, refusals, request, take } from "./ownership.js";
 
 export function Controls({ drive }) {
   const name = drive.name;
   const isHeld = isOurs(name);
+  const form = useRef(null);
   useEffect(() => () => giveBack(name), [name]);
   const takes = drive.control === "lease";
   return html`
@@ -25,8 +26,8 @@ export function Controls({ drive }) {
       ${may("operator") && !takes && html`<p class="quiet">${t("drive.fixed", { control: t(`control.${drive.control}`) })}</p>`}
       ${may("operator") && !isHeld && html`<p class="quiet"><${Stopping} drive=${drive} takes=${takes} /></p>`}
       ${isHeld && html`<p class="quiet">${t("drive.foreground")}</p>`}
-      ${may("operator") && takes && html`<${Setpoints} drive=${drive} isHeld=${isHeld} />`}
-      ${may("operator") && html`<${Buttons} drive=${drive} isHeld=${isHeld} />`}
+      ${may("operator") && takes && html`<${Setpoints} drive=${drive} isHeld=${isHeld} form=${form} />`}
+      ${may("operator") && html`<${Buttons} drive=${drive} isHeld=${isHeld} form=${form} />`}
       <${Refusal} drive=${name} />
     </section>
   `;
@@ -38,13 +39,15 @@ function Stopping({ drive, takes }) {
   return takes ? null : t("drive.stop_only");
 }
 
-function Buttons({ drive, isHeld }) {
-  const does = (action, fields) => () => request(drive.name, action, fields);
+function Buttons({ drive, isHeld, form }) {
+  const does = (action) => () => request(drive.name, action);
+  // Who has typed a setpoint expects to start with it.
+  const starts = (direction) => async () => (await sendTyped(drive.name, form.current)) && request(drive.name, "start", { direction });
   const mayStop = isHeld || drive.stop_by_anyone;
   return html`
     <div class="buttons">
-      <button class="main" disabled=${!isHeld} onClick=${does("start", { direction: 1 })}>${t("action.start")}</button>
-      <button disabled=${!isHeld} onClick=${does("start", { direction: -1 })}>${t("action.start_reverse")}</button>
+      <button class="main" disabled=${!isHeld} onClick=${starts(1)}>${t("action.start")}</button>
+      <button disabled=${!isHeld} onClick=${starts(-1)}>${t("action.start_reverse")}</button>
       <button class="stop" disabled=${!mayStop} onClick=${does("stop")}>${t("action.stop")}</button>
       <button class="stop" disabled=${!mayStop} onClick=${does("quick_stop")}>${t("action.quick_stop")}</button>
       <button disabled=${!mayStop} onClick=${does("disable_voltage")}>${t("action.disable_voltage")}</button>

@@ -1,9 +1,9 @@
 // The setpoints of a drive in one form, which sends those that are filled in together: as one telegram.
 
-import { html, useRef } from "../ui.js";
+import { html, useState } from "../ui.js";
 import { below, leafOf, nature } from "../site.js";
 import { quality, reason } from "../values.js";
-import { quantity } from "../format.js";
+import { quantity, range } from "../format.js";
 import { t } from "../texts.js";
 import { good } from "../drivestate.js";
 import { request } from "./ownership.js";
@@ -21,29 +21,42 @@ function offered(drive) {
   return below(`${drive.name}/command`).filter(isOffered).sort((one, other) => Number(isMain(other)) - Number(isMain(one)));
 }
 
-export function Setpoints({ drive, isHeld }) {
-  const form = useRef();
+/** `form` is a reference, so that a start can send what is typed. */
+export function Setpoints({ drive, isHeld, form }) {
+  const [said, setSaid] = useState("");
   const names = offered(drive);
   if (!names.length) return null;
   const onSubmit = async (event) => {
     event.preventDefault();
-    const values = filled(new FormData(form.current));
-    if (!Object.keys(values).length) return form.current.querySelector("input").focus();
-    const outcome = await request(drive.name, "write", { values });
-    // What stands in a field is what the next sending sends.
-    if (outcome.ok) form.current?.reset();
+    if (isTyped(form.current)) return sendTyped(drive.name, form.current);
+    setSaid(t("drive.nothing_to_send"));
+    form.current.querySelector("input:enabled")?.focus();
   };
   return html`
-    <form class="setpoint" ref=${form} onSubmit=${onSubmit}>
+    <form class="setpoint" ref=${form} onSubmit=${onSubmit} onInput=${() => setSaid("")}>
       ${names.map((name) => html`<${Setpoint} key=${name} name=${name} isMain=${leafOf(name) === drive.main} isHeld=${isHeld} />`)}
       <button disabled=${!isHeld}>${t("drive.send")}</button>
+      <small role="status">${said}</small>
     </form>
   `;
 }
 
+/** Sends what is typed in `form`, if anything is; whether nothing was refused. */
+export async function sendTyped(drive, form) {
+  if (!form) return true;
+  if (!form.reportValidity()) return false;
+  if (!isTyped(form)) return true;
+  const outcome = await request(drive, "write", { values: filled(form) });
+  // What stands in a field is what the next sending sends.
+  if (outcome.ok) form.reset();
+  return outcome.ok;
+}
+
+const isTyped = (form) => Object.keys(filled(form)).length > 0;
+
 // {leaf: number} of the fields with a number in them.
-function filled(fields) {
-  const typed = [...fields].filter(([, text]) => String(text).trim() !== "").map(([leaf, text]) => [leaf, Number(text)]);
+function filled(form) {
+  const typed = [...new FormData(form)].filter(([, text]) => String(text).trim() !== "").map(([leaf, text]) => [leaf, Number(text)]);
   return Object.fromEntries(typed.filter(([, number]) => Number.isFinite(number)));
 }
 
@@ -56,8 +69,8 @@ function Setpoint({ name, isMain, isHeld }) {
     <p class="field">
       <label for=${id}>${t("drive.setpoint", { name: t(`point.${leaf}`) })}</label>
       <input id=${id} name=${leaf} type="number" step=${type === "float" ? "any" : 1} min=${low} max=${high} disabled=${!isHeld || cannot} />
-      <span>${unit}</span>
-      <small>${cannot ? reason(name) || t("quality.config_error") : t("drive.now", { value: quantity(good(name), unit) })}</small>
+      <span class="range">${range(low, high, unit)}</span>
+      <small>${cannot ? reason(name) || t("quality.config_error") : t("drive.sent", { value: quantity(good(name), unit) })}</small>
     </p>
   `;
 }

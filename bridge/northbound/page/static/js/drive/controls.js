@@ -3,6 +3,7 @@
 import { html, useEffect, useRef } from "../ui.js";
 import { may } from "../session.js";
 import { t } from "../texts.js";
+import { clock } from "../format.js";
 import { told } from "../outcome.js";
 import { ownerOf } from "../owner.js";
 import { sendTyped, Setpoints } from "./setpoints.js";
@@ -62,6 +63,7 @@ function Refusal({ drive }) {
 }
 
 function text({ action, outcome }) {
+  if (action === "hidden") return t("drive.was_hidden", { time: clock(outcome.at) });
   if (action === "keep_alive") return t("outcome.lost", { message: told(outcome) });
   const what = t(`action.${action}`);
   if (outcome.ok) return t("outcome.not_forwarded", { what, message: outcome.message });

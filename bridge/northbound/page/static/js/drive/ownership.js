@@ -15,7 +15,7 @@ const timers = new Map();
 /** Drives whose latest renewal has no answer yet. */
 const underway = new Set();
 
-/** The last thing that went wrong, by drive: {action, outcome}. */
+/** The last thing that went wrong, by drive: {action, outcome}; "hidden" is what this tab did itself, at `outcome.at`. */
 export const refusals = signal({});
 
 /** Whether this tab controls `drive`. */
@@ -54,6 +54,15 @@ function refuse(drive, action, outcome) {
   refusals.value = { ...refusals.value, [drive]: outcome && { action, outcome } };
 }
 
+// Who was in the way is not there any more: what was refused then might be granted now. The owner may be told later
+// than the refusal.
+function forget(drive, refused) {
+  if (refused?.outcome.code !== "not_allowed" || refused.action === "keep_alive") return;
+  const owner = value(`${drive}/supervision/owner`);
+  refused.owner ||= owner;
+  if (refused.owner !== owner) refuse(drive, "", null);
+}
+
 // One at a time: what waits in a slow connection must not go on renewing when the tab has gone.
 async function renew(drive) {
   if (document.hidden) return stop(drive);
@@ -77,7 +86,16 @@ function stopAll() {
   for (const drive of [...timers.keys()]) stop(drive);
 }
 
-document.addEventListener("visibilitychange", () => document.hidden && stopAll());
+function onHidden() {
+  const ours = [...timers.keys()];
+  stopAll();
+  for (const drive of ours) refuse(drive, "hidden", { at: Date.now() });
+}
+
+document.addEventListener("visibilitychange", () => document.hidden && onHidden());
+effect(() => {
+  for (const drive in refusals.value) forget(drive, refusals.value[drive]);
+});
 effect(() => {
   if (!isConnected.value) stopAll();
 });

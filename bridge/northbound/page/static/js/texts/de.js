@@ -201,6 +201,7 @@ export const de = {
   "drive.stop_only": "Von hier kann er nur angehalten werden.",
   "drive.stop_by_owner": "Nur wer ihn steuert, kann ihn anhalten (stop_by_anyone = false): von hier kann es sonst niemand.",
   "drive.foreground": "Sie steuern den Antrieb, solange dieser Tab sichtbar ist. Verdeckt, geschlossen oder getrennt: er hält an.",
+  "drive.was_hidden": "Dieser Tab war um {time} verborgen: der Antrieb wurde zurückgegeben und hält an.",
   "drive.setpoint": "Sollwert, {name}",
   "drive.sent": "gesendet {value}",
   "drive.nothing_to_send": "nichts zu senden",

@@ -201,6 +201,7 @@ export const en = {
   "drive.stop_only": "From here it can be stopped only.",
   "drive.stop_by_owner": "Only who controls it can stop it (stop_by_anyone = false): from here nobody else can.",
   "drive.foreground": "The drive is yours as long as this tab is visible. Hidden, closed or cut off, it stops.",
+  "drive.was_hidden": "This tab was hidden at {time}: the drive was given back and has stopped.",
   "drive.setpoint": "Setpoint, {name}",
   "drive.sent": "sent {value}",
   "drive.nothing_to_send": "nothing to send",

@@ -105,11 +105,13 @@ def test_a_trend_is_paused_zoomed_and_kept_as_a_file(desk: Desk, tmp_path: Path)
         pause = page.locator(".trend header button").first
         page.wait_for_timeout(1000)
         pause.click()
+        expect(page.locator(".trend header")).to_contain_text("paused")
         before = page.evaluate(DRAWN)
         page.wait_for_timeout(500)
         assert page.evaluate(DRAWN) == before, "paused, it stays as it is"
         with page.expect_download() as download:
             page.get_by_role("button", name="CSV").click()
+        assert re.search(rf"-{DRIVE.replace('/', '-')}-\d{{4}}-\d\d-\d\d-\d{{6}}\.csv$", download.value.suggested_filename)
         head, first, *_ = download.value.path().read_text(encoding="utf-8").splitlines()
         assert head.startswith(f'"time","{DRIVE}/command/frequency [Hz]","{DRIVE}/actual/frequency [Hz]"')
         assert re.match(r"\d{4}-\d\d-\d\dT[\d:.]+Z,", first)
@@ -125,6 +127,7 @@ def test_a_trend_is_paused_zoomed_and_kept_as_a_file(desk: Desk, tmp_path: Path)
         axis = page.evaluate(DRAWN)
         page.wait_for_timeout(500)
         assert page.evaluate(DRAWN) == axis, "what is zoomed to does not move on"
+        expect(page.get_by_role("button", name="Back to live")).to_be_visible()
         plot.dblclick()
         page.mouse.move(0, 0)
         page.wait_for_timeout(500)

@@ -83,10 +83,11 @@ function options(names, box, onZoom) {
   const number = new Intl.NumberFormat(language.value, { maximumFractionDigits: 2 });
   return {
     ...sizeOf(box),
+    legend: { markers: { width: 0, fill: (_, index) => pattern(colourOf(`--series-${index - 1}`), DASHES[index - 1]) } },
     cursor: { drag: { x: true, y: false }, bind: { dblclick: () => () => onZoom(false) } },
     hooks: { setSelect: [(plot) => plot.select.width > 0 && onZoom(true)] },
     series: [
-      { label: t("trend.time"), value: (_, at) => (at === null ? "–" : new Date(at * 1000).toLocaleTimeString(language.value, { hour12: false })) },
+      { label: t("trend.time"), value: (plot, at) => (at === null ? "–" : timeOf(at, (plot.scales.x.max - plot.scales.x.min) / 10)) },
       ...names.map((name, index) => ({
         label: titleOf(name),
         scale: nature(name).unit ?? "",
@@ -99,10 +100,26 @@ function options(names, box, onZoom) {
       })),
     ],
     axes: [
-      { ...axis, values: (_, ticks) => ticks.map((at) => new Date(at * 1000).toLocaleTimeString(language.value, { hour12: false })) },
+      { ...axis, space: 85, values: (_, ticks, __, ___, step) => ticks.map((at) => timeOf(at, step)) },
       ...units.slice(0, 3).map((unit, index) => ({ ...axis, scale: unit, label: unit, labelSize: 18, size: 54, side: index ? 1 : 3, grid: index ? { show: false } : axis.grid, values: (_, ticks) => ticks.map((one) => number.format(one)) })),
     ],
   };
+}
+
+// The time of day of `at`, in s; with as many decimals as times need that are `step` s apart.
+function timeOf(at, step) {
+  const decimals = [1, 0.1, 0.01].filter((one) => step < one).length;
+  return new Date(at * 1000).toLocaleTimeString(language.value, {
+    hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23",
+    ...(decimals && { fractionalSecondDigits: /** @type {1 | 2 | 3} */ (decimals) }),
+  });
+}
+
+// The dashes of a line as a background, for those who cannot tell the colours apart.
+function pattern(colour, dash) {
+  let at = 0;
+  const parts = dash.map((length, index) => `${index % 2 ? "transparent" : colour} ${at}px ${(at += length)}px`);
+  return parts.length ? `repeating-linear-gradient(90deg, ${parts.join(", ")})` : colour;
 }
 
 // A colour of the style sheet as it is at present: a canvas does not know custom properties.

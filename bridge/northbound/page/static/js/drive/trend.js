@@ -2,6 +2,9 @@
 
 import { html, useEffect, useRef, useState } from "../ui.js";
 import { save } from "../download.js";
+import { clock } from "../format.js";
+import { now } from "../live.js";
+import { siteName } from "../session.js";
 import { below, nature } from "../site.js";
 import { t } from "../texts.js";
 import { Course, titleOf } from "./course.js";
@@ -13,7 +16,8 @@ export function Trend({ drive }) {
   const offered = trendable(drive.name);
   const [names, setNames] = useState(() => first(drive, offered));
   const [spanS, setSpan] = useState(60);
-  const [isPaused, setPaused] = useState(false);
+  const [pausedAt, setPausedAt] = useState(0);
+  const isPaused = pausedAt > 0;
   const [isZoomed, setZoomed] = useState(false);
   const course = useRef(null);
   const box = useRef(null);
@@ -22,6 +26,10 @@ export function Trend({ drive }) {
     return () => mine.close();
   }, [names.join()]);
   useEffect(() => course.current.show({ spanS, isPaused, isZoomed }), [names.join(), spanS, isPaused, isZoomed]);
+  const toLive = () => {
+    setPausedAt(0);
+    setZoomed(false);
+  };
   const toggle = (name) => {
     setNames(names.includes(name) ? names.filter((one) => one !== name) : [...names, name].slice(-MOST));
     setZoomed(false);
@@ -30,7 +38,9 @@ export function Trend({ drive }) {
     <section class="trend" aria-labelledby="trend">
       <header>
         <h2 id="trend">${t("trend.title")}</h2>
-        <button aria-pressed=${isPaused} onClick=${() => setPaused(!isPaused)}>${t("trend.pause")}</button>
+        <button aria-pressed=${isPaused} onClick=${() => setPausedAt(isPaused ? 0 : now())}>${t("trend.pause")}</button>
+        ${isPaused && html`<strong>${t("trend.paused", { time: clock(pausedAt) })}</strong>`}
+        ${isZoomed && html`<button onClick=${toLive}>${t("trend.to_live")}</button>`}
         <label>${t("trend.span")}
           <select value=${spanS} onChange=${(event) => setSpan(Number(event.target.value))}>
             ${SPANS_S.map((one) => html`<option value=${one}>${one} s</option>`)}
@@ -68,6 +78,19 @@ function first(drive, offered) {
 
 function keep(drive, names, history) {
   const head = ["time", ...names.map((name) => `${name}${nature(name).unit ? ` [${nature(name).unit}]` : ""}`)];
-  const rows = history.rows().map(([s, ...held]) => [new Date(s * 1000).toISOString(), ...held.map((one) => one ?? "")].join(","));
-  save(`${drive.replaceAll("/", "-")}.csv`, [head.map((one) => `"${one}"`).join(","), ...rows, ""].join("\r\n"), "text/csv");
+  const rows = history.rows().map(([s, ...held]) => [new Date(s * 1000).toISOString(), ...held.map(rounded)].join(","));
+  save(fileName(drive), [head.map((one) => `"${one}"`).join(","), ...rows, ""].join("\r\n"), "text/csv");
+}
+
+// Several of them can be told apart, and are sorted by time.
+function fileName(drive) {
+  const time = new Date(now()).toLocaleString("sv").replaceAll(":", "");
+  return `${siteName.value}-${drive}-${time}.csv`.replace(/[^\p{L}\p{N}._-]+/gu, "-");
+}
+
+// Six digits are more than any drive measures; what is left of the point is kept as it is.
+function rounded(value) {
+  if (typeof value !== "number") return value ?? "";
+  const whole = String(Math.trunc(Math.abs(value))).length;
+  return Number.isInteger(value) ? value : Number(value.toPrecision(Math.max(6, whole)));
 }

@@ -342,6 +342,8 @@ export const de = {
 
   "trend.title": "Verlauf",
   "trend.pause": "Pause",
+  "trend.paused": "angehalten {time}",
+  "trend.to_live": "Zurück zum Verlauf",
   "trend.span": "Zeitraum",
   "trend.csv": "CSV",
   "trend.hint": "Ziehen vergrößert, Doppelklick stellt zurück.",

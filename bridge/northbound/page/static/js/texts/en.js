@@ -342,6 +342,8 @@ export const en = {
 
   "trend.title": "Trend",
   "trend.pause": "Pause",
+  "trend.paused": "paused {time}",
+  "trend.to_live": "Back to live",
   "trend.span": "Span",
   "trend.csv": "CSV",
   "trend.hint": "Drag to zoom, double-click to go back.",

@@ -20,12 +20,17 @@ export class Course {
     this._frozen = null;
     this._state = { spanS: 60, isPaused: false, isZoomed: false };
     this._isDue = false;
+    // At once: what is zoomed to is gone again when another row comes before it is told.
+    const zoom = (isZoomed) => {
+      this._state = { ...this._state, isZoomed };
+      onZoom(isZoomed);
+    };
     follow(names, (rows) => this._take(rows), () => this._take([[now(), ...names.map(() => null)]]));
     // Colours are read from the style sheet when the plot is made.
     this._end = effect(() => {
       void [isDark.value, language.value];
       this._plot?.destroy();
-      this._plot = new Plot(options(names, box, onZoom), this.shown.columns(), box);
+      this._plot = new Plot(options(names, box, zoom), this.shown.columns(), box);
       this._draw();
     });
     this._sizes = new ResizeObserver(() => this._plot.setSize(sizeOf(box)));

@@ -18,6 +18,12 @@ from tests.browser.hands import (
 from tests.support.desk import Desk
 
 
+HIDDEN = """is => {
+    Object.defineProperty(document, "hidden", { value: is, configurable: true });
+    document.dispatchEvent(new Event("visibilitychange"));
+}"""
+
+
 def test_a_drive_is_taken_started_stopped_and_given_back(desk: Desk) -> None:
     with desk.sits("operator") as page:
         to_drive(page)
@@ -57,6 +63,8 @@ def test_a_tab_that_hangs_is_a_controller_that_fell_silent(desk: Desk) -> None:
         with hanging(page):
             expect(watcher.locator(".sentence")).to_contain_text("its controller fell silent")
         expect(watcher.locator(".trouble")).to_contain_text("(web page)")
+        expect(watcher.locator(".faults")).to_contain_text("tripped by the bridge, not by the drive")
+        expect(watcher.locator(".faults")).not_to_contain_text("What to do")
         expect(watcher.locator(".trouble .remedy")).to_contain_text("acknowledge")
         page.get_by_role("button", name="Acknowledge fault").click()
         expect(watcher.locator(".sentence")).to_contain_text("Everything is in order")
@@ -132,6 +140,29 @@ def test_a_refusal_is_not_told_again_on_return(bench: Desk) -> None:
         to(other, "drive/b/fu2")
         expect(other.locator(".ownership")).to_be_visible()
         expect(other.get_by_role("alert")).to_have_text("")
+
+
+def test_a_refusal_is_forgotten_when_its_reason_has_gone(bench: Desk) -> None:
+    with bench.sits("operator") as owner, bench.sits("operator") as other:
+        for page in (owner, other):
+            to(page, "drive/b/fu2")
+        take(owner)
+        other.get_by_role("button", name="Take control").click()
+        expect(other.get_by_role("alert")).to_contain_text("is controlled by")
+        owner.get_by_role("button", name="Give back").click()
+        expect(other.get_by_role("alert")).to_have_text("")
+
+
+def test_who_hid_a_tab_is_told_on_return_what_became_of_its_drive(bench: Desk) -> None:
+    with bench.sits("operator") as page:
+        to(page, "drive/b/fu2")
+        take(page)
+        page.evaluate(HIDDEN, True)
+        expect(page.locator(".ownership")).to_contain_text("nobody")
+        page.evaluate(HIDDEN, False)
+        expect(page.get_by_role("alert")).to_contain_text("This tab was hidden at")
+        take(page)
+        expect(page.get_by_role("alert")).to_have_text("")
 
 
 def test_an_observer_is_told_that_it_may_read(desk: Desk) -> None:

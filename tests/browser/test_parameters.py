@@ -106,7 +106,7 @@ def test_a_drive_is_compared_with_its_like_until_that_is_stopped_or_left(bench: 
         read = asked(page, "read_parameter")
         to(page, "parameters/a/fu1")
         options = page.locator("#source option")
-        files = ["factory settings", "a backup, EDS or XDD file"]
+        files = ["factory settings (none known)", "a backup, EDS or XDD file"]
         expect(options).to_have_text([*files, "a/fu2", "b/fu1", "b/fu2"])
         expect(page.locator("td.value", has_text="…")).to_have_count(0)
         page.get_by_label("Compare with").select_option("drive b/fu1")

@@ -55,6 +55,15 @@ def test_an_address_to_copy_is_one_that_can_be_reached(bench: Desk) -> None:
             expect(page.locator(".facts")).to_contain_text(shown)
 
 
+def test_what_is_not_there_is_told(desk: Desk) -> None:
+    with desk.sits("observer") as page:
+        to(page, "bus/can9")
+        expect(page.locator("#main")).to_have_text("There is no bus can9. Plant")
+        to(page, "integration/modbus")
+        page.get_by_role("searchbox").fill("xyzzy")
+        expect(page.locator(".search")).to_contain_text("No row matches “xyzzy”.")
+
+
 def test_a_bus_is_listened_to_filtered_counted_and_captured(desk: Desk) -> None:
     with desk.sits("observer") as page:
         to(page, "bus/can0")

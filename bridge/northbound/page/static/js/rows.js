@@ -20,7 +20,7 @@ export function Rows({ address, copied }) {
     <p class="search">
       <input type="search" aria-label=${t("integration.search", { count: rows.length })}
         placeholder=${t("integration.search", { count: rows.length })} onInput=${(event) => setWanted(event.target.value)} />
-      <small role="status">${t("integration.shown", { shown: Math.min(found.length, DRAWN), count: found.length })}</small>
+      <small role="status">${counted(Math.min(found.length, DRAWN), found.length, wanted)}</small>
     </p>
     <div class="scroll" tabindex="0" role="group" aria-label=${address}>
       <table class="rows">
@@ -32,6 +32,11 @@ export function Rows({ address, copied }) {
       </table>
     </div>
   `;
+}
+
+/** How much is found by `wanted`, in words. */
+export function counted(shown, count, wanted) {
+  return count || !wanted.trim() ? t("integration.shown", { shown, count }) : t("integration.no_match", { wanted: wanted.trim() });
 }
 
 /** The rows in which every word of `wanted` is somewhere in `text(row)`. */

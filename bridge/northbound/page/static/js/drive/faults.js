@@ -4,15 +4,14 @@ import { html } from "../ui.js";
 import { has, label } from "../site.js";
 import { number } from "../format.js";
 import { faultIn, t } from "../texts.js";
-import { good } from "../drivestate.js";
+import { good, goodLabel } from "../drivestate.js";
 import { inWords } from "../trouble.js";
 import { Memory } from "./memory.js";
 
 export function Faults({ drive }) {
   const status = (leaf) => good(`${drive.name}/status/${leaf}`);
   const text = status("fault_text");
-  const own = faultIn(drive.mapping, status("fault_number"));
-  const [cause, remedy] = [own.cause || status("fault_cause"), own.remedy || status("fault_remedy")];
+  const { cause, remedy } = reasons(drive);
   return html`
     <section class="faults" aria-labelledby="faults">
       <h2 id="faults">${t("faults.title")}</h2>
@@ -27,6 +26,14 @@ export function Faults({ drive }) {
       <${Emergencies} node=${drive.node} />
     </section>
   `;
+}
+
+// After a trip of the bridge's watchdog the fault shown is the bridge's, and what the maker says of that number is not.
+function reasons(drive) {
+  if (goodLabel(`${drive.name}/supervision/watchdog_state`) === "tripped") return { cause: t("faults.by_bridge"), remedy: "" };
+  const status = (leaf) => good(`${drive.name}/status/${leaf}`);
+  const own = faultIn(drive.mapping, status("fault_number"));
+  return { cause: own.cause || status("fault_cause"), remedy: own.remedy || status("fault_remedy") };
 }
 
 // The text of the last fault begins with its number.

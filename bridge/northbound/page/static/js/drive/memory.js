@@ -25,13 +25,16 @@ export function Memory({ drive }) {
 
 // {rows: [[name, text], …], said}; `said` is why there is nothing, or nothing more.
 async function remembered(drive) {
-  const rows = [];
+  let rows = [];
+  let isEmpty = false;
   const ofDrive = (parameter) => ask(drive.name, "read_parameter", { parameter });
   for (const { name, title } of parametersOf(drive.name)) {
     const outcome = await ofDrive(name);
     if (!outcome.ok) return { rows, said: told(outcome) };
     rows.push([`${name} ${title}`, exact(outcome.value, 1)]);
+    isEmpty = outcome.value === 0 && (isEmpty || rows.length === 1);
   }
+  if (isEmpty) rows = [];
   const count = await ofDrive("1003:00");
   // Not every device has the list: what it refuses it does not have.
   if (!count.ok && !count.abort_code) return { rows, said: told(count) };
@@ -40,7 +43,7 @@ async function remembered(drive) {
     const { ok, value } = await ofDrive(`1003:${sub}`);
     if (ok) rows.push([`1003h:${sub}`, inWords(drive, value)]);
   }
-  return { rows, said: rows.length ? "" : t("faults.keeps_none") };
+  return { rows, said: rows.length ? "" : t(isEmpty ? "faults.empty" : "faults.keeps_none") };
 }
 
 // The error code, and beside it 16 bits of the maker's.

@@ -69,8 +69,7 @@ function Setpoint({ name, isMain, isHeld }) {
     <p class="field">
       <label for=${id}>${t("drive.setpoint", { name: t(`point.${leaf}`) })}</label>
       <input id=${id} name=${leaf} type="number" step=${type === "float" ? "any" : 1} min=${low} max=${high} disabled=${!isHeld || cannot} />
-      <span class="range">${range(low, high, unit)}</span>
-      <small>${cannot ? reason(name) || t("quality.config_error") : t("drive.sent", { value: quantity(good(name), unit) })}</small>
+      <small>${range(low, high, unit)}<br />${cannot ? reason(name) || t("quality.config_error") : t("drive.sent", { value: quantity(good(name), unit) })}</small>
     </p>
   `;
 }

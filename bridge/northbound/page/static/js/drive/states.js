@@ -1,7 +1,7 @@
 // The state machine of the drive with its present state lit, and the steps that are possible from there
 // (CiA 402 §7.2; NORD BU 2500 §6.5; the families name their states alike).
 
-import { classes, html } from "../ui.js";
+import { classes, html, useEffect, useRef } from "../ui.js";
 import { t } from "../texts.js";
 import { ownState } from "../drivestate.js";
 
@@ -33,13 +33,15 @@ const STEPS = [
 
 export function StateDiagram({ drive }) {
   const present = ownState(drive.name);
+  const box = useRef(null);
+  useEffect(() => reveal(box.current), [present]);
   const there = Object.keys(PLACES).filter((name) => drive.states.includes(name));
   const all = STEPS.map(([from, to, command]) => [from, command === "stop" ? drive.stops_in : to, command]);
   const steps = all.filter(([from, to]) => there.includes(from) && there.includes(to) && isDirect(from, to, there));
   return html`
     <section class=${classes("diagram", { unsure: !(present in PLACES) })} aria-labelledby="diagram">
       <h2 id="diagram">${t("drive.states")}</h2>
-      <div class="scroll" tabindex="0" role="group" aria-label=${t("drive.states")}>
+      <div class="scroll" ref=${box} tabindex="0" role="group" aria-label=${t("drive.states")}>
       <svg viewBox="0 0 720 140" role="img" aria-label=${t("drive.states.now", { state: t(`state.${present}`) })}>
         <defs>
           <marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="9" markerHeight="9" markerUnits="userSpaceOnUse" orient="auto-start-reverse">
@@ -54,6 +56,15 @@ export function StateDiagram({ drive }) {
       <${Possible} steps=${steps.filter(([from]) => from === present)} present=${present} />
     </section>
   `;
+}
+
+// On a phone the drawing is wider than its box. The page itself stays where it is.
+function reveal(box) {
+  const node = box.querySelector(".present")?.getBoundingClientRect();
+  if (!node || box.scrollWidth <= box.clientWidth) return;
+  const around = box.getBoundingClientRect();
+  const left = box.scrollLeft + node.left + node.width / 2 - (around.left + around.width / 2);
+  box.scrollTo({ left, behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "instant" : "smooth" });
 }
 
 // Where a family has the state between two others, the way leads through it.

@@ -15,7 +15,7 @@ import { TroubleRow } from "./plant.js";
 
 export const bus = { path: "bus", topics, View };
 
-const named = (route) => buses.value.find((one) => one.name === route[1]) ?? buses.value[0];
+const named = (route) => (route[1] ? buses.value.find((one) => one.name === route[1]) : buses.value[0]);
 
 function topics(route) {
   return named(route) ? [`bus ${named(route).name}`] : [];
@@ -23,6 +23,7 @@ function topics(route) {
 
 function View({ route }) {
   const one = named(route);
+  if (!one && route[1]) return html`<p>${t("bus.not_there", { name: route[1] })} <a href=${address("plant")}>${t("page.plant")}</a></p>`;
   if (!one) return null;
   return html`
     <h1>${t("page.bus")} ${one.name}</h1>

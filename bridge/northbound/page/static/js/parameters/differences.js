@@ -23,7 +23,7 @@ export function Differences({ holder, result, mayWrite }) {
     setLeft(next);
   };
   return html`
-    <p role="status"><strong>${many("parameters.differ", result.rows.length, { source: result.source })}</strong>
+    <p role="status"><strong>${many("parameters.differ", result.rows.length, { source: result.source })}</strong>${" "}
       ${many("parameters.same", result.same)} ${result.missing.length > 0 && many("parameters.not_there", result.missing.length)}</p>
     ${result.refusal && html`<p class="failure">${result.refusal}</p>`}
     ${result.rows.length > 0 && html`

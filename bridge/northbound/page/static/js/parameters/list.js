@@ -5,7 +5,7 @@ import { may } from "../session.js";
 import { ask, isConnected } from "../live.js";
 import { t } from "../texts.js";
 import { told } from "../outcome.js";
-import { matching } from "../rows.js";
+import { counted, matching } from "../rows.js";
 import { Editor } from "./editor.js";
 import { held, read, readAll } from "./held.js";
 import { range, shown } from "./value.js";
@@ -31,7 +31,7 @@ export function List({ holder, described, onWritten }) {
         <input type="search" aria-label=${t("parameters.search", { count: all.length })}
           placeholder=${t("parameters.search", { count: all.length })}
           onInput=${(event) => (setWanted(event.target.value), setCount(AT_ONCE))} />
-        <small role="status">${t("integration.shown", { shown: drawn.length, count: found.length })}</small>
+        <small role="status">${counted(drawn.length, found.length, wanted)}</small>
         <button onClick=${onReadAgain} disabled=${!isConnected.value}>${t("parameters.read_again")}</button>
         ${described.can_save && may("engineer") && html`<${Save} holder=${holder} />`}
       </p>

@@ -14,11 +14,12 @@ export const placeOf = (what, holder) => `api/${what}/${holder.split("/").map(en
 
 export function Sets({ holder, described, others }) {
   const [state, setState] = useState({});
-  const [source, setSource] = useState("factory");
   const file = useRef();
   const turn = useRef({ isOver: true });
   const settings = described.parameters.filter((one) => one.setting);
   const names = settings.map((one) => one.name);
+  const hasFactory = settings.some((one) => "factory" in one);
+  const [source, setSource] = useState(hasFactory ? "factory" : "file");
   const end = () => (turn.current.isOver = true);
   useEffect(() => end, []);
   // What was stopped, or left, says nothing more.
@@ -60,7 +61,7 @@ export function Sets({ holder, described, others }) {
         <button onClick=${backUp} disabled=${state.busy}>${t("parameters.back_up")}</button>
         <label for="source">${t("parameters.compare_with")}</label>
         <select id="source" value=${source} disabled=${state.busy} onChange=${(event) => setSource(event.target.value)}>
-          <option value="factory">${t("parameters.source.factory")}</option>
+          <option value="factory" disabled=${!hasFactory}>${t(hasFactory ? "parameters.source.factory" : "parameters.source.none")}</option>
           <option value="file">${t("parameters.source.file")}</option>
           ${others.map((name) => html`<option value=${`drive ${name}`}>${t("parameters.source.drive", { name })}</option>`)}
         </select>
@@ -70,6 +71,7 @@ export function Sets({ holder, described, others }) {
         <small>${state.busy ?? state.done ?? ""}</small>
         <span class="hidden" role="status">${state.begun ?? state.done ?? ""}</span>
       </p>
+      ${!hasFactory && source === "file" && html`<p class="quiet">${t("parameters.no_factory")}</p>`}
       ${state.failure && html`<pre class="failure" role="alert">${state.failure}</pre>`}
       ${state.result && html`<${Differences} holder=${holder} result=${state.result} mayWrite=${may("engineer")} />`}
     </section>
@@ -80,7 +82,6 @@ export function Sets({ holder, described, others }) {
 const SOURCES = {
   factory: async ({ settings }) => {
     const known = settings.filter((one) => "factory" in one);
-    if (!known.length) throw new Error(t("parameters.no_factory"));
     return { name: t("parameters.source.factory"), values: Object.fromEntries(known.map((one) => [one.name, one.factory])) };
   },
   file: async ({ holder, file }) => {

@@ -4,7 +4,7 @@ import { html, useState } from "../ui.js";
 import { below, leafOf, nature } from "../site.js";
 import { quality, reason } from "../values.js";
 import { quantity, range } from "../format.js";
-import { t } from "../texts.js";
+import { t, translated } from "../texts.js";
 import { good } from "../drivestate.js";
 import { request } from "./ownership.js";
 
@@ -69,7 +69,7 @@ function Setpoint({ name, isMain, isHeld }) {
     <p class="field">
       <label for=${id}>${t("drive.setpoint", { name: t(`point.${leaf}`) })}</label>
       <input id=${id} name=${leaf} type="number" step=${type === "float" ? "any" : 1} min=${low} max=${high} disabled=${!isHeld || cannot} />
-      <small>${range(low, high, unit)}<br />${cannot ? reason(name) || t("quality.config_error") : t("drive.sent", { value: quantity(good(name), unit) })}</small>
+      <small>${range(low, high, unit)}<br />${cannot ? translated(reason(name)) || t("quality.config_error") : t("drive.sent", { value: quantity(good(name), unit) })}</small>
     </p>
   `;
 }

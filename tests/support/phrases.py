@@ -11,6 +11,7 @@ from typing import Final
 SLOT: Final = re.compile(r"\{(\w+)([#…]?)\}")
 _HOLDS: Final = {"": r"(\S+)", "#": r"(-?\d[\w.+-]*|[\dA-F]+h)", "…": r"((?:(?!: ).)+?)"}
 _WORDS: Final = re.compile("[a-z]{3}")
+_JOINED: Final = re.compile("[:;] ")
 _DEEPEST: Final = 8
 
 Pair = tuple[str, str]
@@ -57,6 +58,9 @@ class Book:
     def _of_text(self, text: str, depth: int) -> str:
         if depth > _DEEPEST:
             return text
+        head, inner = _aside(text)
+        if _JOINED.search(inner):
+            return f"{self._of_text(head, depth)} ({self._of_text(inner, depth + 1)})"
         return "; ".join(self._of_part(part, depth) for part in text.split("; "))
 
     def _of_part(self, part: str, depth: int) -> str:
@@ -64,25 +68,28 @@ class Book:
         if phrase is not None:
             return phrase
         parts = part.split(", ")
-        if len(parts) > 1 and all(self._has(one) or not _WORDS.search(one) for one in parts):
-            found = (self._of_phrase(one, depth) for one in parts)
-            return ", ".join(one if other is None else other for one, other in zip(parts, found, strict=True))
+        if len(parts) > 1 and all(self._has(one) for one in parts):
+            return ", ".join(self._of_item(one, depth) for one in parts)
         for mark in (": ", ". "):
             if mark in part:
                 head, _, tail = part.partition(mark)
-                return f"{self._of_head(head, depth)}{mark}{self._of_part(tail, depth)}"
+                return f"{self._of_part(head, depth)}{mark}{self._of_part(tail, depth)}"
+        head, inner = _aside(part)
+        if inner:
+            return f"{self._of_part(head, depth)} ({self._of_text(inner, depth + 1)})"
         self.unknown.append(part)
         return part
 
-    def _of_head(self, head: str, depth: int) -> str:
-        found = self._of_phrase(head, depth)
-        if found is None:
-            self.unknown.append(head)
-            return head
-        return found
+    def _has(self, item: str) -> bool:
+        heads = item, _aside(item)[0]
+        return not _WORDS.search(item) or any(one in self._whole or self.first(one) for one in heads)
 
-    def _has(self, part: str) -> bool:
-        return part in self._whole or self.first(part) is not None
+    def _of_item(self, item: str, depth: int) -> str:
+        phrase = self._of_phrase(item, depth)
+        if phrase is not None or not _WORDS.search(item):
+            return phrase or item
+        head, inner = _aside(item)
+        return f"{self._of_phrase(head, depth)} ({self._of_text(inner, depth + 1)})"
 
     def _of_phrase(self, part: str, depth: int) -> str | None:
         if part in self._whole:
@@ -99,3 +106,14 @@ class Book:
             return self._of_text(held[name], depth + 1) if is_looked_up(name) else held[name]
 
         return SLOT.sub(filled, phrase.other)
+
+
+def _aside(text: str) -> tuple[str, str]:
+    """What stands before the brackets at the end of a text, and in them."""
+    if text.endswith(")"):
+        opened = 0
+        for at in range(len(text) - 1, 0, -1):
+            opened += (text[at] == ")") - (text[at] == "(")
+            if not opened:
+                return (text[: at - 1], text[at + 1 : -1]) if text[at - 1] == " " else (text, "")
+    return text, ""

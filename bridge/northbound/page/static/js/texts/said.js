@@ -1,8 +1,9 @@
 // What the bridge itself says, in the reader's language: a phrase book from its English.
 //
 // A phrase is a pair of sentences with slots: {name} holds one word as it is, {name#} a number, {name…} words as they
-// are, and {NAME} words that are looked up in turn. Texts that are joined by "; ", ": " or ". " are looked up part by
-// part; a list with commas only where every part of it has a phrase. What has no phrase stays English.
+// are, and {NAME} words that are looked up in turn. Texts that are joined by "; ", ": " or ". ", or end with something
+// in brackets, are looked up part by part; a list with commas only where every part of it has a phrase. What has no
+// phrase stays English.
 
 import { signal } from "../ui.js";
 
@@ -14,6 +15,7 @@ const AGAIN_MS = 10000;
 const SLOT = /\{(\w+)([#…]?)\}/g;
 const HOLDS = { "": "(\\S+)", "#": "(-?\\d[\\w.+-]*|[\\dA-F]+h)", "…": "((?:(?!: )[^])+?)" };
 const WORDS = /[a-z]{3}/;
+const JOINED = /[:;] /;
 const books = signal({});
 const loading = new Set();
 
@@ -47,6 +49,8 @@ export function bookOf(phrases) {
 
   function ofText(text, depth) {
     if (depth > DEEPEST) return text;
+    const [head, inner] = aside(text);
+    if (JOINED.test(inner)) return `${ofText(head, depth)} (${ofText(inner, depth + 1)})`;
     return text.split("; ").map((part) => ofPart(part, depth)).join("; ");
   }
 
@@ -55,18 +59,23 @@ export function bookOf(phrases) {
     if (phrase !== null) return phrase;
     const list = part.split(", ");
     if (list.length > 1) {
-      const others = list.map((one) => ofPhrase(one, depth) ?? (WORDS.test(one) ? null : one));
+      const others = list.map((one) => ofItem(one, depth));
       if (!others.includes(null)) return others.join(", ");
     }
     const colon = part.indexOf(": ");
-    if (colon >= 0) {
-      const head = part.slice(0, colon);
-      return `${ofPhrase(head, depth) ?? head}: ${ofPart(part.slice(colon + 2), depth)}`;
-    }
+    if (colon >= 0) return `${ofPart(part.slice(0, colon), depth)}: ${ofPart(part.slice(colon + 2), depth)}`;
     const stop = part.indexOf(". ");
-    if (stop < 0) return part;
-    const head = part.slice(0, stop);
-    return `${ofPhrase(head, depth) ?? head}. ${ofPart(part.slice(stop + 2), depth)}`;
+    if (stop >= 0) return `${ofPart(part.slice(0, stop), depth)}. ${ofPart(part.slice(stop + 2), depth)}`;
+    const [head, inner] = aside(part);
+    return inner ? `${ofPart(head, depth)} (${ofText(inner, depth + 1)})` : part;
+  }
+
+  function ofItem(one, depth) {
+    const phrase = ofPhrase(one, depth);
+    if (phrase !== null || !WORDS.test(one)) return phrase ?? one;
+    const [head, inner] = aside(one);
+    const first = inner && ofPhrase(head, depth);
+    return first ? `${first} (${ofText(inner, depth + 1)})` : null;
   }
 
   function ofPhrase(part, depth) {
@@ -90,6 +99,18 @@ export function bookOf(phrases) {
     if (kept.size > KEPT) kept.delete(kept.keys().next().value);
     return other;
   };
+}
+
+// What stands before the brackets at the end of a text, and in them.
+function aside(text) {
+  if (!text.endsWith(")")) return [text, ""];
+  let open = 0;
+  for (let at = text.length - 1; at > 0; at--) {
+    if (text[at] === ")") open++;
+    else if (text[at] === "(" && --open === 0)
+      return text[at - 1] === " " ? [text.slice(0, at - 1), text.slice(at + 1, -1)] : [text, ""];
+  }
+  return [text, ""];
 }
 
 const isLookedUp = (name) => name === name.toUpperCase();

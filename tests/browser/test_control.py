@@ -17,7 +17,6 @@ from tests.browser.hands import (
 )
 from tests.support.desk import Desk
 
-
 HIDDEN = """is => {
     Object.defineProperty(document, "hidden", { value: is, configurable: true });
     document.dispatchEvent(new Event("visibilitychange"));
@@ -63,6 +62,7 @@ def test_a_tab_that_hangs_is_a_controller_that_fell_silent(desk: Desk) -> None:
         with hanging(page):
             expect(watcher.locator(".sentence")).to_contain_text("its controller fell silent")
         expect(watcher.locator(".trouble")).to_contain_text("(web page)")
+        to_drive(watcher)
         expect(watcher.locator(".faults")).to_contain_text("tripped by the bridge, not by the drive")
         expect(watcher.locator(".faults")).not_to_contain_text("What to do")
         expect(watcher.locator(".trouble .remedy")).to_contain_text("acknowledge")

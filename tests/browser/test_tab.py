@@ -111,7 +111,9 @@ def test_a_trend_is_paused_zoomed_and_kept_as_a_file(desk: Desk, tmp_path: Path)
         assert page.evaluate(DRAWN) == before, "paused, it stays as it is"
         with page.expect_download() as download:
             page.get_by_role("button", name="CSV").click()
-        assert re.search(rf"-{DRIVE.replace('/', '-')}-\d{{4}}-\d\d-\d\d-\d{{6}}\.csv$", download.value.suggested_filename)
+        assert re.search(
+            rf"-{DRIVE.replace('/', '-')}-\d{{4}}-\d\d-\d\d-\d{{6}}\.csv$", download.value.suggested_filename
+        )
         head, first, *_ = download.value.path().read_text(encoding="utf-8").splitlines()
         assert head.startswith(f'"time","{DRIVE}/command/frequency [Hz]","{DRIVE}/actual/frequency [Hz]"')
         assert re.match(r"\d{4}-\d\d-\d\dT[\d:.]+Z,", first)

@@ -27,6 +27,7 @@ from tests.support.process import free_port, peer
 NODES = 60
 LOADS = 5
 WATCHED_S = 10.0
+SETTLED_MS = 1000
 VIEWERS = 5
 FRAME_EVENTS = ["-*", "disabled-by-default-devtools.timeline.frame", "devtools.timeline.frame"]
 TILES = """
@@ -103,7 +104,8 @@ def test_first_paint_and_what_is_loaded(rig: Rig) -> None:
             "Network.loadingFinished", lambda loaded, size=size: _add(size, loaded["encodedDataLength"])
         )
         page.goto(rig.address)
-        page.wait_for_function("window.painted")
+        expect(page.locator(".tile").first).to_be_visible()
+        page.wait_for_timeout(SETTLED_MS)
         [painted] = page.evaluate(
             "performance.getEntriesByName('first-contentful-paint').map((one) => one.startTime)"
         )

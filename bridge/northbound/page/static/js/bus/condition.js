@@ -28,7 +28,7 @@ export function Condition({ bus }) {
       ${good(point("last_error")) && html`<p><span class="label">${t("bus.last_error")}</span> ${translated(good(point("last_error")))}</p>`}
       ${good(point("second_master")) && html`<p class="is-alarm"><${Icon} name="alarm" /> ${t("trouble.second_master")}</p>`}
       <${Strangers} point=${point} />
-      ${good(point("passive")) && html`<p>${nature(point("passive")).description}</p>`}
+      ${good(point("passive")) && html`<p>${translated(nature(point("passive")).description)}</p>`}
     </section>
   `;
 }

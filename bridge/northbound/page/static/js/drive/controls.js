@@ -2,7 +2,7 @@
 
 import { html, useEffect, useRef } from "../ui.js";
 import { may } from "../session.js";
-import { t } from "../texts.js";
+import { t, translated } from "../texts.js";
 import { clock } from "../format.js";
 import { told } from "../outcome.js";
 import { ownerOf } from "../owner.js";
@@ -66,6 +66,6 @@ function text({ action, outcome }) {
   if (action === "hidden") return t("drive.was_hidden", { time: clock(outcome.at) });
   if (action === "keep_alive") return t("outcome.lost", { message: told(outcome) });
   const what = t(`action.${action}`);
-  if (outcome.ok) return t("outcome.not_forwarded", { what, message: outcome.message });
+  if (outcome.ok) return t("outcome.not_forwarded", { what, message: translated(outcome.message) });
   return t("outcome.refused", { what, message: told(outcome) });
 }

@@ -2,7 +2,7 @@
 
 import { html, useState } from "../ui.js";
 import { number, shortest } from "../format.js";
-import { t } from "../texts.js";
+import { t, translated } from "../texts.js";
 import { told } from "../outcome.js";
 import { held, write } from "./held.js";
 import { range, shown, typed } from "./value.js";
@@ -18,7 +18,7 @@ export function Editor({ holder, entry, described, onWritten }) {
     setSaid({ text: t("parameters.writing"), isBusy: true });
     const outcome = await write(holder, entry.name, value);
     setSaid(outcome.ok
-      ? { text: outcome.message || t("parameters.written", { value: shown(entry, outcome.value) }) }
+      ? { text: translated(outcome.message) || t("parameters.written", { value: shown(entry, outcome.value) }) }
       : { isFailure: true, text: t("outcome.refused", { what: entry.name, message: told(outcome) }) });
     if (outcome.ok) onWritten();
   };

@@ -10,6 +10,8 @@ import { inOwnFrame } from "./frames.js";
 import { lose, take } from "./values.js";
 
 const MOST_EVENTS = 200;
+/** Points that are drawn in one frame: a slow browser without a GPU has time for them. */
+const AT_ONCE = 80;
 
 export { ask, isConnected } from "./connection.js";
 /** What is wrong, the worst first; null until the server has told. */
@@ -96,15 +98,30 @@ function onMessage(message) {
   } else if ("heard" in message) onHeard(message);
   else if ("events" in message) events.value = message.events.reverse();
   else if ("event" in message) events.value = [message.event, ...events.value].slice(0, MOST_EVENTS);
-  else keep(message.state ?? message.changes);
+  else if ("state" in message) begin(message.state);
+  else keep(message.changes);
 }
 
 // A hidden tab gets no frames: what came meanwhile is kept as one set of readings, however long that takes.
 function keep(readings) {
   if (pending) return void Object.assign(pending, readings);
   pending = readings;
-  inOwnFrame(() => {
-    if (pending) take(pending);
-    pending = null;
-  });
+  inOwnFrame(draw);
+}
+
+// As many as there is time for in a frame; the rest in those after it.
+function draw() {
+  if (!pending) return;
+  const names = Object.keys(pending);
+  const part = names.slice(0, AT_ONCE);
+  take(Object.fromEntries(part.map((name) => [name, pending[name]])));
+  pending = part.length < names.length ? Object.fromEntries(names.slice(AT_ONCE).map((name) => [name, pending[name]])) : null;
+  if (pending) inOwnFrame(draw);
+}
+
+// All that a page shows is there at once: it is newer than what has not been drawn yet.
+function begin(state) {
+  const all = { ...pending, ...state };
+  pending = null;
+  inOwnFrame(() => take(all));
 }

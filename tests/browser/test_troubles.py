@@ -11,7 +11,7 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from tests.browser.hands import SHOTS
+from tests.browser.hands import SHOTS, start, take
 from tests.support import sites
 from tests.support.desk import Desk
 from tests.support.process import Process, free_port, peer, until
@@ -89,6 +89,24 @@ def test_a_cable_is_pulled(tmp_path: Path, chromium: Browser) -> None:
         expect(plant.page.locator(".busnode")).to_contain_text("not heard")
         plant.tell("mend_cable")
         expect(plant.page.locator(".sentence")).to_contain_text("Everything is in order")
+
+
+def test_a_bus_is_pulled_while_a_drive_runs_on_it(tmp_path: Path, chromium: Browser) -> None:
+    with broken(tmp_path, chromium) as plant:
+        page = plant.page
+        page.get_by_role("link", name=DRIVE).first.click()
+        take(page)
+        start(page, "20")
+        plant.tell("pull_adapter")
+        expect(page.locator(".drivehead .state")).to_contain_text("not heard")
+        page.get_by_role("link", name="Plant", exact=True).click()
+        plant.says("can0", "the bus is down", "the interface has vanished", "CAN interface is connected")
+        expect(page.locator(".trouble")).to_have_count(1)
+        expect(page.locator(".busstate")).to_contain_text("down")
+        plant.shot("bus")
+        plant.tell("plug_adapter")
+        expect(page.locator(".sentence")).to_contain_text("Everything is in order")
+        expect(page.locator(".tile", has_text=DRIVE)).not_to_contain_text("running")
 
 
 def test_a_drive_has_a_fault_and_is_acknowledged(tmp_path: Path, chromium: Browser) -> None:

@@ -11,6 +11,7 @@ import asyncio
 import sys
 from pathlib import Path
 
+from bridge.can.interface import ControllerState
 from bridge.can.virtual import VirtualBus, VirtualWire
 from bridge.canopen.frame import Frame
 from bridge.cli import logs
@@ -34,7 +35,8 @@ class Plant(asyncio.DatagramProtocol):
         playing = Simulation(self.wire.end("simulation"), [self.node])
         self.wire.players.append(playing.catch_up)
         self.simulations.append(playing)
-        return self.wire.end(table.name)
+        self.end = self.wire.end(table.name)
+        return self.end
 
     def datagram_received(self, data: bytes, addr: object) -> None:
         getattr(self, data.decode())()
@@ -47,6 +49,18 @@ class Plant(asyncio.DatagramProtocol):
 
     def mend_cable(self) -> None:
         self.wire.cut = False
+
+    def pull_adapter(self) -> None:
+        """What a bus shows whose interface has gone: nothing comes, and nothing is sent later."""
+        status = self.end.status
+        status.state = ControllerState.DOWN
+        status.outages += 1
+        status.note_error("the interface has vanished")
+        self.cut_cable()
+
+    def plug_adapter(self) -> None:
+        self.end.status.state = ControllerState.OK
+        self.mend_cable()
 
     def fail_drive(self) -> None:
         assert isinstance(self.node, NordTu4)

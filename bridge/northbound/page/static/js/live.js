@@ -30,6 +30,7 @@ let trend = { names: [], number: 0, onRows: (rows) => {}, onLost: () => {} };
 let wish = null;
 let onHeard = (message) => {};
 let pending = null;
+let whole = null;
 let aheadMs = 0;
 
 export function connect() {
@@ -79,7 +80,7 @@ function onReady() {
 }
 
 function onLost() {
-  pending = null;
+  pending = whole = null;
   trend.onLost();
   lose();
 }
@@ -121,7 +122,13 @@ function draw() {
 
 // All that a page shows is there at once: it is newer than what has not been drawn yet.
 function begin(state) {
-  const all = { ...pending, ...state };
+  const isDue = whole !== null;
+  whole = { ...whole, ...pending, ...state };
   pending = null;
-  inOwnFrame(() => take(all));
+  if (!isDue) inOwnFrame(drawWhole);
+}
+
+function drawWhole() {
+  if (whole) take(whole);
+  whole = null;
 }

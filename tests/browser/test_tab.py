@@ -6,7 +6,7 @@ import os
 import re
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from playwright.sync_api import expect
@@ -43,7 +43,8 @@ def stopped(pid: int) -> Iterator[None]:
     try:
         yield
     finally:
-        os.kill(pid, signal.SIGCONT)
+        with suppress(ProcessLookupError):  # hung for too long: the bridge has ended it
+            os.kill(pid, signal.SIGCONT)
 
 
 def test_a_drive_whose_page_was_left_while_it_was_taken_is_given_back(desk: Desk) -> None:
@@ -89,7 +90,7 @@ def test_a_front_that_hangs_is_seen_and_its_tab_is_a_silent_controller(
 
 def test_whoever_comes_back_after_the_session_is_over_logs_in_again(desk: Desk) -> None:
     with desk.sits("operator") as page:
-        expect(page.locator(".sentence")).to_contain_text("in order")
+        expect(page.locator(".sentence")).to_contain_text(re.compile("in order|since"))
         page.context.clear_cookies()
         # As after a laptop's sleep: the connection is gone, and the session as well.
         page.context.set_offline(True)

@@ -5,7 +5,7 @@ import { ended, session } from "./session.js";
 
 const RETRY_MS = [500, 1000, 2000, 4000];
 /** The server says something every second. A link that is half open, or a server that hangs, does not. */
-const SILENCE_MS = 3500;
+const SILENCE_MS = 3000;
 const LOOK_MS = 500;
 /** Longer than the bridge takes for the slowest of its answers. */
 const ANSWER_MS = 15_000;

@@ -10,8 +10,6 @@ import { inOwnFrame } from "./frames.js";
 import { lose, take } from "./values.js";
 
 const MOST_EVENTS = 200;
-/** Points that are drawn in one frame: a slow browser without a GPU has time for them. */
-const AT_ONCE = 80;
 
 export { ask, isConnected } from "./connection.js";
 /** What is wrong, the worst first; null until the server has told. */
@@ -30,7 +28,6 @@ let trend = { names: [], number: 0, onRows: (rows) => {}, onLost: () => {} };
 let wish = null;
 let onHeard = (message) => {};
 let pending = null;
-let whole = null;
 let aheadMs = 0;
 
 export function connect() {
@@ -80,7 +77,7 @@ function onReady() {
 }
 
 function onLost() {
-  pending = whole = null;
+  pending = null;
   trend.onLost();
   lose();
 }
@@ -99,36 +96,19 @@ function onMessage(message) {
   } else if ("heard" in message) onHeard(message);
   else if ("events" in message) events.value = message.events.reverse();
   else if ("event" in message) events.value = [message.event, ...events.value].slice(0, MOST_EVENTS);
-  else if ("state" in message) begin(message.state);
-  else keep(message.changes);
+  else keep(message.state ?? message.changes);
 }
 
 // A hidden tab gets no frames: what came meanwhile is kept as one set of readings, however long that takes.
 function keep(readings) {
   if (pending) return void Object.assign(pending, readings);
   pending = readings;
-  inOwnFrame(draw);
+  // Beside a trend each frame has to be in time (frames.js). An idle browser begins one for us, and it may take longer.
+  const soon = trend.names.length ? inOwnFrame : requestAnimationFrame;
+  soon(draw);
 }
 
-// As many as there is time for in a frame; the rest in those after it.
 function draw() {
-  if (!pending) return;
-  const names = Object.keys(pending);
-  const part = names.slice(0, AT_ONCE);
-  take(Object.fromEntries(part.map((name) => [name, pending[name]])));
-  pending = part.length < names.length ? Object.fromEntries(names.slice(AT_ONCE).map((name) => [name, pending[name]])) : null;
-  if (pending) inOwnFrame(draw);
-}
-
-// All that a page shows is there at once: it is newer than what has not been drawn yet.
-function begin(state) {
-  const isDue = whole !== null;
-  whole = { ...whole, ...pending, ...state };
+  if (pending) take(pending);
   pending = null;
-  if (!isDue) inOwnFrame(drawWhole);
-}
-
-function drawWhole() {
-  if (whole) take(whole);
-  whole = null;
 }

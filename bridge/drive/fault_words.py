@@ -1,4 +1,8 @@
-"""A fault as its maker writes it, with its text, cause and remedy."""
+"""A fault as its maker writes it, with its text, cause and remedy.
+
+Both are the manual's where it explains the fault. Where it does not, they are general advice for its kind:
+marked as general, with the manual that knows more behind it.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,11 @@ from bridge.mapping.model import Family
 Language = Literal["en", "de"]
 _DECIMAL: Final = ("number", "group")
 """Fields of a form for numbers such as 10.3; the others take a whole number apart."""
+_GENERAL: Final[dict[Language, tuple[str, str, str]]] = {
+    "en": ("Possible causes: {}.", "General advice: {}", " Details: {}."),
+    "de": ("Mögliche Ursachen: {}.", "Allgemeiner Rat: {}", " Genaueres: {}."),
+}
+"""How general advice is marked: its cause, its remedy, and the manual behind it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +49,7 @@ class FaultWords:
         self._is_code = "hex" in fields
         number = self._emcy.number
         self._mask = number.mask if number else None
+        self._no_faults = no_faults(family)
 
     def own(self, fault: float) -> Explained:
         """A finding of the bridge, under the number that the family has for it."""
@@ -55,7 +65,7 @@ class FaultWords:
         if not cause:
             return self._explained(number, name, found)
         exact = f"{name}.{cause}"
-        said = self._explained(number, exact if exact in self._entries else name, self._text(exact) or found)
+        said = self._explained(number, exact, self._text(exact) or found)
         return Explained(number, f"{said.text}, cause {cause}", said.cause, said.remedy)
 
     def knows(self, fault: float) -> bool:
@@ -65,8 +75,7 @@ class FaultWords:
     def of_code(self, code: int) -> Explained:
         """An emergency message that has nothing but its code."""
         name = f"{code:04X}h"
-        group = f"{name[:2]}xxh"
-        return self._explained(name, name if name in self._entries else group, self._text(name))
+        return self._explained(name, name, self._text(name))
 
     def listed(self, name: str) -> Explained:
         """A fault by the name that the mapping file has for it: ``10.3``, ``41``, ``52.1``, ``8130h``."""
@@ -122,12 +131,34 @@ class FaultWords:
         return FORM_FIELD.sub(digits, form)
 
     def _explained(self, number: str, name: str, text: str) -> Explained:
-        entry = self._entries.get(name)
+        if name in self._no_faults:
+            return Explained(number, text)
+        names = _from_exact_to_group(name)
+        entry = next((self._entries[one] for one in names if one in self._entries), None)
         said = getattr(entry, self._language) if entry else Explanation.model_validate({})
-        elsewhere, remedy = self._faults.elsewhere, said.remedy
-        if text and elsewhere is not None and not (said.cause or remedy):
-            remedy = getattr(elsewhere, self._language)
-        return Explained(number, text, said.cause, remedy)
+        if not (said.cause or said.remedy):
+            said = self._general(names) or said
+        return Explained(number, text, said.cause, said.remedy)
+
+    def _general(self, names: tuple[str, ...]) -> Explanation | None:
+        """General advice for a fault that nobody explains; None where the family has none for its kind."""
+        faults = self._faults
+        kind = next((faults.kinds[one] for one in names if one in faults.kinds), faults.other_kind)
+        if kind is None:
+            return None
+        cause, remedy, details = _GENERAL[self._language]
+        advised, elsewhere = getattr(faults.advice[kind], self._language), faults.elsewhere
+        more = details.format(getattr(elsewhere, self._language)) if elsewhere is not None else ""
+        return Explanation(cause=cause.format(advised.cause), remedy=remedy.format(advised.remedy) + more)
+
+
+def _from_exact_to_group(name: str) -> tuple[str, ...]:
+    """The names under which something may be said of a fault, the nearest first: a cause is of its event, a
+    code of its group and of its class (CiA 301 §7.2.7.1; from F000h on, groups are classes of their own)."""
+    if not name.endswith("h"):
+        return (name, name.partition(".")[0])
+    group = (name, f"{name[:2]}xxh")
+    return (*group, f"{name[0]}0xxh") if name[0].isdecimal() else group
 
 
 def listed_faults(family: Family) -> list[str]:
@@ -138,6 +169,12 @@ def listed_faults(family: Family) -> list[str]:
     own = {*explained, *faults.german}
     codes = [f"{code}h" for code in emcy.codes if "{hex" in faults.form or f"{code}h" in own]
     codes = [code for code in codes if "xx" not in code]  # groups, for codes that nobody lists
-    none = {"0000h", str(emcy.event.gone) if emcy.event else ""}
+    none = no_faults(family)
     names = dict.fromkeys([*faults.texts, *emcy.events, *codes, *explained])
     return [name for name in names if name not in none]
+
+
+def no_faults(family: Family) -> frozenset[str]:
+    """The names by which an emergency message says that there is no fault any more."""
+    event = family.emcy.event
+    return frozenset(("0000h", *([] if event is None or event.gone is None else [str(event.gone)])))

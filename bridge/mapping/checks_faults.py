@@ -35,6 +35,13 @@ def check_faults(family: Family, file: MergedFile) -> None:
             file.fault(key, f"there is no fault {name!r}", hint)
     for n, one in enumerate(family.fault):
         _check_languages(one, ("fault", n), file)
+    kinds: list[tuple[str, Key]] = [(kind, ("faults", "kinds", name)) for name, kind in faults.kinds.items()]
+    if faults.other_kind is not None:
+        kinds.append((faults.other_kind, ("faults", "other_kind")))
+    for kind, key in kinds:
+        if kind not in faults.advice:
+            hint = f"it has {', '.join(sorted(faults.advice)) or 'none'}"
+            file.fault(key, f"faults.advice has no {kind!r}", hint)
 
 
 def known_faults(family: Family) -> dict[str, str]:

@@ -88,6 +88,20 @@ class FaultEntry(Table):
     de: Explanation = Field(default_factory=lambda: Explanation.model_validate({}))
 
 
+class Advised(Table):
+    """General advice in one language; both sentences are there."""
+
+    cause: str = Field(min_length=1, description="what it often is, as the rest of a sentence")
+    remedy: str = Field(min_length=1, description="what to do, in whole sentences")
+
+
+class Advice(Table):
+    """General advice for one kind of fault, in our own words."""
+
+    en: Advised
+    de: Advised
+
+
 class FaultParameter(Table):
     """A fault number that the drive itself keeps."""
 
@@ -105,7 +119,16 @@ class FaultNumbers(Table):
     form: FaultForm = Field("", description="how the maker writes a number that the drive tells")
     form_to: float | None = Field(None, description="numbers above it are written as they are")
     elsewhere: Wording | None = Field(
-        None, description="where to look for the cause of a fault that this file has none for"
+        None, description="which manual knows more of a fault that has general advice alone"
+    )
+    kinds: dict[FaultName, str] = Field(
+        default_factory=dict[str, str],
+        description="what kind of fault it is, an entry of `advice`, by what a [[fault]] would be called",
+    )
+    other_kind: str | None = Field(None, description="the kind of every fault that `kinds` does not have")
+    advice: dict[str, Advice] = Field(
+        default_factory=dict[str, Advice],
+        description="general advice, for faults without cause and remedy of their own",
     )
     texts: dict[FaultNumber, str]
     german: dict[FaultName, str] = Field(

@@ -39,9 +39,12 @@ def _walk(
             header = path
             found.setdefault(header, {})[name] = _facts(info)
         else:
+            if get_origin(info.annotation) is dict:
+                key = f"{key}.NAME"
             _walk(inner, key, found, leaves)
             header = f"[[{key}]]" if is_list else f"[{key}]"
-            found[header] = found.pop(key)
+            if key in found:  # a table that has nothing but tables has no header
+                found[header] = found.pop(key)
 
 
 def _inner_model(annotation: Any, leaves: tuple[type, ...]) -> tuple[type[BaseModel] | None, bool]:

@@ -53,11 +53,44 @@ def test_cause_and_remedy_are_there_in_both_languages() -> None:
     assert german.text == "Time-out durch P151/P513: Die Steuerung schweigt"
 
 
-def test_where_the_manual_explains_nothing_it_says_which_one_does() -> None:
-    one = FaultWords(NORD).of_drive(3.0)
-    assert not one.cause
+def test_where_the_manual_explains_nothing_there_is_general_advice_and_where_more_is_said() -> None:
+    one, german = FaultWords(NORD).of_drive(3.0), FaultWords(NORD, "de").of_drive(3.0)
+    assert one.cause.startswith("Possible causes: the load is too heavy")
+    assert one.remedy.startswith("General advice: Check that the machine moves freely")
     assert "BU 0200" in one.remedy
-    assert FaultWords(NORD, "de").of_drive(3.0).remedy.startswith("BU 2500 §8.3.3 nennt nur den Namen")
+    assert german.remedy.startswith("Allgemeiner Rat: Leichtgängigkeit")
+    assert german.remedy.endswith("BU 2500 §8.3.3 nennt nur den Namen.")
+
+
+@pytest.mark.parametrize(
+    ("family", "code", "advised"),
+    [
+        (CIA402, 0x2340, "insulation"),  # the code
+        (CIA402, 0x2311, "ramp"),  # its group 23xxh is no kind, the class 20xxh is
+        (CIA402, 0x7308, "encoder"),  # its group
+        (NORD, 0x5110, "terminating"),  # NORD: fault of the external bus; CiA: low voltage (§8.3.3)
+        (CIA402, 0x5110, "24 V"),
+        (CIA402, 0xFF77, "ask the maker"),  # nobody knows it
+    ],
+)
+def test_advice_is_by_the_code_else_by_its_group_else_by_its_class(family, code: int, advised: str) -> None:
+    assert advised in FaultWords(family).of_code(code).remedy
+
+
+def test_a_number_that_no_list_has_comes_with_advice_too() -> None:
+    one = FaultWords(LENZE).of_drive(75169803)
+    assert not one.text
+    assert "Engineer" in one.remedy
+
+
+def test_no_fault_is_in_need_of_no_advice() -> None:
+    """ID 441684.06 §9.3: event 30 says that there is none any more."""
+    assert not FaultWords(CIA402).of_code(0).remedy
+    assert not FaultWords(STOEBER).of_drive(30).remedy
+
+
+def test_a_cause_takes_the_advice_of_its_event() -> None:
+    assert "Let the motor cool down" in FaultWords(STOEBER).of_drive(41, 2).remedy
 
 
 def test_an_emergency_code_is_explained_too() -> None:

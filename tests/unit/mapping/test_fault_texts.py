@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
+from bridge.drive import FaultWords
 from bridge.drive.fault_words import listed_faults
 from bridge.errors import FileFaults
 from bridge.mapping import load_family
@@ -32,11 +34,52 @@ def test_what_the_manual_explains_is_explained(name: str) -> None:
         assert all((one.en.cause, one.en.remedy, one.de.cause, one.de.remedy)), one.name
 
 
+DEEDS = {
+    "en": r"(?:^|[.;:,] (?:then )?|and )"
+    r"(?:check|compare|connect|free|lengthen|let|look|lower|make|measure|note|read|restore|set|switch|warm)\b",
+    "de": r"\b(?:abschalten|anschließen|einstellen|erwärmen|freimachen|lassen|lesen|machen|messen|nachsehen"
+    r"|notieren|prüfen|senken|verlängern|vergleichen|wiederherstellen)\b",
+}
+"""What somebody at the machine can do, in the imperative."""
+DETAILS = {"en": " Details: ", "de": " Genaueres: "}
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
 @pytest.mark.parametrize("name", FAMILIES)
-def test_what_it_does_not_explain_names_another_manual(name: str) -> None:
-    elsewhere = FAMILIES[name].faults.elsewhere
+def test_every_remedy_names_something_to_do_and_where_more_is_said_comes_behind(name: str, language) -> None:
+    family = FAMILIES[name]
+    words = FaultWords(family, language)
+    idle = [
+        f"{one}: {one.remedy}"
+        for one in map(words.listed, listed_faults(family))
+        if not re.search(DEEDS[language], one.remedy.partition(DETAILS[language])[0], re.IGNORECASE)
+    ]
+    assert not idle
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+@pytest.mark.parametrize("name", FAMILIES)
+def test_every_fault_has_a_cause_and_general_advice_says_that_it_is_general(name: str, language) -> None:
+    family = FAMILIES[name]
+    words, explained = FaultWords(family, language), {one.name for one in family.fault}
+    elsewhere = family.faults.elsewhere
     assert elsewhere is not None
-    assert elsewhere.en != elsewhere.de
+    general, possible = {"en": ("General", "Possible"), "de": ("Allgemein", "Möglich")}[language]
+    for fault in listed_faults(family):
+        one = words.listed(fault)
+        assert one.cause, fault
+        is_general = fault not in explained
+        assert (one.remedy.startswith(general), one.cause.startswith(possible)) == (is_general, is_general)
+        assert one.remedy.endswith(f"{getattr(elsewhere, language)}.") is is_general
+
+
+def test_every_kind_of_advice_is_of_use_to_some_family_and_none_says_what_another_does() -> None:
+    faults = [family.faults for family in FAMILIES.values()]
+    used = {kind for one in faults for kind in (*one.kinds.values(), one.other_kind)}
+    advice = faults[0].advice
+    assert set(advice) == used
+    remedies = [said.remedy for one in advice.values() for said in (one.en, one.de)]
+    assert len(remedies) == len(set(remedies))
 
 
 @pytest.mark.parametrize("name", [name for name in FAMILIES if not name.startswith("cia402/")])
@@ -61,6 +104,9 @@ def changed(folder: Path, more: str) -> Family:
         ('[faults.german]\n"77" = "x"\n', "there is no fault '77'"),
         ('[[fault]]\nname = "41"\nen.cause = "hot"\n', "has no cause, which en has"),
         ('[[fault]]\nname = "41"\nde.remedy = "kühlen"\n', "has no remedy, which de has"),
+        ('[faults.kinds]\n41 = "hot"\n', "faults.advice has no 'hot'"),
+        ('[faults]\nother_kind = "odd"\n', "faults.advice has no 'odd'"),
+        ('[faults.advice.hot.en]\ncause = "it is hot"\nremedy = "Cool it."\n', "faults.advice.hot.de"),
         ('[faults]\nform = "{shape}"\n', "takes {number}"),
         ('[faults]\nform = "{bits 3-9}"\n', "has no bits"),
         ('[eeprom.save_command]\nparameter = "C01"\nvalue = 1\n', "C01 is no command"),

@@ -73,11 +73,11 @@ class Parts:
 
 
 class Velocity(Parts):
-    """vl: 6042h in 1/min, 6046h, 6048h, 6049h."""
+    """vl: 6042h in 1/min by 604Ch, 6046h, 6048h, 6049h."""
 
     @property
     def _limited(self) -> float:
-        """The target in 1/min within 6046h."""
+        """The target, in the drive's own numbers, within 6046h."""
         least, most = self.settings.vl_limits
         target = self.targets.vl_velocity if self._word & BIT_6 and self._word & BIT_4 else 0
         if not target:
@@ -87,7 +87,7 @@ class Velocity(Parts):
 
     @property
     def demand(self) -> float:
-        return self._limited * INCREMENTS / 60
+        return self._limited * self.settings.vl_factor * INCREMENTS / 60
 
     def advance(self, dt_s: float) -> None:
         if self._word & BIT_4 and not self._word & BIT_5:  # the ramp is locked

@@ -46,6 +46,7 @@ _NUMBERS: Final = {
     0x609A: (Type.UNSIGNED32, "homing_acceleration"),
 }
 _ARRAYS: Final = {
+    0x604C: ((Type.INTEGER32, Type.INTEGER32), "vl_dimension"),
     0x6046: ((Type.UNSIGNED32, Type.UNSIGNED32), "vl_limits"),
     0x6048: ((Type.UNSIGNED32, Type.UNSIGNED16), "vl_acceleration"),
     0x6049: ((Type.UNSIGNED32, Type.UNSIGNED16), "vl_deceleration"),
@@ -133,8 +134,8 @@ class Cia402Objects:
 
         i16, i32 = Type.INTEGER16, Type.INTEGER32
         dictionary.add(0x6042, 0, variable(i16, lambda: targets, "vl_velocity", in_pdos=True))
-        actual(0x6043, i16, lambda: axis.demand_rpm)
-        actual(0x6044, i16, lambda: axis.actual_rpm)
+        actual(0x6043, i16, lambda: round(axis.demand_rpm / self._settings.vl_factor))
+        actual(0x6044, i16, lambda: round(axis.actual_rpm / self._settings.vl_factor))
         actual(0x6062, i32, lambda: round(motor.position))
         actual(0x6064, i32, lambda: round(motor.position))
         actual(0x606B, i32, lambda: axis.demand_velocity)

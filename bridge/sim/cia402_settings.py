@@ -49,6 +49,8 @@ class Cia402Settings:
         default_factory=lambda: {0x605A: 2, 0x605B: 0, 0x605C: 1, 0x605D: 1, 0x605E: 2}
     )
     mode: int = Mode.NONE
+    vl_dimension: list[int] = field(default_factory=lambda: [1, 1])
+    """604Ch: numerator and denominator, by which the numbers of the vl mode become 1/min."""
     vl_limits: list[int] = field(default_factory=lambda: [0, 3000])
     """6046h: least and greatest speed."""
     vl_acceleration: list[int] = field(default_factory=lambda: [3000, 2])
@@ -78,6 +80,12 @@ class Cia402Settings:
     """60C2h: 60C2:01 × 10^60C2:02 s."""
     heartbeat_consumer: int = 0
     """1016h:1: node id in bits 16 … 22, time in ms in the low word."""
+
+    @property
+    def vl_factor(self) -> float:
+        """604Ch; a factor that is none counts as 1."""
+        numerator, denominator = self.vl_dimension
+        return numerator / denominator if numerator and denominator else 1.0
 
     @property
     def max_speed(self) -> float:

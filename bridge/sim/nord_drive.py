@@ -11,7 +11,7 @@ from bridge.sim.dictionary import DataType, Dictionary, Number
 from bridge.sim.news import News
 from bridge.sim.nord_faults import INTERFACE_MISSING
 from bridge.sim.nord_parameters import PARAMETER_BASE, PARAMETERS, DriveParameters, Parameter, add_display
-from bridge.sim.nord_posicon import PositionControl, approach, target
+from bridge.sim.nord_posicon import PositionControl, approach, stretch, target
 from bridge.sim.nord_ramp import Demand, step, turned
 from bridge.sim.nord_states import STATE_BITS, State, commanded
 from bridge.sim.ticks import next_tick
@@ -253,7 +253,8 @@ class NordDrive:
         """The set position in increments, where the drive positions."""
         if self.demand or self.parameters.raw(600, 1, self._set) == PositionControl.OFF:
             return None
-        return target(self.setpoints, lambda n: self.parameters.meaning(546, n, self._set))
+        stretched = stretch(self.parameters)
+        return target(self.setpoints, lambda n: self.parameters.meaning(546, n, self._set), stretched)
 
     def _positioning_hz(self) -> float:
         """How fast it may go there. The position gives the direction."""
@@ -371,11 +372,15 @@ class NordDrive:
             case 9:
                 return self.fault_tenths
             case 10:
-                return round(self.position_increments) & 0xFFFF
+                return self._position_word & 0xFFFF
             case 15:
-                return round(self.position_increments) >> 16 & 0xFFFF
+                return self._position_word >> 16 & 0xFFFF
             case _:
                 return 0
+
+    @property
+    def _position_word(self) -> int:
+        return round(self.position_increments / stretch(self.parameters))
 
     def _shown(self, words: Sequence[int], element: int) -> int:
         return words[element - 1] if self.parameters.raw(509) else 0

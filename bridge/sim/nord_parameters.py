@@ -51,6 +51,9 @@ PARAMETERS: Final = (
     Parameter(546, (1, 0, 0, 0, 0), 0, 57, per_set=True),  # meaning of the setpoints
     Parameter(560, (1,), 0, 2),  # 0 = changes go to RAM only, 1 = to the EEPROM too
     Parameter(600, (0,), 0, 2, per_set=True),  # position control, see nord_posicon
+    Parameter(604, (0,), 0, 17),  # encoder for positions
+    Parameter(607, (1, 1, 1), 1, 32000),  # ratio, and
+    Parameter(608, (1, 1, 1), 1, 32000),  # reduction of positions, see nord_posicon
 )
 
 _ON_SYSTEM_BUS: Final = (120, 509, 543, 546)

@@ -1,7 +1,8 @@
 """POSICON, the position control of a NORD inverter: ramps to a position and stops there.
 
 BU 2500 has how positions are transferred (§6.5.4), an example with three axes (§5.4) and what bit 8 of the
-status word means (§6.5.2). P600, which switches it on, is as those drives are commonly documented.
+status word means (§6.5.2). P600, which switches it on, is as those drives are commonly documented. By §6.5.4
+the range of what is transferred grows with P607 over P608: these are taken to be elements 3 of both.
 """
 
 from __future__ import annotations
@@ -48,7 +49,12 @@ def commission(parameters: DriveParameters) -> None:
     parameters.commission(600, PositionControl.AT_SETPOINT)
 
 
-def target(words: Sequence[int], meaning: Callable[[int], int]) -> int | None:
+def stretch(parameters: DriveParameters) -> float:
+    """Increments to one step of the words."""
+    return parameters.raw(607, 3) / parameters.raw(608, 3)
+
+
+def target(words: Sequence[int], meaning: Callable[[int], int], stretched: float = 1.0) -> int | None:
     """The set position in increments; ``meaning`` has the code of a setpoint, from 1. None without the low
     word. The low word alone is signed (§6.5.4)."""
     by_code = {meaning(number): word for number, word in enumerate(words, start=1)}
@@ -58,7 +64,7 @@ def target(words: Sequence[int], meaning: Callable[[int], int]) -> int | None:
     bits = 32 if HIGH_WORD in by_code else 16
     value = by_code.get(HIGH_WORD, 0) << 16 | low & 0xFFFF
     signed = (value & (1 << bits) - 1 ^ 1 << bits - 1) - (1 << bits - 1)
-    return max(-_MOST, min(_MOST, signed))
+    return round(max(-_MOST, min(_MOST, signed * stretched)))
 
 
 def approach(

@@ -22,6 +22,8 @@ class Polling:
         self._sdo = sdo
         self._show = show
         self._due: list[tuple[float, int]] = []
+        self._asked: set[int] = set()
+        """Polls that wait for their answer: of a node that is slow, no more of them pile up."""
         self._now = 0.0
         self._spared: dict[str, float] = {}
         self._remote = RemotePolling()
@@ -29,6 +31,7 @@ class Polling:
     def start(self, drives: Iterable[DrivePdos], now: float) -> None:
         """Begin; of ``drives``, whose TPDOs have to be asked for are asked."""
         self._due = [(now, number) for number in range(len(self._polls))]
+        self._asked.clear()
         self._remote.start(drives, now)
 
     def on_pdo(self, name: str, value: int, now: float, until: float) -> None:
@@ -59,6 +62,9 @@ class Polling:
                 heapq.heappush(self._due, (spared, number))
                 continue
             heapq.heappush(self._due, (now + poll.every_ms / 1000, number))
+            if number in self._asked:
+                continue
+            self._asked.add(number)
             done = self._done(number)
             self._sdo.read(poll.object.index, poll.object.sub, now, done, priority=Priority.POLL)
 
@@ -66,6 +72,7 @@ class Polling:
         poll = self._polls[number]
 
         def done(result: Result) -> None:
+            self._asked.discard(number)
             if not isinstance(result, SdoError):
                 self._show(poll.name, INTEGERS[poll.data_type].decode(result), self._now)
             elif result.by_server:

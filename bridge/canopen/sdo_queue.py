@@ -19,7 +19,9 @@ class Priority(IntEnum):
 
     COMMAND = 0
     BOOT = 1
-    POLL = 2
+    MEANING = 2
+    """What decides how process data are to be read."""
+    POLL = 3
 
 
 @dataclass(slots=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -11,7 +11,7 @@ from bridge.command.following import Following
 from bridge.command.link import FurtherTpdo
 from bridge.drive import Lack, ParameterSet, ValueCodec, codecs
 from bridge.image import Image, Quality, Value
-from bridge.mapping.model import Slot
+from bridge.mapping.model import Meaning, Slot
 
 _GOOD: Final = (Quality.GOOD, "")
 _STATUS: Final = ("status_word", "drive_status_word", "state", "emcy_code")
@@ -46,8 +46,21 @@ class _Compiled:
 class ActualData:
     """The process data of one drive. A PDO costs one comparison per value."""
 
-    def __init__(self, channel: DriveChannel, slot: Slot, following: Following, image: Image) -> None:
+    def __init__(
+        self,
+        channel: DriveChannel,
+        slot: Slot,
+        following: Following,
+        image: Image,
+        on_code: Callable[[Meaning, int, float], None],
+    ) -> None:
+        """``on_code`` gets the code of a word's meaning, where a TPDO brings it."""
         drive, family = channel.name, channel.family
+        self._on_code = on_code
+        told = [(one, family.told_by(slot, one)) for one in _meanings(channel, slot)]
+        self._can_tell = [(family.process.tpdo.index(word), one) for one, word in told if word]
+        self._telling: list[tuple[int, Meaning]] = []
+        self._codes_told: list[int] = []
         self._image = image
         self._channel = channel
         self._following = following
@@ -74,15 +87,32 @@ class ActualData:
 
     def compile(self) -> None:
         """Take over what the boot-up has found, or what has been read since."""
+        unserved = self._channel.unserved
+        self._telling = [
+            (place, one) for place, one in self._can_tell if f"actual/{self._process[place]}" not in unserved
+        ]
         self._of_sets = {in_set: self._compiled(in_set) for in_set in self._channel.meanings.sets}
         self._use(self.words[0])
+
+    @property
+    def told_by_tpdo(self) -> frozenset[str]:
+        """The words whose meaning the drive's TPDOs tell, by their leaves."""
+        return frozenset(one.leaf for _, one in self._telling)
+
+    def _look_for_codes(self, now: float) -> None:
+        told = [self.words[place] for place, _ in self._telling]
+        if told == self._codes_told:
+            return
+        self._codes_told = told
+        for (_, meaning), word in zip(tuple(self._telling), told, strict=True):
+            self._on_code(meaning, word - 0x1_0000 if word & 0x8000 else word, now)
 
     def _compiled(self, in_set: int) -> _Compiled:
         found = [self._channel.meanings.codec(codec, in_set) for codec in self._codecs]
         return _Compiled(
             tuple(_plain(codec) for codec, _ in found if codec.is_plain),
             tuple(codec for codec, _ in found if not codec.is_plain),
-            tuple(self._to_judge(self._channel.unserved, found)),
+            tuple(self._to_judge(self._channel.unserved, found, in_set)),
         )
 
     def _use(self, status_word: int) -> None:
@@ -92,7 +122,7 @@ class ActualData:
         self._shown = None
 
     def _to_judge(
-        self, unserved: Mapping[str, str], found: Iterable[tuple[ValueCodec, Lack | None]]
+        self, unserved: Mapping[str, str], found: Iterable[tuple[ValueCodec, Lack | None]], in_set: int
     ) -> Iterable[_Judged]:
         for index in self._status:
             yield _Judged(index)
@@ -101,7 +131,10 @@ class ActualData:
             yield _Judged(next(rest), _unserved(unserved, [word]), self._further_of((place,)))
         for codec, lack in found:
             leaves = [codec.model.name, *(self._process[place] for place in codec.places)]
-            yield _Judged(next(rest), _unserved(unserved, leaves) or lack, self._further_of(codec.places))
+            why = self._channel.meanings.doubt(codec.model, in_set)
+            doubt = Lack(Quality.STALE, why) if why else None
+            index, lack = next(rest), _unserved(unserved, leaves) or lack or doubt
+            yield _Judged(index, lack, self._further_of(codec.places))
 
     def _further_of(self, places: Sequence[int]) -> tuple[FurtherTpdo, ...]:
         return tuple(pdo for pdo in self._channel.link.further if not pdo.places.isdisjoint(places))
@@ -119,6 +152,8 @@ class ActualData:
             self._channel.on_actual_words(self.words, now)
         if pdo.on_data(now):
             self._shown = None
+        if self._telling:
+            self._look_for_codes(now)
         self.refresh(now)
 
     def look(self, now: float) -> None:
@@ -141,6 +176,8 @@ class ActualData:
         held[:] = words
         channel.on_pdo(now)
         channel.on_status_word(words[0], now)
+        if self._telling:
+            self._look_for_codes(now)
         if has_new_status or not self._is_good(now):
             self.refresh(now)
         else:
@@ -199,14 +236,23 @@ class ActualData:
         """A point's quality, and the reason where that is not the one of the drive's ``quality``."""
         if not quality.has_value:
             return quality, ""
-        if point.lack:
+        if point.lack and not point.lack.quality.has_value:
             return point.lack
         for pdo in sorted(point.further, key=_goodness):
             # Waiting goes first, then stale.
             is_worse = quality is Quality.GOOD or pdo.quality is Quality.WAITING
             if pdo.quality is not Quality.GOOD and is_worse:
                 return pdo.quality, f"no {pdo.name} from the drive"
-        return quality, ""
+        return point.lack if point.lack and quality is Quality.GOOD else (quality, "")
+
+
+def _meanings(channel: DriveChannel, slot: Slot) -> list[Meaning]:
+    return [
+        one
+        for group in ("command", "actual")
+        for run in channel.family.meanings_of(slot, group)
+        for one in run
+    ]
 
 
 def _plain(codec: ValueCodec) -> _Plain:

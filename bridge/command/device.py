@@ -171,8 +171,8 @@ class Device:
         """It has refused an SDO that a client had asked for."""
         self._image.set(self._abort_code, abort_code, now)
 
-    def on_scale(self, parameter: str, full: float, in_set: int = 1) -> None:
-        """Nothing of it is scaled by a parameter."""
+    def on_parameter(self, name: str, setting: float, now: float) -> None:
+        """Nothing of it depends on a parameter."""
 
     def _judge(self, now: float) -> None:
         for heard in self._heard:

@@ -14,13 +14,15 @@ from bridge.command.event import Event
 from bridge.command.follow import Verdict
 from bridge.command.following import Following
 from bridge.command.link import FurtherTpdo
+from bridge.command.meaning_news import MeaningNews
 from bridge.command.request import Identity
+from bridge.command.setpoint_doubts import InForce, in_force
 from bridge.command.worst_case import StopTime, Wire, stop_time
 from bridge.config import BusTable, DriveTable, NodeTable
 from bridge.drive import MOVING, Codes, Lack, OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, codecs
 from bridge.drive.own_supervision import why_silence_does_not_stop
 from bridge.image import Image, Point, Quality, Value
-from bridge.mapping.model import Family, Slot
+from bridge.mapping.model import Family, Meaning, Slot
 
 _IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
 _FAULT: Final = ("fault_text", "fault_number", "fault_cause", "fault_remedy")
@@ -105,7 +107,7 @@ class Drive(Commanded):
         self.given_parameters = table.parameters
         self._shown_for: tuple[int, int, Wire, float | None] | None = None
         self._set = ParameterSet(family.control_word.parameter_set_bits)
-        self._actual = ActualData(self.channel, self.slot, self.following, image)
+        self._actual = ActualData(self.channel, self.slot, self.following, image, self._on_code)
         # What its node brings, which is not looked at here.
         self.on_process_data = self._actual.on_process_data
         self.on_unchanged_data = self._actual.on_unchanged_data
@@ -113,6 +115,7 @@ class Drive(Commanded):
         self._image = image
         self.points = points[self.name]
         self._find_points()
+        self.news = MeaningNews(self, report)
 
     def _find_points(self) -> None:
         """Where its points stand in the image."""
@@ -174,26 +177,46 @@ class Drive(Commanded):
         self.rpdo_type = rpdo_type
         self.channel.unserved.clear()
         self.channel.unserved.update(unserved)
-        self._compile()
+        self.compile()
         self.refresh(now)
 
     def on_heard_again(self) -> None:
         """Its node could not be heard for a while, and goes on as it was; the state that follows shows it."""
         self._actual.on_heard_again()
 
-    def on_scale(self, parameter: str, full: float, in_set: int = 1) -> None:
-        """The drive's own value of a scaling parameter; it wins over the site file."""
-        self.channel.meanings.on_scale(parameter, full, in_set)
-        self._compile()
+    def on_parameter(self, name: str, setting: float, now: float) -> None:
+        """Its own setting of a parameter, in set 1, that decides what its words mean."""
+        self.news.on_parameter(name, setting, now)
+
+    @property
+    def told_by_tpdo(self) -> frozenset[str]:
+        """The words whose meaning its TPDOs tell, by their leaves: it need not be asked."""
+        return self._actual.told_by_tpdo
+
+    def _on_code(self, meaning: Meaning, code: int, now: float) -> None:
+        """A TPDO has brought the code of a word's meaning. What else depends on it is asked at once."""
+        self.news.is_to_be_asked = True
+        self.news.on_code(meaning, code, now)
+
+    def in_force(self) -> dict[str, InForce]:
+        """The scaled commands that are served with the control word that counts, by their names."""
+        setpoints = self.channel.setpoints
+        commands = self._commands_in[self._set.of(self.channel.control_word)]
+        return {
+            one.codec.model.name: in_force(one.codec, setpoints)
+            for one in commands
+            if one.codec.places and not one.lack
+        }
 
     def on_codes(self, codes: Codes, why_unread: str = "cannot be read") -> bool:
         """What the drive's parameters say that its words carry. True where a setpoint that was written before
         means something else now: it must not be sent to a drive that is enabled next."""
         means_otherwise = self.channel.meanings.on_codes(codes, why_unread)
-        self._compile()
+        self.compile()
         return means_otherwise
 
-    def _compile(self) -> None:
+    def compile(self) -> None:
+        """Take over what has been read of the meaning of its words."""
         self._commands_in = self._compiled_commands()
         self._actual.compile()
 
@@ -312,7 +335,9 @@ class Drive(Commanded):
         in_set = self._set.of(channel.control_word)
         for index, codec in zip(self._value_indices, self._commands_in[in_set], strict=True):
             value = codec.codec.from_words(setpoints)
-            quality, why = codec.lack or (Quality.GOOD, "")
+            why = channel.doubts.why(codec.codec.model.name, setpoints)
+            why = why or channel.meanings.doubt(codec.codec.model, in_set)
+            quality, why = codec.lack or (Quality.STALE if why else Quality.GOOD, why)
             image.set(index, value, now, quality, why)
 
     def _refresh_supervision(self, now: float) -> None:

@@ -12,6 +12,8 @@ from bridge.command.leg.settings import leg_settings
 from bridge.command.leg.state import AWAITS_REPORT
 from bridge.command.leg.turn import control_word
 from bridge.command.link import Link, NodeState
+from bridge.command.request import Reply, Request, Write
+from bridge.command.setpoint_doubts import SetpointDoubts
 from bridge.command.status import DriveStatus
 from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
@@ -43,6 +45,9 @@ class DriveChannel(Channel):
         the drive."""
         self.unserved: dict[str, str] = {}
         """Points that the node cannot serve, by their leaf, with the reason; known after boot-up."""
+        self.doubts = SetpointDoubts()
+        words = family.process.rpdo[1:]
+        self._places = {word: place for place, word in enumerate(words)}
         self._status = DriveStatus(family)
         decode = TelegramDecoder(
             name, family, slot, self.meanings, self.unserved, lambda: self._reported_word
@@ -50,6 +55,17 @@ class DriveChannel(Channel):
         link = Link(settings.telegram_downtime_s, hold_ms)
         of_leg = leg_settings(family, settings, decode)
         super().__init__(name, of_leg, link, report, settled=settled, tripped=tripped, due=due)
+
+    # requests
+
+    def handle(self, request: Request, now: float, reply: Reply) -> None:
+        heard = self.telegrams
+        super().handle(request, now, reply)
+        if self.telegrams == heard or not isinstance(request.command, Write):
+            return
+        names = request.command.values
+        if self.doubts.forget(names, [self._places[name] for name in names if name in self._places]):
+            self._settled(now)
 
     # what others may see
 

@@ -75,8 +75,8 @@ class HasParameters(Protocol):
         """It has refused an SDO that a client had asked for."""
         ...
 
-    def on_scale(self, parameter: str, full: float, in_set: int = 1) -> None:
-        """Its own value of a scaling parameter."""
+    def on_parameter(self, name: str, setting: float, now: float) -> None:
+        """Its own setting of a parameter, in set 1, that decides what process data mean."""
         ...
 
 

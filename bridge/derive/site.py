@@ -100,7 +100,7 @@ def _node(node: ProposedNode, name: str, family: Family | None) -> Iterator[str]
         yield f"{off}[[bus.node.drive]]"
         yield f"{off}slot = {string(slot.name)}"
         yield f'{off}control = "none"'
-        scales = sorted({one.full for one in family.values_of(slot) if one.full})
+        scales = sorted({name for one in family.values_of(slot) for name in one.scaled_by})
         if scales:
             given = ", ".join(f"{scale} = " for scale in scales)
             yield f"# parameters = {{ {given} }}      # where they cannot be read from the drive"

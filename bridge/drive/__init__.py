@@ -1,13 +1,15 @@
 """Drive logic without vendor names: words, states, values, emergencies."""
 
+from bridge.drive.conditions import Key as Key
+from bridge.drive.conditions import Lack as Lack
 from bridge.drive.emergency import EmergencyReader as EmergencyReader
 from bridge.drive.emergency import Told as Told
 from bridge.drive.fault_words import Explained as Explained
 from bridge.drive.fault_words import FaultWords as FaultWords
 from bridge.drive.meaning import Codes as Codes
-from bridge.drive.meaning import Lack as Lack
 from bridge.drive.meaning import Meanings as Meanings
 from bridge.drive.meaning import codecs as codecs
+from bridge.drive.meaning import deciding as deciding
 from bridge.drive.meaning import default_codecs as default_codecs
 from bridge.drive.meaning import default_codes as default_codes
 from bridge.drive.own_supervision import OwnJudgement as OwnJudgement

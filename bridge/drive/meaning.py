@@ -4,25 +4,19 @@ scale. A meaning counts only where it has been read from the drive."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
+from bridge.drive.conditions import Conditions, Key, Lack
 from bridge.drive.parameter_set import ParameterSet
 from bridge.drive.scaling import LinearScale, is_scale, no_scale, scale_of
 from bridge.drive.values import ValueCodec, scales_of
 from bridge.image import Quality
-from bridge.mapping.model import Family, Meaning, ProcessValue, Slot
+from bridge.mapping.model import Family, Meaning, Parameter, ProcessValue, Slot
 
 Codes = Mapping[str, Sequence[int | None]]
 """By the word's leaf, such as ``actual/value_1``, the code in each parameter set; None: it cannot be read."""
 
 _FIRST: Final = 1
-
-
-class Lack(NamedTuple):
-    """Why a value is not served."""
-
-    quality: Quality
-    why: str
 
 
 class Meanings:
@@ -34,20 +28,25 @@ class Meanings:
         self._family = family
         self._slot = slot
         self.sets = range(_FIRST, family.sets + 1)
-        self.scales = scales_of(family, given)
-        """In set 1, by the value's leaf."""
-        self._scales = {number: {} if number > _FIRST else self.scales for number in self.sets}
+        self.conditions = Conditions(family)
+        self._known: dict[int, dict[str, float]] = {number: {} for number in self.sets}
+        """The parameters that scale, as far as they are known, in each set."""
         for name, full in given.items():
             parameter, in_set = family.parameter_and_set(name)
             if in_set in self.sets:
-                self._scales[in_set].update(scales_of(family, {parameter: full}))
-        self._no_scale: dict[tuple[str, int], float] = {}
+                self._known[in_set][parameter] = full
+        self._scales = {number: scales_of(family, known) for number, known in self._known.items()}
+        self.scales = self._scales[_FIRST]
+        """In set 1, by the value's leaf."""
+        self._no_scale: dict[Key, float] = {}
         """What the drive has for parameters that scale, and that is no scale."""
         self._codes: dict[str, tuple[int | None, ...]] = {}
         self._unread = Lack(Quality.WAITING, "has not been read yet")
         self._found: dict[tuple[str, int], tuple[ValueCodec, Lack | None]] = {}
+        self._overdue: frozenset[Key] = frozenset()
         self._set = ParameterSet(family.status_word.parameter_set_bits)
         self._followers = _followers(family, slot)
+        self._values = {value.leaf: ValueCodec(value, _words(family, value)) for value in family.value}
 
     @property
     def codes(self) -> Codes:
@@ -58,15 +57,40 @@ class Meanings:
         """The drive's own value of a scaling parameter; it wins over the site file. Of one that is no scale
         no value is made, with neither the site file's nor what was read before."""
         self._found.clear()
-        scales = self._scales[in_set]
+        scales, known = self._scales[in_set], self._known[in_set]
         self._no_scale.pop((parameter, in_set), None)
         if is_scale(full):
-            scales.update(scales_of(self._family, {parameter: full}))
-            return
-        self._no_scale[parameter, in_set] = full
+            known[parameter] = full
+        else:
+            known.pop(parameter, None)
+            self._no_scale[parameter, in_set] = full
         for value in self._family.value:
-            if value.full == parameter:
-                scales.pop(value.leaf, None)
+            if parameter in value.scaled_by:
+                scale = _scale(value, known)
+                if scale is None:
+                    scales.pop(value.leaf, None)
+                else:
+                    scales[value.leaf] = scale
+
+    def has_told(self, name: str, setting: float | None, in_set: int = _FIRST) -> bool:
+        """Whether the drive has said this already of a parameter that decides what values mean."""
+        key = self.conditions.key(name, in_set)
+        # As texts: what is no number is no other one each time.
+        is_same = repr(self.conditions.told(key)) == repr(self._setting(name, setting))
+        return is_same and self.conditions.has_been_asked(key)
+
+    def on_parameter(self, name: str, setting: float | None, in_set: int = _FIRST) -> None:
+        """What the drive says of such a parameter, None where it refuses to tell it."""
+        self._found.clear()
+        value = self._setting(name, setting)
+        self.conditions.tell(self.conditions.key(name, in_set), value)
+        scales = any(name in one.scaled_by for one in self._family.value)
+        if value is not None and scales and self._family.parameter_named(name).read:
+            self.on_scale(name, value, in_set)
+
+    def _setting(self, name: str, told: float | None) -> float | None:
+        """What counts where the drive says this."""
+        return self._family.parameter_named(name).absent if told is None else round(float(told), 9)
 
     def on_codes(self, codes: Codes, why_unread: str = "cannot be read") -> bool:
         """What the drive's parameters say that its words carry. True where a setpoint that was written before
@@ -76,6 +100,34 @@ class Meanings:
         self._codes = {leaf: tuple(of_sets) for leaf, of_sets in codes.items()}
         self._unread = Lack(Quality.CONFIG_ERROR, why_unread)
         return before not in ({}, self._of_commands())
+
+    def take_defaults(self) -> None:
+        """What is taken where there is no drive to ask."""
+        self.on_codes(default_codes(self._family))
+        self.conditions.take_defaults()
+
+    def on_overdue(self, overdue: frozenset[Key]) -> bool:
+        """What has not been read again in time, by its key. True where that is news."""
+        is_news = overdue != self._overdue
+        self._overdue = overdue
+        return is_news
+
+    def doubt(self, model: ProcessValue, in_set: int) -> str:
+        """Why it is not certain that this value still means what it meant; empty where it is."""
+        if not self._overdue:
+            return ""
+        late = [key[0] for key in self._deciding(model, in_set) if key in self._overdue]
+        return f"the drive has not been asked for longer than 10 s: {late[0]}" if late else ""
+
+    def _deciding(self, model: ProcessValue, in_set: int) -> list[Key]:
+        """What decides the meaning of a value in this set."""
+        conditions = self.conditions
+        runs = self._family.meanings_of(self._slot, model.group) if model.code else []
+        keys: list[Key] = [(one.leaf, in_set) for run in runs for one in run]
+        named = (*model.scaled_by, *model.when, *self._family.steady_of(model))
+        keys += [conditions.key(name, in_set) for name in named]
+        needed = self._values.get(model.needs or "")
+        return keys + (self._deciding(needed.model, in_set) if needed else [])
 
     def _of_commands(self) -> dict[str, tuple[int | None, ...]]:
         return {leaf: codes for leaf, codes in self._codes.items() if leaf.startswith("command/")}
@@ -103,31 +155,36 @@ class Meanings:
 
     def _compiled(self, codec: ValueCodec, in_set: int) -> tuple[ValueCodec, Lack | None]:
         model = codec.model
-        found = codec.scaled(self._scale(model, in_set))
+        number = in_set if self._family.depends_on_set(model) else _FIRST
+        found = codec.scaled(self._scales[number].get(model.leaf))
         if model.code:
             places = self._places(model, in_set)
             if isinstance(places, Lack):
                 return found.placed(()), places
             found = found.placed(places)
-        why = found.why_unknown
-        if why and self._depends(model) and in_set > _FIRST:
-            why = f"parameter set {in_set} is active, and {model.full} is not known of it"
-        number = in_set if self._depends(model) else _FIRST
-        if why and model.full and (model.full, number) in self._no_scale:
-            why = no_scale(model.full, self._no_scale[model.full, number])
-        return found, Lack(Quality.CONFIG_ERROR, why) if why else None
+        lack = self.conditions.lack(model, in_set, self._unread)
+        needed = None if lack or model.needs is None else self._values.get(model.needs)
+        if needed is not None:
+            lack = self.codec(needed, in_set)[1]
+        return found, lack or self._lack_of_scale(found, number)
 
-    def _depends(self, model: ProcessValue) -> bool:
-        return self._family.depends_on_set(model)
-
-    def _scale(self, model: ProcessValue, in_set: int) -> LinearScale | None:
-        number = in_set if self._depends(model) else _FIRST
-        return self._scales[number].get(model.leaf)
+    def _lack_of_scale(self, codec: ValueCodec, number: int) -> Lack | None:
+        """``number`` is the set in which its parameters are looked up."""
+        why = codec.why_unknown
+        if why and number > _FIRST:
+            why = f"parameter set {number} is active, and {codec.model.full} is not known of it"
+        for name in codec.model.scaled_by if why else ():
+            if (name, number) in self._no_scale:
+                why = no_scale(name, self._no_scale[name, number])
+        return Lack(Quality.CONFIG_ERROR, why) if why else None
 
     def _places(self, model: ProcessValue, in_set: int) -> tuple[int, ...] | Lack:
         """Where this value stands among the words of its group, without the first one for commands."""
         runs = self._family.meanings_of(self._slot, model.group)
         asked = [meaning for run in runs for meaning in run]
+        twice = self._named_twice(model, asked, in_set) if model.group == "command" else ""
+        if twice:
+            return Lack(Quality.DISABLED, twice)
         if model.word_names:
             by_word = {meaning.word: meaning for meaning in asked}
             asked = [by_word[word] for word in model.word_names]
@@ -151,6 +208,16 @@ class Meanings:
         in_this = f" in {which}" if which else ""
         otherwise = ", ".join(dict.fromkeys(one.otherwise for one in asked))
         return Lack(Quality.DISABLED, f"{otherwise}{in_this}: {found}")
+
+    def _named_twice(self, model: ProcessValue, asked: Sequence[Meaning], in_set: int) -> str:
+        """Words that parameters of their own make the same setpoint: the drive adds them, and one of them
+        alone says nothing."""
+        for code in model.code:
+            named = {one.parameter: one for one in asked if self._code(one, in_set) == code}
+            if len(named) > 1:
+                shown = ", ".join(self._shown(one, in_set) for one in named.values())
+                return f"in more than one word: {shown}"
+        return ""
 
     def _shown(self, meaning: Meaning, in_set: int) -> str:
         code = self._code(meaning, in_set)
@@ -194,6 +261,45 @@ def _followers(family: Family, slot: Slot) -> list[tuple[ValueCodec, ValueCodec]
     ]
 
 
+def _words(family: Family, value: ProcessValue) -> Sequence[str]:
+    """Those that places of this value count."""
+    return family.process.rpdo[1:] if value.group == "command" else family.process.tpdo
+
+
+def _scale(value: ProcessValue, known: Mapping[str, float]) -> LinearScale | None:
+    """Its scale, with these values of the parameters."""
+    over = None if value.scale is None else value.scale.over
+    return scale_of(value, known.get(value.full or ""), known.get(over) if over else 1.0)
+
+
+def _absent(family: Family) -> dict[str, float]:
+    """The settings that count where a drive has no such parameter."""
+    return {one.name: one.absent for one in family.parameter if one.absent is not None}
+
+
+def deciding(family: Family, slot: Slot, codes: Codes) -> list[Parameter]:
+    """The parameters that decide what the values mean that are in the words of a drive with these codes, in
+    one of its parameter sets."""
+    groups = {
+        group: [run for run in family.meanings_of(slot, group) if run] for group in ("command", "actual")
+    }
+
+    def is_there(value: ProcessValue) -> bool:
+        return not value.code or any(
+            set(value.code) <= {codes.get(one.leaf, (None,) * family.sets)[in_set] for one in run}
+            for run in groups[value.group]
+            for in_set in range(family.sets)
+        )
+
+    named = {
+        name
+        for value in family.values_of(slot)
+        if is_there(value)
+        for name in (*value.scaled_by, *value.when, *family.steady_of(value))
+    }
+    return [one for one in family.parameter if one.name in named]
+
+
 def default_codes(family: Family) -> Codes:
     """What is taken where there is no drive to ask."""
     return {meaning.leaf: (meaning.default,) * family.sets for meaning in family.meaning}
@@ -205,7 +311,7 @@ def codecs(
     """The commands or the actual values of a drive, scaled by the parameters that are ``given``. Those whose
     place only the drive knows have none."""
     return [
-        ValueCodec(value, words, scale_of(value, given.get(value.full or "")))
+        ValueCodec(value, words, _scale(value, given))
         for value in family.values_of(slot)
         if value.group == group
     ]
@@ -216,8 +322,9 @@ def default_codecs(
 ) -> list[ValueCodec]:
     """Those that have a place without a drive to ask: by the defaults of the mapping file. ``words`` begin
     with the control or the status word."""
+    given = {**_absent(family), **given}
     meanings = Meanings(family, slot, given)
-    meanings.on_codes(default_codes(family))
+    meanings.take_defaults()
     first = 1 if group == "command" else 0
     found: list[ValueCodec] = []
     for codec in codecs(family, slot, group, words, given):

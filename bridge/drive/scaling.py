@@ -70,20 +70,24 @@ def is_scale(full: float) -> bool:
     return 0 < full < math.inf
 
 
+def _is_known(value: float | None) -> bool:
+    return value is not None and is_scale(value)
+
+
 def no_scale(parameter: str, value: float) -> str:
     """Why nothing is made of words that ``parameter`` scales, where that has a value that is no scale."""
     return f"{parameter} is {value:g} in the drive, which is no scale"
 
 
-def scale_of(value: ProcessValue, full: float | None = None) -> LinearScale | None:
-    """The scale of a value, ``full`` being what its parameter holds; None where it has none, or where
-    that is not known."""
+def scale_of(value: ProcessValue, full: float | None = None, over: float | None = 1.0) -> LinearScale | None:
+    """The scale of a value, ``full`` and ``over`` being what its parameters hold; None where it has none, or
+    where that is not known."""
     scale = value.scale
-    if scale is None or (scale.full is not None and (full is None or not is_scale(full))):
+    if scale is None or (scale.full is not None and not (_is_known(full) and _is_known(over))):
         return None
     least = -math.inf if value.low is None else value.low
     most = math.inf if value.high is None else value.high
-    if scale.full is None or full is None:
+    if scale.full is None or full is None or over is None:
         over, under = _ratio(scale.factor)
         return LinearScale(over, under, math.inf, scale.offset, value.raw_type, least, most)
-    return LinearScale(full, scale.at or 1, scale.limit, 0.0, value.raw_type, least, most)
+    return LinearScale(full, (scale.at or 1) * over, scale.limit, 0.0, value.raw_type, least, most)

@@ -63,7 +63,9 @@ class ValueCodec:
 
     @property
     def why_unknown(self) -> str:
-        return f"{self.model.full} cannot be read and is not in the site file" if self.is_unknown else ""
+        if not self.is_unknown:
+            return ""
+        return f"{' and '.join(self.model.scaled_by)} cannot be read and is not in the site file"
 
     @property
     def is_plain(self) -> bool:
@@ -128,5 +130,12 @@ class ValueCodec:
 
 def scales_of(family: Family, given: Mapping[str, float]) -> dict[str, LinearScale]:
     """The scales that are known with the parameters that are ``given``, by the value's leaf."""
-    found = {value.leaf: scale_of(value, given.get(value.full or "")) for value in family.value}
+    found = {
+        value.leaf: scale_of(
+            value,
+            given.get(value.full or ""),
+            given.get(value.scale.over) if value.scale and value.scale.over else 1.0,
+        )
+        for value in family.value
+    }
     return {leaf: scale for leaf, scale in found.items() if scale is not None}

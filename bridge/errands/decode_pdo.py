@@ -125,6 +125,6 @@ def _view(
         frozenset(
             one.name
             for one in family.value
-            if one.group == group and (one.code or family.depends_on_set(one))
+            if one.group == group and (one.is_conditional or family.depends_on_set(one))
         ),
     )

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from bridge.mapping.checks_process import check_parameter
 from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family, ProcessValue
 from bridge.tomlfile import Key
+
+_TEXTS: Final = ("string", "bytes")
+_OTHERWISE: Final = ProcessValue.model_fields["otherwise"].default
+_OF_MODE: Final = (10, 12, 13)
+"""Bits of a status word that the mode of operation gives their meaning (CiA 402, 6041h)."""
 
 
 def check_values(family: Family, file: MergedFile) -> None:
@@ -21,6 +28,7 @@ def check_values(family: Family, file: MergedFile) -> None:
         _check_kind(value, key, file)
         _check_scale(family, value, key, file)
         _check_follows(family, value, key, file)
+        _check_conditions(family, value, key, file)
         first = seen.setdefault(value.leaf, (*key, "name"))
         if first != (*key, "name"):
             message = f"point {value.leaf!r} is there twice"
@@ -156,6 +164,57 @@ def _check_scale(family: Family, value: ProcessValue, key: Key, file: MergedFile
     for name in ("factor", "offset"):
         if name in scale.model_fields_set:
             file.fault((*at, name), "has no meaning with full", "value = word × full / at")
-    is_known = check_parameter(scale.full, family, (*at, "full"), file)
-    if is_known and family.parameter_named(scale.full).data_type in ("string", "bytes"):
-        file.fault((*at, "full"), f"{scale.full} is a text")
+    _check_number(scale.full, family, (*at, "full"), file)
+    if scale.over is not None:
+        _check_number(scale.over, family, (*at, "over"), file)
+
+
+def _check_number(name: str, family: Family, key: Key, file: MergedFile) -> None:
+    """``name`` is a parameter that is listed and holds a number."""
+    if check_parameter(name, family, key, file) and family.parameter_named(name).data_type in _TEXTS:
+        file.fault(key, f"{name} is a text")
+
+
+def _check_conditions(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
+    """What decides whether there is such a value can be read, and one of two that share a bit says when it is
+    meant."""
+    for name in value.when:
+        _check_number(name, family, (*key, "when", name), file)
+    for place, name in enumerate(value.steady):
+        _check_number(name, family, (*key, "steady", place), file)
+    for name in [one.name for one in family.parameter if one.name in value.when and not one.read]:
+        file.fault((*key, "when", name), f"{name} cannot be read", "name one that the drive tells")
+    leaves = {one.leaf: one for one in family.value}
+    seen = {value.leaf}
+    needed = value.needs
+    while needed is not None:
+        if needed not in leaves or needed in seen:
+            known_leaves = ", ".join(sorted(set(leaves) - {value.leaf}))
+            why = "needs itself" if needed in seen else f"there is no value {needed!r}"
+            file.fault((*key, "needs"), why, f"known: {known_leaves}")
+            return
+        seen.add(needed)
+        needed = leaves[needed].needs
+    if value.otherwise != _OTHERWISE and not value.when:
+        file.fault((*key, "otherwise"), "has no meaning without when")
+    _check_shared_bit(family, value, key, file)
+
+
+def _check_shared_bit(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
+    """A bit that two values are made of means the one or the other: each says when. So does a bit of a status
+    word that the drive's mode of operation gives its meaning, as soon as one of its values says so."""
+    if value.bit is None or value.is_conditional:
+        return
+    for other in family.value:
+        same = (other.group, other.word) == (value.group, value.word)
+        if other is not value and same and other.bit == value.bit:
+            hint = "say when it is meant: code, when or needs"
+            file.fault((*key, "bit"), f"is {other.name}, too, and nothing says when", hint)
+            return
+    is_of_mode = any(
+        (one.group, one.word) == (value.group, value.word) and one.bit is not None and one.code
+        for one in family.value
+    )
+    if is_of_mode and value.bit in _OF_MODE:
+        told = ", ".join(sorted({one.parameter for one in family.meaning if one.word == value.word}))
+        file.fault((*key, "bit"), f"has its meaning from {told} as others of this word", "give it a code")

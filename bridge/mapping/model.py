@@ -231,8 +231,13 @@ class Family(Table):
         raise KeyError(name)
 
     def depends_on_set(self, value: ProcessValue) -> bool:
-        """Whether the parameter that scales it differs between the drive's parameter sets."""
-        return value.full is not None and self.parameter_named(value.full).sets > 0
+        """Whether a parameter that scales it differs between the drive's parameter sets."""
+        return any(self.parameter_named(name).sets for name in value.scaled_by)
+
+    def steady_of(self, value: ProcessValue) -> list[str]:
+        """The parameters whose change makes it unknown: also one that scales it and is told in another form
+        than the site file gives it."""
+        return [*value.steady, *(name for name in value.scaled_by if not self.parameter_named(name).read)]
 
     def object_of(self, parameter: Parameter) -> ObjectRef:
         """Where a parameter is in the object dictionary."""
@@ -289,6 +294,15 @@ class Family(Table):
         pdos = slot.rpdo if group == "command" else slot.tpdo
         words = self.rpdo_words if group == "command" else self.tpdo_words
         return [[by_word[word] for word in words(pdo) if word in by_word] for pdo in pdos]
+
+    def told_by(self, slot: Slot, meaning: Meaning) -> str | None:
+        """The word of a TPDO that carries the code itself, as where 6061h is mapped; None where none does."""
+        ref = self.object_of_meaning(meaning, 1)
+        for pdo in slot.tpdo if self.sets == 1 else ():
+            for word, refs in zip(self.tpdo_words(pdo), pdo.objects, strict=True):
+                if all(one.parts == (ref,) for one in refs):
+                    return word
+        return None
 
     def needed_bits(self, group: str) -> int:
         """Bits of the control word, or for the group ``actual`` of the status word, without which a drive

@@ -100,6 +100,9 @@ class Parameter(Table):
     states: States = Field(default_factory=dict[int, str])
     point: bool = Field(False, description="true: shown as a point of the drive")
     every_ms: int = Field(0, ge=0, le=3_600_000, description="how often a point is read; 0: on demand")
+    absent: float | None = Field(
+        None, description="the value that counts where the drive refuses to tell it, as one without it"
+    )
     read: bool = Field(True, description="false where it can only be given in the site file")
     volatile: bool = Field(False, description="true where a write does not go to the EEPROM")
     command: bool = Field(

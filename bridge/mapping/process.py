@@ -136,11 +136,12 @@ class SdoServer(Table):
 
 
 class Scale(Table):
-    """value = word × full / at, with ``full`` a parameter of the drive such as P105; or
-    value = word × factor + offset."""
+    """value = word × full / at, with ``full`` a parameter of the drive such as P105, divided by another one,
+    ``over``, where there is one; or value = word × factor + offset."""
 
     full: str | None = None
     at: int | None = Field(None, gt=0)
+    over: str | None = Field(None, description="a further parameter, by which the value is divided")
     limit: float = Field(2.0, gt=0, description="largest magnitude as a multiple of full")
     factor: float = Field(1.0, allow_inf_nan=False)
     offset: float = Field(0.0, allow_inf_nan=False)
@@ -199,6 +200,20 @@ class ProcessValue(Table):
         description="an actual value whose words this command has until the drive is enabled, so that "
         "enabling moves nothing",
     )
+    when: dict[str, Annotated[list[float], Field(min_length=1)]] = Field(
+        default_factory=dict[str, list[float]],
+        description="by parameter, the values of it with which this value means what it says",
+    )
+    needs: str | None = Field(
+        None, description="another value, such as command/position, without which this one means nothing"
+    )
+    steady: list[str] = Field(
+        default_factory=list[str],
+        description="parameters that give it another meaning when they are changed, nobody can tell which",
+    )
+    otherwise: str = Field(
+        "means something else", description="what is said where a parameter in `when` has another value"
+    )
     description: str = ""
 
     @property
@@ -242,3 +257,14 @@ class ProcessValue(Table):
     def full(self) -> str | None:
         """The parameter that scales it, or None."""
         return None if self.scale is None else self.scale.full
+
+    @property
+    def scaled_by(self) -> tuple[str, ...]:
+        """The parameters that scale it."""
+        named = () if self.scale is None else (self.scale.full, self.scale.over)
+        return tuple(name for name in named if name is not None)
+
+    @property
+    def is_conditional(self) -> bool:
+        """The drive's parameters say whether there is such a value."""
+        return bool(self.code or self.when or self.needs)

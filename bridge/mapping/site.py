@@ -164,7 +164,7 @@ def _check_drive(drive: RawTable, family: Family, file: TomlFile) -> None:
         file.fault((*drive.key, "slot"), message, f"it has {', '.join(slots)}")
     if slot in slots:
         _check_pdos(drive, family, slot, file)
-    scales = {value.full for value in family.value if value.full is not None}
+    scales = {name for value in family.value for name in value.scaled_by}
     given = drive.table("parameters")
     for name in given.content:
         parameter, in_set = family.parameter_and_set(name)

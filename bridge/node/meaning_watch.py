@@ -4,66 +4,104 @@ the drive's keypad, or with the maker's tool."""
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.canopen.sdo import Priority, Result, SdoChannel, SdoError
 from bridge.command import Drive
-from bridge.command.event import Event, Kind
-from bridge.command.plant import Node, Plant
-from bridge.drive import MOVING, DriveState, ParameterSet, is_scale, no_scale
+from bridge.command.plant import Node
+from bridge.drive import DriveState, Key, ParameterSet
 from bridge.mapping.model import Meaning, ObjectRef, Parameter
-from bridge.node.boot import code_of, meanings_of, parameter_value, scales_of
+from bridge.node.boot import code_of, deciding_of, meanings_of, parameter_value
 from bridge.node.sdo_channels import SdoChannels, channel_of
 
 _EVERY_S: Final = 8.0
-"""From one pass to the next: with the pass itself a change is found within 10 s."""
+"""How old an answer is when it is asked for again: with the time that this takes a change is found within
+``_BOUND_S``."""
+_BOUND_S: Final = 10.0
+"""Older answers are not taken for certain."""
 _LOOK_S: Final = 0.5
-"""How often it is looked whether a drive has been enabled."""
+"""How often it is looked what is due."""
+_PAUSE_S: Final = 1.0
+"""From a question that nobody has answered to the next one about the same."""
+_SHARE: Final = 0.25
+"""How much the newest answer counts in the time that answers take."""
+_TURNS: Final = 3
+"""Transfers to one about a set that is not in use: the others are for what is polled."""
+_SLOWEST: Final = 0.75
+"""How much of ``_EVERY_S`` may be kept for asking about the sets in use, where answers are slow."""
 
-_Asked = tuple[Meaning | Parameter, int, ObjectRef]
+
+@dataclass(slots=True, eq=False)
+class _Item:
+    """One object that decides what words mean. Times are when it was answered, and asked in vain."""
+
+    what: Meaning | Parameter
+    in_set: int
+    ref: ObjectRef
+    key: Key
+    read_at: float
+    tried_at: float = -math.inf
+
+    @property
+    def is_of_all_sets(self) -> bool:
+        return isinstance(self.what, Parameter) and not self.what.sets
 
 
 @dataclass(slots=True)
 class _Watched:
+    """One drive. ``items`` are those that count with the codes its words have."""
+
     drive: Drive
     sdo: SdoChannel
-    asked: list[_Asked]
-    set: ParameterSet
-    due: float = math.inf
+    items: dict[Key, _Item] = field(default_factory=dict[Key, _Item])
+    codes: object = None
+    """The codes for which ``items`` were chosen."""
     was_enabled: bool = False
-    means_otherwise: bool = False
-    """The setpoints that are held were written for another meaning of their words."""
+    not_before: float = -math.inf
+    """Answers from before are asked for again."""
+    answer_s: float = 0.0
+    """How long an answer takes."""
+    rest_at: float = -math.inf
+    """When a set that is not in use may be asked about."""
+    is_asking: bool = False
     run: int = 0
-    """Counts passes: what an earlier one is told late does not count."""
-    codes: dict[str, list[int | None]] = field(default_factory=dict[str, list[int | None]])
-    scales: dict[tuple[str, int], float] = field(default_factory=dict[tuple[str, int], float])
+    """Counts the times in operation: what is told late does not count."""
 
 
 class MeaningWatch:
-    """The drives of one node. Nothing is asked where the family names no such parameters. A drive is asked
-    every few seconds and whenever it has been enabled, first for the parameter set that is active."""
+    """The drives of one node. Nothing is asked where the family names no such parameters.
 
-    def __init__(self, node: Node, sdo: SdoChannels, plant: Plant) -> None:
-        self._plant = plant
+    Each answer is asked for again when it is some seconds old, the oldest first, and before all others those
+    that count in the parameter sets in use; all of them when the drive has been enabled, and when it says by
+    a TPDO that something has changed. ``now`` is the time of the last frame or timer.
+    """
+
+    def __init__(self, node: Node, sdo: SdoChannels) -> None:
         self._drives: list[_Watched] = []
         self._look_at: float | None = None
-        self._now = 0.0
+        self.now = 0.0
         for drive in node.drives:
             number = channel_of(node, drive.slot)
-            asked: list[_Asked] = [*meanings_of(drive), *scales_of(drive)]
+            asked = meanings_of(drive) or any(
+                value.scaled_by or value.when or value.steady for value in drive.family.values_of(drive.slot)
+            )
             if number is not None and asked:
-                bits = ParameterSet(drive.family.status_word.parameter_set_bits)
-                self._drives.append(_Watched(drive, sdo[number], asked, bits))
+                self._drives.append(_Watched(drive, sdo[number]))
 
     def start(self, now: float) -> None:
         """The node is in operation, and its drives have just been asked."""
+        self.now = now
         if not self._drives:
             return
         self._look_at = now + _LOOK_S
         for watched in self._drives:
-            watched.due = now + _EVERY_S
-            watched.was_enabled = False
+            watched.run += 1
+            watched.was_enabled = watched.is_asking = False
+            watched.items.clear()
+            watched.not_before = -math.inf
+            self._choose(watched, now)
 
     def stop(self) -> None:
         self._look_at = None
@@ -74,85 +112,105 @@ class MeaningWatch:
         return self._look_at
 
     def on_time(self, now: float) -> None:
-        self._now = now
+        self.now = now
         if self._look_at is None or now < self._look_at:
             return
         self._look_at = now + _LOOK_S
         for watched in self._drives:
+            news = watched.drive.news
             is_enabled = watched.drive.channel.state is DriveState.OPERATION_ENABLED
-            if is_enabled and not watched.was_enabled:
-                watched.due = now
+            if news.is_to_be_asked or (is_enabled and not watched.was_enabled):
+                watched.not_before = now
+            news.is_to_be_asked = False
             watched.was_enabled = is_enabled
-            self._drop_setpoints(watched, now)
-            if watched.due <= now:
-                watched.due = now + _EVERY_S
-                self._ask(watched, now)
+            news.drop_old_setpoints(now)
+            self._choose(watched, -math.inf)
+            self._judge(watched)
+            self._ask(watched)
 
-    def _drop_setpoints(self, watched: _Watched, now: float) -> None:
-        """Of a drive that is not enabled: it has to be commanded anew. One that runs does already what its
-        words mean now."""
-        channel = watched.drive.channel
-        is_moving = channel.state in MOVING or channel.words.enables(channel.output.words[0])
-        if watched.means_otherwise and not is_moving:
-            watched.means_otherwise = False
-            channel.start_anew(now)
-
-    def _ask(self, watched: _Watched, now: float) -> None:
-        """One pass. Each answer leads to the next question, so that others get their turn in between."""
-        watched.run += 1
-        known = watched.drive.channel.meanings
-        watched.codes = {leaf: list(codes) for leaf, codes in known.codes.items()}
-        active = watched.set.of(watched.drive.channel.drive_status_word)
-        # The last one is asked first.
-        rest = sorted(watched.asked, key=lambda one: one[1] == active)
-        self._next(watched, rest, watched.run, now)
-
-    def _next(self, watched: _Watched, rest: list[_Asked], run: int, now: float) -> None:
-        if not rest:
+    def _choose(self, watched: _Watched, read_at: float) -> None:
+        """What is asked depends on the codes. What is new among it has been read at ``read_at``."""
+        drive = watched.drive
+        codes = drive.channel.meanings.codes
+        if codes is watched.codes and watched.items:
             return
-        what, in_set, ref = rest.pop()
+        watched.codes = codes
+        conditions, before = drive.channel.meanings.conditions, watched.items
+        told = drive.told_by_tpdo
+        items = [
+            _Item(one, in_set, ref, (one.leaf, in_set), read_at)
+            for one, in_set, ref in meanings_of(drive)
+            if one.leaf not in told
+        ]
+        for one, in_set, ref in deciding_of(drive, codes):
+            key = conditions.key(one.name, in_set)
+            items.append(_Item(one, in_set, ref, key, read_at))
+        watched.items = {one.key: before.get(one.key, one) for one in items}
+
+    def _judge(self, watched: _Watched) -> None:
+        """What has not been answered for too long is in doubt."""
+        late = (key for key, one in watched.items.items() if self.now - one.read_at > _BOUND_S)
+        watched.drive.news.on_overdue(frozenset(late), self.now)
+
+    def _ask(self, watched: _Watched) -> None:
+        """The next question. Its answer leads to the one after it, so that others get their turn between."""
+        if watched.is_asking or self._look_at is None:
+            return
+        sets = _sets_in_use(watched.drive)
+        in_use: list[_Item] = []
+        rest: list[_Item] = []
+        for one in watched.items.values():
+            (in_use if one.is_of_all_sets or one.in_set in sets else rest).append(one)
+        lead_s = min(_SLOWEST * _EVERY_S, len(in_use) * watched.answer_s)
+        due = [one for one in in_use if self._is_due(watched, one, _EVERY_S - lead_s)]
+        if not due:
+            due = [one for one in rest if self._is_due(watched, one, _EVERY_S)]
+            if due and self.now < watched.rest_at:
+                self._look_at = min(self._look_at, watched.rest_at)
+                return
+            watched.rest_at = self.now + _TURNS * watched.answer_s
+        if due:
+            self._read(watched, min(due, key=lambda one: max(one.read_at, one.tried_at)))
+
+    def _is_due(self, watched: _Watched, item: _Item, every_s: float) -> bool:
+        is_old = item.read_at < watched.not_before or self.now >= item.read_at + every_s
+        return is_old and self.now >= item.tried_at + _PAUSE_S
+
+    def _read(self, watched: _Watched, item: _Item) -> None:
+        run, asked_at = watched.run, self.now
 
         def done(result: Result) -> None:
             if run != watched.run or self._look_at is None:
                 return
-            if isinstance(what, Parameter):
-                self._told_scale(watched, what, in_set, result)
-            elif not (isinstance(result, SdoError) and not result.by_server):
-                data = None if isinstance(result, SdoError) else result
-                self._told(watched, what, in_set, code_of(watched.drive.family, what, data))
-            self._next(watched, rest, run, self._now)
+            watched.is_asking = False
+            watched.answer_s += _SHARE * (self.now - asked_at - watched.answer_s)
+            if isinstance(result, SdoError) and not result.by_server:
+                item.tried_at = self.now
+            else:
+                item.read_at = self.now
+                self._told(watched.drive, item, None if isinstance(result, SdoError) else result)
+            self._choose(watched, -math.inf)
+            self._judge(watched)
+            self._ask(watched)
 
-        watched.sdo.read(ref.index, ref.sub, now, done, priority=Priority.POLL)
+        watched.is_asking = True
+        watched.sdo.read(item.ref.index, item.ref.sub, self.now, done, priority=Priority.MEANING)
 
-    def _told_scale(self, watched: _Watched, parameter: Parameter, in_set: int, result: Result) -> None:
-        if isinstance(result, SdoError):
+    def _told(self, drive: Drive, item: _Item, data: bytes | None) -> None:
+        """``data`` is None where the drive has refused it."""
+        if isinstance(item.what, Meaning):
+            code = code_of(drive.family, item.what, data)
+            drive.news.on_code(item.what, code, self.now, item.in_set)
             return
         try:
-            value = parameter_value(parameter, result)
+            setting = None if data is None else parameter_value(item.what, data)
         except ValueError:
-            value = 0.0
-        key = parameter.name, in_set
-        if watched.scales.get(key) == value:
-            return
-        watched.scales[key] = value
-        watched.drive.on_scale(parameter.name, value, in_set)
-        watched.drive.refresh(self._now)
-        if not is_scale(value):
-            message = no_scale(parameter.name, value)
-            self._plant.report(Event(self._now, Kind.CONFIGURATION, watched.drive.name, 500, message))
+            setting = 0.0
+        drive.news.on_parameter(item.what.name, setting, self.now, item.in_set)
 
-    def _told(self, watched: _Watched, meaning: Meaning, in_set: int, code: int | None) -> None:
-        codes = watched.codes.setdefault(meaning.leaf, [None] * watched.drive.family.sets)
-        before = codes[in_set - 1]
-        if code == before:
-            return
-        codes[in_set - 1] = code
-        drive = watched.drive
-        watched.means_otherwise |= drive.on_codes(watched.codes)
-        self._drop_setpoints(watched, self._now)
-        drive.refresh(self._now)
-        told = "cannot be read" if code is None else f"is {code}"
-        was = "could not be read" if before is None else f"was {before}"
-        what = f"{meaning.parameter} of parameter set {in_set} {told}, it {was}"
-        message = f"{what}: {meaning.leaf} has another meaning"
-        self._plant.report(Event(self._now, Kind.CONFIGURATION, drive.name, 500, message))
+
+def _sets_in_use(drive: Drive) -> Sequence[int]:
+    """That of the drive's status word, and that which is commanded."""
+    family, channel = drive.family, drive.channel
+    actual = ParameterSet(family.status_word.parameter_set_bits).of(channel.drive_status_word)
+    return actual, ParameterSet(family.control_word.parameter_set_bits).of(channel.control_word)

@@ -55,7 +55,7 @@ class NodeWire:
         self.sdo = SdoChannels(node)
         self.rejected = 0
         self.faults = FaultReading(node, self.sdo)
-        self.meanings = MeaningWatch(node, self.sdo, plant)
+        self.meanings = MeaningWatch(node, self.sdo)
         self._emergencies = Emergencies(node, plant, self.reject, self.faults.on_emcy)
         self.error_control = ErrorControl(node.table, listener.on_duplicate)
         self.polling = Polling(node.family.poll, self.sdo.for_polls, self._show_poll)
@@ -129,6 +129,7 @@ class NodeWire:
 
     def _on_sdo(self, channel: SdoChannel, frame: Frame) -> None:
         unmatched, late = channel.unmatched, channel.late
+        self.meanings.now = frame.time
         channel.on_frame(frame)
         if channel.late == late:
             self.error_control.on_reply(frame, matched=channel.unmatched == unmatched)

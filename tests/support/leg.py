@@ -13,7 +13,7 @@ from bridge.command.leg.state import WANTS_STOP_WORD, Way
 from bridge.command.leg.step import initial, step
 from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
-from bridge.drive import DriveState, Meanings, default_codes
+from bridge.drive import DriveState, Meanings
 from bridge.image import Value
 from bridge.mapping import load_family
 
@@ -28,7 +28,7 @@ def settings_of(mapping: str, **given: object) -> LegSettings:
     keys = {"slot": family.slot[0].name, "control": "modbus", "fieldbus_timeout_ms": 0, **given}
     table = DriveTable.model_validate(keys)
     meanings = Meanings(family, family.slot[0], {})
-    meanings.on_codes(default_codes(family))
+    meanings.take_defaults()
     decode = TelegramDecoder("n/d", family, family.slot[0], meanings, {}).decode
     return leg_settings(family, table, decode)
 

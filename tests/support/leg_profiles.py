@@ -13,7 +13,7 @@ from bridge.command.leg.step import initial, step
 from bridge.command.leg.table import Stimulus
 from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
-from bridge.drive import DriveState, Meanings, default_codes
+from bridge.drive import DriveState, Meanings
 from bridge.mapping import load_family
 from tests.support.leg_recorded import Cells
 from tests.support.leg_seen import Rules
@@ -174,7 +174,7 @@ def space(
     settings = {"slot": name, "control": "modbus", "fieldbus_timeout_ms": 2000, **given}
     table = DriveTable.model_validate(settings)
     meanings = Meanings(family, family.slot[0], {})
-    meanings.on_codes(default_codes(family))
+    meanings.take_defaults()
     decode = TelegramDecoder(f"n/{name}", family, family.slot[0], meanings, {}).decode
     drive = leg_settings(family, table, decode)
     leg = initial(drive)

@@ -8,7 +8,7 @@ from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Request
 from bridge.command.drive_channel import DriveChannel
 from bridge.command.link import NodeState
 from bridge.config import DriveTable
-from bridge.drive import EmergencyReader, LinearScale, Told, default_codes
+from bridge.drive import EmergencyReader, LinearScale, Told
 from bridge.image import Value
 from bridge.mapping import Family, load_family
 from tests.support.leg_words import HALF_SPEED, NORD_TU4, LegWords
@@ -69,7 +69,7 @@ class Rig:
         meanings = self.channel.meanings
         meanings.scales.setdefault("command/frequency", LinearScale(50.0, 16384, 2.0))
         meanings.scales.setdefault("command/velocity", LinearScale(3000.0, 1000, 2.0))
-        meanings.on_codes(default_codes(family))
+        meanings.take_defaults()
         self.channel.link.pdo_deadline_s = pdo_deadline_s
         self.now = 1000.0
 

@@ -12,7 +12,6 @@ from pathlib import Path
 
 from bridge.command import Plant
 from bridge.config import Site
-from bridge.drive import default_codes
 from bridge.mapping import load_family
 
 FAMILY = "nord/sk-tu4-cao"
@@ -104,7 +103,8 @@ def plant_of(text: str, mapping: str = FAMILY) -> Plant:
 def has_default_meanings(plant: Plant) -> None:
     """As if the drives had been asked, and are as their mapping takes them to be."""
     for drive in plant.drives.values():
-        drive.on_codes(default_codes(drive.family))
+        drive.channel.meanings.take_defaults()
+        drive.compile()
         drive.refresh(0.0)
 
 

@@ -102,7 +102,10 @@ def _made_of(family: Family, value: ProcessValue) -> str:
     if scale is None:
         return words
     if scale.full is not None:
-        return f"{words} × {scale.full} / {scale.at}"
+        under = " / ".join(
+            [*([f"{scale.at}"] if scale.at != 1 else []), *([scale.over] if scale.over else [])]
+        )
+        return f"{words} × {scale.full}{f' / {under}' if under else ''}"
     factor = "" if scale.factor == 1 else f" × {scale.factor:g}"
     offset = "" if not scale.offset else f" {'+' if scale.offset > 0 else '−'} {abs(scale.offset):g}"
     return f"{words}{factor}{offset}"
@@ -114,6 +117,15 @@ def _meaning(family: Family, value: ProcessValue) -> str:
     if value.word_names and value.code:
         pairs = zip(value.word_names, value.code, strict=True)
         parts.append("while " + " and ".join(f"{told[word]} is {code}" for word, code in pairs))
+    alike: dict[str, list[str]] = {}
+    for name, settings in value.when.items():
+        alike.setdefault(" or ".join(f"{one:g}" for one in settings), []).append(name)
+    for told, names in alike.items():
+        parts.append(f"while {', '.join(names)} {'is' if len(names) == 1 else 'are'} {told}")
+    if value.needs:
+        parts.append(f"while there is `{value.needs}`")
+    if family.steady_of(value):
+        parts.append(f"until {' or '.join(family.steady_of(value))} is changed")
     if value.states:
         parts.append(states_text(value.states))
     if value.bits:

@@ -26,7 +26,7 @@ from bridge.node.boot.memory import BootMemory as BootMemory
 from bridge.node.boot.pdo_settings import MOST_ENTRIES as MOST_ENTRIES
 from bridge.node.boot.procedure import boot as boot
 from bridge.node.boot.scales import code_of as code_of
+from bridge.node.boot.scales import deciding_of as deciding_of
 from bridge.node.boot.scales import meanings_of as meanings_of
 from bridge.node.boot.scales import parameter_value as parameter_value
-from bridge.node.boot.scales import scales_of as scales_of
 from bridge.node.boot.status import BootError as BootError

@@ -12,7 +12,7 @@ from bridge.canopen.dialogue import Read, Write
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.canopen.sdo import SdoError
 from bridge.command import Identification
-from bridge.drive import OwnJudgement
+from bridge.drive import Key, OwnJudgement
 from bridge.mapping.fields import ObjectRef
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.pdo_plan import PdoPlan
@@ -123,10 +123,10 @@ class SignalPlan:
 
 @dataclass(slots=True)
 class WordFacts:
-    """What a drive has told of its words: ``scales`` by parameter and set, ``codes`` by the word's leaf for
-    each set, None for what it does not tell, and ``why_unread``."""
+    """What a drive has told of its words: ``parameters`` that decide what they mean, by name and set,
+    ``codes`` by the word's leaf for each set, None for what it does not tell, and ``why_unread``."""
 
-    scales: dict[tuple[str, int], float] = field(default_factory=dict[tuple[str, int], float])
+    parameters: dict[Key, float | None] = field(default_factory=dict[Key, float | None])
     codes: dict[str, list[int | None]] = field(default_factory=dict[str, list[int | None]])
     why_unread: str = "cannot be read"
 

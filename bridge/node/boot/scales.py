@@ -10,7 +10,7 @@ from bridge.canopen.dialogue import optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
 from bridge.command.plant import Node
-from bridge.drive import is_scale, no_scale
+from bridge.drive import Codes, deciding, is_scale, no_scale
 from bridge.mapping.model import Family, Meaning, ObjectRef, Parameter
 from bridge.node.boot.actions import Action, BootResult, WordFacts
 from bridge.node.sdo_channels import FIRST, channel_of
@@ -25,14 +25,13 @@ def meanings_of(drive: Drive) -> list[tuple[Meaning, int, ObjectRef]]:
     return [(one, in_set, family.object_of_meaning(one, in_set)) for in_set in sets for one in asked]
 
 
-def scales_of(drive: Drive) -> list[tuple[Parameter, int, ObjectRef]]:
-    """The scaling parameters that a drive is asked for: in which parameter set, and where."""
+def deciding_of(drive: Drive, codes: Codes) -> list[tuple[Parameter, int, ObjectRef]]:
+    """The parameters that a drive whose words have these codes is asked for, because they scale a value or
+    say whether there is one: in which parameter set, and where."""
     family = drive.family
-    scaling = {value.full for value in family.values_of(drive.slot)}
     return [
         (one, in_set, family.object_in_set(family.object_of(one), in_set))
-        for one in family.parameter
-        if one.read and one.name in scaling
+        for one in deciding(family, drive.slot, codes)
         for in_set in range(1, family.sets + 1 if one.sets else 2)
     ]
 
@@ -62,7 +61,7 @@ def read_words(node: Node, drive: Drive, result: BootResult) -> Generator[Action
         for one, in_set, ref in asked:
             data = yield from optional(ref.index, ref.sub, channel)
             found.codes[one.leaf][in_set - 1] = code_of(drive.family, one, data)
-        yield from _read_scales(node, drive, channel, found, result)
+        yield from _read_parameters(node, drive, channel, found, result)
     except SdoError:
         if channel == FIRST:
             raise
@@ -72,23 +71,23 @@ def read_words(node: Node, drive: Drive, result: BootResult) -> Generator[Action
     return found
 
 
-def _read_scales(
+def _read_parameters(
     node: Node, drive: Drive, channel: int, found: WordFacts, result: BootResult
 ) -> Generator[Action, bytes | None]:
-    for parameter, in_set, ref in scales_of(drive):
+    scaling = {name for value in drive.family.value for name in value.scaled_by}
+    for parameter, in_set, ref in deciding_of(drive, found.codes):
         data = yield from optional(ref.index, ref.sub, channel)
-        if data is None:
-            continue
         try:
-            value = parameter_value(parameter, data)
+            value = None if data is None else parameter_value(parameter, data)
         except ValueError as error:
             result.notes.append(f"{drive.slot.name}: {error}")
             value = math.nan
-        found.scales[parameter.name, in_set] = value
+        found.parameters[parameter.name, in_set] = value
+        if value is None or parameter.name not in scaling or not parameter.read:
+            continue
         if not is_scale(value):
             result.notes.append(f"{drive.slot.name}: {no_scale(parameter.name, value)}")
-            continue
-        if in_set == 1:
+        elif in_set == 1:
             _compare(drive, parameter, value, result)
 
 

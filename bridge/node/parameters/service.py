@@ -89,8 +89,10 @@ class NodeParameters:
         self._view = ParameterView(node, plant.image, names)
         sharing = sum(other.bus is node.bus for other in plant.nodes.values())
         self._polling = ParameterPolling(node, names, sharing, self._poll)
-        self._scaling = {value.full for value in node.family.value} & {
-            parameter.name for parameter in node.family.parameter if parameter.read
+        self._deciding = {
+            name
+            for value in node.family.value
+            for name in (*value.scaled_by, *value.when, *node.family.steady_of(value))
         }
         self._reading: dict[tuple[str, ObjectRef], Waiting] = {}
         self._writing: set[tuple[str, ObjectRef]] = set()
@@ -330,9 +332,9 @@ class NodeParameters:
             return
         self._view.show(drive.name, result)
         name = entry.definition.name if entry.definition else ""
-        if name in self._scaling and entry.address == self._names.resolve(name).address:
-            # It scales the process data, which follow at once.
-            drive.on_scale(name, float(result.value))
+        if name in self._deciding and entry.address == self._names.resolve(name).address:
+            # It decides what the process data mean, which follow at once.
+            drive.on_parameter(name, float(result.value), self._now)
 
 
 def _why_not_set(identity: Identity, drive: HasParameters) -> str:

@@ -255,10 +255,10 @@ def connect(
         drive.on_identification(result.identification, now)
         drive.on_own_supervision(result.own[drive.name], now)
         facts = result.words[drive.name]
-        for (name, in_set), full in facts.scales.items():
-            drive.on_scale(name, full, in_set)
         if drive.on_codes(facts.codes, facts.why_unread):
             drive.channel.start_anew(now)
+        for (name, in_set), setting in facts.parameters.items():
+            drive.news.on_parameter(name, setting, now, in_set)
         result.notes += [f"{drive.slot.name}: {what}" for what in drive.channel.meanings.unknown()]
         plan = result.drives[drive.name]
         if not plan.rpdos or not plan.tpdos or plan.problem:

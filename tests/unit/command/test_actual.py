@@ -52,7 +52,8 @@ def words_of(count: int) -> st.SearchStrategy[list[int]]:
 def scaled() -> Hall:
     hall = Hall()
     hall.run()
-    hall.drive.on_scale("P112", 10.0)
+    hall.drive.channel.meanings.on_scale("P112", 10.0)
+    hall.drive.compile()
     return hall
 
 

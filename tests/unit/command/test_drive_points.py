@@ -53,7 +53,8 @@ def test_a_setpoint_whose_scale_nobody_knows_is_a_configuration_error(hall: Hall
     infeed = hall.plant.drives["conveyor/infeed"]
     reading = hall.plant.image.read("conveyor/infeed/command/frequency")
     assert (reading.quality, reading.reason) == (Quality.CONFIG_ERROR, UNREAD)
-    infeed.on_scale("P105", 60.0)
+    infeed.channel.meanings.on_scale("P105", 60.0)
+    infeed.compile()
     infeed.refresh(6.0)
     assert hall.plant.image.read("conveyor/infeed/command/frequency").quality is Quality.GOOD
 

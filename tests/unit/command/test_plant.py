@@ -221,17 +221,20 @@ class TestData:
         assert reading.reason == "P112 cannot be read and is not in the site file"
 
     def test_a_scale_learned_at_boot_up_counts_from_then_on(self, running: Hall):
-        running.drive.on_scale("P112", 8.0)
+        running.drive.channel.meanings.on_scale("P112", 8.0)
+        running.drive.compile()
         running.pdo(ENABLED, 0x2000, 0x4000)
         assert running.read("actual/current").quality is Quality.GOOD
         assert running.value("actual/current") == 8.0
-        running.drive.on_scale("P105", 60.0)
+        running.drive.channel.meanings.on_scale("P105", 60.0)
+        running.drive.compile()
         running.write(frequency=60.0)
         assert running.value("command/setpoint_1") == 0x4000
         assert running.value("command/frequency") == 60.0
 
     def test_a_scale_of_nothing_is_no_scale(self, running: Hall):
-        running.drive.on_scale("P112", 0.0)
+        running.drive.channel.meanings.on_scale("P112", 0.0)
+        running.drive.compile()
         running.pdo(ENABLED, 0x2000, 0x4000)
         assert running.read("actual/current").quality is Quality.CONFIG_ERROR
 

@@ -458,7 +458,9 @@ def test_pp_a_position_that_the_drive_does_not_take_is_told_and_the_next_has_its
     assert not word(bench.sent(0x205)[-1]) & 0x10
     bench.node.settings.mode = Mode.PROFILE_POSITION
     bench.node.axis.set_mode()
-    bench.write(DRIVE, position=20_000)
+    assert bench.write(DRIVE, position=20_000).code is Code.NOT_CONFIGURED, "the mode has to be seen first"
+    keep_alive(bench, 1.5)
+    assert bench.write(DRIVE, position=20_000).code is Code.OK
     keep_alive(bench, 1.5)
     assert bench.value("axis/drive/actual/position") == 20_000
 

@@ -166,6 +166,7 @@ def test_no_point_is_good_unless_its_meaning_was_read(
     active: int,
 ) -> None:
     def prepare(drive: NordDrive) -> None:
+        drive.parameters.commission(600, 2)
         for in_set in range(1, 5):
             means(drive, ACTUAL, *actual[in_set - 1 :: 4], in_set=in_set)
             means(drive, SETPOINT, *setpoints[in_set - 1 :: 4], in_set=in_set)
@@ -189,6 +190,8 @@ def test_no_point_is_good_unless_its_meaning_was_read(
         of_set = enumerate(all_codes[active - 1 :: 4], 1)
         codes = [None if (number, word, active) in unreadable else code for word, code in of_set]
         is_there = set(value.code) <= set(codes)
+        # The drive adds setpoints of one code.
+        is_there &= value.group == "actual" or all(codes.count(code) == 1 for code in value.code)
         # P112 is given for two sets.
         is_scaled = value.full != "P112" or active in (1, 2)
         reading = point(bench, value.leaf)

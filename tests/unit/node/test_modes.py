@@ -122,3 +122,36 @@ def test_whatever_the_mode_nothing_is_good_that_means_something_else(
             taken = bench.write(DRIVE, control_word=15, **{setpoint: 1})
             assert taken.ok is is_own, (mode, taken)
         assert bench.ask(Action.DISABLE_VOLTAGE, DRIVE).ok
+
+
+@pytest.mark.parametrize("mapping", OF_MODE)
+def test_a_mode_that_a_tpdo_tells_counts_at_once(tmp_path: Path, mapping: str) -> None:
+    """6061h is in the TPDO, beside the bits whose meaning it says; 6060h is asked in the next second."""
+    bench = booted(tmp_path, mapping)
+    own, setpoint, bits = OF_MODE[mapping]
+    reached = ("target_reached",) if f"{DRIVE}/actual/target_reached" in bench.plant.image.index else ()
+    assert all(point(bench, f"actual/{bit}").quality is Quality.GOOD for bit in (*bits, *reached))
+    change(bench, Mode.HOMING if own is not Mode.HOMING else Mode.VELOCITY)
+    bench.run(0.15)
+    for bit in (*bits, *reached):
+        assert point(bench, f"actual/{bit}").quality is Quality.DISABLED, bit
+    bench.run(1.0)
+    if setpoint:
+        assert point(bench, f"command/{setpoint}").quality is Quality.DISABLED
+
+
+def test_a_speed_in_another_dimension_is_a_speed_in_1_per_min_all_the_same(tmp_path: Path) -> None:
+    """604Ch: numerator and denominator."""
+    bench = booted(tmp_path, "velocity")
+    bench.write(DRIVE, control_word=6)
+    bench.run(0.2)
+    bench.write(DRIVE, control_word=7)
+    bench.run(0.2)
+    assert bench.write(DRIVE, control_word=0x7F, velocity=300.0).ok
+    bench.node.settings.vl_dimension[:] = [1, 10]
+    for _ in range(100):
+        bench.write(DRIVE, control_word=0x7F)
+        bench.run(0.1)
+    command = point(bench, "command/velocity")
+    assert (command.value, command.quality) == (30.0, Quality.STALE)
+    assert point(bench, "actual/velocity")[:2] == (30.0, Quality.GOOD)

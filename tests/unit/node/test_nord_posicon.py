@@ -190,3 +190,67 @@ def test_a_position_of_32_bits_in_one_pdo_follows_too(tmp_path: Path) -> None:
     assert actual(bench, "target_reached") is True
     write(bench, 5.0, control_word=ENABLE, position=-2.5)
     assert position(bench) == -2.5
+
+
+def keypad(bench: Bench, number: int, raw: int, element: int = 1) -> None:
+    """In every parameter set."""
+    for parameter_set in range(1, 5):
+        bench.node.drives[0].parameters.at_keypad(number, raw, element=element, parameter_set=parameter_set)
+
+
+FOUND_S = 10.0
+"""Within this a change at the keypad is found."""
+
+
+def test_with_position_control_off_no_target_is_reached_and_none_is_taken(tmp_path: Path) -> None:
+    """§6.5.2: without POSICON bit 8 says that the actual value is the setpoint, and so says a drive that runs
+    at its set frequency without end."""
+    bench = made(tmp_path, lambda drive: drive.parameters.commission(600, 0))
+    write(bench, 0.3, control_word=SHUT_DOWN)
+    for values in ({"position": 30.0}, {"frequency": 25.0}, {"frequency": 25.0, "position": 30.0}):
+        refused = bench.write(DRIVE, control_word=ENABLE, **values)
+        assert refused.code is Code.NOT_CONFIGURED
+        assert "the drive does not go to this position in parameter set 1: P600 is 0 (off)" in refused.message
+    bench.run(24.0)
+    reached = bench.plant.image.read(f"{DRIVE}/actual/target_reached")
+    assert (reached.quality, reached.reason) == (
+        Quality.DISABLED,
+        "the drive does not go to this position in parameter set 1: P600 is 0 (off)",
+    )
+    assert bench.node.drives[0].position_increments == 7_250.0
+
+
+@pytest.mark.parametrize(("number", "raw", "element"), [(600, 0, 1), (SETPOINT, 4, 2), (SETPOINT, 23, 1)])
+def test_what_is_changed_on_the_way_leaves_no_target_reached(
+    bench: Bench, number: int, raw: int, element: int
+) -> None:
+    """P600 off, P546[2] no position, P546[1] one, too."""
+    enable(bench)
+    write(bench, 0.5, control_word=ENABLE, frequency=25.0, position=400.0)
+    keypad(bench, number, raw, element)
+    for _ in range(round(FOUND_S / 0.05)):
+        bench.write(DRIVE, control_word=ENABLE)
+        bench.run(0.05)
+    assert bench.plant.image.read(f"{DRIVE}/actual/target_reached").quality is Quality.DISABLED
+    assert bench.write(DRIVE, control_word=ENABLE, position=1.0).code is Code.NOT_CONFIGURED
+    assert bench.write(DRIVE, control_word=SHUT_DOWN, position=1.0).code is Code.OK, "it may be a stop"
+    assert [event.message for event in bench.events if "has another meaning" in event.message]
+
+
+def test_a_gear_or_another_encoder_leaves_no_position(bench: Bench) -> None:
+    """§6.5.4: P607 and P608 stretch what is transferred."""
+    bench.node.drives[0].parameters.at_keypad(607, 5, element=3)
+    bench.run(FOUND_S)
+    position = bench.plant.image.read(f"{DRIVE}/actual/position")
+    assert (position.quality, position.reason) == (
+        Quality.DISABLED,
+        "not in revolutions of the motor: P607[3] is 5",
+    )
+    bench.node.drives[0].parameters.at_keypad(607, 1, element=3)
+    bench.node.drives[0].parameters.at_keypad(604, 1)
+    bench.run(FOUND_S)
+    position = bench.plant.image.read(f"{DRIVE}/actual/position")
+    assert (position.quality, position.reason) == (
+        Quality.CONFIG_ERROR,
+        "P604 was 0 in the drive and is 1: see what it scales, then restart the bridge",
+    )

@@ -152,7 +152,7 @@ def test_a_view_that_is_on_already_is_not_written(make_single):
 
 def test_the_third_view_carries_a_position(make):
     node = NordSingle(5, TU3)
-    for number, meaning in ((546, 23), (547, 24), (548, 1), (543, 10), (544, 15), (545, 1)):
+    for number, meaning in ((546, 23), (547, 24), (548, 1), (543, 10), (544, 15), (545, 1), (600, 2)):
         node.drive.parameters.commission(number, meaning)
     bench = make("nord/sk-tu3-cao-pdo3", node)
     bench.node.drive.position_increments = 2_800_758.0
@@ -160,7 +160,7 @@ def test_the_third_view_carries_a_position(make):
     assert bench.sent(0x405)[-1].data.hex() == "7f0476bc2a000000"
     assert bench.sent(0x385)[-1].data[2:6].hex() == "76bc2a00", "§6.6.1: 2800.758 rev = 002ABC76h"
     assert bench.value(f"{DRIVE}/actual/position") == pytest.approx(2800.758, abs=1e-6)
-    start(bench, frequency=25.0)
+    start(bench, frequency=25.0, position=3000.0)
     assert bench.value(f"{DRIVE}/actual/frequency") == 25.0
     position = bench.value(f"{DRIVE}/actual/position")
     assert isinstance(position, float)

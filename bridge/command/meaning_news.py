@@ -1,0 +1,125 @@
+"""What a drive's settings make of its words, when somebody has changed them: events, and what becomes of
+setpoints that are in force."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
+
+from bridge.command.drive_channel import DriveChannel
+from bridge.command.event import Event, Kind
+from bridge.command.setpoint_doubts import InForce
+from bridge.drive import Codes, Key, is_scale, no_scale
+from bridge.mapping.model import Family, Meaning, Slot
+
+
+class HasWords(Protocol):
+    """The drive whose words they are."""
+
+    name: str
+    family: Family
+    slot: Slot
+    channel: DriveChannel
+
+    @property
+    def is_enabled(self) -> bool: ...
+
+    @property
+    def words(self) -> Sequence[int]: ...
+
+    def in_force(self) -> dict[str, InForce]: ...
+
+    def on_codes(self, codes: Codes) -> bool: ...
+
+    def compile(self) -> None: ...
+
+    def refresh(self, now: float) -> None: ...
+
+
+class MeaningNews:
+    """Of one drive; nothing is told of what is read for the first time."""
+
+    def __init__(self, drive: HasWords, report: Callable[[Event], None]) -> None:
+        self._drive = drive
+        self._report = report
+        self._is_commanded_otherwise = False
+        """A setpoint that is held was written for another meaning of its words."""
+        self.is_to_be_asked = False
+        """Something has happened after which the words may mean something else."""
+
+    def on_parameter(self, name: str, setting: float | None, now: float, in_set: int = 1) -> None:
+        """What the drive says of a parameter that decides what its words mean, in the parameter's unit; None
+        where it refuses to tell."""
+        drive, meanings = self._drive, self._drive.channel.meanings
+        if meanings.has_told(name, setting, in_set):
+            return
+        key = meanings.conditions.key(name, in_set)
+        had, before = meanings.conditions.told(key), drive.in_force()
+        is_first = not meanings.conditions.has_been_asked(key)
+        meanings.on_parameter(name, setting, in_set)
+        drive.compile()
+        if is_first:
+            drive.refresh(now)
+            return
+        after = drive.in_force()
+        gone = [leaf for leaf, one in before.items() if leaf not in after and any(one.words)]
+        self._is_commanded_otherwise |= bool(gone)
+        affected = [*self._doubted(before, after), *self._affected_by(name, setting)]
+        self._tell((name, in_set), setting, had, "; ".join(affected), now)
+
+    def on_code(self, meaning: Meaning, code: int | None, now: float, in_set: int = 1) -> None:
+        """What the drive says of what one word carries; None where it refuses to tell."""
+        known = self._drive.channel.meanings.codes
+        of_sets = [*known.get(meaning.leaf, (None,) * self._drive.family.sets)]
+        had, of_sets[in_set - 1] = of_sets[in_set - 1], code
+        if code == had:
+            return
+        codes = {**known, meaning.leaf: of_sets}
+        self._is_commanded_otherwise |= self._drive.on_codes(codes)
+        affected = f"{meaning.leaf} has another meaning"
+        self._tell((meaning.parameter, in_set), code, had, affected, now)
+
+    def on_overdue(self, overdue: frozenset[Key], now: float) -> None:
+        """What decides the meaning of words and has not been read again in time."""
+        if self._drive.channel.meanings.on_overdue(overdue):
+            self._drive.compile()
+            self._drive.refresh(now)
+
+    def drop_old_setpoints(self, now: float) -> None:
+        """Those that were written for another meaning of their words, of a drive that is not enabled: it has
+        to be commanded anew. One that runs does already what its words mean."""
+        channel = self._drive.channel
+        is_old = self._is_commanded_otherwise or channel.doubts.has_any(channel.setpoints)
+        if is_old and not self._drive.is_enabled:
+            self._is_commanded_otherwise = False
+            channel.start_anew(now)
+
+    def _doubted(self, before: Mapping[str, InForce], after: Mapping[str, InForce]) -> list[str]:
+        note = self._drive.channel.doubts.note
+        return [
+            f"command/{name}: {why}"
+            for name, one in before.items()
+            if name in after and (why := note(name, one, after[name]))
+        ]
+
+    def _affected_by(self, name: str, setting: float | None) -> list[str]:
+        """The values that depend on a parameter, and what changes with it."""
+        family = self._drive.family
+        found: list[str] = []
+        for value in family.values_of(self._drive.slot):
+            is_steady = name in family.steady_of(value)
+            if name in value.when or is_steady:
+                found.append(f"{value.leaf} has another meaning")
+            elif name in value.scaled_by and setting is not None and not is_scale(setting):
+                found.append(no_scale(name, setting))
+            elif name in value.scaled_by:
+                found.append(f"{value.leaf} has another scale")
+        return list(dict.fromkeys(found))
+
+    def _tell(self, key: Key, setting: float | None, had: float | None, affected: str, now: float) -> None:
+        told = "cannot be read" if setting is None else f"is {setting:g}"
+        was = "could not be read" if had is None else f"was {had:g}"
+        message = f"{key[0]} of parameter set {key[1]} {told}, it {was}: {affected}"
+        self._report(Event(now, Kind.CONFIGURATION, self._drive.name, 500, message))
+        self.drop_old_setpoints(now)
+        self._drive.refresh(now)

@@ -1,0 +1,74 @@
+"""Setpoints in force whose word means another value since somebody has changed a parameter of the drive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from bridge.drive import ValueCodec
+
+
+class InForce(NamedTuple):
+    """One scaled command: where its words stand, the words that are held, and what they mean."""
+
+    places: tuple[int, ...]
+    words: tuple[int, ...]
+    value: float
+    unit: str
+
+    @property
+    def text(self) -> str:
+        return f"{self.value:g} {self.unit}".rstrip()
+
+
+class SetpointDoubts:
+    """The word stays, for the drive acts on it; nobody has asked for the value that it means. So a point is
+    in doubt until its command is written anew, or another word has taken its place."""
+
+    def __init__(self) -> None:
+        self._doubts: dict[str, tuple[InForce, str]] = {}
+
+    def note(self, name: str, before: InForce, after: InForce) -> str:
+        """``name`` of the command group means another value; what there is to say, empty where nobody would
+        notice."""
+        if before.words != after.words or before.value == after.value:
+            return ""
+        first = self._doubts.get(name)
+        written = first[0] if first and first[0].words == after.words else before
+        why = f"written as {written.text}, and the same word means {after.text} since the drive was changed"
+        self._doubts[name] = (written, why)
+        return why
+
+    def why(self, name: str, setpoints: Sequence[int]) -> str:
+        """Why a command is in doubt, with these words in force; empty where it is not."""
+        if not self._doubts or name not in self._doubts:
+            return ""
+        written, why = self._doubts[name]
+        return why if words_of(written.places, setpoints) == written.words else ""
+
+    def has_any(self, setpoints: Sequence[int]) -> bool:
+        """Whether a command is in doubt with these words in force."""
+        return any(self.why(name, setpoints) for name in self._doubts)
+
+    def forget(self, names: Iterable[str], written: Iterable[int]) -> bool:
+        """These commands, and those made of the words at these places, have been written. True where one of
+        them was in doubt."""
+        names, places = set(names), set(written)
+        gone = [
+            name
+            for name, (one, _) in self._doubts.items()
+            if name in names or not places.isdisjoint(one.places)
+        ]
+        for name in gone:
+            del self._doubts[name]
+        return bool(gone)
+
+
+def words_of(places: Iterable[int], setpoints: Sequence[int]) -> tuple[int, ...]:
+    return tuple(setpoints[place] for place in places)
+
+
+def in_force(codec: ValueCodec, setpoints: Sequence[int]) -> InForce:
+    """What a command with a place means with these words."""
+    value = codec.from_words(setpoints)
+    return InForce(codec.places, words_of(codec.places, setpoints), float(value), codec.model.unit)

@@ -1,0 +1,88 @@
+"""What parameters of the drive say about its values: with which of their settings a value means what the
+mapping file says, and which of them may not be changed."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from bridge.image import Quality
+from bridge.mapping.model import Family, ProcessValue
+
+_FIRST: Final = 1
+
+Key = tuple[str, int]
+"""A parameter's name, or a word's leaf, and the parameter set; 1 for what all sets share."""
+
+
+class Lack(NamedTuple):
+    """Why a value is not served, or with the quality *stale*, why it is in doubt."""
+
+    quality: Quality
+    why: str
+
+
+class Conditions:
+    """Of one drive: the settings that it has told, in the unit of each parameter."""
+
+    def __init__(self, family: Family) -> None:
+        self._family = family
+        self._told: dict[Key, float | None] = {}
+        self._first: dict[Key, float] = {}
+        """What was told first since the bridge runs."""
+
+    def key(self, name: str, in_set: int) -> Key:
+        """By which a setting is known that counts in this parameter set."""
+        return name, in_set if self._family.parameter_named(name).sets else _FIRST
+
+    def told(self, key: Key) -> float | None:
+        """None where the drive does not tell it, or has not been asked."""
+        return self._told.get(key)
+
+    def has_been_asked(self, key: Key) -> bool:
+        """Whether the drive has answered, if only that it does not tell it."""
+        return key in self._told
+
+    def tell(self, key: Key, value: float | None) -> None:
+        """The drive's answer; None where it refuses one."""
+        self._told[key] = value
+        if value is not None:
+            self._first.setdefault(key, value)
+
+    def take_defaults(self) -> None:
+        """What is taken where there is no drive to ask: that everything means what the mapping file says."""
+        for value in self._family.value:
+            for name, settings in value.when.items():
+                for in_set in range(_FIRST, self._family.sets + 1):
+                    self._told[self.key(name, in_set)] = settings[0]
+
+    def lack(self, value: ProcessValue, in_set: int, unread: Lack) -> Lack | None:
+        """Why ``value`` does not mean in this set what the mapping file says; None where it does. ``unread``
+        says what there is to say of a parameter that the drive has not told."""
+        for name, settings in value.when.items():
+            setting = self.told(self.key(name, in_set))
+            if setting is None:
+                return Lack(unread.quality, f"{name}{self._of(name, in_set)} {unread.why}")
+            if setting not in settings:
+                shown = f"{name} is {setting:g}{self._state(name, setting)}"
+                return Lack(Quality.DISABLED, f"{value.otherwise}{self._in(name, in_set)}: {shown}")
+        for name in self._family.steady_of(value):
+            key = self.key(name, in_set)
+            first, setting = self._first.get(key), self.told(key)
+            if first is not None and setting is not None and first != setting:
+                return Lack(Quality.CONFIG_ERROR, _was_changed(name, first, setting))
+        return None
+
+    def _state(self, name: str, setting: float) -> str:
+        text = self._family.parameter_named(name).states.get(round(setting))
+        return f" ({text})" if text else ""
+
+    def _of(self, name: str, in_set: int) -> str:
+        return f" of parameter set {in_set}" if self._family.parameter_named(name).sets else ""
+
+    def _in(self, name: str, in_set: int) -> str:
+        return f" in parameter set {in_set}" if self._family.parameter_named(name).sets else ""
+
+
+def _was_changed(name: str, first: float, setting: float) -> str:
+    what = f"{name} was {first:g} in the drive and is {setting:g}"
+    return f"{what}: see what it scales, then restart the bridge"

@@ -98,7 +98,7 @@ def exchange(
     _open_channels(project, bus, node)
     for place in places:
         _restore(place, done, wait, force=force, quiet=as_json)
-    _save(places[0].target, done)
+    _save(places[0].target, done, force=force)
     plant, test = drop_test.perform(project, bus, table)
     dropped = drop_report.facts(occasion, plant.nodes[table.name], test)
     audited = list(audit_drives(project, bus.name, [], of_node=table.name))
@@ -200,9 +200,9 @@ def _restore(place: _Place, done: Exchange, wait_s: float, *, force: bool, quiet
     try:
         if found.differences:
             changes = [one.entry for one in found.differences]
-            check = target.alone(force=force, whole=True).check
-            target.run(lambda now: check(changes))
-            write_all(target, place.content.all, done.identity, restored, check, wait_s)
+            standstill = target.alone(force=force, whole=True)
+            target.run(lambda now: standstill.check(changes))
+            write_all(target, place.content.all, done.identity, restored, standstill.gate, wait_s)
     finally:
         done.keep(place.name, _facts(restored))
     tell(f"{target.name}: {len(restored.written)} written")
@@ -218,10 +218,11 @@ def _facts(restored: backups.Restored) -> dict[str, Any]:
     return restored_facts(restored) | {"warnings": sorted(warnings)}
 
 
-def _save(target: Target, done: Exchange) -> None:
+def _save(target: Target, done: Exchange, *, force: bool) -> None:
     """Have the node keep what was written, where its family has a command for that."""
     eeprom = target.family.eeprom
     if eeprom is None or not eeprom.can_save or not done.is_unsaved:
         return
-    warning = target.run(target.access.save, writes=True)
+    gate = target.alone(force=force).gate
+    warning = target.run(lambda now: target.access.save(now, gate), writes=True)
     done.saved(warning)

@@ -52,6 +52,7 @@ def backup(
     took_s = clock.now() - began
     saved = datetime.now(UTC).isoformat(timespec="seconds")
     entries = {entry.name: entry for entry in backups.settings(target.access.names)}
+    left_out = backups.left_out(target.access.names, on_first=target.access.on_first)
     comments = {name: _comment(entries[name].definition) for name in found.values}
     content = BackupFile(
         target.node.mapping,
@@ -63,6 +64,7 @@ def backup(
         found.identity,
         found.objects,
         found.unreadable,
+        left_out=left_out,
     )
     try:
         file.write_text(content.text(), encoding="utf-8")
@@ -70,11 +72,13 @@ def backup(
         raise OperationFailed(f"{file}: {error.strerror or error}") from None
     if as_json:
         facts = {"parameters": found.values, "objects": found.objects, "missing": found.missing}
-        facts |= {"unreadable": found.unreadable, "identity": found.identity}
+        facts |= {"unreadable": found.unreadable, "identity": found.identity, "left_out": left_out}
         print(json.dumps({"ok": True, **facts, "seconds": round(took_s, 1)}))
         return
     for name, why in found.unreadable.items():
         tell(f"not read: {name}: {why}")
+    for why in left_out.values():
+        tell(f"left out: {why}")
     missing = f"; the drive does not have {len(found.missing)} others" if found.missing else ""
     count = len(found.values) + len(found.objects)
     print(f"{count} parameters of {target.name} in {file}, read in {took_s:.0f} s{missing}")
@@ -137,11 +141,11 @@ def restore(
         target.refuse_unforced(changed)
     if asks and not typer.confirm(f"write {len(changed)} parameters of {target.name}?", err=True):
         raise OperationFailed("nothing written")
-    check = target.alone(force=force, whole=bool(changed)).check
-    target.run(lambda now: check(changed))
+    standstill = target.alone(force=force, whole=bool(changed))
+    target.run(lambda now: standstill.check(changed))
     done = backups.Restored()
     try:
-        write_all(target, content.all, identity, done, check, wait)
+        write_all(target, content.all, identity, done, standstill.gate, wait)
     except OperationFailed:
         print_restored(target, done)
         raise

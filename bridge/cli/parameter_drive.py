@@ -12,6 +12,7 @@ import typer
 from bridge import clock
 from bridge.cli.bus import Line, carry_out, not_virtual, tell
 from bridge.cli.terminal import Show, progress
+from bridge.command.output_words import OutputWords
 from bridge.config import BusTable, NodeTable
 from bridge.errands.bystander import Bystander, Standstill
 from bridge.errands.parameter import ParameterErrand
@@ -79,7 +80,16 @@ class Target:
             raise OperationFailed(
                 f"another master is active on {table.name}: {heard.found}; write through it, or stop it first"
             )
-        return Standstill(self.access.names, self.family, self.slot, heard.status, force=force, whole=whole)
+        outputs = OutputWords(self.node.name, self.family.output, self.node.outputs.on_expiry)
+        return Standstill(
+            self.access.names,
+            self.family,
+            self.slot,
+            heard.status,
+            force=force,
+            whole=whole,
+            outputs=outputs,
+        )
 
     def run(
         self,

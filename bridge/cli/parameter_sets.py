@@ -13,7 +13,7 @@ from bridge.cli.terminal import Show
 from bridge.errors import OperationFailed
 from bridge.image import Value
 from bridge.parameter import ObjectRef, ParameterError, Why, backups
-from bridge.parameter.access import Asks
+from bridge.parameter.protection import Gate
 
 _PAUSE_S: Final = 1.0
 """Between two attempts at a node that does not answer."""
@@ -48,7 +48,7 @@ def write_all(
     values: Mapping[str, Value],
     identity: dict[str, int],
     into: backups.Restored,
-    check: Asks,
+    gate: Gate,
     wait_s: float,
 ) -> None:
     """Restore a set to the node that has told ``identity``; ``into`` has what was done in all attempts.
@@ -58,7 +58,7 @@ def write_all(
 
     def steps(now: float) -> backups.Steps:
         yield from backups.identify(identity)
-        yield from backups.restore(target.access, values, into, now, before_it=check)
+        yield from backups.restore(target.access, values, into, now, gate)
 
     patience = _Patience(wait_s)
     while True:

@@ -114,8 +114,8 @@ def write(
         question = f"write {shown(entry, wanted)} to {entry.name} of {target.name}?"
         if not typer.confirm(question, err=True):
             raise OperationFailed("nothing written")
-    check = target.alone(force=force).check
-    written = target.run(lambda now: target.access.write(entry, wanted, now, before_it=check), writes=True)
+    gate = target.alone(force=force).gate
+    written = target.run(lambda now: target.access.write(entry, wanted, now, gate), writes=True)
     if written.warning:
         tell(f"warning: {written.warning}")
     if as_json:
@@ -135,8 +135,8 @@ def save(
     question = f"write the EEPROM of {target.node.name}?"
     if not yes and sys.stdin.isatty() and not typer.confirm(question, err=True):
         raise OperationFailed("nothing saved")
-    check = target.alone(force=force).check
-    warning = target.run(lambda now: target.access.save(now, before_it=check), writes=True)
+    gate = target.alone(force=force).gate
+    warning = target.run(lambda now: target.access.save(now, gate), writes=True)
     if warning:
         tell(f"warning: {warning}")
     print(json.dumps({"ok": True}) if as_json else f"{target.node.name}: saved")

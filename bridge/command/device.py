@@ -137,8 +137,8 @@ class Device:
 
     @property
     def is_enabled(self) -> bool:
-        """One of its outputs is not safe."""
-        return self.outputs is not None and self.outputs.is_active
+        """One of its outputs is anything but safe."""
+        return self.outputs is not None and self.outputs.is_moving
 
     def refusal(self, identity: Identity) -> str:
         """Why ``identity`` may not command it; empty where it may."""

@@ -172,6 +172,13 @@ class Outputs(Commanded):
         """An owner's values are sent."""
         return bool(self.channel.output.words[0] & ACTIVE)
 
+    @property
+    def is_moving(self) -> bool:
+        """An output has another value than its safe one; one that holds its last value is at rest at 0."""
+        words = self.channel.on_wire(self.channel.output)
+        places = self.words.places.values()
+        return any(self.words.raw(words, place) != (place.safe or 0) for place in places)
+
     def stop_time(self) -> StopTime:
         """Longest time from the controller's last telegram to safe values on the bus."""
         if self.words.all_hold:
@@ -197,6 +204,12 @@ class Outputs(Commanded):
         for name, raw in held.items():
             self.words.put(words, self.words.places[name], raw)
         self.words.held = tuple(words)
+        self.refresh(now)
+
+    def on_own_supervision_changed(self, why: str, now: float) -> None:
+        """An object that decides what the node does by itself was written: nothing is known of it."""
+        self.bridge_stop = (0, why)
+        self.own = None
         self.refresh(now)
 
     def on_wire(self, wire: Wire, now: float) -> None:

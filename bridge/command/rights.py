@@ -50,13 +50,12 @@ class Rights:
             return False
         if isinstance(one, Drive) and one.family.sdo_channel(one.slot, node.table.sdo_channels) is None:
             return False
-        if names.protection.why_never(entry):
+        if not names.protection.may_set(entry.address, is_engineer=self.has_engineers):
             return False
         if self.has_engineers:
             return True
-        is_open = names.protection.level(entry.address) != "communication"
         may_command = self.may_command(one) if isinstance(one, Drive) or one.outputs else True
-        return is_open and self.sets_parameters and may_command
+        return self.sets_parameters and may_command
 
 
 def rights_of(plant: Plant, source: Source) -> Rights:

@@ -38,6 +38,8 @@ def device_lines(description: Description, source: str) -> Iterator[str]:
     yield f"name = {string(device.product or source)}"
     yield f"vendor = {string(device.vendor or 'unknown')}"
     yield f"source = {string(source)}"
+    profile = _profile(description)
+    yield f"profile = {profile}" if profile else "# profile = "
     yield ""
     yield from identity_lines(description)
     for name, (entry, kind, title) in inputs.items():
@@ -54,7 +56,9 @@ def device_lines(description: Description, source: str) -> Iterator[str]:
     commanded = {(one.index, one.sub) for pdo in pdos(description) if pdo.receives for one in pdo.mapped}
     told = {(entry.index, entry.sub) for entry, _, _ in inputs.values()}
     for name, entry in entries_of(description):
-        yield from parameter_lines(name, entry, _title(description, entry), {}, commanded | told)
+        yield from parameter_lines(
+            name, entry, _title(description, entry), {}, commanded | told, profile or None
+        )
 
 
 def _signal_lines(description: Description, name: str, entry: Entry, kind: str) -> Iterator[str]:

@@ -159,7 +159,7 @@ def _lines(
     names = {one.index: one.name for one in description.objects}
     for name, entry in entries:
         title = f"{names[entry.index]}: {entry.name}" if ":" in name else entry.name
-        yield from parameter_lines(name, entry, title, known, carried)
+        yield from parameter_lines(name, entry, title, known, carried, PROFILE_402)
 
 
 def _without(description: Description, base: Family, layout: Layout, there: Set[str]) -> Iterator[str]:

@@ -6,9 +6,12 @@ from collections.abc import Container, Iterator, Mapping
 from typing import Final
 
 from bridge.canopen.datatypes import INTEGERS, REALS, TypeName, encode
+from bridge.derive.modes import PROFILE_402
 from bridge.derive.toml import number, one_line, string, value
 from bridge.eds import DataType, Description, Entry, Value
 from bridge.mapping.model import Parameter
+from bridge.parameter.effect import Effect
+from bridge.parameter.profiles import effect_of
 
 TYPES: Final[dict[DataType, TypeName]] = {
     DataType.BOOLEAN: "bool",
@@ -33,10 +36,8 @@ TYPES: Final[dict[DataType, TypeName]] = {
 MANUFACTURER: Final = range(0x2000, 0x6000)
 PROFILE: Final = range(0x6000, 0x6800)
 FURTHER_AXES: Final = range(0x6800, 0xA000)
-_COMMANDS: Final = frozenset((0x6040, 0x6042, 0x6071, 0x607A, *range(0x60B0, 0x60B3), 0x60C1, 0x60FE, 0x60FF))
-"""What commands a drive: set-points, offsets, outputs."""
 _OF_BASE: Final = frozenset((0x6040, 0x6042, 0x6071, 0x607A, *range(0x60B0, 0x60B3), 0x60FF))
-"""Those among them that the base protects by itself."""
+"""What commands a drive and is no parameter of the base."""
 
 
 def parameter_name(index: int, sub: int, *, has_subs: bool) -> str:
@@ -56,10 +57,15 @@ def entries_of(description: Description) -> Iterator[tuple[str, Entry]]:
 
 
 def parameter_lines(
-    name: str, entry: Entry, title: str, known: Mapping[str, Parameter], in_pdos: Container[tuple[int, int]]
+    name: str,
+    entry: Entry,
+    title: str,
+    known: Mapping[str, Parameter],
+    in_pdos: Container[tuple[int, int]],
+    profile: int | None,
 ) -> list[str]:
     """The table of one entry; of one that is ``known`` from what the mapping extends only what differs. Empty
-    where there is nothing to say."""
+    where there is nothing to say. ``profile`` is the device's."""
     if entry.index in _OF_BASE or (entry.index, entry.sub) in in_pdos:
         return []
     kind = TYPES.get(entry.data_type) if entry.data_type else None
@@ -79,7 +85,7 @@ def parameter_lines(
     lines += _limits(entry, kind)
     if _access(entry) != "rw":
         lines.append(f"access = {string(_access(entry))}")
-    lines += _protection(entry)
+    lines += _protection(entry, profile)
     lines += _default(entry, kind)
     if entry.data_type is DataType.DOMAIN:
         lines.append("backup = false")
@@ -99,12 +105,14 @@ def _changes(entry: Entry, kind: TypeName, known: Parameter) -> Iterator[str]:
         yield f"access = {string(_access(entry))}"
 
 
-def _protection(entry: Entry) -> Iterator[str]:
-    """What can be mapped into an RPDO is made to command the device."""
-    if entry.index in _COMMANDS:
-        yield 'protected = "command"'
-    elif entry.pdo_mappable and entry.access.writable:
-        yield 'protected = "while_enabled"'
+def _protection(entry: Entry, profile: int | None) -> Iterator[str]:
+    """What can be mapped into an RPDO is made to command the device: of the maker's objects nobody says how,
+    and those of a drive's profile begin no movement while it is disabled. What the profile itself says of an
+    object is known without the file."""
+    if effect_of(entry.index, profile) or not (entry.pdo_mappable and entry.access.writable):
+        return
+    is_drives = profile == PROFILE_402 and entry.index in PROFILE
+    yield f"protected = {string(Effect.OPERATES.value if is_drives else Effect.MAY_MOVE.value)}"
 
 
 def _limits(entry: Entry, kind: TypeName) -> Iterator[str]:

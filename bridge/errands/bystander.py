@@ -7,14 +7,16 @@ from collections.abc import Generator, Iterable
 
 from bridge.canopen import cobid
 from bridge.canopen.frame import Frame
+from bridge.command.output_words import OutputWords, Place
 from bridge.config import NodeTable
 from bridge.drive import MOVING, StatusWords
 from bridge.errands.drop_test import ForeignMaster
 from bridge.mapping.model import Family, Slot
 from bridge.parameter import Entry, Names, ParameterError, Transfer, TransferFailed, Why
+from bridge.parameter.effect import Verdict, judge
+from bridge.parameter.protection import Gate
 
 _WORD_BYTES = 2
-_LEVELS = ("communication", "while_enabled")
 
 
 class Bystander(ForeignMaster):
@@ -43,12 +45,12 @@ def command_ids(node: NodeTable, family: Family) -> frozenset[int]:
 
 
 class Standstill:
-    """Sees to it that what is protected is not written while the drive is enabled. A node without a slot
-    moves nothing.
+    """Sees to it that what is protected is not written while the drive is enabled, or an output of a node
+    that is no drive is anything but safe.
 
-    ``heard`` is the status word that it has sent by itself, for a drive that cannot be asked for it. Where
-    nobody knows it, only who uses ``force`` writes. ``whole``: nothing else is written while it is known to
-    be enabled either.
+    ``heard`` is the status word that it has sent by itself, for a drive that cannot be asked for it;
+    ``outputs`` are those of a node without a slot. Where nobody knows it, only who uses ``force`` writes.
+    ``whole``: nothing else is written while it is known to be enabled either.
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class Standstill:
         *,
         force: bool,
         whole: bool = False,
+        outputs: OutputWords | None = None,
     ) -> None:
         self._names = names
         self._words = StatusWords(family.status_word) if slot else None
@@ -67,25 +70,52 @@ class Standstill:
         self._heard = heard
         self._force = force
         self._whole = whole
+        self._places = tuple(outputs.places.values()) if outputs and not slot else ()
+
+    @property
+    def gate(self) -> Gate:
+        """For who works at the machine: an engineer, and what moves is asked of the drive."""
+        return Gate(is_engineer=True, is_moving=lambda: False, asks=self.check)
 
     def concerns(self, entry: Entry) -> bool:
-        return self._names.protection.level(entry.address) in _LEVELS
+        effect = self._names.protection.effect(entry.address)
+        return judge(effect, is_engineer=True, is_moving=True) is Verdict.NOT_AT_REST
 
     def check(self, entries: Iterable[Entry]) -> Generator[Transfer, tuple[bytes, float], None]:
         """Raises ``ParameterError`` with the names of those that are not written now."""
-        if self._words is None:
-            return
         concerned = ", ".join(entry.name for entry in entries if self.concerns(entry))
         if not concerned and not self._whole:
             return
+        what = concerned or "a set of parameters"
+        if self._words is None:
+            yield from self._check_outputs(what, must_tell=bool(concerned) and not self._force)
+            return
         word = yield from self._status()
-        rule = f"{concerned or 'a set of parameters'}: not written while the drive is enabled"
+        rule = f"{what}: not written while the drive is enabled"
         if word is not None and self._words.state(word) in MOVING:
             raise ParameterError(Why.PROTECTED, f"{rule}, and it is: stop and disable it first")
         if word is None and concerned and not self._force:
             raise ParameterError(
                 Why.PROTECTED, f"{rule}, and it does not tell whether it is; --force writes all the same"
             )
+
+    def _check_outputs(self, what: str, *, must_tell: bool) -> Generator[Transfer, tuple[bytes, float], None]:
+        """Raises ``ParameterError`` for the first output that the node holds at anything but its safe value;
+        one that is to hold its last value is safe at 0."""
+        for place in self._places:
+            name = place.output.name
+            rule = f"{what}: not written while an output is active"
+            try:
+                data, _ = yield Transfer(place.output.object)
+            except TransferFailed:
+                if not must_tell:
+                    continue
+                raise ParameterError(
+                    Why.PROTECTED,
+                    f"{rule}, and {name} does not tell whether it is; --force writes all the same",
+                ) from None
+            if _is_active(place, data):
+                raise ParameterError(Why.PROTECTED, f"{rule}, and {name} is: make it safe first")
 
     def _status(self) -> Generator[Transfer, tuple[bytes, float], int | None]:
         """The status word as the drive answers for the objects that make it up in its TPDO."""
@@ -100,3 +130,9 @@ class Standstill:
                 return self._heard
             word += data[:each].ljust(each, b"\0")
         return int.from_bytes(word, "little")
+
+
+def _is_active(place: Place, data: bytes) -> bool:
+    """Whether an output that holds these bytes is anything but safe."""
+    raw = int.from_bytes(data, "little") & ((1 << place.output.size) - 1)
+    return raw != (place.safe or 0)

@@ -13,6 +13,7 @@ from bridge.lint.contradictions import check_contradictions
 from bridge.lint.decisions import check_decisions
 from bridge.lint.identifiers import check_identifiers
 from bridge.lint.load import BusLoad, check_load
+from bridge.lint.moving import check_moving
 from bridge.lint.outputs import check_outputs, output_cases
 from bridge.lint.own import WorstCase, check_own_supervision, worst_cases
 from bridge.lint.pdos import check_pdos
@@ -82,6 +83,7 @@ def lint(
         check_own_supervision(bus, report)
         check_contradictions(bus, report)
         check_outputs(bus, report)
+        check_moving(bus, report)
         cases += [*worst_cases(bus), *output_cases(bus)]
         loads.append(check_load(bus, report))
     check_decisions(site, families, report)

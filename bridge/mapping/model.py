@@ -32,6 +32,13 @@ class FamilyTable(Table):
     name: str
     vendor: str
     source: str = Field(description="the manual that the facts of this file are taken from")
+    profile: int | None = Field(
+        None,
+        ge=0,
+        le=0xFFFF,
+        description="number of the device profile, such as 401: what its objects do when they are written. "
+        "Left out: 402 for drives, elsewhere what `device_type` says; else an object is protected as in any",
+    )
     template: bool = Field(False, description="true: it can only be extended, no site can use it")
     preferred: bool = Field(
         False, description="true: `scan` names it where other mappings fit equally well; not inherited"

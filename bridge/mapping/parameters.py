@@ -15,7 +15,7 @@ from bridge.mapping.fields import ObjectRef, Ref, States, Table
 GROUPS: Final = ("number", "letter", "element", "set")
 """What the pattern of parameter names may name."""
 IndexRange = Annotated[str, Field(pattern=r"^[0-9A-F]{4}(-[0-9A-F]{4})?$")]
-Protection = Literal["command", "communication", "while_enabled"]
+Protection = Literal["command", "communication", "safe", "may_move", "while_enabled"]
 _PUNCTUATION: Final = re.compile(r"[^a-z0-9]+")
 VALUE_TYPES: Final = {
     "bool": DataType.BOOL,
@@ -112,8 +112,9 @@ class Parameter(Table):
     )
     protected: Protection | None = Field(
         None,
-        description="command: never written as a parameter; communication: by an engineer, while the drive "
-        "is not enabled; while_enabled: not written while the drive is enabled",
+        description="command: never written as a parameter; communication, safe (how it stops, what it "
+        "becomes), may_move: by an engineer, while the drive is not enabled; while_enabled: not written "
+        "while the drive is enabled",
     )
     backup: bool = Field(True, description="false: identity, addresses and commands, in no parameter set")
     of_node: bool = Field(False, description="true: the node's own, over its first SDO channel")

@@ -6,7 +6,7 @@ carries them out on the SDO channel of the drive (``node.parameters``, or the co
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,6 +17,7 @@ from bridge.parameter.definition import Entry
 from bridge.parameter.error import ParameterError, TransferFailed, Why
 from bridge.parameter.ledger import Key, Ledger
 from bridge.parameter.names import Names
+from bridge.parameter.protection import Gate
 
 FRESH_S: Final = 1.0
 """A value that was read this long ago is what the drive holds: it is not read again before a write."""
@@ -60,7 +61,6 @@ class Written:
     warning: str = ""
 
 
-Asks = Callable[[Iterable[Entry]], Generator[Transfer, tuple[bytes, float], None]]
 Reads = Generator[Transfer, tuple[bytes, float], Reading]
 Writes = Generator[Transfer, tuple[bytes, float], Written]
 Saves = Generator[Transfer, tuple[bytes, float], str]
@@ -139,22 +139,11 @@ class DriveParameters:
 
     # writing
 
-    def write(
-        self,
-        entry: Entry,
-        value: Value,
-        now: float,
-        *,
-        before_it: Asks | None = None,
-        why_not: Callable[[], str] | None = None,
-    ) -> Writes:
+    def write(self, entry: Entry, value: Value, now: float, gate: Gate) -> Writes:
         """Write ``value`` where the drive does not hold it yet, and read it back; a command is written and
-        has been given when the drive answers.
-
-        What ``before_it`` asks of the drive comes right before the write; it raises ``ParameterError`` where
-        there is to be none. ``why_not`` is that of the ``Transfer``.
-        """
+        has been given when the drive answers. ``gate`` lets in what may be written."""
         self.check_writable(entry)
+        self._pass(entry, gate)
         definition = entry.definition
         blind = definition is not None and (definition.command or not definition.readable)
         before: bytes | None = None
@@ -170,12 +159,12 @@ class DriveParameters:
         key = (self._node_name if _is_of_node(entry) else self.name, str(entry.address))
         if wears:
             self._check(key, entry.name, now)
-        if before_it is not None:
-            yield from before_it([entry])
+        if gate.asks is not None:
+            yield from gate.asks([entry])
         self._cache.pop(entry.address, None)
         lost: TransferFailed | None = None
         try:
-            _, now = yield Transfer(entry.address, data, of_node=_is_of_node(entry), why_not=why_not)
+            _, now = yield self._transfer(entry, data, gate, of_node=_is_of_node(entry))
         except TransferFailed as failure:
             if failure.by_drive or blind:
                 raise self._error(entry, failure) from None
@@ -204,6 +193,19 @@ class DriveParameters:
         if why:
             raise ParameterError(Why.PROTECTED, why)
 
+    def _pass(self, entry: Entry, gate: Gate) -> None:
+        """Raises ``ParameterError`` where the gate does not let it in."""
+        if why := self.names.protection.why_not(entry, gate):
+            raise ParameterError(Why.PROTECTED, why)
+
+    def _transfer(self, entry: Entry, data: bytes, gate: Gate, *, of_node: bool) -> Transfer:
+        """A write, which passes the gate once more when its turn has come."""
+
+        def why_not() -> str:
+            return self.names.protection.why_not(entry, gate)
+
+        return Transfer(entry.address, data, of_node, why_not)
+
     # the EEPROM
 
     @property
@@ -216,21 +218,25 @@ class DriveParameters:
             return self.names.resolve(eeprom.save_command.parameter)
         return None if eeprom.save is None else Entry("save", eeprom.save)
 
-    def save(
-        self, now: float, *, before_it: Asks | None = None, why_not: Callable[[], str] | None = None
-    ) -> Saves:
-        """The parameters of the node go to its EEPROM. ``before_it`` and ``why_not`` as with ``write``."""
+    def save(self, now: float, gate: Gate) -> Saves:
+        """The parameters of the node go to its EEPROM. What the gate lets in is judged by the parameter that
+        the family saves by; 1010h does nothing but save."""
         entry, eeprom = self.saving, self._eeprom
         if entry is None or eeprom is None:
             raise ParameterError(Why.NOT_CONFIGURED, f"{self.name} has no command that saves its parameters")
         command = eeprom.save_command
         data = _SAVE if command is None else encode_value(entry, command.value, None)
         key = (self._node_name, str(entry.address))
+        if command is not None:
+            self._pass(entry, gate)
         self._check(key, entry.name, now)
-        if before_it is not None:
-            yield from before_it([entry])
+        if gate.asks is not None:
+            yield from gate.asks([entry])
         try:
-            _, now = yield Transfer(entry.address, data, of_node=True, why_not=why_not)
+            if command is None:
+                _, now = yield Transfer(entry.address, data, of_node=True)
+            else:
+                _, now = yield self._transfer(entry, data, gate, of_node=True)
         except TransferFailed as failure:
             if not failure.by_drive:
                 self._count(key, entry.name, now)

@@ -39,6 +39,8 @@ class BackupFile:
     """What the mapping file does not list, as the drive sends it."""
     unreadable: Mapping[str, str] = field(default_factory=dict[str, str])
     """Why something was not read, by its name; not read back."""
+    left_out: Mapping[str, str] = field(default_factory=dict[str, str])
+    """Why no set holds it, by its name: a restore would move something. Not read back."""
     lines: Mapping[str, int] = field(default_factory=dict[str, int])
     """Where the file has ``mapping``, a part of its identity or a value, by its name."""
 
@@ -60,6 +62,9 @@ class BackupFile:
         if self.unreadable:
             lines += ["", "# Could not be read:"]
             lines += [f"#   {name}: {_one_line(why)}" for name, why in self.unreadable.items()]
+        if self.left_out:
+            lines += ["", "# Left out, because a restore would move something:"]
+            lines += [f"#   {_one_line(why)}" for why in self.left_out.values()]
         if self.identity:
             lines += ["", "[identity]", *(f"{name} = 0x{self.identity[name]:08X}" for name in self.identity)]
         lines += ["", "[parameters]"]

@@ -15,13 +15,16 @@ from typing import Final
 from bridge.canopen import abort
 from bridge.image import Value
 from bridge.mapping.model import ObjectRef
-from bridge.parameter.access import MISSING, Asks, DriveParameters, Transfer, Written
+from bridge.parameter.access import MISSING, DriveParameters, Transfer, Written
 from bridge.parameter.backup_file import IDENTITY
 from bridge.parameter.codec import encode_value
 from bridge.parameter.definition import Entry
+from bridge.parameter.effect import Effect
 from bridge.parameter.error import ParameterError, TransferFailed, Why
 from bridge.parameter.names import Names
+from bridge.parameter.protection import Gate
 
+_MOVING: Final = (Effect.COMMANDS, Effect.MAY_MOVE)
 _NO_VALUE: Final = "is neither a number nor a text"
 _NO_OBJECT: Final = 0x0602_0000
 _READ_ONLY: Final = (0x0601_0000, 0x0601_0002)
@@ -85,16 +88,24 @@ Steps = Generator[Transfer, tuple[bytes, float], None]
 def settings(names: Names, *, on_first: bool = True) -> list[Entry]:
     """What belongs into a set, in the order of the mapping file; the node's own parameters are in the set
     of the drive on its first SDO channel."""
-    return [
-        entry
-        for entry in names.entries()
-        if entry.definition
-        and entry.definition.readable
-        and entry.definition.writable
-        and entry.definition.backup
-        and (on_first or not entry.definition.of_node)
-        and not names.protection.why_never(entry)
-    ]
+    return [one for one in _set(names, on_first) if not names.protection.why_no_setting(one)]
+
+
+def left_out(names: Names, *, on_first: bool = True) -> dict[str, str]:
+    """By name, what could be set and belongs into no set, because it moves something or may; with the
+    reason."""
+    return {
+        one.name: why
+        for one in _set(names, on_first)
+        if names.protection.effect(one.address) in _MOVING and (why := names.protection.why_no_setting(one))
+    }
+
+
+def _set(names: Names, on_first: bool) -> Iterator[Entry]:
+    for entry in names.entries():
+        one = entry.definition
+        if one and one.readable and one.writable and one.backup and (on_first or not one.of_node):
+            yield entry
 
 
 def in_order(names: Names, values: Mapping[str, Value]) -> list[tuple[Entry, Value]]:
@@ -116,6 +127,7 @@ def misfits(names: Names, values: Mapping[str, Value]) -> Iterator[tuple[str, Pa
     for name, value in values.items():
         try:
             entry = _fitting(names, name, seen)
+            _check_moves_nothing(names, entry)
             if entry.definition is not None:  # of others only the drive knows how long they are
                 encode_value(entry, value, None)
         except ParameterError as error:
@@ -137,6 +149,12 @@ def _fitting(names: Names, name: str, seen: dict[ObjectRef, str]) -> Entry:
             "it by itself where it is to be changed",
         )
     return entry
+
+
+def _check_moves_nothing(names: Names, entry: Entry) -> None:
+    """Raises ``ParameterError`` for what no set holds because it moves something."""
+    if names.protection.effect(entry.address) in _MOVING and (why := names.protection.why_no_setting(entry)):
+        raise ParameterError(Why.PROTECTED, f"{why}: remove it")
 
 
 def back_up(access: DriveParameters, into: Backup, now: float) -> Steps:
@@ -176,6 +194,8 @@ def read_objects(access: DriveParameters, addresses: Iterable[ObjectRef], into: 
         entry = access.names.at(address)
         known = (into.objects, into.missing, into.unreadable)
         if entry.definition is not None or any(entry.name in names for names in known):
+            continue
+        if access.names.protection.why_no_setting(entry):
             continue
         try:
             reading = yield from access.read(entry, now)
@@ -219,7 +239,7 @@ def _scan_object(
         into.answers += 1
         gap, has_subs = 0, has_subs or sub > 0
         first = first if sub else entry.name
-        if entry.definition is not None or names.protection.why_never(entry):
+        if entry.definition is not None or names.protection.why_no_setting(entry):
             continue
         if is_told:
             found.objects[entry.name] = reading.value
@@ -318,10 +338,10 @@ def restore(
     values: Mapping[str, Value],
     into: Restored,
     now: float,
-    before_it: Asks | None = None,
+    gate: Gate,
 ) -> Steps:
     """Write a set where the drive differs; every write is read back, and the first refusal ends it.
-    ``before_it`` is that of ``DriveParameters.write``. It may be done again with the same ``into``.
+    ``gate`` is that of ``DriveParameters.write``. It may be done again with the same ``into``.
 
     Raises ``ParameterError`` only for a set that does not fit, before anything is written.
     """
@@ -331,7 +351,7 @@ def restore(
     into.failed, into.error = "", None
     for place, (entry, value) in enumerate(wanted):
         try:
-            written = yield from access.write(entry, value, now, before_it=before_it)
+            written = yield from access.write(entry, value, now, gate)
         except ParameterError as error:
             if error.abort_code in MISSING:
                 into.missing.append(entry.name)
@@ -358,6 +378,7 @@ def _checked(access: DriveParameters, values: Mapping[str, Value]) -> list[tuple
     refused: list[ParameterError] = []
     for entry, value in wanted:
         try:
+            _check_moves_nothing(access.names, entry)
             access.check_writable(entry)
             if entry.definition is not None:  # of others only the drive knows how long they are
                 encode_value(entry, value, None)

@@ -53,5 +53,5 @@ def _settings(description: Description, names: Names) -> Iterator[Entry]:
             if known.definition is not None and not known.definition.backup:
                 continue
             is_open = entry.access.readable and entry.access.writable
-            if is_open and not names.protection.why_never(known):
+            if is_open and not names.protection.why_no_setting(known):
                 yield entry

@@ -1,32 +1,66 @@
 """What may not be written as a parameter, under whatever name: judged by the objects that a write touches.
 
-A maker's parameter may be another name of a communication object, or determine one in another form: see
-``[aliases]`` of the mapping file.
+Every write of a client and of the command line goes through ``DriveParameters``, which asks ``Protection``
+with a ``Gate``. A maker's parameter may be another name of a communication object, or determine one in
+another form: see ``[aliases]`` of the mapping file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Final
+from collections.abc import Callable, Generator, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
 
 from bridge.mapping.aliases import COMMUNICATION, Alias, aliases
 from bridge.mapping.model import Family, ObjectRef, Parameter
 from bridge.mapping.own_places import places
 from bridge.mapping.parameters import indices
 from bridge.parameter.definition import Entry
+from bridge.parameter.effect import Effect, Verdict, judge
+from bridge.parameter.profiles import effect_of
 
-NEVER: Final = "command"
-"""Nobody writes it as a parameter."""
+if TYPE_CHECKING:
+    from bridge.parameter.access import Transfer
+
+_PROFILE: Final = 0xFFFF
+"""The bits of 1000h that are the number of the profile (CiA 301 §7.5.2.1)."""
+_CIA_402: Final = 402
+_ORDER: Final = tuple(Effect)
+
+Asks = Callable[[Iterable[Entry]], "Generator[Transfer, tuple[bytes, float], None]"]
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """Who writes, and what is known of what the node moves.
+
+    ``is_moving`` is asked before a write is queued and again when its turn has come: whoever owns the drive
+    may enable it in between. ``asks`` comes right before the write, and raises ``ParameterError`` where there
+    is to be none: for whoever has to ask the drive whether it moves.
+    """
+
+    is_engineer: bool
+    is_moving: Callable[[], bool]
+    asks: Asks | None = None
 
 
 class Protection:
-    """``flagged`` has the definitions that are protected, with the index of their object."""
+    """What writing the objects of one family does. ``listed`` has its definitions, with the index of each
+    one's object."""
 
-    def __init__(self, family: Family, flagged: Iterable[tuple[int, Parameter]]) -> None:
+    def __init__(self, family: Family, listed: Iterable[tuple[int, Parameter]]) -> None:
         rule = family.parameter_names
+        self._is_device = family.is_device
+        self._profile = _profile_of(family)
         self._commands = [indices(one) for one in rule.protected] if rule else []
         self._own = {place.ref.index for place in places(family, link=True)}
-        self._flags: dict[int, str] = {index: one.protected for index, one in flagged if one.protected}
+        self._names_objects = rule is None or (rule.hexadecimal and not rule.index)
+        self._listed: set[int] = set()
+        self._flags: dict[int, Effect] = {}
+        for index, one in listed:
+            self._listed.add(index)
+            if one.protected:
+                self._flags[index] = _first(Effect(one.protected), self._flags.get(index))
         self._aliases: dict[int, list[Alias]] = {}
         for alias in aliases(family):
             self._aliases.setdefault(alias.ref.index, []).append(alias)
@@ -38,6 +72,10 @@ class Protection:
             for mapped in objects
             for part in mapped.parts
         }
+        self._outputs = {output.object.index for output in family.output}
+        self._errors = {
+            ref.index for one in family.output for ref in (one.error_mode, one.error_value) if ref
+        }
 
     def stands_for(self, address: ObjectRef) -> tuple[ObjectRef, ...]:
         """The communication objects that an object is another name of, or decides; what stands beside one
@@ -46,42 +84,112 @@ class Protection:
         exact = [alias for alias in beside if alias.ref.sub == address.sub]
         return tuple(dict.fromkeys(ref for alias in exact or beside for ref in alias.objects))
 
-    def level(self, address: ObjectRef) -> str:
-        """Who may write an object and when (``Parameter.protected``); what stands beside a protected
-        parameter under the same index is protected like it, and so is what the drive watches the
-        bridge by."""
-        if self._commands_drive(address.index) or self._aliases.get(address.index):
-            return NEVER
-        if address.index in COMMUNICATION or address in self._process:
-            return NEVER
-        return self._flags.get(address.index) or ("communication" if address.index in self._own else "")
+    def effect(self, address: ObjectRef) -> Effect:
+        """What a write of an object does. What stands beside a protected parameter under the same index is
+        protected like it."""
+        index = address.index
+        if (
+            address in self._process
+            or index in self._outputs
+            or any(index in span for span in self._commands)
+        ):
+            return Effect.COMMANDS
+        if index in COMMUNICATION or self._aliases.get(index):
+            return Effect.BUS
+        own = Effect.SUPERVISES if index in self._own else None
+        error = Effect.MAKES_SAFE if index in self._errors else None
+        found = _first(own, error, self._flags.get(index), effect_of(index, self._profile))
+        if found is Effect.SETTING and self._names_objects and index not in self._listed:
+            return Effect.MAY_MOVE
+        return found
 
-    def _commands_drive(self, index: int) -> bool:
-        return self._flags.get(index) == NEVER or any(index in span for span in self._commands)
+    def level(self, address: ObjectRef) -> str:
+        """Who may write an object and when, as clients are told (``Effect.level``)."""
+        return self.effect(address).level
+
+    def may_set(self, address: ObjectRef, *, is_engineer: bool) -> bool:
+        """Whether an engineer, or somebody who is none, ever writes an object."""
+        return judge(self.effect(address), is_engineer=is_engineer, is_moving=False) is Verdict.WRITTEN
 
     def tells_own_supervision(self, address: ObjectRef) -> bool:
-        """Whether an object says what the drive does when the bridge falls silent."""
-        return any(one.index in self._own for one in (address, *self.stands_for(address)))
+        """Whether an object says what the node does when the bridge falls silent."""
+        return any(one.index in self._own for one in (address, *self.stands_for(address))) or (
+            self._is_device and self.effect(address) is Effect.MAKES_SAFE
+        )
+
+    def why_not(self, entry: Entry, gate: Gate) -> str:
+        """Why this is not written by whom the gate lets in; empty where it is."""
+        effect = self.effect(entry.address)
+        match judge(effect, is_engineer=gate.is_engineer, is_moving=gate.is_moving()):
+            case Verdict.WRITTEN:
+                return ""
+            case Verdict.NEVER:
+                return self.why_never(entry)
+            case Verdict.NOT_AN_ENGINEER:
+                return f"{self._what(entry, effect)}: an engineer may set it"
+            case Verdict.NOT_AT_REST if self._is_device:
+                return f"{entry.name} is not written while an output is active: make it safe first"
+            case Verdict.NOT_AT_REST:
+                return f"{entry.name} is not written while the drive is enabled: stop and disable it first"
 
     def why_never(self, entry: Entry) -> str:
         """Why nobody writes it as a parameter; empty where somebody may."""
-        address = entry.address
-        if self._commands_drive(address.index):
-            return f"{entry.name} commands the drive: its controller alone does, by process data"
-        objects = self.stands_for(address)
+        address, effect = entry.address, self.effect(entry.address)
         where = "belongs to the communication that the bridge supervises: set it in the site file"
-        if objects:
+        if effect is Effect.BUS and (objects := self.stands_for(address)):
             names = ", ".join(str(ref) for ref in objects)
             return f"{entry.name} ({address}) stands for {names}, which {where} ([[bus.node.configure]])"
-        if address.index in COMMUNICATION:
+        if effect is Effect.BUS:
             return f"{entry.name} {where} ([[bus.node.configure]])"
+        if effect is Effect.SHAPES:
+            return (
+                f"{entry.name} changes outputs at once, and what is safe for them: set it in the site file "
+                "([[bus.node.configure]])"
+            )
+        if effect is not Effect.COMMANDS:
+            return ""
+        if self._is_device:
+            return f"{entry.name} commands what the node moves: its owner alone does, by process data"
         if address in self._process:
             return f"{entry.name} is process data, which the drive's controller alone commands"
-        return ""
+        return f"{entry.name} commands the drive: its controller alone does, by process data"
+
+    def why_no_setting(self, entry: Entry) -> str:
+        """Why no parameter set holds it: a restore would move something. Empty where one may. What an RPDO
+        can carry to a drive moves nothing while that is disabled, and a set is restored only then."""
+        effect = self.effect(entry.address)
+        if effect is Effect.MAY_MOVE and self._is_device:
+            return f"{entry.name} may move something: no parameter set holds it"
+        return self.why_never(entry)
 
     def why_forced(self, entry: Entry) -> str:
-        """Why the command line, which knows no roles, writes it with ``--force`` only, if at all."""
-        why = self.why_never(entry)
-        if not why and self.level(entry.address) == "communication":
-            why = f"{entry.name} decides who commands the drive and what supervises it"
-        return why
+        """Why the command line, which knows no roles, writes it with ``--force`` only, if at all. What may
+        move a drive does so only while that is enabled, and then it is not written."""
+        effect = self.effect(entry.address)
+        if effect is Effect.MAY_MOVE and not self._is_device:
+            return ""
+        verdict = judge(effect, is_engineer=False, is_moving=False)
+        if verdict is Verdict.NOT_AN_ENGINEER:
+            return self._what(entry, effect)
+        return self.why_never(entry)
+
+    def _what(self, entry: Entry, effect: Effect) -> str:
+        if effect is Effect.SUPERVISES:
+            return f"{entry.name} decides who commands the drive and what supervises it"
+        if effect is Effect.MAKES_SAFE:
+            return f"{entry.name} decides what a stop and a silent bridge do"
+        return f"{entry.name} may move something"
+
+
+def _profile_of(family: Family) -> int | None:
+    """The number of the device profile; None where nobody says it."""
+    if family.family.profile is not None:
+        return family.family.profile
+    if family.slot:
+        return _CIA_402
+    return None if family.identity.device_type is None else family.identity.device_type & _PROFILE
+
+
+def _first(*effects: Effect | None) -> Effect:
+    """The strictest of those that there are."""
+    return min((one for one in effects if one is not None), key=_ORDER.index, default=Effect.SETTING)

@@ -165,7 +165,7 @@ def test_a_parameter_is_written_to_them_without_asking_for_a_status_word(site: P
 
     def procedure(now: float):
         yield from guard.check([entry])
-        written = yield from target.access.write(entry, 5, now, before_it=guard.check)
+        written = yield from target.access.write(entry, 5, now, guard.gate)
         found.append(written.reading)
 
     errand = ParameterErrand(target.node, target.family, target.slot, procedure, 0.0)

@@ -43,6 +43,9 @@ class OwnWatch:
         why = f"{entry.name} {what} since boot: boot the node to have it read again"
         for one in self._concerned(drive, entry):
             one.on_own_supervision_changed(why, now)
+        device = self._node.device
+        if device is not None and device.outputs is not None:
+            device.outputs.on_own_supervision_changed(why, now)
 
     def _concerned(self, drive: HasParameters, entry: Entry) -> Sequence[Drive]:
         """Whom the object is about: ``drive``, or all of the node."""

@@ -46,6 +46,7 @@ from bridge.parameter import (
     Written,
 )
 from bridge.parameter.codec import check_raw, decode, shown
+from bridge.parameter.protection import Gate
 
 _CODES: Final = {
     Why.UNKNOWN_NAME: Code.UNKNOWN_PARAMETER,
@@ -168,9 +169,8 @@ class NodeParameters:
             check_raw(entry, command.value)
             entry = entry.as_bytes
         access.check_writable(entry)
-        level = access.names.protection.level(entry.address)
-        refusal = _why_protected(level, entry, request.identity, drive)
-        if refusal:
+        gate = _gate(request.identity, drive)
+        if refusal := access.names.protection.why_not(entry, gate):
             conclude(_no(Code.NOT_ALLOWED, refusal))
             return
         key = (drive.name, entry.address)
@@ -180,28 +180,13 @@ class NodeParameters:
             conclude(_no(Code.BUSY, f"{entry.name} of {drive.name} is being written"))
         else:
             self._writing.add(key)
-            # Who asks may enable the drive while this waits for its turn.
-            steps = access.write(
-                entry,
-                command.value,
-                now,
-                why_not=lambda: _why_protected(level, entry, request.identity, drive),
-            )
+            steps = access.write(entry, command.value, now, gate)
             self._run(steps, drive, partial(self._on_written, request, drive, entry, conclude))
 
     def _save(
         self, access: DriveParameters, identity: Identity, drive: HasParameters, now: float, conclude: Reply
     ) -> None:
-        entry = access.saving
-
-        def why_not() -> str:
-            level = access.names.protection.level(entry.address) if entry else ""
-            return _why_protected(level, entry, identity, drive) if entry else ""
-
-        if refusal := why_not():
-            conclude(_no(Code.NOT_ALLOWED, refusal))
-            return
-        self._run(access.save(now, why_not=why_not), drive, partial(self._on_saved, conclude))
+        self._run(access.save(now, _gate(identity, drive)), drive, partial(self._on_saved, conclude))
 
     def _read(
         self,
@@ -347,13 +332,8 @@ def _why_not_set(identity: Identity, drive: HasParameters) -> str:
     return drive.refusal(identity)
 
 
-def _why_protected(protection: str, entry: Entry, identity: Identity, drive: HasParameters) -> str:
-    """Why a parameter that more depends on than its own value is not written now."""
-    if protection == "communication" and identity.role < Role.ENGINEER:
-        return f"{entry.name} decides who commands the drive and what supervises it: an engineer may set it"
-    if protection in ("communication", "while_enabled") and drive.is_enabled:
-        return f"{entry.name} is not written while the drive is enabled: stop and disable it first"
-    return ""
+def _gate(identity: Identity, drive: HasParameters) -> Gate:
+    return Gate(identity.role >= Role.ENGINEER, lambda: drive.is_enabled)
 
 
 def _failed(error: ParameterError) -> Outcome:

@@ -213,6 +213,7 @@ def backup_of(
         identity,
         {},
         {entry.name: unreadable[entry.name] for entry in entries if entry.name in unreadable},
+        left_out=backups.left_out(holder.names, on_first=holder.on_first),
     )
     return content.text()
 

@@ -13,6 +13,8 @@ from bridge.drive import DriveState
 from bridge.eds import read_device
 from bridge.errors import OperationFailed
 from bridge.mapping import Family
+from bridge.parameter import Names, ObjectRef
+from bridge.parameter.effect import Effect
 from tests.support.bench import PLC
 from tests.support.invented_eds import (
     BASIC,
@@ -87,10 +89,17 @@ def test_what_the_device_has_not_is_left_out(tmp_path: Path) -> None:
 
 
 def test_what_can_be_mapped_is_not_written_while_the_drive_is_enabled(tmp_path: Path) -> None:
-    sections = {**SPIN, "2008": mapped("torque limit", U16), "60FE": mapped("outputs", U32)}
+    sections = {
+        **SPIN,
+        "2008": mapped("torque limit", U16),
+        "60E0": mapped("positive torque limit", U16),
+        "60FE": mapped("outputs", U32),
+    }
     family = derived(tmp_path, sections)
-    assert family.parameter_named("2008").protected == "while_enabled"
-    assert family.parameter_named("60FE").protected == "command"
+    protection = Names(family).protection
+    assert family.parameter_named("2008").protected == "may_move"
+    assert family.parameter_named("60E0").protected == "while_enabled"
+    assert protection.effect(ObjectRef(0x60FE, 0)) is Effect.COMMANDS
 
 
 def test_a_limit_that_contradicts_the_other_is_a_comment(tmp_path: Path) -> None:

@@ -134,3 +134,20 @@ def test_the_node_is_asked(tmp_path: Path, watch_ms: int, mode: int, verdict: Ow
         now += 0.001
     assert not errand.failed
     assert errand.found["io"].verdict is verdict
+
+
+@pytest.mark.parametrize(("name", "kind"), [("6200:01", "uint8"), ("6200:02", "uint8"), ("6411:01", "int16")])
+def test_a_download_that_switches_an_output_at_every_boot_up_is_an_error(
+    tmp_path: Path, name: str, kind: str
+) -> None:
+    more = f'{SAFE}configure = [{{ object = "{name}", type = "{kind}", value = 1 }}]\n{OWNED}'
+    (error,) = judged(tmp_path, more).of(Severity.ERROR)
+    assert error.fault.message.startswith(f"{name} of io is 1 at every boot-up")
+
+
+@pytest.mark.parametrize(
+    "download", ['"6200:01", type = "uint8", value = 0', '"6206:01", type = "uint8", value = 255']
+)
+def test_what_makes_outputs_safe_may_be_downloaded(tmp_path: Path, download: str) -> None:
+    more = f"{SAFE}configure = [{{ object = {download} }}]\n{OWNED}"
+    assert not judged(tmp_path, more).findings

@@ -32,6 +32,7 @@ from bridge.parameter.backup_file import BackupFile, read_backup
 from bridge.parameter.ledger import Saved
 from bridge.sim.nord_supervision import Presence
 from bridge.sim.nord_tu4 import NordTu4
+from tests.support.gates import ENGINEER_AT_REST
 
 NORD = load_family("nord/sk-tu4-cao")
 NODE = NodeTable.model_validate(
@@ -79,7 +80,7 @@ class Workshop:
     def restore(self, values: dict[str, Value]) -> backups.Restored:
         self.access.forget()
         done = backups.Restored()
-        assert self.run(lambda now: backups.restore(self.access, values, done, now)) is None
+        assert self.run(lambda now: backups.restore(self.access, values, done, now, ENGINEER_AT_REST)) is None
         return done
 
     def compare(self, values: dict[str, Value]) -> backups.Comparison:
@@ -161,7 +162,7 @@ def test_what_this_drive_does_not_have_is_named_and_passed_over(workshop: Worksh
 def test_a_name_that_there_is_not_stops_it_before_anything_is_written(workshop: Workshop) -> None:
     done = backups.Restored()
     values: dict[str, Value] = {"P102.1": 1.0, "P1O5": 1.0}
-    error = workshop.run(lambda now: backups.restore(workshop.access, values, done, now))
+    error = workshop.run(lambda now: backups.restore(workshop.access, values, done, now, ENGINEER_AT_REST))
     assert isinstance(error, ParameterError)
     assert workshop.eeprom_writes == 0
 
@@ -264,7 +265,7 @@ def test_a_file_with_other_line_ends_is_read(tmp_path: Path) -> None:
 
 def _refusal(workshop: Workshop, values: dict[str, Value]) -> str:
     done = backups.Restored()
-    error = workshop.run(lambda now: backups.restore(workshop.access, values, done, now))
+    error = workshop.run(lambda now: backups.restore(workshop.access, values, done, now, ENGINEER_AT_REST))
     assert isinstance(error, ParameterError)
     assert workshop.eeprom_writes == 0
     return str(error)
@@ -308,13 +309,13 @@ def test_the_nodes_own_parameters_are_in_the_set_of_its_first_drive_only() -> No
     names = Names(NORD)
     first = {entry.name for entry in backups.settings(names)}
     second = {entry.name for entry in backups.settings(names, on_first=False)}
-    assert first - second >= {"P151", "P150"}
+    assert first - second >= {"P151", "P154[1]"}
     assert not any(name.startswith("P15") for name in second)
 
 
 def test_an_object_that_no_file_lists_echoes_the_sign_that_was_written() -> None:
     access = DriveParameters("n/d", "n", NORD, Names(NORD), Ledger())
-    steps = access.write(access.names.resolve("2FF0:00"), -5, 0.0)
+    steps = access.write(access.names.resolve("2FF0:00"), -5, 0.0, ENGINEER_AT_REST)
     next(steps)
     steps.send((b"\x01\x00", 0.0))  # held; then P560
     steps.send((b"\x00\x00", 0.0))  # P560: RAM alone; then the write
@@ -418,7 +419,7 @@ def test_a_value_that_the_drive_refuses_costs_a_backup_that_value_alone() -> Non
 def test_what_was_scanned_is_restored_where_it_differs_and_what_is_read_only_is_named() -> None:
     drive, done = AnyDrive(dict(MOTOR)), backups.Restored()
     values: dict[str, Value] = {**FOUND, "P203.2": 25, "P201": 2, "P102.1": 1.0}
-    assert drive.run(backups.restore(_access(), values, done, 0.0)) is None
+    assert drive.run(backups.restore(_access(), values, done, 0.0, ENGINEER_AT_REST)) is None
     assert drive.written == {(0x20CB, 2): b"\x19\0"}
     assert (done.read_only, done.error) == (["P201"], None)
 
@@ -427,12 +428,12 @@ def test_a_restore_that_broke_off_goes_on_and_writes_nothing_twice() -> None:
     objects, done, access = dict(MOTOR), backups.Restored(), _access()
     values: dict[str, Value] = {"P200": 8, "P203.1": 11, "P203.2": 21}
     # read P200, read P560, write, read back: four answers each
-    AnyDrive(objects, 5).run(backups.restore(access, values, done, 0.0))
+    AnyDrive(objects, 5).run(backups.restore(access, values, done, 0.0, ENGINEER_AT_REST))
     assert done.error
     assert done.error.why is Why.NO_ANSWER
     again = AnyDrive(objects)
     access.forget()
-    assert again.run(backups.restore(access, values, done, 0.0)) is None
+    assert again.run(backups.restore(access, values, done, 0.0, ENGINEER_AT_REST)) is None
     assert (done.error, done.same) == (None, [])
     assert [one.reading.entry.name for one in done.written] == ["P200", "P203.1", "P203.2"]
     assert again.written.keys() == {(0x20CB, 1), (0x20CB, 2)}

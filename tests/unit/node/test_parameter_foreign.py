@@ -14,6 +14,7 @@ from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
 from bridge.parameter import DriveParameters, Ledger, Names, ParameterError, backups
 from bridge.parameter.factory import described, factory
+from tests.support.gates import ENGINEER_AT_REST
 
 FAMILY = load_family("cia402/velocity")
 EDS = mappings_dir() / "cia402" / "cia402.eds"
@@ -76,7 +77,7 @@ def test_a_foreign_drive_is_backed_up_compared_with_its_factory_settings_and_res
     access.forget()
     done = backups.Restored()
     changed = {**values, name: 1234}
-    assert device.carry_out(lambda now: backups.restore(access, changed, done, now)) is None
+    assert device.carry_out(lambda now: backups.restore(access, changed, done, now, ENGINEER_AT_REST)) is None
     assert done.error is None, done.error
     assert [one.reading.entry.name for one in done.written] == [name]
     assert device.node.get_data(place.index, place.sub)[:2] == (1234).to_bytes(2, "little")

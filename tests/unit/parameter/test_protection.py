@@ -24,6 +24,7 @@ from bridge.parameter.error import Why
 from bridge.sim.catalogue import simulate_node
 from tests.support import sites
 from tests.support.bench import PLC, Bench
+from tests.support.gates import ENGINEER_AT_REST
 
 FAMILIES: Final = tuple(family_names())
 ENGINEER = Identity(Source.OPCUA, "eve", Role.ENGINEER)
@@ -176,7 +177,7 @@ def refused(access: DriveParameters, text: str, address: ObjectRef) -> bool:
         entry = access.names.resolve(text)
     except ParameterError:
         return True
-    steps = access.write(entry, 1, 0.0)
+    steps = access.write(entry, 1, 0.0, ENGINEER_AT_REST)
     try:
         next(steps)
     except ParameterError as error:
@@ -214,7 +215,7 @@ def test_a_write_that_is_let_through_touches_no_communication_object(mapping: st
     listed = {access.names.resolve(name).address.index for one, name, _ in MANUALS if one == base}
     try:
         entry = access.names.resolve(text)
-        next(access.write(entry, 1, 0.0))
+        next(access.write(entry, 1, 0.0, ENGINEER_AT_REST))
     except (ParameterError, StopIteration):
         return
     assert entry.address.index not in COMMUNICATION
@@ -228,7 +229,7 @@ def test_a_write_that_is_let_through_touches_no_communication_object(mapping: st
 def test_a_parameter_set_with_one_is_refused_before_anything_is_written(mapping: str, name: str) -> None:
     access = access_to(mapping)
     harmless = "C00011" if mapping == LENZE else "C01" if mapping == STOEBER else "P102"
-    steps = backups.restore(access, {harmless: 100, name: 1}, backups.Restored(), 0.0)
+    steps = backups.restore(access, {harmless: 100, name: 1}, backups.Restored(), 0.0, ENGINEER_AT_REST)
     with pytest.raises(ParameterError) as raised:
         next(steps)
     assert raised.value.why in (Why.PROTECTED, Why.READ_ONLY)

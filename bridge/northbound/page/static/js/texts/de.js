@@ -385,6 +385,8 @@ export const de = {
   "parameters.factory_is": "Werkseinstellung: {value}",
   "parameters.protected.command": "Er steuert den Antrieb und wird nicht als Parameter geschrieben.",
   "parameters.protected.communication": "Er entscheidet, wer den Antrieb steuert und was ihn überwacht: Geschrieben wird er nur, während der Antrieb nicht freigegeben ist.",
+  "parameters.protected.safe": "Er entscheidet, was ein Halt und eine schweigende Bridge bewirken: Geschrieben wird er nur, während sich nichts bewegt.",
+  "parameters.protected.may_move": "Er bewegt womöglich etwas: Geschrieben wird er nur, während sich nichts bewegt.",
   "parameters.protected.while_enabled": "Wird nicht geschrieben, während der Antrieb freigegeben ist.",
   "parameters.wear": "EEPROM: {writes} von {cycles} Schreibvorgängen",
   "parameters.wear.command": "Ein Befehl: Es wird nichts gespeichert.",

@@ -385,6 +385,8 @@ export const en = {
   "parameters.factory_is": "Factory setting: {value}",
   "parameters.protected.command": "It commands the drive and is not written as a parameter.",
   "parameters.protected.communication": "It decides who commands the drive and what supervises it: written only while the drive is not enabled.",
+  "parameters.protected.safe": "It decides what a stop and a silent bridge do: written only while nothing moves.",
+  "parameters.protected.may_move": "It may move something: written only while nothing moves.",
   "parameters.protected.while_enabled": "Not written while the drive is enabled.",
   "parameters.wear": "EEPROM: written {writes} times of {cycles}",
   "parameters.wear.command": "A command: nothing is stored.",

@@ -1,0 +1,26 @@
+"""Downloads of the boot-up that move something, whoever owns it."""
+
+from __future__ import annotations
+
+from bridge.lint.bus import BusView
+from bridge.lint.report import LintReport
+from bridge.mapping.fields import ObjectRef
+from bridge.parameter import Names
+from bridge.parameter.effect import Effect
+
+
+def check_moving(bus: BusView, report: LintReport) -> None:
+    """A download of what commands a node is an error; 0 is what it holds after switching on."""
+    for node in bus.nodes:
+        names = Names(node.family)
+        for (index, sub), value in node.settings.values.items():
+            address = ObjectRef(index, sub)
+            setting = node.settings[index, sub]
+            if not value or setting is None or names.protection.effect(address) is not Effect.COMMANDS:
+                continue
+            report.error(
+                setting.key,
+                f"{names.at(address).name} of {node.table.name} is {value} at every boot-up: that commands "
+                "what the node moves, and nobody owns it yet",
+                "leave it out; its owner writes it",
+            )

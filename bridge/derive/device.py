@@ -7,7 +7,8 @@ from typing import Final
 
 from bridge.canopen.datatypes import INTEGERS, REALS
 from bridge.derive.parameters import TYPES, entries_of, parameter_lines
-from bridge.derive.toml import file_name, one_line, string, strings, word
+from bridge.derive.titles import name_of, title_of
+from bridge.derive.toml import one_line, string, strings, word
 from bridge.eds import Description, Entry
 from bridge.eds.pdos import pdos
 
@@ -57,7 +58,7 @@ def device_lines(description: Description, source: str) -> Iterator[str]:
     told = {(entry.index, entry.sub) for entry, _, _ in inputs.values()}
     for name, entry in entries_of(description):
         yield from parameter_lines(
-            name, entry, _title(description, entry), {}, commanded | told, profile or None
+            name, entry, title_of(description, entry), {}, commanded | told, profile or None
         )
 
 
@@ -93,24 +94,11 @@ def _signals(description: Description, *, receives: bool) -> Iterator[tuple[str,
         kind = TYPES.get(entry.data_type) if entry.data_type else None
         if kind is None or kind in ("string", "bytes"):
             continue
-        name = _name(description, entry)
+        name = name_of(title_of(description, entry), entry)
         if name in names:
             name = f"{name}_{entry.index:04x}_{entry.sub:02x}"
         names.add(name)
-        yield name, (entry, kind, _title(description, entry))
-
-
-def _name(description: Description, entry: Entry) -> str:
-    """From the entry's title; the object's goes first where the entry is one of several."""
-    words = file_name(_title(description, entry)).replace("-", "_")
-    return words if words[:1].isalpha() else f"object_{entry.index:04x}_{entry.sub:02x}"
-
-
-def _title(description: Description, entry: Entry) -> str:
-    one = description.object(entry.index)
-    if one is None or not one.object_type.has_subs or entry.name.lower().startswith(one.name.lower()):
-        return entry.name
-    return f"{one.name} {entry.name}"
+        yield name, (entry, kind, title_of(description, entry))
 
 
 def _is_eight_bits(description: Description, entry: Entry) -> bool:

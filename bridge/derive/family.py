@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from bridge.derive.device import GENERIC, device_lines, identity_lines
-from bridge.derive.layout import Layout, NoLayout, layout_of
+from bridge.derive.layout import Layout, NoLayout, PdoLayout, layout_of
 from bridge.derive.modes import (
     CONTROL_WORD,
     MODE,
@@ -21,14 +21,24 @@ from bridge.derive.modes import (
     modes_of,
 )
 from bridge.derive.parameters import FURTHER_AXES, entries_of, parameter_lines
+from bridge.derive.titles import name_of
 from bridge.derive.toml import file_name, one_line, string, strings
-from bridge.eds import Description, read_whole_device_file
+from bridge.eds import DataType, Description, read_whole_device_file
 from bridge.errors import Fault, FileFaults, OperationFailed
 from bridge.mapping import Family, load_family
 from bridge.mapping.loader import family_of
 
 _NEEDED: Final = ("603F", "6007")
 """Parameters that the base itself speaks of; a device without them refuses to be asked."""
+_VALUE_TYPES: Final = {
+    DataType.INTEGER8: "int16",
+    DataType.INTEGER16: "int16",
+    DataType.INTEGER32: "int32",
+    DataType.UNSIGNED8: "uint16",
+    DataType.UNSIGNED16: "uint16",
+    DataType.UNSIGNED32: "uint32",
+}
+"""The types of values in words; a signed byte fills its word with its sign (``signed`` of the PDO)."""
 _INTERPOLATION: Final = 0x60C2
 _CYCLIC: Final = (8, 9)
 
@@ -155,6 +165,7 @@ def _lines(
     yield ""
     yield from identity_lines(description)
     yield from _process(description, layout, mode)
+    yield from _further(layout, {(one.group, one.name) for one in base.value})
     carried = {(index, 0) for index, _ in (*mode.commanded, *mode.told)}
     names = {one.index: one.name for one in description.objects}
     for name, entry in entries:
@@ -199,6 +210,7 @@ def _process(description: Description, layout: Layout, mode: Mode) -> Iterator[s
         ):
             if own:
                 yield f"{direction} = {strings(words)}"
+        yield from _rest(layout.rpdo)
         yield ""
     start = _start(description, mode)
     if layout.is_base and start is None:
@@ -224,6 +236,42 @@ def _process(description: Description, layout: Layout, mode: Mode) -> Iterator[s
         yield 'group = "actual"'
         yield f"word = {string(name)}"
         yield ""
+
+
+def _rest(rpdo: Sequence[PdoLayout]) -> Iterator[str]:
+    """What RPDOs send in words that nobody commands."""
+    words = {
+        word: one.rest >> 16 * n & 0xFFFF
+        for pdo in rpdo
+        for one in pdo.further
+        for n, word in enumerate(one.words)
+    }
+    if resting := ", ".join(f"{word} = {value}" for word, value in words.items() if value):
+        yield f"rest = {{ {resting} }}"
+
+
+def _further(layout: Layout, taken: Set[tuple[str, str]]) -> Iterator[str]:
+    """A value for each further object of its PDOs, by the type that the file has for it. Real numbers and
+    what is longer than two words have their words alone. ``taken`` are the base's values."""
+    seen = set(taken)
+    for group, pdos in (("command", layout.rpdo), ("actual", layout.tpdo)):
+        for one in (one for pdo in pdos for one in pdo.further):
+            kind = _VALUE_TYPES.get(one.entry.data_type) if one.entry.data_type else None
+            if kind is None:
+                continue
+            name = name_of(one.title, one.entry)
+            if (group, name) in seen:
+                name = f"{name}_{one.entry.index:04x}_{one.entry.sub:02x}"
+            seen.add((group, name))
+            yield "[[value]]"
+            yield f"name = {string(name)}"
+            yield f"group = {string(group)}"
+            yield f"word = {string(one.words[0])}" if len(one.words) == 1 else f"words = {strings(one.words)}"
+            yield f"data_type = {string(kind)}"
+            yield '# unit = ""'
+            yield "# scale = { factor = 1.0 }"
+            yield f"description = {string(one.title)}"
+            yield ""
 
 
 def describe(path: Path, folders: Sequence[Path] = ()) -> Family:

@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from bridge.derive.modes import MODE_DISPLAY, Mode, bits_of
+from bridge.derive.modes import MODE, MODE_DISPLAY, PROFILE_402, Mode, bits_of
+from bridge.derive.titles import title_of
 from bridge.derive.toml import string, strings, word
-from bridge.eds import Description
+from bridge.eds import DataType, Description, Entry
 from bridge.eds.pdos import MappedObject, PdoSummary, pdos
+from bridge.parameter.effect import Effect
+from bridge.parameter.profiles import effect_of
 
 _WORD: Final = 16
 _MOST_WORDS: Final = 4
@@ -17,10 +20,23 @@ _MOST_PROCESS_WORDS: Final = 9
 _FIRST_COB_ID: Final = {True: 0x200, False: 0x180}
 _PREDEFINED: Final = 4
 _MOST_COB_ID: Final = 0x780
+_DUMMIES: Final = range(0x0001, 0x0008)
+"""Data types that fill a PDO (CiA 301 §7.4.7)."""
 
 
 class NoLayout(Exception):
     """The device cannot be driven in this mode; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Further:
+    """An object that a PDO carries beside what the mode needs; ``words`` are those that it fills, the low one
+    first. ``rest`` is what an RPDO sends in it while nobody commands it, as an integer without sign."""
+
+    words: tuple[str, ...]
+    entry: Entry
+    title: str
+    rest: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +49,10 @@ class PdoLayout:
     objects: tuple[str, ...]
     turn_on: bool = False
     """The device has it off."""
+    further: tuple[Further, ...] = ()
+    """What it carries beside what the mode needs."""
+    signed: tuple[str, ...] = ()
+    """Objects of one byte with a sign."""
 
     def lines(self, direction: str, *, names_words: bool = True) -> list[str]:
         """As an item of ``[[slot]]``."""
@@ -41,6 +61,8 @@ class PdoLayout:
         if names_words:
             lines.append(f"words = {strings(self.words)}")
         lines.append(f"objects = [{objects}]")
+        if self.signed:
+            lines.append(f"signed = {strings(self.signed)}")
         if self.turn_on:
             lines.append("write = true                 # the device has it switched off")
         return lines
@@ -69,7 +91,7 @@ def layout_of(description: Description, mode: Mode) -> Layout:
     rpdo: tuple[PdoLayout, ...] = ()
     tpdo: tuple[PdoLayout, ...] = ()
     if not _is_free(description, mode.commanded, receives=True):
-        rpdo = _own(description, commands, "setpoint", receives=True)
+        rpdo = _own(description, mode, commands, "setpoint", receives=True)
     if _is_free(description, (*mode.told, (MODE_DISPLAY, 8)), receives=False) and tells_mode:
         told[f"value_{len(told)}"] = (MODE_DISPLAY, 8)
     elif _is_free(description, mode.told, receives=False):
@@ -79,7 +101,7 @@ def layout_of(description: Description, mode: Mode) -> Layout:
     else:
         if tells_mode:
             told[f"value_{len(told)}"] = (MODE_DISPLAY, 8)
-        tpdo = _own(description, told, "value", receives=False)
+        tpdo = _own(description, mode, told, "value", receives=False)
         tells_mode = any(_ref(MODE_DISPLAY, 8) in pdo.objects for pdo in tpdo)
     rpdo_words = _process(commands, rpdo)
     tpdo_words = _process(told, tpdo)
@@ -130,12 +152,16 @@ def _is_free(description: Description, objects: Sequence[tuple[int, int]], *, re
     return all(entry and entry.pdo_mappable for entry in entries)
 
 
-def _own(description: Description, words: _Words, others: str, *, receives: bool) -> tuple[PdoLayout, ...]:
+def _own(
+    description: Description, mode: Mode, words: _Words, others: str, *, receives: bool
+) -> tuple[PdoLayout, ...]:
     """The device's own PDOs that carry the objects of ``words``. Raises ``NoLayout``."""
     of_direction = [one for one in pdos(description) if one.receives is receives]
     bases = {one.number: base for one in of_direction if (base := _base(description, one)) is not None}
     there = [one for one in of_direction if one.number in bases and _is_usable(description, one)]
     there.sort(key=lambda one: not one.enabled)
+    # One that carries nothing else needs nobody to say what is right for the rest of it.
+    there.sort(key=lambda one: sum(not _is_wanted(item, words) for item in one.mapped))
     wanted = dict.fromkeys(words.values())
     needed = [one for one in wanted if one[0] != MODE_DISPLAY]
     whole = [one for one in there if all(_carries(one, want) for want in needed)]
@@ -152,7 +178,7 @@ def _own(description: Description, words: _Words, others: str, *, receives: bool
                     f"no {kind} of the device carries {want[0]:04X}h, and {kind}1 cannot be made to"
                 )
             chosen.append(carriers[0])
-    names = _Names(words, others)
+    names = _Names(description, mode, words, others)
     return tuple(names.layout(one, bases[one.number]) for one in sorted(chosen, key=lambda one: one.number))
 
 
@@ -178,6 +204,10 @@ def _base(description: Description, pdo: PdoSummary) -> int | None:
     return None
 
 
+def _is_wanted(one: MappedObject, words: _Words) -> bool:
+    return not one.sub and (one.index, one.bits) in words.values()
+
+
 def _carries(pdo: PdoSummary, want: tuple[int, int]) -> bool:
     return any((one.index, one.bits) == want and one.sub == 0 for one in pdo.mapped)
 
@@ -185,7 +215,9 @@ def _carries(pdo: PdoSummary, want: tuple[int, int]) -> bool:
 class _Names:
     """Gives each word of the chosen PDOs a name, and none twice."""
 
-    def __init__(self, words: _Words, others: str) -> None:
+    def __init__(self, description: Description, mode: Mode, words: _Words, others: str) -> None:
+        self._description = description
+        self._mode = mode
         self._free = dict(words)
         self._others = others
         self._next = len(words)
@@ -193,11 +225,49 @@ class _Names:
     def layout(self, pdo: PdoSummary, cob_id: int) -> PdoLayout:
         words: list[str] = []
         objects: list[str] = []
+        further: list[Further] = []
         for one in pdo.mapped:
-            names = self._known(one) or self._new(max(1, one.bits // _WORD))
+            names = self._known(one)
+            if not names:
+                names = self._new(max(1, one.bits // _WORD))
+                if one.index not in _DUMMIES:
+                    further.append(self._further(pdo, one, tuple(names)))
             words += names
             objects += [_ref(one.index, one.bits, one.sub)] * len(names)
-        return PdoLayout(pdo.number, cob_id, tuple(words), tuple(objects), not pdo.enabled)
+        signed = tuple(_ref(one.index, sub=one.sub) for one in pdo.mapped if self._is_signed_byte(pdo, one))
+        return PdoLayout(
+            pdo.number, cob_id, tuple(words), tuple(objects), not pdo.enabled, tuple(further), signed
+        )
+
+    def _is_signed_byte(self, pdo: PdoSummary, one: MappedObject) -> bool:
+        """Whether it has to be told that a byte of a TPDO has a sign."""
+        entry = None if pdo.receives else self._description.entry(one.index, one.sub)
+        return entry is not None and entry.data_type is DataType.INTEGER8
+
+    def _further(self, pdo: PdoSummary, one: MappedObject, words: tuple[str, ...]) -> Further:
+        """Raises ``NoLayout`` for what an RPDO carries and nobody says a right value for: 0 is not right for
+        a torque limit, and as a mode of operation it is none."""
+        entry = self._description.entry(one.index, one.sub)
+        if entry is None:
+            kind = "RPDO" if pdo.receives else "TPDO"
+            ref = _ref(one.index, one.bits, one.sub)
+            raise NoLayout(f"{kind}{pdo.number} carries {ref}, which the file does not describe")
+        title = title_of(self._description, entry)
+        if not pdo.receives:
+            return Further(words, entry, title)
+        mask = (1 << one.bits) - 1
+        if one.index == MODE:
+            return Further(words, entry, title, self._mode.number & mask)
+        value = entry.current.at(None) if entry.current else None
+        if isinstance(value, int):
+            return Further(words, entry, title, value & mask)
+        if effect_of(one.index, PROFILE_402) is Effect.COMMANDS:
+            return Further(words, entry, title)
+        raise NoLayout(
+            f"RPDO{pdo.number} carries {one.index:04X}h:{one.sub:02X} ({entry.name}) too, and line "
+            f"{entry.line} of the file has no default value to be sent in it: give it one, or write the "
+            "mapping by hand"
+        )
 
     def _known(self, one: MappedObject) -> list[str]:
         names = [name for name, want in self._free.items() if want == (one.index, one.bits) and not one.sub]

@@ -38,6 +38,10 @@ def check_process(family: Family, file: MergedFile) -> None:
         if words[0] != first:
             file.fault(("process", name), f"must begin with {first}")
         twice(((word, ("process", name, place)) for place, word in enumerate(words)), "word", file)
+    for word in family.process.rest:
+        if word not in family.process.rpdo[1:]:
+            hint = f"known: {', '.join(family.process.rpdo[1:])}"
+            file.fault(("process", "rest", word), f"there is no setpoint word {word!r}", hint)
 
 
 def check_slots(family: Family, file: MergedFile) -> None:

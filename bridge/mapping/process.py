@@ -26,10 +26,19 @@ class Process(Table):
     tpdo: list[Name] = Field(
         min_length=1, max_length=MOST_WORDS, description="status_word, then the words of actual values"
     )
+    rest: dict[Name, Annotated[int, Field(ge=0, le=0xFFFF)]] = Field(
+        default_factory=dict[str, int],
+        description="words of `rpdo` that are not 0 while nobody commands them, such as a mode of operation",
+    )
     exact_length: bool = Field(False, description="true where a PDO of any other length is not evaluated")
     forbidden_types: list[Annotated[int, Field(ge=0, le=255)]] = Field(
         default_factory=list[int], description="transmission types that the drives do not have"
     )
+
+    @property
+    def resting(self) -> tuple[int, ...]:
+        """The setpoint words while nobody commands them."""
+        return tuple(self.rest.get(word, 0) for word in self.rpdo[1:])
 
 
 class Pdo(Table):

@@ -45,6 +45,8 @@ class LegSettings:
     """Places of setpoints that are the drive's actual words, and those of these words, as long as nothing is
     commanded: enabling moves nothing then."""
     handshake: HandshakeSettings | None
+    resting: tuple[int, ...] = ()
+    """The setpoints while nobody commands them; left out: all 0."""
 
 
 def leg_settings(family: Family, table: DriveTable, decode: Decode) -> LegSettings:
@@ -65,6 +67,7 @@ def leg_settings(family: Family, table: DriveTable, decode: Decode) -> LegSettin
         timeout_range_ms=(low_ms, high_ms),
         follows=_followers(family, slot),
         handshake=_handshake(family, slot),
+        resting=family.process.resting,
     )
 
 

@@ -54,7 +54,7 @@ _OVERWRITTEN: Final = Outcome(Code.CANCELLED, "a control word was written meanwh
 
 def initial(settings: LegSettings) -> LegState:
     """Of a bridge that starts: nobody owns the drive, and its node has not been seen."""
-    rest = (0,) * settings.setpoints
+    rest = settings.resting or (0,) * settings.setpoints
     stopped = settings.words.stopped
     timer = Timer(settings.timeout_ms)
     way = Way(is_open=False, why="the drive's node is not seen yet")

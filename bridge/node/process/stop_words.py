@@ -51,8 +51,9 @@ class StopWords:
         frames: list[Frame] = []
         for drive in self._node.drives:
             channel = drive.channel
-            count = len(drive.family.process.rpdo)
-            words: Sequence[int] = (channel.words.stopped, *([0] * (count - 1)))
+            process = drive.family.process
+            count = len(process.rpdo)
+            words: Sequence[int] = (channel.words.stopped, *process.resting)
             pdos = connected.get(drive.name)
             if pdos and not channel.output.silent and not channel.words.enables(channel.output.words[0]):
                 words = channel.output.words

@@ -55,6 +55,7 @@ APART: Final = (
     "bridge/command/leg/state.py",  # what its states mean, for the documentation
     "bridge/command/leg/table.py",
     "bridge/command/follow.py",
+    "bridge/drive/fault_words.py",  # in both languages itself
     "bridge/master/ending.py",  # the log's last lines
     "bridge/parameter/error.py",
     "bridge/parameter/backup_file.py",  # the command line and its files
@@ -70,7 +71,6 @@ UNSAID: Final[dict[str, tuple[str, ...]]] = {
     "bridge/drive/meaning.py": ("7Xq of  Zq zq",),
     "bridge/drive/own_supervision.py": ("7Xq = 7Xq ms", "7Xq × 100D:00 = 7Xq ms × 7Xq"),
     "bridge/master/master.py": ("the master has failed: Zq zq",),
-    "bridge/drive/fault_words.py": ("7Xqxxh",),
     "bridge/master/watch.py": ("master", "stranger 7Xq", "duplicate 7Xq"),
     "bridge/mirror/publisher.py": ("Zq zq (is this site already being run?)",),
     "bridge/northbound/page/bus.py": ("seconds = 1…7Xq, format = 7Xq",),

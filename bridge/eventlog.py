@@ -16,7 +16,7 @@ def log_event(event: Event) -> None:
     severity, and hide each other as little as a worse one."""
     kind = event.kind, event.severity
     extra = about(event.source, kind, first=1 if event.kind in REPEATING else A_FEW)
-    _log.log(_level(event.severity), "%s: %s", event.source, event.message, extra=extra)
+    _log.log(_level(event.severity), "%s: %s", event.source, event.text, extra=extra)
 
 
 def _level(severity: int) -> int:

@@ -35,6 +35,7 @@ from bridge.northbound.modbus.units import units_of
 from bridge.northbound.zenoh.session import ZenohServer
 from bridge.notify import Notifier
 from bridge.parts import Parts, ServerPart
+from bridge.plantcondition import PlantCondition
 from bridge.preflight import check_files
 from bridge.project import Project, count
 from bridge.wear import WearKeeper
@@ -85,6 +86,7 @@ class Service:
         self._networks = [network for _, network in networks]
         self.master = Master(networks, self.plant, clock.now, self.notifier.alive, alarm, clock.suspended_s)
         self.view = PlantView(self.plant, clock.now, clock.epoch_ns, self.master.carry_out, self.master.wake)
+        self.condition = PlantCondition(self.plant, project.families, clock.now, clock.epoch_ns)
         self.modbus = (
             ModbusServer(self.view, units_of(self.plant), site.modbus, clock.now) if site.modbus else None
         )
@@ -188,6 +190,7 @@ class Service:
             "master": self.master.failed(),
             "EEPROM counts": self.wear.run(),
             "audit log": self.audit.run(),
+            "condition": self.condition.run(),
             "start": self._start(),
             **{part.name: self.parts.keep(part) for part in parts},
         }

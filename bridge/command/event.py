@@ -20,18 +20,27 @@ class Kind(StrEnum):
     CONFIGURATION = "configuration"
     FRONT = "front"
     INTRUDER = "intruder"
+    CAUSE = "cause"
+    """What several others have in common."""
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
     """``source`` is a drive, a node or a bus by its name in the site; ``severity`` is that of OPC UA
-    (1 … 1000, Part 5 §6.4.2); ``time`` is monotonic."""
+    (1 … 1000, Part 5 §6.4.2); ``time`` is monotonic. ``cause`` is what has brought it about, as a phrase;
+    empty where nothing known has."""
 
     time: float
     kind: Kind
     source: str
     severity: int
     message: str
+    cause: str = ""
+
+    @property
+    def text(self) -> str:
+        """The message with its cause."""
+        return f"{self.message} (because: {self.cause})" if self.cause else self.message
 
 
 REPEATING: Final = frozenset((Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION, Kind.INTRUDER))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
 from typing import Final, Protocol
@@ -149,6 +149,8 @@ class Plant:
         self._outcomes: deque[tuple[Reply, Outcome]] = deque()
         self._gate = EventGate()
         self._guard = Guard("event")
+        self.because: Callable[[Event], str] = lambda event: ""
+        """Finds what has caused an event."""
         self._refused_by_others = 0
         self._is_closing = False
         self._buses = frozenset(f"bus/{bus.name}" for bus in site.bus)
@@ -233,6 +235,8 @@ class Plant:
     def report(self, event: Event) -> None:
         if not self._gate.admits(event):
             return
+        with self._guard:
+            event = replace(event, cause=event.cause or self.because(event))
         for listener in tuple(self._listeners):
             with self._guard:
                 listener(event)

@@ -11,6 +11,7 @@ from bridge.command import follow
 from bridge.command.leg.state import WATCHDOG_STATES
 from bridge.command.link import NodeState
 from bridge.command.parameter_points import parameter_points
+from bridge.condition.told import CONDITIONS
 from bridge.config import BusTable, DriveTable, NodeTable, Site
 from bridge.drive import DRIVE_STATES, LinearScale, ValueCodec, scales_of
 from bridge.image import DataType, Point
@@ -248,6 +249,7 @@ def _node_points(node: NodeTable, polls: list[Poll]) -> list[Point]:
         point("emcy_history", _TEXT, "the last eight emergency messages as JSON, newest first"),
         point("emcy_suppressed", _U32, "emergency messages not reported because too many came"),
         *(point(poll.name, poll.data_type, poll.description, bits=tuple(poll.bits)) for poll in polls),
+        point("condition", _U8, "the worst that is wrong with the node or its drives", states=CONDITIONS),
         point("device_errors", _TEXT, "errors that the node reported at its last boot-up, 1001h and 1003h"),
         point("state", _U8, "what the bridge does with the node", states=NODE_STATES),
     ]
@@ -274,6 +276,7 @@ def _bus_points(bus: BusTable) -> list[Point]:
         point("sync_window_misses", _U32, "synchronous TPDOs that came after the SYNC window"),
         point("intruders", _U32, "frames of others on identifiers that belong to the bridge alone"),
         point("last_intruder", _TEXT, "the latest one in words"),
+        point("condition", _U8, "the worst that is wrong on the bus or anything on it", states=CONDITIONS),
         point("passive", _FLAG, "another bridge is in charge of the bus; this one only listens"),
     ]
 
@@ -299,6 +302,13 @@ def _bridge_points() -> list[Point]:
             "longest delay of a round of the bus process, since start",
             unit="ms",
         ),
+        point("hangs", _U32, "times for which the bus process could not run for 100 ms or longer"),
+        point("last_hang_ms", _U32, "how long it could not run the last time", unit="ms"),
+        point("condition", _U8, "the worst that is wrong anywhere", states=CONDITIONS),
+        point("troubles", _TEXT, "what is wrong as JSON, the worst first, each with what it explains"),
+        point("recent_troubles", _TEXT, "what was wrong and is over since ten minutes at most, as JSON"),
+        point("drives_waiting", _U32, "drives that do not tell their state yet, with nothing wrong"),
+        point("stops_unproven", _TEXT, "drives that may run on when the bridge falls silent"),
         point("missed_deadlines", _U32, "deadlines of drives that the bridge had not planned, since start"),
         *(point(leaf, _U32, f"{what}, since start") for leaf, what in CONNECTION_COUNTS.items()),
     ]

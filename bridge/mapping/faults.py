@@ -115,6 +115,9 @@ class FaultNumbers(Table):
     bridge_timeout: float = Field(description="the bus interface's own fault for the same event")
     telegram_downtime: float
     node_missing: float
+    silent_bus: list[FaultName] = Field(
+        default_factory=list[str], description="faults with which the drive itself answers a silent bus"
+    )
     prefix: str = ""
     form: FaultForm = Field("", description="how the maker writes a number that the drive tells")
     form_to: float | None = Field(None, description="numbers above it are written as they are")

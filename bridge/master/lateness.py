@@ -8,6 +8,8 @@ from bridge.command import Event, Kind, Plant
 from bridge.command.worst_case import REACTION_BOUND_MS
 from bridge.ratelimit import RateLimit
 
+HANG_MS: Final = 100
+"""From so long on the bus process counts as having been too slow to notice what went on."""
 _EVENTS: Final = 3
 _EVENT_EVERY_S: Final = 60.0
 _SEVERITY_ROUND, _SEVERITY_TRIP = 500, 700
@@ -21,10 +23,24 @@ class Lateness:
         self._plant = plant
         self._trip_ms = 0.0
         self._round_ms = 0.0
+        self._hangs = 0
+        self._last_hang_ms = 0
+        self._hung_until = float("-inf")
         self._trip_limit = RateLimit(_EVENTS, _EVENT_EVERY_S)
         self._round_limit = RateLimit(_EVENTS, _EVENT_EVERY_S)
 
+    def on_hang(self, began: float, now: float) -> None:
+        """The bus process did not run in between, though something was due. A hang counts once, however many
+        notice it."""
+        hang_ms = 1000 * (now - began)
+        if hang_ms < HANG_MS or began < self._hung_until:
+            return
+        self._hangs += 1
+        self._last_hang_ms = round(hang_ms)
+        self._hung_until = now
+
     def on_round(self, due: float, now: float) -> None:
+        self.on_hang(due, now)
         late_ms = 1000 * (now - due)
         self._round_ms = max(self._round_ms, late_ms)
         if late_ms > REACTION_BOUND_MS and self._round_limit.allows(now):
@@ -42,5 +58,7 @@ class Lateness:
         self._plant.report(Event(now, Kind.WATCHDOG, "bridge", severity, message))
 
     def refresh(self, now: float) -> None:
+        self._plant.set("bridge/hangs", self._hangs, now)
+        self._plant.set("bridge/last_hang_ms", self._last_hang_ms, now)
         self._plant.set("bridge/worst_trip_lateness_ms", round(self._trip_ms, 1), now)
         self._plant.set("bridge/worst_round_lateness_ms", round(self._round_ms, 1), now)

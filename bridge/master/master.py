@@ -259,6 +259,7 @@ class Master:
         if not hung:
             return
         self.gaps += 1
+        self._lateness.on_hang(self._last_round, now)
         message = f"the bridge hung for {pause_s * 1000:.0f} ms; all drives were left without commands"
         if slept_s:
             message = f"the machine was suspended for {slept_s:.1f} s; all drives were left without commands"

@@ -17,6 +17,7 @@ from bridge.northbound.modbus.units import BRIDGE_DRIVES, Units
 from bridge.northbound.view import View
 
 _BUS_WARNING, _BUS_PASSIVE, _BUS_OFF, _BUS_DOWN = 1, 2, 3, 4
+_CONDITION_BITS, _UNPROVEN_BIT = 8, 10
 _LOST: Final = NODE_CODES[NodeState.LOST]
 _OPERATIONAL: Final = NODE_CODES[NodeState.OPERATIONAL]
 _STARTING: Final = tuple(
@@ -81,6 +82,8 @@ class BridgeUnit(Unit):
             for name in (drive.drive_name for drive in units.drives)
         }
         self._version: Final = index["bridge/version"]
+        self._condition: Final = index["bridge/condition"]
+        self._unproven: Final = index["bridge/stops_unproven"]
 
     def read_words(self, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]:
         if table is not Table.INPUT_REGISTER:
@@ -114,13 +117,15 @@ class BridgeUnit(Unit):
 
     def _module_state(self, bus_state: int, *, tripped: bool) -> int:
         """The bits of P173 (BU 2500 §7.1.3). Its bits 8 … 15 are about drives; here each drive has a
-        register."""
+        register, and they tell what is wrong anywhere."""
         states = self._image.values(self._nodes)
         operational = all(state == _OPERATIONAL for state in states)
         starting = any(state in _STARTING for state in states)
         warning = bus_state in (_BUS_WARNING, _BUS_PASSIVE)
         bits = (starting, operational, _LOST in states, tripped, warning, bus_state == _BUS_OFF)
-        return sum(bit << position for position, bit in enumerate(bits))
+        condition, unproven = self._image.values((self._condition, self._unproven))
+        summary = int(condition) << _CONDITION_BITS | bool(unproven) << _UNPROVEN_BIT
+        return summary | sum(bit << position for position, bit in enumerate(bits))
 
     def identify(self) -> Mapping[int, str]:
         version = str(self._image[self._version].value)

@@ -16,7 +16,8 @@ BRIDGE_DRIVES: Final = 5
 """First input register of the bridge's one word per drive."""
 _MODULE_STATE: Final = (
     "bits as NORD P173: 0 pre-operational, 1 operational, 2 a node lost, 3 a watchdog tripped, "
-    "4 CAN warning, 5 bus-off"
+    "4 CAN warning, 5 bus-off; here also 8…9 the worst that is wrong anywhere: 0 nothing, 1 warning, "
+    "2 alarm, 3 danger, 10 a drive may run on when the bridge falls silent"
 )
 
 

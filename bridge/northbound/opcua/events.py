@@ -71,7 +71,7 @@ class EventSender:
             "SourceName": variant(event.source, kinds.String),
             "Time": variant(source_time(self._epoch_ns(event.time)), kinds.DateTime),
             "ReceiveTime": variant(datetime.now(UTC), kinds.DateTime),
-            "Message": variant(text(event.message + more), kinds.LocalizedText),
+            "Message": variant(text(event.text + more), kinds.LocalizedText),
             "Severity": variant(event.severity, kinds.UInt16),
         }
         for emitter in self._emitters(event.source):

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Any
 
 import msgspec
 
+from bridge.condition.layout import Layout, layout_of
 from bridge.config import Site
 from bridge.image import Image, Point
 from bridge.mapping import Family
-from bridge.northbound.page.troubles import Layout
 
-_MOVES_BY: Final = ("velocity", "frequency", "speed", "position", "torque")
-"""What a drive is moved by, the most telling first."""
 _encode = msgspec.json.Encoder().encode
 
 
@@ -21,7 +19,7 @@ def described(image: Image, site: Site, families: dict[str, Family]) -> dict[str
     """For JSON. ``places`` has for each drive, bus, node and the bridge which of ``natures`` has its points,
     by their names there. Drives of a kind have one in common, so that a plant of hundreds is loaded as soon
     as a small one. What is empty is left out of a point."""
-    layout = layout_of(image, site, families)
+    layout = layout_of(image.points, site, families)
     places, natures = _natures(image.points, layout)
     nodes: list[dict[str, Any]] = []
     drives: list[dict[str, Any]] = []
@@ -55,23 +53,6 @@ def described(image: Image, site: Site, families: dict[str, Family]) -> dict[str
         "places": places,
         "natures": natures,
     }
-
-
-def layout_of(image: Image, site: Site, families: dict[str, Family]) -> Layout:
-    """Which drives are where, and what moves them."""
-    units = {point.name: point.unit for point in image.points}
-    nodes = [(bus.name, node) for bus in site.bus for node in bus.node]
-    drives = {
-        f"{node.name}/{families[node.mapping].leaf_of(drive)}": node.name
-        for _, node in nodes
-        for drive in node.drive
-    }
-    return Layout(
-        drives=drives,
-        nodes={node.name: bus for bus, node in nodes},
-        buses=tuple(bus.name for bus in site.bus),
-        mains=_mains(drives, units),
-    )
 
 
 def _natures(
@@ -112,17 +93,3 @@ def _stops_in(family: Family) -> str:
     control = family.control_word
     word = control.run & ~control.stop.mask | control.stop.value
     return "ready" if word & 0xF == control.ready & 0xF else "switched_on"
-
-
-def _mains(drives: Iterable[str], units: Mapping[str, str]) -> dict[str, str]:
-    """The leaf of setpoint and actual value that tell most of each drive that has such a pair."""
-    pairs: dict[str, list[str]] = {}
-    for name, unit in units.items():
-        drive, command, leaf = name.rpartition("/command/")
-        if command and unit and f"{drive}/actual/{leaf}" in units:
-            pairs.setdefault(drive, []).append(leaf)
-    return {
-        drive: next((leaf for leaf in _MOVES_BY if leaf in pairs[drive]), pairs[drive][0])
-        for drive in drives
-        if drive in pairs
-    }

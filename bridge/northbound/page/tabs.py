@@ -14,13 +14,14 @@ import msgspec
 from starlette.websockets import WebSocket
 
 from bridge.command import Event
+from bridge.condition.layout import Layout
 from bridge.guard import Guard
 from bridge.image import Image
 from bridge.northbound.page.hearing import Hearings
 from bridge.northbound.page.sessions import Session, Sessions
 from bridge.northbound.page.tab import BAD_MESSAGE, GONE, NO_TOKEN, SESSION_OVER, TOO_MANY, Tab, close
 from bridge.northbound.page.topics import Topics
-from bridge.northbound.page.troubles import Layout, Troubles
+from bridge.northbound.page.troubles import Troubles
 from bridge.northbound.page.viewer import BadMessage
 from bridge.northbound.view import View
 
@@ -28,8 +29,8 @@ _TICK_S: Final = 0.05
 """A trend has a row for each tick."""
 _BEAT: Final = 2
 """Ticks from one message to the next."""
-_TROUBLES: Final = 10
-"""Ticks from one look for troubles to the next while a tab is open: it goes through all drives."""
+_TROUBLES: Final = 4
+"""Ticks from one look for troubles to the next while a tab is open."""
 _LOOK: Final = 20
 """Ticks from one look at the sessions of the tabs to the next, and from one time that tabs are told."""
 _MOST_TABS: Final = 64
@@ -55,7 +56,7 @@ class Tabs:
         self._hearings = hearings
         self._clock = clock
         self._topics = Topics(view, layout)
-        self._troubles = Troubles(view.image, layout, self._epoch_ms)
+        self._troubles = Troubles(view.image, self._epoch_ms)
         self._events = deque[dict[str, Any]](maxlen=_EVENTS_KEPT)
         self._tabs: list[Tab] = []
         self._guard = Guard("page")
@@ -218,6 +219,7 @@ class Tabs:
             "source": event.source,
             "severity": event.severity,
             "message": event.message,
+            "cause": event.cause,
         }
         self._events.append(shown)
         data = _encode({"event": shown})

@@ -16,8 +16,8 @@ from typing import Any, Final
 
 import msgspec
 
+from bridge.condition.layout import Layout
 from bridge.image import Image, Point, Quality
-from bridge.northbound.page.troubles import Layout
 from bridge.northbound.view import View
 
 _MOST_AT_ONCE: Final = 1 << 20

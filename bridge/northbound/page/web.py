@@ -6,7 +6,7 @@ import asyncio
 import logging
 from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, TypedDict
 
@@ -22,15 +22,15 @@ from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket
 
 from bridge.command import Role
+from bridge.condition.layout import layout_of
 from bridge.config import PageTable, Site
 from bridge.mapping import Family
 from bridge.northbound.logins import PasswordChecks, TooManyChecks
 from bridge.northbound.page.bus import Bus, Capture
-from bridge.northbound.page.describe import described, layout_of
+from bridge.northbound.page.describe import described
 from bridge.northbound.page.guards import MOST_BODY, Guards
 from bridge.northbound.page.hearing import Ear, Hearings
 from bridge.northbound.page.integration import Export, Integration
-from bridge.northbound.page.own_faults import own_faults
 from bridge.northbound.page.parameters import Counts, Parameters, holders_of
 from bridge.northbound.page.sessions import Session, Sessions
 from bridge.northbound.page.system import System, SystemFacts
@@ -116,7 +116,7 @@ class Page:
         self._sessions = Sessions()
         self._throttle = Throttle()
         self._checks = PasswordChecks(most=_MOST_CHECKS)
-        layout = replace(layout_of(view.image, site, families), own_faults=own_faults(site, families))
+        layout = layout_of(view.image.points, site, families)
         self._tabs = Tabs(view, layout, self._sessions, Hearings(backstage.ears), clock)
         self._description = _encode(described(view.image, site, families))
         self._is_encrypted = table.certificate is not None

@@ -37,12 +37,13 @@ class _Beside(msgspec.Struct, omit_defaults=True):
     r: str = ""
 
 
-class _Told(msgspec.Struct):
+class _Told(msgspec.Struct, omit_defaults=True):
     t: float
     kind: str
     source: str
     severity: int
     message: str
+    cause: str = ""
 
 
 class _Done(msgspec.Struct, omit_defaults=True):
@@ -172,7 +173,8 @@ def seconds(epoch_ns: int) -> float:
 
 
 def event_json(event: Event, epoch_ns: int) -> bytes:
-    return _encode(_Told(seconds(epoch_ns), event.kind, event.source, event.severity, event.message))
+    told = _Told(seconds(epoch_ns), event.kind, event.source, event.severity, event.message, event.cause)
+    return _encode(told)
 
 
 def outcome_json(outcome: Outcome) -> bytes:

@@ -107,3 +107,15 @@ def test_no_hold_up_between_two_clocks_is_taken_for_a_suspend(
         assert found <= slept + 1e-9 or (slept == 0.0 and found == 0.0)
         if slept > 4.0:
             assert found > 0
+
+
+HANGS, LAST_HANG = "bridge/hangs", "bridge/last_hang_ms"
+
+
+def test_a_bus_process_that_stood_still_counts_it_once(bench: Bench) -> None:
+    bench.hang(0.6)
+    bench.run(0.5)
+    assert (bench.value(HANGS), bench.value(LAST_HANG)) == (1, 600)
+    bench.hang(0.05)
+    bench.run(0.5)
+    assert (bench.value(HANGS), bench.value(LAST_HANG)) == (1, 600), "that is not worth a word"

@@ -46,6 +46,7 @@ COVERED: Final = (
     "bridge/mapping/device.py",
     "bridge/mapping/emcy_codes.py",
     "bridge/parts.py",
+    "bridge/plantcondition.py",
     "bridge/front_process.py",
     "bridge/page_buses.py",
 )
@@ -64,6 +65,7 @@ APART: Final = (
     "bridge/parameter/set_file.py",
 )
 UNSAID: Final[dict[str, tuple[str, ...]]] = {
+    "bridge/command/event.py": ("Zq zq (because: 7Xq)",),
     "bridge/command/plant.py": ("Zq zq on 7Xq", "more than 247 drives have no Modbus unit id"),
     "bridge/command/worst_case.py": (
         "how much older the owner's last telegram may be than the bridge assumes",

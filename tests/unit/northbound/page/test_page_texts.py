@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from bridge.command import Code
+from bridge.condition.findings import Rank
 from bridge.image import DataType, Point
 from bridge.mapping import family_names, load_family
-from bridge.northbound.page.troubles import Rank
 from tests.support import sites
 
 JS = Path("bridge/northbound/page/static/js")
@@ -75,9 +75,9 @@ def test_each_text_that_is_asked_for_is_there() -> None:
 
 
 def test_each_kind_of_trouble_says_what_it_is_why_and_what_to_do() -> None:
-    server = "".join(path.read_text(encoding="utf-8") for path in Path("bridge/northbound/page").glob("*.py"))
-    kinds = {*_KINDS.findall(server), "bus_off", "bus_down"}
-    assert len(kinds) >= 17
+    judged = "".join(path.read_text(encoding="utf-8") for path in Path("bridge/condition").glob("*.py"))
+    kinds = {*_KINDS.findall(judged), "bus_off", "bus_down", "bridge_dead"}
+    assert len(kinds) >= 21
     english = texts("en")
     for kind in kinds:
         assert {f"trouble.{kind}", f"trouble.{kind}.why", f"trouble.{kind}.remedy"} <= english.keys(), kind

@@ -1,6 +1,6 @@
 // What is wrong, in words. The server finds the troubles; here they get their texts.
 
-import { effect, signal } from "./ui.js";
+import { computed, effect, signal } from "./ui.js";
 import { now as boxNow, troubles, waiting } from "./live.js";
 import { address } from "./route.js";
 import { clock, span } from "./format.js";
@@ -41,7 +41,7 @@ export function headline(trouble) {
 
 /** The present fault of a drive in the reader's language, with its number; empty where it has none of its own. */
 export function faultText(drive) {
-  const found = (troubles.value ?? []).find((one) => one.kind === "drive_fault" && one.place === drive);
+  const found = everything.value.find((one) => one.kind === "drive_fault" && one.place === drive);
   return found ? inWords(driveAt(drive), found.facts.text, found.facts.number) : "";
 }
 
@@ -53,10 +53,19 @@ export function inWords(drive, text, number) {
 
 const RANKS = ["danger", "alarm", "warning"];
 
+/** Everything that is wrong, causes and what they explain. */
+const everything = computed(() => (troubles.value ?? []).flatMap((one) => [one, ...(one.explains ?? [])]));
+
 /** How much is wrong at one of `places`: 0 is the worst, 3 nothing. */
 export function rankAt(places) {
-  const found = (troubles.value ?? []).find((one) => places.includes(one.place));
-  return found ? RANKS.indexOf(found.rank) : RANKS.length;
+  const ranks = everything.value.filter((one) => places.includes(one.place)).map((one) => RANKS.indexOf(one.rank));
+  return Math.min(RANKS.length, ...ranks);
+}
+
+/** The worst at one of `places`, or what explains it there: null where nothing is wrong. */
+export function worstAt(places) {
+  const found = (troubles.value ?? []).filter((one) => [one, ...(one.explains ?? [])].some((each) => places.includes(each.place)));
+  return found[0] ?? null;
 }
 
 /** What it means and where it comes from; empty where the headline says it all. */
@@ -75,15 +84,27 @@ function variant(trouble) {
 
 /** What to do. */
 export function remedy(trouble) {
+  if (trouble.until) return t("trouble.left.remedy");
   return said(trouble).remedy || maybe(`trouble.${trouble.kind}.remedy`, withDefaults(trouble));
 }
 
 export function since(trouble) {
+  if (trouble.until) return t("since.until", { time: clock(trouble.since), until: clock(trouble.until) });
   return t(trouble.or_longer ? "since.longer" : "since", { time: clock(trouble.since) });
 }
 
 export function lasting(trouble) {
   return span(now.value - trouble.since);
+}
+
+/** How many things it explains, or has left behind. */
+export function explained(trouble) {
+  return many(trouble.until ? "plant.left" : "plant.explains", trouble.explains.length);
+}
+
+/** What has caused one of these, and when: "came with can0: no node answers, since 12:36:01". */
+export function cameWith(cause) {
+  return t("plant.came_with", { cause: `${nameOf(cause.place)}: ${headline(cause)}`, time: clock(cause.since) });
 }
 
 /** What people call the place. */

@@ -1,12 +1,13 @@
 // How the bus is: state, load and counters, and who is on it that should not be.
 
-import { classes, html } from "../ui.js";
+import { html } from "../ui.js";
 import { isConnected } from "../live.js";
 import { nature } from "../site.js";
 import { number, quantity } from "../format.js";
 import { t, translated } from "../texts.js";
-import { good, goodLabel } from "../drivestate.js";
-import { Icon, shapeOfBus } from "../icons.js";
+import { good } from "../drivestate.js";
+import { BusState } from "./state.js";
+import { Icon } from "../icons.js";
 import { Meter } from "../meter.js";
 
 const COUNTERS = ["tx_errors", "rx_errors", "error_frames", "frames_lost", "frames_expired", "sync_window_misses"];
@@ -14,12 +15,11 @@ const STRANGERS = ["unexpected_nodes", "duplicate_ids", "last_intruder"];
 
 export function Condition({ bus }) {
   const point = (leaf) => `bus/${bus.name}/${leaf}`;
-  const state = goodLabel(point("state"));
   const load = good(point("load"));
   return html`
     <section class="panel" aria-labelledby="condition">
       <h2 id="condition">${t("bus.condition")}
-        <span class=${classes("busstate", `is-${state}`)}><${Icon} name=${shapeOfBus(state)} /> ${t(`bus.${state}`)}</span></h2>
+        <${BusState} bus=${bus} /></h2>
       <dl class="counters">
         <div><dt>${t("plant.load")}</dt><dd><${Meter} share=${(load ?? 0) / 100} warn=${0.8} /> ${quantity(load, "%")}</dd></div>
         <div><dt>${t("bus.bitrate")}</dt><dd>${quantity(bus.bitrate / 1000, "kbit/s")}</dd></div>

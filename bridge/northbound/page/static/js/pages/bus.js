@@ -3,11 +3,12 @@
 import { html } from "../ui.js";
 import { troubles } from "../live.js";
 import { address } from "../route.js";
-import { buses, nodes } from "../site.js";
+import { buses } from "../site.js";
 import { t } from "../texts.js";
 import { Failure, useFetched } from "../fetched.js";
 import { Condition } from "../bus/condition.js";
 import { Capture } from "../bus/capture.js";
+import { placesOf } from "../bus/state.js";
 import { Layout } from "../bus/layout.js";
 import { Nodes } from "../bus/nodes.js";
 import { Traffic } from "../bus/traffic.js";
@@ -36,8 +37,8 @@ function View({ route }) {
 
 function Bus({ bus }) {
   const told = useFetched(`api/bus/${encodeURIComponent(bus.name)}`);
-  const places = [`bus/${bus.name}`, ...nodes.value.filter((node) => node.bus === bus.name).map((node) => node.name)];
-  const own = (troubles.value ?? []).filter((one) => places.includes(one.place));
+  const places = placesOf(bus);
+  const own = (troubles.value ?? []).filter((one) => [one, ...(one.explains ?? [])].some((each) => places.includes(each.place)));
   return html`
     <${Condition} bus=${bus} />
     ${own.length > 0 && html`<section class="attention" aria-label=${t("plant.attention")}><ol>

@@ -7,10 +7,11 @@ import { below, buses, drives, leafOf, nature, nodes } from "../site.js";
 import { quality } from "../values.js";
 import { clock, number, quantity } from "../format.js";
 import { many, maybe, t } from "../texts.js";
-import { Icon, shapeOfBus, shapeOfNode } from "../icons.js";
+import { BusState } from "../bus/state.js";
+import { Icon, shapeOfNode } from "../icons.js";
 import { Meter } from "../meter.js";
 import { ownerOf } from "../owner.js";
-import { explanation, faultText, headline, lasting, nameOf, pageOfPlace, rankAt, remedy, since } from "../trouble.js";
+import { cameWith, explained, explanation, faultText, headline, lasting, nameOf, pageOfPlace, rankAt, remedy, since } from "../trouble.js";
 import { good, goodLabel, stateKey, stateOf } from "../drivestate.js";
 
 export const plant = { path: "plant", topics: () => ["plant"], View: Plant };
@@ -60,9 +61,23 @@ export function TroubleRow({ trouble }) {
         <a href=${pageOfPlace(trouble.place)}>${nameOf(trouble.place)}</a> <strong>${headline(trouble)}</strong>
         <span class="when">${since(trouble)} (${lasting(trouble)})</span>
         <p>${explanation(trouble)}</p>
+        ${trouble.explains && html`<${Explained} cause=${trouble} />`}
       </div>
       <p class="remedy"><span class="label">${t("plant.what_to_do")}</span> ${remedy(trouble)}</p>
     </li>
+  `;
+}
+
+// What follows from a cause stays to be seen, below it.
+function Explained({ cause }) {
+  return html`
+    <details class="explains" open=${Boolean(cause.until)}><summary>${explained(cause)}</summary>
+      <ul>
+        ${cause.explains.map((one) => html`<li key=${one.kind + one.place}>
+          <a href=${pageOfPlace(one.place)}>${nameOf(one.place)}</a> ${headline(one)}, ${since(one)}
+          ${cause.until && html` <small>(${cameWith(cause)})</small>`}</li>`)}
+      </ul>
+    </details>
   `;
 }
 
@@ -89,12 +104,11 @@ function tilesOf(bus) {
 
 function BusHead({ bus }) {
   const point = `bus/${bus.name}`;
-  const state = goodLabel(`${point}/state`);
   const load = good(`${point}/load`);
   return html`
     <header>
       <h2 id=${`bus-${bus.name}`}><a href=${address("bus", bus.name)}>${bus.name}</a></h2>
-      <span class=${classes("busstate", `is-${state}`)}><${Icon} name=${shapeOfBus(state)} /> ${t(`bus.${state}`)}</span>
+      <${BusState} bus=${bus} />
       <span class="fact">${t("plant.load")} <${Meter} share=${(load ?? 0) / 100} warn=${0.8} /> ${quantity(load, "%")}</span>
       <span class="fact">${t("plant.errors")} ${number(good(`${point}/error_frames`))}</span>
     </header>

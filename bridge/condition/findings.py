@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final
@@ -25,12 +25,14 @@ class Rank(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """``place`` is ``<node>/<drive>``, ``<node>``, ``bus/<bus>`` or ``bridge``."""
+    """``place`` is ``<node>/<drive>``, ``<node>``, ``bus/<bus>`` or ``bridge``. ``is_of_bus``: a fault with
+    which a drive answers a silent bus."""
 
     rank: Rank
     kind: str
     place: str
     facts: tuple[tuple[str, Value], ...] = ()
+    is_of_bus: bool = False
 
 
 class Look:
@@ -105,7 +107,10 @@ def of_node(look: Look, node: str) -> Iterator[Trouble]:
         yield Trouble(Rank.WARNING, "node_disabled", node)
 
 
-def of_drive(look: Look, drive: str, own_fault: OwnFault | None, *, is_heard: bool) -> Iterator[Trouble]:
+def of_drive(
+    look: Look, drive: str, own_fault: OwnFault | None, bus_faults: frozenset[str] = frozenset()
+) -> Iterator[Trouble]:
+    """``bus_faults`` are the numbers of those with which it answers a silent bus."""
     if look(f"{drive}/supervision/follows") is False:
         yield Trouble(Rank.DANGER, "ignores_stop", drive)
     is_tripped = look.label(f"{drive}/supervision/watchdog_state") == "tripped"
@@ -113,17 +118,19 @@ def of_drive(look: Look, drive: str, own_fault: OwnFault | None, *, is_heard: bo
         owner = look(f"{drive}/supervision/owner") or ""
         timeout = look(f"{drive}/supervision/fieldbus_timeout_ms") or 0
         yield Trouble(Rank.ALARM, "controller_silent", drive, (("owner", owner), ("timeout_ms", timeout)))
-    if not is_heard:
-        return
     quality, reason = look.quality(f"{drive}/status/state")
     if quality is Quality.CONFIG_ERROR:
         yield Trouble(Rank.ALARM, "drive_not_as_configured", drive, (("why", reason),))
     elif quality in (Quality.LOST, Quality.DEAD):
         yield Trouble(Rank.ALARM, "drive_lost", drive, (("why", reason),))
     elif facts := _own(look, drive, own_fault) if is_tripped else _shown(look, drive):
-        yield Trouble(Rank.ALARM, "drive_fault", drive, facts)
+        is_of_bus = dict(facts).get("number") in bus_faults
+        yield Trouble(Rank.ALARM, "drive_fault", drive, facts, is_of_bus)
     elif quality is Quality.STALE:
         yield Trouble(Rank.WARNING, "drive_stale", drive, (("why", reason),))
+    quality, reason = look.quality(f"{drive}/supervision/worst_case_bridge_ms")
+    if quality is Quality.CONFIG_ERROR:
+        yield Trouble(Rank.WARNING, "stop_unproven", drive, (("why", reason),))
 
 
 def _shown(look: Look, drive: str) -> tuple[tuple[str, Value], ...]:
@@ -154,6 +161,18 @@ def of_meaning(look: Look, drive: str, main: str) -> Iterator[Trouble]:
         quality, reason = look.quality(f"{drive}/{group}/{main}")
         if quality is Quality.DISABLED and reason:
             yield Trouble(Rank.WARNING, f"no_{group}", drive, (("value", main), ("why", reason)))
+
+
+def silence_of(look: Look, bus: str, nodes: Sequence[str]) -> Iterator[Trouble]:
+    """None of the nodes that should be there answers, which breaks of each of them at once would not explain.
+    A single one may be alone to blame, unless nobody acknowledges what the controller sends."""
+    place = f"bus/{bus}"
+    states = [look.label(f"{node}/node/state") for node in nodes]
+    expected = [state for state in states if state not in ("disabled", "stopped", "config_error")]
+    if not expected or any(state not in ("lost", "absent") for state in expected):
+        return
+    if len(expected) > 1 or look.label(f"{place}/state") == "passive":
+        yield Trouble(Rank.ALARM, "bus_silent", place, (("nodes", len(expected)),))
 
 
 def of_bridge(look: Look) -> Iterator[Trouble]:

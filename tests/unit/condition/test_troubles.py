@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
-
 import pytest
 
-from bridge.command import Plant
-from bridge.image import Image, Quality, Value
-from bridge.mapping import Family, load_family
-from bridge.northbound.page.describe import described, layout_of
-from bridge.northbound.page.own_faults import own_faults
-from bridge.northbound.page.topics import topics_of
-from bridge.northbound.page.troubles import Troubles
+from bridge.image import Quality, Value
 from tests.support import sites
+from tests.support.condition import Watched
 
 DRIVE, NODE, BUS = "conveyor/fu1", "conveyor", "bus/can0"
 _SITE = sites.site(
@@ -22,41 +14,12 @@ _SITE = sites.site(
 )
 
 
-def families_of(plant: Plant) -> dict[str, Family]:
-    return {node.mapping: load_family(node.mapping) for bus in plant.site.bus for node in bus.node}
-
-
-class Case:
-    def __init__(self) -> None:
-        plant = sites.plant_of(_SITE)
-        self.image: Image = plant.image
-        self.now_ms = 1_000_000.0
-        families = families_of(plant)
-        layout = layout_of(plant.image, plant.site, families)
-        self.layout = replace(layout, own_faults=own_faults(plant.site, families))
-        self.troubles = Troubles(self.image, self.layout, lambda: self.now_ms)
-        for name in (BUS, f"{NODE}/node"):
-            self.set(f"{name}/state", 0 if name == BUS else 2)
-        for drive in self.layout.drives:
-            self.set(f"{drive}/status/state", 4)
-        self.set("bridge/audit_lost", 0)
-        self.set(f"{BUS}/intruders", 0)
-        self.troubles.beat()
-
-    def set(self, name: str, value: Value, quality: Quality = Quality.GOOD, reason: str = "") -> None:
-        self.image.set(self.image.index[name], value, self.now_ms / 1000, quality, reason)
-
-    def later(self, ms: float = 10_000.0) -> list[dict[str, Any]]:
-        self.now_ms += ms
-        self.troubles.beat()
-        return self.troubles.shown
-
-    def kinds(self) -> list[tuple[str, str]]:
-        return [(one["kind"], one["place"]) for one in self.later()]
+def case_of() -> Watched:
+    return Watched(_SITE)
 
 
 def test_a_plant_in_order_has_none() -> None:
-    assert Case().kinds() == []
+    assert case_of().kinds() == []
 
 
 @pytest.mark.parametrize(
@@ -83,7 +46,7 @@ def test_a_plant_in_order_has_none() -> None:
     ],
 )
 def test_each_is_told_with_its_place_and_when_it_began(name: str, value: Value, kind: str, rank: str) -> None:
-    case = Case()
+    case = case_of()
     case.later()
     case.set(name, value)
     (trouble,) = case.later(500.0)
@@ -106,56 +69,45 @@ def test_each_is_told_with_its_place_and_when_it_began(name: str, value: Value, 
     ],
 )
 def test_a_drive_that_is_not_heard_as_it_should_be(quality: Quality, kind: str) -> None:
-    case = Case()
+    case = case_of()
     case.set(f"{DRIVE}/status/state", 4, quality, "why")
     (trouble,) = case.later()
     assert (trouble["kind"], trouble["place"], trouble["facts"]) == (kind, DRIVE, {"why": "why"})
 
 
-def test_what_follows_from_another_trouble_is_left_out() -> None:
-    case = Case()
+def test_what_follows_from_another_trouble_stands_below_it() -> None:
+    case = case_of()
     case.set(f"{BUS}/state", 4)
     case.set(f"{NODE}/node/state", 3)
     for drive in case.layout.drives:
         case.set(f"{drive}/status/state", 4, Quality.LOST)
-    assert case.kinds() == [("bus_down", BUS)]
-    case.set(f"{BUS}/state", 0)
-    assert case.kinds() == [("node_lost", NODE)]
+    (down,) = case.later()
+    assert (down["kind"], down["place"]) == ("bus_down", BUS)
+    assert {(one["kind"], one["place"]) for one in down["explains"]} == {
+        ("node_lost", NODE),
+        *(("drive_lost", drive) for drive in case.layout.drives),
+    }
 
 
-def test_a_bus_process_that_does_not_answer_says_nothing_of_the_drives() -> None:
-    case = Case()
-    case.set("conveyor/fu2/supervision/follows", False)
-    case.later()
-    case.image.judge(range(len(case.image.points)), Quality.DEAD, 1.0, "bus process not reachable")
-    (trouble,) = case.later(500.0)
-    assert (trouble["kind"], trouble["place"], trouble["rank"]) == ("bridge_dead", "bridge", "alarm")
-    assert trouble["since"] == case.now_ms
-    assert case.kinds() == [("bridge_dead", "bridge")]
-    case.set("bridge/audit_lost", 0)
-    assert "bridge_dead" not in [kind for kind, _ in case.kinds()], "it answers again"
-
-
-def test_lines_lost_before_the_front_began_are_a_trouble_and_old_intruders_are_not() -> None:
-    case = Case()
+def test_lines_lost_before_the_bridge_began_are_a_trouble_and_old_intruders_are_not() -> None:
+    case = case_of()
     case.set("bridge/audit_lost", 3)
     case.set(f"{BUS}/intruders", 3)
-    case.troubles = Troubles(case.image, case.layout, lambda: case.now_ms)
-    case.troubles.beat()
-    (trouble,) = case.troubles.shown
+    case.begin()
+    (trouble,) = case.beat()
     assert (trouble["kind"], trouble["or_longer"]) == ("log_lost", True)
     assert case.later(11 * 60_000.0) == [], "nothing was lost for ten minutes"
 
 
 def test_a_node_that_boots_for_ever_is_a_trouble_after_ten_seconds() -> None:
-    case = Case()
+    case = case_of()
     case.later()
     began_ms = case.now_ms
     case.set(f"{NODE}/node/state", 1)
     case.set(f"{NODE}/node/boot_status", "reads 1018h")
     for drive in case.layout.drives:
         case.set(f"{drive}/status/state", 0, Quality.WAITING)
-    case.troubles.beat()
+    case.beat()
     assert case.later(9000.0) == []
     assert case.troubles.waiting == 2, "nothing is wrong yet, nor is all in order"
     (trouble,) = case.later(1500.0)
@@ -166,12 +118,12 @@ def test_a_node_that_boots_for_ever_is_a_trouble_after_ten_seconds() -> None:
     case.set(f"{NODE}/node/state", 2)
     assert case.later() == []
     case.set(f"{NODE}/node/state", 1)
-    case.troubles.beat()
+    case.beat()
     assert case.later(9000.0) == [], "it boots anew"
 
 
 def test_nodes_that_wait_for_a_mandatory_one_do_not_boot_for_ever() -> None:
-    case = Case()
+    case = case_of()
     case.set(f"{BUS}/held_by", "lift")
     case.set(f"{NODE}/node/state", 1)
     case.set(f"{DRIVE}/status/state", 0, Quality.WAITING)
@@ -181,18 +133,17 @@ def test_nodes_that_wait_for_a_mandatory_one_do_not_boot_for_ever() -> None:
 
 
 def test_a_drive_that_says_nothing_yet_is_counted_as_waiting() -> None:
-    case = Case()
+    case = case_of()
     assert case.troubles.waiting == 0
     case.set(f"{DRIVE}/status/state", 0, Quality.WAITING)
-    assert case.troubles.beat()
-    assert (case.troubles.shown, case.troubles.waiting) == ([], 1)
+    assert (case.beat(), case.troubles.waiting) == ([], 1)
     case.set(f"{DRIVE}/supervision/watchdog_state", 3)
-    case.troubles.beat()
+    case.beat()
     assert case.troubles.waiting == 0
 
 
 def test_the_worst_comes_first() -> None:
-    case = Case()
+    case = case_of()
     case.set(f"{BUS}/state", 1)
     case.set(f"{DRIVE}/status/fault_text", "E010")
     case.set("conveyor/fu2/supervision/follows", False)
@@ -200,7 +151,7 @@ def test_the_worst_comes_first() -> None:
 
 
 def test_a_fault_is_told_with_its_cause_and_what_to_do() -> None:
-    case = Case()
+    case = case_of()
     facts = {"text": "E010 bus", "number": "E010/10.3", "cause": "silence", "remedy": "speak"}
     for leaf, text in facts.items():
         case.set(f"{DRIVE}/status/fault_{leaf}", text)
@@ -210,7 +161,7 @@ def test_a_fault_is_told_with_its_cause_and_what_to_do() -> None:
 
 def test_a_drive_with_a_fault_of_its_own_has_it_beside_a_silent_controller() -> None:
     """After a trip the points show the bridge's fault; what the drive sent says more (BU 2500 §6.5.3)."""
-    case = Case()
+    case = case_of()
     case.set(f"{DRIVE}/supervision/watchdog_state", 3)
     case.set(f"{DRIVE}/status/fault_text", "E010/10.3")
     case.set(f"{DRIVE}/status/drive_status_word", 0x0631)
@@ -225,15 +176,15 @@ def test_a_drive_with_a_fault_of_its_own_has_it_beside_a_silent_controller() -> 
     assert case.later()[1]["facts"]["text"] == "fault"
 
 
-def test_what_was_there_when_the_front_began_may_be_older() -> None:
-    case = Case()
+def test_what_was_there_when_the_bridge_began_may_be_older() -> None:
+    case = case_of()
     case.set(f"{DRIVE}/status/fault_text", "E010")
     assert case.later(100.0)[0]["or_longer"] is True
 
 
 @pytest.mark.parametrize("name", ["bridge/audit_lost", f"{BUS}/intruders"])
 def test_what_only_happens_is_shown_for_ten_minutes(name: str) -> None:
-    case = Case()
+    case = case_of()
     case.set(name, 5)
     assert case.kinds()
     assert case.later(580_000.0)
@@ -241,35 +192,3 @@ def test_what_only_happens_is_shown_for_ten_minutes(name: str) -> None:
     assert case.later(10_000.0)
     assert case.later(590_000.0), "it has happened again"
     assert not case.later(20_000.0)
-
-
-def test_a_beat_says_whether_anything_is_new() -> None:
-    case = Case()
-    assert not case.troubles.beat()
-    case.set(f"{DRIVE}/status/fault_text", "E010")
-    assert case.troubles.beat()
-    assert not case.troubles.beat()
-
-
-def test_each_point_is_in_the_topics_of_its_place() -> None:
-    case = Case()
-    points = case.image.points
-    topics = topics_of(points, case.layout)
-    shown = {index for indices in topics.values() for index in indices}
-    assert shown == set(range(len(points)))
-    assert {points[index].name for index in topics[f"drive {DRIVE}"]} == {
-        point.name for point in points if point.name.startswith(f"{DRIVE}/")
-    }
-    assert set(topics) == {"plant", "bus can0", "node conveyor", f"drive {DRIVE}", "drive conveyor/fu2"}
-
-
-def test_the_site_is_described_by_the_names_of_its_points() -> None:
-    plant = sites.plant_of(_SITE)
-    told = described(plant.image, plant.site, families_of(plant))
-    assert [one["name"] for one in told["drives"]] == [DRIVE, "conveyor/fu2"]
-    assert all(one["main"] == "frequency" and one["stops_in"] == "ready" for one in told["drives"])
-    names = {f"{place}/{leaf}" for place, kind in told["places"].items() for leaf in told["natures"][kind]}
-    assert names == {point.name for point in plant.image.points}
-    for drive in told["drives"]:
-        assert f"actual/{drive['main']}" in told["natures"][told["places"][drive["name"]]]
-    assert all(told["natures"].count(one) == 1 for one in told["natures"]), "each kind is described once"

@@ -1,0 +1,69 @@
+"""Which drives are on which nodes, and these on which bus. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridge.condition.findings import OwnFault
+from bridge.config import Site
+from bridge.image import Point
+from bridge.mapping import Family
+
+MOVES_BY: Final = ("velocity", "frequency", "speed", "position", "torque")
+"""What a drive is moved by, the most telling first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Drives ``<node>/<drive>`` with their nodes, nodes with their buses, by their names."""
+
+    drives: Mapping[str, str]
+    nodes: Mapping[str, str]
+    buses: tuple[str, ...]
+    mains: Mapping[str, str] = field(default_factory=dict[str, str])
+    """What each drive is moved by, such as ``frequency``, as far as it has that."""
+    own_faults: Mapping[str, OwnFault] = field(default_factory=dict[str, OwnFault])
+    bus_faults: Mapping[str, frozenset[str]] = field(default_factory=dict[str, frozenset[str]])
+    """The numbers of the faults with which each drive answers a silent bus."""
+
+    def above(self, place: str) -> tuple[str, ...]:
+        """``place`` and what contains it, such as a drive, its node and its bus: ``conveyor/fu1``,
+        ``conveyor``, ``bus/can0``."""
+        if node := self.drives.get(place):
+            return place, node, f"bus/{self.nodes[node]}"
+        if bus := self.nodes.get(place):
+            return place, f"bus/{bus}"
+        return (place,)
+
+
+def layout_of(points: Sequence[Point], site: Site, families: Mapping[str, Family]) -> Layout:
+    """Which drives are where, and what moves them."""
+    units = {point.name: point.unit for point in points}
+    nodes = [(bus.name, node) for bus in site.bus for node in bus.node]
+    drives = {
+        f"{node.name}/{families[node.mapping].leaf_of(drive)}": node.name
+        for _, node in nodes
+        for drive in node.drive
+    }
+    return Layout(
+        drives=drives,
+        nodes={node.name: bus for bus, node in nodes},
+        buses=tuple(bus.name for bus in site.bus),
+        mains=_mains(drives, units),
+    )
+
+
+def _mains(drives: Iterable[str], units: Mapping[str, str]) -> dict[str, str]:
+    """The leaf of setpoint and actual value that tell most of each drive that has such a pair."""
+    pairs: dict[str, list[str]] = {}
+    for name, unit in units.items():
+        drive, command, leaf = name.rpartition("/command/")
+        if command and unit and f"{drive}/actual/{leaf}" in units:
+            pairs.setdefault(drive, []).append(leaf)
+    return {
+        drive: next((leaf for leaf in MOVES_BY if leaf in pairs[drive]), pairs[drive][0])
+        for drive in drives
+        if drive in pairs
+    }

@@ -1,0 +1,63 @@
+"""What is wrong as points tell it: JSON, with codes and facts, for whoever has the texts. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Final
+
+import msgspec
+
+from bridge.condition.causes import Known, Shown
+from bridge.condition.findings import Rank, Trouble
+from bridge.condition.recent import Ended
+
+MOST: Final = 100
+"""Troubles in one text; each explains at most as many. The worst come first."""
+CONDITIONS: Final = ((0, "ok"), (1, "warning"), (2, "alarm"), (3, "danger"))
+"""How bad it is at a place, as points number it."""
+_encode = msgspec.json.Encoder().encode
+
+
+def condition(rank: Rank | None) -> int:
+    """The number of the worst trouble at a place, 0 where there is none."""
+    return 0 if rank is None else len(CONDITIONS) - 1 - rank
+
+
+def troubles_json(shown: Iterable[Shown]) -> str:
+    """A list of objects: rank, kind, place, since in ms since 1970, facts; ``or_longer`` where it may have
+    begun before the bridge did, ``explains`` (the same of each consequence) and ``until`` where the cause is
+    over, and only these are left."""
+    return _json([_shown(one) for one in list(shown)[:MOST]])
+
+
+def recent_json(ended: Iterable[Ended]) -> str:
+    """As ``troubles_json``, with ``until`` and ``times``, how often each ended."""
+    return _json([_shown(one.shown) | {"until": round(one.until_ms), "times": one.times} for one in ended])
+
+
+def _json(told: list[dict[str, Any]]) -> str:
+    return _encode(told).decode()
+
+
+def _shown(one: Shown) -> dict[str, Any]:
+    said = _said(one.trouble, one.rank, one.since_ms, is_or_longer=one.is_or_longer)
+    if one.until_ms is not None:
+        said["until"] = round(one.until_ms)
+    if one.explains:
+        said["explains"] = [_known(known) for known in one.explains[:MOST]]
+    return said
+
+
+def _known(one: Known) -> dict[str, Any]:
+    return _said(one.trouble, one.trouble.rank, one.since_epoch_ms, is_or_longer=one.is_or_longer)
+
+
+def _said(trouble: Trouble, rank: Rank, since_ms: float, *, is_or_longer: bool) -> dict[str, Any]:
+    said: dict[str, Any] = {
+        "rank": rank.name.lower(),
+        "kind": trouble.kind,
+        "place": trouble.place,
+        "since": round(since_ms),
+        "facts": dict(trouble.facts),
+    }
+    return said | ({"or_longer": True} if is_or_longer else {})

@@ -1,0 +1,120 @@
+"""How the plant is, as points and events of the bus process: judged twice a second, in portions."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Final
+
+from bridge.command import Event, Kind, Plant
+from bridge.condition.causes import Shown
+from bridge.condition.findings import Rank, Trouble
+from bridge.condition.layout import layout_of
+from bridge.condition.own_faults import with_faults
+from bridge.condition.told import condition, recent_json, troubles_json
+from bridge.condition.troubles import Troubles
+from bridge.mapping import Family
+
+LOOK_EVERY_S: Final = 0.5
+_PORTION: Final = 20
+"""Buses and drives that are looked at in one go: about 0.1 ms."""
+_UNPROVEN: Final = "stop_unproven"
+_NOTICED: Final = {
+    Kind.NODE_LOST: "node_lost",
+    Kind.WATCHDOG: "controller_silent",
+    Kind.FRONT: "fronts_failing",
+}
+"""The trouble that an event is about."""
+
+
+class PlantCondition:
+    """Keeps ``bridge/troubles`` and its like up to date, and gives events their cause.
+
+    ``clock`` is monotonic, ``epoch_ns`` the time of day at one of its times."""
+
+    def __init__(
+        self,
+        plant: Plant,
+        families: dict[str, Family],
+        clock: Callable[[], float],
+        epoch_ns: Callable[[float], int],
+    ) -> None:
+        self._plant = plant
+        self._clock = clock
+        self._epoch_ns = epoch_ns
+        layout = with_faults(layout_of(plant.image.points, plant.site, families), plant.site, families)
+        self.troubles = Troubles(plant.image, layout, clock() * 1000)
+        self._conditions = {"bridge/condition": ""}
+        self._conditions |= {f"bus/{bus}/condition": f"bus/{bus}" for bus in layout.buses}
+        self._conditions |= {f"{node}/node/condition": node for node in layout.nodes}
+        self._told_causes: set[tuple[str, str, float]] = set()
+        plant.because = self.because
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        while True:
+            now = self._clock()
+            for number, _ in enumerate(self.troubles.look(now * 1000, self._epoch_ns(now) / 1e6)):
+                if number % _PORTION == _PORTION - 1:
+                    await asyncio.sleep(0)
+            self.show(now)
+            await asyncio.sleep(LOOK_EVERY_S)
+
+    def look(self) -> None:
+        """Once, at everything."""
+        now = self._clock()
+        self.troubles.beat(now * 1000, self._epoch_ns(now) / 1e6)
+        self.show(now)
+
+    def show(self, now: float) -> None:
+        """Bring the points up to date, and tell causes that have been found."""
+        troubles, plant = self.troubles, self._plant
+        ranks = troubles.ranks
+        for name, place in self._conditions.items():
+            plant.set(name, condition(ranks.get(place)), now)
+        plant.set("bridge/troubles", troubles_json(troubles.shown), now)
+        plant.set("bridge/recent_troubles", recent_json(troubles.recent), now)
+        plant.set("bridge/drives_waiting", troubles.waiting, now)
+        everything = [one.trouble for one in troubles.shown]
+        everything += [known.trouble for one in troubles.shown for known in one.explains]
+        unproven = sorted(one.place for one in everything if one.kind == _UNPROVEN)
+        plant.set("bridge/stops_unproven", ", ".join(unproven), now)
+        self._tell_causes(troubles.shown, now)
+
+    def _tell_causes(self, shown: list[Shown], now: float) -> None:
+        """What no single event tells. A cause is told once, as soon as it is found."""
+        present: set[tuple[str, str, float]] = set()
+        for one in shown:
+            message = _said(one.trouble)
+            if not message:
+                continue
+            found = (*one.key, one.since_ms)
+            present.add(found)
+            if found not in self._told_causes and one.until_ms is None:
+                source = one.trouble.place.removeprefix("bus/")
+                severity = 900 if one.rank is not Rank.WARNING else 500
+                self._plant.report(Event(now, Kind.CAUSE, source, severity, message))
+        self._told_causes = present
+
+    def because(self, event: Event) -> str:
+        """What has caused an event, as a phrase; empty where nothing known has."""
+        kind = _NOTICED.get(event.kind)
+        if kind is None or event.source == "bridge":
+            return ""
+        cause = self.troubles.cause_of(Trouble(Rank.ALARM, kind, event.source), self._clock() * 1000)
+        return _said(cause) or f"{cause.kind.replace('_', ' ')} at {cause.place}" if cause else ""
+
+
+def _said(trouble: Trouble) -> str:
+    """A cause that is found by what several have in common, in words."""
+    facts = dict(trouble.facts)
+    match trouble.kind:
+        case "bus_silent":
+            bus = trouble.place.removeprefix("bus/")
+            return f"no node of {bus} answers: cable at the box, terminator or supply of the bus"
+        case "controllers_silent":
+            return f"{facts['owner']} fell silent with {facts['drives']} drives"
+        case "box_slow":
+            return f"this box was too slow for {facts['ms']} ms"
+        case _:
+            return ""

@@ -1,0 +1,100 @@
+"""What the page tells of a plant: its points by topic, its description, and what is wrong."""
+
+from __future__ import annotations
+
+from bridge.condition.told import troubles_json
+from bridge.image import Quality
+from bridge.northbound.page.describe import described
+from bridge.northbound.page.topics import topics_of
+from bridge.northbound.page.troubles import Troubles
+from tests.support import sites
+from tests.support.condition import Watched, families_of
+
+DRIVE, BUS = "conveyor/fu1", "bus/can0"
+_SITE = sites.site(
+    sites.bus(sites.node(sites.drive("fu1", "lease", 1000), sites.drive("fu2", "lease", 1000)))
+)
+
+
+class Front:
+    """A front beside a bus process that judges."""
+
+    def __init__(self) -> None:
+        self.bus = Watched(_SITE)
+        self.now_ms = 5000.0
+        self.begin()
+
+    def begin(self) -> None:
+        self.troubles = Troubles(self.bus.image, lambda: self.now_ms)
+
+    def judge(self) -> None:
+        self.bus.later(500.0)
+        self.bus.set("bridge/troubles", troubles_json(self.bus.troubles.shown))
+        self.bus.set("bridge/recent_troubles", "[]")
+        self.bus.set("bridge/drives_waiting", self.bus.troubles.waiting)
+
+
+def test_a_front_shows_what_the_bus_process_has_judged_and_tells_what_is_new() -> None:
+    front = Front()
+    assert not front.troubles.beat(), "before anything was judged"
+    front.bus.set(f"{BUS}/duplicate_ids", "5")
+    front.judge()
+    assert front.troubles.beat()
+    assert [one["kind"] for one in front.troubles.shown] == ["duplicate_ids"]
+    assert not front.troubles.beat()
+
+
+def test_a_front_that_starts_anew_knows_since_when() -> None:
+    front = Front()
+    front.bus.later(60_000.0)
+    front.bus.set(f"{BUS}/duplicate_ids", "5")
+    front.judge()
+    front.troubles.beat()
+    before = front.troubles.shown
+    front.now_ms += 3_600_000.0
+    front.begin()
+    front.judge()
+    front.troubles.beat()
+    assert front.troubles.shown == before
+    assert "or_longer" not in before[0]
+
+
+def test_a_bus_process_that_does_not_answer_says_nothing_of_the_drives() -> None:
+    front = Front()
+    front.bus.set("conveyor/fu2/supervision/follows", False)
+    front.judge()
+    front.troubles.beat()
+    front.bus.image.judge(range(len(front.bus.image.points)), Quality.DEAD, 1.0, "bus process not reachable")
+    assert front.troubles.beat()
+    (trouble,) = front.troubles.shown
+    assert (trouble["kind"], trouble["place"], trouble["rank"]) == ("bridge_dead", "bridge", "alarm")
+    assert trouble["since"] == front.now_ms
+    front.now_ms += 1000.0
+    assert not front.troubles.beat(), "it goes on"
+    front.judge()
+    front.troubles.beat()
+    assert [one["kind"] for one in front.troubles.shown] == ["drive_lost", "drive_lost"], "it answers"
+
+
+def test_each_point_is_in_the_topics_of_its_place() -> None:
+    case = Watched(_SITE)
+    points = case.image.points
+    topics = topics_of(points, case.layout)
+    shown = {index for indices in topics.values() for index in indices}
+    assert shown == set(range(len(points)))
+    assert {points[index].name for index in topics[f"drive {DRIVE}"]} == {
+        point.name for point in points if point.name.startswith(f"{DRIVE}/")
+    }
+    assert set(topics) == {"plant", "bus can0", "node conveyor", f"drive {DRIVE}", "drive conveyor/fu2"}
+
+
+def test_the_site_is_described_by_the_names_of_its_points() -> None:
+    plant = sites.plant_of(_SITE)
+    told = described(plant.image, plant.site, families_of(plant))
+    assert [one["name"] for one in told["drives"]] == [DRIVE, "conveyor/fu2"]
+    assert all(one["main"] == "frequency" and one["stops_in"] == "ready" for one in told["drives"])
+    names = {f"{place}/{leaf}" for place, kind in told["places"].items() for leaf in told["natures"][kind]}
+    assert names == {point.name for point in plant.image.points}
+    for drive in told["drives"]:
+        assert f"actual/{drive['main']}" in told["natures"][told["places"][drive["name"]]]
+    assert all(told["natures"].count(one) == 1 for one in told["natures"]), "each kind is described once"

@@ -18,6 +18,8 @@ from bridge.mapping import Family
 LOOK_EVERY_S: Final = 0.5
 _PORTION: Final = 20
 """Buses and drives that are looked at in one go: about 0.1 ms."""
+_NO_NEWS: Final = 500
+"""Events below this severity tell that something is over, or was done."""
 _UNPROVEN: Final = "stop_unproven"
 _NOTICED: Final = {
     Kind.NODE_LOST: "node_lost",
@@ -99,7 +101,7 @@ class PlantCondition:
     def because(self, event: Event) -> str:
         """What has caused an event, as a phrase; empty where nothing known has."""
         kind = _NOTICED.get(event.kind)
-        if kind is None or event.source == "bridge":
+        if kind is None or event.source == "bridge" or event.severity < _NO_NEWS:
             return ""
         cause = self.troubles.cause_of(Trouble(Rank.ALARM, kind, event.source), self._clock() * 1000)
         return _said(cause) or f"{cause.kind.replace('_', ' ')} at {cause.place}" if cause else ""

@@ -33,8 +33,9 @@ _BEGINNING_MS: Final = 2000.0
 """What is there so soon after the bridge has begun may have been there before."""
 RECENT_MS: Final = 600_000.0
 """How long something that happens, and then is over, is shown after it has happened last."""
-_SLOW_SHOWN_MS: Final = 10_000.0
-"""How long a standstill of this box is shown by itself."""
+_SLOW_SHOWN_MS: Final = 3000.0
+"""How long a standstill of this box is shown by itself, and what begins is taken for its consequence: what is
+noticed later has another reason."""
 _AT_ONCE_MS: Final = 5000.0
 """Drives of one controller that trip within this time have it in common."""
 

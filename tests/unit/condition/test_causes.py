@@ -191,6 +191,13 @@ def test_a_node_that_stays_away_after_a_standstill_is_a_trouble_of_its_own(plant
     assert top(plant, 60_000.0) == [("node_lost", "press")]
 
 
+def test_a_controller_that_falls_silent_after_a_standstill_is_its_own_trouble(plant: Watched) -> None:
+    hang(plant, 150)
+    plant.later(5000.0)
+    trip(plant, DRIVES[0])
+    assert top(plant) == [("controller_silent", DRIVES[0])]
+
+
 def test_a_standstill_without_consequences_is_told_and_passes(plant: Watched) -> None:
     hang(plant, 600)
     assert top(plant) == [("box_slow", "bridge")]

@@ -8,11 +8,11 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Final, Protocol
 
 from bridge.command import Event, Kind, Plant
-from bridge.errors import BridgeError
+from bridge.errors import BridgeError, Unavailable
 from bridge.notify import Notifier
 from bridge.quietlog import about
 from bridge.ratelimit import Pauses
@@ -45,14 +45,42 @@ class Server(Protocol):
     async def failed(self) -> None: ...
 
 
-class ServerPart:
-    """A server of this process, which has been started once before."""
+class Ports:
+    """What can be opened at the start. One port that is taken, or an address that is not there yet, does not
+    keep a plant from being served on the others: it is tried again with the parts."""
 
-    def __init__(self, name: str, title: str, server: Server) -> None:
+    def __init__(self) -> None:
+        self._opened: set[str] = set()
+        self._failed: dict[str, str] = {}
+
+    async def open(self, name: str, start: Callable[[], Awaitable[object]]) -> None:
+        """Start what serves under ``name``."""
+        try:
+            await start()
+        except Unavailable as error:
+            self._failed[name] = str(error)
+        else:
+            self._opened.add(name)
+
+    def has(self, name: str) -> bool:
+        """Whether it has been opened."""
+        return name in self._opened
+
+    def check(self, *, needs_all: bool) -> None:
+        """Raises ``Unavailable`` where none could be opened, or where one could not and the site
+        ``needs_all``: a service that cannot be reached has no business on the bus."""
+        if self._failed and (needs_all or not self._opened):
+            raise Unavailable("\n".join(self._failed.values()))
+
+
+class ServerPart:
+    """A server of this process, which ``is_started`` already or is to be started first."""
+
+    def __init__(self, name: str, title: str, server: Server, *, is_started: bool = True) -> None:
         self.name = name
         self.title = title
         self._server = server
-        self._is_started = True
+        self._is_started = is_started
 
     async def run_once(self, serves: Callable[[], None]) -> str:
         if not self._is_started:

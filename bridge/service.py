@@ -34,7 +34,7 @@ from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
 from bridge.northbound.zenoh.session import ZenohServer
 from bridge.notify import Notifier
-from bridge.parts import Parts, ServerPart
+from bridge.parts import Parts, Ports, ServerPart
 from bridge.plantcondition import PlantCondition
 from bridge.preflight import check_files
 from bridge.project import Project, count
@@ -114,6 +114,7 @@ class Service:
         self._ending: Ending | None = None
         drives, buses = count(len(self.plant.drives), "drive"), count(len(site.bus), "bus")
         self.parts = Parts(self.plant, self.notifier, clock.now, f"{drives} on {buses}")
+        self._opened = Ports()
         self.fronts: list[Front] = []
         self._ports: list[Port] = []
         """Of the fronts: a front that dies leaves its port to the next."""
@@ -130,9 +131,9 @@ class Service:
     async def run(self, ready: Callable[[], None] = lambda: None) -> None:
         """Serve until cancelled; ``ready`` is called as soon as the buses are open.
 
-        Raises ``FileFaults`` where a file cannot be used, ``Unavailable`` where a bus or a port cannot be
-        opened, and ``OperationFailed`` when the master has failed. A server or a front that fails later is
-        started again.
+        Raises ``FileFaults`` where a file cannot be used, ``Unavailable`` where a bus or all ports cannot be
+        opened (with ``site.all_ports``: one of them), and ``OperationFailed`` when the master has failed. A
+        server or a front that cannot be started or fails later is started again.
         """
         self._say_what_is_doubtful()
         async with AsyncExitStack() as stack:
@@ -155,22 +156,26 @@ class Service:
             await self._serve()
 
     async def _open_ports(self, stack: AsyncExitStack) -> None:
-        """Ports first: a service that cannot be reached has no business on the bus."""
+        """Ports first: a service that cannot be reached has no business on the bus. One that cannot be opened
+        is tried again while the others are served, unless the site needs all."""
+        ports, needs_all = self._opened, self.project.site.site.all_ports
         if self.modbus:
-            await self.modbus.start()
             stack.push_async_callback(self.modbus.close)
-        for port in self._ports:
-            port.socket()
+            await ports.open("modbus", self.modbus.start)
+        for front, port in zip(self.fronts, self._ports, strict=True):
             stack.callback(port.close)
+            await ports.open(front.name, port.open)
         if self.zenoh:
-            await self.zenoh.start()
             stack.push_async_callback(self.zenoh.close)
+            await ports.open("zenoh", self.zenoh.start)
+        ports.check(needs_all=needs_all)
         await self.mirror.start()
         stack.push_async_callback(self.mirror.close)
         # After the mirror, which sees that the folder of their sockets is ours alone.
-        for gateway in self.gateways.values():
-            await gateway.start()
+        for name, gateway in self.gateways.items():
             stack.push_async_callback(gateway.close)
+            await ports.open(f"gateway {name}", gateway.start)
+        ports.check(needs_all=needs_all)
         for tap in self._taps:
             stack.push_async_callback(tap.close)
             try:
@@ -202,12 +207,14 @@ class Service:
         raise OperationFailed(f"the service has lost a task: {', '.join(task.get_name() for task in done)}")
 
     def _servers(self) -> Iterator[ServerPart]:
+        has = self._opened.has
         if self.modbus:
-            yield ServerPart("modbus", "the Modbus server", self.modbus)
+            yield ServerPart("modbus", "the Modbus server", self.modbus, is_started=has("modbus"))
         if self.zenoh:
-            yield ServerPart("zenoh", "the zenoh session", self.zenoh)
-        for name, gateway in self.gateways.items():
-            yield ServerPart(f"gateway {name}", f"the gateway of {name}", gateway)
+            yield ServerPart("zenoh", "the zenoh session", self.zenoh, is_started=has("zenoh"))
+        for bus, gateway in self.gateways.items():
+            name = f"gateway {bus}"
+            yield ServerPart(name, f"the gateway of {bus}", gateway, is_started=has(name))
         yield ServerPart("mirror", "the link to the fronts", self.mirror)
 
     async def _start(self) -> None:

@@ -59,6 +59,7 @@ class SiteTable(Table):
     name: Name = Field(description="a name for this site, lower_snake_case")
     state_dir: str = "/var/lib/drivebridge"
     runtime_dir: str = Field("/run/drivebridge", description="folder for the socket between our processes")
+    all_ports: bool = Field(False, description="whether to start only where each port can be opened")
 
 
 def _mapped(text: object) -> object:

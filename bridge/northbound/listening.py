@@ -69,6 +69,10 @@ class Port:
         self._key = key
         self._socket: socket.socket | None = None
 
+    async def open(self) -> None:
+        """As ``socket``, for who opens several things."""
+        self.socket()
+
     def socket(self) -> socket.socket:
         """The listening socket, a new one if the old one has ended. Raises ``Unavailable``."""
         if self._socket is None or not is_listening(self._socket):

@@ -24,7 +24,7 @@ from tests.support.zenoh_peer import until
 
 RPDO1 = 0x205
 PLC = Identity(Source.MODBUS, "127.0.0.1")
-TASKS = {"master", "EEPROM counts", "audit log", "start", "modbus", "zenoh", "mirror", "slow"}
+TASKS = {"master", "EEPROM counts", "audit log", "condition", "start", "modbus", "zenoh", "mirror", "slow"}
 """What the service runs side by side."""
 PARTS = {"modbus", "zenoh", "mirror", "slow"}
 """What is started again where it fails."""

@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from bridge import clock
+from bridge.config import Site
 from bridge.drive import FaultWords
 from bridge.drive.fault_words import listed_faults
 from bridge.errors import OperationFailed
@@ -34,6 +35,11 @@ _log = logging.getLogger(__name__)
 def fault_texts(families: dict[str, Family]) -> FaultTexts:
     """In German; English is what the points say."""
     return {"de": {name: _in_german(family) for name, family in families.items()}}
+
+
+def _kept_sessions(site: Site) -> Path:
+    """Beside the socket of the mirror: the folder is ours alone, and empty after a boot."""
+    return Path(site.site.runtime_dir).absolute() / f"{site.site.name}-page.sessions"
 
 
 def exports_of(project: Project) -> dict[str, Export]:
@@ -88,7 +94,7 @@ async def run_page(project: Project, signs: int | None = None, listening: int | 
         stack.push_async_callback(mirror.close)
         table = site.page
         bound = listen(table.listen, "page.listen") if listening is None else socket.socket(fileno=listening)
-        page = Page(mirror, site, project.families, backstage_of(project), clock.now)
+        page = Page(mirror, site, project.families, backstage_of(project), clock.now, _kept_sessions(site))
         server = PageServer(page, bound, table.certificate, table.private_key)
         await server.start()
         stack.push_async_callback(server.close)

@@ -9,6 +9,8 @@ import time
 from collections.abc import AsyncGenerator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 from typing import Any, Final
 
 from websockets.asyncio.client import ClientConnection, connect
@@ -26,6 +28,8 @@ from tests.support.passwords import cheap_hash
 TIMEOUT_S: Final = 5.0
 ROLES: Final = ("observer", "operator", "engineer")
 Json = dict[str, Any]
+_hash = cache(cheap_hash)
+"""The same in each front of a site."""
 
 
 class PlantView:
@@ -99,9 +103,15 @@ class Answer:
 class Served:
     """``page`` on a port of its own; ``later_s`` is how much later than now it is for the page."""
 
-    def __init__(self, anonymous: str = "", system: Any = None, capture: Any = no_capture) -> None:
+    def __init__(
+        self,
+        anonymous: str = "",
+        system: Any = None,
+        capture: Any = no_capture,
+        kept: Path | None = None,
+    ) -> None:
         users = "".join(
-            f'[[opcua.user]]\nname = "{one}"\nrole = "{one}"\npassword_hash = "{cheap_hash(one + "!")}"\n'
+            f'[[opcua.user]]\nname = "{one}"\nrole = "{one}"\npassword_hash = "{_hash(one + "!")}"\n'
             for one in ROLES
         )
         more = f'anonymous = "{anonymous}"' if anonymous else ""
@@ -114,7 +124,7 @@ class Served:
         families: dict[str, Family] = {sites.FAMILY: sites.family(sites.FAMILY)}
         site: Site = plant.site
         backstage = Backstage({}, {}, [], {"can0": {}}, capture, dict, {}, self.system)
-        self.page = Page(self.view, site, families, backstage, lambda: time.monotonic() + self.later_s)
+        self.page = Page(self.view, site, families, backstage, lambda: time.monotonic() + self.later_s, kept)
         self.bound = socket.create_server(("127.0.0.1", 0))
         self.port = self.bound.getsockname()[1]
         self.origin = f"http://127.0.0.1:{self.port}"

@@ -9,6 +9,7 @@ import socket
 import struct
 import time
 from collections.abc import AsyncGenerator
+from pathlib import Path
 
 import pytest
 from websockets.exceptions import ConnectionClosed
@@ -131,6 +132,50 @@ async def test_the_tabs_of_one_session_leave_room_for_others(served: Served) -> 
         await message(other, "you")
 
 
+async def test_four_logins_of_an_observer_leave_room_for_the_engineer(served: Served) -> None:
+    async with contextlib.AsyncExitStack() as stack:
+        refused = 0
+        for _ in range(4):
+            cookie, token = await served.login("observer")
+            for _ in range(16):
+                tab = await stack.enter_async_context(served.live(cookie))
+                await tab.send(token)
+                try:
+                    await message(tab, "you")
+                except ConnectionClosed:
+                    refused += 1
+        assert refused == 48, "however often one user logs in"
+        cookie, token = await served.login("engineer")
+        tab = await stack.enter_async_context(served.live(cookie))
+        await tab.send(token)
+        await message(tab, "you")
+
+
+async def test_idle_connections_keep_nobody_out(served: Served) -> None:
+    async with contextlib.AsyncExitStack() as stack:
+        for _ in range(400):
+            _, writer = await asyncio.open_connection("127.0.0.1", served.port)
+            stack.callback(writer.close)
+        began = time.monotonic()
+        cookie, token = await served.login("engineer")
+        tab = await stack.enter_async_context(served.live(cookie))
+        await tab.send(token)
+        await message(tab, "you")
+        assert time.monotonic() - began < 5.0
+
+
+async def test_a_front_that_is_started_anew_knows_who_has_logged_in(tmp_path: Path) -> None:
+    before = Served(kept=tmp_path / "page.sessions")
+    async with before.serving():
+        cookie, token = await before.login("engineer")
+    after = Served(kept=tmp_path / "page.sessions")
+    async with after.serving(), after.live(cookie) as tab:
+        await tab.send(token)
+        await message(tab, "you")
+        answer = await after.ask("POST", "/api/logout", Cookie=cookie, X_Token=token)
+        assert answer.status == 200
+
+
 async def test_a_session_that_ends_before_its_token_comes_is_over(served: Served) -> None:
     cookie, token = await served.login("operator")
     async with served.live(cookie) as tab:
@@ -180,23 +225,20 @@ async def test_rows_of_a_trend_have_the_number_of_their_choice(served: Served) -
             pass
 
 
-async def test_a_trouble_is_told_soon_and_has_the_time_when_nobody_looked(served: Served) -> None:
-    place = served.view.image.index[f"{DRIVE}/supervision/follows"]
+async def test_a_trouble_that_the_bus_process_tells_is_told_soon(served: Served) -> None:
+    image, place = served.view.image, served.view.image.index["bridge/troubles"]
+    said = {"rank": "danger", "kind": "ignores_stop", "place": DRIVE, "since": 1000, "facts": {}}
     cookie, token = await served.login("observer")
-    served.view.image.set(place, False, 1.0)
-    began_ms = time.time() * 1000
-    await asyncio.sleep(2.5)
+    image.set(place, json.dumps([said]), 1.0)
+    await asyncio.sleep(1.5)
     async with served.live(cookie) as tab:
         await tab.send(token)
-        trouble = (await message(tab, "troubles"))["troubles"][0]
-        assert trouble["kind"] == "ignores_stop"
-        assert trouble["since"] == pytest.approx(began_ms + 500, abs=600)
-        served.view.image.set(place, True, 1.0)
+        assert (await message(tab, "troubles"))["troubles"] == [said], "also when nobody has looked"
+        image.set(place, "[]", 2.0)
         began = time.monotonic()
         told = await message(tab, "troubles")
         assert time.monotonic() - began < 0.6
-        assert "ignores_stop" not in [one["kind"] for one in told["troubles"]]
-        assert isinstance(told["waiting"], int)
+        assert (told["troubles"], told["waiting"], told["recent"]) == ([], 0, [])
 
 
 async def test_a_client_that_leaves_at_any_moment_is_no_failure(

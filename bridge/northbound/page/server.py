@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import socket
 import ssl
+import time
 from collections.abc import Generator
 from typing import Any, Final
 
@@ -16,8 +17,10 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from bridge.errors import OperationFailed
 from bridge.northbound.listening import until_deaf
 from bridge.northbound.page.guards import MOST_HEAD
+from bridge.northbound.page.shares import MOST_CONNECTIONS, Connections, Doing
 from bridge.northbound.page.viewer import MOST_BYTES
 from bridge.northbound.page.web import Page
+from bridge.northbound.sources import source_of
 
 _HEADERS_S: Final = 10.0
 """How long the head of a request may take to come, the first of a connection included."""
@@ -27,31 +30,43 @@ _STALLED_S: Final = 20.0
 _CLOSING_S: Final = 12.0
 """How long a tab's connection may last when nothing is served on it any more: uvicorn waits 10 s for the
 client's part of closing it."""
-_MOST_CONNECTIONS: Final = 256
 
 
 class _Protocol(H11Protocol):
-    """uvicorn waits for ever for the head of a request that has begun, or never begins."""
+    """uvicorn waits for ever for the head of a request that has begun, or never begins, and lets in whoever
+    comes first."""
 
+    _shares: Connections[asyncio.Transport]
+    """Of this server: a class of its own for each has it."""
     _deadline: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: Any) -> None:
         super().connection_made(transport)
         self._expect_head()
+        address = source_of(self.client[0] if self.client else "")
+        for other in self._shares.opened(transport, address, time.monotonic()):
+            other.abort()
 
     def data_received(self, data: bytes) -> None:
         before = self._request
         super().data_received(data)
         if self._request is not before or self.transport.get_protocol() is not self:
             self._forget()  # its head is here, or that of a WebSocket, which another protocol serves
+            is_live = self.transport.get_protocol() is not self
+            self._does(Doing.UNPROVED if is_live else Doing.BUSY)
 
     def on_response_complete(self) -> None:
         super().on_response_complete()
         if not self.transport.is_closing() and (self._request is None or self._request.response_complete):
             self._expect_head(_IDLE_S + _HEADERS_S)
+            self._does(Doing.KEPT)
+
+    def _does(self, doing: Doing) -> None:
+        self._shares.does(self.transport, doing, time.monotonic())
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._forget()
+        self._shares.closed(self.transport)
         super().connection_lost(exc)
 
     @property
@@ -72,6 +87,7 @@ class _Protocol(H11Protocol):
 class _LiveProtocol(WebSocketsSansIOProtocol):
     """uvicorn waits for ever for a client that takes nothing, even to close its connection."""
 
+    _shares: Connections[asyncio.Transport]
     _deadline: asyncio.TimerHandle | None = None
     _is_ending = False
 
@@ -87,6 +103,7 @@ class _LiveProtocol(WebSocketsSansIOProtocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._forget()
+        self._shares.closed(self.transport)
         super().connection_lost(exc)
 
     async def run_asgi(self) -> None:
@@ -119,10 +136,11 @@ class PageServer:
         self, page: Page, bound: socket.socket, certificate: str | None = None, private_key: str | None = None
     ) -> None:
         self._bound = bound
+        shares = {"_shares": Connections[asyncio.Transport]()}
         config = uvicorn.Config(
             page.app,
-            http=_Protocol,
-            ws=_LiveProtocol,
+            http=type("_Shared", (_Protocol,), shares),
+            ws=type("_SharedLive", (_LiveProtocol,), shares),
             ws_max_size=MOST_BYTES,
             ws_ping_interval=20.0,
             ws_ping_timeout=20.0,
@@ -133,7 +151,8 @@ class PageServer:
             server_header=False,
             date_header=False,
             proxy_headers=False,
-            limit_concurrency=_MOST_CONNECTIONS,
+            # Beyond our own limit, which closes those that do least: connections end a moment later.
+            limit_concurrency=4 * MOST_CONNECTIONS,
             timeout_keep_alive=_IDLE_S,
             timeout_graceful_shutdown=2,
             h11_max_incomplete_event_size=MOST_HEAD,

@@ -3,12 +3,15 @@
 A session is known by two secrets: its id, which only the cookie has, and its token, which every change has to
 name. What another site makes a browser send has the cookie and not the token (OWASP, cross-site request
 forgery). An id is never one that a browser has brought along: each login begins a session with another one.
+Neither is kept here: of the id there is a hash, and the token is made of the id.
 """
 
 from __future__ import annotations
 
+import hashlib
 import hmac
 import secrets
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -22,28 +25,33 @@ MOST_OF_ONE: Final = 16
 """Sessions of one user, or of visitors from one address, beside those with an open tab."""
 MOST_VISITORS: Final = 128
 """Anybody may become one by asking: they leave room for who logs in."""
+KEEP_EVERY_S: Final = 60.0
 _BYTES: Final = 32
 
 
 @dataclass(slots=True, eq=False)
 class Session:
-    """``user`` is empty for who reads without a login, from ``address``; ``tabs`` are those that are open."""
+    """``key`` is the hash of its id. ``user`` is empty for who reads without a login, from ``address``;
+    ``tabs`` are those that are open. ``id`` and ``token`` are empty until its browser has brought the id."""
 
-    id: str
-    token: str
+    key: str
     user: str
     role: Role
     began: float
     used: float
     address: str = ""
     tabs: int = 0
+    id: str = ""
+    token: str = ""
 
     def is_over(self, now: float) -> bool:
         return now >= self.used + IDLE_S or now >= self.began + LONGEST_S
 
     def has(self, token: str) -> bool:
         """Whether this is its token; takes the same time for each."""
-        return hmac.compare_digest(self.token.encode(), token.encode("utf-8", "surrogatepass"))
+        return bool(self.token) and hmac.compare_digest(
+            self.token.encode(), token.encode("utf-8", "surrogatepass")
+        )
 
 
 class Sessions:
@@ -51,6 +59,21 @@ class Sessions:
 
     def __init__(self) -> None:
         self._sessions: dict[str, Session] = {}
+        self._is_changed = False
+        self._kept_at = 0.0
+
+    def restore(self, sessions: Iterable[Session]) -> None:
+        """Those of a front before this one."""
+        self._sessions.update((one.key, one) for one in sessions)
+
+    def take_changed(self, now: float) -> list[Session] | None:
+        """All of them where somebody has come or gone since the last call, or once a minute: that is to be
+        kept. None where nothing is."""
+        if not self._is_changed and now < self._kept_at + KEEP_EVERY_S:
+            return None
+        self._is_changed, self._kept_at = False, now
+        self._drop_old(now)
+        return list(self._sessions.values())
 
     def __len__(self) -> int:
         return len(self._sessions)
@@ -65,24 +88,28 @@ class Sessions:
         for sessions, most in ((own, MOST_OF_ONE), (visitors, MOST_VISITORS), (everybody, MOST)):
             if len(sessions) >= most and self._drop_idle(sessions):
                 break
-        session_id, token = (secrets.token_urlsafe(_BYTES) for _ in range(2))
-        session = self._sessions[session_id] = Session(session_id, token, user, role, now, now, address)
+        session = Session("", user, role, now, now, address)
+        _known_by(session, secrets.token_urlsafe(_BYTES))
+        self._sessions[session.key] = session
+        self._is_changed = True
         return session
 
     def find(self, session_id: str, now: float) -> Session | None:
         """The session with this id, which has been used now; None where there is none any more."""
-        session = self._sessions.get(session_id)
+        session = self._sessions.get(_key_of(session_id))
         if session is None:
             return None
         if session.is_over(now):
             self.end(session)
             return None
+        _known_by(session, session_id)
         session.used = max(now, session.used)
         return session
 
     def end(self, session: Session) -> None:
         """May be called again."""
-        self._sessions.pop(session.id, None)
+        if self._sessions.pop(session.key, None):
+            self._is_changed = True
 
     def _drop_old(self, now: float) -> None:
         for session in [one for one in self._sessions.values() if one.is_over(now)]:
@@ -94,3 +121,16 @@ class Sessions:
         if idle:
             self.end(min(idle, key=lambda one: one.used))
         return bool(idle)
+
+
+def _key_of(session_id: str) -> str:
+    return hashlib.sha256(session_id.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _known_by(session: Session, session_id: str) -> None:
+    """The token cannot be told from what is kept: it needs the id, which nobody but the browser has."""
+    if session.id != session_id:
+        session.key = _key_of(session_id)
+        session.id = session_id
+        made = hmac.digest(session_id.encode("utf-8", "surrogatepass"), b"token of the page", "sha256")
+        session.token = made.hex()

@@ -49,6 +49,10 @@ class Tab:
         self._listening: asyncio.Task[None] | None = None
         self._closing: asyncio.Task[None] | None = None
 
+    @property
+    def is_closing(self) -> bool:
+        return self._closing is not None
+
     def tell(self, data: bytes) -> None:
         """Have it sent in its turn. A tab for which a thousand messages wait already is closed: it would wait
         for ever for an outcome that is left out."""

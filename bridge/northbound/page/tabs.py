@@ -19,10 +19,12 @@ from bridge.guard import Guard
 from bridge.image import Image
 from bridge.northbound.page.hearing import Hearings
 from bridge.northbound.page.sessions import Session, Sessions
+from bridge.northbound.page.shares import Seat, admit
 from bridge.northbound.page.tab import BAD_MESSAGE, GONE, NO_TOKEN, SESSION_OVER, TOO_MANY, Tab, close
 from bridge.northbound.page.topics import Topics
 from bridge.northbound.page.troubles import Troubles
 from bridge.northbound.page.viewer import BadMessage
+from bridge.northbound.sources import source_of
 from bridge.northbound.view import View
 
 _TICK_S: Final = 0.05
@@ -33,8 +35,6 @@ _TROUBLES: Final = 4
 """Ticks from one look for troubles to the next while a tab is open."""
 _LOOK: Final = 20
 """Ticks from one look at the sessions of the tabs to the next, and from one time that tabs are told."""
-_MOST_TABS: Final = 64
-MOST_OF_SESSION: Final = 16
 _EVENTS_KEPT: Final = 200
 _TOKEN_S: Final = 5.0
 _encode = msgspec.json.Encoder().encode
@@ -51,6 +51,8 @@ class Tabs:
         hearings: Hearings,
         clock: Callable[[], float],
     ) -> None:
+        self.keep: Callable[[list[Session]], None] = lambda sessions: None
+        """Takes the sessions for a front after this one."""
         self._view = view
         self._sessions = sessions
         self._hearings = hearings
@@ -74,6 +76,7 @@ class Tabs:
             beating.cancel()
             with suppress(asyncio.CancelledError):
                 await beating
+            self.keep_sessions()
             self._hearings.close()
             self._topics.close()
 
@@ -106,7 +109,26 @@ class Tabs:
             return NO_TOKEN
         if self._sessions.find(session.id, self._clock()) is None:
             return SESSION_OVER  # while its token was awaited
-        return TOO_MANY if len(self._tabs) >= _MOST_TABS or session.tabs >= MOST_OF_SESSION else 0
+        return 0 if self._finds_room(session, socket) else TOO_MANY
+
+    def _finds_room(self, session: Session, socket: WebSocket) -> bool:
+        """Whether there is a tab left for this session, or one gives way to it."""
+        seated = [tab for tab in self._tabs if not tab.is_closing]
+        taken = [
+            Seat(
+                tab.session.user,
+                source_of(tab.viewer.identity.address),
+                tab.session.role,
+                tab.viewer.commands,
+                tab.since_ms,
+            )
+            for tab in seated
+        ]
+        address = source_of(socket.client.host if socket.client else "")
+        admission = admit(taken, Seat(session.user, address, session.role, since=self._epoch_ms()))
+        if admission.gives_way is not None:
+            seated[admission.gives_way].close(TOO_MANY, "gave way")
+        return admission.is_in
 
     def end(self, session: Session) -> None:
         """Close the tabs of this session, which is over."""
@@ -205,6 +227,13 @@ class Tabs:
         for session in {tab.session for tab in self._tabs}:
             if self._sessions.find(session.id, self._clock()) is None:
                 self.end(session)
+        self.keep_sessions()
+
+    def keep_sessions(self) -> None:
+        """For a front after this one, as far as they have changed."""
+        sessions = self._sessions.take_changed(self._clock())
+        if sessions is not None:
+            self.keep(sessions)
 
     def _tell_time(self) -> None:
         """A tab that is told nothing for some seconds knows by this that its connection or we hang."""

@@ -108,6 +108,11 @@ class Viewer:
         """How often it has let go of everything."""
         self._limit = RateLimit(_MESSAGES, _EVERY_S)
 
+    @property
+    def commands(self) -> bool:
+        """Whether it has taken something and not given it back."""
+        return bool(self._owned)
+
     def on_message(self, data: bytes, now: float, known: Callable[[str], bool]) -> None:
         """One message of the tab; ``known`` says which topics there are, of buses ``bus <bus>``. Raises
         ``BadMessage``."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
+from collections.abc import AsyncGenerator, Callable, Iterable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +23,7 @@ from starlette.websockets import WebSocket
 
 from bridge.command import Role
 from bridge.condition.layout import layout_of
-from bridge.config import PageTable, Site
+from bridge.config import PageTable, Site, UserTable
 from bridge.mapping import Family
 from bridge.northbound.logins import PasswordChecks, TooManyChecks
 from bridge.northbound.page.bus import Bus, Capture
@@ -32,6 +32,7 @@ from bridge.northbound.page.guards import MOST_BODY, Guards
 from bridge.northbound.page.hearing import Ear, Hearings
 from bridge.northbound.page.integration import Export, Integration
 from bridge.northbound.page.parameters import Counts, Parameters, holders_of
+from bridge.northbound.page.sessionfile import SessionFile, credential_of
 from bridge.northbound.page.sessions import Session, Sessions
 from bridge.northbound.page.system import System, SystemFacts
 from bridge.northbound.page.tabs import Tabs
@@ -106,7 +107,9 @@ class Page:
         families: dict[str, Family],
         backstage: Backstage,
         clock: Callable[[], float],
+        kept: Path | None = None,
     ) -> None:
+        """``kept`` is a file for the sessions, for a front after this one."""
         settings, table = site.opcua, site.page or PageTable.model_validate({})
         self._clock = clock
         self._fault_texts = backstage.fault_texts
@@ -118,6 +121,10 @@ class Page:
         self._checks = PasswordChecks(most=_MOST_CHECKS)
         layout = layout_of(view.image.points, site, families)
         self._tabs = Tabs(view, layout, self._sessions, Hearings(backstage.ears), clock)
+        if kept is not None:
+            file = SessionFile(kept, self._credentials(settings.user if settings else ()))
+            self._sessions.restore(file.load(clock()))
+            self._tabs.keep = file.save
         self._description = _encode(described(view.image, site, families))
         self._is_encrypted = table.certificate is not None
         # The port: cookies know none, and two pages of one host would log each other out.
@@ -170,6 +177,13 @@ class Page:
         return self._tabs.shown
 
     # who asks
+
+    def _credentials(self, users: Iterable[UserTable]) -> dict[str, str]:
+        """What the sessions of each user rest on, and under the empty name those of visitors."""
+        credentials = {user.name: credential_of(user.role, user.password_hash) for user in users}
+        if self._anonymous is not None:
+            credentials[""] = credential_of(self._anonymous.name, "")
+        return credentials
 
     def _session_of(self, connection: HTTPConnection) -> Session | None:
         session_id = connection.cookies.get(self._cookie)

@@ -116,7 +116,7 @@ class Service:
         self.parts = Parts(self.plant, self.notifier, clock.now, f"{drives} on {buses}")
         self._opened = Ports()
         self.fronts: list[Front] = []
-        self._ports: list[Port] = []
+        self._ports: dict[str, Port] = {}
         """Of the fronts: a front that dies leaves its port to the next."""
         if fronts and site.opcua:
             self._add_front("opcua", Port(site.opcua.listen, "opcua.listen"))
@@ -124,7 +124,7 @@ class Service:
             self._add_front("page", Port(site.page.listen, "page.listen"))
 
     def _add_front(self, role: str, port: Port) -> None:
-        self._ports.append(port)
+        self._ports[role] = port
         command = ["run", str(self.project.path), "--role", role]
         self.fronts.append(Front(role, command, watched=True, listening=port.socket))
 
@@ -162,9 +162,9 @@ class Service:
         if self.modbus:
             stack.push_async_callback(self.modbus.close)
             await ports.open("modbus", self.modbus.start)
-        for front, port in zip(self.fronts, self._ports, strict=True):
+        for role, port in self._ports.items():
             stack.callback(port.close)
-            await ports.open(front.name, port.open)
+            await ports.open(role, port.open)
         if self.zenoh:
             stack.push_async_callback(self.zenoh.close)
             await ports.open("zenoh", self.zenoh.start)

@@ -29,8 +29,10 @@ from bridge.image import Image, Quality
 
 BOOTING_MS: Final = 10_000.0
 """A node may boot for this long before it is a trouble."""
-_BEGINNING_MS: Final = 2000.0
+_BEGINNING_MS: Final = 4000.0
 """What is there so soon after the bridge has begun may have been there before."""
+_FOUND_MS: Final = 3000.0
+"""How long the bridge looks for its nodes at first, before one counts as absent."""
 RECENT_MS: Final = 600_000.0
 """How long something that happens, and then is over, is shown after it has happened last."""
 _SLOW_SHOWN_MS: Final = 3000.0
@@ -158,10 +160,12 @@ class Troubles:
         if self._has_risen(f"bus/{bus}/intruders", now_ms):
             who = look(f"bus/{bus}/last_intruder") or ""
             yield Trouble(Rank.ALARM, "intruder", f"bus/{bus}", (("who", who),))
-        if not is_down and not look(f"bus/{bus}/passive"):
+        is_looking = now_ms - self._began_ms < _FOUND_MS
+        if not is_down and not is_looking and not look(f"bus/{bus}/passive"):
             yield from silence_of(look, bus, nodes)
         for node in nodes:
-            yield from of_node(look, node)
+            if not is_looking or look.label(f"{node}/node/state") != "absent":
+                yield from of_node(look, node)
             yield from self._of_booting(node, bus, now_ms)
 
     def _of_booting(self, node: str, bus: str, now_ms: float) -> Iterator[Trouble]:

@@ -34,8 +34,13 @@ def serving(folder: Path, *nodes: str) -> Iterator[int]:
 def pair(name: str, node_id: int) -> str:
     """Of two drives one is left as it is when its controller falls silent, and one is its owner's alone."""
     drives = (
-        sites.drive("fu1", "lease", 1000, f'on_expiry = "hold"\ntelegram_downtime_s = 0\n{sites.SCALED}'),
-        sites.drive("fu2", "lease", 1000, f"stop_by_anyone = false\n{sites.SCALED}"),
+        sites.drive(
+            "fu1",
+            "lease",
+            1000,
+            f'on_expiry = "hold"\ntelegram_downtime_s = 0\n{sites.ACCEPTED}\n{sites.SCALED}',
+        ),
+        sites.drive("fu2", "lease", 1000, f"stop_by_anyone = false\n{sites.ACCEPTED}\n{sites.SCALED}"),
     )
     return sites.node(*drives, name=name, node_id=node_id)
 

@@ -59,8 +59,8 @@ def broken(
     """The page's first screen of a plant that is in order as yet, or where ``at_first`` is wrong."""
     port, modbus, commands = free_port(), free_port(), free_port()
     drives = (
-        sites.drive("fu2", "none", 0),
-        sites.drive("fu1", control, 1000, f"unit_id = 1\n{sites.SCALED}"),
+        sites.drive("fu2", "none", 0, f"{sites.ACCEPTED}\n{sites.SCALED}"),
+        sites.drive("fu1", control, 1000, f"unit_id = 1\n{sites.ACCEPTED}\n{sites.SCALED}"),
     )
     site = sites.write(
         folder,

@@ -102,14 +102,14 @@ def test_texts_of_others_are_shown_as_texts(desk: Desk, bridge: tuple[Process, i
         assert "owned" not in page.title()
 
 
-def test_what_the_bridge_says_is_german_on_the_german_page(desk: Desk) -> None:
+def test_who_watches_whom_is_german_on_the_german_page(desk: Desk) -> None:
     with desk.sits("operator") as page:
         to_drive(page)
-        expect(page.locator(".chain")).to_contain_text("the drive runs on: P151 is 0 (off)")
+        expect(page.locator(".chain")).to_contain_text("It runs on.")
         page.get_by_role("button", name="Deutsch").click()
-        expect(page.locator(".chain")).to_contain_text("der Antrieb läuft weiter: P151 ist 0 (aus)")
+        expect(page.locator(".chain")).to_contain_text("Er läuft weiter.")
         page.get_by_role("button", name="English").click()
-        expect(page.locator(".chain")).to_contain_text("the drive runs on: P151 is 0 (off)")
+        expect(page.locator(".chain")).to_contain_text("It runs on.")
 
 
 def test_the_system_shows_the_file_without_its_secrets(desk: Desk) -> None:

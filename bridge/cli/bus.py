@@ -23,6 +23,7 @@ from bridge.errands.errand import Errand
 from bridge.mapping import Family
 from bridge.mapping.model import SdoServer
 from bridge.node.sdo_channels import FIRST
+from bridge.parameter.number_text import NumberError, command_line_number
 from bridge.project import load_project
 
 BusName = Annotated[str | None, typer.Option("--bus", help="the bus of SITE; not needed where it has one")]
@@ -110,12 +111,12 @@ class Line:
             if node.name == text:
                 return node.id
         try:
-            node_id = int(text, 0)
-        except ValueError:
+            node_id = command_line_number(text)
+        except NumberError:
             known = ", ".join(node.name for node in self.table.node)
             hint = f" or one of {known}" if known else ""
             raise typer.BadParameter(f"{text!r} is no node: an address 1…127{hint}") from None
-        if not 1 <= node_id <= 127:
+        if not isinstance(node_id, int) or not 1 <= node_id <= 127:
             raise typer.BadParameter(f"{text} is no node id: 1…127")
         return node_id
 

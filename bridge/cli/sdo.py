@@ -20,6 +20,7 @@ from bridge.errands.single import SdoErrand
 from bridge.errors import OperationFailed
 from bridge.mapping.model import SdoServer
 from bridge.parameter import Names, ObjectRef
+from bridge.parameter.number_text import NumberError, command_line_number
 
 app = typer.Typer(help="Read or write an object of a node.", no_args_is_help=True)
 
@@ -99,7 +100,8 @@ def write(
         raise typer.BadParameter(f"{why}. --force writes it: not beside a bridge whose drive runs")
     way = _way(line, node_id, sdo_channel, timeout_ms, retries)
     where = f"{index:04X}h:{sub:02X} of node {node_id}"
-    if not yes and sys.stdin.isatty() and not typer.confirm(f"write {text} to {where}?", err=True):
+    question = f"write {decode(kind, data)} ({kind}) to {where}?"
+    if not yes and sys.stdin.isatty() and not typer.confirm(question, err=True):
         raise OperationFailed("nothing written")
     _transfer(line, way, index, sub, data, as_json=as_json)
     if as_json:
@@ -132,6 +134,8 @@ def encode(kind: ValueType, text: str) -> bytes:
     name = _ALSO.get(kind, kind)
     try:
         return datatypes.encode(name, _typed(name, text))
+    except NumberError as error:
+        raise ValueError(f"{error} ({kind})") from None
     except (ValueError, KeyError):
         raise ValueError(f"{text!r} is no {kind} value") from None
 
@@ -140,8 +144,8 @@ def _typed(name: str, text: str) -> Plain:
     if name == "bool":
         return {"0": False, "1": True, "false": False, "true": True}[text.lower()]
     if name in REALS:
-        return float(text)
-    return int(text, 0) if name in INTEGERS else text
+        return float(command_line_number(text, is_code=False))
+    return command_line_number(text) if name in INTEGERS else text
 
 
 def decode(kind: ValueType, data: bytes) -> Plain:

@@ -9,6 +9,7 @@ from typing import Final
 
 from bridge.canopen.datatypes import INTEGERS
 from bridge.image import DataType
+from bridge.image.limits import shown_range
 from bridge.mapping.model import ProcessValue
 
 _WORD_BITS: Final = 32
@@ -53,7 +54,7 @@ class LinearScale:
     def to_word(self, value: float) -> int:
         """The nearest word. Raises ValueError where ``value`` is out of range."""
         if not self.low <= value <= self.high:
-            raise ValueError(f"takes {self.low:g}…{self.high:g}, not {value:g}")
+            raise ValueError(f"takes {shown_range(self.low, self.high)}, not {value:.10g}")
         return INTEGERS[self.raw].to_word(round((value - self.offset) * self.at / self.full))
 
 

@@ -10,6 +10,7 @@ from typing import Final
 from bridge.canopen.datatypes import INTEGERS
 from bridge.drive.scaling import LinearScale, scale_of
 from bridge.image import DataType
+from bridge.image.limits import shown_range
 from bridge.mapping.model import Family, ProcessValue
 
 _WORD_BITS: Final = 16
@@ -118,7 +119,7 @@ class ValueCodec:
 
     def _whole(self, value: float) -> int:
         if not self._low <= value <= self._high:
-            raise ValueError(f"takes {self._low:g}…{self._high:g}, not {value:g}")
+            raise ValueError(f"takes {shown_range(self._low, self._high)}, not {value:.10g}")
         number = int(value)
         if number != value:
             raise ValueError(f"takes a whole number, not {value:g}")

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from bridge.canopen.datatypes import INTEGERS
 from bridge.image import DataType, Value
+from bridge.image.limits import shown_range
 from bridge.mapping.fields import Name, Ref, States, Table
 from bridge.mapping.parameters import VALUE_TYPES
 from bridge.mapping.process import Process
@@ -76,7 +77,7 @@ class Signal(Table):
             raise ValueError("takes a number")
         low, high = self.low, self.high
         if (low is not None and value < low) or (high is not None and value > high):
-            raise ValueError(f"takes {_range(low, high)}, not {value:g}")
+            raise ValueError(f"takes {shown_range(low, high)}, not {value:.10g}")
         number = (value - self.offset) / self.factor if self.is_scaled else value
         real = _REALS.get(self.data_type)
         if real is not None:
@@ -86,7 +87,7 @@ class Signal(Table):
         raw, kind = round(number), INTEGERS[self.data_type]
         if not kind.low <= raw <= kind.high:
             ends = [kind.low * self.factor + self.offset, kind.high * self.factor + self.offset]
-            raise ValueError(f"takes {_range(min(ends), max(ends))}, not {value:g}")
+            raise ValueError(f"takes {shown_range(min(ends), max(ends))}, not {value:.10g}")
         return raw & ((1 << self.size) - 1)
 
 
@@ -103,12 +104,6 @@ class Output(Signal):
         None, description="says whether it takes the error value when the node leaves Operational (CiA 401)"
     )
     error_value: Ref | None = Field(None, description="the error value")
-
-
-def _range(low: float | None, high: float | None) -> str:
-    if low is None:
-        return f"up to {high:g}"
-    return f"{low:g} and more" if high is None else f"{low:g}…{high:g}"
 
 
 def no_process() -> Process:

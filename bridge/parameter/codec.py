@@ -12,8 +12,10 @@ from typing import Final
 from bridge.canopen import datatypes
 from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, Integer
 from bridge.image import Value
+from bridge.image.limits import shown_range
 from bridge.parameter.definition import Entry
 from bridge.parameter.error import ParameterError, Why
+from bridge.parameter.number_text import NumberError, command_line_number
 
 _RAW_SIZES: Final = (1, 2, 4, 8)
 _SIGN: Final = 0x80
@@ -86,7 +88,8 @@ def matches(entry: Entry, held: bytes, wanted: bytes) -> bool:
 
 
 def parse(entry: Entry, text: str) -> Value:
-    """A value as it is typed. Raises ``ParameterError``; whether it is in range, ``encode_value`` says."""
+    """A value as it is typed on the command line. Raises ``ParameterError``; whether it is in range,
+    ``encode_value`` says."""
     definition = entry.definition
     kind = definition.data_type if definition else ""
     if kind in ("string", "bytes"):
@@ -96,15 +99,16 @@ def parse(entry: Entry, text: str) -> Value:
         return bare.lower() in ("1", "true")
     if definition and bare.lower() in (state.lower() for state in definition.states.values()):
         return bare
-    for reader in (lambda: int(bare, 0), lambda: float(bare)):
-        try:
-            return reader()
-        except ValueError:
-            continue
-    if definition is None:
-        return text
-    takes = _shown_states(entry) if definition.states else "true or false" if kind == "bool" else "a number"
-    raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {takes}, not {text!r}")
+    try:
+        return command_line_number(bare, is_code=not entry.unit)
+    except NumberError as error:
+        if definition is None and error.why == "no_number":
+            return text
+        if definition and (definition.states or kind == "bool"):
+            takes = _shown_states(entry) if definition.states else "true or false"
+            message = f"{entry.name} takes {takes}, not {text!r}"
+            raise ParameterError(Why.OUT_OF_RANGE, message) from None
+        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name}: {error}") from None
 
 
 def check_raw(entry: Entry, value: Value) -> None:
@@ -170,11 +174,11 @@ def _check_range(entry: Entry, number: int | float) -> None:
     definition = entry.definition
     if definition is None:
         return
-    low = -math.inf if definition.low is None else definition.low
-    high = math.inf if definition.high is None else definition.high
-    if not low <= number <= high:
+    low, high = definition.low, definition.high
+    if (low is not None and number < low) or (high is not None and number > high):
         unit = f" {definition.unit}" if definition.unit else ""
-        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {low:g}…{high:g}{unit}, not {number:g}")
+        message = f"{entry.name} takes {shown_range(low, high)}{unit}, not {number:.10g}"
+        raise ParameterError(Why.OUT_OF_RANGE, message)
 
 
 def _shown_states(entry: Entry) -> str:

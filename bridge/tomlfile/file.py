@@ -19,6 +19,7 @@ from bridge.tomlfile.messages import explain
 
 Model = TypeVar("Model", bound=BaseModel)
 
+_DECIMAL_COMMA: Final = re.compile(r"=\s*[-+]?([0-9]+),([0-9]+)")
 _SYNTAX_PLACE: Final = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)")
 
 
@@ -68,7 +69,7 @@ class TomlFile:
             place = _SYNTAX_PLACE.search(str(error))
             line = int(place[1]) if place and place[1] else text.rstrip("\n").count("\n") + 1
             message = _SYNTAX_PLACE.sub("", str(error))
-            raise self._unreadable(line, f"is not TOML: {message}") from error
+            raise self._unreadable(line, f"is not TOML: {message}", _hint(text, line)) from error
         except RecursionError as error:
             raise self._unreadable(0, "is nested too deeply") from error
         except ValueError as error:  # a number of more digits than Python reads
@@ -157,3 +158,8 @@ def _real_key(data: Any, location: Sequence[int | str]) -> Key:
             key.append(part)
             here = items[part] if part < len(items) else None
     return tuple(key)
+
+
+def _hint(text: str, line: int) -> str:
+    found = _DECIMAL_COMMA.search(next(iter(text.split("\n")[line - 1 : line]), ""))
+    return f"a number has a decimal point: {found[1]}.{found[2]}" if found else ""

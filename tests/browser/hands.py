@@ -93,7 +93,7 @@ def asked(page: Page, action: str) -> list[Any]:
 
     page.on("websocket", lambda socket: socket.on("framesent", on_frame))
     page.reload()
-    expect(page.locator(".sentence")).to_contain_text("in order")
+    expect(page.locator(".sentence")).to_contain_text(re.compile("in order|in Ordnung"))
     return found
 
 

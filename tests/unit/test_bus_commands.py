@@ -227,6 +227,17 @@ def test_a_further_sdo_channel_has_the_cob_ids_of_the_mapping(site: Path) -> Non
         choose_line(None, BusChoice(None, "socketcan", "can0")).sdo_server(5, 2)
 
 
+@pytest.mark.parametrize("kind", ["int16", "uint8", "float", "double"])
+@pytest.mark.parametrize("text", ["2,5", "1,500", "1_0", "\u0662", "nan", "inf", "0b1"])
+def test_sdo_write_sends_no_number_that_may_be_another(kind: ValueType, text: str) -> None:
+    with pytest.raises(ValueError, match=r"write 2\.5|write 1500 or 1\.5|is no number|only the digits"):
+        encode(kind, text)
+
+
+def test_sdo_write_takes_the_manuals_hexadecimal() -> None:
+    assert encode("uint16", "047Fh") == encode("uint16", "0x47f") == bytes.fromhex("7F 04")
+
+
 def test_an_sdo_errand_asks_again_as_often_as_it_was_told() -> None:
     errand = SdoErrand(5, 0x1000, 0, None, 10.0, 0.5, retries=2)
     asked, now = 0, 10.0

@@ -30,6 +30,12 @@ class TestReading:
         assert file.data == {"a": {"b": "x"}}
         assert file.line(("a", "b")) == 3
 
+    def test_a_decimal_comma_is_answered_with_how_the_number_is_written(self, tmp_path: Path):
+        with pytest.raises(FileFaults) as refused:
+            file_of(tmp_path, '[parameters]\n"P102" = 3,5  # s\n')
+        (fault,) = refused.value.faults
+        assert (fault.line, fault.hint) == (2, "a number has a decimal point: 3.5")
+
     @pytest.mark.parametrize(
         ("content", "line", "message"),
         [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import binascii
 import math
+import re
 from typing import Final
 
 from bridge.canopen.datatypes import REALS, Integer
@@ -15,6 +16,7 @@ _INTEGERS: Final = {
     **{f"u{8 * size}": Integer(size) for size in range(1, 9)},
 }
 _REALS: Final = {"r32": REALS["real32"], "r64": REALS["real64"]}
+_REAL: Final = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[-+]?[0-9]+)?", re.IGNORECASE)
 _TIMES: Final = ("t", "td")
 """Days and milliseconds: TIME_OF_DAY and TIME_DIFFERENCE (CiA 301 §7.1.6.5)."""
 _MS: Final = Integer(4)
@@ -58,13 +60,13 @@ def encode(kind: str, words: list[str]) -> bytes:
         except (binascii.Error, ValueError):
             raise BadText(f"{kind} is written in base64") from None
     if kind in _REALS:
+        number = float(text) if _REAL.fullmatch(text) else math.inf
         try:
-            number = float(text)
             if math.isfinite(number):
                 return _REALS[kind].encode(number)
         except ValueError:
             pass
-        raise BadText(f"{kind} is a number that fits")
+        raise BadText(f"{kind} is a number that fits, such as -2.5e3")
     number = _whole(text)
     if kind == "b" and number not in (0, 1):
         raise BadText("a boolean is 0 or 1")

@@ -244,6 +244,7 @@ def _entry(holder: Holder, entry: Entry, counts: Mapping[tuple[str, str], int]) 
         "title": definition.title,
         "object": str(entry.address),
         "type": definition.data_type,
+        "whole": definition.value_type.is_integer,
         "unit": definition.unit,
         "low": definition.low,
         "high": definition.high,

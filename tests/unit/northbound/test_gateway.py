@@ -78,6 +78,12 @@ def test_values_and_bytes(kind: str, words: str, octets: str) -> None:
     assert encode(kind, decode(kind, data).split()) == data
 
 
+@pytest.mark.parametrize("text", ["1_0", "\u0662", "nan", "inf", "2,5", "1e999", "0x10", "", "."])
+def test_a_real_number_has_the_digits_0_to_9(text: str) -> None:
+    with pytest.raises(BadText, match="r32 is a number that fits"):
+        encode("r32", [text])
+
+
 @given(st.sampled_from(sorted(TYPES - {"vs"})), st.binary(max_size=20))
 def test_any_bytes_are_a_value_or_a_bad_one(kind: str, data: bytes) -> None:
     try:

@@ -144,7 +144,7 @@ def test_what_is_typed_is_read_as_the_parameter_takes_it(one: Entry, text: str, 
 
 
 def test_what_is_typed_and_is_no_value_is_refused() -> None:
-    with pytest.raises(ParameterError, match="takes a number, not 'much'"):
+    with pytest.raises(ParameterError, match="P1: 'much' is no number"):
         parse(entry("int16"), "much")
 
 
@@ -154,3 +154,23 @@ def test_a_negative_number_in_four_bytes_is_the_same_number() -> None:
     assert matches(number, bytes.fromhex("05 00 00 00"), encode_value(number, 5, None))
     assert not matches(number, bytes.fromhex("05 00 FF FF"), encode_value(number, 5, None))
     assert not matches(entry("uint16"), bytes.fromhex("FB FF FF FF"), bytes.fromhex("FB FF"))
+
+
+@pytest.mark.parametrize("text", ["3,5", "1,500", "1_0", "\u0662\u0665", "nan", "inf", "25h"])
+def test_what_may_be_another_number_is_never_written_by_the_command_line(text: str) -> None:
+    with pytest.raises(ParameterError, match="P1: ") as refused:
+        parse(entry("int16", factor=0.1, unit="s"), text)
+    assert refused.value.why is Why.OUT_OF_RANGE
+
+
+def test_a_decimal_comma_is_answered_with_how_it_is_written() -> None:
+    with pytest.raises(ParameterError, match=r"'3,5' is not how numbers are written here: write 3\.5"):
+        parse(entry("int16", factor=0.1), "3,5")
+    with pytest.raises(ParameterError, match=r"'1,500' may mean 1500 or 1\.5: write 1500 or 1\.5"):
+        parse(entry("int16", factor=0.1), "1,500")
+
+
+def test_a_comma_makes_no_text_of_a_number_where_no_file_describes_the_object() -> None:
+    with pytest.raises(ParameterError, match=r"write 2\.5"):
+        parse(RAW, "2,5")
+    assert parse(RAW, "drive 7") == "drive 7"

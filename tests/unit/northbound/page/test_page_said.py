@@ -62,6 +62,7 @@ APART: Final = (
     "bridge/parameter/backup_file.py",  # the command line and its files
     "bridge/parameter/backups.py",
     "bridge/parameter/ledger_file.py",
+    "bridge/parameter/number_text.py",
     "bridge/parameter/set_file.py",
 )
 UNSAID: Final[dict[str, tuple[str, ...]]] = {

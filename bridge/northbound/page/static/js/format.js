@@ -45,18 +45,31 @@ export function quantity(value, unit = "") {
   return unit && shown !== "–" ? `${shown}\u202f${unit}` : shown;
 }
 
-/** What is allowed, with its unit: "-100 … 100 Hz"; the unit alone where nothing is limited. */
+/** A number with all of its digits and its unit: "25.0 Hz", "2.125 Hz". */
+export function inFull(value, unit = "") {
+  const shown = exact(value, DECIMALS[unit] ?? 0);
+  return unit ? `${shown}\u202f${unit}` : shown;
+}
+
+/** What is allowed, with its unit: "-100 … 99.9 Hz"; the unit alone where nothing is limited. */
 export function range(low, high, unit = "") {
   const has = (one) => typeof one === "number";
-  if (has(low) && has(high)) return `${limit(low, unit)} … ${limit(high, unit)} ${unit}`.trimEnd();
-  if (has(low) || has(high)) return `${has(low) ? `≥ ${limit(low, unit)}` : `≤ ${limit(high, unit)}`} ${unit}`.trimEnd();
+  const [least, most] = [has(low) && limit(low, unit, Math.ceil), has(high) && limit(high, unit, Math.floor)];
+  if (has(low) && has(high)) return `${least} … ${most} ${unit}`.trimEnd();
+  if (has(low) || has(high)) return `${has(low) ? `≥ ${least}` : `≤ ${most}`} ${unit}`.trimEnd();
   return unit;
 }
 
-// A limit comes from the bits of a word, such as 199.994: its decimals tell nobody anything.
-function limit(value, unit) {
-  const decimals = Number.isInteger(value) ? 0 : DECIMALS[unit] ?? 2;
-  return exact(Number(value.toFixed(decimals)));
+// A limit comes from the bits of a word, such as 199.994: its decimals tell nobody anything. They are left out towards
+// the inside, so that what is shown as allowed is.
+function limit(value, unit, inwards) {
+  for (let decimals = DECIMALS[unit] ?? 2; decimals < 9; decimals++) {
+    const step = 10 ** decimals;
+    const shown = Number(value.toFixed(decimals));
+    const inside = shown === value ? value : Number((inwards(value * step) / step).toFixed(decimals));
+    if (Math.abs(inside - value) <= Math.abs(value) / 100) return exact(inside);
+  }
+  return exact(value);
 }
 
 /** A time span in its largest units: 8 s, 3 min 20 s, 2 h 5 min. */

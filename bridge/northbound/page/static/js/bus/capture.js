@@ -6,9 +6,10 @@ import { fetched } from "../fetched.js";
 import { siteName } from "../session.js";
 import { t } from "../texts.js";
 import { Icon } from "../icons.js";
+import { NumberField, numbersIn } from "../numberfield.js";
 
 const ENDINGS = { candump: "log", asc: "asc" };
-const LONGEST_S = 60;
+const LIMITS = { unit: "s", low: 1, high: 60, isWhole: true };
 const ANSWERS_S = 15;
 
 // The server keeps as many frames as it has room for.
@@ -18,10 +19,13 @@ export function Capture({ bus }) {
   const [state, setState] = useState({});
   const onSubmit = async (event) => {
     event.preventDefault();
-    const { seconds, format } = Object.fromEntries(new FormData(event.target));
+    const numbers = numbersIn(event.target);
+    if (!numbers) return;
+    const { seconds } = numbers;
+    const format = event.target.elements.format.value;
     setState({ busy: t("capture.runs", { seconds }) });
     const address = `api/bus/${encodeURIComponent(bus.name)}/capture?seconds=${seconds}&format=${format}`;
-    const { value, failure } = await fetched(address, { limitMs: (Number(seconds) + ANSWERS_S) * 1000, read: taken });
+    const { value, failure } = await fetched(address, { limitMs: (seconds + ANSWERS_S) * 1000, read: taken });
     if (failure) return setState({ failure });
     save(`${siteName.value}-${bus.name}${value.isCut ? "-cut" : ""}.${ENDINGS[format]}`, value.text);
     setState(value.isCut ? { failure: t("capture.cut") } : {});
@@ -31,7 +35,7 @@ export function Capture({ bus }) {
       <h2 id="capture">${t("capture.title")}</h2>
       <form class="search" onSubmit=${onSubmit}>
         <label for="seconds">${t("capture.seconds")}</label>
-        <input id="seconds" name="seconds" type="number" min="1" max=${LONGEST_S} defaultValue="10" required />
+        <${NumberField} id="seconds" name="seconds" says="number.lasts" limits=${LIMITS} initial=${10} isRequired=${true} />
         <label for="format">${t("capture.format")}</label>
         <select id="format" name="format"><option value="candump">candump -L (.log)</option><option value="asc">Vector ASC (.asc)</option></select>
         <button disabled=${state.busy}><${Icon} name="download" /> ${t("capture.start")}</button>

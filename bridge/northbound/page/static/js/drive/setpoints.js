@@ -4,6 +4,7 @@ import { html, useState } from "../ui.js";
 import { below, leafOf, nature } from "../site.js";
 import { quality, reason } from "../values.js";
 import { quantity, range } from "../format.js";
+import { NumberField, numbersIn } from "../numberfield.js";
 import { t, translated } from "../texts.js";
 import { good } from "../drivestate.js";
 import { request } from "./ownership.js";
@@ -28,7 +29,8 @@ export function Setpoints({ drive, isHeld, form }) {
   if (!names.length) return null;
   const onSubmit = async (event) => {
     event.preventDefault();
-    if (isTyped(form.current)) return sendTyped(drive.name, form.current);
+    const values = numbersIn(form.current);
+    if (!values || Object.keys(values).length) return values && send(drive.name, form.current, values);
     setSaid(t("drive.nothing_to_send"));
     form.current.querySelector("input:enabled")?.focus();
   };
@@ -44,20 +46,16 @@ export function Setpoints({ drive, isHeld, form }) {
 /** Sends what is typed in `form`, if anything is; whether nothing was refused. */
 export async function sendTyped(drive, form) {
   if (!form) return true;
-  if (!form.reportValidity()) return false;
-  if (!isTyped(form)) return true;
-  const outcome = await request(drive, "write", { values: filled(form) });
+  const values = numbersIn(form);
+  if (!values) return false;
+  return Object.keys(values).length ? send(drive, form, values) : true;
+}
+
+async function send(drive, form, values) {
+  const outcome = await request(drive, "write", { values });
   // What stands in a field is what the next sending sends.
   if (outcome.ok) form.reset();
   return outcome.ok;
-}
-
-const isTyped = (form) => Object.keys(filled(form)).length > 0;
-
-// {leaf: number} of the fields with a number in them.
-function filled(form) {
-  const typed = [...new FormData(form)].filter(([, text]) => String(text).trim() !== "").map(([leaf, text]) => [leaf, Number(text)]);
-  return Object.fromEntries(typed.filter(([, number]) => Number.isFinite(number)));
 }
 
 function Setpoint({ name, isMain, isHeld }) {
@@ -68,7 +66,7 @@ function Setpoint({ name, isMain, isHeld }) {
   return html`
     <p class="field">
       <label for=${id}>${t("drive.setpoint", { name: t(`point.${leaf}`) })}</label>
-      <input id=${id} name=${leaf} type="number" step=${type === "float" ? "any" : 1} min=${low} max=${high} disabled=${!isHeld || cannot} />
+      <${NumberField} id=${id} name=${leaf} says="number.sends" limits=${{ unit, low, high, isWhole: type !== "float" }} isDisabled=${!isHeld || cannot} />
       <small>${range(low, high, unit)}<br />${cannot ? translated(reason(name)) || t("quality.config_error") : t("drive.sent", { value: quantity(good(name), unit) })}</small>
     </p>
   `;

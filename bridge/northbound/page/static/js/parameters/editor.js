@@ -1,11 +1,12 @@
 // Changes one parameter, within its range, and says what that costs the EEPROM.
 
 import { html, useState } from "../ui.js";
-import { number, shortest } from "../format.js";
+import { number } from "../format.js";
+import { NumberField, numbersIn } from "../numberfield.js";
 import { t, translated } from "../texts.js";
 import { told } from "../outcome.js";
 import { held, write } from "./held.js";
-import { range, shown, typed } from "./value.js";
+import { chosen, isChosen, isText, limitsOf, range, shown } from "./value.js";
 
 export function Editor({ holder, entry, described, onWritten }) {
   const [said, setSaid] = useState({ text: "" });
@@ -13,8 +14,9 @@ export function Editor({ holder, entry, described, onWritten }) {
   const onSubmit = async (event) => {
     event.preventDefault();
     if (said.isBusy) return; // a write costs the EEPROM one of its cycles
-    const value = typed(entry, event.target.elements.value.value);
-    if (Number.isNaN(value)) return;
+    const numbers = numbersIn(event.target);
+    if (!numbers) return;
+    const value = numbers.value ?? chosen(entry, event.target.elements.value.value);
     setSaid({ text: t("parameters.writing"), isBusy: true });
     const outcome = await write(holder, entry.name, value);
     setSaid(outcome.ok
@@ -37,7 +39,7 @@ export function Editor({ holder, entry, described, onWritten }) {
 }
 
 function Field({ entry, value, isBusy }) {
-  if (entry.states || entry.type === "bool") {
+  if (isChosen(entry)) {
     const choices = entry.states ?? { true: "true", false: "false" };
     const isKnown = String(value) in choices;
     return html`<select id="value" name="value" required disabled=${isBusy}>
@@ -45,9 +47,8 @@ function Field({ entry, value, isBusy }) {
       ${Object.entries(choices).map(([code, text]) => html`
         <option value=${code} selected=${String(value) === code}>${entry.states ? `${code} (${text})` : text}</option>`)}</select>`;
   }
-  const isText = entry.type === "string" || entry.type === "bytes";
-  return html`<input id="value" name="value" required disabled=${isBusy} type=${isText ? "text" : "number"} step="any" min=${entry.low} max=${entry.high}
-    defaultValue=${typeof value === "number" ? shortest(value) : (value ?? "")} />`;
+  if (isText(entry)) return html`<input id="value" name="value" required disabled=${isBusy} type="text" defaultValue=${value ?? ""} />`;
+  return html`<${NumberField} id="value" name="value" says="number.writes" limits=${limitsOf(entry)} initial=${value} isRequired=${true} isDisabled=${isBusy} />`;
 }
 
 // What a write costs.

@@ -1,6 +1,6 @@
 // Values of parameters as people read and type them: as they are in the drive, in the reader's number format.
 
-import { exact } from "../format.js";
+import { exact, range as rangeOf } from "../format.js";
 
 const BARE = ["string", "bytes"];
 
@@ -16,13 +16,22 @@ export function shown(entry, value) {
 /** "0 … 320 s"; empty where there is none. */
 export function range(entry) {
   if (entry.low === undefined && entry.high === undefined) return "";
-  return `${exact(entry.low)} … ${exact(entry.high)}${entry.unit ? ` ${entry.unit}` : ""}`;
+  return rangeOf(entry.low, entry.high, entry.unit);
 }
 
-/** What was typed, as it is sent. */
-export function typed(entry, text) {
-  if (entry.type === "bool") return text === "true";
-  return BARE.includes(entry.type) ? text : Number(text);
+/** Whether its value is chosen from a list. */
+export const isChosen = (entry) => Boolean(entry.states) || entry.type === "bool";
+export const isText = (entry) => BARE.includes(entry.type);
+
+/** What a number has to be that is typed for it. */
+export function limitsOf({ unit, low, high, whole }) {
+  return { unit, low, high, isWhole: whole };
+}
+
+/** What was chosen, or typed as a text, as it is sent. */
+export function chosen(entry, code) {
+  if (entry.type === "bool") return code === "true";
+  return isText(entry) ? code : Number(code);
 }
 
 /** Whether two values are the same; a state may be given by its text. */

@@ -15,7 +15,7 @@ ENGLISH = 'localStorage.setItem("drivebridge.language", "en")'
 
 
 def take_in(page: Page, button: str) -> None:
-    to(page, "drive/winder/drive")
+    to(page, "drive/a/fu1")
     page.get_by_role("button", name=button).click()
     expect(page.locator(".ownership button")).to_have_count(1)
     expect(page.locator("#setpoint")).to_be_enabled()
@@ -27,10 +27,10 @@ def test_a_german_page_reads_a_comma_whatever_the_browser_speaks(bench: Desk, lo
         written = asked(page, "write")
         take_in(page, "Steuerung übernehmen")
         page.locator("#setpoint").fill("2,5")
-        expect(page.locator("#setpoint-echo")).to_have_text("sendet 2,5\u202f1/min")
+        expect(page.locator("#setpoint-echo")).to_have_text("sendet 2,5\u202fHz")
         page.get_by_role("button", name="Senden").click()
         expect(page.locator("#setpoint")).to_have_value("")
-        assert written == [{"values": {"velocity": 2.5}}]
+        assert written == [{"values": {"frequency": 2.5}}]
 
 
 def test_what_may_mean_two_numbers_is_sent_neither_by_send_nor_by_start(bench: Desk) -> None:
@@ -51,12 +51,12 @@ def test_the_other_languages_notation_is_shown_in_this_one_before_it_is_sent(ben
         take_in(page, "Take control")
         page.locator("#setpoint").fill("2,5")
         page.get_by_role("button", name="Send").click()
-        expect(page.locator("#setpoint-echo")).to_contain_text("2,5 was read as 2.5\u202f1/min")
+        expect(page.locator("#setpoint-echo")).to_contain_text("2,5 was read as 2.5\u202fHz")
         expect(page.locator("#setpoint")).to_have_value("2.5")
         assert written == []
         page.get_by_role("button", name="Send").click()
         expect(page.locator("#setpoint")).to_have_value("")
-        assert written == [{"values": {"velocity": 2.5}}]
+        assert written == [{"values": {"frequency": 2.5}}]
 
 
 def test_a_german_page_writes_a_parameter_as_it_was_typed(bench: Desk) -> None:
@@ -79,7 +79,7 @@ def test_a_german_page_writes_a_parameter_as_it_was_typed(bench: Desk) -> None:
 
 def test_no_page_has_a_field_that_leaves_a_number_to_the_browser(bench: Desk) -> None:
     with bench.sits("engineer", GERMAN) as page:
-        for place in ("plant", "drive/winder/drive", "parameters/a/fu1", "bus/can0", "system"):
+        for place in ("plant", "drive/winder/drive", "drive/a/fu1", "parameters/a/fu1", "bus/can0", "system"):
             to(page, place)
             expect(page.locator("main h1, main h2").first).to_be_visible()
             expect(page.locator("input[type=number]")).to_have_count(0)

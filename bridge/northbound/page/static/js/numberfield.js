@@ -42,7 +42,7 @@ export function NumberField({ id, name, limits, says, initial = undefined, isReq
     });
   });
   return html`
-    <input id=${id} name=${name} type="text" inputmode="decimal" autocomplete="off" spellcheck=${false} defaultValue=${beginning}
+    <input ref=${input} id=${id} name=${name} type="text" inputmode="decimal" autocomplete="off" spellcheck=${false} defaultValue=${beginning}
       onInput=${follow} required=${isRequired} disabled=${isDisabled} aria-invalid=${found.failure ? "true" : undefined} aria-describedby="${id}-echo" />
     <output id="${id}-echo" for=${id} class=${found.failure ? "echo failure" : "echo"}>${note || said(found, text, says, limits)}</output>
   `;

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 
-from playwright.sync_api import expect
+from playwright.sync_api import WebSocketRoute, expect
 
 from tests.browser.hands import (
     asked,
     hanging,
+    owner,
     start,
     state,
     take,
@@ -16,6 +17,7 @@ from tests.browser.hands import (
     to_drive,
 )
 from tests.support.desk import Desk
+from tests.wire.test_page import DRIVE
 
 HIDDEN = """is => {
     Object.defineProperty(document, "hidden", { value: is, configurable: true });
@@ -179,3 +181,76 @@ def test_log_out(desk: Desk) -> None:
         expect(page.get_by_role("button", name="Back")).to_have_count(0)
         page.reload()
         expect(page.locator('input[name="user"]')).to_be_visible()
+
+
+def test_who_leaves_a_running_drive_is_told_first_that_it_stops(desk: Desk) -> None:
+    with desk.sits("operator") as page:
+        to_drive(page)
+        expect(page.locator(".controls")).to_be_visible()
+        take(page)
+        expect(page.locator(".controls")).to_contain_text("It stops when you leave the page")
+        start(page, "20")
+        asks = page.get_by_role("alertdialog")
+        for leave in (
+            lambda: page.get_by_role("link", name="Plant", exact=True).click(),
+            lambda: to(page, "system"),
+            lambda: page.get_by_role("button", name="Log out").click(),
+        ):
+            leave()
+            expect(asks).to_contain_text("the drive is given back and stops")
+            expect(page.get_by_role("button", name="Stay here")).to_be_focused()
+            page.get_by_role("button", name="Stay here").click()
+            expect(asks).to_have_count(0)
+            assert page.url.endswith(f"#/drive/{DRIVE}")
+            state(page).to_have_text(re.compile("running"))
+        page.get_by_role("link", name="Plant", exact=True).click()
+        page.get_by_role("button", name="Leave and stop the drive").click()
+        expect(page.locator(".tile").first).to_be_visible()
+        to_drive(page)
+        owner(page).to_contain_text("nobody")
+        state(page).not_to_have_text(re.compile("running"))
+
+
+def test_who_leaves_a_drive_that_stands_is_asked_nothing(desk: Desk) -> None:
+    with desk.sits("operator") as page:
+        to_drive(page)
+        take(page)
+        page.get_by_role("link", name="Plant", exact=True).click()
+        expect(page.locator(".tile").first).to_be_visible()
+
+
+def test_a_tab_that_was_cut_off_says_so_itself(desk: Desk) -> None:
+    with desk.sits("operator") as page:
+        sockets: list[WebSocketRoute] = []
+
+        def on_socket(socket: WebSocketRoute) -> None:
+            sockets.append(socket.connect_to_server())
+
+        page.route_web_socket(re.compile("/live$"), on_socket)
+        page.reload()
+        to_drive(page)
+        take(page)
+        start(page, "20")
+        sockets[-1].close()
+        expect(page.get_by_role("alert").first).to_contain_text("This tab lost its connection at")
+        expect(page.locator(".trouble, .sentence.is-none").first).to_be_visible()
+        take(page)
+        reset = page.get_by_role("button", name="Acknowledge fault")
+        if page.locator(".trouble").count():
+            expect(page.locator(".trouble .remedy").first).to_contain_text("This tab lost its connection")
+            reset.click()
+        expect(page.locator(".sentence")).to_contain_text("in order")
+
+
+def test_a_screen_reader_is_told_each_state_that_a_drive_comes_to(desk: Desk) -> None:
+    with desk.sits("operator") as page:
+        to_drive(page)
+        take(page)
+        told = page.get_by_role("status").filter(has_text=f"{DRIVE}: ")
+        start(page, "20")
+        expect(told).to_have_text(f"{DRIVE}: running")
+        page.get_by_role("button", name="Stop", exact=True).click()
+        expect(told).not_to_have_text(f"{DRIVE}: running")
+        expect(told).to_have_text(re.compile(f"{DRIVE}: [a-z]"))
+        expect(page.get_by_role("img", name=re.compile("^Course of .*frequency"))).to_have_count(1)
+        page.get_by_role("button", name="Give back").click()

@@ -9,21 +9,22 @@ from playwright.sync_api import Page, expect
 
 from tests.browser.hands import asked, to
 from tests.support.desk import Desk
+from tests.wire.test_page import DRIVE
 
 GERMAN = 'localStorage.setItem("drivebridge.language", "de")'
 ENGLISH = 'localStorage.setItem("drivebridge.language", "en")'
 
 
 def take_in(page: Page, button: str) -> None:
-    to(page, "drive/a/fu1")
+    to(page, f"drive/{DRIVE}")
     page.get_by_role("button", name=button).click()
     expect(page.locator(".ownership button")).to_have_count(1)
     expect(page.locator("#setpoint")).to_be_enabled()
 
 
 @pytest.mark.parametrize("locale", ["en-US", "de-DE"])
-def test_a_german_page_reads_a_comma_whatever_the_browser_speaks(bench: Desk, locale: str) -> None:
-    with bench.sits("operator", GERMAN, locale=locale) as page:
+def test_a_german_page_reads_a_comma_whatever_the_browser_speaks(desk: Desk, locale: str) -> None:
+    with desk.sits("operator", GERMAN, locale=locale) as page:
         written = asked(page, "write")
         take_in(page, "Steuerung übernehmen")
         page.locator("#setpoint").fill("2,5")
@@ -31,10 +32,11 @@ def test_a_german_page_reads_a_comma_whatever_the_browser_speaks(bench: Desk, lo
         page.get_by_role("button", name="Senden").click()
         expect(page.locator("#setpoint")).to_have_value("")
         assert written == [{"values": {"frequency": 2.5}}]
+        page.locator(".ownership button").click()
 
 
-def test_what_may_mean_two_numbers_is_sent_neither_by_send_nor_by_start(bench: Desk) -> None:
-    with bench.sits("operator", GERMAN, locale="en-US") as page:
+def test_what_may_mean_two_numbers_is_sent_neither_by_send_nor_by_start(desk: Desk) -> None:
+    with desk.sits("operator", GERMAN, locale="en-US") as page:
         written, started = asked(page, "write"), asked(page, "start")
         take_in(page, "Steuerung übernehmen")
         page.locator("#setpoint").fill("1.500")
@@ -43,10 +45,11 @@ def test_what_may_mean_two_numbers_is_sent_neither_by_send_nor_by_start(bench: D
             expect(page.locator("#setpoint-echo")).to_contain_text("1.500 kann 1,5 oder 1500 heißen")
             expect(page.locator("#setpoint")).to_have_attribute("aria-invalid", "true")
         assert written == started == []
+        page.locator(".ownership button").click()
 
 
-def test_the_other_languages_notation_is_shown_in_this_one_before_it_is_sent(bench: Desk) -> None:
-    with bench.sits("operator", ENGLISH, locale="de-DE") as page:
+def test_the_other_languages_notation_is_shown_in_this_one_before_it_is_sent(desk: Desk) -> None:
+    with desk.sits("operator", ENGLISH, locale="de-DE") as page:
         written = asked(page, "write")
         take_in(page, "Take control")
         page.locator("#setpoint").fill("2,5")
@@ -57,12 +60,13 @@ def test_the_other_languages_notation_is_shown_in_this_one_before_it_is_sent(ben
         page.get_by_role("button", name="Send").click()
         expect(page.locator("#setpoint")).to_have_value("")
         assert written == [{"values": {"frequency": 2.5}}]
+        page.locator(".ownership button").click()
 
 
-def test_a_german_page_writes_a_parameter_as_it_was_typed(bench: Desk) -> None:
-    with bench.sits("engineer", GERMAN, locale="en-US") as page:
+def test_a_german_page_writes_a_parameter_as_it_was_typed(desk: Desk) -> None:
+    with desk.sits("engineer", GERMAN, locale="en-US") as page:
         written = asked(page, "write_parameter")
-        to(page, "parameters/a/fu1")
+        to(page, f"parameters/{DRIVE}")
         page.get_by_role("searchbox").fill("P102.1")
         page.get_by_role("button", name="P102.1").first.click()
         field = page.locator("#value")

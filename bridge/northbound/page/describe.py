@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import msgspec
 
 from bridge.condition.layout import Layout, layout_of
 from bridge.config import Site
+from bridge.drive.scaling import scale_of
 from bridge.image import Image, Point
 from bridge.mapping import Family
+from bridge.parameter import Names
 
 _encode = msgspec.json.Encoder().encode
 
@@ -20,7 +22,7 @@ def described(image: Image, site: Site, families: dict[str, Family]) -> dict[str
     by their names there. Drives of a kind have one in common, so that a plant of hundreds is loaded as soon
     as a small one. What is empty is left out of a point."""
     layout = layout_of(image.points, site, families)
-    places, natures = _natures(image.points, layout)
+    places, natures = _natures(image.points, layout, _scaled(image, site, families))
     nodes: list[dict[str, Any]] = []
     drives: list[dict[str, Any]] = []
     for bus in site.bus:
@@ -43,6 +45,7 @@ def described(image: Image, site: Site, families: dict[str, Family]) -> dict[str
                         "states": list(dict.fromkeys(state.name for state in family.status_word.state)),
                         "stops_in": _stops_in(family),
                         "main": layout.mains.get(name, ""),
+                        "set_bits": list(family.status_word.parameter_set_bits),
                     }
                 )
     return {
@@ -56,13 +59,15 @@ def described(image: Image, site: Site, families: dict[str, Family]) -> dict[str
 
 
 def _natures(
-    points: Sequence[Point], layout: Layout
+    points: Sequence[Point], layout: Layout, scaled: Mapping[str, dict[str, Any]]
 ) -> tuple[dict[str, int], list[dict[str, dict[str, Any]]]]:
     by_place: dict[str, dict[str, dict[str, Any]]] = {}
     for point in points:
         longer = "/".join(point.path[:2])
         place = longer if point.path[0] == "bus" or longer in layout.drives else point.path[0]
-        by_place.setdefault(place, {})[point.name[len(place) + 1 :]] = _point(point)
+        by_place.setdefault(place, {})[point.name[len(place) + 1 :]] = _point(point) | scaled.get(
+            point.name, {}
+        )
     kinds: dict[bytes, int] = {}
     natures: list[dict[str, dict[str, Any]]] = []
     places: dict[str, int] = {}
@@ -71,6 +76,33 @@ def _natures(
         if kind == len(natures):
             natures.append(of_place)
     return places, natures
+
+
+def _scaled(image: Image, site: Site, families: dict[str, Family]) -> dict[str, dict[str, Any]]:
+    """What scales a value that may be written, by its point: ``scaled_by`` has the point of the parameter in
+    each parameter set, below the drive, empty where there is none, and ``of_full`` the limits as multiples of the parameter's value.
+
+    So the page shows the limits of the drive's own P105 or C01, and not those of the site file.
+    """
+    there = {point.name for point in image.points}
+    known = {name: Names(family) for name, family in families.items()}
+    found: dict[str, dict[str, Any]] = {}
+    for node in (node for bus in site.bus for node in bus.node):
+        family = families[node.mapping]
+        points = {
+            family.parameter_and_set(entry.name): f"parameter/{entry.leaf}"
+            for entry in known[node.mapping].points()
+        }
+        for table in node.drive:
+            drive = f"{node.name}/{family.leaf_of(table)}"
+            for value in family.values_of(family.slot_named(table.slot)):
+                one = scale_of(value, 1.0)
+                if value.group != "command" or one is None or not value.full:
+                    continue
+                sets = [points.get((value.full, number), "") for number in range(1, family.sets + 1)]
+                if f"{drive}/{sets[0]}" in there:
+                    found[f"{drive}/{value.leaf}"] = {"scaled_by": sets, "of_full": [one.low, one.high]}
+    return found
 
 
 def _point(point: Point) -> dict[str, Any]:

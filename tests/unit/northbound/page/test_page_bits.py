@@ -1,5 +1,5 @@
-"""What the page calls a bit of a control or status word is what is so while the bit is 1, for every bit of every
-family, in both languages."""
+"""What the page calls a bit of a control or status word is what is so while the bit is 1: for every bit of
+every family, in both languages."""
 
 from __future__ import annotations
 
@@ -116,15 +116,65 @@ STATUS: Final[dict[str, int | None]] = {
     "Schlupf zu groß": 0,
 }
 FREE: Final = frozenset(
-    "axis_bit_0 axis_bit_1 change_immediately change_on_setpoint command_bit_0 command_bit_1"
-    " command_bit_2 command_bit_3 command_taken current_limited direction_left direction_right e48_bit_0"
-    " e48_bit_1 e48_bit_2 follows_command free_status_0 function_480_11 function_480_12 function_481_9"
-    " function_481_10 handshake homing_attained homing_start internal_limit limit_switch_negative"
-    " limit_switch_positive manufacturer_8 manufacturer_11 manufacturer_12 manufacturer_13 manufacturer_14"
-    " manufacturer_15 mode_bit_4 mode_bit_5 mode_bit_6 mode_bit_9 mode_bit_12 mode_bit_13 new_setpoint"
-    " parameter_set_bit_0 parameter_set_bit_1 relative release_brake setpoint_acknowledged setpoint_reached"
-    " speed_at_setpoint speed_below_comparison standstill start state_bit_0 state_bit_1 state_bit_2"
-    " state_bit_3 target_reached turning_left turning_right".split()
+    (
+        "axis_bit_0",
+        "axis_bit_1",
+        "change_immediately",
+        "change_on_setpoint",
+        "command_bit_0",
+        "command_bit_1",
+        "command_bit_2",
+        "command_bit_3",
+        "command_taken",
+        "current_limited",
+        "direction_left",
+        "direction_right",
+        "e48_bit_0",
+        "e48_bit_1",
+        "e48_bit_2",
+        "follows_command",
+        "free_status_0",
+        "function_480_11",
+        "function_480_12",
+        "function_481_9",
+        "function_481_10",
+        "handshake",
+        "homing_attained",
+        "homing_start",
+        "internal_limit",
+        "limit_switch_negative",
+        "limit_switch_positive",
+        "manufacturer_8",
+        "manufacturer_11",
+        "manufacturer_12",
+        "manufacturer_13",
+        "manufacturer_14",
+        "manufacturer_15",
+        "mode_bit_4",
+        "mode_bit_5",
+        "mode_bit_6",
+        "mode_bit_9",
+        "mode_bit_12",
+        "mode_bit_13",
+        "new_setpoint",
+        "parameter_set_bit_0",
+        "parameter_set_bit_1",
+        "relative",
+        "release_brake",
+        "setpoint_acknowledged",
+        "setpoint_reached",
+        "speed_at_setpoint",
+        "speed_below_comparison",
+        "standstill",
+        "start",
+        "state_bit_0",
+        "state_bit_1",
+        "state_bit_2",
+        "state_bit_3",
+        "target_reached",
+        "turning_left",
+        "turning_right",
+    )
 )
 """Bits that say neither that a drive may run nor that it may not."""
 _DENIES: Final = ("kein", "nicht ", "ohne ", "no ", "not ", "without ", "non-")
@@ -176,7 +226,8 @@ class Running(Bench):
         slot = load_family(mapping).slot[0].name
         whole = sites.node(sites.drive(slot, "lease", 30_000, ""), name="n", mapping=mapping)
         site = load_site(sites.write(folder, sites.bus(whole), ""))
-        super().__init__(site, family=load_family(mapping), mapping=mapping, node=simulate_node(mapping, 5, {}))
+        node = simulate_node(mapping, 5, {})
+        super().__init__(site, family=load_family(mapping), mapping=mapping, node=node)
         self.run(2.0)
         (self.name,) = self.plant.drives
         self.do(Action.TAKE_CONTROL, 0.1, ttl_ms=30_000)

@@ -4,6 +4,7 @@ import { classes, html, useEffect } from "./ui.js";
 import { isOneTooMany } from "./connection.js";
 import { connect, disconnect, isConnected, leave, show, troubles, waiting } from "./live.js";
 import { logout, session, siteName } from "./session.js";
+import { leaveBy } from "./leaving.js";
 import { Login } from "./login.js";
 import { menu, pageOf, pathOf } from "./pages.js";
 import { address, route } from "./route.js";
@@ -88,8 +89,8 @@ function Tools() {
       <button class="plain" onClick=${nextTheme} aria-label=${t("frame.theme", { theme: t(`theme.${theme.value}`) })}
         title=${t("frame.theme", { theme: t(`theme.${theme.value}`) })}><${Icon} name=${theme.value} /></button>
       <span class="who">${who.user || t("frame.visitor")} <small>${t(`role.${who.role}`)}</small></span>
-      ${who.user && html`<button onClick=${logout}>${t("frame.logout")}</button>`}
-      ${!who.user && who.has_users && html`<button onClick=${() => (session.value = null)}>${t("frame.login")}</button>`}
+      ${who.user && html`<button onClick=${() => leaveBy(logout)}>${t("frame.logout")}</button>`}
+      ${!who.user && who.has_users && html`<button onClick=${() => leaveBy(() => (session.value = null))}>${t("frame.login")}</button>`}
     </div>
   `;
 }

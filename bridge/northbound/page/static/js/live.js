@@ -23,6 +23,11 @@ export const events = signal([]);
 /** Who this tab is as a controller: what `owner` says of a drive that it has taken. */
 export const self = signal("");
 
+/** Who this tab has been since it was opened: another one after each loss of its connection. */
+const selves = new Set();
+
+export const hasBeen = (owner) => selves.has(owner);
+
 let topics = [];
 let trend = { names: [], number: 0, onRows: (rows) => {}, onLost: () => {} };
 let wish = null;
@@ -83,7 +88,7 @@ function onLost() {
 }
 
 function onMessage(message) {
-  if ("you" in message) self.value = message.you;
+  if ("you" in message) selves.add((self.value = message.you));
   else if ("now" in message) aheadMs = message.now - Date.now();
   else if ("troubles" in message) {
     batch(() => {

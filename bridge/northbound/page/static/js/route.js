@@ -1,10 +1,18 @@
 // Which page is shown: `#/plant`, `#/drive/conveyor/fu1`.
 
+import { leaveBy } from "./leaving.js";
 import { computed, signal } from "./ui.js";
 
 const place = signal(location.hash);
 addEventListener("hashchange", () => {
-  place.value = location.hash;
+  const [shown, wanted] = [place.value, location.hash];
+  if (wanted === shown) return;
+  leaveBy(() => {
+    if (location.hash !== wanted) history.pushState(null, "", wanted);
+    place.value = wanted;
+  });
+  // Until that is agreed to, the address is that of the page that is shown.
+  if (place.value === shown) history.replaceState(null, "", shown || location.pathname + location.search);
 });
 
 /** The parts of the address: `["drive", "conveyor", "fu1"]`. */

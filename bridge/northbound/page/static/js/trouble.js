@@ -1,7 +1,7 @@
 // What is wrong, in words. The server finds the troubles; here they get their texts.
 
 import { computed, effect, signal } from "./ui.js";
-import { now as boxNow, troubles, waiting } from "./live.js";
+import { hasBeen, now as boxNow, troubles, waiting } from "./live.js";
 import { address } from "./route.js";
 import { clock, span } from "./format.js";
 import { drives, nodes } from "./site.js";
@@ -85,7 +85,14 @@ function variant(trouble) {
 /** What to do. */
 export function remedy(trouble) {
   if (trouble.until) return t("trouble.left.remedy");
-  return said(trouble).remedy || maybe(`trouble.${trouble.kind}.remedy`, withDefaults(trouble));
+  return said(trouble).remedy || maybe(`trouble.${trouble.kind}.remedy${whose(trouble)}`, withDefaults(trouble));
+}
+
+// A controller that is a tab of this page cannot be looked after as a PLC is.
+function whose({ kind, facts }) {
+  if (kind !== "controller_silent" || !facts.owner) return "";
+  if (hasBeen(facts.owner)) return "_self";
+  return /^local:.*#/.test(facts.owner) ? "_tab" : "";
 }
 
 export function since(trouble) {

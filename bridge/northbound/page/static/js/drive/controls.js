@@ -1,19 +1,25 @@
 // Setpoints and commands, for who controls the drive; stopping is everybody's who may command at all.
 
 import { html, useEffect, useRef } from "../ui.js";
+import { leaveNow, leaving, stay, whileMoving } from "../leaving.js";
 import { may } from "../session.js";
 import { t, translated } from "../texts.js";
 import { clock } from "../format.js";
 import { told } from "../outcome.js";
+import { ownState } from "../drivestate.js";
 import { ownerOf } from "../owner.js";
 import { sendTyped, Setpoints } from "./setpoints.js";
 import { giveBack, isOurs, refusals, request, take } from "./ownership.js";
+
+/** Nothing moves, and nothing would be stopped. */
+const AT_REST = ["not_ready", "switch_on_inhibited", "ready", "switched_on", "fault", "disabled"];
 
 export function Controls({ drive }) {
   const name = drive.name;
   const isHeld = isOurs(name);
   const form = useRef(null);
   useEffect(() => () => giveBack(name), [name]);
+  useEffect(() => whileMoving(() => isOurs(name) && !AT_REST.includes(ownState(name))), [name]);
   const takes = drive.control === "lease";
   return html`
     <section class="controls" aria-labelledby="controls">
@@ -29,8 +35,22 @@ export function Controls({ drive }) {
       ${isHeld && html`<p class="quiet">${t("drive.foreground")}</p>`}
       ${may("operator") && takes && html`<${Setpoints} drive=${drive} isHeld=${isHeld} form=${form} />`}
       ${may("operator") && html`<${Buttons} drive=${drive} isHeld=${isHeld} form=${form} />`}
+      ${leaving.value && html`<${Leaving} drive=${name} />`}
       <${Refusal} drive=${name} />
     </section>
+  `;
+}
+
+// It is no modal dialog: the buttons that stop the drive stay where they are, and its lease is renewed meanwhile.
+function Leaving({ drive }) {
+  const first = useRef(null);
+  useEffect(() => first.current.focus(), []);
+  return html`
+    <div class="leaving" role="alertdialog" aria-labelledby="leaving">
+      <p id="leaving">${t("drive.leaving", { name: drive })}</p>
+      <p class="buttons"><button ref=${first} class="main" onClick=${stay}>${t("drive.stay")}</button>
+        <button class="stop" onClick=${leaveNow}>${t("drive.leave")}</button></p>
+    </div>
   `;
 }
 
@@ -64,6 +84,7 @@ function Refusal({ drive }) {
 
 function text({ action, outcome }) {
   if (action === "hidden") return t("drive.was_hidden", { time: clock(outcome.at) });
+  if (action === "cut_off") return t("drive.was_cut_off", { time: clock(outcome.at) });
   if (action === "keep_alive") return t("outcome.lost", { message: told(outcome) });
   const what = t(`action.${action}`);
   if (outcome.ok) return t("outcome.not_forwarded", { what, message: translated(outcome.message) });

@@ -31,6 +31,7 @@ export class Course {
       void [isDark.value, language.value];
       this._plot?.destroy();
       this._plot = new Plot(options(names, box, zoom), this.shown.columns(), box);
+      describe(box.querySelector("canvas"), names);
       this._draw();
     });
     this._sizes = new ResizeObserver(() => this._plot.setSize(sizeOf(box)));
@@ -80,6 +81,12 @@ export function titleOf(name) {
   const { unit } = nature(name);
   const [group, leaf] = name.split("/").slice(-2);
   return `${t(`group.${group}`)}: ${t(`point.${leaf}`)}${unit ? ` [${unit}]` : ""}`;
+}
+
+// What is drawn has no text of its own; its values stand in the legend below it.
+function describe(picture, names) {
+  picture.setAttribute("role", "img");
+  picture.setAttribute("aria-label", t("trend.picture", { names: names.map(titleOf).join(", ") }));
 }
 
 function options(names, box, onZoom) {

@@ -1,7 +1,7 @@
 // What this tab controls. It renews its leases itself, and only while it is in sight: hidden, closed or cut off it
 // falls silent as any controller may, and the drive stops in its published time.
 
-import { effect, signal } from "../ui.js";
+import { effect, signal, untracked } from "../ui.js";
 import { ask, isConnected, self } from "../live.js";
 import { value } from "../values.js";
 
@@ -15,7 +15,8 @@ const timers = new Map();
 /** Drives whose latest renewal has no answer yet. */
 const underway = new Set();
 
-/** The last thing that went wrong, by drive: {action, outcome}; "hidden" is what this tab did itself, at `outcome.at`. */
+/** The last thing that went wrong, by drive: {action, outcome}; "hidden" and "cut_off" are what became of this tab itself,
+ * at `outcome.at`. */
 export const refusals = signal({});
 
 /** Whether this tab controls `drive`. */
@@ -72,7 +73,8 @@ async function renew(drive) {
   underway.delete(drive);
   if (!["not_allowed", "not_connected", "timed_out"].includes(outcome.code) || !stop(drive)) return;
   wanted.delete(drive);
-  refuse(drive, "keep_alive", outcome);
+  if (outcome.code === "not_allowed") return refuse(drive, "keep_alive", outcome);
+  refuse(drive, "cut_off", { at: Date.now() });
 }
 
 /** Whether it had been renewed until now. */
@@ -86,16 +88,16 @@ function stopAll() {
   for (const drive of [...timers.keys()]) stop(drive);
 }
 
-function onHidden() {
+function letGo(why) {
   const ours = [...timers.keys()];
   stopAll();
-  for (const drive of ours) refuse(drive, "hidden", { at: Date.now() });
+  for (const drive of ours) refuse(drive, why, { at: Date.now() });
 }
 
-document.addEventListener("visibilitychange", () => document.hidden && onHidden());
+document.addEventListener("visibilitychange", () => document.hidden && letGo("hidden"));
 effect(() => {
   for (const drive in refusals.value) forget(drive, refusals.value[drive]);
 });
 effect(() => {
-  if (!isConnected.value) stopAll();
+  if (!isConnected.value) untracked(() => letGo("cut_off"));
 });

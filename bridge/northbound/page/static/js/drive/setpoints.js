@@ -7,6 +7,7 @@ import { quantity, range } from "../format.js";
 import { NumberField, numbersIn } from "../numberfield.js";
 import { t, translated } from "../texts.js";
 import { good } from "../drivestate.js";
+import { limitsOf } from "./limits.js";
 import { request } from "./ownership.js";
 
 const WORDS = /^(control_word|setpoint_\d+)$/;
@@ -36,7 +37,7 @@ export function Setpoints({ drive, isHeld, form }) {
   };
   return html`
     <form class="setpoint" ref=${form} onSubmit=${onSubmit} onInput=${() => setSaid("")}>
-      ${names.map((name) => html`<${Setpoint} key=${name} name=${name} isMain=${leafOf(name) === drive.main} isHeld=${isHeld} />`)}
+      ${names.map((name) => html`<${Setpoint} key=${name} drive=${drive} name=${name} isMain=${leafOf(name) === drive.main} isHeld=${isHeld} />`)}
       <button disabled=${!isHeld}>${t("drive.send")}</button>
       <small role="status">${said}</small>
     </form>
@@ -58,8 +59,9 @@ async function send(drive, form, values) {
   return outcome.ok;
 }
 
-function Setpoint({ name, isMain, isHeld }) {
-  const { unit, low, high, type } = nature(name);
+function Setpoint({ drive, name, isMain, isHeld }) {
+  const { unit, type } = nature(name);
+  const { low, high } = limitsOf(drive, name);
   const leaf = leafOf(name);
   const id = isMain ? "setpoint" : `setpoint-${leaf}`;
   const cannot = quality(name) === "config_error";

@@ -43,6 +43,7 @@ function Drive({ drive }) {
       <a href=${address("parameters", ...drive.name.split("/"))}>${t("page.parameters")}</a>
       <a href=${address("bus", drive.bus)}>${t("page.bus")} ${drive.bus}</a>
       <${Actuals} drive=${drive} />
+      <span class="hidden" role="status">${drive.name}: ${t(stateKey(state, drive))}</span>
     </header>
     ${own.length > 0 && html`<section class="attention" aria-label=${t("plant.attention")}><ol>
       ${own.map((trouble) => html`<${TroubleRow} key=${trouble.kind + trouble.place} trouble=${trouble} />`)}

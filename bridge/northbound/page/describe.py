@@ -79,8 +79,9 @@ def _natures(
 
 
 def _scaled(image: Image, site: Site, families: dict[str, Family]) -> dict[str, dict[str, Any]]:
-    """What scales a value that may be written, by its point: ``scaled_by`` has the point of the parameter in
-    each parameter set, below the drive, empty where there is none, and ``of_full`` the limits as multiples of the parameter's value.
+    """Scales of the values that may be written, by the value's point: ``scaled_by`` has the point of the
+    parameter in each parameter set, below the drive, empty where there is none, and ``of_full`` the limits
+    as multiples of the parameter's value.
 
     So the page shows the limits of the drive's own P105 or C01, and not those of the site file.
     """

@@ -1,4 +1,4 @@
-"""The page shows, and checks, the limits that a drive's own parameters give, and not those of the site file."""
+"""The page shows and checks the limits that a drive's own parameters give, not those of the site file."""
 
 from __future__ import annotations
 

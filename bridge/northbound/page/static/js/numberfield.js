@@ -14,7 +14,7 @@ const fields = new WeakMap();
  * `initial` is a number. */
 export function NumberField({ id, name, limits, says, initial = undefined, isRequired = false, isDisabled = false }) {
   const input = useRef(null);
-  const [beginning] = useState(() => (typeof initial === "number" ? exact(initial) : ""));
+  const beginning = typeof initial === "number" ? exact(initial) : "";
   const [text, setText] = useState(beginning);
   const [note, setNote] = useState("");
   const found = understood(text, limits);
@@ -23,6 +23,8 @@ export function NumberField({ id, name, limits, says, initial = undefined, isReq
     setNote("");
     input.current.setCustomValidity(understood(input.current.value, limits).failure ?? "");
   };
+  // What is in the drive may be read later than the field is there; a field that nobody has typed in shows it.
+  useEffect(follow, [beginning]);
   useEffect(() => {
     const { form } = input.current;
     const onReset = () => setTimeout(() => input.current && follow());

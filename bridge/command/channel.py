@@ -10,6 +10,7 @@ not look like a dead drive.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from bridge.command.event import Event, Kind
 from bridge.command.leg import event, owners
@@ -115,7 +116,11 @@ class Channel:
         return self.leg.stage.is_tripped
 
     def refusal(self, identity: Identity) -> str:
-        """Why ``identity`` may not command it, whose owner is there; empty where it may."""
+        """Why ``identity`` may not command it, whose owner is there, over any of its connections; empty where
+        it may."""
+        owner = self.leg.owner.identity
+        if owner is not None and identity.is_same(owner):
+            identity = replace(identity, connection=owner.connection)
         return owners.refusal(self.leg_settings.control, self.leg.owner, identity, is_replaceable=False)
 
     # the node
@@ -170,9 +175,13 @@ class Channel:
         """Do what ``request`` asks; ``reply`` is called exactly once, now or later."""
         self._happen(request, now, reply)
 
-    def on_connection(self, identity: Identity, now: float, *, is_there: bool) -> None:
-        """``identity`` has its first connection, or none any more: no telegram, and no end of control."""
-        self.leg, _ = step(self.leg_settings, self.leg, event.Connection(identity, is_there), now)
+    def on_connection(
+        self, identity: Identity, now: float, *, is_there: bool, has_others: bool = False
+    ) -> None:
+        """A connection of ``identity`` has begun or ended, and the same user has others or not: no telegram,
+        and no end of control."""
+        connection = event.Connection(identity, is_there, has_others)
+        self.leg, _ = step(self.leg_settings, self.leg, connection, now)
 
     def on_refused(self, now: float) -> None:
         """A request about it was refused elsewhere, and counts as one that is refused here."""

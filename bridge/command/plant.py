@@ -301,11 +301,13 @@ class Plant:
             reply, outcome = self._outcomes.popleft()
             reply(outcome)
 
-    def on_connection(self, identity: Identity, now: float, *, is_there: bool) -> None:
-        """``identity`` has connected, or its last connection has ended: no telegram, and no end of control.
-        Told where a protocol knows it."""
+    def on_connection(
+        self, identity: Identity, now: float, *, is_there: bool, has_others: bool = False
+    ) -> None:
+        """A connection of ``identity`` has begun or ended, and the same user has others or not: no telegram,
+        and no end of control. Told where a protocol knows it."""
         for one in self._commanded.values():
-            one.channel.on_connection(identity, now, is_there=is_there)
+            one.channel.on_connection(identity, now, is_there=is_there, has_others=has_others)
 
     def rejected(self, rejection: Rejection, now: float, count: int = 1) -> None:
         """What a protocol has refused by itself, ``count`` times: counted, told and written to the audit log
@@ -480,8 +482,8 @@ class PlantView:
     def count(self, leaf: str, by: int = 1) -> None:
         self._plant.count(leaf, self._clock(), by)
 
-    def on_connection(self, identity: Identity, *, is_there: bool) -> None:
-        self._plant.on_connection(identity, self._clock(), is_there=is_there)
+    def on_connection(self, identity: Identity, *, is_there: bool, has_others: bool = False) -> None:
+        self._plant.on_connection(identity, self._clock(), is_there=is_there, has_others=has_others)
 
 
 def _unit_ids(site: Site) -> dict[tuple[str, int], int]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum, StrEnum
 from typing import Any, ClassVar, Final
 
@@ -34,11 +34,13 @@ class Role(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Who asks. Two requests come from the same controller exactly if ``source`` and ``user`` agree.
+    """Who asks, and over which connection.
 
     ``user`` is the session's user on OPC UA, the client's IP address on Modbus, the controller's name
     on zenoh. ``address`` is for the log only. ``sets_parameters``: may write parameters of drives without
-    being an engineer, where a protocol knows no roles.
+    being an engineer, where a protocol knows no roles. ``connection`` is the name of the client's connection
+    (``port 51234`` on Modbus, ``session 1f3a9c02`` on OPC UA and zenoh), empty where the protocol knows none
+    and of an owner whose connection has ended.
     """
 
     source: Source
@@ -46,13 +48,27 @@ class Identity:
     role: Role = Role.OPERATOR
     address: str = ""
     sets_parameters: bool = False
+    connection: str = ""
 
     @property
     def may_set_parameters(self) -> bool:
         return self.sets_parameters or self.role >= Role.ENGINEER
 
     def is_same(self, other: Identity | None) -> bool:
+        """Same user of the same protocol, over any connection."""
         return other is not None and self.source is other.source and self.user == other.user
+
+    def goes_on_as(self, other: Identity | None) -> bool:
+        """Same user over the same connection, or over any where that of ``other`` has ended."""
+        return other is not None and other.connection in ("", self.connection) and self.is_same(other)
+
+    def without_connection(self) -> Identity:
+        """The same user, whose connection has ended."""
+        return replace(self, connection="")
+
+    def named_beside(self, other: Identity | None) -> str:
+        """Name that tells it from ``other``: with its connection where both are the same user."""
+        return f"{self} {self.connection}".rstrip() if self.is_same(other) else str(self)
 
     def __str__(self) -> str:
         return f"{self.source.label}:{self.user}"

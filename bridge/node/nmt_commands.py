@@ -64,8 +64,8 @@ def refusal(request: Request, commanded: Sequence[Drive | Outputs]) -> str | Non
         return None
     for one in commanded:
         owner = one.channel.owner
-        if owner is not None and not request.identity.is_same(owner):
-            return f"{one.name} is controlled by {owner}"
+        if owner is not None and not request.identity.goes_on_as(owner):
+            return f"{one.name} is controlled by {owner.named_beside(request.identity)}"
     return None
 
 

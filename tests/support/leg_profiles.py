@@ -102,6 +102,21 @@ _STOPS: Final = {
 }
 _WATCH: Final = {"drive's own watch is off", "drive's own watch is on"}
 _CONNECTION: Final = {"owner's connection ends", "owner is connected"}
+_TWINS: Final = {
+    "owner writes a stop",
+    "owner enables",
+    "owner releases",
+    "twin writes a stop",
+    "twin enables",
+    "twin stops the drive",
+    "twin releases",
+    "owner's connection ends, not its twin",
+    "twin's connection ends",
+    "rival enables",
+    "drive follows",
+    "everything is due",
+}
+"""Two connections of one address."""
 _LEAN: Final = _BASE - {
     "owner acknowledges by an edge",
     "owner's stop comes late",
@@ -281,6 +296,48 @@ _SETTINGS: Final[dict[str, Profile]] = {
         "stop_by_anyone": False,
     },
     "stopped by the owner only": {"names": _LEAN | {"owner stops the drive"}, "stop_by_anyone": False},
+    "two connections": {
+        "names": _TWINS
+        | {
+            "owner resets the fault",
+            "owner acknowledges by an edge",
+            "twin acknowledges by an edge",
+            "owner's connection ends",
+            "node lost",
+            "node operational",
+        }
+    },
+    "two connections, hold": {"names": _TWINS | {"owner resets the fault"}, "on_expiry": "hold"},
+    "two connections, registers": {
+        "names": _TWINS
+        | {
+            "owner keeps alive",
+            "owner resets the fault by a register",
+            "twin keeps alive",
+            "twin resets the fault by a register",
+        }
+    },
+    "two connections, started": {
+        "names": _TWINS - {"rival enables"} | {"owner starts the drive", "twin starts the drive"},
+    },
+    "two connections, off": {
+        "names": _TWINS | _CONNECTION | {"stranger stops the drive"},
+        "fieldbus_timeout_ms": 0,
+    },
+    "two connections, lease": {
+        "names": _TWINS | {"owner takes control", "twin takes control", "owner resets the fault"},
+        "control": "lease",
+    },
+    "two connections, time-out writable": {
+        "names": _TWINS
+        | {
+            "owner sets a longer time-out",
+            "owner switches the time-out off",
+            "twin sets a longer time-out",
+        },
+        "fieldbus_timeout_writable": True,
+        "fieldbus_timeout_range_ms": [0, 3000],
+    },
     "time-out writable": {
         "names": _LEAN
         | {"owner sets a longer time-out", "owner switches the time-out off", "rival sets a longer time-out"},

@@ -23,12 +23,18 @@ class _One(Identity):
     __eq__ = object.__eq__
     __hash__ = object.__hash__
 
+    def without_connection(self) -> Identity:
+        return PLC_ANYHOW if self.is_same(PLC_ANYHOW) else self
 
-def _one(who: Identity) -> Identity:
-    return _One(who.source, who.user, who.role)
+
+def _one(who: Identity, connection: str = "") -> Identity:
+    return _One(who.source, who.user, who.role, connection=connection)
 
 
-PLC, OTHER_PLC, OPERATOR = _one(rig.PLC), _one(rig.OTHER_PLC), _one(rig.OPERATOR)
+PLC, OTHER_PLC, OPERATOR = _one(rig.PLC, "one"), _one(rig.OTHER_PLC), _one(rig.OPERATOR)
+TWIN: Final = _one(rig.PLC, "another")
+"""Another connection of the PLC's address."""
+PLC_ANYHOW: Final = _one(rig.PLC)
 OBSERVER, ENGINEER = _one(rig.OBSERVER), _one(rig.ENGINEER)
 
 
@@ -51,6 +57,9 @@ def _writes_of(words: LegWords) -> dict[str, _Telegram]:
         "owner writes a setpoint": (PLC, words.setpoint),
         "owner writes another setpoint": (PLC, words.more),
         "owner writes a value that is too large": (PLC, words.too_large),
+        "twin writes a stop": (TWIN, stop),
+        "twin enables": (TWIN, enable),
+        "twin acknowledges by an edge": (TWIN, {"control_word": acknowledge}),
         "rival writes a stop": (OTHER_PLC, stop),
         "rival enables": (OTHER_PLC, enable),
         "stranger enables": (OPERATOR, enable),
@@ -82,6 +91,13 @@ def requests_of(rules: Rules, ttl_ms: int) -> dict[str, Request]:
         ("owner takes control", PLC, TakeControl(ttl_ms), None, None),
         ("owner sets a longer time-out", PLC, SetTimeout(3000), None, None),
         ("owner switches the time-out off", PLC, SetTimeout(0), None, None),
+        ("twin keeps alive", TWIN, Do(Action.KEEP_ALIVE), None, False),
+        ("twin resets the fault by a register", TWIN, Do(Action.RESET_FAULT), None, True),
+        ("twin stops the drive", TWIN, Do(Action.STOP), None, None),
+        ("twin starts the drive", TWIN, Start(0), None, None),
+        ("twin releases", TWIN, Do(Action.RELEASE_CONTROL), None, None),
+        ("twin takes control", TWIN, TakeControl(ttl_ms), None, None),
+        ("twin sets a longer time-out", TWIN, SetTimeout(3000), None, None),
         ("rival sets a longer time-out", OTHER_PLC, SetTimeout(3000), None, None),
         ("rival takes control", OTHER_PLC, TakeControl(ttl_ms), None, None),
         ("rival starts the drive", OTHER_PLC, Start(0), None, None),

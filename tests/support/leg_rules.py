@@ -40,6 +40,19 @@ class Model(Memory):
 
     # who may
 
+    def owns(self, who: Any) -> bool:
+        """An owner is one connection; when that has ended, whichever its user comes by next."""
+        owner = self.owner
+        return who is owner or (self.is_cut and who.user == owner.user)
+
+    def pressed(self, who: Any) -> bool:
+        """Its last telegram acknowledged by a register."""
+        last = self.pressed_by
+        return who is last or (self.is_pressed_cut and who.user == last.user)
+
+    def press(self, who: Any) -> None:
+        self.pressed_by, self.is_pressed_cut = who, False
+
     @property
     def is_gone(self) -> bool:
         """The owner, where no time-out says so."""
@@ -52,11 +65,13 @@ class Model(Memory):
         rules = self.rules
         if who.role < 1 or rules.control == "none":
             return False
-        is_owner = who == self.owner
+        is_owner = self.owns(who)
         is_free = self.owner is None or self.is_silent or self.is_gone
+        is_quiet = self.quiet_at is not None and self.now >= self.quiet_at
         if rules.control == "lease":
             return is_owner or (take and (is_free or who.role >= 2))
         is_free = is_free or (self.heard_at is None and self.timeout_s > 0)
+        is_free = is_free or (is_quiet and who.user == self.owner.user)
         return who.source.label == rules.control and (is_owner or is_free or (take and who.role >= 2))
 
     def may_stop(self, who: Any) -> bool:
@@ -109,7 +124,7 @@ class Model(Memory):
             self.stop_kind = max(self.stop_kind, kind, key=STRENGTH.index)
 
     def asked_to_stop(self, who: Any, kind: str, *, is_late: bool) -> None:
-        if who != self.owner:
+        if not self.owns(who):
             if self.owner is not None and not self.timeout_s and self.gone_at is None:
                 self.gone_at = self.now + GONE_S
         elif not is_late:
@@ -119,20 +134,29 @@ class Model(Memory):
     def leave(self) -> None:
         self.stop()
         self.owner = self.deadline = self.heard_at = self.lease_until = self.bit = None
-        self.absent_at = self.gone_at = None
-        self.is_silent = False
+        self.absent_at = self.gone_at = self.quiet_at = None
+        self.is_silent = self.is_cut = False
         self.timeout_s = self.rules.timeout_s
 
-    def connection(self, who: Any, *, is_there: bool) -> None:
-        if who == self.owner:
-            self.absent_at = None if is_there else self.now + GONE_S
+    def connection(self, who: Any, *, is_there: bool, has_others: bool) -> None:
+        if not is_there:
+            self.is_pressed_cut |= who is self.pressed_by
+        if self.owner is None or who.user != self.owner.user:
+            return
+        if is_there:
+            self.absent_at = None
+            return
+        self.is_cut |= who is self.owner
+        if not has_others:
+            self.absent_at = self.now + GONE_S
 
     def own(self, who: Any) -> None:
-        if who != self.owner:
-            if self.owner is not None:
-                self.leave()
-            self.owner = who
+        if not self.owns(who) and self.owner is not None:
+            self.leave()
+        self.owner, self.is_cut = who, False
         self.absent_at = self.gone_at = None
+        judges_by_itself = self.timeout_s or self.rules.control == "lease"
+        self.quiet_at = None if judges_by_itself else self.now + GONE_S
         if self.rules.control == "lease":
             self.lease_until = self.now + self.lease_s
 
@@ -146,6 +170,8 @@ class Model(Memory):
         self.timeout_s = timeout_s
         runs = timeout_s and self.heard_at is not None and not self.is_silent
         self.deadline = (self.heard_at or 0.0) + timeout_s if runs else None
+        judges_by_itself = timeout_s or self.rules.control == "lease"
+        self.quiet_at = None if judges_by_itself else (self.heard_at or self.now) + GONE_S
 
     def telegram(self, who: Any) -> None:
         self.own(who)

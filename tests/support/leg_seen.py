@@ -47,6 +47,7 @@ class Times(NamedTuple):
     news_until: float | None = None
     up_until: float | None = None
     down_until: float | None = None
+    quiet_at: float | None = None
 
 
 class Seen(NamedTuple):
@@ -74,6 +75,10 @@ class Seen(NamedTuple):
     has_begun: bool = False
     bit: bool | None = None
     pressed_by: Any = None
+    is_cut: bool = False
+    """The owner's connection has ended."""
+    is_pressed_cut: bool = False
+    """So has that of ``pressed_by``."""
     is_there: bool = True
     is_placed: bool = True
     is_heard: bool = True
@@ -127,6 +132,7 @@ class Memory:
             self.news_until,
             self.up_until,
             self.down_until,
+            self.quiet_at,
         ) = seen.times
         (
             _,
@@ -145,6 +151,8 @@ class Memory:
             self.has_begun,
             self.bit,
             self.pressed_by,
+            self.is_cut,
+            self.is_pressed_cut,
             self.is_there,
             self.is_placed,
             self.is_heard,

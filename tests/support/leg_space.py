@@ -13,6 +13,7 @@ from unittest.mock import patch
 from bridge.command import (
     Action,
     Code,
+    Identity,
     Request,
     SetTimeout,
     Start,
@@ -43,7 +44,7 @@ from tests.support.leg_deeds import HOLDS, Done
 from tests.support.leg_forget import Forgetting
 from tests.support.leg_oracle import Oracle
 from tests.support.leg_recorded import RecordedTable, Walked
-from tests.support.leg_requests import PLC, requests_of
+from tests.support.leg_requests import PLC, TWIN, requests_of
 from tests.support.leg_rules import FAULTED
 from tests.support.leg_seen import Rules, Seen, first
 from tests.support.leg_time import NOW, State, ahead, come, timeless
@@ -114,8 +115,14 @@ class Space:
             "bridge gap": self._gap,
             "everything is due": lambda state: self._round(come(state, ahead(state))),
             "nothing is due": self._round,
-            "owner's connection ends": lambda state: self._connection(state, is_there=False),
-            "owner is connected": lambda state: self._connection(state, is_there=True),
+            "owner's connection ends": lambda state: self._connection(state, PLC, is_there=False),
+            "owner is connected": lambda state: self._connection(state, PLC, is_there=True),
+            "owner's connection ends, not its twin": lambda state: self._connection(
+                state, PLC, is_there=False, has_others=True
+            ),
+            "twin's connection ends": lambda state: self._connection(
+                state, TWIN, is_there=False, has_others=True
+            ),
         }
 
     def _late(self, happen: Callable[[State], State]) -> Callable[[State], State]:
@@ -175,19 +182,19 @@ class Space:
                 assert isinstance(word, int)
                 is_stop = "control_word" in values and not words.enabling.fit(word)
                 is_valid = word & words.valid == words.valid and values is not words.too_large
-                return is_valid and (not is_late or (is_stop and who == oracle.owner))
+                return is_valid and (not is_late or (is_stop and oracle.owns(who)))
             case Start():
                 return not (is_late or oracle.is_tripped or oracle.says in FAULTED) and oracle.is_open
             case SetTimeout():
-                return self.rules.is_writable and who == oracle.owner
+                return self.rules.is_writable and oracle.owns(who)
             case _:
                 return not is_late
 
     def _tell(self, oracle: Oracle, request: Request) -> None:
         who, command, action = request.identity, request.command, request.action
         is_late = request.received_at is not None
-        if request.pressed is False and who == oracle.pressed_by:
-            oracle.pressed_by = None
+        if request.pressed is False and oracle.pressed(who):
+            oracle.press(None)
         match command:
             case Write() if is_late:
                 oracle.late_stop()
@@ -207,13 +214,16 @@ class Space:
                 oracle.set_timeout(timeout_ms / 1000)
             case _ if action in STOP_ACTIONS:
                 oracle.asked_to_stop(who, action, is_late=is_late)
-            case _ if action is Action.KEEP_ALIVE or (request.pressed and who == oracle.pressed_by):
+            case _ if action is Action.KEEP_ALIVE or (request.pressed and oracle.pressed(who)):
+                if request.pressed:
+                    oracle.press(who)
                 oracle.telegram(who)
             case _ if action is Action.RESET_FAULT:
-                oracle.pressed_by = who if request.pressed else oracle.pressed_by
+                if request.pressed:
+                    oracle.press(who)
                 oracle.acknowledge(who, is_reset=True)
             case _:
-                if who == oracle.owner:
+                if oracle.owns(who):
                     oracle.leave()
 
     # rounds of the service
@@ -315,11 +325,11 @@ class Space:
             oracle.leave()
         return self._time(leg, after, oracle, effects)
 
-    def _connection(self, state: State, *, is_there: bool) -> State:
+    def _connection(self, state: State, who: Identity, *, is_there: bool, has_others: bool = False) -> State:
         leg, seen = state
         oracle = Oracle(self.rules, seen, NOW)
-        after, effects = self._step(leg, Connection(PLC, is_there))
-        oracle.connection(PLC, is_there=is_there)
+        after, effects = self._step(leg, Connection(who, is_there, has_others))
+        oracle.connection(who, is_there=is_there, has_others=has_others)
         return self._end(leg, after, oracle, effects)
 
     # what must hold
@@ -339,7 +349,8 @@ class Space:
         oracle.look_at_way()
         assert oracle.is_starting is is_going_on, "a start goes on until something ends it"
         assert leg.stage.is_tripped is oracle.is_tripped, "tripped exactly if the owner's time was up"
-        assert leg.owner.identity == oracle.owner
+        owner = oracle.owner
+        assert leg.owner.identity is (owner.without_connection() if oracle.is_cut else owner)
         sent = leg.sent
         oracle.check(sent.words, silent=sent.silent)
         if oracle.sends:

@@ -23,7 +23,7 @@ _ORACLES: Final = len(Times._fields)
 
 
 def _instants(leg: LegState, seen: Seen) -> Instants:
-    _, _, lease_until, absent_until, stopped_until = leg.owner
+    _, _, lease_until, absent_until, stopped_until, quiet_until = leg.owner
     _, heard_at, deadline, _ = leg.timer
     start = leg.start
     started = _NEVER if start is None else (start.until, start.settles_at, start.believed_at, start.leaves_at)
@@ -39,6 +39,7 @@ def _instants(leg: LegState, seen: Seen) -> Instants:
         order.rises_at,
         leg.pulse_until,
         *started,
+        quiet_until,
         *seen.times,
     )
 
@@ -54,14 +55,16 @@ def _with(leg: LegState, seen: Seen, instants: Instants) -> State:
             leaves_at=instants[13],
         )
     leg = leg._replace(
-        owner=type(owner)(owner.identity, owner.lease_s, lease_until, absent_until, stopped_until),
+        owner=type(owner)(
+            owner.identity, owner.lease_s, lease_until, absent_until, stopped_until, instants[14]
+        ),
         timer=type(timer)(timer.timeout_ms, heard_at, deadline, timer.is_overdue),
         trip=type(leg.trip)(*trip),
         order=order._replace(deadline=instants[7], rises_at=instants[8]),
         pulse_until=instants[9],
         start=start,
     )
-    return leg, seen._replace(times=Times(*instants[14:]))
+    return leg, seen._replace(times=Times(*instants[15:]))
 
 
 _timeless: dict[Instants, Instants] = {}

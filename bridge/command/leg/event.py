@@ -59,10 +59,11 @@ class OwnWatch:
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """``identity`` has its first connection, or none any more."""
+    """A connection of ``identity`` has begun or ended. ``has_others``: the same user has other ones."""
 
     identity: Identity
     is_there: bool
+    has_others: bool = False
 
 
 Event = Request | Time | Report | ActualWords | Way | NodeBack | StartAnew | BridgeGap | OwnWatch | Connection

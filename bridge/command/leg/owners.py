@@ -3,6 +3,9 @@
 With ``control`` a protocol, the first identity of that protocol whose valid telegram arrives owns the drive
 until it releases it or falls silent. With ``"lease"`` any operator takes the drive for a time and keeps it by
 going on; with ``"none"`` nobody commands it.
+
+An owner is one connection: two programs that call themselves the same must not move a drive in turns. Another
+connection of the same user is somebody else until the owner's has ended; then it goes on where that was.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ from typing import Final
 
 from bridge.command.event import Kind
 from bridge.command.freshness import arrival_of
+from bridge.command.leg.event import Connection
 from bridge.command.leg.state import Owner, Timer
 from bridge.command.leg.turn import Turn
 from bridge.command.request import DONE, STOP_ACTIONS, Action, Code, Identity, Outcome, Request, Role
@@ -20,6 +24,7 @@ _LEASE_MS: Final = (100, 600_000)
 GONE_S: Final = 10.0
 """Without a watchdog: after this an owner that gives no sign holds nobody up any more. Long enough for one
 that connects anew for each telegram, and for a person who was stopped."""
+_NO_TIMES: Final = [None, None, None]
 
 
 def refusal(control: str, owner: Owner, identity: Identity, *, is_replaceable: bool) -> str:
@@ -28,17 +33,21 @@ def refusal(control: str, owner: Owner, identity: Identity, *, is_replaceable: b
         return f"{identity} may only read"
     if control == "none":
         return "the site file gives nobody control of this drive"
-    if identity.is_same(owner.identity):
+    if identity.goes_on_as(owner.identity):
         return ""
     if control == "lease":
-        if owner.identity is None:
-            return "take control of the drive first"
-        return f"the drive is controlled by {owner.identity}"
+        return (
+            "take control of the drive first" if owner.identity is None else _taken(owner.identity, identity)
+        )
     if identity.source.label != control:
         return f"the drive is controlled by {control}"
     if owner.identity is None or is_replaceable:
         return ""
-    return f"the drive is controlled by {owner.identity}"
+    return _taken(owner.identity, identity)
+
+
+def _taken(owner: Identity, identity: Identity) -> str:
+    return f"the drive is controlled by {owner.named_beside(identity)}"
 
 
 def _take_refusal(control: str, owner: Owner, identity: Identity, *, is_replaceable: bool) -> str:
@@ -48,10 +57,9 @@ def _take_refusal(control: str, owner: Owner, identity: Identity, *, is_replacea
         return "" if may_break else refusal(control, owner, identity, is_replaceable=is_replaceable)
     if identity.role < Role.OPERATOR:
         return f"{identity} may only read"
-    free = owner.identity is None or is_replaceable or identity.is_same(owner.identity)
-    if free or identity.role >= Role.ENGINEER:
+    if owner.identity is None or is_replaceable or identity.role >= Role.ENGINEER:
         return ""
-    return f"the drive is controlled by {owner.identity}"
+    return "" if identity.goes_on_as(owner.identity) else _taken(owner.identity, identity)
 
 
 def check_authority(turn: Turn, request: Request) -> None:
@@ -62,7 +70,8 @@ def check_authority(turn: Turn, request: Request) -> None:
     if request.action in STOP_ACTIONS and may_stop and identity.role >= Role.OPERATOR:
         return
     judge = _take_refusal if request.action is Action.TAKE_CONTROL else refusal
-    why = judge(settings.control, turn.owner, identity, is_replaceable=_owner_is_replaceable(turn))
+    is_replaceable = _owner_is_replaceable(turn) or _is_quiet_beside(turn, identity)
+    why = judge(settings.control, turn.owner, identity, is_replaceable=is_replaceable)
     if why:
         raise Refusal(Code.NOT_ALLOWED, why)
 
@@ -72,6 +81,14 @@ def _owner_is_replaceable(turn: Turn) -> bool:
     timer = turn.timer
     is_idle = timer.timeout_ms > 0 and timer.heard_at is None and turn.settings.control != "lease"
     return timer.is_overdue or is_idle or _owner_is_gone(turn)
+
+
+def _is_quiet_beside(turn: Turn, identity: Identity) -> bool:
+    """Another connection of the owner's user asks, and the owner's, which may be half open, has said nothing
+    for ``GONE_S`` where no watchdog judges it. A lease has an end of its own."""
+    quiet_until = turn.owner.quiet_until
+    is_over = quiet_until is not None and turn.now >= quiet_until
+    return is_over and identity.is_same(turn.owner.identity)
 
 
 def _owner_is_gone(turn: Turn) -> bool:
@@ -85,11 +102,13 @@ def _owner_is_gone(turn: Turn) -> bool:
 
 def own(turn: Turn, request: Request) -> None:
     """A valid telegram: who sent it owns the drive from now on."""
-    identity = request.identity
-    if request.pressed is False and identity.is_same(turn.edges.pressed_by):
+    identity, owner = request.identity, turn.owner.identity
+    if request.pressed is False and identity.goes_on_as(turn.edges.pressed_by):
         turn.edges = turn.edges._replace(pressed_by=None)
-    if not identity.is_same(turn.owner.identity):
+    if owner is None or not identity.goes_on_as(owner):
         _hand_over(turn, identity)
+    elif identity.connection != owner.connection:
+        turn.owner = turn.owner._replace(identity=identity)
     _renew(turn, arrival_of(request, turn.now))
 
 
@@ -101,25 +120,30 @@ def hear(turn: Turn, request: Request) -> None:
 
 def _renew(turn: Turn, at: float) -> None:
     """The owner has shown that it is there: its lease runs anew."""
-    identity, lease_s, lease_until, absent_until, stopped_until = turn.owner
+    identity, lease_s, lease_until, *times = turn.owner
+    quiet_until = None
     if turn.settings.control == "lease":
         lease_until = at + lease_s
-    elif absent_until is None and stopped_until is None:
+    elif not turn.timer.timeout_ms:
+        quiet_until = at + GONE_S
+    elif times == _NO_TIMES:
         return
-    turn.owner = Owner(identity, lease_s, lease_until)
+    turn.owner = Owner(identity, lease_s, lease_until, quiet_until=quiet_until)
 
 
 def _hand_over(turn: Turn, identity: Identity, lease_s: float | None = None) -> None:
     """Another owner, or a lease taken anew; the drive is stopped where the owner changes."""
     before = turn.owner.identity
-    changes = not identity.is_same(before)
+    changes = not identity.goes_on_as(before)
     if changes and before is not None:
         turn.leave()
     if lease_s is None or turn.settings.control != "lease":
         lease_s = turn.owner.lease_s
     turn.owner = Owner(identity, lease_s)
     _renew(turn, turn.now)
-    if changes:
+    if changes and identity.is_same(before):
+        turn.tell(Kind.OWNER, 300, f"controlled by {identity.named_beside(before)}")
+    elif changes:
         turn.tell(Kind.OWNER, 200, f"controlled by {identity}")
 
 
@@ -128,13 +152,14 @@ def take_control(turn: Turn, identity: Identity, ttl_ms: int) -> None:
     if turn.settings.control == "lease" and not low <= ttl_ms <= high:
         raise Refusal(Code.OUT_OF_RANGE, f"ttl_ms takes {low}…{high}")
     owner = turn.owner.identity
-    if owner is not None and not _owner_is_replaceable(turn) and not identity.is_same(owner):
-        turn.tell(Kind.OWNER, 500, f"{identity} takes control away from {owner}")
+    if owner is not None and not _owner_is_replaceable(turn) and not identity.goes_on_as(owner):
+        who, whom = identity.named_beside(owner), owner.named_beside(identity)
+        turn.tell(Kind.OWNER, 500, f"{who} takes control away from {whom}")
     _hand_over(turn, identity, ttl_ms / 1000)
 
 
 def release(turn: Turn, identity: Identity) -> Outcome:
-    if not identity.is_same(turn.owner.identity):
+    if not identity.goes_on_as(turn.owner.identity):
         return Outcome(Code.OK, "not in control")
     turn.tell(Kind.OWNER, 200, f"released by {turn.owner.identity}")
     turn.leave()
@@ -147,7 +172,7 @@ def set_timeout(turn: Turn, identity: Identity, timeout_ms: int) -> None:
     settings, timer = turn.settings, turn.timer
     if not settings.timeout_writable:
         raise Refusal(Code.NOT_ALLOWED, "the site file does not allow to change fieldbus_timeout_ms")
-    if not identity.is_same(turn.owner.identity):
+    if not identity.goes_on_as(turn.owner.identity):
         raise Refusal(Code.NOT_ALLOWED, "only who controls the drive may change fieldbus_timeout_ms")
     low, high = settings.timeout_range_ms
     if not low <= timeout_ms <= high:
@@ -155,4 +180,25 @@ def set_timeout(turn: Turn, identity: Identity, timeout_ms: int) -> None:
     runs = timeout_ms and timer.heard_at is not None and not timer.is_overdue
     deadline = (timer.heard_at or 0.0) + timeout_ms / 1000 if runs else None
     turn.timer = Timer(timeout_ms, timer.heard_at, deadline, timer.is_overdue)
+    judges_by_itself = timeout_ms > 0 or settings.control == "lease"
+    quiet_until = None if judges_by_itself else (timer.heard_at or turn.now) + GONE_S
+    turn.owner = turn.owner._replace(quiet_until=quiet_until)
     turn.tell(Kind.CONFIGURATION, 400, f"fieldbus_timeout_ms = {timeout_ms}, by {identity}")
+
+
+def on_connection(turn: Turn, event: Connection) -> None:
+    """A connection has begun or ended: no telegram, and no end of control. What its user does next, over any
+    connection, goes on where the one that has ended was."""
+    identity, owner, pressed_by = event.identity, turn.owner, turn.edges.pressed_by
+    if not event.is_there and pressed_by is not None and identity.goes_on_as(pressed_by):
+        turn.edges = turn.edges._replace(pressed_by=pressed_by.without_connection())
+    if owner.identity is None or not identity.is_same(owner.identity):
+        return
+    if event.is_there:
+        turn.owner = owner._replace(absent_until=None)
+        return
+    if identity.goes_on_as(owner.identity):
+        owner = owner._replace(identity=owner.identity.without_connection())
+    if not event.has_others:
+        owner = owner._replace(absent_until=turn.now + GONE_S)
+    turn.owner = owner

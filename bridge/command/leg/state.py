@@ -129,14 +129,18 @@ class Timer(NamedTuple):
 
 
 class Owner(NamedTuple):
-    """``absent_until``: it has no connection any more; ``stopped_until``: somebody else has stopped its drive
-    and it has sent nothing since. From then on it is gone, where no watchdog says so."""
+    """``identity`` is one connection; without its name it is whichever the same user comes by next.
+
+    Where no watchdog says so: ``absent_until``: it has no connection any more; ``stopped_until``: somebody
+    else has stopped its drive and it has sent nothing since. From then on it is gone. ``quiet_until``: until
+    then it has been heard recently enough to keep out other connections of its own user."""
 
     identity: Identity | None = None
     lease_s: float = 0.0
     lease_until: float | None = None
     absent_until: float | None = None
     stopped_until: float | None = None
+    quiet_until: float | None = None
 
 
 class Edges(NamedTuple):

@@ -87,10 +87,8 @@ def step(settings: LegSettings, state: LegState, event: Event, now: float) -> tu
             _gap(turn)
         case OwnWatch(stops=stops):
             turn.silence_stops = stops
-        case Connection(identity=identity, is_there=is_there):
-            if identity.is_same(turn.owner.identity):
-                absent_until = None if is_there else now + owners.GONE_S
-                turn.owner = turn.owner._replace(absent_until=absent_until)
+        case Connection():
+            owners.on_connection(turn, event)
             return turn.end(), turn.effects
     turn.settle()
     if isinstance(event, StartAnew):
@@ -150,7 +148,8 @@ def _handle(turn: Turn, request: Request) -> None:
         else:
             turn.effects.append(Answer(_carry_out(turn, request)))
     except Refusal as refusal:
-        message = f"{request.action} by {request.identity} refused: {refusal.message}"
+        who = request.identity.named_beside(turn.owner.identity)
+        message = f"{request.action} by {who} refused: {refusal.message}"
         turn.tell(Kind.REFUSED, 300, message)
         refused = Outcome(refusal.code, refusal.message, forwarded=False)
         turn.effects.append(Answer(refused, is_refused=True))
@@ -193,7 +192,7 @@ def _carry_out(turn: Turn, request: Request) -> Outcome:
 
 def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome:
     words = turn.settings.words
-    is_owner = request.identity.is_same(turn.owner.identity)
+    is_owner = request.identity.goes_on_as(turn.owner.identity)
     # A new owner inherits no setpoints.
     kept = turn.setpoints if is_owner else turn.rest
     telegram = turn.settings.decode(values, kept, control_word(words, turn))
@@ -262,10 +261,11 @@ def _take_stale_stop(turn: Turn, word: int) -> Outcome:
 def _reset_fault(turn: Turn, request: Request) -> Outcome:
     """A method is an order each time; a register acknowledges where the telegram before it did not."""
     if request.pressed:
-        if request.identity.is_same(turn.edges.pressed_by):
+        was_pressed = request.identity.goes_on_as(turn.edges.pressed_by)
+        turn.edges = turn.edges._replace(pressed_by=request.identity)
+        if was_pressed:
             owners.hear(turn, request)
             return Outcome(Code.OK, "no edge: the telegram before it acknowledged, too", forwarded=False)
-        turn.edges = turn.edges._replace(pressed_by=request.identity)
     owners.own(turn, request)
     _acknowledge(turn, request, pulse=True)
     return DONE
@@ -283,12 +283,12 @@ def _acknowledge(turn: Turn, request: Request, *, pulse: bool) -> None:
 def _stop(turn: Turn, request: Request) -> None:
     """Stop, by whoever asks. The owner's telegrams go on counting, its old enable does not."""
     who, action, words = request.identity, request.action, turn.settings.words
-    if who.is_same(turn.owner.identity):
+    owner = turn.owner
+    if who.goes_on_as(owner.identity):
         if not _is_stale(turn, request):
             owners.hear(turn, request)
     else:
-        turn.tell(Kind.OWNER, 400, f"{action} by {who}")
-        owner = turn.owner
+        turn.tell(Kind.OWNER, 400, f"{action} by {who.named_beside(owner.identity)}")
         if turn.timer.timeout_ms == 0 and owner.identity is not None and owner.stopped_until is None:
             # Whoever is there answers to a stop of its drive.
             turn.owner = owner._replace(stopped_until=turn.now + owners.GONE_S)

@@ -12,6 +12,7 @@ from bridge.command.leg.effect import Heard
 from bridge.command.leg.state import Output, Stage
 from bridge.command.leg.table import TABLE, Cell, Deed, Stimulus
 from bridge.command.leg.turn import Turn
+from bridge.command.request import Identity
 from tests.support import leg_space
 from tests.support.leg_profiles import CYCLIC, MOST, space
 from tests.support.leg_words import POSITION
@@ -24,6 +25,15 @@ _TELEGRAMS: Final = {
     "owner releases",
     "rival enables",
     "stranger stops the drive",
+    "drive follows",
+    "everything is due",
+}
+_TWINS: Final = {
+    "owner writes a stop",
+    "owner enables",
+    "twin writes a stop",
+    "twin enables",
+    "owner's connection ends, not its twin",
     "drive follows",
     "everything is due",
 }
@@ -60,6 +70,11 @@ PROFILES: Final[dict[str, dict[str, Any]]] = {
     "hold": {"names": _TELEGRAMS, "on_expiry": "hold"},
     "lease": {"names": _TELEGRAMS | {"owner takes control"}, "control": "lease"},
     "off": {"names": _TELEGRAMS, "fieldbus_timeout_ms": 0},
+    "twins": {"names": _TWINS},
+    "twins, off": {"names": _TWINS, "fieldbus_timeout_ms": 0},
+    "twins' registers": {
+        "names": _TWINS | {f"{who} resets the fault by a register" for who in ("owner", "twin")}
+    },
     "way": {"names": _WAY},
     "hold, way": {"names": _WAY - {"rival enables", "bus back"}, "on_expiry": "hold"},
     "edges": {"names": _EDGES},
@@ -139,6 +154,13 @@ def _edge(leg: Turn, *_: Any) -> None:
     leg.edges = leg.edges._replace(bit=False)
 
 
+def _presses(leg: Turn, identity: Identity, of: Callable[..., None] = owners._hand_over) -> None:
+    """What one connection has pressed counts for the other, too."""
+    of(leg, identity)
+    if identity.is_same(leg.edges.pressed_by):
+        leg.edges = leg.edges._replace(pressed_by=identity)
+
+
 def _counts(leg: Turn, *_: Any) -> None:
     if leg.timer.deadline is not None:
         leg.timer = leg.timer._replace(deadline=leg.now + 2.0)
@@ -173,6 +195,21 @@ DEEDS: Final[dict[str, tuple[str, object, str, object]]] = {
     "silence speaks": ("silence", turn, "_reaction", _speaks),
     "a reaction keeps setpoints": ("telegrams", turn, "_reaction", _moves),
     "a lease has no end": ("lease", Turn, "judge", _before(Turn.judge, _loses_its_lease)),
+    "connections of one address are one owner": ("twins", Identity, "goes_on_as", Identity.is_same),
+    "an owner's next connection is somebody else": (
+        "twins",
+        Identity,
+        "goes_on_as",
+        lambda identity, other: identity is other,
+    ),
+    "an owner's connection does not end": ("twins", owners, "on_connection", lambda leg, event: None),
+    "a half-open connection keeps its user out": (
+        "twins, off",
+        owners,
+        "_is_quiet_beside",
+        lambda leg, identity: False,
+    ),
+    "two connections press one register": ("twins' registers", owners, "_hand_over", _presses),
     "an owner is never gone": ("off", owners, "GONE_S", 20.0),
     "a gap is not noticed": ("way", step, "_gap", lambda leg: None),
     "every acknowledge bit is an edge": ("edges", step, "_write", _before(step._write, _edge)),

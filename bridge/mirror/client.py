@@ -11,15 +11,15 @@ from dataclasses import replace
 from functools import partial
 from typing import Final, TypeVar
 
-from bridge.command import Code, Event, Outcome, Rejection, Reply, Request
+from bridge.command import Code, Event, Identity, Outcome, Rejection, Reply, Request
 from bridge.errors import OperationFailed
 from bridge.guard import Guard
 from bridge.image import Image, Quality
 from bridge.mirror import protocol
-from bridge.mirror.protocol import Changed, Counted, Delta, Malformed, Snapshot
+from bridge.mirror.protocol import Changed, Connected, Counted, Delta, Malformed, Snapshot
 from bridge.mirror.rejections import Rejections
 from bridge.quietlog import about
-from bridge.zenohlink import Message, ZenohLink, zenoh_config
+from bridge.zenohlink import Answer, Message, ZenohLink, zenoh_config
 
 _log = logging.getLogger(__name__)
 
@@ -67,6 +67,7 @@ class MirrorClient:
         self._points_changed = False
         self._listeners: list[Callable[[Event], None]] = []
         self._asking = set[asyncio.Task[Outcome]]()
+        self._telling = set[asyncio.Task[list[Answer]]]()
         self._rejections = Rejections()
         self._counts = Counter[str]()
         self._guard = Guard("mirror")
@@ -130,6 +131,14 @@ class MirrorClient:
     def count(self, leaf: str, by: int = 1) -> None:
         """Told to the bus process within 0.1 s."""
         self._counts[leaf] += by
+
+    def on_connection(self, identity: Identity, *, is_there: bool, has_others: bool = False) -> None:
+        """Told to the bus process before whatever is submitted afterwards. While that is away nobody is told:
+        the owner's time decides."""
+        told = protocol.encode(Connected(identity, is_there, has_others))
+        telling = asyncio.get_running_loop().create_task(self._link.get(protocol.CONNECTION, told))
+        self._telling.add(telling)
+        telling.add_done_callback(self._telling.discard)
 
     def _tell_rejections(self) -> None:
         for rejected in self._rejections.take():
@@ -203,8 +212,8 @@ class MirrorClient:
             await asyncio.sleep(_LOOK_EVERY_S)
 
     async def close(self) -> None:
-        for asking in tuple(self._asking):
-            asking.cancel()
+        for task in (*self._asking, *self._telling):
+            task.cancel()
         await self._link.close()
 
     async def failed(self) -> None:

@@ -22,6 +22,7 @@ EVENT: Final = "mirror/event"
 REQUEST: Final = "mirror/request"
 REJECTED: Final = "mirror/rejected"
 COUNTED: Final = "mirror/counted"
+CONNECTION: Final = "mirror/connection"
 TOKEN: Final = "mirror/@/bus"
 
 _LEAST_INT: Final = -(2**63)
@@ -89,14 +90,22 @@ class Counted(msgspec.Struct, array_like=True, frozen=True):
     by: int
 
 
+class Connected(msgspec.Struct, array_like=True, frozen=True):
+    """A client's connection to a front has begun or ended; ``has_others``: the same user has other ones."""
+
+    identity: Identity
+    is_there: bool
+    has_others: bool
+
+
 _encoder = msgspec.msgpack.Encoder()
 _decoders: dict[type, msgspec.msgpack.Decoder[Any]] = {
     kind: msgspec.msgpack.Decoder(kind)
-    for kind in (Snapshot, Delta, Event, Rejected, Counted, Outcome, _Asked, *COMMANDS.values())
+    for kind in (Snapshot, Delta, Event, Rejected, Counted, Connected, Outcome, _Asked, *COMMANDS.values())
 }
 
 
-def encode(message: Snapshot | Delta | Event | Rejected | Counted | Outcome) -> bytes:
+def encode(message: Snapshot | Delta | Event | Rejected | Counted | Connected | Outcome) -> bytes:
     """Raises nothing: a text that is not Unicode, or a number too long for MessagePack, is changed, because
     one bad value of a client must not cost the whole message."""
     try:

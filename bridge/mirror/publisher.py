@@ -15,7 +15,7 @@ from bridge.command.freshness import NEVER, TAKEN_LATE
 from bridge.errors import Unavailable
 from bridge.mirror import protocol
 from bridge.mirror.endpoint import close_to_others, prepare_folder
-from bridge.mirror.protocol import Changed, Delta, Malformed, Rejected, Snapshot
+from bridge.mirror.protocol import Changed, Connected, Delta, Malformed, Rejected, Snapshot
 from bridge.zenohlink import Asked, Message, Pace, ZenohLink, zenoh_config
 
 _POINTS_PER_DELTA: Final = 500
@@ -69,6 +69,7 @@ class MirrorPublisher:
         close_to_others(self._endpoint)
         # A front that has a snapshot may send requests.
         self._link.declare_queryable(protocol.REQUEST, self._on_request)
+        self._link.declare_queryable(protocol.CONNECTION, self._on_connection)
         self._link.declare_queryable(protocol.SNAPSHOT, self._on_snapshot)
         self._link.declare_subscriber(protocol.REJECTED, self._on_rejected)
         self._link.declare_subscriber(protocol.COUNTED, self._on_counted)
@@ -165,6 +166,18 @@ class MirrorPublisher:
         told = self._read(protocol.decode_counted, message)
         if told:
             self._view.count(told.leaf, told.by)
+
+    def _on_connection(self, asked: Asked) -> None:
+        """A query and no message: those are lost where a front is in a hurry, and the requests that follow
+        overtake them."""
+        try:
+            told = protocol.decode(Connected, asked.payload or b"")
+        except Malformed as error:
+            self.malformed += 1
+            asked.fail(str(error).encode(), "text/plain")
+            return
+        self._view.on_connection(told.identity, is_there=told.is_there, has_others=told.has_others)
+        asked.finish()
 
     def _read(self, decode: Callable[[bytes], _Told], message: Message) -> _Told | None:
         try:

@@ -42,16 +42,13 @@ class View(Protocol):
         """Count up a point of the bridge's own, such as ``opcua_refused_connections``."""
         ...
 
+    def on_connection(self, identity: Identity, *, is_there: bool, has_others: bool = False) -> None:
+        """Tell that the client's connection that ``identity`` names has begun or ended; ``has_others``: the
+        same user has other ones. What is submitted afterwards finds it so."""
+        ...
+
     def on_event(self, listener: Callable[[Event], None]) -> None: ...
 
     def forget(self, listener: Callable[[Event], None]) -> None:
         """Tell ``listener`` no more."""
-        ...
-
-
-class ConnectionView(View, Protocol):
-    """A view that is told who is connected, by a protocol that knows it."""
-
-    def on_connection(self, identity: Identity, *, is_there: bool) -> None:
-        """``identity`` has its first connection, or none any more: no telegram, and no end of control."""
         ...

@@ -54,6 +54,8 @@ class PlantView:
 
     def count(self, leaf: str, by: int = 1) -> None: ...
 
+    def on_connection(self, identity: Any, *, is_there: bool, has_others: bool = False) -> None: ...
+
     def on_event(self, listener: Any) -> None:
         self.listeners.append(listener)
 

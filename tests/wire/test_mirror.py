@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -187,6 +188,27 @@ async def test_a_start_that_takes_its_time_holds_up_no_other_request(endpoint: s
         drive_says(fu4, ENABLED)
         plant.deliver_outcomes()
         assert await start == Outcome(Code.OK)
+
+
+async def test_what_a_front_submits_after_a_session_has_ended_finds_it_ended(endpoint: str) -> None:
+    """One session after the other of one user: each goes on where the one before was."""
+    plant = make_plant()
+    node_is(plant, NodeState.OPERATIONAL)
+    fu4 = plant.drives["conveyor/fu4"]
+    drive_says(fu4, READY)
+    outcomes: list[Outcome] = []
+    async with publishing(endpoint, plant), front(endpoint) as client:
+        sessions = [replace(SCADA, connection=f"session {number}") for number in range(100)]
+        assert (await client.request(Request(sessions[0], "conveyor/fu4", TakeControl(60_000)))).ok
+        stranger = Request(sessions[1], "conveyor/fu4", Do(Action.KEEP_ALIVE))
+        refused = await client.request(stranger)
+        assert refused.message == "the drive is controlled by opcua:ann session 0"
+        for session in sessions:
+            client.on_connection(session, is_there=True)
+            client.submit(Request(session, "conveyor/fu4", Do(Action.KEEP_ALIVE)), outcomes.append)
+            client.on_connection(session, is_there=False, has_others=True)
+        await until(lambda: len(outcomes) == len(sessions), "every answer")
+        assert all(outcome.ok for outcome in outcomes), outcomes
 
 
 async def test_a_request_that_waited_too_long_moves_nothing_but_may_stop(endpoint: str) -> None:

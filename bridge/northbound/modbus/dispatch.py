@@ -73,7 +73,7 @@ _CODES: Final = {
     ExceptionCode.NOT_RESPONDING: Code.NOT_READY,
 }
 """The outcome for an exception that is raised here."""
-_WRITES: Final = (
+WRITES: Final = (
     Function.WRITE_COIL,
     Function.WRITE_REGISTER,
     Function.WRITE_COILS,
@@ -121,7 +121,7 @@ class Dispatcher:
             given = self._read(unit, request, caller)
         except Refused as error:
             given = refusal(pdu[0], error.code)
-            if pdu[0] in _WRITES:
+            if pdu[0] in WRITES:
                 self._note_refusal(unit_id, pdu[0], caller, error.code)
         answer(given)
 

@@ -18,7 +18,7 @@ from bridge.northbound.modbus.session import READ_MOST, Session
 from bridge.northbound.modbus.units import Units
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.sources import source_of
-from bridge.northbound.view import ConnectionView
+from bridge.northbound.view import View
 from bridge.quietlog import about
 
 _log = logging.getLogger(__name__)
@@ -33,9 +33,7 @@ IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 class ModbusServer:
     """Serves ``units`` as ``settings`` say. ``clock`` gives monotonic seconds."""
 
-    def __init__(
-        self, view: ConnectionView, units: Units, settings: ModbusTable, clock: Callable[[], float]
-    ) -> None:
+    def __init__(self, view: View, units: Units, settings: ModbusTable, clock: Callable[[], float]) -> None:
         self._settings = settings
         self._view = view
         self._dispatcher = Dispatcher(view, units, settings.word_order, clock)
@@ -44,6 +42,8 @@ class ModbusServer:
         self._clock = clock
         self._pulse = Pulse(clock)
         self._sessions: set[Session] = set()
+        self._writers: dict[str, set[Session]] = {}
+        """Those of each address that have written."""
         self._server: asyncio.Server | None = None
         self._socket: socket.socket | None = None
 
@@ -105,15 +105,36 @@ class ModbusServer:
         self._sessions.add(session)
         shown = f"[{address}]" if address.version == 6 else str(address)
         sets = self._settings.parameters == "write"
-        identity = Identity(Source.MODBUS, str(address), Role.OPERATOR, f"{shown}:{port}", sets)
-        self._view.on_connection(identity, is_there=True)
+        who = Source.MODBUS, str(address), Role.OPERATOR, f"{shown}:{port}"
+        identity = Identity(*who, sets, connection=f"port {port}")
+        self._view.on_connection(identity, is_there=True, has_others=self._has_others(identity, session))
         return identity
 
     def leave(self, session: Session) -> None:
+        """Its client has closed the connection, or it is closed for another reason."""
         self._sessions.discard(session)
         identity = session.identity
-        if identity is not None and not any(identity.is_same(other.identity) for other in self._sessions):
-            self._view.on_connection(identity, is_there=False)
+        if identity is None:
+            return
+        writers = self._writers.get(identity.user, set())
+        writers.discard(session)
+        if not writers:
+            self._writers.pop(identity.user, None)
+        has_others = self._has_others(identity, session)
+        self._view.on_connection(identity, is_there=False, has_others=has_others)
+
+    def on_write(self, session: Session, identity: Identity) -> None:
+        """``session`` is about to write. A client that has closed one connection before it goes on over the
+        next must not depend on which of the two the loop reads first: those that the kernel knows to be
+        closed end now."""
+        writers = self._writers.setdefault(identity.user, set())
+        writers.add(session)
+        if len(writers) > 1:
+            for other in [one for one in writers if one is not session and one.has_been_closed]:
+                self.leave(other)
+
+    def _has_others(self, identity: Identity, session: Session) -> bool:
+        return any(one is not session and identity.is_same(one.identity) for one in self._sessions)
 
     def on_fault(self, session: Session, fault: str) -> None:
         """The session is closed for this reason."""

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 from bridge.command import Identity
 from bridge.command.freshness import Inflow
-from bridge.northbound.modbus.dispatch import Answer, Dispatcher
+from bridge.northbound.modbus.dispatch import WRITES, Answer, Dispatcher
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.sources import source_of
 
@@ -35,6 +35,7 @@ READ_MOST: Final = 16 * 1024
 kind."""
 
 _UNREAD_MOST: Final = 32 * 1024  # bytes of answers that may wait for a client; beyond that it is not served
+_ESTABLISHED: Final = 1  # of TCP_INFO's first byte (linux/tcp.h)
 _KEEPALIVE: Final = (("TCP_KEEPIDLE", 30), ("TCP_KEEPINTVL", 10), ("TCP_KEEPCNT", 3))
 _HEADER: Final = struct.Struct(">HHHB")
 _BEFORE_LENGTH_COUNTS: Final = 6
@@ -190,6 +191,19 @@ class Session(asyncio.BufferedProtocol):
         """Whom limits count it for, and lines of the log."""
         return source_of(self.identity.user) if self.identity else ""
 
+    @property
+    def has_been_closed(self) -> bool:
+        """Its client has closed the connection, whether that was read or not; as far as the kernel tells."""
+        transport = self._transport
+        if transport is None or transport.is_closing():
+            return True
+        info = getattr(socket, "TCP_INFO", None)
+        if info is None:
+            return False
+        sock = transport.get_extra_info("socket")
+        state: bytes = sock.getsockopt(socket.IPPROTO_TCP, info, 1)
+        return state[0] != _ESTABLISHED
+
     def close(self) -> None:
         """End the connection; answers that the client has not read are lost."""
         transport = self._transport
@@ -224,6 +238,10 @@ class Session(asyncio.BufferedProtocol):
         self._conversation.receive(memoryview(self._room)[:nbytes], received_at)
         self._go_on()
 
+    def eof_received(self) -> None:
+        # The transport is closed when the answers are sent; the client has gone now.
+        self._server.leave(self)
+
     def pause_writing(self) -> None:
         self._stalled = asyncio.get_running_loop().call_later(STALL_LIMIT_S, self._drop_stalled)
 
@@ -244,8 +262,12 @@ class Session(asyncio.BufferedProtocol):
     # work
 
     def _handle(self, unit_id: int, pdu: bytes, answer: Answer, received_at: float) -> None:
-        if self.identity is not None:
-            self._dispatcher.handle(unit_id, pdu, self.identity, answer, received_at)
+        identity = self.identity
+        if identity is None:
+            return
+        if pdu[0] in WRITES:
+            self._server.on_write(self, identity)
+        self._dispatcher.handle(unit_id, pdu, identity, answer, received_at)
 
     def _go_on(self) -> None:
         """There is work: do it now, unless a turn is scheduled anyway."""

@@ -193,6 +193,7 @@ class OpcUaServer:
             users,
             Writer(self._view, inner.aspace, tree.writable),
             Caller(self._view, inner.aspace, tree.method),
+            self._view,
         )
         events = self._events(inner, tree)
         inner.subscriptions.prepare()

@@ -10,7 +10,7 @@ import asyncio
 import math
 import secrets
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, cast
 
 from asyncua.crypto.permission_rules import User, UserRole
@@ -46,6 +46,7 @@ from bridge.northbound.opcua.shares import make_room
 from bridge.northbound.opcua.structures import READ
 from bridge.northbound.opcua.subscriptions import Subscriptions
 from bridge.northbound.opcua.writes import Writer
+from bridge.northbound.view import View
 
 _LONGEST_SESSION_MS: Final = 120_000.0
 
@@ -54,6 +55,8 @@ _FOR_ENGINEERS: Final = tuple(
 )
 
 _TOKEN_BYTES: Final = 32
+_NAME_BYTES: Final = 4
+"""Of the name by which a session is told from others of its user, also from those before a restart."""
 _OBSERVER_ACCESS: Final = data_value(variant(READ, ua.VariantType.Byte))
 _OBSERVER_EXECUTABLE: Final = data_value(variant(False, ua.VariantType.Boolean))
 _NOTHING: Final = variant(None, ua.VariantType.Null)
@@ -67,6 +70,7 @@ class Services:
     users: Users
     writer: Writer
     caller: Caller
+    view: View
 
 
 class Session(InternalSession):
@@ -82,7 +86,8 @@ class Session(InternalSession):
         self.external = True
         server.register_external_session(self)
         self.address = str(name[0]) if isinstance(name, tuple) else str(name)
-        self.identity = Identity(Source.OPCUA, "", Role.OBSERVER, self.address)
+        self._name = f"session {secrets.token_hex(_NAME_BYTES)}"
+        self.identity = Identity(Source.OPCUA, "", Role.OBSERVER, self.address, connection=self._name)
         self.channel_certificate: bytes | None = None
         self.publishing = PublishQueue()
         self.browser = Browser(aspace)
@@ -120,7 +125,10 @@ class Session(InternalSession):
         if admitted is None:
             raise ServiceError(StatusCodes.BadIdentityTokenRejected)
         result = super().activate_session(params, peer_certificate)
-        self.identity = admitted
+        if not admitted.is_same(self.identity):
+            self._tell(is_there=False)  # for the user before
+        self.identity = replace(admitted, connection=self._name)
+        self._tell(is_there=True)
         # Never Admin: that role may change the address space and write anything.
         self.user = User(UserRole.User, admitted.user)
         return result
@@ -130,8 +138,17 @@ class Session(InternalSession):
         return self._server.services
 
     def leave(self, now: float) -> None:
-        """Its connection has ended."""
+        """Its connection has ended. It may be activated on another one, and goes on then."""
         self.holder, self.left_at = None, now
+        self._tell(is_there=False)
+
+    def _tell(self, *, is_there: bool) -> None:
+        """Tell the bridge that the session can be used, or that it cannot."""
+        if not self.identity.user:
+            return  # it never was
+        others = (one for one in self._server.sessions if one is not self and one.holder is not None)
+        has_others = any(self.identity.is_same(one.identity) for one in others)
+        self.services.view.on_connection(self.identity, is_there=is_there, has_others=has_others)
 
     # services
 
@@ -187,6 +204,7 @@ class Session(InternalSession):
         # asyncua closes it again when its connection ends, and would have the subscriptions deleted then.
         if self.state is SessionState.Closed:
             return
+        self._tell(is_there=False)
         self.publishing.close(loop_time())
         self.subscriptions.end(self, delete=delete_subs)
         await super().close_session(delete_subs=False)

@@ -36,14 +36,19 @@ from bridge.errors import Unavailable
 from bridge.image import DataType, Point, Quality
 from bridge.mirror import protocol, socket_endpoint
 from bridge.mirror.endpoint import prepare_folder
-from bridge.mirror.protocol import Changed, Counted, Delta, Malformed, Rejected, Snapshot
+from bridge.mirror.protocol import Changed, Connected, Counted, Delta, Malformed, Rejected, Snapshot
 from tests.support.zenoh_site import make_plant
 
 values = st.booleans() | st.integers(-(2**31), 2**32 - 1) | st.floats(allow_nan=False) | st.text(max_size=20)
 times = st.floats(0, 1e11)
 changes = st.builds(Changed, st.integers(0, 9), values, st.sampled_from(Quality), times, st.text(max_size=10))
 identities = st.builds(
-    Identity, st.sampled_from(Source), st.text(max_size=10), st.sampled_from(Role), st.text()
+    Identity,
+    st.sampled_from(Source),
+    st.text(max_size=10),
+    st.sampled_from(Role),
+    st.text(),
+    connection=st.text(max_size=10),
 )
 commands = st.one_of(
     st.builds(Write, st.dictionaries(st.text(max_size=10), values, max_size=4)),
@@ -65,6 +70,11 @@ def test_deltas_read_back(readings: list[Changed]) -> None:
     assert back == delta
     assert [type(changed.value) for changed in back.readings] == [type(c.value) for c in readings]
     assert all(isinstance(changed.quality, Quality) for changed in back.readings)
+
+
+@given(st.builds(Connected, identities, st.booleans(), st.booleans()))
+def test_who_comes_and_goes_reads_back(told: Connected) -> None:
+    assert protocol.decode(Connected, protocol.encode(told)) == told
 
 
 @given(requests, st.floats(0, 1e9))

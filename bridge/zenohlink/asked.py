@@ -33,6 +33,8 @@ class Asked:
     """The selector's part after the ``?``."""
     received_at: float
     """When zenoh handed it over, in monotonic seconds; it may have waited for the loop since."""
+    source: str
+    """Id of the client's zenoh session, where the client gives it; not proved."""
     _query: zenoh.Query
     _link: ZenohLink
     _lane: Lane

@@ -235,7 +235,8 @@ class ZenohLink:
                 parameters = str(query.parameters)
                 key, now = str(query.key_expr), time.monotonic()
                 lane = prompt if self._is_prompt(key) else other
-                asked = Asked(key, payload, attachment, parameters, now, query, self, lane)
+                source = _source(query.source_info)
+                asked = Asked(key, payload, attachment, parameters, now, source, query, self, lane)
                 if not self._inbox.take_in(partial(handler, asked), share(key, payload)):
                     # Not here: ending a query may wait for its client, and this thread reads for all others.
                     lane.do(lambda _: query.drop())
@@ -280,12 +281,12 @@ class ZenohLink:
 
         self.submit(declare)
 
-    def follow_endings(self, handler: Callable[[], None]) -> None:
-        """Call ``handler`` for each connection to a peer that has ended."""
+    def follow_endings(self, handler: Callable[[str], None]) -> None:
+        """Call ``handler`` with the id of each zenoh session to which the connection has ended."""
 
         def on_event(event: zenoh.TransportEvent) -> None:
             if event.kind == zenoh.SampleKind.DELETE:
-                self._inbox.take_in(handler)
+                self._inbox.take_in(partial(handler, str(event.transport.zid)))
 
         def declare(session: zenoh.Session) -> None:
             callback = zenoh.handlers.Callback(on_event, indirect=False)
@@ -335,9 +336,14 @@ def _to_answer(reply: zenoh.Reply) -> Answer:
 
 
 def _to_message(sample: zenoh.Sample) -> Message:
-    attachment = _to_bytes(sample.attachment)
+    attachment, source = _to_bytes(sample.attachment), _source(sample.source_info)
     payload, encoding = sample.payload.to_bytes(), str(sample.encoding)
-    return Message(str(sample.key_expr), payload, encoding, attachment, time.monotonic())
+    return Message(str(sample.key_expr), payload, encoding, attachment, time.monotonic(), source)
+
+
+def _source(info: zenoh.SourceInfo | None) -> str:
+    """Id of the session that says of itself that it has sent this; empty where none does."""
+    return "" if info is None else str(info.source_id.zid)
 
 
 def _to_bytes(data: zenoh.ZBytes | None) -> bytes | None:

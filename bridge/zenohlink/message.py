@@ -12,13 +12,14 @@ _SOURCE_PLACE: Final = re.compile(r"\s+at /\S+?\.rs:\d+\.?")
 @dataclass(frozen=True, slots=True)
 class Message:
     """A payload with its key, sent or received. ``encoding`` is zenoh's name for it; ``received_at`` is in
-    monotonic seconds."""
+    monotonic seconds; ``source`` is the id of the sender's zenoh session, where it gives it, not proved."""
 
     key: str
     payload: bytes
     encoding: str = ""
     attachment: bytes | None = None
     received_at: float = 0.0
+    source: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,12 +70,21 @@ class Peer:
         await self.do("get", key)
 
     async def command(
-        self, key: str, payload: object = None, controller: str | None = None, target: str | None = None
+        self,
+        key: str,
+        payload: object = None,
+        controller: str | None = None,
+        target: str | None = None,
+        session: str | None = None,
+        source: str | None = None,
     ) -> dict[str, Any]:
         """The answer to a command query, whether it is an error reply or not."""
         text = payload if isinstance(payload, str) or payload is None else json.dumps(payload)
-        attachment = json.dumps({"controller": controller}) if controller else None
-        said = await self.do("get", key, payload=text, attachment=attachment, target=target)
+        named = {"controller": controller, "session": session}
+        attachment = (
+            json.dumps({name: value for name, value in named.items() if value}) if controller else None
+        )
+        said = await self.do("get", key, payload=text, attachment=attachment, target=target, source=source)
         texts = said["errors"] + [value["payload"] for value in said["values"]]
         assert len(texts) == 1, said
         answer: dict[str, Any] = json.loads(texts[0])

@@ -81,6 +81,7 @@ class _Options(msgspec.Struct, forbid_unknown_fields=True):
 
 class _Controller(msgspec.Struct):
     controller: str = ANONYMOUS
+    session: str = ""
 
 
 _one_or_bare = msgspec.json.Decoder(_One | bool | int | float | str)
@@ -92,19 +93,29 @@ _Model = TypeVar("_Model")
 
 
 def identity_of(attachment: bytes | None) -> Identity:
-    """Who asks: ``{"controller": "<name>"}`` in the attachment. Raises BadCommand.
+    """Who asks: ``{"controller": "<name>", "session": "<name>"}`` in the attachment, each of which may be
+    missing. Raises BadCommand.
 
-    Nobody checks the name: this is for sites without users.
+    Nobody checks the controller's name: it is for sites without users.
     """
     if not attachment:
         return Identity(Source.ZENOH, ANONYMOUS)
     wanted = 'the attachment must be {"controller": "<name>"}'
     if len(attachment) > _LONGEST:
         raise BadCommand(MALFORMED, wanted)
-    name = _decoded(_controller, attachment, wanted).controller
-    if not NAME.fullmatch(name):
+    said = _decoded(_controller, attachment, wanted)
+    if not NAME.fullmatch(said.controller) or (said.session and not NAME.fullmatch(said.session)):
         raise BadCommand(MALFORMED, WANTED_NAME)
-    return Identity(Source.ZENOH, name)
+    connection = f"session {said.session}" if said.session else ""
+    return Identity(Source.ZENOH, said.controller, connection=connection)
+
+
+def session_of(attachment: bytes | None) -> str:
+    """Connection that the attachment names; empty where it names none, whatever else is in it."""
+    try:
+        return identity_of(attachment).connection
+    except BadCommand:
+        return ""
 
 
 class Commands:

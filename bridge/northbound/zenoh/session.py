@@ -29,8 +29,9 @@ from bridge.northbound.view import View
 from bridge.northbound.zenoh import keys
 from bridge.northbound.zenoh.access import access_control
 from bridge.northbound.zenoh.askers import Askers
-from bridge.northbound.zenoh.commands import MALFORMED, BadCommand, Commands, identity_of
+from bridge.northbound.zenoh.commands import MALFORMED, BadCommand, Commands, identity_of, session_of
 from bridge.northbound.zenoh.publication import Publication
+from bridge.northbound.zenoh.sessions import Sessions
 from bridge.northbound.zenoh.users import ANONYMOUS, Users, read_users
 from bridge.quietlog import about
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
@@ -58,6 +59,7 @@ class ZenohServer:
         self._link = self._new_link()
         self._pulse = Pulse(clock)
         self._askers = Askers()
+        self._sessions = Sessions()
         self._publication = self._new_publication()
         self._gets: dict[asyncio.Task[None], float] = {}
         """When each was begun, the oldest first."""
@@ -92,7 +94,7 @@ class ZenohServer:
             if self._settings.accept_put:
                 self._link.declare_subscriber(space.own_commands, self._on_put, share, from_others=True)
         self._link.declare_token(space.bridge_token)
-        self._link.follow_endings(lambda: self._view.count("zenoh_broken_connections"))
+        self._link.follow_endings(self._on_ending)
         self._view.on_event(self._on_event)
         self._publication.start()
 
@@ -132,6 +134,12 @@ class ZenohServer:
         payload = keys.event_json(event, self._view.epoch_ns(event.time))
         self._link.send(Message(self._keys.event_key(event), payload, keys.JSON))
 
+    def _on_ending(self, source: str) -> None:
+        """The connection to the zenoh session ``source`` has ended."""
+        self._view.count("zenoh_broken_connections")
+        for identity, has_others in self._sessions.ended(source):
+            self._view.on_connection(identity, is_there=False, has_others=has_others)
+
     def _on_strangers(self, places: list[str]) -> None:
         """Clients that stayed silent, or that zenoh does not let in."""
         self._view.count("zenoh_broken_connections", len(places))
@@ -146,7 +154,7 @@ class ZenohServer:
         owner, tail = ("", "") if is_pattern else self._users.owner(self._keys.tail(asked.key))
         if is_pattern and asked.payload is not None:
             bad = BadCommand(MALFORMED, "a command goes to one key, without wildcards")
-            self._note_refusal(owner, asked.key, asked.attachment, bad)
+            self._note_refusal(owner, asked.key, asked, bad)
             _refuse(asked, bad)
         elif asked.payload is not None or self._commands.is_method(tail):
             self._command(asked, owner, tail)
@@ -203,16 +211,16 @@ class ZenohServer:
                 asked.fail(payload, keys.JSON)
 
         try:
-            request = self._request(owner, tail, asked.payload or b"", asked.attachment)
+            request = self._request(owner, tail, asked.payload or b"", self._identity(owner, asked))
         except BadCommand as bad:
-            self._note_refusal(owner, tail, asked.attachment, bad)
+            self._note_refusal(owner, tail, asked, bad)
             _refuse(asked, bad)
             return
         self._submit(request, asked.received_at, reply)
 
-    def _request(self, owner: str, tail: str, payload: bytes, attachment: bytes | None) -> Request:
+    def _request(self, owner: str, tail: str, payload: bytes, identity: Identity) -> Request:
         """Raises ``BadCommand``. A stop is accepted from anybody."""
-        request = self._commands.request(tail, payload, self._identity(owner, attachment))
+        request = self._commands.request(tail, payload, identity)
         if self._users.are_proved and not owner and request.action not in STOP_ACTIONS:
             own = f"{self._keys.top}/@/controller/<user>/{tail}"
             raise BadCommand(Code.NOT_ALLOWED, f"nobody knows who asks by this key; use your own, {own}")
@@ -224,13 +232,15 @@ class ZenohServer:
         came_at = self._askers.arrival(request.identity.user, received_at, now, self._pulse.look)
         self._view.submit(replace(request, received_at=came_at), reply)
 
-    def _identity(self, owner: str, attachment: bytes | None) -> Identity:
+    def _identity(self, owner: str, sent: Asked | Message) -> Identity:
         """Raises ``BadCommand``."""
         if self._users.are_proved:
-            identity = Identity(Source.ZENOH, owner or ANONYMOUS)
+            who = owner or ANONYMOUS
+            identity = Identity(Source.ZENOH, who, connection=session_of(sent.attachment))
         else:
-            identity = identity_of(attachment)
-        return replace(identity, sets_parameters=self._settings.parameters == "write")
+            identity = identity_of(sent.attachment)
+        identity = replace(identity, sets_parameters=self._settings.parameters == "write")
+        return self._sessions.of(identity, sent.source)
 
     def _read_parameter(self, asked: Asked, owner: str, tail: str) -> None:
         """A get on the key of a parameter: read from the drive, or with ``?cached`` as last read."""
@@ -250,17 +260,17 @@ class ZenohServer:
             asked.finish()
 
         try:
-            identity = self._identity(owner, asked.attachment)
+            identity = self._identity(owner, asked)
             request = self._commands.reading(drive, name, identity, cached=cached)
         except BadCommand as bad:
             _refuse(asked, bad)
             return
         self._view.submit(request, reply)
 
-    def _note_refusal(self, owner: str, tail: str, attachment: bytes | None, bad: BadCommand) -> None:
+    def _note_refusal(self, owner: str, tail: str, sent: Asked | Message, bad: BadCommand) -> None:
         """A command that was refused before it became a request, for the audit log."""
         try:
-            identity = self._identity(owner, attachment)
+            identity = self._identity(owner, sent)
         except BadCommand:
             identity = identity_of(None)
         target, action = self._commands.meant(tail)
@@ -270,10 +280,10 @@ class ZenohServer:
         """A plain put on a command key, if the site allows them. It has no answer."""
         owner, tail = self._users.owner(self._keys.tail(message.key))
         try:
-            request = self._request(owner, tail, message.payload, message.attachment)
+            request = self._request(owner, tail, message.payload, self._identity(owner, message))
         except BadCommand as bad:
             _log.info("zenoh: a put on %s is no command: %s", message.key, bad.message, extra=about("puts"))
-            self._note_refusal(owner, tail, message.attachment, bad)
+            self._note_refusal(owner, tail, message, bad)
             return
         self._submit(request, message.received_at, lambda _: None)
 

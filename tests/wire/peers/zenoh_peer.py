@@ -41,6 +41,7 @@ def ask(session: zenoh.Session, order: dict[str, str]) -> None:
         attachment=order.get("attachment"),
         target=target,
         timeout=5.0,
+        source_info=zenoh.SourceInfo(session.id, 1) if order.get("source") else None,
     )
     values: list[dict[str, object]] = []
     errors: list[str] = []

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
+from bridge.command.life_sign import LEAF as LIFE_SIGN
 from bridge.command.request import (
     Action,
     Code,
@@ -188,7 +189,7 @@ class AuditTrail:
         top = f"{request.target}/command/"
         match request.command:
             case Write(values=values):
-                names = {leaf: f"{top}{leaf}" for leaf in values}
+                names = {leaf: f"{top}{leaf}" for leaf in values if leaf != LIFE_SIGN}
             case SetTimeout():
                 names = {"fieldbus_timeout_ms": f"{request.target}/supervision/fieldbus_timeout_ms"}
             case TakeControl() | Do(action=Action.RELEASE_CONTROL):
@@ -326,7 +327,8 @@ def _goes_on(before: _Telegrams, entry: AuditEntry) -> bool:
 def _asked(request: Request) -> Values:
     match request.command:
         case Write(values=values):
-            return dict(values)
+            # A token of the life sign changes each second, and orders nothing.
+            return {leaf: value for leaf, value in values.items() if leaf != LIFE_SIGN}
         case SetTimeout(timeout_ms=timeout_ms):
             return {"fieldbus_timeout_ms": timeout_ms}
         case TakeControl(ttl_ms=ttl_ms):

@@ -123,6 +123,13 @@ class Channel:
             identity = replace(identity, connection=owner.connection)
         return owners.refusal(self.leg_settings.control, self.leg.owner, identity, is_replaceable=False)
 
+    def life_sign(self, now: float) -> int:
+        """Newest token that the owner has brought back; 0 where none counts."""
+        life, until = self.leg_settings.life, self.leg.owner.alive_until
+        if life is None or until is None:
+            return 0
+        return life.token(round(until - self.timeout_ms / 1000, 3)) if now < until else 0
+
     # the node
 
     def on_node(self, state: NodeState, now: float) -> None:

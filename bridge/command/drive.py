@@ -13,6 +13,7 @@ from bridge.command.drive_channel import DriveChannel
 from bridge.command.event import Event
 from bridge.command.follow import Verdict
 from bridge.command.following import Following
+from bridge.command.life_sign import LEAF as LIFE_SIGN
 from bridge.command.link import FurtherTpdo
 from bridge.command.meaning_news import MeaningNews
 from bridge.command.request import Identity
@@ -132,6 +133,8 @@ class Drive(Commanded):
         self._value_indices = places("command", [codec.model.name for codec in self._commands])
         self._supervision = places("status", _FAULT) + places("supervision", _SUPERVISION)
         self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms", "telegrams"))
+        self._life = places("supervision", (LIFE_SIGN,)) if self.table.life_sign else []
+        self._brought = places("command", (LIFE_SIGN,)) if self.table.life_sign else []
         (self._abort_code,) = places("supervision", ("sdo_abort_code",))
         self._follows = places("supervision", ("follows", "last_stop"))
         self._stop_ms, self._bridge_ms = places("supervision", ("worst_case_stop_ms", "worst_case_bridge_ms"))
@@ -339,6 +342,8 @@ class Drive(Commanded):
             why = why or channel.meanings.doubt(codec.codec.model, in_set)
             quality, why = codec.lack or (Quality.STALE if why else Quality.GOOD, why)
             image.set(index, value, now, quality, why)
+        if self._brought:
+            image.set(self._brought[0], channel.life_sign(now), now)
 
     def _refresh_supervision(self, now: float) -> None:
         channel = self.channel
@@ -382,6 +387,9 @@ class Drive(Commanded):
         self._image.keep(left, channel.left_ms(now), now)
         self._image.keep(age, channel.link.age_ms(now), now)
         self._image.keep(telegrams, channel.telegrams, now)
+        life = channel.leg_settings.life
+        if life is not None:
+            self._image.keep(self._life[0], life.token(now), now)
 
     def _show(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:
         """Values that the bridge itself knows: their quality is always good."""

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from bridge.command import follow
 from bridge.command.leg.state import WATCHDOG_STATES
+from bridge.command.life_sign import LEAF as LIFE_SIGN
 from bridge.command.link import NodeState
 from bridge.command.parameter_points import parameter_points
 from bridge.condition.told import CONDITIONS
@@ -96,6 +97,7 @@ def _drive_points(name: str, family: Family, table: DriveTable) -> list[Point]:
         *(actual(word, _U16, as_sent) for word in actual_values[1:]),
         *(_value(name, value, scales) for value in values if value.group == "actual"),
         *_supervision_points(name, table.fieldbus_timeout_writable),
+        *(_life_points(name) if table.life_sign else ()),
         *_identity_points(name),
     ]
 
@@ -220,6 +222,15 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
         point("last_stop", _U8, "how the last stop ended", states=follow.LAST_STOPS),
         point("telegrams", _U16, "counts the owner's valid telegrams, modulo 65536"),
         point("sdo_abort_code", _U32, _ABORT_CODE),
+    ]
+
+
+def _life_points(name: str) -> list[Point]:
+    offered = "token that a telegram has to bring back, another one each second"
+    brought = "token that the owner has brought back last; 0: none that counts"
+    return [
+        _point(f"{name}/supervision", LIFE_SIGN, _U16, offered),
+        _point(f"{name}/command", LIFE_SIGN, _U16, brought, writable=True),
     ]
 
 

@@ -4,6 +4,7 @@ Reference for users: ``docs/reference/site-file.md``.
 """
 
 from bridge.config.fields import IGNORE_ALL_S as IGNORE_ALL_S
+from bridge.config.fields import LIFE_SIGN_MS as LIFE_SIGN_MS
 from bridge.config.fields import Reaction as Reaction
 from bridge.config.fields import WordOrder as WordOrder
 from bridge.config.load import load_site as load_site

@@ -9,6 +9,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Final, cast
 
+from bridge.config.fields import LIFE_SIGN_MS
 from bridge.config.model import BusTable
 from bridge.tomlfile import Key, RawTable, TomlFile
 
@@ -135,8 +136,28 @@ def _check_control(drive: RawTable, file: TomlFile) -> None:
             f"the drive is controlled by {control}, which this site does not serve",
             f"add a [{control}] table",
         )
+    if drive.content.get("life_sign") is True:
+        _check_life_sign(drive, file)
     if control in _WITHOUT_CONNECTIONS and drive.content.get("stop_by_anyone") is False:
         _check_dead_owner(drive, file)
+
+
+def _check_life_sign(drive: RawTable, file: TomlFile) -> None:
+    """A program that reads a token at the last moment brings back one that is ``LIFE_SIGN_MS`` old."""
+    if drive.text("control") not in (*_PROTOCOLS, "lease"):
+        file.fault((*drive.key, "life_sign"), "has no effect: nobody controls the drive", "leave it out")
+        return
+    why_long = f"with life_sign, what a living program brings back is up to {LIFE_SIGN_MS} ms old"
+    right = f"more than {LIFE_SIGN_MS} ms, by the time that a token needs to the program and back"
+    given = drive.whole("fieldbus_timeout_ms")
+    if given is not None and given <= LIFE_SIGN_MS:
+        why = "too short" if given else "no supervision"
+        file.fault((*drive.key, "fieldbus_timeout_ms"), f"{given} ms is {why}: {why_long}", right)
+    span = drive.content.get("fieldbus_timeout_range_ms")
+    low = next(iter(cast("list[object]", span)), None) if isinstance(span, list) else None
+    if isinstance(low, int) and low <= LIFE_SIGN_MS:
+        key = (*drive.key, "fieldbus_timeout_range_ms")
+        file.fault(key, f"{low} ms is too short: {why_long}", f"[lowest, highest], lowest {right}")
 
 
 def _check_dead_owner(drive: RawTable, file: TomlFile) -> None:

@@ -18,6 +18,9 @@ OnIntruder = Literal["stop_node", "stop_all", "report"]
 ParameterRights = Literal["write", "read"]
 WordOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
 
+LIFE_SIGN_MS: Final = 1000
+"""How long each token of a life sign is offered. A program that reads one at the last moment brings back one
+that is this old."""
 IGNORE_ALL_S: Final = -0.1
 """``telegram_downtime_s`` that reports communication errors and otherwise ignores them (P513 = -0.1)."""
 

@@ -20,6 +20,7 @@ from bridge.canopen.datatypes import TypeName, encode
 from bridge.canopen.pdo import MOST_BITS, PdoEntry
 from bridge.config.download import Download
 from bridge.config.fields import (
+    LIFE_SIGN_MS,
     LONGEST_TIMEOUT_MS,
     Control,
     ControllerName,
@@ -115,6 +116,7 @@ class DriveTable(Table):
     fieldbus_timeout_ms: int | None = Field(
         None, ge=0, le=LONGEST_TIMEOUT_MS, description="0 (off) or 1…32767 ms, like P151"
     )
+    life_sign: bool = False
     fieldbus_timeout_writable: bool = False
     fieldbus_timeout_range_ms: TimeoutRange | None = Field(
         None, description="[lowest, highest] that the owner may set, each 0…32767 ms"
@@ -154,7 +156,8 @@ class DriveTable(Table):
         if self.fieldbus_timeout_range_ms is not None:
             low, high = self.fieldbus_timeout_range_ms
             return low, high
-        return 1, min(10 * (self.fieldbus_timeout_ms or LONGEST_TIMEOUT_MS), LONGEST_TIMEOUT_MS)
+        low = LIFE_SIGN_MS + 1 if self.life_sign else 1
+        return low, min(10 * (self.fieldbus_timeout_ms or LONGEST_TIMEOUT_MS), LONGEST_TIMEOUT_MS)
 
 
 SafeValue = bool | int | float | Literal["hold"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.canopen.sync import LAST_SYNCHRONOUS, tpdo_deadline_s
-from bridge.config import IGNORE_ALL_S
+from bridge.config import IGNORE_ALL_S, LIFE_SIGN_MS
 from bridge.lint.bus import BusView, DriveView, NodeView
 from bridge.lint.report import LintReport
 from bridge.node.process.held import held_s, least_deadman_ms
@@ -14,6 +14,9 @@ _SLOW_ANSWER_MS: Final = 50
 """How long an SDO answer may take: 30 + 20 ms in an 8400 motec (EDS84DMOTCAN 3.0 §9), 50 ms and more behind
 NORD's system bus."""
 _SDO_LIVES: Final = 10
+_ROUND_TRIP_MS: Final = 500
+"""Of a life sign's token: some 200 ms until an OPC UA or zenoh client is told of it (at once where a Modbus
+client reads it), a program that reads and writes every 100 ms, and the network."""
 _LONGEST_DEADMAN_MS: Final = 10_000
 
 
@@ -25,6 +28,7 @@ def check_times(bus: BusView, report: LintReport) -> None:
         _check_sdo(node, report)
         for drive in node.drives:
             _check_controller(bus, drive, report)
+            _check_life_sign(drive, report)
             _check_range(drive, report)
             _check_held(bus, drive, report)
             _check_downtime(bus, node, drive, report)
@@ -95,6 +99,19 @@ def _check_controller(bus: BusView, drive: DriveView, report: LintReport) -> Non
             "longer after a hang of the bridge than after its controller fell silent",
             f"at least {bus.table.deadman_ms}, or a shorter deadman_ms",
         )
+
+
+def _check_life_sign(drive: DriveView, report: LintReport) -> None:
+    table = drive.table
+    left_ms = (table.fieldbus_timeout_ms or 0) - LIFE_SIGN_MS
+    if not table.life_sign or not 0 < left_ms < _ROUND_TRIP_MS:
+        return
+    report.warning(
+        (*drive.key, "fieldbus_timeout_ms"),
+        f"leaves {left_ms} ms for a token of the life sign: it may be {LIFE_SIGN_MS} ms old when it is read, "
+        f"and reading it, the program's cycle and writing it back take up to {_ROUND_TRIP_MS} ms",
+        f"at least {LIFE_SIGN_MS + _ROUND_TRIP_MS}",
+    )
 
 
 def _check_range(drive: DriveView, report: LintReport) -> None:

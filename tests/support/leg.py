@@ -11,6 +11,7 @@ from bridge.command.leg.outlook import next_deadline
 from bridge.command.leg.settings import LegSettings, leg_settings
 from bridge.command.leg.state import WANTS_STOP_WORD, Way
 from bridge.command.leg.step import initial, step
+from bridge.command.life_sign import LifeSign
 from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
 from bridge.drive import DriveState, Meanings
@@ -18,6 +19,7 @@ from bridge.image import Value
 from bridge.mapping import load_family
 
 PLC = Identity(Source.MODBUS, "192.168.1.10")
+TOKENS = LifeSign(start=4711, step=20_002)
 OPEN = Way(is_open=True, why="", is_heard=True)
 SHUT = Way(is_open=False, why="the drive's node is lost", is_heard=True)
 
@@ -30,7 +32,7 @@ def settings_of(mapping: str, **given: object) -> LegSettings:
     meanings = Meanings(family, family.slot[0], {})
     meanings.take_defaults()
     decode = TelegramDecoder("n/d", family, family.slot[0], meanings, {}).decode
-    return leg_settings(family, table, decode)
+    return leg_settings(family, table, decode, TOKENS)
 
 
 class Leg:

@@ -16,6 +16,7 @@ from bridge.config import DriveTable
 from bridge.drive import DriveState, Meanings
 from bridge.mapping import load_family
 from tests.support.leg_recorded import Cells
+from tests.support.leg_requests import AGES_S, LIFE
 from tests.support.leg_seen import Rules
 from tests.support.leg_space import Space
 from tests.support.leg_time import NOW
@@ -117,6 +118,25 @@ _TWINS: Final = {
     "everything is due",
 }
 """Two connections of one address."""
+_ALIVE: Final = {
+    "owner writes a stop, alive",
+    "owner enables, alive",
+    "owner acknowledges by an edge, alive",
+    "owner enables, with an older token",
+    "owner enables, with an expired token",
+    "owner brings back a token",
+    "owner writes a stop",
+    "owner enables",
+    "owner resets the fault",
+    "owner stops the drive",
+    "owner releases",
+    "rival writes a stop, alive",
+    "rival writes a stop",
+    "stranger stops the drive",
+    "drive follows",
+    "everything is due",
+}
+"""Of a drive that asks for a life sign."""
 _LEAN: Final = _BASE - {
     "owner acknowledges by an edge",
     "owner's stop comes late",
@@ -191,7 +211,7 @@ def space(
     meanings = Meanings(family, family.slot[0], {})
     meanings.take_defaults()
     decode = TelegramDecoder(f"n/{name}", family, family.slot[0], meanings, {}).decode
-    drive = leg_settings(family, table, decode)
+    drive = leg_settings(family, table, decode, LIFE)
     leg = initial(drive)
     for event in (NodeBack(), Way(True, "", "", True), Report(DriveState.READY, False, "")):
         leg, _ = step(drive, leg, event, NOW)
@@ -205,6 +225,7 @@ def space(
         control=table.control,
         stop_by_anyone=table.stop_by_anyone,
         is_writable=table.fieldbus_timeout_writable,
+        ages_s=AGES_S if table.life_sign else None,
     )
     return Space(drive, rules, leg, names, after_hang, ttl_ms)
 
@@ -338,6 +359,23 @@ _SETTINGS: Final[dict[str, Profile]] = {
         "fieldbus_timeout_writable": True,
         "fieldbus_timeout_range_ms": [0, 3000],
     },
+    "life sign": {"names": _ALIVE | {"owner's stop comes late"}, "life_sign": True},
+    "life sign, hold": {"names": _ALIVE, "life_sign": True, "on_expiry": "hold"},
+    "life sign, started": {
+        "names": _ALIVE - {"owner acknowledges by an edge, alive"} | {"owner starts the drive"},
+        "life_sign": True,
+    },
+    "life sign, lease": {
+        "names": _ALIVE | {"owner takes control", "owner keeps alive"},
+        "life_sign": True,
+        "control": "lease",
+    },
+    "life sign, time-out writable": {
+        "names": _ALIVE | {"owner sets a longer time-out"},
+        "life_sign": True,
+        "fieldbus_timeout_writable": True,
+    },
+    "life sign, errors ignored": {"names": _ALIVE, "life_sign": True, "telegram_downtime_s": -0.1},
     "time-out writable": {
         "names": _LEAN
         | {"owner sets a longer time-out", "owner switches the time-out off", "rival sets a longer time-out"},

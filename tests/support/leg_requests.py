@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from bridge.command import Action, Do, Identity, Request, SetTimeout, Start, TakeControl, Write
+from bridge.command.life_sign import LifeSign
 from bridge.image import Value
 from tests.support import rig
 from tests.support.leg_seen import Rules
@@ -38,6 +39,10 @@ PLC_ANYHOW: Final = _one(rig.PLC)
 OBSERVER, ENGINEER = _one(rig.OBSERVER), _one(rig.ENGINEER)
 
 
+LIFE: Final = LifeSign(start=4711, step=20_002)
+AGES_S: Final = {LIFE.token(NOW - age_s): age_s for age_s in (0.0, 1.0, 5.0)}
+"""Tokens that are offered now, that were and still count, and that do not any more."""
+_FRESH, _OLDER, _EXPIRED = AGES_S
 _Telegram = tuple[Identity, Mapping[str, Value]]
 
 
@@ -60,6 +65,16 @@ def _writes_of(words: LegWords) -> dict[str, _Telegram]:
         "twin writes a stop": (TWIN, stop),
         "twin enables": (TWIN, enable),
         "twin acknowledges by an edge": (TWIN, {"control_word": acknowledge}),
+        "owner writes a stop, alive": (PLC, {**stop, "life_sign": _FRESH}),
+        "owner enables, alive": (PLC, {**enable, "life_sign": _FRESH}),
+        "owner acknowledges by an edge, alive": (
+            PLC,
+            {"control_word": acknowledge, "life_sign": _FRESH},
+        ),
+        "owner enables, with an older token": (PLC, {**enable, "life_sign": _OLDER}),
+        "owner enables, with an expired token": (PLC, {**enable, "life_sign": _EXPIRED}),
+        "owner brings back a token": (PLC, {"life_sign": _FRESH}),
+        "rival writes a stop, alive": (OTHER_PLC, {**stop, "life_sign": _FRESH}),
         "rival writes a stop": (OTHER_PLC, stop),
         "rival enables": (OTHER_PLC, enable),
         "stranger enables": (OPERATOR, enable),

@@ -50,6 +50,19 @@ class Model(Memory):
         last = self.pressed_by
         return who is last or (self.is_pressed_cut and who.user == last.user)
 
+    def dies_at(self, who: Any, token: Any) -> float | None:
+        """When telegrams of ``who`` end to count, with this token or the one brought before; None for
+        never."""
+        ages_s = self.rules.ages_s
+        if ages_s is None:
+            return None
+        before = self.dead_at if self.owns(who) and self.dead_at is not None else self.now
+        return before if token is None else max(before, self.now + self.timeout_s - ages_s[token])
+
+    def lives(self, who: Any, token: Any = None) -> bool:
+        dies_at = self.dies_at(who, token)
+        return dies_at is None or self.now < dies_at
+
     def press(self, who: Any) -> None:
         self.pressed_by, self.is_pressed_cut = who, False
 
@@ -127,14 +140,14 @@ class Model(Memory):
         if not self.owns(who):
             if self.owner is not None and not self.timeout_s and self.gone_at is None:
                 self.gone_at = self.now + GONE_S
-        elif not is_late:
+        elif not is_late and self.lives(who):
             self.telegram(who)
         self.stop(kind)
 
     def leave(self) -> None:
         self.stop()
         self.owner = self.deadline = self.heard_at = self.lease_until = self.bit = None
-        self.absent_at = self.gone_at = self.quiet_at = None
+        self.absent_at = self.gone_at = self.quiet_at = self.dead_at = None
         self.is_silent = self.is_cut = False
         self.timeout_s = self.rules.timeout_s
 
@@ -167,17 +180,24 @@ class Model(Memory):
 
     def set_timeout(self, timeout_s: float) -> None:
         """Counted from the last telegram; a silence that has been found out stays one."""
+        if self.dead_at is not None:
+            self.dead_at += timeout_s - self.timeout_s
         self.timeout_s = timeout_s
         runs = timeout_s and self.heard_at is not None and not self.is_silent
         self.deadline = (self.heard_at or 0.0) + timeout_s if runs else None
+        if self.deadline and self.dead_at is not None:
+            self.deadline = min(self.deadline, self.dead_at)
         judges_by_itself = timeout_s or self.rules.control == "lease"
         self.quiet_at = None if judges_by_itself else (self.heard_at or self.now) + GONE_S
 
-    def telegram(self, who: Any) -> None:
+    def telegram(self, who: Any, token: Any = None) -> None:
+        dies_at = self.dies_at(who, token)
         self.own(who)
         self.is_silent = False
         self.heard_at = self.now
         self.deadline = self.now + self.timeout_s if self.timeout_s else None
+        if dies_at is not None and self.deadline is not None:
+            self.dead_at, self.deadline = dies_at, min(dies_at, self.deadline)
 
     def acknowledge(self, who: Any, *, is_reset: bool = False) -> None:
         """``is_reset``: the drive's own fault is reset, too."""
@@ -189,9 +209,9 @@ class Model(Memory):
             self.stop()
             self.missing = Missing.STOP_WORD
 
-    def word(self, who: Any, word: int) -> None:
+    def word(self, who: Any, word: int, token: Any = None) -> None:
         words = self.rules.words
-        self.telegram(who)
+        self.telegram(who, token)
         self._end_start()
         self.has_begun = False
         enables, acknowledges = words.enabling.fit(word), bool(word & words.acknowledge)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import IntEnum
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -30,6 +31,8 @@ class Rules(NamedTuple):
     control: str
     stop_by_anyone: bool
     is_writable: bool
+    ages_s: Mapping[int, float] | None = None
+    """Of the tokens of a drive that asks for a life sign."""
 
 
 class Times(NamedTuple):
@@ -48,6 +51,7 @@ class Times(NamedTuple):
     up_until: float | None = None
     down_until: float | None = None
     quiet_at: float | None = None
+    dead_at: float | None = None
 
 
 class Seen(NamedTuple):
@@ -133,6 +137,7 @@ class Memory:
             self.up_until,
             self.down_until,
             self.quiet_at,
+            self.dead_at,
         ) = seen.times
         (
             _,

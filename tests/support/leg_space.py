@@ -13,6 +13,7 @@ from unittest.mock import patch
 from bridge.command import (
     Action,
     Code,
+    Do,
     Identity,
     Request,
     SetTimeout,
@@ -181,12 +182,16 @@ class Space:
                 word = values.get("control_word", words.valid)
                 assert isinstance(word, int)
                 is_stop = "control_word" in values and not words.enabling.fit(word)
+                is_late = is_late or not oracle.lives(who, values.get("life_sign"))
                 is_valid = word & words.valid == words.valid and values is not words.too_large
                 return is_valid and (not is_late or (is_stop and oracle.owns(who)))
             case Start():
+                is_late = is_late or not oracle.lives(who)
                 return not (is_late or oracle.is_tripped or oracle.says in FAULTED) and oracle.is_open
             case SetTimeout():
                 return self.rules.is_writable and oracle.owns(who)
+            case Do(action=Action.KEEP_ALIVE | Action.RESET_FAULT):
+                return not is_late and oracle.lives(who)
             case _:
                 return not is_late
 
@@ -196,14 +201,14 @@ class Space:
         if request.pressed is False and oracle.pressed(who):
             oracle.press(None)
         match command:
-            case Write() if is_late:
+            case Write(values=values) if is_late or not oracle.lives(who, values.get("life_sign")):
                 oracle.late_stop()
             case Write(values=values):
                 word = values.get("control_word")
                 if isinstance(word, int):
-                    oracle.word(who, word)
+                    oracle.word(who, word, values.get("life_sign"))
                 else:
-                    oracle.telegram(who)
+                    oracle.telegram(who, values.get("life_sign"))
                 if "position" in values:
                     oracle.order(values["position"])
             case Start():

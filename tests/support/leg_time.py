@@ -23,7 +23,7 @@ _ORACLES: Final = len(Times._fields)
 
 
 def _instants(leg: LegState, seen: Seen) -> Instants:
-    _, _, lease_until, absent_until, stopped_until, quiet_until = leg.owner
+    _, _, lease_until, absent_until, stopped_until, quiet_until, alive_until = leg.owner
     _, heard_at, deadline, _ = leg.timer
     start = leg.start
     started = _NEVER if start is None else (start.until, start.settles_at, start.believed_at, start.leaves_at)
@@ -40,6 +40,7 @@ def _instants(leg: LegState, seen: Seen) -> Instants:
         leg.pulse_until,
         *started,
         quiet_until,
+        alive_until,
         *seen.times,
     )
 
@@ -56,7 +57,7 @@ def _with(leg: LegState, seen: Seen, instants: Instants) -> State:
         )
     leg = leg._replace(
         owner=type(owner)(
-            owner.identity, owner.lease_s, lease_until, absent_until, stopped_until, instants[14]
+            owner.identity, owner.lease_s, lease_until, absent_until, stopped_until, *instants[14:16]
         ),
         timer=type(timer)(timer.timeout_ms, heard_at, deadline, timer.is_overdue),
         trip=type(leg.trip)(*trip),
@@ -64,7 +65,7 @@ def _with(leg: LegState, seen: Seen, instants: Instants) -> State:
         pulse_until=instants[9],
         start=start,
     )
-    return leg, seen._replace(times=Times(*instants[15:]))
+    return leg, seen._replace(times=Times(*instants[16:]))
 
 
 _timeless: dict[Instants, Instants] = {}
@@ -90,6 +91,9 @@ def ahead(state: State) -> list[float]:
 
 
 def come(state: State, due: list[float]) -> State:
-    """These are now."""
+    """These are now. The one order that would not only be odd but impossible is left out: with its life sign
+    an owner's time is up at the latest."""
     instants = _instants(*state)
+    if state[0].owner.alive_until in due:
+        due = [*due, *(it for it in (state[0].timer.deadline, state[1].times.deadline) if it is not None)]
     return _with(*state, tuple(NOW if instant in due else instant for instant in instants))

@@ -82,7 +82,10 @@ def test_the_reactions_are_explained() -> None:
 
 @pytest.fixture(scope="module")
 def plant() -> Plant:
+    """The demo, with all that fu1 can have."""
     project = load_project(DEMO_SITE)
+    drives = project.site.bus[0].node[0].drive
+    drives[0] = drives[0].model_copy(update={"life_sign": True})
     return Plant(project.site, project.families, __version__)
 
 

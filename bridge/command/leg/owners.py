@@ -120,7 +120,7 @@ def hear(turn: Turn, request: Request) -> None:
 
 def _renew(turn: Turn, at: float) -> None:
     """The owner has shown that it is there: its lease runs anew."""
-    identity, lease_s, lease_until, *times = turn.owner
+    identity, lease_s, lease_until, *times, alive_until = turn.owner
     quiet_until = None
     if turn.settings.control == "lease":
         lease_until = at + lease_s
@@ -128,7 +128,7 @@ def _renew(turn: Turn, at: float) -> None:
         quiet_until = at + GONE_S
     elif times == _NO_TIMES:
         return
-    turn.owner = Owner(identity, lease_s, lease_until, quiet_until=quiet_until)
+    turn.owner = Owner(identity, lease_s, lease_until, quiet_until=quiet_until, alive_until=alive_until)
 
 
 def _hand_over(turn: Turn, identity: Identity, lease_s: float | None = None) -> None:
@@ -139,12 +139,10 @@ def _hand_over(turn: Turn, identity: Identity, lease_s: float | None = None) -> 
         turn.leave()
     if lease_s is None or turn.settings.control != "lease":
         lease_s = turn.owner.lease_s
-    turn.owner = Owner(identity, lease_s)
+    turn.owner = Owner(identity, lease_s, alive_until=None if changes else turn.owner.alive_until)
     _renew(turn, turn.now)
-    if changes and identity.is_same(before):
-        turn.tell(Kind.OWNER, 300, f"controlled by {identity.named_beside(before)}")
-    elif changes:
-        turn.tell(Kind.OWNER, 200, f"controlled by {identity}")
+    if changes:
+        turn.tell(Kind.OWNER, 200, f"controlled by {identity.named_beside(before)}")
 
 
 def take_control(turn: Turn, identity: Identity, ttl_ms: int) -> None:
@@ -179,10 +177,14 @@ def set_timeout(turn: Turn, identity: Identity, timeout_ms: int) -> None:
         raise Refusal(Code.OUT_OF_RANGE, f"fieldbus_timeout_ms takes {low}…{high} here")
     runs = timeout_ms and timer.heard_at is not None and not timer.is_overdue
     deadline = (timer.heard_at or 0.0) + timeout_ms / 1000 if runs else None
+    alive_until = turn.owner.alive_until
+    if alive_until is not None:
+        alive_until += (timeout_ms - timer.timeout_ms) / 1000
+        deadline = deadline and min(deadline, alive_until)
     turn.timer = Timer(timeout_ms, timer.heard_at, deadline, timer.is_overdue)
     judges_by_itself = timeout_ms > 0 or settings.control == "lease"
     quiet_until = None if judges_by_itself else (timer.heard_at or turn.now) + GONE_S
-    turn.owner = turn.owner._replace(quiet_until=quiet_until)
+    turn.owner = turn.owner._replace(quiet_until=quiet_until, alive_until=alive_until)
     turn.tell(Kind.CONFIGURATION, 400, f"fieldbus_timeout_ms = {timeout_ms}, by {identity}")
 
 

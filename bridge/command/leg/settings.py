@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from bridge.command.life_sign import LifeSign
 from bridge.command.telegram import Telegram
 from bridge.config import IGNORE_ALL_S, DriveTable, Reaction
 from bridge.drive import ControlWords, ValueCodec
@@ -47,10 +48,15 @@ class LegSettings:
     handshake: HandshakeSettings | None
     resting: tuple[int, ...] = ()
     """The setpoints while nobody commands them; left out: all 0."""
+    life: LifeSign | None = None
+    """What the owner's program has to bring back."""
 
 
-def leg_settings(family: Family, table: DriveTable, decode: Decode) -> LegSettings:
-    """Those of a drive of this family, as the site file has it."""
+def leg_settings(
+    family: Family, table: DriveTable, decode: Decode, life: LifeSign | None = None
+) -> LegSettings:
+    """Those of a drive of this family, as the site file has it. ``life``: its tokens where it asks for a life
+    sign, random ones by default."""
     slot = family.slot_named(table.slot)
     low_ms, high_ms = table.timeout_range_ms
     return LegSettings(
@@ -68,6 +74,7 @@ def leg_settings(family: Family, table: DriveTable, decode: Decode) -> LegSettin
         follows=_followers(family, slot),
         handshake=_handshake(family, slot),
         resting=family.process.resting,
+        life=(life or LifeSign.at_random()) if table.life_sign else None,
     )
 
 

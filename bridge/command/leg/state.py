@@ -141,6 +141,8 @@ class Owner(NamedTuple):
     absent_until: float | None = None
     stopped_until: float | None = None
     quiet_until: float | None = None
+    alive_until: float | None = None
+    """Until then its telegrams count, where the drive asks for a life sign."""
 
 
 class Edges(NamedTuple):

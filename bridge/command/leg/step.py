@@ -10,7 +10,7 @@ from typing import Final
 
 from bridge.command.event import Kind
 from bridge.command.freshness import TAKEN_LATE, arrival_of, is_stale, limit_ms_of
-from bridge.command.leg import order, owners, start
+from bridge.command.leg import alive, order, owners, start
 from bridge.command.leg.effect import Answer, Effect
 from bridge.command.leg.event import (
     ActualWords,
@@ -50,6 +50,9 @@ from bridge.drive import FAULTED
 from bridge.image import Value
 
 _OVERWRITTEN: Final = Outcome(Code.CANCELLED, "a control word was written meanwhile")
+
+_CAME_LATE: Final = "came late, and counts as a stop only"
+_IS_LIFELESS: Final = "came without a life sign, and counts as a stop only"
 
 
 def initial(settings: LegSettings) -> LegState:
@@ -143,6 +146,7 @@ def _handle(turn: Turn, request: Request) -> None:
         owners.check_authority(turn, request)
         if request.action not in TAKEN_LATE and _is_stale(turn, request):
             raise _stale(turn, request)
+        alive.check(turn, request)
         if isinstance(request.command, Start):
             _start(turn, request, request.command.direction)
         else:
@@ -195,16 +199,19 @@ def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome
     is_owner = request.identity.goes_on_as(turn.owner.identity)
     # A new owner inherits no setpoints.
     kept = turn.setpoints if is_owner else turn.rest
+    values, alive_until = alive.read(turn, request.identity, values)
     telegram = turn.settings.decode(values, kept, control_word(words, turn))
     word = telegram.control_word
     if word is not None and not words.is_valid(word):
         turn.happens(Stimulus.INVALID)
         raise Refusal(Code.NOT_VALID, f"control word {word:04X}h: the bit 'control data valid' is 0")
-    if _is_stale(turn, request):
+    is_late = _is_stale(turn, request)
+    if is_late or alive.is_missing(turn, alive_until):
         if word is None or not is_owner or words.enables(word):
-            raise _stale(turn, request)
-        return _take_stale_stop(turn, word)
+            raise _stale(turn, request) if is_late else alive.refusal()
+        return _take_stale_stop(turn, word, _CAME_LATE if is_late else _IS_LIFELESS)
     owners.own(turn, request)
+    alive.note(turn, alive_until)
     if word is not None:
         mask = words.acknowledge_mask
         is_set, was_set = bool(word & mask), turn.edges.bit
@@ -245,14 +252,14 @@ def _take(turn: Turn, word: int | None, setpoints: tuple[int, ...], values: Mapp
     return turn.happens(Stimulus.STOP_WORD if is_stop else Stimulus.ENABLING_WORD, _OVERWRITTEN)
 
 
-def _take_stale_stop(turn: Turn, word: int) -> Outcome:
-    """The owner's stop, however long it has waited. It is no sign of life, acknowledges nothing and brings no
-    setpoints."""
+def _take_stale_stop(turn: Turn, word: int, why: str) -> Outcome:
+    """The owner's stop, however long it has waited, or by a program that may be dead; ``why``. It is no sign
+    of life, acknowledges nothing and brings no setpoints."""
     acknowledge = turn.settings.words.acknowledge_mask
     turn.stop(word & ~acknowledge | turn.word & acknowledge, is_asked=True)
     if turn.happens(Stimulus.LATE_STOP, _OVERWRITTEN) is Deed.TAKE:
         return Outcome(Code.OK, turn.why_blocked, forwarded=False)
-    return Outcome(Code.OK, "came late, and counts as a stop only")
+    return Outcome(Code.OK, why)
 
 
 # acknowledge, stop, start
@@ -285,7 +292,7 @@ def _stop(turn: Turn, request: Request) -> None:
     who, action, words = request.identity, request.action, turn.settings.words
     owner = turn.owner
     if who.goes_on_as(owner.identity):
-        if not _is_stale(turn, request):
+        if not _is_stale(turn, request) and alive.is_there(turn, who):
             owners.hear(turn, request)
     else:
         turn.tell(Kind.OWNER, 400, f"{action} by {who.named_beside(owner.identity)}")

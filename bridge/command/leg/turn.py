@@ -177,6 +177,9 @@ class Turn:
         timeout_ms, heard_at, _, _ = self.timer
         heard_at = at if heard_at is None else max(at, heard_at)
         deadline = heard_at + timeout_ms / 1000 if timeout_ms else None
+        alive_until = self.owner.alive_until
+        if deadline is not None and alive_until is not None:
+            deadline = min(deadline, alive_until)
         self.timer = Timer(timeout_ms, heard_at, deadline)
         self.effects.append(Heard())
 

@@ -31,11 +31,13 @@ from bridge.northbound.modbus.registers import (
     ACKNOWLEDGE,
     DIAGNOSTICS,
     KEEP_ALIVE,
+    LIFE_SIGN,
     PARAMETERS,
     PROCESS_WORDS,
     QUALITY_BITS,
     STOP,
     TIMEOUT,
+    TOKEN,
     VALUES,
     WORDS_NOT_GOOD,
     DriveMap,
@@ -93,6 +95,9 @@ class DriveUnit(Unit):
         }
         self._diagnostics: Final = [place(leaf) for leaf in _DIAGNOSTICS]
         self._commands: Final = {0: place("command/control_word"), **self._words[Table.HOLDING_REGISTER]}
+        self._token = place("supervision/life_sign") if drive_map.has_life_sign else None
+        self._brought = place("command/life_sign") if drive_map.has_life_sign else None
+        self._last_command: Final = LIFE_SIGN if drive_map.has_life_sign else STOP
         self._owner, self._timeout = place("supervision/owner"), place("supervision/fieldbus_timeout_ms")
         self._identity: Final = [place(f"identity/{leaf}") for leaf in _IDENTITY]
         self._inputs: Final = values(drive_map.inputs)
@@ -199,6 +204,8 @@ class DriveUnit(Unit):
             words.append(self._not_good((place - 1 for place in places), places.values()))
             words += from_int(self._not_good(range(_FLAGS), self._flagged))
             words.append(int(telegrams))
+        if end > TOKEN and self._token is not None:
+            words += 0, int(self._image[self._token].value)
         return words + [0] * (VALUES - DIAGNOSTICS - len(words))
 
     def _not_good(self, bits: Iterable[int], indices: Iterable[int]) -> int:
@@ -218,6 +225,8 @@ class DriveUnit(Unit):
         owner, timeout_ms = self._image.values((self._owner, self._timeout))
         words[KEEP_ALIVE] = int(owner == str(caller))
         words[TIMEOUT] = int(timeout_ms)
+        if self._brought is not None:
+            words[LIFE_SIGN] = int(self._image[self._brought].value)
         return words
 
     # writing
@@ -258,6 +267,8 @@ class DriveUnit(Unit):
         if block.get(_RESERVED) or block.get(ACKNOWLEDGE, 0) > 1:
             raise Refused(ExceptionCode.ILLEGAL_VALUE)
         values = self._values_of(start, words, block)
+        if LIFE_SIGN in block:
+            values = {**(values or {}), "life_sign": block[LIFE_SIGN]}
         requests = [] if values is None else [self._write(values, caller)]
         return self._with_commands(requests, block, caller)
 
@@ -298,7 +309,7 @@ class DriveUnit(Unit):
 
     def _check_writable(self, start: int, end: int) -> None:
         only_reserved = start == _RESERVED and end == KEEP_ALIVE
-        if only_reserved or (start < VALUES and end > STOP + 1):
+        if only_reserved or (start < VALUES and end > self._last_command + 1):
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
 
     def _process_values(self, block: dict[int, int]) -> dict[str, Value]:

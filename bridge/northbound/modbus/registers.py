@@ -29,11 +29,13 @@ KEEP_ALIVE: Final = 10
 ACKNOWLEDGE: Final = 11
 TIMEOUT: Final = 12
 STOP: Final = 13
+LIFE_SIGN: Final = 14
 # Input registers of a drive: 0 … 9 are the drive's data, 10 … 31 the bridge's own knowledge.
 DIAGNOSTICS: Final = 10
 WORDS_NOT_GOOD: Final = 21
 VALUES_NOT_GOOD: Final = 22
 TELEGRAMS: Final = 24
+TOKEN: Final = 26
 VALUES: Final = 32
 """First register of the 32-bit values, input and holding alike."""
 PARAMETERS: Final = 1000
@@ -117,6 +119,7 @@ class DriveMap:
         self.unit_id = drive.unit_id
         family, slot = drive.family, drive.slot
         self.texts = {0: family.family.vendor, 1: family.family.name, 5: slot.name, 6: drive.name}
+        self.has_life_sign = drive.table.life_sign
         is_writable = drive.table.fieldbus_timeout_writable
         self.timeout_range_ms = drive.table.timeout_range_ms if is_writable else None
         self.words: dict[Table, dict[int, str]] = {
@@ -127,6 +130,7 @@ class DriveMap:
         fixed = (
             *_input_rows(self.words[Table.INPUT_REGISTER]),
             *_holding_rows(self.words[Table.HOLDING_REGISTER], allows, may_set=is_writable),
+            *(_life_rows(allows) if self.has_life_sign else ()),
         )
         # What has to be set in the drive first goes behind all others, whose addresses do not depend on it.
         values = sorted(family.values_of(slot), key=lambda value: not family.is_usual(slot, value))
@@ -230,6 +234,16 @@ def _holding_rows(setpoints: Mapping[int, str], allows: Allows, *, may_set: bool
         row(ACKNOWLEDGE, "acknowledge", "uint16", "", "write 1 to acknowledge a fault; reads 0"),
         timeout(TIMEOUT, name, "uint16", "ms", text),
         stop(STOP, "stop", "uint16", "", "1 stop, 2 quick stop, 3 disable voltage; reads 0"),
+    ]
+
+
+def _life_rows(allows: Allows) -> list[Row]:
+    offered = "token to be brought back, another one each second"
+    brought = f"what input register {TOKEN} had, not longer ago than register {TIMEOUT}"
+    access = _access(allows.may_command)
+    return [
+        Row(Table.INPUT_REGISTER, TOKEN, "supervision/life_sign", "uint16", "r", "", offered),
+        Row(Table.HOLDING_REGISTER, LIFE_SIGN, "command/life_sign", "uint16", access, "", brought),
     ]
 
 

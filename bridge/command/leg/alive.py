@@ -1,0 +1,66 @@
+"""Telegrams of a drive with ``life_sign = true`` count for as long as the newest token that its owner has
+brought back: from when that was offered first, for the time-out (``bridge.command.life_sign``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from bridge.command.leg.turn import Turn
+from bridge.command.life_sign import LEAF
+from bridge.command.request import Action, Code, Identity, Request
+from bridge.command.telegram import Refusal
+from bridge.image import Value
+
+_MISSING: Final = "the life sign is missing or too old: write supervision/life_sign to command/life_sign"
+_PROVES: Final = frozenset((Action.KEEP_ALIVE, Action.RESET_FAULT, Action.START))
+"""Commands that have no place for a token, and count as telegrams."""
+
+
+def read(turn: Turn, who: Identity, values: Mapping[str, Value]) -> tuple[Mapping[str, Value], float | None]:
+    """Values of a telegram without its token; and until when telegrams count with it, or with the one that
+    ``who`` has brought back before. Raises ``Refusal``."""
+    life = turn.settings.life
+    if life is None:
+        if LEAF in values:
+            raise Refusal(Code.UNKNOWN_POINT, "this drive asks for no life sign")
+        return values, None
+    until = turn.owner.alive_until if who.goes_on_as(turn.owner.identity) else None
+    if LEAF not in values:
+        return values, until
+    token = values[LEAF]
+    if isinstance(token, bool) or not isinstance(token, int | float) or token not in range(0x1_0000):
+        raise Refusal(Code.OUT_OF_RANGE, "life_sign takes 0…65535")
+    rest = {leaf: value for leaf, value in values.items() if leaf != LEAF}
+    issued_at = life.issued_at(int(token), turn.now)
+    if issued_at is None:
+        return rest, until
+    ends_at = issued_at + turn.timer.timeout_ms / 1000
+    return rest, ends_at if until is None else max(until, ends_at)
+
+
+def is_missing(turn: Turn, until: float | None) -> bool:
+    """Whether a telegram that counts until then, as ``read`` says, does not count at all."""
+    return turn.settings.life is not None and (until is None or turn.now >= until)
+
+
+def refusal() -> Refusal:
+    return Refusal(Code.NOT_VALID, _MISSING)
+
+
+def is_there(turn: Turn, who: Identity) -> bool:
+    """Whether what ``who`` does without a token proves that its program lives."""
+    until = turn.owner.alive_until if who.goes_on_as(turn.owner.identity) else None
+    return not is_missing(turn, until)
+
+
+def check(turn: Turn, request: Request) -> None:
+    """Raises ``Refusal`` for a command that would be a telegram of a program that may be dead."""
+    if request.action in _PROVES and not is_there(turn, request.identity):
+        raise refusal()
+
+
+def note(turn: Turn, until: float | None) -> None:
+    """The owner's telegrams count until then."""
+    if until is not None and until != turn.owner.alive_until:
+        turn.owner = turn.owner._replace(alive_until=until)

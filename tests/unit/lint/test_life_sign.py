@@ -35,7 +35,7 @@ def test_a_time_out_that_leaves_little_for_the_way_of_a_token_is_a_warning(
 def test_one_within_which_a_living_program_may_have_read_nothing_newer_is_refused(
     tmp_path: Path, timeout_ms: int
 ) -> None:
-    with pytest.raises(FileFaults, match="fieldbus_timeout_ms.*more than 1000 ms"):
+    with pytest.raises(FileFaults, match=r"fieldbus_timeout_ms.*more than 1000 ms"):
         warnings(tmp_path, timeout_ms)
 
 

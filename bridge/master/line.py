@@ -42,7 +42,7 @@ class Repeated:
         self._repetitions: Repetitions = {}
         self._of_nodes: dict[str, list[tuple[Repetition, bool]]] = {}
         """By the node's name, in order; and whether each needs SYNC."""
-        self._made_for: tuple[int, NmtState, bool] | None = None
+        self._made_for: tuple[int, NmtState, bool, tuple[NodeCore, ...]] | None = None
 
     def repetitions(self, *, anew: bool = False) -> Repetitions:
         """The frames to be repeated: the same object while they are the same.
@@ -52,11 +52,12 @@ class Repeated:
         """
         network = self._network
         changed = self._plant.take_changed(network.bus.name)
-        made_for = network.routings, network.nmt_state, network.charge.acts()
+        made_for = network.routings, network.nmt_state, network.charge.acts(), network.farewell.awaiting
         anew = anew or made_for != self._made_for
         if anew or changed:
             self._made_for = made_for
-            self._repetitions = self._make(None if anew else changed) if network.charge.acts() else {}
+            acts = network.charge.acts()
+            self._repetitions = self._make(None if anew else changed) if acts else self._make_last()
         return self._repetitions
 
     def _make(self, changed: set[str] | None) -> Repetitions:
@@ -83,8 +84,17 @@ class Repeated:
             )
         return repetitions
 
+    def _make_last(self) -> Repetitions:
+        """The stopped words that nodes have still to take over, though the bus is left to another bridge."""
+        wanted = [one for node in self._network.farewell.awaiting for one in self._of_node(node)]
+        repetitions = {one.frames[0].can_id: one for one, _ in wanted}
+        if self._network.farewell.awaiting and self._network.bus.sync_period_ms:
+            repetitions[cobid.SYNC] = Repetition(self._sync, self._network.bus.sync_period_ms / 1000)
+        return repetitions
+
     def _of_node(self, node: NodeCore) -> Iterator[tuple[Repetition, bool]]:
         if node.sends_process_data:
+            node.leaving.owed.note()
             for pdos in node.wire.pdos:
                 if not pdos.is_silent:
                     for wanted in pdos.repetitions(self._network.bus.rpdo_period_s):

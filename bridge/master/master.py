@@ -107,7 +107,9 @@ class Master:
         if self._running:
             await asyncio.sleep(_STOP_DRIVES_S)
         for _ in range(round(_DRIVES_FOLLOW_S / _LOOK_S)):
-            if not self._running or not waits_for(self._plant) or self._clock() > now + _DRIVES_FOLLOW_S:
+            is_left = not any(line.network.farewell.is_on for line in self._lines)
+            has_stopped = is_left and not waits_for(self._plant)
+            if not self._running or has_stopped or self._clock() > now + _DRIVES_FOLLOW_S:
                 break
             await asyncio.sleep(_LOOK_S)
         ending = end(self._plant, self._clock(), self._enforce, can_send=self._running)
@@ -167,6 +169,7 @@ class Master:
             _log.exception("not every drive could be stopped")
         for line in self._lines:
             try:
+                line.network.say_farewell(now)
                 line.flush(now)
             except Exception:  # noqa: BLE001 - nor may it keep the next bus from it
                 _log.exception("bus %s: no stopped words could be sent", line.bus.name)

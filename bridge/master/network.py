@@ -21,6 +21,7 @@ from bridge.config import BusTable
 from bridge.config.download import Download
 from bridge.master.bus_points import BusPoints
 from bridge.master.charge import Charge
+from bridge.master.farewell import Farewell
 from bridge.master.intruders import Intruders
 from bridge.master.listening import Listening
 from bridge.master.schedule import Schedule
@@ -61,7 +62,8 @@ class Network:
         self._schedule = Schedule(self.nodes)
         own_id = bus.master_node_id if bus.heartbeat_ms else None
         known = {node.table.id: node.node.name for node in self.nodes}
-        self.charge = Charge(bus, self.nodes, plant, self._forget_bus, listening)
+        self.charge = Charge(bus, self.nodes, plant, self._give_way, listening)
+        self.farewell = Farewell(self.nodes)
         self._watch = BusWatch(bus.name, own_id, self.charge.acts, known, plant)
         self._intruders = Intruders(bus, self.nodes, plant, self.charge.acts, self._stop_nodes)
         self.ours: frozenset[int] = frozenset()
@@ -110,14 +112,21 @@ class Network:
                     node.booting.pump(now)
                     self._schedule.touch(node)
             for node in touched:
-                self._frames += node.wire.take_frames()
+                self._frames += node.wire.take_frames(only_commands=not self.charge.acts())
                 self._routes_changed |= node.wire.routes_changed
                 self._schedule.plan(node)
 
     def on_time(self, now: float) -> None:
+        was_left = self.charge.is_left
         self.charge.on_time(now)
         if not self.charge.acts():
+            self.farewell.on_time(now)
+            self._touch_all(self.farewell.told)
+            self._pump(now)
             return
+        if was_left:
+            # The other bridge may have started a node that was to stay stopped.
+            self._return(now)
         if not self._has_booted:
             self._boot_up(now)
         if self._time:
@@ -130,7 +139,8 @@ class Network:
 
     def next_deadline(self) -> float | None:
         if not self.charge.acts():
-            return self.charge.next_deadline()
+            times = (self.charge.next_deadline(), self.farewell.next_deadline())
+            return min((time for time in times if time is not None), default=None)
         times = (self._schedule.next_deadline(), self._time.next_deadline() if self._time else None)
         return min((time for time in times if time is not None), default=None)
 
@@ -163,8 +173,10 @@ class Network:
         action = Action.RESET if whole else Action.RESET_COMMUNICATION
         for node in sorted(self.nodes, key=lambda node: node.table.start_order):
             if node.table.enabled:
-                node.carry_out_command(action, "the bridge at its start", now, send=False)
-                self._frames.append(nmt.command(node_commands.NMT[action], node.table.id))
+                # A reset of the communication waits until the stopped words have been taken over.
+                node.carry_out_command(action, "the bridge at its start", now, send=not whole)
+                if whole:
+                    self._frames.append(nmt.command(node_commands.NMT[action], node.table.id))
 
     @property
     def nmt_state(self) -> NmtState:
@@ -266,7 +278,9 @@ class Network:
         frames, self._frames = self._frames, []
         if not self.charge.acts():
             self._nmt_for_all = None
-            return []
+            frames = frames if self.farewell.is_on else []
+            self.farewell.on_sending(has_frames=bool(frames))
+            return frames
         if self._nmt_for_all:
             # Last: the stopped words of the drives go before it.
             frames.append(self._nmt_for_all)
@@ -313,8 +327,25 @@ class Network:
                 if drive in unsent and (is_sent or not drive.following.awaits_sending):
                     self._plant.on_handed_over(drive, now)
 
+    def _give_way(self, now: float, why: str) -> None:
+        """Another bridge is in charge: nothing more is sent than what is owed."""
+        self._forget_bus(now, why)
+        self.say_farewell(now)
+
+    def say_farewell(self, now: float) -> None:
+        """Send what is owed, where this bridge acts no more."""
+        if not self.charge.acts():
+            self.farewell.begin(now)
+            self._touch_all(self.nodes)
+            self._pump(now)
+
+    def _touch_all(self, nodes: Sequence[NodeCore]) -> None:
+        for node in nodes:
+            self._schedule.touch(node)
+
     def bus_is_gone(self, now: float) -> None:
         self.charge.bus_is_gone()
+        self.farewell.bus_is_gone()
         self._forget_bus(now)
 
     def _forget_bus(self, now: float, why: str = "the bus is down") -> None:
@@ -325,14 +356,19 @@ class Network:
         self._nmt_for_all = None
         for node in self.nodes:
             node.bus_is_gone(now, why)
-            self._schedule.touch(node)
+        self._touch_all(self.nodes)
 
     def bus_is_back(self, now: float) -> None:
         """What was written while the bus was down must not be sent first."""
         self.charge.bus_is_back(now)
+        if self.charge.acts():
+            self._return(now)
+        self.say_farewell(now)
+
+    def _return(self, now: float) -> None:
         for node in self.nodes:
             node.bus_is_back(now)
-            self._schedule.touch(node)
+        self._touch_all(self.nodes)
 
     def refresh(self, status: BusStatus, now: float) -> None:
         """Bring the points of the bus and its nodes up to date; a few times a second."""

@@ -13,6 +13,7 @@ from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.command.plant import Node
 from bridge.command.worst_case import takeover_ms
 from bridge.node.boot import BootMemory
+from bridge.node.owed_stop import OwedStop
 from bridge.node.wire import NodeWire
 
 
@@ -26,8 +27,7 @@ class Leaving:
         self._wire = wire
         self._memory = memory
         self._takes_words = takes_words
-        self._owed: NmtCommand | None = None
-        """What was put off when the bus went down."""
+        self.owed = OwedStop(node)
 
     @property
     def is_due(self) -> bool:
@@ -83,20 +83,14 @@ class Leaving:
     def on_restart(self) -> None:
         """The node has started: whatever it was told before is over."""
         self.forget()
+        self.owed.settle()
         for drive in self._node.drives:
             drive.following.on_restart()
 
     def forget(self) -> None:
-        self._owed = None
         self._wire.put_off.clear()
 
-    def on_bus_gone(self, *, stays_stopped: bool) -> None:
-        """``stays_stopped``: the node is not booted again by itself when the bus is back."""
-        if stays_stopped:
-            self._owed = self._wire.put_off.command or self._owed
-
-    def on_bus_back(self, now: float) -> None:
-        command, self._owed = self._owed, None
-        if command is not None:
-            self._wire.send_stopped()
-            self.send(command, now)
+    def tell(self, command: NmtCommand, now: float) -> None:
+        """Stopped words on all its identifiers, and then ``command``."""
+        self._wire.send_stopped()
+        self.send(command, now)

@@ -20,6 +20,7 @@ from bridge.node.leaving import Leaving
 from bridge.node.neighbours import Neighbours
 from bridge.node.parameters.service import NodeParameters
 from bridge.node.process.stop_words import StopWords
+from bridge.node.put_off import CANCELS_WORDS
 from bridge.node.sdo_channels import SdoChannels
 from bridge.node.view import NodeView
 from bridge.node.wire import Listener, NodeWire
@@ -59,8 +60,8 @@ class NodeCore:
         self.boot_at: float | None = 0.0
         self.has_concluded = False
         """Whether a boot-up has ended, well or not, since the bus is there."""
-        self._told_to_stop = False
-        """A stopped node answers no SDO: it has to be woken before it is asked."""
+        self._told: NmtCommand | None = None
+        """The NMT command that it was told last and that keeps it out of Operational."""
         self._reset_at = float("-inf")
         """When a boot-up has last reset the node, or its communication."""
         self._back_off = BackOff()
@@ -91,7 +92,7 @@ class NodeCore:
 
     def _on_boot_up(self, now: float) -> None:
         """The node has started: whatever it was told before is forgotten."""
-        self._told_to_stop = False
+        self._told = None
         self._memory.may_run = False
         self.leaving.on_restart()
         if now > self._reset_at + _OWN_RESET_S:
@@ -156,7 +157,7 @@ class NodeCore:
 
     def was_told(self, command: NmtCommand) -> None:
         """This NMT command was the last one it got."""
-        self._told_to_stop = command is NmtCommand.STOP
+        self._told = command if command in CANCELS_WORDS else None
 
     # time
 
@@ -172,7 +173,8 @@ class NodeCore:
             self.boot_at = None
             self._last_boot = now
             self.leaving.forget()
-            if self._told_to_stop or self.error_control.state is NmtState.STOPPED:
+            # A stopped node answers no SDO: it has to be woken before it is asked.
+            if self._told is NmtCommand.STOP or self.error_control.state is NmtState.STOPPED:
                 self.wire.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
             self.booting.begin(now)
         self.wire.polling.on_time(now)
@@ -240,7 +242,7 @@ class NodeCore:
         self._enter_operation("; ".join([", ".join(problems) or "ok", *result.notes]), now)
 
     def _enter_operation(self, text: str, now: float) -> None:
-        self._told_to_stop = False
+        self._told = None
         self._operational_since = now
         self._back_off.entered_operation(now)
         # The guard may have run out between the start command and the node's answer.
@@ -268,7 +270,7 @@ class NodeCore:
         it seems to be absent: it may hear all the same, and our heartbeat would keep it running."""
         self.stop_drives(now)
         self.wire.send_stopped()
-        self._told_to_stop = True
+        self._told = NmtCommand.STOP
         if self._memory.may_run and not self.leaving.is_stopped_by_nmt:
             self._reset_at = now
             self.wire.send_nmt(NmtCommand.RESET_NODE)
@@ -302,7 +304,7 @@ class NodeCore:
         self.leave_operation(now)
         if reaction == "stop_node":
             self.leaving.send(NmtCommand.STOP, now)
-            self._told_to_stop = True
+            self._told = NmtCommand.STOP
         elif reaction != "nothing":
             self.boot_at = now + pause_s
         if stops_all:
@@ -340,11 +342,8 @@ class NodeCore:
         """The bus is down, or another's: everything on it is lost at once."""
         self.error_control.assume(NmtState.UNKNOWN)
         self.stop_drives(now)
-        self.leaving.on_bus_gone(stays_stopped=self.state is NodeState.STOPPED)
         self.wire.clear()
-        gave_up = self.boot_at is None and self.state is NodeState.LOST and self.table.on_loss == "stop_node"
-        was_stopped = self.state is NodeState.STOPPED or gave_up
-        if self.state is NodeState.DISABLED or was_stopped:
+        if self.state is NodeState.DISABLED or self._stays_stopped:
             # Who was stopped on purpose is not started by a bus that comes back.
             return
         if self.state is not NodeState.ABSENT:
@@ -354,9 +353,17 @@ class NodeCore:
         self.has_concluded = False
         self.boot_at = now + self._back_off.pause_s
 
+    @property
+    def _stays_stopped(self) -> bool:
+        """It was stopped, and nobody boots it by itself."""
+        gave_up = self.boot_at is None and self.state is NodeState.LOST and self.table.on_loss == "stop_node"
+        return self.state is NodeState.STOPPED or gave_up
+
     def bus_is_back(self, now: float) -> None:
+        """Whether a node that stays stopped has had its command is not known: it gets that once more."""
         self.stop_drives(now)
-        self.leaving.on_bus_back(now)
+        if self._stays_stopped:
+            self.leaving.tell(self._told or NmtCommand.STOP, now)
 
     def set_state(self, state: NodeState, now: float) -> None:
         if state is self.state:

@@ -89,11 +89,11 @@ class NodeWire:
         self.routes_changed = False
         return self.routes
 
-    def take_frames(self) -> list[Frame]:
-        frames = self._frames + self.sdo.take_frames() + self.error_control.take_frames()
-        frames += self.polling.take_frames()
-        self._frames = []
-        return frames
+    def take_frames(self, *, only_commands: bool = False) -> list[Frame]:
+        """``only_commands``: nothing but words and NMT goes out, and what was to be asked is dropped."""
+        asked = self.sdo.take_frames() + self.error_control.take_frames() + self.polling.take_frames()
+        commands, self._frames = self._frames, []
+        return commands if only_commands else commands + asked
 
     def clear(self) -> None:
         """Send nothing that waits: the bus is gone."""
@@ -159,6 +159,10 @@ class NodeWire:
         if self._node.device:
             self._node.device.on_time(now)
         self.sdo.on_time(now)
+        self.send_put_off(now)
+
+    def send_put_off(self, now: float) -> None:
+        """The NMT command that waits, if its time has come."""
         command = self.put_off.on_time(now)
         if command is not None:
             self.send_nmt(command)

@@ -1,0 +1,48 @@
+"""The stop that the bridge owes a node for what it has enabled there. Sans-IO.
+
+Much makes the bridge silent towards a node: another bridge, a bus that goes, a command, a boot-up. None of it may
+come before the stop, so the debt is kept apart from the node's state, and whoever ends the sending asks here.
+"""
+
+from __future__ import annotations
+
+from bridge.command.drive import Drive
+from bridge.command.follow import LastStop
+from bridge.command.outputs import Outputs
+from bridge.command.plant import Node
+
+
+class OwedStop:
+    """A debt begins with the first word that enables a drive or an output. It ends when the drive has said
+    that it follows its stop, when the node has started anew, or when stopped words and an NMT stop have gone
+    out. Nothing comes back of an output: for those it takes one of the last two."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._enabled: set[Drive | Outputs] = set()
+
+    def note(self) -> None:
+        """What the channels put out is about to be repeated on the bus."""
+        for one in self._node.commanded:
+            if _enables(one):
+                self._enabled.add(one)
+            elif one in self._enabled and _has_followed(one):
+                self._enabled.discard(one)
+
+    @property
+    def is_open(self) -> bool:
+        """Something may still run as the bridge has told it."""
+        return any(_enables(one) or not _has_followed(one) for one in self._enabled)
+
+    def settle(self) -> None:
+        """The node has had its stop, or has started anew."""
+        self._enabled.clear()
+
+
+def _enables(one: Drive | Outputs) -> bool:
+    output = one.channel.output
+    return not output.silent and one.channel.words.enables(output.words[0])
+
+
+def _has_followed(one: Drive | Outputs) -> bool:
+    return isinstance(one, Drive) and one.following.last_stop is LastStop.FOLLOWED

@@ -21,6 +21,13 @@ _FIRST_GUESS: Final = 1 / 12
 """Stuff bits for each bit that can be stuffed: process data has more zeros than chance would give."""
 
 
+def longest_bits(length: int) -> int:
+    """Bits of a frame with an 11-bit identifier and ``length`` bytes, with the most stuff bits possible and
+    the pause after it (ISO 11898-1: after the first five bits one for every four)."""
+    stuffable = STUFFED_BITS + 8 * length
+    return stuffable + (stuffable - 1) // 4 + UNSTUFFED_BITS
+
+
 def exact_bits(frame: Frame) -> int:
     """Bits of ``frame`` on the wire, interframe space of three bits included."""
     remote = bool(frame.can_id & REMOTE)

@@ -44,6 +44,8 @@ def check(
         print(case)
         for terms in case.terms:
             print(f"  {terms}")
+    for exposure in verdict.exposures:
+        print(exposure)
     if errors:
         raise FileFaults([finding.fault for finding in errors])
     print(f"{site}: {_served(project)} on {count(len(project.site.bus), 'bus')}, no faults")
@@ -81,6 +83,7 @@ def _as_json(project: Project, verdict: Verdict) -> dict[str, Any]:
         "drives": _drives(project),
         "devices": _devices(project),
         "buses": [asdict(load) for load in verdict.loads],
+        "intruders": [asdict(exposure) for exposure in verdict.exposures],
         "worst_cases": [
             {
                 "drive": case.drive,

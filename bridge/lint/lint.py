@@ -12,6 +12,7 @@ from bridge.lint.bus import Downloads, view_bus
 from bridge.lint.contradictions import check_contradictions
 from bridge.lint.decisions import check_decisions
 from bridge.lint.identifiers import check_identifiers
+from bridge.lint.intruder import Exposure, exposure
 from bridge.lint.load import BusLoad, check_load
 from bridge.lint.moving import check_moving
 from bridge.lint.outputs import check_outputs, output_cases
@@ -26,12 +27,13 @@ from bridge.mapping.site import described_file
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Findings in the order of the site file, the predicted load of each bus, and how long each drive may
-    take to stop."""
+    """Findings in the order of the site file, the predicted load of each bus, how long each drive may take to
+    stop, and what an intruder can do on each bus."""
 
     findings: tuple[LintFinding, ...]
     loads: tuple[BusLoad, ...]
     worst_cases: tuple[WorstCase, ...] = ()
+    exposures: tuple[Exposure, ...] = ()
 
     def of(self, severity: Severity) -> tuple[LintFinding, ...]:
         return tuple(finding for finding in self.findings if finding.severity is severity)
@@ -75,6 +77,7 @@ def lint(
     report = LintReport(path)
     loads: list[BusLoad] = []
     cases: list[WorstCase] = []
+    exposures: list[Exposure] = []
     for b, table in enumerate(site.bus):
         bus = view_bus(table, ("bus", b), families, known, downloads)
         check_identifiers(bus, report)
@@ -86,5 +89,6 @@ def lint(
         check_moving(bus, report)
         cases += [*worst_cases(bus), *output_cases(bus)]
         loads.append(check_load(bus, report))
+        exposures.append(exposure(bus))
     check_decisions(site, families, report)
-    return Verdict(report.findings(), tuple(loads), tuple(cases))
+    return Verdict(report.findings(), tuple(loads), tuple(cases), tuple(exposures))

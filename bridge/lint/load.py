@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.can.wirebits import STUFFED_BITS, UNSTUFFED_BITS
+from bridge.can.wirebits import longest_bits
 from bridge.lint.bus import BusView, NodeView, PdoView
 from bridge.lint.report import LintReport
 from bridge.node.boot.error_control import heartbeat_period_ms
@@ -16,13 +16,6 @@ _SDO_BYTES: Final = 8
 _TIME_BYTES: Final = 6
 _WORTH_A_WARNING: Final = 60.0
 _FULL: Final = 100.0
-
-
-def longest_bits(length: int) -> int:
-    """Bits of a frame with an 11-bit identifier and ``length`` bytes, with the most stuff bits possible and
-    the pause after it (ISO 11898-1: after the first five bits one for every four)."""
-    stuffable = STUFFED_BITS + 8 * length
-    return stuffable + (stuffable - 1) // 4 + UNSTUFFED_BITS
 
 
 @dataclass(frozen=True, slots=True)

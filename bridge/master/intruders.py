@@ -7,14 +7,18 @@ servers of its nodes. Where it sends no SYNC or TIME, somebody else may produce 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
 from bridge.canopen import cobid, nmt
 from bridge.canopen.decode_sdo import SdoListener
 from bridge.canopen.frame import Frame
-from bridge.command import Event, Kind, Plant
+from bridge.canopen.nmt import NmtCommand
+from bridge.command import Drive, Event, Kind, Plant
 from bridge.config import BusTable
+from bridge.drive import DriveState
+from bridge.master.answers import Answers
 from bridge.node.node import NodeCore
 from bridge.node.process.command_frames import Command, commands_of
 from bridge.node.process.process_data import DrivePdos
@@ -24,7 +28,14 @@ from bridge.ratelimit import Pauses
 _AGAIN_S: Final = 10.0
 """How often an intruder that goes on is reported, with the number of frames since the last time."""
 _STOP_AGAIN_S: Final = 1.0
-"""How often a node gets its NMT stop as long as the frames go on."""
+"""How often a node that is held stopped is told so again, for frames that do not bring its drives back."""
+_PATIENCE_S: Final = 1.0
+"""For how long answers may leave a drive enabled now and then before its node is reset."""
+_RESET_AGAIN_S: Final = 2.0
+"""A node that has been reset gets this time to start."""
+_ENDED_S: Final = 2.0
+"""An intruder that has been silent for so long has ended."""
+_NMT_BYTES: Final = 2
 _SEVERE: Final = 900
 _HARMLESS: Final = 500
 
@@ -56,6 +67,9 @@ class Intruders:
         self._sdo: dict[int, SdoListener] = {}
         self._pauses = Pauses(_AGAIN_S)
         self._stopped: dict[int, float] = {}
+        self._answers = Answers(bus.bitrate)
+        self._series: dict[int, _Series] = {}
+        """By the node's id."""
         self._spoken = frozenset(
             tpdo.cob_id for node in nodes for drive in node.table.drive for tpdo in drive.tpdo
         )
@@ -93,7 +107,7 @@ class Intruders:
 
     def routes(self, others: Mapping[int, Handler]) -> dict[int, Handler]:
         """Identifiers on which we send single frames, which do not come back to us: TIME and SDO requests."""
-        routes: dict[int, Handler] = {}
+        routes: dict[int, Handler] = {cobid.NMT: partial(self._on_nmt, others.get(cobid.NMT))}
         if self._bus.time_period_s:
             routes[cobid.TIME] = self._on_time
         for node in self._nodes:
@@ -128,11 +142,37 @@ class Intruders:
         if frame.can_id in self._commands:
             node, command = self._commands[frame.can_id]
             enables = command.enables(frame.data)
-            self._meet(frame, [node], lambda: f"{self.name(frame)}: {command.said(frame.data)}", enables)
+            said = partial(self._said_command, frame, command)
+            self._meet(frame, [node], said, enables, brings_back=enables)
         elif frame.can_id == cobid.SYNC:
             self._meet(frame, [node for node in self._nodes if _follows_sync(node)], lambda: self.name(frame))
         else:
             self._meet(frame, self._nodes, lambda: f"{self.name(frame)}: {_said_state(frame.data)}")
+
+    def _said_command(self, frame: Frame, command: Command) -> str:
+        return f"{self.name(frame)}: {command.said(frame.data)}"
+
+    def _on_nmt(self, then: Handler | None, frame: Frame) -> None:
+        """Our own NMT commands do not come back. A node that is in operation loses it by some of them, which
+        is noticed; one that is held stopped must not come back."""
+        if then:
+            then(frame)
+        command, addressed = self._addressed(frame.data)
+        held = [node for node in addressed if node.is_held]
+        if command == NmtCommand.STOP and len(held) == len(addressed):
+            # Another bridge that stops what is stopped is not answered: it would answer in its turn.
+            self._meet(frame, None, lambda: f"NMT {nmt.describe(frame.data)} (000h)")
+            return
+        back = [node for node in held if command in (NmtCommand.START, NmtCommand.ENTER_PRE_OPERATIONAL)]
+        said = partial("NMT {} (000h)".format, nmt.describe(frame.data))
+        self._meet(frame, back, said, bool(back), brings_back=bool(back))
+
+    def _addressed(self, data: bytes) -> tuple[int | None, Sequence[NodeCore]]:
+        """The command, and whom it is for; nobody where it is none."""
+        if len(data) < _NMT_BYTES:
+            return None, ()
+        command, node_id = data[:_NMT_BYTES]
+        return command, [node for node in self._nodes if node_id in (0, node.table.id)]
 
     def _on_time(self, frame: Frame) -> None:
         self._meet(frame, [], lambda: f"TIME ({frame.can_id:03X}h)")
@@ -156,9 +196,12 @@ class Intruders:
         affected: Sequence[NodeCore] | None,
         said: Callable[[], str],
         is_worse: bool = False,
+        *,
+        brings_back: bool = False,
     ) -> None:
         """Count it, answer it, and report it, though not every frame. ``affected``: None if it changes
-        nothing. ``is_worse``: report it even if another one on this identifier has just been reported."""
+        nothing. ``is_worse``: report it even if another one on this identifier has just been reported.
+        ``brings_back``: drives of a node that is held stopped may run by it."""
         if not self._acts():
             return
         self.count += 1
@@ -170,16 +213,89 @@ class Intruders:
             severity = _HARMLESS if affected is None else _SEVERE
             event = Event(frame.time, Kind.INTRUDER, self._bus.name, severity, f"intruder: {self.last}")
             self._plant.report(event)
-        due = [node for node in stopped if frame.time >= self._stopped.get(node.table.id, frame.time)]
-        if due:
-            for node in due:
-                self._stopped[node.table.id] = frame.time + _STOP_AGAIN_S
-            self._stop(due, f"the bridge, because of an intruder: {said()}", frame.time)
+        due = [node for node in stopped if self._is_due(node, frame.time, brings_back=brings_back)]
+        running = [node for node in due if not node.is_held]
+        if running:
+            self._stop(running, f"the bridge, because of an intruder: {said()}", frame.time)
+        for node in due:
+            self._stopped[node.table.id] = frame.time + _STOP_AGAIN_S
+            if node not in running:
+                self._answers.ask(node, self._identifiers(node))
+        self.on_time(frame.time)
+
+    def _is_due(self, node: NodeCore, now: float, *, brings_back: bool) -> bool:
+        """Whether the node is told to stop: at once if it is not held, or may come back; else once a second,
+        which two bridges that take each other for intruders can do for ever."""
+        return brings_back or not node.is_held or now >= self._stopped.get(node.table.id, now)
+
+    def _identifiers(self, node: NodeCore) -> int:
+        """On how many identifiers the node gets stopped words."""
+        return sum(one is node for one, _ in self._commands.values())
+
+    def on_time(self, now: float) -> None:
+        """Tell those again for whom there is room on the bus."""
+        for node in self._answers.take(now):
+            series = self._series.get(node.table.id)
+            if series is None or now > series.last + _ENDED_S:
+                series = self._series[node.table.id] = _Series(now)
+            series.last = now
+            series.look_at = now + _PATIENCE_S
+            if series.has_to_reset(node, now):
+                self._reset(node, series, now)
+            else:
+                node.hold_again(now)
+        for node in self._nodes:
+            # It has ended: its last word may have been the last.
+            series = self._series.get(node.table.id)
+            if series is not None and now >= series.look_at:
+                series.look_at = float("inf")
+                if series.has_to_reset(node, now):
+                    self._reset(node, series, now)
+
+    def _reset(self, node: NodeCore, series: _Series, now: float) -> None:
+        series.reset_at = now
+        node.hold_by_reset(now)
+        message = "reset node: an intruder keeps a drive enabled, which an NMT stop does not stop"
+        self._plant.report(Event(now, Kind.INTRUDER, node.node.name, _SEVERE, message))
+
+    def next_deadline(self) -> float | None:
+        looks = [series.look_at for series in self._series.values() if series.look_at < float("inf")]
+        answer_at = self._answers.next_deadline()
+        return min(looks + ([] if answer_at is None else [answer_at]), default=None)
+
+    def bus_is_gone(self) -> None:
+        self._answers.clear()
+        self._series.clear()
 
     def _to_be_stopped(self, affected: Sequence[NodeCore] | None) -> Sequence[NodeCore]:
         if affected is None or self._bus.on_intruder == "report":
             return ()
         return self._nodes if self._bus.on_intruder == "stop_all" else affected
+
+
+@dataclass(slots=True)
+class _Series:
+    """Answers to an intruder that goes on."""
+
+    since: float
+    last: float = float("-inf")
+    reset_at: float = float("-inf")
+    look_at: float = float("inf")
+    """When it is judged though nobody is answered."""
+
+    def has_to_reset(self, node: NodeCore, now: float) -> bool:
+        """The drives of this family run on in Stopped, and the last that one has said is that it is enabled."""
+        begun = max(self.since, self.reset_at)
+        if node.leaving.is_stopped_by_nmt or now < self.reset_at + _RESET_AGAIN_S:
+            return False
+        return now >= begun + _PATIENCE_S and any(_said_enabled_at(one) > begun for one in node.node.drives)
+
+
+def _said_enabled_at(drive: Drive) -> float:
+    """When the drive has last said that it is enabled, if that is the last thing that it has said."""
+    heard = drive.channel.link.last_pdo
+    is_enabled = drive.channel.state is DriveState.OPERATION_ENABLED
+    return heard if is_enabled and heard is not None else float("-inf")
 
 
 def _follows_sync(node: NodeCore) -> bool:

@@ -135,13 +135,15 @@ class Network:
         for node in self._schedule.take_due(now):
             node.on_time(now)
             self._schedule.touch(node)
+        self._intruders.on_time(now)
         self._pump(now)
 
     def next_deadline(self) -> float | None:
         if not self.charge.acts():
             times = (self.charge.next_deadline(), self.farewell.next_deadline())
             return min((time for time in times if time is not None), default=None)
-        times = (self._schedule.next_deadline(), self._time.next_deadline() if self._time else None)
+        time_at = self._time.next_deadline() if self._time else None
+        times = (self._schedule.next_deadline(), time_at, self._intruders.next_deadline())
         return min((time for time in times if time is not None), default=None)
 
     def came_back(self, now: float) -> None:
@@ -345,6 +347,7 @@ class Network:
 
     def bus_is_gone(self, now: float) -> None:
         self.charge.bus_is_gone()
+        self._intruders.bus_is_gone()
         self.farewell.bus_is_gone()
         self._forget_bus(now)
 

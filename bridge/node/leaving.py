@@ -43,8 +43,10 @@ class Leaving:
     def takeover_s(self) -> float:
         """How long stopped words may take from the bus to the drives: 0 where they wait for no SYNC, or where
         the node takes none any more."""
-        if not self._takes_words():
-            return 0.0
+        return self._sync_s if self._takes_words() else 0.0
+
+    @property
+    def _sync_s(self) -> float:
         known = [takeover_ms(self._node.bus, kind) / 1000 for kind in self._memory.rpdo_types]
         return max((*known, *(one.takeover_s for one in self._node.commanded)), default=0.0)
 
@@ -90,7 +92,11 @@ class Leaving:
     def forget(self) -> None:
         self._wire.put_off.clear()
 
-    def tell(self, command: NmtCommand, now: float) -> None:
-        """Stopped words on all its identifiers, and then ``command``."""
+    def tell(self, command: NmtCommand, now: float, *, takes_words: bool = False) -> None:
+        """Stopped words on all its identifiers, and then ``command``. ``takes_words``: it is in Operational,
+        whatever is known of it."""
         self._wire.send_stopped()
-        self.send(command, now)
+        if takes_words and self._sync_s:
+            self._wire.put_off.begin(command, now, self._sync_s)
+        else:
+            self.send(command, now)

@@ -62,6 +62,8 @@ class NodeCore:
         """Whether a boot-up has ended, well or not, since the bus is there."""
         self._told: NmtCommand | None = None
         """The NMT command that it was told last and that keeps it out of Operational."""
+        self._held_by_reset_at = float("-inf")
+        """When it was reset though it is to stay stopped."""
         self._reset_at = float("-inf")
         """When a boot-up has last reset the node, or its communication."""
         self._back_off = BackOff()
@@ -103,6 +105,10 @@ class NodeCore:
         pause_s = loop.on_boot_up(now)
         self._view.loops(loop, now)
         if self.state is NodeState.DISABLED:
+            return
+        if self.state is NodeState.STOPPED and now <= self._held_by_reset_at + _OWN_RESET_S:
+            self._told = NmtCommand.STOP
+            self.leaving.send(NmtCommand.STOP, now)
             return
         if self.is_operational:
             self._view.restarted(now)
@@ -154,6 +160,24 @@ class NodeCore:
     def boot_next(self, at: float | None) -> None:
         """Then, or at once when it is past; None: not until somebody asks for it."""
         self.boot_at = at
+
+    @property
+    def is_held(self) -> bool:
+        """It was told to leave Operational, and nobody has asked for it since."""
+        return self._told is not None and self.state not in (NodeState.OPERATIONAL, NodeState.BOOTING)
+
+    def hold_again(self, now: float) -> None:
+        """Somebody else may have brought it back."""
+        if self._told is not None:
+            self.leaving.tell(self._told, now, takes_words=True)
+            self._touch()
+
+    def hold_by_reset(self, now: float) -> None:
+        """Neither words nor NMT stop keep its drives from running: it starts anew, and stays stopped."""
+        self._reset_at = self._held_by_reset_at = now
+        self.wire.send_stopped()
+        self.wire.send_nmt(NmtCommand.RESET_NODE)
+        self._touch()
 
     def was_told(self, command: NmtCommand) -> None:
         """This NMT command was the last one it got."""

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.canopen.frame import Frame
+from bridge.master.answers import SHARE, answer_bits
 from bridge.command import Action, Event, Identity, Kind, Role, Source
 from tests.support.bench import Bench, write_site
 from tests.support.quick import Quick, quick_site
@@ -93,7 +94,7 @@ def test_it_is_watched_where_the_site_file_puts_it_before_the_node_is_there(tmp_
     assert bench.value("bus/can0/intruders") == 2
 
 
-def test_one_who_goes_on_is_counted_and_told_now_and_then_and_stopped_again(tmp_path: Path) -> None:
+def test_one_who_goes_on_is_counted_told_now_and_then_and_answered_within_a_share_of_the_bus(tmp_path: Path) -> None:
     bench = running(tmp_path)
     begin = bench.now
     for _ in range(1200):
@@ -101,7 +102,9 @@ def test_one_who_goes_on_is_counted_and_told_now_and_then_and_stopped_again(tmp_
         bench.run(0.01)
     assert bench.number("bus/can0/intruders") >= 1190
     assert len(told(bench)) == 2 and "frames since the last message" in told(bench)[1].message
-    assert 10 <= len(nmt(bench, begin)) <= 13
+    answers = len(nmt(bench, begin))
+    assert 600 <= answers <= 1200
+    assert answers * answer_bits(4) <= (12 * SHARE + 0.05) * 250_000
 
 
 def test_that_it_enables_now_is_told_at_once(tmp_path: Path) -> None:

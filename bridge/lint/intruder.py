@@ -1,0 +1,60 @@
+"""What somebody else on a bus can do who sends what only the bridge may send, a second master for instance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from bridge.command.worst_case import REACTION_BOUND_MS, sync_wait_ms
+from bridge.lint.bus import BusView, NodeView
+from bridge.lint.wire import busy_bits, wire_of
+from bridge.master.answers import SHARE, answer_bits
+
+_LOOK_MS: Final = 10
+"""How often the bus is looked at for frames of others (``bridge/can/foreignwatch.py``)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Exposure:
+    """Of one bus. ``within_ms``: from an intruding frame to the end of the answer; None where nothing bounds it
+    (a load of more than 100 %). ``answers_per_s``: for the node with the most RPDOs."""
+
+    bus: str
+    on_intruder: str
+    within_ms: int | None
+    answers_per_s: int
+    share_percent: int
+
+    def __str__(self) -> str:
+        if self.on_intruder == "report":
+            return f"{self.bus}: an intruder is only reported: it can run every drive for as long as it likes"
+        within = "not in a known time" if self.within_ms is None else f"within {self.within_ms} ms"
+        return (
+            f"{self.bus}: an intruder is answered {within}, up to {self.answers_per_s} times a second "
+            f"({self.share_percent} % of the bus): until each answer it can run a drive, and for longer where "
+            "it sends more often. No node can keep another one from sending on CAN"
+        )
+
+
+def exposure(bus: BusView) -> Exposure:
+    """By the site's files: what a node holds may differ."""
+    busy = busy_bits(bus)
+    longest: float | None = 0.0
+    for node in bus.nodes:
+        for drive in node.drives:
+            wire = wire_of(bus, drive.rpdos, busy)
+            if wire.before_ms is None or longest is None:
+                longest = None
+                continue
+            kind = drive.rpdos[0].transmission_type
+            sync_ms = sync_wait_ms(bus.table, kind)
+            longest = max(longest, wire.before_ms + wire.frames_ms + sync_ms)
+    within_ms = None if longest is None else math.ceil(REACTION_BOUND_MS + _LOOK_MS + longest)
+    bits = max((answer_bits(_identifiers(node)) for node in bus.nodes), default=answer_bits(1))
+    per_s = int(SHARE * bus.table.bitrate / bits)
+    return Exposure(bus.table.name, bus.table.on_intruder, within_ms, per_s, round(100 * SHARE))
+
+
+def _identifiers(node: NodeView) -> int:
+    return sum(pdo.receives and pdo.enabled for pdo in node.pdos)

@@ -1,7 +1,7 @@
 """What others send on identifiers that are ours alone, on a socket of its own.
 
-All our own frames come back there, so it wakes nobody: it is looked at a hundred times a second, and five times
-as often while somebody is there.
+All our own frames come back there, so it wakes nobody: it is looked at a hundred times a second, and five
+times as often while somebody is there.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What somebody else on a bus can do who sends what only the bridge may send, a second master for instance."""
+"""Exposure of a bus to somebody who sends what only the bridge may send, a second master for instance."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _LOOK_MS: Final = 10
 
 @dataclass(frozen=True, slots=True)
 class Exposure:
-    """Of one bus. ``within_ms``: from an intruding frame to the end of the answer; None where nothing bounds it
-    (a load of more than 100 %). ``answers_per_s``: for the node with the most RPDOs."""
+    """One bus. ``within_ms``: from an intruding frame to the end of the answer; None where nothing bounds
+    it (a load of more than 100 %). ``answers_per_s``: for the node with the most RPDOs."""
 
     bus: str
     on_intruder: str
@@ -28,7 +28,7 @@ class Exposure:
 
     def __str__(self) -> str:
         if self.on_intruder == "report":
-            return f"{self.bus}: an intruder is only reported: it can run every drive for as long as it likes"
+            return f"{self.bus}: an intruder is only reported: it can run drives for as long as it likes"
         within = "not in a known time" if self.within_ms is None else f"within {self.within_ms} ms"
         return (
             f"{self.bus}: an intruder is answered {within}, up to {self.answers_per_s} times a second "

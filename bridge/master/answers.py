@@ -1,5 +1,5 @@
-"""How often nodes are told again to stop while an intruder goes on: as often as it speaks, within a share of the
-bus. Sans-IO."""
+"""How often nodes are told again to stop while an intruder goes on: as often as it speaks, within a share of
+the bus. Sans-IO."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bridge.can.wirebits import longest_bits
 from bridge.node.node import NodeCore
 
 SHARE: Final = 0.2
-"""Of the bus: an answer must not do what an intruder could not do better by sending more."""
+"""Of the bus: somebody who provokes answers must not fill it by them."""
 _AT_ONCE_S: Final = 0.05
 """An allowance that was not used adds up for so long."""
 _SPARE_S: Final = 0.001

@@ -284,7 +284,7 @@ class _Series:
     """When it is judged though nobody is answered."""
 
     def has_to_reset(self, node: NodeCore, now: float) -> bool:
-        """The drives of this family run on in Stopped, and the last that one has said is that it is enabled."""
+        """The drives of this family run on in Stopped, and one has said last that it is enabled."""
         begun = max(self.since, self.reset_at)
         if node.leaving.is_stopped_by_nmt or now < self.reset_at + _RESET_AGAIN_S:
             return False

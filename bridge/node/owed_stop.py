@@ -1,7 +1,8 @@
 """The stop that the bridge owes a node for what it has enabled there. Sans-IO.
 
-Much makes the bridge silent towards a node: another bridge, a bus that goes, a command, a boot-up. None of it may
-come before the stop, so the debt is kept apart from the node's state, and whoever ends the sending asks here.
+Much makes the bridge silent towards a node: another bridge, a bus that goes, a command, a boot-up. None of it
+may come before the stop, so the debt is kept apart from the node's state, and whoever ends the sending asks
+here.
 """
 
 from __future__ import annotations

@@ -24,6 +24,9 @@ ENABLE = "7f04002000000000"
 SILENCE_S = 1.2
 """The longest time after which a second bridge takes over: six times the 0.2 s that it listens."""
 NOISE_S = 2.0
+DEADMAN_S = 1.0
+ENABLED_MASK, ENABLED = 0x6F, 0x27
+"""NORD's status word (BU 2500 §6.5.1), as that of CiA 402."""
 
 
 class Lab:
@@ -93,6 +96,10 @@ def make_lab(tmp_path: Path) -> Iterator[Callable[..., Lab]]:
 
 def stops(bus: Sniffer, since: float) -> list[Seen]:
     return [frame for frame in bus.of(NMT, since) if frame.data[:1] == b"\x02"]
+
+
+def starts(bus: Sniffer, since: float) -> list[Seen]:
+    return [frame for frame in bus.of(NMT, since) if frame.data[:1] == b"\x01"]
 
 
 def test_own_frames_are_never_an_intruders_however_the_words_change(make_lab) -> None:
@@ -202,3 +209,43 @@ def test_a_second_bridge_stays_passive_and_takes_over_when_the_first_is_gone(mak
     second.wait_output("node operational", 15.0)
     until(lambda: len(lab.bus.of(RPDO1, killed)) > 20, 10.0, "process data")
     assert not [frame for frame in lab.bus.of(RPDO1, killed) if frame.word & 1]
+
+
+def test_a_hang_with_a_frame_of_a_second_bridge_waiting_stops_the_drive_before_the_bus_is_left(
+    make_lab,
+) -> None:
+    """A stopped process, and one heartbeat with the bridge's own identifier in its inbox."""
+    lab = make_lab()
+    lab.run_drive()
+    lab.bridge.signal(signal.SIGSTOP)
+    time.sleep(DEADMAN_S + 0.3)
+    # Content that the bridge itself has not sent lately: only by that is a frame of this host another's.
+    lab.bus.send(OWN, b"\x7f")
+    time.sleep(0.05)
+    begin = time.time()
+    lab.bridge.signal(signal.SIGCONT)
+    lab.bridge.wait_output("passive: another bridge is in charge of this bus", 5.0)
+    until(lambda: bool(stops(lab.bus, begin)), 5.0, "the NMT stop")
+    left = stops(lab.bus, begin)[0].time
+    words = [frame for frame in lab.bus.of(RPDO1, begin) if frame.time <= left]
+    assert words and not words[0].word & 1, "the stopped word goes before it"
+    assert not [frame for frame in lab.bus.of(RPDO1, begin) if frame.word & 1]
+    time.sleep(0.3)
+    assert not lab.bus.of(OWN, left + 0.05), "then the bus is left"
+
+
+def test_an_intruder_that_is_a_master_is_answered_as_often_as_it_starts_the_node(make_lab) -> None:
+    lab = make_lab()
+    lab.run_drive()
+    lab.send(RPDO1, ENABLE, period_s=0.02, count=200)
+    begin = lab.send(NMT, "0105", period_s=0.02, count=100)
+    until(lambda: len(starts(lab.bus, begin)) >= 90, 20.0, "the intruder")
+    answers = len(stops(lab.bus, begin)) / len(starts(lab.bus, begin))
+    assert answers >= 0.5
+    said = [frame.word & ENABLED_MASK == ENABLED for frame in lab.bus.of(TPDO1, begin)]
+    assert sum(said) <= 0.6 * len(said)
+    lab.bridge.wait_output("NMT start for node 5 (000h)", 5.0)
+    time.sleep(3.0)
+    quiet = time.time()
+    time.sleep(0.5)
+    assert not lab.bus.of(TPDO1, quiet), "the node stays stopped"

@@ -78,6 +78,11 @@ def lost_drive(rig: Rig, drive: Drive) -> float:
     return lost(rig, drive) + TPDO_MS
 
 
+def given_way(seconds: float) -> Bound:
+    """The bridge is back then, stops the drive and its node, whose heartbeat says so, and leaves the bus."""
+    return lambda rig, drive: seconds * 1000 + node_stopped(rig, drive)
+
+
 def after(seconds: float) -> Bound:
     """The bridge is back then, and stops the drive."""
     return lambda rig, drive: seconds * 1000 + at_once_drive(rig, drive)

@@ -32,6 +32,7 @@ from tests.proof.strangers import Connection
 VICTIM: Final = next(drive for drive in DRIVES if drive.family is CIA402)
 """Whose RPDO is not heard any more, or sent by somebody else. It watches our heartbeat, so it goes on."""
 _INTRUDES_S: Final = 0.02
+_MASTERS_S: Final = 1.0
 _DOWN_S: Final = 20.0
 _AHEAD: Final = 100
 _WAITS_S: Final = min(0.25, PLANT.short_s)
@@ -40,12 +41,17 @@ _FED_S: Final = 0.1
 _STARTS_S: Final = 60.0
 _NEVER_SENT: Final = 0x7FF
 _OPERATIONAL: Final = b"\x05"
+_PRE_OPERATIONAL: Final = b"\x7f"
+_NMT: Final = 0x000
+_START: Final = 0x01
 
 
 class Intruder:
-    """Sends a drive's RPDO with a word that enables, beside the bridge."""
+    """Sends a drive's RPDO with a word that enables, beside the bridge, and before it NMT start if it is a
+    master."""
 
-    def __init__(self, drive: Drive) -> None:
+    def __init__(self, drive: Drive, *, is_master: bool = False) -> None:
+        self._start = bytes((_START, drive.node_id)) if is_master else b""
         # None of the setpoints that its owner writes: on the wire what another device sends bears no mark of
         # this host, here nothing but the data tells it from what the bridge has sent a moment ago.
         setpoint = drive.family.setpoint + NUMBERS
@@ -59,6 +65,8 @@ class Intruder:
     def _run(self) -> None:
         while not self._ended.wait(_INTRUDES_S):
             with suppress(OSError):
+                if self._start:
+                    machine.send(BRIDGE_SIDE, _NMT, self._start)
                 machine.send(BRIDGE_SIDE, *self._frame)
 
     def end(self) -> None:
@@ -70,6 +78,26 @@ def intrude(rig: Rig) -> float:
     intruder = Intruder(VICTIM)
     rig.guests.callback(intruder.end)
     return intruder.since
+
+
+def intrude_as_master(rig: Rig) -> float:
+    """For as long as the drive may come back; it has to be stopped when that ends, and to stay so."""
+    intruder = Intruder(VICTIM, is_master=True)
+    time.sleep(_MASTERS_S)
+    intruder.end()
+    return time.monotonic()
+
+
+def pause_beside_twin(rig: Rig) -> float:
+    """The bridge stands still, and a frame of a second one waits for it. Its content is none of what the
+    bridge itself has sent lately: on this host only that tells it from the bridge's own."""
+    assert rig.bridge
+    now = time.monotonic()
+    rig.bridge.signal(signal.SIGSTOP)
+    time.sleep(PLANT.paused_s)
+    machine.send(BRIDGE_SIDE, BRIDGE_HEARTBEAT, _PRE_OPERATIONAL)
+    rig.bridge.signal(signal.SIGCONT)
+    return now
 
 
 def end_intruder(rig: Rig) -> None:

@@ -132,7 +132,9 @@ def test_what_runs_is_stopped_before_the_bus_is_left_to_another(
     assert stopped_and_left(bench, begin)
     left_at = max(frame.time for frame in bench.log if not frame.can_id)
     assert left_at <= begin + (kind * SYNC_S + SLACK_S if kind <= 240 else 0.01)
-    assert not [f for f in bench.log if f.time > left_at + SLACK_S + 0.01 and f.can_id in (0, RPDO, 0x77F, 0x80)]
+    assert not [
+        f for f in bench.log if f.time > left_at + SLACK_S + 0.01 and f.can_id in (0, RPDO, 0x77F, 0x80)
+    ]
     bench.run(3.0)
     assert speed(bench.node) == 0
 
@@ -267,7 +269,9 @@ def down(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("target", ["n", "bus/can0"])
-@pytest.mark.parametrize("when", ["while it is down", "in the round in which it goes", "before a short outage"])
+@pytest.mark.parametrize(
+    "when", ["while it is down", "in the round in which it goes", "before a short outage"]
+)
 @pytest.mark.parametrize("kind", [1, 255])
 @pytest.mark.parametrize("mapping", ["lenze/8400-motec", "cia402/velocity"])
 def test_a_node_that_is_to_stop_is_stopped_when_the_bus_is_back(

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.master.answers import SHARE, answer_bits
 from bridge.command import Action, Event, Identity, Kind, Role, Source
+from bridge.master.answers import SHARE, answer_bits
 from tests.support.bench import Bench, write_site
 from tests.support.quick import Quick, quick_site
 
@@ -94,7 +94,9 @@ def test_it_is_watched_where_the_site_file_puts_it_before_the_node_is_there(tmp_
     assert bench.value("bus/can0/intruders") == 2
 
 
-def test_one_who_goes_on_is_counted_told_now_and_then_and_answered_within_a_share_of_the_bus(tmp_path: Path) -> None:
+def test_one_who_goes_on_is_counted_told_now_and_then_and_answered_within_a_share_of_the_bus(
+    tmp_path: Path,
+) -> None:
     bench = running(tmp_path)
     begin = bench.now
     for _ in range(1200):

@@ -3,6 +3,7 @@ often. Judged by what the simulated drives report and do."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Final
 
@@ -38,8 +39,9 @@ class Intruder:
 
     def __init__(self, bench: LastWords, start_every_s: float) -> None:
         self.bench = bench
-        ids = sorted({f.can_id for f in bench.log if 0x200 <= f.can_id < 0x580 and f.can_id & 0x7F == 5})
-        self.frames = [bench.sent(can_id)[-1] for can_id in ids if can_id < 0x580 and not (can_id >> 7) % 2 == 1]
+        is_rpdo = re.compile("0x[2345]05").fullmatch
+        ids = sorted({frame.can_id for frame in bench.log if is_rpdo(hex(frame.can_id))})
+        self.frames = [bench.sent(can_id)[-1] for can_id in ids]
         self.start_every_s = start_every_s
         self.fastest = 0.0
         self._coming: list[tuple[float, Frame]] = []

@@ -28,11 +28,11 @@ class Exposure:
 
     def __str__(self) -> str:
         if self.on_intruder == "report":
-            return f"{self.bus}: an intruder is only reported: it can run drives for as long as it likes"
+            return f"{self.bus}: an intruder is only reported: it can run drives as long as it likes"
         within = "not in a known time" if self.within_ms is None else f"within {self.within_ms} ms"
         return (
             f"{self.bus}: an intruder is answered {within}, up to {self.answers_per_s} times a second "
-            f"({self.share_percent} % of the bus): until each answer it can run a drive, and for longer where "
+            f"({self.share_percent} % of the bus): until each answer it can run a drive, and longer where "
             "it sends more often. No node can keep another one from sending on CAN"
         )
 

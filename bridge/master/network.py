@@ -177,6 +177,7 @@ class Network:
             if node.table.enabled:
                 # A reset of the communication waits until the stopped words have been taken over.
                 node.carry_out_command(action, "the bridge at its start", now, send=not whole)
+                self._frames += node.wire.take_frames(only_commands=True)
                 if whole:
                     self._frames.append(nmt.command(node_commands.NMT[action], node.table.id))
 

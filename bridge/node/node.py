@@ -387,7 +387,7 @@ class NodeCore:
         """Whether a node that stays stopped has had its command is not known: it gets that once more."""
         self.stop_drives(now)
         if self._stays_stopped:
-            self.leaving.tell(self._told or NmtCommand.STOP, now)
+            self.leaving.tell(self._told or NmtCommand.STOP, now, takes_words=True)
 
     def set_state(self, state: NodeState, now: float) -> None:
         if state is self.state:

@@ -87,7 +87,7 @@ def moving(folder: Path, mapping: str, kind: int, *, node: str = "", bus: str = 
     family = load_family(mapping)
     slot = family.slot[0].name
     full = {value.full for value in family.value if value.full}
-    scaled = ", ".join(f"{name} = {SCALED.get(name, 1500.0)}" for name in sorted(full))
+    scaled = ", ".join(f'"{name}" = {SCALED.get(name, 1500.0)}' for name in sorted(full))
     more = f"parameters = {{ {scaled} }}\nignored_stop_ms = {round(IGNORED_S * 1000)}\n"
     if kind != ASYNCHRONOUS:
         more += f"rpdo = {{ transmission_type = {kind} }}"

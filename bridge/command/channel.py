@@ -14,7 +14,17 @@ from dataclasses import replace
 
 from bridge.command.event import Event, Kind
 from bridge.command.leg import event, owners
-from bridge.command.leg.effect import Answer, Effect, Heard, Ignored, StartBegun, StartEnded, Tell, Tripped
+from bridge.command.leg.effect import (
+    Answer,
+    Effect,
+    Heard,
+    Ignored,
+    LetGo,
+    StartBegun,
+    StartEnded,
+    Tell,
+    Tripped,
+)
 from bridge.command.leg.outlook import next_deadline, output_then, until, watchdog_state
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import WANTS_STOP_WORD, LegState, Output, WatchdogState, Way
@@ -67,6 +77,11 @@ class Channel:
     @property
     def output(self) -> Output:
         """The words that belong on the bus now."""
+        return self.leg.sent
+
+    @property
+    def wired(self) -> Output | tuple[int, ...]:
+        """What the bus gets by ``output``."""
         return self.leg.sent
 
     @property
@@ -233,6 +248,8 @@ class Channel:
                         outcomes.append((started, outcome))
                 case Tripped():
                     self._on_tripped(effect, now)
+                case LetGo():
+                    self._on_let_go()
                 case Ignored():
                     self._on_ignored(now)
                 case Tell(kind=kind, severity=severity, message=message):
@@ -256,6 +273,9 @@ class Channel:
 
     def _on_ignored(self, now: float) -> None:
         """The controller is silent, and the site file has that ignored."""
+
+    def _on_let_go(self) -> None:
+        """Somebody has stopped it by a command."""
 
     def _node_has_changed(self, state: NodeState, now: float) -> None:
         """The node is in another state than before."""

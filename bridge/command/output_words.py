@@ -70,6 +70,14 @@ class OutputWords:
                 self.put(words, place, place.safe)
         return tuple(words)
 
+    def let_go(self) -> None:
+        """Nothing is held any more: what holds its last value gets 0, or what is nearest to it."""
+        words = list(self.held)
+        for place in self.places.values():
+            if place.safe is None:
+                self.put(words, place, _off(place.output))
+        self.held = tuple(words)
+
     def on_wire(self, words: tuple[int, ...]) -> tuple[int, ...]:
         """What outputs get by the words of the leg, the control word first."""
         return words[1:] if words[0] & ACTIVE else self.safe(self.held)
@@ -105,3 +113,14 @@ class OutputWords:
         mask = 1 << int(bit)
         raw = self.raw(words, place)
         return raw | mask if value else raw & ~mask
+
+
+def _off(output: Output) -> int:
+    """The integer of the value nearest to 0 that the output takes."""
+    low, high = output.low, output.high
+    value = max(0.0 if low is None else low, min(0.0 if high is None else high, 0.0))
+    try:
+        return output.encode(value)
+    except ValueError:
+        # Its scale has an offset that leaves 0 out.
+        return 0

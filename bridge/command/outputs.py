@@ -18,10 +18,9 @@ from bridge.command.event import Event, Kind
 from bridge.command.follow import Verdict
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import Output as Sent
-from bridge.command.leg.state import Stage
 from bridge.command.link import Link, NodeState
 from bridge.command.output_words import ACTIVE, OutputWords
-from bridge.command.request import Action, Code, Outcome, Reply, Request, Write
+from bridge.command.request import Action, Code, Outcome, Reply, Request
 from bridge.command.worst_case import StopTime, Wire, output_stop_time
 from bridge.config import BusTable, NodeTable, OutputsTable
 from bridge.drive import ControlWords, OwnJudgement
@@ -83,10 +82,15 @@ class OutputChannel(Channel):
             timeout_range_ms=(0, 0),
             follows=(),
             handshake=None,
+            acknowledge_resumes=True,
         )
         super().__init__(name, of_leg, Link(0.0, hold_ms), report, settled=settled, tripped=tripped, due=due)
         safe = words.held
         self.leg = self.leg._replace(rest=safe, setpoints=safe, sent=Sent((0, *safe)))
+
+    @property
+    def wired(self) -> tuple[int, ...]:
+        return self.on_wire(self.output)
 
     def on_wire(self, output: Sent) -> tuple[int, ...]:
         """What the outputs get by this output of the leg."""
@@ -99,18 +103,10 @@ class OutputChannel(Channel):
             self._tell(now, Kind.REFUSED, 300, message)
             reply(Outcome(Code.UNKNOWN_POINT, "outputs are written, and not started", forwarded=False))
             return
-        if request.action is not Action.RESET_FAULT:
-            super().handle(request, now, reply)
-            return
+        super().handle(request, now, reply)
 
-        def acknowledged(outcome: Outcome) -> None:
-            if outcome.ok and outcome.forwarded and self.leg.stage is Stage.INTERLOCKED:
-                # Whoever acknowledges means to go on: nothing is active by that.
-                again = Request(request.identity, request.target, Write())
-                super(OutputChannel, self).handle(again, now, lambda outcome: None)
-            reply(outcome)
-
-        super().handle(request, now, acknowledged)
+    def _on_let_go(self) -> None:
+        self.output_words.let_go()
 
     def _node_has_changed(self, state: NodeState, now: float) -> None:
         if state is NodeState.OPERATIONAL:

@@ -278,9 +278,9 @@ class Plant:
             reply = self._counting_refusals(request, now, reply)
             reply(Outcome(Code.READ_ONLY, f"{request.target} has no outputs", forwarded=False))
             return False
-        before, until = one.channel.output, one.channel.until
+        before, until = one.channel.wired, one.channel.until
         one.channel.handle(request, now, reply)
-        is_changed = one.channel.output != before or request.action in _BRINGS_TIMERS_FORWARD
+        is_changed = one.channel.wired != before or request.action in _BRINGS_TIMERS_FORWARD
         # The bus may have been told to stop the drive by itself: not any more, its owner is there.
         return is_changed or (until is not None and until < now + one.burst_s)
 

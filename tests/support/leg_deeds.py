@@ -37,6 +37,11 @@ class Done:
         return any(isinstance(effect, Answer) and effect.is_refused for effect in self.effects)
 
     @property
+    def is_kept(self) -> bool:
+        """It was taken, and nothing is sent for it."""
+        return any(isinstance(effect, Answer) and not effect.outcome.forwarded for effect in self.effects)
+
+    @property
     def is_done(self) -> bool:
         return any(
             isinstance(effect, StartEnded) and effect.outcome.code is Code.OK for effect in self.effects
@@ -77,7 +82,8 @@ def _goes_on(done: Done) -> bool:
 
 HOLDS: Final[dict[Deed, Callable[[Done], bool]]] = {
     Deed.NOTHING: lambda done: True,
-    Deed.FORWARD: lambda done: done.answers(forwarded=True),
+    # What it is told as is the oracle's business.
+    Deed.FORWARD: lambda done: done.answers(forwarded=True) or done.answers(forwarded=False),
     Deed.TAKE: lambda done: done.answers(forwarded=False),
     Deed.REFUSE: lambda done: done.is_refused,
     Deed.STOP: _is_stopped,
@@ -85,6 +91,7 @@ HOLDS: Final[dict[Deed, Callable[[Done], bool]]] = {
     Deed.CLEAR_STOP: lambda done: not done.enables and any(isinstance(one, Answer) for one in done.effects),
     Deed.REACT: _reacts,
     Deed.SILENCE: lambda done: done.after.sent.silent or not done.after.silence_stops,
+    Deed.KEEP_SILENT: lambda done: done.after.sent.silent and done.is_kept,
     Deed.WAIT: lambda done: done.waits,
     Deed.READY: lambda done: done.waits,
     Deed.GO_ON: _goes_on,

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final
 
 from tests.support.leg_rules import MOVING, Model
 from tests.support.leg_seen import Missing
 from tests.support.leg_words import STRENGTH
 
+BURST_S: Final = 0.1
+"""So long a stop breaks the silence."""
 TAKES_S: Final = 1.0
 """A drive has so long to take a position."""
 PAUSE_S: Final = 0.1
@@ -23,8 +26,10 @@ class Oracle(Model):
         rules, word, now = self.rules, sent[0], self.now
         words = rules.words
         is_mute = self.mute_at is not None and now >= self.mute_at
-        assert silent is (is_mute and self.watches), (
-            "nothing is sent where the site file says so, and only there"
+        if is_mute:
+            self._break_silence(word)
+        assert silent is (is_mute and self.watches and self.speaks_until is None), (
+            "nothing is sent where the site file says so, and only there; but a stop for everybody is, once"
         )
         assert word & words.valid == words.valid, "the drive takes what is sent"
         setpoints = sent[1:]
@@ -45,6 +50,17 @@ class Oracle(Model):
             self._check_reaction(word, is_mute=is_mute)
         if words.handshake:
             self._check_handshake(bool(word & words.handshake) and enables)
+
+    def _break_silence(self, word: int) -> None:
+        """For a stop that somebody asks for, where the drive has not been sent it in this silence: else who
+        asks again and again would keep the drive's own supervision from tripping."""
+        is_over = self.speaks_until is None or self.now >= self.speaks_until
+        if self.asks and (word != self.said or (is_over and not self.watches)):
+            self.speaks_until = self.now + BURST_S
+        elif is_over:
+            self.speaks_until = None
+        if self.speaks_until is not None:
+            self.said = word
 
     def _are_at_rest(self, setpoints: tuple[int, ...]) -> bool:
         return setpoints == self.at if self.at else not any(setpoints)
@@ -77,16 +93,50 @@ class Oracle(Model):
     def check_stop(self, word: int, kind: str) -> None:
         assert any(stop.fit(word) for stop in self.rules.words.stops(kind)), f"{word:04X}h is no {kind}"
 
-    def check_told(self, action: str, word: int, *, forwarded: bool) -> None:
-        """What the owner is told of its telegram: a write that is kept from the drive says so."""
-        if action != "write":
+    def check_told(
+        self,
+        action: str,
+        values: Mapping[str, Any],
+        sent: tuple[int, ...],
+        *,
+        is_edge: bool,
+        silent: bool,
+        forwarded: bool,
+    ) -> None:
+        """*Forwarded* if and only if the wire says what was asked. ``values`` are those of a write;
+        ``is_edge``: of two acknowledges by the same register the second is none."""
+        words, word = self.rules.words, sent[0]
+        says = not silent
+        if action == "write":
+            says = says and self._carries(values, sent)
+            wanted = values.get("control_word", words.enable)
+            if self.is_tripped and (self.rules.reaction != "hold" or words.enabling.fit(wanted)):
+                # What is taken then is kept from the drive, even where that gets the same by itself.
+                assert not forwarded, "told as forwarded while tripped"
+                return
+        elif action in STRENGTH:
+            says = says and any(stop.fit(word) for stop in words.stops(action))
+        elif action == "reset_fault":
+            says = says and is_edge and bool(word & words.acknowledge)
+        else:
+            # Nothing is asked of the drive.
             return
-        if self.is_tripped:
-            assert self.is_held or self.rules.reaction == "hold" or not forwarded, (
-                "told as forwarded while tripped"
-            )
-        elif self.missing is Missing.NOTHING and not self.is_starting:
-            assert forwarded is self.rules.words.enabling.fit(word), "told as what was done"
+        assert forwarded is says, f"{action} told as {'' if forwarded else 'not '}forwarded"
+
+    def _carries(self, values: Mapping[str, Any], sent: tuple[int, ...]) -> bool:
+        """The telegram is what is sent. The acknowledge bit counts as an edge alone; the bridge hands
+        positions over."""
+        words, wanted = self.rules.words, values.get("control_word")
+        if wanted is not None:
+            if (wanted ^ sent[0]) & ~(words.acknowledge | words.handshake):
+                return False
+            if not words.enabling.fit(wanted):
+                return True
+        number = next((value for name, value in values.items() if name != "control_word"), None)
+        if number is None:
+            return True
+        size = 2 if "position" in values else 1
+        return tuple(number >> 16 * place & 0xFFFF for place in range(size)) == sent[1 : 1 + size]
 
     def check_kernel(self, until: float | None, then: tuple[int, ...], *, silent: bool) -> None:
         """What enables is on the bus until ``until``, whoever is alive then, and then ``then``."""

@@ -143,6 +143,7 @@ class Model(Memory):
         elif not is_late and self.lives(who):
             self.telegram(who)
         self.stop(kind)
+        self.asks = True
 
     def leave(self) -> None:
         self.stop()
@@ -204,7 +205,7 @@ class Model(Memory):
         self.telegram(who)
         if self.is_tripped or (is_reset and self.says in FAULTED):
             self.is_tripped = False
-            self.mute_at = self.coasts_at = None
+            self.mute_at = self.coasts_at = self.speaks_until = self.said = None
             self.stop_kind = ""
             self.stop()
             self.missing = Missing.STOP_WORD

@@ -45,6 +45,7 @@ class Times(NamedTuple):
     gone_at: float | None = None
     mute_at: float | None = None
     coasts_at: float | None = None
+    speaks_until: float | None = None
     start_until: float | None = None
     news_from: float | None = None
     news_until: float | None = None
@@ -66,6 +67,8 @@ class Seen(NamedTuple):
     is_tripped: bool = False
     stop_kind: str = ""
     """Tripped: how the drive is being stopped, by the reaction or by somebody who has asked for more."""
+    said: int | None = None
+    """The control word that has broken the silence."""
     watches: bool = True
     """The drive stops by itself without its RPDOs."""
     is_held: bool = False
@@ -118,11 +121,13 @@ class Memory:
     """What the rules remember, while one step is judged; the attributes are those of ``Seen`` and
     ``Times``."""
 
-    __slots__ = ("now", "rules", *Times._fields, *Seen._fields[1:])
+    __slots__ = ("asks", "now", "rules", *Times._fields, *Seen._fields[1:])
 
     def __init__(self, rules: Rules, seen: Seen, now: float) -> None:
         self.rules = rules
         self.now = now
+        self.asks = False
+        """Somebody has just asked for a stop."""
         (
             self.heard_at,
             self.deadline,
@@ -131,6 +136,7 @@ class Memory:
             self.gone_at,
             self.mute_at,
             self.coasts_at,
+            self.speaks_until,
             self.start_until,
             self.news_from,
             self.news_until,
@@ -147,6 +153,7 @@ class Memory:
             self.is_silent,
             self.is_tripped,
             self.stop_kind,
+            self.said,
             self.watches,
             self.is_held,
             self.missing,

@@ -161,11 +161,20 @@ class Space:
             assert both == alone, "a refused telegram changes nothing"
         else:
             assert may, f"{request.action} was taken"
+            is_edge = not request.pressed or request.identity != oracle.pressed_by
             self._tell(oracle, request)
+            sent, command = after.sent, request.command
             if answer is not None:
-                oracle.check_told(request.action, after.sent.words[0], forwarded=answer.outcome.forwarded)
-            if request.action in STOP_ACTIONS and not after.sent.silent:
-                oracle.check_stop(after.sent.words[0], request.action)
+                oracle.check_told(
+                    request.action,
+                    command.values if isinstance(command, Write) else {},
+                    sent.words,
+                    is_edge=is_edge,
+                    silent=sent.silent,
+                    forwarded=answer.outcome.forwarded,
+                )
+            if request.action in STOP_ACTIONS:
+                oracle.check_stop(sent.words[0], request.action)
         return self._end(leg, after, oracle, effects)
 
     def _may(self, oracle: Oracle, request: Request) -> bool:
@@ -317,6 +326,7 @@ class Space:
         after, effects = self._step(leg, StartAnew())
         oracle.stop()
         oracle.followed = True
+        oracle.said = None
         return self._time(leg, after, oracle, effects)
 
     def _gap(self, state: State) -> State:
@@ -350,7 +360,10 @@ class Space:
         assert was + begun == is_going_on + len(ended), "a start has one outcome"
         for number, outcome in enumerate(ended):
             if number >= was + begun - 1:
-                oracle.start_has_ended(is_done=outcome.code is Code.OK)
+                is_done = outcome.code is Code.OK
+                enables = self.rules.words.enabling.fit(leg.sent.words[0]) and not leg.sent.silent
+                assert enables or not is_done, "a start is told as done when the drive gets what enables it"
+                oracle.start_has_ended(is_done=is_done)
         oracle.look_at_way()
         assert oracle.is_starting is is_going_on, "a start goes on until something ends it"
         assert leg.stage.is_tripped is oracle.is_tripped, "tripped exactly if the owner's time was up"

@@ -34,7 +34,9 @@ def _instants(leg: LegState, seen: Seen) -> Instants:
         stopped_until,
         heard_at,
         deadline,
-        *leg.trip,
+        leg.trip.ramps_until,
+        leg.trip.silent_from,
+        leg.trip.burst_until,
         order.deadline,
         order.rises_at,
         leg.pulse_until,
@@ -47,25 +49,25 @@ def _instants(leg: LegState, seen: Seen) -> Instants:
 
 def _with(leg: LegState, seen: Seen, instants: Instants) -> State:
     owner, timer, start, order = leg.owner, leg.timer, leg.start, leg.order
-    lease_until, absent_until, stopped_until, heard_at, deadline, *trip = instants[:7]
+    lease_until, absent_until, stopped_until, heard_at, deadline = instants[:5]
     if start is not None:
         start = start._replace(
-            until=instants[10] or NOW,
-            settles_at=instants[11],
-            believed_at=instants[12],
-            leaves_at=instants[13],
+            until=instants[11] or NOW,
+            settles_at=instants[12],
+            believed_at=instants[13],
+            leaves_at=instants[14],
         )
     leg = leg._replace(
         owner=type(owner)(
-            owner.identity, owner.lease_s, lease_until, absent_until, stopped_until, *instants[14:16]
+            owner.identity, owner.lease_s, lease_until, absent_until, stopped_until, *instants[15:17]
         ),
         timer=type(timer)(timer.timeout_ms, heard_at, deadline, timer.is_overdue),
-        trip=type(leg.trip)(*trip),
-        order=order._replace(deadline=instants[7], rises_at=instants[8]),
-        pulse_until=instants[9],
+        trip=type(leg.trip)(instants[5], instants[6], instants[7], leg.trip.burst),
+        order=order._replace(deadline=instants[8], rises_at=instants[9]),
+        pulse_until=instants[10],
         start=start,
     )
-    return leg, seen._replace(times=Times(*instants[16:]))
+    return leg, seen._replace(times=Times(*instants[17:]))
 
 
 _timeless: dict[Instants, Instants] = {}

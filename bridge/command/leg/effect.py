@@ -41,6 +41,11 @@ class Tripped:
 
 
 @dataclass(frozen=True, slots=True)
+class LetGo:
+    """Somebody has stopped it by a command: nothing is held any more."""
+
+
+@dataclass(frozen=True, slots=True)
 class Ignored:
     """The controller is silent, and the site file has that ignored."""
 
@@ -54,4 +59,4 @@ class Tell:
     message: str
 
 
-Effect = Answer | StartBegun | StartEnded | Heard | Tripped | Ignored | Tell
+Effect = Answer | StartBegun | StartEnded | Heard | Tripped | LetGo | Ignored | Tell

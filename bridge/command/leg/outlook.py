@@ -49,6 +49,7 @@ def next_deadline(state: LegState) -> float | None:
         state.owner.lease_until,
         state.trip.ramps_until,
         state.trip.silent_from,
+        state.trip.burst_until,
         state.pulse_until,
         state.order.deadline,
         state.order.rises_at,

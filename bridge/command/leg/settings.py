@@ -50,6 +50,9 @@ class LegSettings:
     """The setpoints while nobody commands them; left out: all 0."""
     life: LifeSign | None = None
     """What the owner's program has to bring back."""
+    acknowledge_resumes: bool = False
+    """An acknowledge stands for a word that does not enable, unless somebody has stopped it by a command:
+    that asks for such a word of the owner's own."""
 
 
 def leg_settings(

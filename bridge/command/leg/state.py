@@ -44,6 +44,7 @@ class Stage(StrEnum):
     RAMPING = "ramping"
     TRIPPED = "tripped"
     SILENCED = "silent"
+    BURST = "burst"
     HELD = "held"
     LET_GO = "let go"
 
@@ -67,6 +68,7 @@ MEANING: Final[dict[Stage, str]] = {
     Stage.RAMPING: "quick stop is sent until the drive is at rest, for 10 s at most",
     Stage.TRIPPED: "disable voltage is sent, or with `stop` the family's stop",
     Stage.SILENCED: "nothing is sent; disable voltage where that would not stop the drive",
+    Stage.BURST: "a stop that somebody has asked for breaks the silence for 0.1 s",
     Stage.HELD: "what was sent before the trip is still sent",
     Stage.LET_GO: "a stop has replaced what was held",
 }
@@ -87,7 +89,9 @@ STARTING: Final = frozenset(
 UNHEARD: Final = frozenset((Stage.ASKING, Stage.PREPARED, Stage.BLIND))
 AWAITS_REPORT: Final = UNHEARD | {Stage.SETTLING}
 """What the drive says next counts, also where it says nothing new."""
-REACTING: Final = frozenset((Stage.RAMPING, Stage.TRIPPED, Stage.SILENCED))
+MUTE: Final = frozenset((Stage.SILENCED, Stage.BURST))
+"""Silence stops the drive, where it does."""
+REACTING: Final = MUTE | {Stage.RAMPING, Stage.TRIPPED}
 ANY_TRIP: Final = REACTING | {Stage.HELD, Stage.LET_GO}
 WANTS_STOP_WORD: Final = ANY_TRIP | {Stage.CLOSED, Stage.INTERLOCKED}
 """The owner has to send a word that does not enable before one that does goes to the drive."""
@@ -168,10 +172,14 @@ class Start(NamedTuple):
 
 
 class Trip(NamedTuple):
-    """When a quick stop becomes disable voltage at the latest, and when nothing is sent any more."""
+    """When a quick stop becomes disable voltage at the latest, when nothing is sent any more, and when a stop
+    that breaks the silence ends."""
 
     ramps_until: float | None = None
     silent_from: float | None = None
+    burst_until: float | None = None
+    burst: int | None = None
+    """Control word that the silence was broken by."""
 
 
 class Order(NamedTuple):

@@ -23,6 +23,7 @@ from bridge.command.leg.event import (
     StartAnew,
     Time,
 )
+from bridge.command.leg.forwarded import SENT_BEFORE, Edge, Stop, Words, judged
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import (
     LegState,
@@ -94,6 +95,7 @@ def step(settings: LegSettings, state: LegState, event: Event, now: float) -> tu
             owners.on_connection(turn, event)
             return turn.end(), turn.effects
     turn.settle()
+    effects = judged(settings, turn.asked, turn.sent, turn.effects)
     if isinstance(event, StartAnew):
         # What the drive says from now on is from after all that it was told.
         if turn.motion is Motion.EXPECTED:
@@ -101,7 +103,7 @@ def step(settings: LegSettings, state: LegState, event: Event, now: float) -> tu
         elif turn.motion is Motion.FAULTED:
             turn.motion = Motion.ENDED
     after = turn.end()
-    return (state if after == state else after), turn.effects
+    return (state if after == state else after), effects
 
 
 def _report(turn: Turn, report: Report) -> None:
@@ -123,6 +125,7 @@ def _follow(turn: Turn, actual: tuple[int, ...]) -> None:
 
 def _start_anew(turn: Turn) -> None:
     turn.happens(Stimulus.ANEW, Outcome(Code.CANCELLED, "the drive has to be enabled anew"))
+    turn.trip = turn.trip._replace(burst=None)
     turn.stop(turn.settings.words.stop(turn.sent.words[0]))
 
 
@@ -179,7 +182,7 @@ def _carry_out(turn: Turn, request: Request) -> Outcome:
         case Do(action=Action.RESET_FAULT):
             return _reset_fault(turn, request)
         case Do(action=Action.STOP | Action.QUICK_STOP | Action.DISABLE_VOLTAGE):
-            _stop(turn, request)
+            return _stop(turn, request)
         case TakeControl(ttl_ms=ttl_ms):
             owners.take_control(turn, request.identity, ttl_ms)
         case Do(action=Action.RELEASE_CONTROL):
@@ -222,11 +225,13 @@ def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome
             _acknowledge(turn, request, pulse=False)
             # The edge itself goes on to the drive; whatever else the word asks has to be asked anew.
             turn.word |= mask
-            return Outcome(Code.OK, "acknowledged; the drive stays stopped", forwarded=False)
+            turn.asked = Words(word, telegram.setpoints)
+            return Outcome(Code.OK, "acknowledged; the drive stays stopped")
         if not is_edge and not turn.word & mask:
             word &= ~mask  # what was sent meanwhile would make an edge of a bit that never fell
     turn.hear(arrival_of(request, turn.now))
     if _take(turn, word, telegram.setpoints, values) is Deed.FORWARD:
+        turn.asked = Words(word, telegram.setpoints)
         return DONE
     return Outcome(Code.OK, turn.why_blocked, forwarded=False)
 
@@ -249,6 +254,8 @@ def _take(turn: Turn, word: int | None, setpoints: tuple[int, ...], values: Mapp
     if word is None:
         return turn.happens(Stimulus.SETPOINTS)
     turn.word, turn.is_ours = word, False
+    if is_stop and turn.settings.acknowledge_resumes and not turn.is_tripped:
+        turn.is_asked = False
     return turn.happens(Stimulus.STOP_WORD if is_stop else Stimulus.ENABLING_WORD, _OVERWRITTEN)
 
 
@@ -259,6 +266,7 @@ def _take_stale_stop(turn: Turn, word: int, why: str) -> Outcome:
     turn.stop(word & ~acknowledge | turn.word & acknowledge, is_asked=True)
     if turn.happens(Stimulus.LATE_STOP, _OVERWRITTEN) is Deed.TAKE:
         return Outcome(Code.OK, turn.why_blocked, forwarded=False)
+    turn.asked = Words(word, turn.rest)
     return Outcome(Code.OK, why)
 
 
@@ -275,6 +283,7 @@ def _reset_fault(turn: Turn, request: Request) -> Outcome:
             return Outcome(Code.OK, "no edge: the telegram before it acknowledged, too", forwarded=False)
     owners.own(turn, request)
     _acknowledge(turn, request, pulse=True)
+    turn.asked = Edge()
     return DONE
 
 
@@ -287,7 +296,7 @@ def _acknowledge(turn: Turn, request: Request, *, pulse: bool) -> None:
         turn.tell(Kind.WATCHDOG, 200, f"acknowledged by {by}; the drive stays stopped")
 
 
-def _stop(turn: Turn, request: Request) -> None:
+def _stop(turn: Turn, request: Request) -> Outcome:
     """Stop, by whoever asks. The owner's telegrams go on counting, its old enable does not."""
     who, action, words = request.identity, request.action, turn.settings.words
     owner = turn.owner
@@ -304,8 +313,15 @@ def _stop(turn: Turn, request: Request) -> None:
         Action.QUICK_STOP: words.quick_stop,
         Action.DISABLE_VOLTAGE: words.disable_voltage,
     }
+    turn.run_out()  # what is silent by now has to be broken
+    word = changes[action](turn.sent.words[0])
+    if turn.has_been_sent(word):
+        turn.happens(Stimulus.STOP_AGAIN)
+        return Outcome(Code.OK, SENT_BEFORE, forwarded=False)
     turn.happens(Stimulus.STOP, Outcome(Code.CANCELLED, f"{action} by {who}"))
-    turn.stop_as_asked(changes[action](turn.sent.words[0]))
+    turn.stop_as_asked(word)
+    turn.asked = Stop(changes[action])
+    return DONE
 
 
 def _start(turn: Turn, request: Request, direction: int) -> None:

@@ -29,6 +29,7 @@ class Stimulus(StrEnum):
     LEFT = "owner releases, loses its lease or is replaced; the bridge hung"
     # anybody
     STOP = "stop by a command"
+    STOP_AGAIN = "stop by a command that was sent in this silence already"
     # a start
     START = "start of a drive that stands"
     START_STOPPING = "start while a stop is on its way"
@@ -44,6 +45,7 @@ class Stimulus(StrEnum):
     START_OVERDUE = "3 s since the start began"
     RAMP_OVERDUE = "10 s since the trip"
     SILENCE_DUE = "then_silence_ms since the trip"
+    BURST_OVER = "0.1 s since the silence was broken"
     # the drive
     SAYS_ENABLED = "drive says: operation enabled"
     SAYS_BRAKING = "drive says: quick stop active"
@@ -66,6 +68,7 @@ class Deed(StrEnum):
     CLEAR_STOP = "clear the fault, stop"
     REACT = "reaction, fault"
     SILENCE = "send nothing"
+    KEEP_SILENT = "go on sending nothing"
     WAIT = "hold the stop, wait"
     READY = "send READY"
     GO_ON = "answer with the next word"
@@ -81,7 +84,7 @@ _Row = Mapping[Iterable[Stage], tuple[Stage | None, Deed]]
 _OPEN: Final = (_S.READY, _S.ENABLED)
 _SHUT: Final = (_S.CLOSED,)
 _LOCKED: Final = (_S.INTERLOCKED,)
-_REACTING: Final = (_S.RAMPING, _S.TRIPPED, _S.SILENCED)
+_REACTING: Final = (_S.RAMPING, _S.TRIPPED, _S.SILENCED, _S.BURST)
 _HOLDING: Final = (_S.HELD, _S.LET_GO)
 _FREE: Final = (*_LOCKED, *_OPEN, *STARTING)
 """Neither closed nor tripped."""
@@ -136,7 +139,8 @@ _ROWS: Final[dict[Stimulus, _Row]] = {
         (*_FREE, *ANY_TRIP): (_S.INTERLOCKED, Deed.CLEAR_STOP),
     },
     Stimulus.LEFT: _stops(),
-    Stimulus.STOP: _stops(),
+    Stimulus.STOP: {**_stops(), (_S.SILENCED,): (_S.BURST, Deed.STOP)},
+    Stimulus.STOP_AGAIN: {(_S.SILENCED,): (None, Deed.KEEP_SILENT)},
     Stimulus.START: _starts(_S.LEADING, Deed.GO_ON),
     Stimulus.START_STOPPING: _starts(_S.SETTLING, Deed.WAIT),
     Stimulus.START_UNHEARD: {
@@ -159,6 +163,7 @@ _ROWS: Final[dict[Stimulus, _Row]] = {
     Stimulus.START_OVERDUE: {tuple(STARTING): (_S.INTERLOCKED, Deed.GIVE_UP)},
     Stimulus.RAMP_OVERDUE: {(_S.RAMPING,): (_S.TRIPPED, Deed.REACT)},
     Stimulus.SILENCE_DUE: {(_S.RAMPING, _S.TRIPPED): (_S.SILENCED, Deed.SILENCE)},
+    Stimulus.BURST_OVER: {(_S.BURST,): (_S.SILENCED, Deed.SILENCE)},
     Stimulus.SAYS_ENABLED: {tuple(STARTING): (_S.ENABLED, Deed.DONE)},
     Stimulus.SAYS_BRAKING: {tuple(AWAITS_REPORT): (_S.BRAKING, Deed.WAIT)},
     Stimulus.SAYS_AT_REST: {

@@ -7,11 +7,13 @@ from typing import Final
 
 from bridge.command.event import Kind
 from bridge.command.leg import order
-from bridge.command.leg.effect import Effect, Heard, Ignored, StartEnded, Tell, Tripped
+from bridge.command.leg.effect import Effect, Heard, Ignored, LetGo, StartEnded, Tell, Tripped
+from bridge.command.leg.forwarded import Asked
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import (
     BLOCKED,
     MAY_FOLLOW_LATE,
+    MUTE,
     REACTING,
     RESTS,
     STARTING,
@@ -30,6 +32,9 @@ from bridge.drive import FAULTED, MOVING, ControlWords, DriveState
 
 _ACKNOWLEDGE_PULSE_S: Final = 0.1
 """How long a generated acknowledge edge stays on the bus: longer than any cycle we send with."""
+_BURST_S: Final = 0.1
+"""How long a stop breaks the silence: as long, so that the drive has it for certain; then the drive's own
+supervision goes on."""
 _RAMP_LIMIT_S: Final = 10.0
 """After that a quick stop by the watchdog is followed by disable voltage in any case: Lenze's holds the motor
 for ever, and so does CiA 402's with 605Ah = 5 … 8."""
@@ -47,12 +52,14 @@ _values = attrgetter(*LegState._fields)
 class Turn:
     """Made from a state, changed, and made a state again. The attributes are those of ``LegState``."""
 
-    __slots__ = ("effects", "now", "settings", *LegState._fields)
+    __slots__ = ("asked", "effects", "now", "settings", *LegState._fields)
 
     def __init__(self, settings: LegSettings, state: LegState, now: float) -> None:
         self.settings = settings
         self.now = now
         self.effects: list[Effect] = []
+        self.asked: Asked | None = None
+        """What a request asks of the bus: its answer is judged by that."""
         (
             self.way,
             self.timer,
@@ -158,14 +165,26 @@ class Turn:
         has to."""
         self.word = word
         self.is_ours = True
-        self.is_asked = is_asked
+        # Where an acknowledge resumes, nothing but the owner's own word ends a stop that somebody asked for.
+        self.is_asked = is_asked or (self.is_asked and self.settings.acknowledge_resumes)
         self.drop_setpoints()
 
     def stop_as_asked(self, word: int) -> None:
         """A stop by a command, made from the word that is sent. A reaction of the watchdog goes on from it,
-        too: after a ramp was begun, somebody may still disable the voltage."""
+        too: after a ramp was begun, somebody may still disable the voltage. Silence is broken for it, once
+        for each stop: whoever asks for the same again and again must not keep the drive's own supervision
+        from tripping."""
+        is_new = word != self.trip.burst
         self.stop(word, is_asked=True)
         self.sent = Output((word, *self.rest), self.sent.silent)
+        self.effects.append(LetGo())
+        if self.stage is Stage.BURST and (is_new or self.trip.burst_until is None):
+            self.trip = self.trip._replace(burst_until=self.now + _BURST_S)
+
+    def has_been_sent(self, word: int) -> bool:
+        """This stop has broken the silence before, and nothing is sent any more."""
+        is_silent = self.stage is Stage.SILENCED and self.silence_stops
+        return is_silent and word == self.trip.burst
 
     def drop_setpoints(self) -> None:
         self.setpoints = self.rest
@@ -227,10 +246,16 @@ class Turn:
         ``pulse`` an acknowledge edge is sent to the drive."""
         is_reset = pulse and self.drive in FAULTED
         word = self.word_at_rest
+        if self.settings.reaction == "silence" and self.is_tripped and self.trip.burst is None:
+            # Nobody has asked for a ramp.
+            word = self.settings.words.disable_voltage(word)
         deed = self.happens(Stimulus.ACKNOWLEDGE_FAULT if is_reset else Stimulus.ACKNOWLEDGE)
         self.trip = Trip()
         if deed is Deed.CLEAR_STOP:
             self.stop(word)
+        if self.settings.acknowledge_resumes and self.stage is Stage.INTERLOCKED and not self.is_asked:
+            # Whoever acknowledges means to go on: nothing is active by that.
+            self.happens(Stimulus.STOP_WORD)
         if pulse:
             self.pulse_until = self.now + _ACKNOWLEDGE_PULSE_S
 
@@ -275,25 +300,18 @@ class Turn:
 
     def settle(self) -> None:
         """Bring the way to the drive and what is sent up to date."""
-        now = self.now
         self.look_at_way()
-        ramps_until, silent_from = self.trip
-        if ramps_until is not None and now >= ramps_until:
-            self.happens(Stimulus.RAMP_OVERDUE)
-            self.trip = self.trip._replace(ramps_until=None)
-        if silent_from is not None and now >= silent_from:
-            self.happens(Stimulus.SILENCE_DUE)
-            self.trip = self.trip._replace(silent_from=None)
-        if self.pulse_until is not None and now >= self.pulse_until:
-            self.pulse_until = None
+        self.run_out()
         was_enabling = self.is_enabling
         _send(self)
+        if self.stage is Stage.BURST:
+            self.trip = self.trip._replace(burst=self.sent.words[0])
         handshake = self.settings.handshake
         if handshake is not None:
             self.order, is_untaken = order.went_on(
                 self.order,
                 tuple(self.setpoints[place] for place in handshake.places),
-                now,
+                self.now,
                 is_taken=self.is_taken,
                 commanded=self.is_commanded,
             )
@@ -305,6 +323,22 @@ class Turn:
             if not was_enabling:
                 self.motion = Motion.SEEN if self.is_enabled else Motion.EXPECTED
             self.is_asked = False
+
+    def run_out(self) -> None:
+        """What has its time only: the ramp of a reaction, the time before its silence, a burst, a pulse."""
+        now = self.now
+        ramps_until, silent_from, burst_until, _ = self.trip
+        if ramps_until is not None and now >= ramps_until:
+            self.happens(Stimulus.RAMP_OVERDUE)
+            self.trip = self.trip._replace(ramps_until=None)
+        if silent_from is not None and now >= silent_from:
+            self.happens(Stimulus.SILENCE_DUE)
+            self.trip = self.trip._replace(silent_from=None)
+        if burst_until is not None and now >= burst_until:
+            self.happens(Stimulus.BURST_OVER)
+            self.trip = self.trip._replace(burst_until=None)
+        if self.pulse_until is not None and now >= self.pulse_until:
+            self.pulse_until = None
 
 
 # What goes to the drive: the owner's words, or a stop in their place. Nothing that enables a drive gets past
@@ -334,17 +368,17 @@ def _send(turn: Turn) -> None:
 
 def _reaction(turn: Turn) -> Output:
     word = _reaction_word(turn)
-    is_silent = turn.stage is Stage.SILENCED
-    if is_silent and not turn.silence_stops:
+    if turn.stage in MUTE and not turn.silence_stops:
         return Output((turn.settings.words.disable_voltage(word), *turn.rest))
+    is_silent = turn.stage is Stage.SILENCED
     return Output((word, *turn.rest), is_silent)
 
 
 def _reaction_word(turn: Turn) -> int:
     reaction, words, word = turn.settings.reaction, turn.settings.words, turn.sent.words[0]
-    if reaction != "stop" and turn.trip.ramps_until is None:
+    if reaction == "disable_voltage" or (reaction == "quick_stop" and turn.trip.ramps_until is None):
         return words.disable_voltage(word)
-    stopped = words.stop(word) if reaction == "stop" else words.quick_stop(word)
+    stopped = words.quick_stop(word) if reaction == "quick_stop" else words.stop(word)
     return words.withhold(stopped) if turn.motion in RESTS else stopped
 
 

@@ -101,6 +101,8 @@ CELLS: Final[dict[str, tuple[str, Stage, Stimulus, Cell]]] = {
     "nor a bus that was gone": ("way", _S.ENABLED, _E.ANEW, (_S.READY, _D.STOP)),
     "nor a node that was gone": ("way", _S.CLOSED, _E.WAY_OPEN, (_S.READY, _D.NOTHING)),
     "a lost node does nothing": ("way", _S.ENABLED, _E.WAY_CLOSED, (_S.ENABLED, _D.NOTHING)),
+    "a stop does not break the silence": ("silence", _S.SILENCED, _E.STOP, (_S.SILENCED, _D.STOP)),
+    "and one that does has no end": ("silence", _S.BURST, _E.BURST_OVER, (_S.BURST, _D.NOTHING)),
     "silence does not come": (
         "stop, then silence",
         _S.TRIPPED,
@@ -192,6 +194,8 @@ DEEDS: Final[dict[str, tuple[str, object, str, object]]] = {
     "a word lifts the interlock": ("telegrams", turn, "at_rest", lambda words, word: words.run),
     "a quick stop is a ramp": ("quick_stop", turn, "_reaction_word", _weak),
     "a quick stop has no end": ("quick_stop", turn, "_RAMP_LIMIT_S", 20.0),
+    "what is asked is told as sent": ("moved", step, "judged", lambda *given: given[-1]),
+    "who asks again breaks the silence again": ("silence", Turn, "has_been_sent", lambda leg, word: False),
     "silence speaks": ("silence", turn, "_reaction", _speaks),
     "a reaction keeps setpoints": ("telegrams", turn, "_reaction", _moves),
     "a lease has no end": ("lease", Turn, "judge", _before(Turn.judge, _loses_its_lease)),

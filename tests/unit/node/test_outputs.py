@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from bridge.canopen.frame import Frame
 from bridge.command import Action, Code, Identity, Kind, Outcome, Source
+from bridge.command.request import STOP_ACTIONS
 from bridge.image import Quality, Value
 from tests.support.bench import PLC, Bench
 from tests.support.devices import IO_BLOCK, OUTPUTS, device_bench, io_block
@@ -95,8 +96,35 @@ def test_nobody_else_writes_them_and_anybody_stops_them(bench: Bench) -> None:
     assert write(bench, OTHER, valves=1).code is Code.NOT_ALLOWED
     assert bench.ask(Action.STOP, "shaft", OTHER).ok
     bench.run(0.02)
-    assert held(bench) == {"valves": 0, "speed": 5.0, "lamp": 3}
+    assert held(bench) == shown(bench) == {"valves": 0, "speed": 5.0, "lamp": 0}
     assert bench.value("shaft/supervision/refused_writes") == 1
+
+
+@pytest.mark.parametrize("action", sorted(STOP_ACTIONS))
+def test_a_stop_by_anybody_ends_what_a_dead_owner_left_on(bench: Bench, action: Action) -> None:
+    """``hold`` speaks of silence, never of somebody's Stop (shared design, watchdog, third edition)."""
+    go(bench)
+    bench.run(0.4)
+    assert (bench.value("shaft/supervision/watchdog_state"), held(bench)["lamp"]) == (3, 3)
+    assert bench.ask(action, "shaft", OTHER) == Outcome(Code.OK)
+    bench.run(0.02)
+    assert held(bench) == shown(bench) == {"valves": 0, "speed": 5.0, "lamp": 0}
+
+
+@pytest.mark.parametrize("is_dead", [False, True])
+def test_an_acknowledge_takes_no_stop_by_somebody_else_back(bench: Bench, is_dead: bool) -> None:
+    """A PLC that acknowledges in each cycle does not mean the colleague's stop."""
+    go(bench)
+    if is_dead:
+        bench.run(0.4)
+    bench.ask(Action.STOP, "shaft", OTHER)
+    for _ in range(5):
+        assert bench.ask(Action.RESET_FAULT, "shaft").ok
+        assert not write(bench, valves=0x81, lamp=3).forwarded
+        assert held(bench) == {"valves": 0, "speed": 5.0, "lamp": 0}
+    assert write(bench, valves=0, speed=5.0, lamp=0).forwarded, "an edge of the owner's own"
+    assert write(bench, valves=0x81, lamp=3).forwarded
+    assert held(bench)["valves"] == 0x81
 
 
 def test_a_node_that_was_away_gets_nothing_active_by_itself(bench: Bench) -> None:

@@ -1,0 +1,78 @@
+"""Whether what a request asks is on the bus: an answer says *forwarded* only where the words that are sent
+say so. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+from bridge.command.leg.effect import Answer, Effect
+from bridge.command.leg.settings import LegSettings
+from bridge.command.leg.state import Output
+from bridge.command.request import Code, Outcome
+
+SILENT: Final = "nothing is sent, so that the drive's own supervision stops it"
+SENT_BEFORE: Final = (
+    "sent in this silence already; nothing is sent, so that the drive's own supervision stops it"
+)
+_KEPT: Final = "the setpoints stay at rest until the drive is enabled"
+_REPLACED: Final = "a stop that is in force is sent instead"
+
+
+class Words(NamedTuple):
+    """A control word, None where none is written, and the setpoints that are to go with it."""
+
+    word: int | None
+    setpoints: tuple[int, ...]
+
+
+class Stop(NamedTuple):
+    """A stop, by the function that makes it of a control word: it leaves one as it is that stops as much."""
+
+    of: Callable[[int], int]
+
+
+class Edge(NamedTuple):
+    """An acknowledge bit of the bridge's own."""
+
+
+Asked = Words | Stop | Edge
+
+
+def why_not(settings: LegSettings, asked: Asked, sent: Output) -> str:
+    """Why ``sent`` does not say what is asked; empty where it does."""
+    if sent.silent:
+        return SILENT
+    words = settings.words
+    word, *setpoints = sent.words
+    match asked:
+        case Stop(of=of):
+            return "" if of(word) == word & ~words.acknowledge_mask else _REPLACED
+        case Edge():
+            return "" if word & words.acknowledge_mask else _REPLACED
+        case Words(word=wanted, setpoints=values):
+            if wanted is not None and (wanted ^ word) & ~_free(settings):
+                return _REPLACED
+            # With a stop they are nothing.
+            is_stop = wanted is not None and not words.enables(wanted)
+            return "" if is_stop or values == tuple(setpoints) else _KEPT
+
+
+def _free(settings: LegSettings) -> int:
+    """Bits in which a word may differ: an acknowledge bit counts as an edge only, and the bridge itself adds
+    the one that hands over a position."""
+    return settings.words.acknowledge_mask | (settings.handshake.mask if settings.handshake else 0)
+
+
+def judged(settings: LegSettings, asked: Asked | None, sent: Output, effects: list[Effect]) -> list[Effect]:
+    """``effects`` of a request with its answer as ``sent`` has it."""
+    why = "" if asked is None else why_not(settings, asked, sent)
+    if not why:
+        return effects
+    return [_not_forwarded(one, why) if isinstance(one, Answer) else one for one in effects]
+
+
+def _not_forwarded(answer: Answer, why: str) -> Answer:
+    if answer.is_refused or not answer.outcome.forwarded:
+        return answer
+    return Answer(Outcome(Code.OK, answer.outcome.message or why, forwarded=False))

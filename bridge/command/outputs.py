@@ -3,7 +3,7 @@
 They are commanded by the same leg as drives. Its control word has one bit: the telegram of an owner that
 leaves every output safe stops, any other is active. So the rules of a drive hold word by word: who owns them,
 how long an owner may be silent, and that after a trip or a pause of the node nothing is active until the
-owner has acknowledged or has sent the safe values once.
+owner has acknowledged or has sent the safe values once; after a stop by a command, until it has sent them.
 """
 
 from __future__ import annotations

@@ -42,8 +42,14 @@ _REASONS: Final[tuple[tuple[str, Iterable[Stimulus], Iterable[Stage]], ...]] = (
     (
         "a ramp has a limit only as the reaction, and only until the drive rests",
         [_E.RAMP_OVERDUE],
-        {*Stage} - {_S.RAMPING, _S.SILENCED},
+        {*Stage} - {_S.RAMPING, _S.SILENCED, _S.BURST},
     ),
+    (
+        "nothing but silence is broken, and the same stop does not break it while it is sent",
+        [_E.STOP_AGAIN],
+        {*Stage} - {_S.SILENCED},
+    ),
+    ("only a burst has an end", [_E.BURST_OVER], {*Stage} - {_S.BURST}),
     ("silence follows a reaction that stops, once", [_E.SILENCE_DUE], {*Stage} - {_S.RAMPING, _S.TRIPPED}),
 )
 

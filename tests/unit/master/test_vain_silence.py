@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.command import Code, Event, Identity, Outcome, Request, Role, Source, WriteParameter
+from bridge.command import Action, Code, Event, Identity, Outcome, Request, Role, Source, WriteParameter
+from bridge.command.request import STOP_ACTIONS
 from bridge.command.worst_case import stop_time
 from bridge.config import load_site
 from bridge.drive import DriveState
@@ -205,3 +206,22 @@ def test_of_a_write_that_nobody_answered_the_watch_is_not_known(tmp_path: Path) 
     (event,) = bench.told()
     assert "P151" in event.message
     assert bench.stop_ms == plain_ms(bench)
+
+
+@pytest.mark.parametrize("drive", [SILENCE, THEN_SILENCE])
+@pytest.mark.parametrize("action", sorted(STOP_ACTIONS))
+def test_a_stop_by_anybody_is_on_the_bus_though_the_drive_gets_nothing_any_more(
+    tmp_path: Path, drive: str, action: Action
+) -> None:
+    """As one burst: then the drive's own P151 trips all the same (BU 2500 §7.1.1)."""
+    bench = Silent(tmp_path, TU4, "fu1", drive, P151=300.0)
+    bench.run_the_drive()
+    bench.run(0.25)
+    assert not bench.rpdos(0.03)
+    assert bench.ask(action, bench.name, ENGINEER) == Outcome(Code.OK)
+    assert 2 <= bench.rpdos(0.2) <= 12
+    assert not any(bench.drive.channel.words.enables(frame.data[0]) for frame in bench.sent(0x205))
+    assert not bench.rpdos(0.3)
+    assert not bench.ask(action, bench.name, ENGINEER).forwarded
+    assert not bench.rpdos(0.5)
+    assert bench.drive.channel.state is DriveState.FAULT, "P151 has tripped"

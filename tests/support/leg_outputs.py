@@ -22,7 +22,7 @@ from tests.support.leg_seen import Seen, Times
 from tests.support.leg_time import NOW, ahead, come, timeless
 
 ON: Final = 0xFE
-_NAMES: Final = ("valves", "lamp")
+_NAMES: Final[tuple[str, ...]] = ("valves", "lamp")
 
 
 class _State(NamedTuple):
@@ -56,8 +56,9 @@ class OutputSpace:
         self.safe = tuple(0 if value == "hold" else int(value) for value in on_expiry)
         """What they get after somebody's Stop."""
         self.expiry = on_expiry
-        stop, active = dict(zip(_NAMES, self.safe, strict=True)), dict.fromkeys(_NAMES, ON)
-        self.events: dict[str, Callable[[], None]] = {
+        stop: dict[str, Value] = dict(zip(_NAMES, self.safe, strict=True))
+        active: dict[str, Value] = dict.fromkeys(_NAMES, ON)
+        self.events: dict[str, Callable[[], object]] = {
             "owner writes what is safe": lambda: self._write(PLC, stop),
             "owner writes": lambda: self._write(PLC, active),
             "rival writes": lambda: self._write(OTHER_PLC, active),
@@ -76,6 +77,7 @@ class OutputSpace:
             "bus back": lambda: self._happen(StartAnew()),
             "nothing is due": lambda: self._happen(Time()),
         }
+        self.is_stopped = False
         self.steps = 0
 
     def _settled(self) -> None:

@@ -50,7 +50,7 @@ def test_the_stop_that_breaks_the_silence_is_the_one_that_was_asked_for() -> Non
 
 def test_who_asks_again_and_again_does_not_keep_the_drives_supervision_from_tripping() -> None:
     rig = silent()
-    stop(rig)
+    last = stop(rig)
     spoken_s = 0.0
     for _ in range(100):
         rig.wait(0.01)

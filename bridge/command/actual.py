@@ -14,6 +14,8 @@ from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Meaning, Slot
 
 _GOOD: Final = (Quality.GOOD, "")
+_SPEEDS: Final = ("frequency", "velocity")
+"""Names of the value by which one sees whether a drive slows down."""
 _STATUS: Final = ("status_word", "drive_status_word", "state", "emcy_code")
 
 
@@ -41,6 +43,8 @@ class _Compiled:
     plain: tuple[_Plain, ...]
     others: tuple[ValueCodec, ...]
     judged: tuple[_Judged, ...]
+    speed: ValueCodec | None
+    """None where the TPDO with the status word brings no actual speed."""
 
 
 class ActualData:
@@ -113,12 +117,25 @@ class ActualData:
             tuple(_plain(codec) for codec, _ in found if codec.is_plain),
             tuple(codec for codec, _ in found if not codec.is_plain),
             tuple(self._to_judge(self._channel.unserved, found, in_set)),
+            next((codec for codec, lack in found if self._is_speed(codec, lack)), None),
+        )
+
+    def _is_speed(self, codec: ValueCodec, lack: Lack | None) -> bool:
+        """Served by the TPDO with the status word. Its scale does not matter."""
+        unserved = [
+            f"actual/{leaf}" for leaf in (codec.model.name, *(self._process[n] for n in codec.places))
+        ]
+        is_served = codec.places and not any(leaf in self._channel.unserved for leaf in unserved)
+        is_known = lack is None or codec.is_unknown
+        return bool(codec.model.name in _SPEEDS and is_served and is_known) and not self._further_of(
+            codec.places
         )
 
     def _use(self, status_word: int) -> None:
         """Words mean what they mean in the parameter set that the drive tells."""
         compiled = self._of_sets[self._set.of(status_word)]
         self._plain, self._others, self._judged = compiled.plain, compiled.others, compiled.judged
+        self._speed = compiled.speed
         self._shown = None
 
     def _to_judge(
@@ -182,15 +199,21 @@ class ActualData:
             self.refresh(now)
         else:
             self._refresh_values(now)
-        self._following.after_pdo(now)
+        self._judge_stop(now)
 
     def on_unchanged_data(self, now: float) -> None:
         """A TPDO that says what the last one said."""
         self._following.before_pdo(now)
         self._channel.on_unchanged(now)
-        self._following.after_pdo(now)
+        self._judge_stop(now)
         if self.quality is not Quality.GOOD:
             self.refresh(now)
+
+    def _judge_stop(self, now: float) -> None:
+        """By the TPDO that has just come."""
+        self._following.after_pdo(now)
+        speed = None if self._speed is None else float(self._speed.from_words(self.words))
+        self._following.on_telegram(now, speed)
 
     def refresh(self, now: float) -> None:
         channel = self._channel

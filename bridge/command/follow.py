@@ -1,10 +1,7 @@
 """Does a drive do what its last stop asked? The judgement, without a drive.
 
-A stop is *forwarded* when it has been handed to the bus, *followed* when the drive says so, and *ignored*
-when the drive says at the end of the bound that it is still enabled. The same look finds a drive that is
-enabled although nothing that enables was sent: a deaf RPDO, another master and a broken drive are one case.
-
-What follows an ignored stop may halt a plant, so nothing is called ignored that may be something else:
+docs/explanation/dead-man-chain.md, "A stop that is not followed". What follows an ignored stop may halt a plant,
+so nothing is called ignored that may be something else:
 
 - The bound begins when the stop has been handed to the bus, not when it was decided.
 - What counts is when the drive's telegram was received. A drive ignores its stop by a telegram received after
@@ -14,14 +11,13 @@ What follows an ignored stop may halt a plant, so nothing is called ignored that
   restarts with the first telegram after the pause, or when its node is in operation.
 - A word that takes the voltage has a short bound; any other stop may be a ramp, with a long one. The bound of
   the weaker word holds as long as the drive may still have that word.
-- A drive that reports that it is not enabled has ended its ramp. If it reports enabled again, it has until
-  the short bound after the stop. A drive that has not said since the enabling word that it was enabled has
-  perhaps not had that word yet: its ramp may still begin.
-- Where the word leaves the voltage on, a drive may hold the motor, and may be enabled for a moment on its
-  way there: it gets a bound for that, too.
+- A drive that reports that it is not enabled has ended its ramp: enabled again, it has until the short bound
+  after the stop. One that has not said since the enabling word that it was enabled has perhaps not had it yet.
+- Where the word leaves the voltage on, a drive may hold the motor, or be enabled on its way there for a bound.
 - A drive that the bridge itself cuts off, by an NMT stop of its node, is judged by its last report: if that
   was *enabled* and the drive is not known to stop in that state, it ignores its stop when the bound has
   passed.
+- Stops that are shorter than their bound are summed until the drive obeys (``unfollowed.py``).
 - The ramp of a fault may come at any time, and has its bound from then.
 - A status word that fits no state of the family says nothing.
 """
@@ -32,6 +28,8 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 from math import inf
 from typing import Final
+
+from bridge.command.unfollowed import StopTime, Unfollowed
 
 _LOOK_AGAIN_S: Final = 1.0
 """How often a drive that is no longer heard is looked at."""
@@ -81,6 +79,10 @@ class Bounds:
     off_s: float
     ramp_s: float
     silence_s: float | None = None
+    seen_off_s: float = inf
+    """After a word that takes the voltage the drive has said so by then, unless telegrams were lost."""
+    seen_s: float = inf
+    """After any stop the drive's telegrams tell of its ramp by then."""
 
     def of(self, sent: Sent) -> float | None:
         return {Sent.OFF: self.off_s, Sent.RAMP: self.ramp_s, Sent.SILENT: self.silence_s}.get(sent)
@@ -98,6 +100,8 @@ class Verdict:
     again: bool = False
     is_cut_off: bool = False
     """The bridge had taken the drive's node out of operation, and it has said nothing else since."""
+    summed: StopTime | None = None
+    """Stops that it ignores together, each of them too short to be judged by itself."""
 
 
 class Follow:
@@ -129,6 +133,7 @@ class Follow:
         self._graced = False
         self._disobeyed_at = -inf
         self._look_at = -inf
+        self._unfollowed = Unfollowed()
         self._verdicts: list[Verdict] = []
 
     @property
@@ -183,6 +188,7 @@ class Follow:
             self._until = until if self._until == inf else max(self._until, min(until, last))
         if sent is not Sent.SILENT:
             self._off_since = now if sent is Sent.OFF else inf
+        self._begin_sums()
 
     def on_node(self, *, is_there: bool) -> None:
         """The node is in operation, or is not."""
@@ -192,6 +198,7 @@ class Follow:
         if self._is_cut_off and not is_there:
             return
         self._forget()
+        self._unfollowed = Unfollowed()
         self._says = Says.NOTHING
         if is_there and self._sent is not Sent.ENABLES:
             self._begin()
@@ -239,7 +246,13 @@ class Follow:
         self._rested = self._graced = False
         self._is_cut_off = self._was_enabled = self._rose = False
         self._look_at = -inf
+        self._unfollowed = self._unfollowed.end()
         self._verdicts.clear()
+
+    def _begin_sums(self) -> None:
+        if self._since is not None:
+            on_from = self._off_since + self._bounds.seen_off_s
+            self._unfollowed = self._unfollowed.begin(on_from, self._since + self._bounds.seen_s)
 
     # what the drive does
 
@@ -252,6 +265,20 @@ class Follow:
         self._off_since = at if self._on_bus is Sent.OFF else inf
         self._stopping_since = at
         self._look_at = -inf
+        self._begin_sums()
+
+    def on_telegram(self, at: float, speed: float | None) -> None:
+        """Any telegram, of which ``on_report`` knows already; ``speed`` is None where it tells none."""
+        is_late = self._since is not None and at < self._since
+        if is_late or self._says is not Says.ENABLED or self._sent is Sent.SILENT:
+            return
+        off_s, ramp_s = self._bounds.off_s, self._bounds.ramp_s
+        takes = self._on_bus is Sent.OFF or self._sent is Sent.ENABLES
+        found = self._unfollowed.seen(at, speed, takes_voltage=takes, off_s=off_s, ramp_s=ramp_s)
+        self._unfollowed, summed = found
+        if summed is not None and self.state is not LastStop.IGNORED:
+            self._disobeyed_at = at
+            self._conclude(LastStop.IGNORED, at, summed)
 
     def on_report(self, says: Says, at: float) -> None:
         """The drive's status word is another one now, by a telegram received ``at``."""
@@ -259,6 +286,9 @@ class Follow:
         self._rose |= says not in (Says.AT_REST, Says.NOTHING)
         if says is Says.STOPPING and before is not says:
             self._stopping_since = at
+        if says in (Says.STOPPING, Says.AT_REST) or (says is Says.HOLDING and self._on_bus is not Sent.OFF):
+            # Also where the next word enables already.
+            self._unfollowed = self._unfollowed.obeyed()
         if self._since is None or at < self._since or says is Says.NOTHING:
             return
         obeys = self._obeys(at)
@@ -311,10 +341,10 @@ class Follow:
         if self.state is LastStop.FORWARDED:
             self._conclude(LastStop.FOLLOWED, at)
 
-    def _conclude(self, outcome: LastStop, at: float) -> None:
+    def _conclude(self, outcome: LastStop, at: float, summed: StopTime | None = None) -> None:
         since = at if self._since is None else self._since
         again = not self.follows
-        self._verdicts.append(Verdict(outcome, self.state, since, at, again, self._is_cut_off))
+        self._verdicts.append(Verdict(outcome, self.state, since, at, again, self._is_cut_off, summed))
         self.state = outcome
         self.follows = outcome is LastStop.FOLLOWED
 

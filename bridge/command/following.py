@@ -13,6 +13,9 @@ from bridge.drive import MOVING, DriveState, OwnJudgement, OwnVerdict, StatusWor
 _DEADLINES: Final = 3
 _ON_CHANGE_S: Final = 0.5
 """Replaces the deadline if the drive sends its TPDO on change only."""
+_CYCLE_S: Final = 0.1
+"""From a word in the node to a telegram with a speed that is another one: through an interface, there and back.
+"""
 
 
 class Following:
@@ -89,19 +92,19 @@ class Following:
     def _bounds(self, rpdo_period_ms: int, own: OwnJudgement | None) -> Bounds:
         channel = self._channel
         given_ms = channel.settings.ignored_stop_ms
+        stopping = channel.family.stopping
+        deadline_s = channel.link.pdo_deadline_s or _ON_CHANGE_S
+        way_s = rpdo_period_ms / 1000
         if given_ms is not None:
             off_s = ramp_s = given_ms / 1000
         else:
-            stopping = channel.family.stopping
-            deadline_s = channel.link.pdo_deadline_s or _ON_CHANGE_S
-            on_bus_s = _DEADLINES * deadline_s + rpdo_period_ms / 1000
-            off_s = on_bus_s + stopping.off_ms / 1000
+            off_s = _DEADLINES * deadline_s + way_s + stopping.off_ms / 1000
             ramp_s = off_s + stopping.ramp_ms / 1000
-        if own is None or own.verdict is not OwnVerdict.STOPS:
-            return Bounds(off_s, ramp_s)
-        # Our heartbeat goes on while the RPDOs are silent: a drive that supervises it would not stop.
-        own_ms = own.process_data_ms or own.bridge_ms
-        return Bounds(off_s, ramp_s, own_ms / 1000 + ramp_s)
+        silence_s = None
+        if own is not None and own.verdict is OwnVerdict.STOPS:
+            # Our heartbeat goes on while the RPDOs are silent: a drive that supervises it would not stop.
+            silence_s = (own.process_data_ms or own.bridge_ms) / 1000 + ramp_s
+        return Bounds(off_s, ramp_s, silence_s, way_s + stopping.off_ms / 1000, way_s + _CYCLE_S)
 
     # what the drive does
 
@@ -119,6 +122,13 @@ class Following:
         if word != self._status_word or not self._follow.is_informed:
             self._status_word = word
             self._follow.on_report(self._says(word), now)
+            self._channel.due(NOW)
+
+    def on_telegram(self, now: float, speed: float | None) -> None:
+        """The TPDO that ``after_pdo`` knows, also one that says what the last one said; ``speed`` is the actual speed or frequency in any unit."""
+        before = self._follow.state
+        self._follow.on_telegram(now, speed)
+        if self._follow.state is not before:
             self._channel.due(NOW)
 
     def _says(self, word: int) -> Says:

@@ -43,7 +43,11 @@ def conclude(
         tell(Event(now, Kind.WATCHDOG, drive.name, _WORST, message))
         # What can be done has been done: its node has been told to stop, and takes no more words.
         return
-    if verdict.before is LastStop.FOLLOWED:
+    summed = verdict.summed
+    if summed is not None and summed.stops > 1:
+        stops = f"{summed.stops} stops of together {summed.time_s:.2f} s"
+        what = f"ignores its stop: enabled and no slower in {stops}"
+    elif verdict.before is LastStop.FOLLOWED:
         what = f"is enabled although nothing that enables was sent: {_sent(drive)} for {took_s:.2f} s"
     else:
         what = f"ignores its stop: {_sent(drive)} since {took_s:.2f} s"

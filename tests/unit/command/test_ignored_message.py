@@ -135,3 +135,21 @@ def test_a_drive_that_is_sent_nothing_is_told_as_such() -> None:
     line.enables().goes_on(0.25 + 0.5 + 0.5)
     message = f"ignores its stop: nothing is sent since 1.00 s, {SAYS}; NMT stop of conveyor{STAYS}"
     assert line.told[-1] == (1000, message)
+
+
+def test_stops_that_are_ignored_together_are_told_with_their_time() -> None:
+    line = JudgedPlant(more="ignored_stop_ms = 2000").enables()
+    line.drive.words[1] = 0x2000
+    for _ in range(20):
+        if line.told:
+            break
+        line.asks(Action.STOP)
+        line.goes_on(line.now - 1024.0 + 0.5)
+        line.writes(NORD_TU4.shut_down)
+        line.writes(NORD_TU4.enable)
+        line.goes_on(line.now - 1024.0 + 0.5)
+    message = (
+        f"ignores its stop: enabled and no slower in 6 stops of together 2.03 s, {SAYS}; NMT stop of conveyor"
+    )
+    assert line.told == [(1000, f"{message}{STAYS}")]
+    assert line.endings[-1] == ("ignored", f"{message}{STAYS}")

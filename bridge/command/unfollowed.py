@@ -1,0 +1,108 @@
+"""Stop time in which a drive goes on as if nothing had been sent, summed over the stops of an owner that jogs.
+
+A stop that is shorter than its bound decides nothing by itself: the next enabling word ends it. But a drive that
+obeys shows it in each of them, and a deaf one in none:
+
+- Told to take the voltage off, it has said so ``seen_off_s`` later unless telegrams were lost.
+- On a ramp it says *enabled* to the end, and may never come to rest between two words that enable. But it gets
+  slower: from ``seen_s`` on its telegrams tell of the ramp, and what the slowest ramp loses in so much time is
+  known, in one piece or in many. A quarter of that is demanded: an S-curve has lost an eighth of its speed
+  after a quarter of its time.
+
+The time counts that is covered by telegrams. A speed is compared with the one before in the same stop, or with
+that of a drive that went on steadily before it: one that still speeds up when the stop comes gets no slower at
+first, and is not to blame for that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Final
+
+_PART: Final = 4
+"""The judgement comes after this part of the slowest ramp, and asks for this part of what it has lost by then."""
+_STEADY: Final = 1 / 64
+"""A speed that differs by no more than this part is the same."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopTime:
+    """Of ``stops`` stops since the drive last obeyed, ``time_s`` in which it was enabled and has ``lost`` so
+    much of its speed (1 is all of it; 0 where no speed is known). Times are monotonic seconds."""
+
+    time_s: float = 0.0
+    lost: float = 0.0
+    stops: int = 0
+    begins_at: float = inf
+    """Telegrams from then on tell of the stop in force; infinite where there is none."""
+    seen_at: float | None = None
+    speed: float = 0.0
+    """Of the telegram received at ``seen_at``, the last one in this stop or in the run before it."""
+    is_steady: bool = False
+    """The telegram before it, in the same run, had the same speed."""
+    has_counted: bool = False
+    """The stop in force is one of ``stops``."""
+
+    def begin(self, begins_at: float) -> StopTime:
+        seen_at = self.seen_at if self.is_steady else None
+        return replace(self, begins_at=begins_at, seen_at=seen_at, has_counted=False, is_steady=False)
+
+    def end(self) -> StopTime:
+        return replace(self.begin(inf), seen_at=None)
+
+    def obeyed(self) -> StopTime:
+        return StopTime(begins_at=self.begins_at)
+
+    def seen(self, at: float, speed: float | None) -> StopTime:
+        """A telegram that says *enabled*; ``speed`` in any unit, None where it is of no interest. One that
+        stands, or turns round, obeys."""
+        now = speed or 0.0
+        if speed is not None and (not now or (self.seen_at is not None and now * self.speed < 0)):
+            return self.obeyed()
+        if self.seen_at is None or at < self.begins_at:
+            is_steady = self.seen_at is not None and abs(now - self.speed) <= _STEADY * abs(self.speed)
+            return replace(self, seen_at=at, speed=now, is_steady=is_steady and self.begins_at == inf)
+        before = self.speed
+        return replace(
+            self,
+            time_s=self.time_s + at - max(self.seen_at, self.begins_at),
+            lost=self.lost + ((abs(before) - abs(now)) / max(abs(before), abs(now)) if now else 0.0),
+            stops=self.stops + (not self.has_counted),
+            seen_at=at,
+            speed=now,
+            has_counted=True,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Unfollowed:
+    """Both judgements: *enabled* after words that take the voltage, and no slower after any stop."""
+
+    on: StopTime = StopTime()
+    fast: StopTime = StopTime()
+
+    def begin(self, on_from: float, fast_from: float) -> Unfollowed:
+        """A stop, another word of it, or a drive that was not heard for a while."""
+        return Unfollowed(self.on.begin(on_from), self.fast.begin(fast_from))
+
+    def end(self) -> Unfollowed:
+        """A word that enables: what has been summed stays."""
+        return Unfollowed(self.on.end(), self.fast.end())
+
+    def obeyed(self) -> Unfollowed:
+        return Unfollowed(self.on.obeyed(), self.fast.obeyed())
+
+    def seen(
+        self, at: float, speed: float | None, *, takes_voltage: bool, off_s: float, ramp_s: float
+    ) -> tuple[Unfollowed, StopTime | None]:
+        """A telegram that says *enabled*; and the time that makes the stop in force an ignored one.
+        ``off_s`` and ``ramp_s`` are the bounds of a single stop, ``speed`` is None where none is known."""
+        on = self.on.seen(at, None) if takes_voltage else self.on
+        fast = self.fast if speed is None else self.fast.seen(at, speed)
+        if on.time_s >= off_s:
+            return self.obeyed(), on
+        if fast.time_s < max(off_s, ramp_s / _PART):
+            return Unfollowed(on, fast), None
+        has_kept = fast.lost < fast.time_s / ramp_s / _PART
+        return Unfollowed(on, fast.obeyed()), fast if has_kept else None

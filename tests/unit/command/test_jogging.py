@@ -47,6 +47,8 @@ class Motor:
             self.due.append((now + self.late_s, word))
 
     def step(self, now: float) -> None:
+        if self.is_deaf:
+            return  # it goes on as it was
         while self.due and self.due[0][0] <= now:
             word = self.due.pop(0)[1]
             if word is not self.word:
@@ -164,6 +166,74 @@ def test_it_is_named_again_only_after_as_much_time_again() -> None:
     times = [verdict.at for verdict in jogged.ignored]
     assert len(times) > 1
     assert min(b - a for a, b in zip(times, times[1:], strict=False)) > 10.0
+
+
+def jogged_by_hand(word: Sent = Sent.RAMP, *, has_speed: bool = True) -> Jogged:
+    """Deaf, and almost named."""
+    jogged = Jogged(Motor(is_deaf=True), 0.05, has_speed=has_speed)
+    counts_s = BOUNDS.ramp_s / 4 if word is Sent.RAMP else BOUNDS.off_s
+    seen_s = SEEN_S if word is Sent.RAMP else SEEN_OFF_S
+    for _ in range(4):
+        jogged.send(word, 0.9 * counts_s / 4 + seen_s)
+        jogged.send(Sent.ENABLES, 1.0)
+    assert not jogged.ignored
+    return jogged
+
+
+def again(jogged: Jogged) -> bool:
+    """Whether one more such stop names it."""
+    jogged.send(Sent.RAMP, 0.9)
+    return bool(jogged.ignored)
+
+
+def test_one_more_stop_names_it() -> None:
+    assert again(jogged_by_hand())
+
+
+@pytest.mark.parametrize("says", [Says.AT_REST, Says.STOPPING, Says.HOLDING])
+def test_a_report_but_enabled_begins_the_sum_anew(says: Says) -> None:
+    jogged = jogged_by_hand()
+    for state in (says, Says.ENABLED):
+        jogged.motor.state = state
+        jogged.send(Sent.ENABLES, 0.2)
+    assert not again(jogged)
+
+
+def test_a_node_that_was_away_begins_the_sum_anew() -> None:
+    jogged = jogged_by_hand()
+    jogged.follow.on_node(is_there=False)
+    jogged.follow.on_node(is_there=True)
+    jogged.said = Says.NOTHING
+    jogged.send(Sent.ENABLES, 1.0)
+    assert not again(jogged)
+
+
+def test_on_the_ramp_of_a_quick_stop_nothing_is_summed() -> None:
+    jogged = Jogged(Motor(is_deaf=True, state=Says.STOPPING), 0.05)
+    jogged.jog(Sent.RAMP, 1.0, 0.9, 30.0)
+    assert not jogged.ignored
+
+
+def test_silence_is_not_summed() -> None:
+    """The drive is to stop by its own time-out, which has a bound of its own."""
+    jogged = Jogged(Motor(is_deaf=True), 0.05)
+    jogged.jog(Sent.SILENT, 1.0, 0.9, 30.0)
+    assert not jogged.ignored
+
+
+def test_a_telegram_older_than_the_stop_is_not_summed() -> None:
+    jogged = Jogged(Motor(is_deaf=True), 0.05)
+    jogged.send(Sent.RAMP, 0.5)
+    before = jogged.follow.is_judged, jogged.now - 1.0
+    jogged.follow.on_telegram(before[1], 0.0)  # the bus is drained late: it stood then
+    jogged.send(Sent.RAMP, BOUNDS.ramp_s / 4 - 0.5 + SEEN_S + 0.1)
+    assert len(jogged.ignored) == 1
+
+
+def test_ramps_without_a_speed_are_not_summed() -> None:
+    jogged = Jogged(Motor(is_deaf=True), 0.05, has_speed=False)
+    jogged.jog(Sent.RAMP, 1.0, 0.9, 30.0)
+    assert not jogged.ignored
 
 
 motors = st.builds(

@@ -1,0 +1,137 @@
+"""Seeded faults that single unit tests have to find: ``python -m tests.support.seeded TABLE``.
+
+Each fault is an edit of one function's body or of a module's constant. It goes into the running program, in a
+process of its own that has been forked from one with everything imported: the tests that the table names have to
+fail there. So a fault costs what its tests cost.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import signal
+import sys
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Final
+
+import pytest
+
+from tests.proof.mutants import Edit
+from tests.support.process import REPOSITORY
+
+_MOST_S: Final = 20
+"""Tests that take longer with a fault have noticed it: it is in a loop without an end."""
+_PLAIN: Final = (bool, int, float, str, tuple, frozenset)
+_FOUND: Final = (pytest.ExitCode.TESTS_FAILED, -signal.SIGALRM)
+
+
+@dataclass(frozen=True, slots=True)
+class Seeded:
+    """``edit`` is of a file below ``bridge/``; one of ``tests``, by their pytest ids, has to fail with it."""
+
+    name: str
+    edit: Edit
+    tests: tuple[str, ...]
+
+    @property
+    def module(self) -> str:
+        return "bridge." + self.edit.file.removesuffix(".py").replace("/", ".")
+
+    def source(self) -> str:
+        """The file with the fault. Raises ``ValueError`` where its place is not there."""
+        return self.edit.apply((REPOSITORY / "bridge" / self.edit.file).read_text(encoding="utf-8"))
+
+
+def load(path: Path) -> tuple[Seeded, ...]:
+    """A table has for each file the folder or file of its tests, and the faults."""
+    found: list[Seeded] = []
+    for part in tomllib.loads(path.read_text(encoding="utf-8"))["file"]:
+        for fault in part["fault"]:
+            tests = tuple(f"{part['tests']}/{test}" for test in fault["tests"])
+            edit = Edit(part["file"], fault["find"], fault["replace"])
+            found.append(Seeded(fault["name"], edit, tests))
+    return tuple(found)
+
+
+def seed(module: ModuleType, source: str) -> int:
+    """Put functions and plain constants of ``source`` into the module that is in use; how many differ."""
+    changed = ModuleType(module.__name__)
+    changed.__file__ = module.__file__
+    sys.modules[module.__name__], held = changed, sys.modules[module.__name__]
+    try:
+        exec(compile(source, str(module.__file__), "exec"), changed.__dict__)
+    finally:
+        sys.modules[module.__name__] = held
+    old, new = dict(_functions(module)), dict(_functions(changed))
+    count = 0
+    for name, function in new.items():
+        if name in old and _differ(old[name], function):
+            old[name].__code__ = function.__code__
+            old[name].__defaults__ = function.__defaults__
+            count += 1
+    for name, value in vars(changed).items():
+        if isinstance(value, _PLAIN) and not name.startswith("__") and vars(module)[name] != value:
+            setattr(module, name, value)
+            count += 1
+    return count
+
+
+def _differ(one: FunctionType, other: FunctionType) -> bool:
+    codes = one.__code__, other.__code__
+    return codes[0].replace(co_firstlineno=0) != codes[1].replace(co_firstlineno=0)
+
+
+def _functions(module: ModuleType) -> Iterator[tuple[str, FunctionType]]:
+    owners = [value for value in vars(module).values() if isinstance(value, type)]
+    for owner in (module, *(one for one in owners if one.__module__ == module.__name__)):
+        for held in vars(owner).values():
+            for one in (held, getattr(held, "fget", None), getattr(held, "__func__", None)):
+                if isinstance(one, FunctionType) and one.__module__ == module.__name__:
+                    yield one.__qualname__, one
+
+
+def run(tests: tuple[str, ...], fault: Seeded | None = None) -> int:
+    """Exit code of pytest with this fault, in a process of its own; 99 where the fault changes nothing."""
+    pid = os.fork()
+    if pid:
+        return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    code = 98
+    try:
+        nothing = os.open(os.devnull, os.O_RDWR)
+        for stream in (0, 1, 2):
+            os.dup2(nothing, stream)
+        if fault is not None:
+            signal.alarm(_MOST_S)
+        if fault is not None and not seed(importlib.import_module(fault.module), fault.source()):
+            code = 99
+        else:
+            code = int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests]))
+    finally:
+        os._exit(code)
+
+
+def main() -> int:
+    """Print the faults that live. Exit code 1 where there is one."""
+    os.chdir(REPOSITORY)
+    faults = load(Path(sys.argv[1]))
+    for test in sorted({test.partition("::")[0] for fault in faults for test in fault.tests}):
+        importlib.import_module(test.removesuffix(".py").replace("/", "."))
+    for fault in faults:
+        importlib.import_module(fault.module)
+    if code := run(tuple(sorted({test for fault in faults for test in fault.tests}))):
+        print(f"the tests end with {code} on the program as it is")
+        return 1
+    lives = {fault.name: code for fault in faults if (code := run(fault.tests, fault)) not in _FOUND}
+    for name, code in lives.items():
+        print(
+            {0: f"{name}: no test notices", 99: f"{name}: changes nothing"}.get(code, f"{name}: code {code}")
+        )
+    return bool(lives)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

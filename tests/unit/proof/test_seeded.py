@@ -1,0 +1,55 @@
+"""The unit tests beside the dead-man chain find each fault that is seeded into it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.process import REPOSITORY
+from tests.support.seeded import load
+
+TABLE = Path(__file__).with_name("seeded.toml")
+FAULTS = load(TABLE)
+_LIMIT_S = 600.0
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_a_fault_has_one_place_in_the_program_and_compiles(fault: object) -> None:
+    (found,) = [one for one in FAULTS if one is fault]
+    compile(found.source(), found.edit.file, "exec")
+
+
+def test_each_fault_is_another() -> None:
+    assert len({fault.name for fault in FAULTS}) == len({fault.edit for fault in FAULTS}) == len(FAULTS)
+
+
+def test_every_fault_is_found_by_the_tests_that_are_named_for_it() -> None:
+    command = [sys.executable, "-m", "tests.support.seeded", str(TABLE)]
+    done = subprocess.run(
+        command, cwd=REPOSITORY, capture_output=True, text=True, check=False, timeout=_LIMIT_S
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_fault_that_no_test_notices_is_named(tmp_path: Path) -> None:
+    table = tmp_path / "seeded.toml"
+    table.write_text(
+        """
+        [[file]]
+        file = "node/put_off.py"
+        tests = "tests/unit/node"
+        fault = [
+          { name = "found", tests = ["test_put_off.py"], find = "return None", replace = "return self.command" },
+          { name = "lives", tests = ["test_put_off.py::test_it_goes_out_once"], find = "> _LATE_S", replace = ">= _LATE_S" },
+        ]
+        """.replace("return None", "        self._at = now + (self._wait_s").replace(
+            "return self.command", "        self._at = 0 * (self._wait_s"
+        ),
+        encoding="utf-8",
+    )
+    command = [sys.executable, "-m", "tests.support.seeded", str(table)]
+    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=False, timeout=120.0)
+    assert (done.returncode, done.stdout) == (1, "lives: no test notices\n")

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
@@ -21,10 +22,11 @@ from bridge.cli import logs
 from bridge.cli.bus import AsJson
 from bridge.config import Site, load_site
 from bridge.errors import BridgeError, OperationFailed, Unavailable
+from bridge.witness.findings import Alarm, Finding, Kind, Sight, Stop
 from bridge.witness.numbers import Numbers
 from bridge.witness.plan import UnknownFamily, WatchedBus, plan
 from bridge.witness.shell import CannotListen, Witness
-from bridge.witness.watch import Alarm, Finding, Kind, Sight, Stop
+from bridge.witness.watch import UNKNOWN_MS
 
 _log = logging.getLogger(__name__)
 
@@ -101,7 +103,7 @@ def _buses(site: Site, path: Path, channels: list[str], own_timeout_ms: int | No
         planned = plan(site, own_timeout_ms=own_timeout_ms)
     except UnknownFamily as error:
         raise BridgeError(f"{path}: the witness does not know the drives of the mapping {error}") from error
-    return [WatchedBus(bus.name, places.get(bus.name, bus.channel), bus.drives, bus.beats) for bus in planned]
+    return [replace(bus, channel=places.get(bus.name, bus.channel)) for bus in planned]
 
 
 def _numbers(site: Site, given: str | None, buses: list[WatchedBus]) -> Numbers | None:
@@ -125,7 +127,8 @@ def _promises(buses: list[WatchedBus], has_numbers: bool) -> list[str]:
         for drive in bus.drives:
             stop_ms = drive.stop_ms(drive.timeout_ms) if has_numbers else 0
             controller = f"{stop_ms} ms" if stop_ms else "not judged"
-            silent = f"{drive.silent_ms} ms" if drive.silent_ms else "not judged, give --own-timeout-ms"
+            own = "" if drive.silent_ms else " (the drive's own time-out is not known, give --own-timeout-ms)"
+            silent = f"{drive.silent_ms or UNKNOWN_MS} ms{own}"
             lines.append(
                 f"{drive.name}: dead controller: {controller}, dead bridge: {silent}, "
                 f"stop followed within {drive.follow_ms} ms"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 from typing import Any, Final
@@ -25,8 +25,10 @@ _QUEUE_MS: Final = 50
 """How long a frame may wait for an interface that is none of the kernel's."""
 _TPDO_MS: Final = 500
 """How often a drive says what it does, where the site file does not tell."""
-_RAMP_MS: Final = 5000
+RAMP_MS: Final = 5000
 """How long a drive may take to stand, where the site file does not tell."""
+_LOST_MS: Final = 1000
+"""So much longer than its supervision a node may be silent: it may have been told to restart."""
 _FIRST_UNITS: Final = range(1, 248)
 _NUMBERS: Final = {base + 0x100 * place: place + 1 for base in (0x180, 0x200) for place in range(4)}
 """The PDO's number by its identifier without the node's (CiA 301 §7.3.5)."""
@@ -50,6 +52,18 @@ class Word:
 
 
 @dataclass(frozen=True, slots=True)
+class Speed:
+    """A signed number in a PDO."""
+
+    byte: int
+    bytes: int
+
+    def of(self, data: bytes) -> int | None:
+        part = data[self.byte : self.byte + self.bytes]
+        return int.from_bytes(part, "little", signed=True) if len(part) == self.bytes else None
+
+
+@dataclass(frozen=True, slots=True)
 class WatchedDrive:
     """One drive. Times are in ms.
 
@@ -69,6 +83,15 @@ class WatchedDrive:
     beside_ms: int | None
     silent_ms: int
     follow_ms: int
+    node_id: int = 0
+    rpdo_ms: float = 0.0
+    """How often the bridge repeats its RPDO."""
+    speed: Speed | None = None
+    """None where its TPDO brings none."""
+    nmt_stops: bool = False
+    """It does not run in the NMT state Stopped."""
+    lost_ms: int = 0
+    """Nothing heard of its node for so long means that it is cut off; 0 where that is not known."""
 
     def stop_ms(self, timeout_ms: int) -> int:
         """From the owner's last telegram to the last enabling RPDO, with this time-out in force; 0 where
@@ -78,12 +101,14 @@ class WatchedDrive:
 
 @dataclass(frozen=True, slots=True)
 class WatchedBus:
-    """``beats`` has what is sent by the bridge alone, with its period in ms, by identifier."""
+    """``beats`` has what is sent by the bridge alone, with its period in ms, by identifier; ``nodes`` the SDO time-out
+    of each node in s."""
 
     name: str
     channel: str
     drives: tuple[WatchedDrive, ...]
     beats: dict[int, tuple[str, int]]
+    nodes: dict[int, float] = field(default_factory=dict[int, float])
 
 
 class UnknownFamily(Exception):
@@ -123,7 +148,8 @@ def _bus(bus: BusTable, units: dict[tuple[str, int], int], own_timeout_ms: int |
         beats[0x080] = ("SYNC", bus.sync_period_ms)
     if bus.heartbeat_ms:
         beats[0x700 + bus.master_node_id] = ("the bridge's heartbeat", bus.heartbeat_ms)
-    return WatchedBus(bus.name, bus.channel or "", tuple(drives), beats)
+    nodes = {node.id: node.sdo_timeout_ms / 1000 for node in bus.node}
+    return WatchedBus(bus.name, bus.channel or "", tuple(drives), beats, nodes)
 
 
 def _drive(
@@ -150,8 +176,26 @@ def _drive(
         timeout_ms=timeout_ms or 0,
         beside_ms=_beside_ms(bus) if is_watched else None,
         silent_ms=own_ms + tpdo_ms if own_ms else 0,
-        follow_ms=3 * tpdo_ms + _RAMP_MS,
+        follow_ms=3 * tpdo_ms + RAMP_MS,
+        node_id=node.id,
+        rpdo_ms=1000 * bus.rpdo_period_s,
+        speed=_speed(family, node.mapping),
+        nmt_stops=family.get("nmt_stops", False),
+        lost_ms=_lost_ms(node, table),
     )
+
+
+def _speed(family: dict[str, Any], mapping: str) -> Speed | None:
+    place = family.get("speed", {}).get(mapping)
+    return Speed(*place) if place else None
+
+
+def _lost_ms(node: NodeTable, table: DriveTable) -> int:
+    """Its error control, or its TPDO where the site file says how often that comes."""
+    if node.supervision == "none":
+        return _LOST_MS + 3 * _tpdo_ms(table) if any(pdo.event_ms for pdo in table.tpdo) else 0
+    times = node.life_time_factor if node.supervision == "guarding" else 1
+    return _LOST_MS + times * node.supervision_ms
 
 
 def _beside_ms(bus: BusTable) -> int:

@@ -7,9 +7,10 @@ import time
 from collections.abc import Callable, Sequence
 
 from bridge.witness.can import Listener
+from bridge.witness.findings import Finding
 from bridge.witness.numbers import Numbers
 from bridge.witness.plan import WatchedBus
-from bridge.witness.watch import Finding, Watch
+from bridge.witness.watch import Watch
 
 _TICK_S = 0.05
 

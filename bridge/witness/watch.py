@@ -12,15 +12,22 @@ seems, and never earlier. Without readings nothing is known of the owner, which 
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
-from enum import StrEnum
 from typing import Final
 
-from bridge.witness.plan import WatchedBus, WatchedDrive
+from bridge.witness.findings import Alarm, Cause, Finding, Kind, Sight, Stop
+from bridge.witness.jogging import Jogs
+from bridge.witness.plan import RAMP_MS, WatchedBus, WatchedDrive
+from bridge.witness.services import Services
 
 _TURNS_S: Final = 0.5
 _MOST_TURNS: Final = 4
 """An RPDO that turns from "run" to "stop" and back so often in ``_TURNS_S`` has two senders."""
+UNKNOWN_MS: Final = 3000
+"""From the last RPDO to a drive that has stopped, where its own time-out is not known."""
+_BOOT_UP, _STOPPED = 0x00, 0x04
+"""States that a node says (CiA 301 §7.2.8.3.2.2)."""
+_TAKES_OUT: Final = (0x02, 0x80, 0x81, 0x82)
+"""NMT commands after which a node says nothing of its drives (CiA 301 §7.2.8.3.1)."""
 _BEAT_WINDOW_S: Final = 2.0
 _BEAT_LOAD: Final = 1.5
 _BEAT_SPARE: Final = 5
@@ -31,67 +38,6 @@ _UNSEEN_S: Final = 1.0
 """An enabled drive gets its RPDO more often than that."""
 BLIND_S: Final = 5.0
 """Without a reading for so long the witness says that it sees nothing of the owner."""
-
-
-class Cause(StrEnum):
-    """Why a drive stopped."""
-
-    CONTROLLER = "controller silent"
-    COMMAND = "stop commanded"
-    BRIDGE = "bridge silent"
-    DRIVE = "drive by itself"
-
-
-class Kind(StrEnum):
-    """What an alarm is about."""
-
-    LATE = "late"
-    RUNS_ON = "runs on"
-    IGNORED = "stop ignored"
-    UNTOLD = "enabled untold"
-    INTRUDER = "intruder"
-    BLIND = "blind"
-
-
-@dataclass(frozen=True, slots=True)
-class Stop:
-    """One stop of a drive. ``bus_ms``: from the owner's last telegram to the first RPDO that stops, None
-    where that is not what stopped it; ``drive_ms``: from what stopped it to the drive that says so."""
-
-    drive: str
-    cause: Cause
-    time: float
-    bus_ms: int | None
-    bus_bound_ms: int | None
-    drive_ms: int
-    drive_bound_ms: int | None
-
-    @property
-    def is_in_time(self) -> bool:
-        pairs = ((self.bus_ms, self.bus_bound_ms), (self.drive_ms, self.drive_bound_ms))
-        return all(ms is None or bound is None or ms <= bound for ms, bound in pairs)
-
-
-@dataclass(frozen=True, slots=True)
-class Alarm:
-    """A promise is broken, or somebody else is there. ``source`` is a drive or a bus."""
-
-    source: str
-    kind: Kind
-    time: float
-    message: str
-
-
-@dataclass(frozen=True, slots=True)
-class Sight:
-    """What was said to be blind sees again."""
-
-    source: str
-    time: float
-    message: str
-
-
-Finding = Stop | Alarm | Sight
 
 
 class _Track:
@@ -120,6 +66,14 @@ class _Track:
         self.is_enabled = False
         self.tpdo_at: float | None = None
         self.enabled_since: float | None = None
+        self.jogs = Jogs(RAMP_MS / 1000, drive.follow_ms / 1000)
+        self.rpdo = b""
+        self.repeats: deque[float] = deque()
+        """When an RPDO came that says what the one before it said."""
+        self.node_at: float | None = None
+        """Its node's error control was heard last."""
+        self.taken_out_at: float | None = None
+        """Its node was taken out of operation by NMT while it said "enabled"."""
         self.told: set[Kind] = set()
         """Alarms of what goes on are raised once."""
 
@@ -144,6 +98,11 @@ class Watch:
         self._tracks = {drive.name: _Track(drive) for drive in bus.drives}
         self._by_rpdo = {track.drive.rpdo: track for track in self._tracks.values()}
         self._by_tpdo = {track.drive.tpdo: track for track in self._tracks.values()}
+        self._services = Services(bus.nodes, self._is_told_to_run)
+        self._by_guard: dict[int, list[_Track]] = {}
+        for track in self._tracks.values():
+            if track.drive.node_id:
+                self._by_guard.setdefault(0x700 + track.drive.node_id, []).append(track)
         self._beats = bus.beats
         self._beaten: dict[int, deque[float]] = {can_id: deque() for can_id in bus.beats}
         self._findings: list[Finding] = []
@@ -151,7 +110,11 @@ class Watch:
     @property
     def identifiers(self) -> list[int]:
         """What it has to see."""
-        return sorted({*self._by_rpdo, *self._by_tpdo, *self._beats})
+        services = self._services.identifiers
+        return sorted({*self._by_rpdo, *self._by_tpdo, *self._beats, *self._by_guard, *services})
+
+    def _is_told_to_run(self, node_id: int) -> bool:
+        return any(one.tells_run for one in self._tracks.values() if one.drive.node_id == node_id)
 
     def take_findings(self) -> list[Finding]:
         findings, self._findings = self._findings, []
@@ -166,6 +129,24 @@ class Watch:
             self._on_tpdo(track, data, at)
         elif can_id in self._beats:
             self._on_beat(can_id, at)
+        elif can_id in self._by_guard:
+            for track in self._by_guard[can_id]:
+                self._on_guard(track, data, at)
+        elif can_id in self._services.identifiers:
+            if why := self._services.on_frame(can_id, data, at):
+                self._alarm(self._name, Kind.INTRUDER, at, why)
+            if can_id == 0x000 and len(data) == 2 and data[0] in _TAKES_OUT:
+                for track in self._tracks.values():
+                    if track.is_enabled and data[1] in (0, track.drive.node_id):
+                        track.taken_out_at = at
+
+    def _on_guard(self, track: _Track, data: bytes, at: float) -> None:
+        """Heartbeat or guarding answer of its node: the lower seven bits are the state."""
+        track.node_at = at
+        state = data[0] & 0x7F if data else None
+        if state == _BOOT_UP or (state == _STOPPED and track.drive.nmt_stops):
+            track.is_enabled, track.enabled_since, track.taken_out_at = False, None, None
+            track.told -= {Kind.RUNS_ON, Kind.IGNORED, Kind.UNTOLD, Kind.UNHEARD}
 
     def on_number(
         self, name: str, number: int, asked_at: float, answered_at: float, timeout_ms: int | None = None
@@ -193,9 +174,11 @@ class Watch:
 
     def _on_rpdo(self, track: _Track, data: bytes, at: float) -> None:
         enables = track.drive.control.enables(data)
+        self._on_repeat(track, data, at)
         track.rpdo_at = at
         if enables is None:
             return
+        track.jogs.on_turn(at, stops=not enables)
         if enables:
             track.stopped_at = None
             if track.late_at is None and _is_late(track, at):
@@ -206,6 +189,20 @@ class Watch:
         if enables != track.tells_run:
             track.tells_run = enables
             self._on_turn(track, at)
+
+    def _on_repeat(self, track: _Track, data: bytes, at: float) -> None:
+        """The bridge repeats an RPDO so often, and no more: beside that it sends what is new."""
+        is_same, track.rpdo, period_ms = data == track.rpdo, data, track.drive.rpdo_ms
+        if not is_same or not period_ms:
+            return
+        times = track.repeats
+        times.append(at)
+        while times[0] < at - _BEAT_WINDOW_S:
+            times.popleft()
+        if len(times) > _BEAT_LOAD * _BEAT_WINDOW_S * 1000 / period_ms + _BEAT_SPARE:
+            times.clear()
+            message = f"RPDO {track.drive.rpdo:03X}h comes too often: somebody else sends it, too"
+            self._alarm(track.drive.name, Kind.INTRUDER, at, message)
 
     def _on_turn(self, track: _Track, at: float) -> None:
         turns = track.turns
@@ -227,12 +224,24 @@ class Watch:
             return
         was_enabled, track.is_enabled = track.is_enabled, enabled
         track.tpdo_at = at
+        track.taken_out_at = track.taken_out_at if enabled else None
+        track.told.discard(Kind.UNHEARD)
+        self._on_speed(track, data, at)
         if enabled and not was_enabled:
             track.enabled_since = at
         elif was_enabled and not enabled:
             self._findings.append(self._stop_of(track, at))
             track.told -= {Kind.RUNS_ON, Kind.IGNORED, Kind.UNTOLD}
             track.enabled_since = None
+
+    def _on_speed(self, track: _Track, data: bytes, at: float) -> None:
+        """Whether it brakes, where its owner jogs."""
+        if not track.is_enabled:
+            track.jogs.on_obeyed()
+            return
+        speed = track.drive.speed.of(data) if track.drive.speed is not None else None
+        if speed is not None and (found := track.jogs.on_speed(speed, at)):
+            self._alarm(track.drive.name, Kind.IGNORED, at, found)
 
     def _on_beat(self, can_id: int, at: float) -> None:
         what, period_ms = self._beats[can_id]
@@ -266,7 +275,7 @@ class Watch:
                 drive_bound_ms=drive.follow_ms,
             )
         since = at if track.rpdo_at is None else track.rpdo_at
-        is_bridge = drive.silent_ms and at - since > _UNSEEN_S / 4
+        is_bridge = at - since > _UNSEEN_S / 4
         return Stop(
             drive.name,
             Cause.BRIDGE if is_bridge else Cause.DRIVE,
@@ -274,7 +283,7 @@ class Watch:
             bus_ms=None,
             bus_bound_ms=None,
             drive_ms=_ms(at - since),
-            drive_bound_ms=drive.silent_ms if is_bridge else None,
+            drive_bound_ms=(drive.silent_ms or None) if is_bridge else None,
         )
 
     def on_time(self, now: float) -> None:
@@ -282,6 +291,7 @@ class Watch:
         for track in self._tracks.values():
             self._judge_controller(track, now)
             self._judge_drive(track, now)
+            self._judge_unheard(track, now)
         if self._asks:
             self._judge_sight(now)
 
@@ -330,11 +340,24 @@ class Watch:
             if seen - track.enabled_since > _UNSEEN_S:
                 message = f"enabled, and nobody sends its RPDO {drive.rpdo:03X}h"
                 self._once(track, Kind.UNTOLD, now, message)
-        elif drive.silent_ms and _ms(seen - track.rpdo_at) > drive.silent_ms:
-            message = (
-                f"enabled {_ms(seen - track.rpdo_at)} ms after its last RPDO; promised: {drive.silent_ms}"
-            )
+        elif _ms(seen - track.rpdo_at) > (drive.silent_ms or UNKNOWN_MS):
+            promised = f"promised: {drive.silent_ms}" if drive.silent_ms else "its own time-out is not known"
+            message = f"enabled {_ms(seen - track.rpdo_at)} ms after its last RPDO; {promised}"
             self._once(track, Kind.RUNS_ON, now, message)
+
+    def _judge_unheard(self, track: _Track, now: float) -> None:
+        """A drive that said "enabled" last, and cannot say any more whether it stops."""
+        if not track.is_enabled or track.tpdo_at is None:
+            return
+        if (out_at := track.taken_out_at) is not None and _ms(now - out_at) > track.drive.follow_ms:
+            message = (
+                "may run on: it said that it is enabled before its node was taken out of operation by NMT"
+            )
+            self._once(track, Kind.UNHEARD, now, message)
+        heard_at = max(track.tpdo_at, track.node_at or 0.0)
+        if track.drive.lost_ms and _ms(now - heard_at) > track.drive.lost_ms:
+            message = f"may run on: enabled when it was heard last, {_ms(now - heard_at)} ms ago"
+            self._once(track, Kind.UNHEARD, now, message)
 
     def _once(self, track: _Track, kind: Kind, now: float, message: str) -> None:
         if kind not in track.told:

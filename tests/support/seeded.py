@@ -11,6 +11,7 @@ import importlib
 import os
 import signal
 import sys
+import time
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -125,12 +126,21 @@ def main() -> int:
     if code := run(tuple(sorted({test for fault in faults for test in fault.tests}))):
         print(f"the tests end with {code} on the program as it is")
         return 1
-    lives = {fault.name: code for fault in faults if (code := run(fault.tests, fault)) not in _FOUND}
-    for name, code in lives.items():
-        print(
-            {0: f"{name}: no test notices", 99: f"{name}: changes nothing"}.get(code, f"{name}: code {code}")
-        )
-    return bool(lives)
+    lives = False
+    for fault in faults:
+        begin = time.monotonic()
+        code = run(fault.tests, fault)
+        if "--times" in sys.argv:
+            print(f"{time.monotonic() - begin:.1f} s {fault.name}", flush=True)
+        if code not in _FOUND:
+            lives = True
+            print(
+                {0: f"{fault.name}: no test notices", 99: f"{fault.name}: changes nothing"}.get(
+                    code, f"{fault.name}: code {code}"
+                ),
+                flush=True,
+            )
+    return lives
 
 
 if __name__ == "__main__":

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.witness.plan import WatchedBus, WatchedDrive, Word
-from bridge.witness.watch import BLIND_S, Alarm, Cause, Kind, Sight, Stop, Watch
+from bridge.witness.findings import Alarm, Cause, Kind, Sight, Stop
+from bridge.witness.plan import Speed, WatchedBus, WatchedDrive, Word
+from bridge.witness.watch import BLIND_S, UNKNOWN_MS, Watch
 
 RPDO, TPDO, SYNC = 0x205, 0x185, 0x080
 CONTROL, STATUS = Word(0, 2, 0x000F, 0x000F), Word(0, 2, 0x007F, 0x0037)
@@ -296,4 +299,142 @@ def test_an_honest_plant_is_left_alone(events: list[str]) -> None:
         if event != "write":
             plant.tpdo = READY
             plant.run(0.5)
+    assert not plant.alarms
+
+
+# what nobody promises, and what is heard of the node alone
+
+HEARD = replace(FU1, node_id=5, rpdo_ms=10, speed=Speed(2, 2), lost_ms=1200)
+HEARTBEAT, NMT, OPERATIONAL = 0x705, 0x000, b"\x05"
+
+
+def heard(drive: WatchedDrive = HEARD) -> Plant:
+    plant = Plant()
+    bus = replace(BUS, drives=(drive,), nodes={5: 0.5})
+    plant.watch = Watch(bus)
+    plant.move()
+    plant.watch.on_frame(HEARTBEAT, OPERATIONAL, plant.now)
+    return plant
+
+
+def test_it_has_to_see_heartbeats_nmt_and_sdo() -> None:
+    bus = replace(BUS, drives=(HEARD,), nodes={5: 0.5})
+    assert Watch(bus).identifiers == [NMT, SYNC, TPDO, RPDO, 0x585, 0x605, HEARTBEAT]
+
+
+def test_a_drive_without_a_known_time_out_may_not_run_on_for_ever() -> None:
+    plant = heard(replace(HEARD, silent_ms=0))
+    plant.rpdo, plant.answers, plant.beats = None, False, 0
+    plant.run(UNKNOWN_MS / 1000 - 0.1)
+    assert not plant.alarms
+    plant.run(0.3)
+    assert plant.kinds == [Kind.RUNS_ON]
+    assert "its own time-out is not known" in plant.alarms[0].message
+    plant.tpdo = READY
+    plant.run(0.1)
+    assert (plant.stops[0].cause, plant.stops[0].drive_bound_ms) == (Cause.BRIDGE, None)
+
+
+def test_a_drive_whose_node_is_stopped_while_it_is_enabled_may_run_on() -> None:
+    plant = heard()
+    plant.rpdo = STOP
+    plant.run(0.02)
+    plant.watch.on_frame(NMT, b"\x02\x05", plant.now)
+    plant.tpdo = None
+    for _ in range(14):
+        plant.run(0.1)
+        plant.watch.on_frame(HEARTBEAT, b"\x04", plant.now)
+    assert not plant.alarms
+    plant.run(0.2)
+    assert plant.kinds == [Kind.UNHEARD]
+    assert "before its node was taken out of operation by NMT" in plant.alarms[0].message
+    plant.run(5.0)
+    assert plant.kinds == [Kind.UNHEARD]
+
+
+@pytest.mark.parametrize(
+    ("drive", "state"), [(HEARD, b"\x00"), (replace(HEARD, nmt_stops=True), b"\x04"), (HEARD, None)]
+)
+def test_who_has_restarted_is_stopped_by_nmt_or_says_so_is_not_told(
+    drive: WatchedDrive, state: bytes | None
+) -> None:
+    plant = heard(drive)
+    plant.rpdo = STOP
+    plant.run(0.02)
+    plant.watch.on_frame(NMT, b"\x02\x05", plant.now)
+    plant.tpdo = READY if state is None else None
+    plant.run(0.02)
+    plant.tpdo = None
+    if state is not None:
+        plant.watch.on_frame(HEARTBEAT, state, plant.now)
+    plant.run(5.0)
+    assert not plant.alarms
+
+
+def test_a_cut_of_a_drive_that_was_enabled_is_told() -> None:
+    plant = heard()
+    plant.tpdo = None
+    plant.run(1.0)
+    assert not plant.alarms
+    plant.run(0.4)
+    assert plant.kinds == [Kind.UNHEARD]
+    assert "enabled when it was heard last" in plant.alarms[0].message
+
+
+@pytest.mark.parametrize("lost_ms", [0, 1200])
+def test_a_node_that_is_heard_or_of_which_nobody_knows_is_not_cut_off(lost_ms: int) -> None:
+    """A TPDO that is sent on change alone may not come for long."""
+    plant = heard(replace(HEARD, lost_ms=lost_ms))
+    plant.tpdo = None
+    for _ in range(50):
+        plant.run(0.1)
+        if lost_ms:
+            plant.watch.on_frame(HEARTBEAT, OPERATIONAL, plant.now)
+    assert not plant.alarms
+
+
+def test_who_repeats_the_frame_that_runs_the_drive_is_told() -> None:
+    plant = heard()
+    for _ in range(200):
+        plant.watch.on_frame(RPDO, RUN, plant.now + 0.005)
+        plant.run(0.01)
+    assert Kind.INTRUDER in plant.kinds
+    assert "RPDO 205h comes too often" in plant.alarms[0].message
+
+
+def test_new_words_may_come_as_often_as_their_owner_likes() -> None:
+    plant = heard()
+    for n in range(400):
+        plant.watch.on_frame(RPDO, RUN[:2] + n.to_bytes(2, "little"), plant.now + 0.005)
+        plant.run(0.01)
+    assert not plant.alarms
+
+
+@pytest.mark.parametrize(("can_id", "data"), [(NMT, b"\x02\x05"), (0x605, bytes.fromhex("2317100000000000"))])
+def test_foreign_services_are_told(can_id: int, data: bytes) -> None:
+    plant = heard()
+    plant.watch.on_frame(can_id, data, plant.now)
+    plant.run(0.01)
+    assert plant.kinds == [Kind.INTRUDER]
+    assert "somebody else sends it" in plant.alarms[0].message
+
+
+def test_a_deaf_drive_whose_owner_jogs_is_told_once_in_a_while() -> None:
+    plant = heard()
+    for _ in range(20):
+        plant.rpdo = STOP
+        plant.run(0.3)
+        plant.rpdo = RUN
+        plant.run(1.0)
+    assert set(plant.kinds) == {Kind.IGNORED}
+    assert len(plant.alarms) <= 5
+    assert plant.alarms[0].message.startswith("enabled and no slower in 1.")
+
+
+def test_two_stops_are_judged_by_themselves(plant: Plant) -> None:
+    for _ in range(4):
+        plant.rpdo = STOP
+        plant.run(0.5)
+        plant.rpdo = RUN
+        plant.run(0.6)
     assert not plant.alarms

@@ -1,0 +1,103 @@
+"""NMT commands and SDO writes that cannot be the bridge's, by what the bridge promises not to do. Sans-IO.
+
+The bus does not say who sent a frame. But the bridge stops a node's drives before it sends the node anything by NMT
+(docs/explanation/dead-man-chain.md), starts a node once, knows no nodes but the site's, asks one question of an SDO
+server at a time, and leaves what a drive hears and watches alone while the drive is told to run.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Final
+
+_COMMANDS: Final = {
+    0x01: "start",
+    0x02: "stop",
+    0x80: "pre-operational",
+    0x81: "reset",
+    0x82: "reset of communication",
+}
+"""CiA 301 §7.2.8.3.1."""
+_START: Final = 0x01
+_STARTS_S: Final = 2.0
+_MOST_STARTS: Final = 3
+_HEARD: Final = (
+    range(0x1005, 0x1008),
+    range(0x1014, 0x1018),
+    range(0x1200, 0x1C00),
+    range(0x1F80, 0x1F81),
+    range(0x6040, 0x6041),
+)
+"""SYNC, the identifier of emergencies, guarding and heartbeats, SDO and PDO parameters, NMT startup, the control word
+(CiA 301 §7.5, CiA 402)."""
+_DOWNLOAD, _UPLOAD, _ABORT = 0x20, 0x40, 0x80
+"""Command specifiers in the three highest bits (CiA 301 §7.2.4.3)."""
+
+
+class Services:
+    """One bus. ``nodes`` has the SDO time-out of each node of the site in s; ``is_told_to_run`` says whether the
+    last RPDO of one of a node's drives enables."""
+
+    def __init__(self, nodes: Mapping[int, float], is_told_to_run: Callable[[int], bool]) -> None:
+        self._nodes = nodes
+        self._is_told_to_run = is_told_to_run
+        self._starts: dict[int, deque[float]] = {node: deque() for node in nodes}
+        self._asked: dict[int, float] = {}
+        """When a question was asked that has no answer yet, by node."""
+
+    @property
+    def identifiers(self) -> set[int]:
+        return (
+            {0x000, *(base + node for node in self._nodes for base in (0x580, 0x600))}
+            if self._nodes
+            else set()
+        )
+
+    def on_frame(self, can_id: int, data: bytes, at: float) -> str:
+        """A sentence where it is somebody else's, else nothing."""
+        if can_id == 0x000:
+            return self._on_nmt(data, at)
+        node = can_id & 0x7F
+        if can_id < 0x600:
+            self._asked.pop(node, None)
+            return ""
+        return self._on_request(node, data, at)
+
+    def _on_nmt(self, data: bytes, at: float) -> str:
+        if len(data) < 2 or data[0] not in _COMMANDS:
+            return "NMT command that there is not: somebody else sends it"
+        what, node = _COMMANDS[data[0]], data[1]
+        if node and node not in self._nodes:
+            return f"NMT {what} of node {node}, which the site does not have: somebody else sends it"
+        for one in (node,) if node else tuple(self._nodes):
+            if self._is_told_to_run(one):
+                return f"NMT {what} of node {one} while a drive of it is told to run: somebody else sends it"
+            if data[0] == _START and self._starts_too_often(one, at):
+                return f"NMT start of node {one} again and again: somebody else sends it"
+        return ""
+
+    def _starts_too_often(self, node: int, at: float) -> bool:
+        starts = self._starts[node]
+        starts.append(at)
+        while starts[0] < at - _STARTS_S:
+            starts.popleft()
+        if len(starts) <= _MOST_STARTS:
+            return False
+        starts.clear()
+        return True
+
+    def _on_request(self, node: int, data: bytes, at: float) -> str:
+        if len(data) < 4:
+            return ""
+        kind, index = data[0] & 0xE0, int.from_bytes(data[1:3], "little")
+        if kind == _ABORT:
+            self._asked.pop(node, None)
+        if kind not in (_DOWNLOAD, _UPLOAD):
+            return ""
+        asked_at, self._asked[node] = self._asked.get(node), at
+        if asked_at is not None and at - asked_at < self._nodes[node]:
+            return f"two SDO requests to node {node} at once: somebody else sends one of them"
+        if kind == _DOWNLOAD and self._is_told_to_run(node) and any(index in part for part in _HEARD):
+            return f"SDO write of {index:04X}h to node {node} while it is told to run: somebody else sends it"
+        return ""

@@ -1,7 +1,7 @@
 """Does a drive do what its last stop asked? The judgement, without a drive.
 
-docs/explanation/dead-man-chain.md, "A stop that is not followed". What follows an ignored stop may halt a plant,
-so nothing is called ignored that may be something else:
+docs/explanation/dead-man-chain.md, "A stop that is not followed". What follows an ignored stop may halt a
+plant, so nothing is called ignored that may be something else:
 
 - The bound begins when the stop has been handed to the bus, not when it was decided.
 - What counts is when the drive's telegram was received. A drive ignores its stop by a telegram received after
@@ -11,9 +11,9 @@ so nothing is called ignored that may be something else:
   restarts with the first telegram after the pause, or when its node is in operation.
 - A word that takes the voltage has a short bound; any other stop may be a ramp, with a long one. The bound of
   the weaker word holds as long as the drive may still have that word.
-- A drive that reports that it is not enabled has ended its ramp: enabled again, it has until the short bound
-  after the stop. One that has not said since the enabling word that it was enabled has perhaps not had it yet.
-- Where the word leaves the voltage on, a drive may hold the motor, or be enabled on its way there for a bound.
+- A drive that reports that it is not enabled has ended its ramp: enabled again, it has until the short
+  bound. One that has not said since the enabling word that it was enabled has perhaps not had it yet.
+- Where the word leaves the voltage on, a drive may hold the motor, and be enabled on its way there.
 - A drive that the bridge itself cuts off, by an NMT stop of its node, is judged by its last report: if that
   was *enabled* and the drive is not known to stop in that state, it ignores its stop when the bound has
   passed.

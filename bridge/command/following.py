@@ -14,8 +14,7 @@ _DEADLINES: Final = 3
 _ON_CHANGE_S: Final = 0.5
 """Replaces the deadline if the drive sends its TPDO on change only."""
 _CYCLE_S: Final = 0.1
-"""From a word in the node to a telegram with a speed that is another one: through an interface, there and back.
-"""
+"""From a word in the node to a telegram with another speed: through a bus interface, there and back."""
 
 
 class Following:
@@ -125,7 +124,8 @@ class Following:
             self._channel.due(NOW)
 
     def on_telegram(self, now: float, speed: float | None) -> None:
-        """The TPDO that ``after_pdo`` knows, also one that says what the last one said; ``speed`` is the actual speed or frequency in any unit."""
+        """The TPDO that ``after_pdo`` knows, changed or not. ``speed`` is the actual speed or
+        frequency in any unit, None where it is not known."""
         before = self._follow.state
         self._follow.on_telegram(now, speed)
         if self._follow.state is not before:

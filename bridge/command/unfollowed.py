@@ -1,17 +1,17 @@
-"""Stop time in which a drive goes on as if nothing had been sent, summed over the stops of an owner that jogs.
+"""Stop time in which a drive goes on as if nothing had been sent, summed over the stops of a jogging owner.
 
-A stop that is shorter than its bound decides nothing by itself: the next enabling word ends it. But a drive that
-obeys shows it in each of them, and a deaf one in none:
+A stop that is shorter than its bound decides nothing by itself: the next enabling word ends it. But a drive
+that obeys shows it in each of them, and a deaf one in none:
 
 - Told to take the voltage off, it has said so ``seen_off_s`` later unless telegrams were lost.
-- On a ramp it says *enabled* to the end, and may never come to rest between two words that enable. But it gets
-  slower: from ``seen_s`` on its telegrams tell of the ramp, and what the slowest ramp loses in so much time is
-  known, in one piece or in many. A quarter of that is demanded: an S-curve has lost an eighth of its speed
+- On a ramp it says *enabled* to the end, and may never come to rest between two words that enable. But it
+  gets slower: from ``seen_s`` on its telegrams tell of the ramp, and what the slowest ramp loses in so much
+  time is known, in one piece or in many. A quarter of that is demanded: an S-curve has lost an eighth of its speed
   after a quarter of its time.
 
-The time counts that is covered by telegrams. A speed is compared with the one before in the same stop, or with
-that of a drive that went on steadily before it: one that still speeds up when the stop comes gets no slower at
-first, and is not to blame for that.
+The time counts that is covered by telegrams. A speed is compared with the one before in the same stop, or
+with that of a drive that went on steadily before it: one that still speeds up when the stop comes gets no
+slower at first, and is not to blame for that.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from math import inf
 from typing import Final
 
 _PART: Final = 4
-"""The judgement comes after this part of the slowest ramp, and asks for this part of what it has lost by then."""
+"""The judgement comes after this part of the slowest ramp, for this part of what it has lost then."""
 _STEADY: Final = 1 / 64
 """A speed that differs by no more than this part is the same."""
 

@@ -1,7 +1,7 @@
-"""Stops of a drive that its owner jogs, too short to be judged one by one: what the witness makes of them. Sans-IO.
+"""Stops of a drive that its owner jogs, too short to be judged one by one. Sans-IO.
 
-A drive that brakes is slower at the end of a stop than it was before it. How much slower is averaged over stops: a
-drive whose speeds would make it the ramp of ``_RAMPS`` times the longest that is expected does not brake.
+A drive that brakes is slower at the end of a stop than it was before it. How much slower is averaged over
+stops: one whose ramp would be ``_RAMPS`` times the longest that is expected does not brake.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ _RAMPS: Final = 4.0
 
 
 class Jogs:
-    """One drive. ``ramp_s`` is the longest ramp that is expected, ``judged_s`` the time of stops after which it is
+    """One drive. ``ramp_s`` is the longest ramp expected, ``judged_s`` the time of stops after which it is
     judged. Speeds are signed, in any unit."""
 
     def __init__(self, ramp_s: float, judged_s: float) -> None:
@@ -54,10 +54,7 @@ class Jogs:
                 self._run = (self._run[0] + 1, self._run[1] + speed)
             return ""
         count, total = self._run
-        if not speed or (count and speed * total < 0):
-            self.on_obeyed()
-            return ""
-        if not count or since_s < _LATE_S:
+        if not total:
             return ""
         self._stops += self._last_at is None
         self._time_s += at - (self._turned_at if self._last_at is None else self._last_at)

@@ -101,8 +101,8 @@ class WatchedDrive:
 
 @dataclass(frozen=True, slots=True)
 class WatchedBus:
-    """``beats`` has what is sent by the bridge alone, with its period in ms, by identifier; ``nodes`` the SDO time-out
-    of each node in s."""
+    """``beats`` has what is sent by the bridge alone, with its period in ms, by identifier; ``nodes`` the SDO
+    time-out of each node in s."""
 
     name: str
     channel: str

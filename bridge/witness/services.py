@@ -1,8 +1,8 @@
 """NMT commands and SDO writes that cannot be the bridge's, by what the bridge promises not to do. Sans-IO.
 
-The bus does not say who sent a frame. But the bridge stops a node's drives before it sends the node anything by NMT
-(docs/explanation/dead-man-chain.md), starts a node once, knows no nodes but the site's, asks one question of an SDO
-server at a time, and leaves what a drive hears and watches alone while the drive is told to run.
+The bus does not say who sent a frame. But the bridge stops a node's drives before it sends the node anything
+by NMT (docs/explanation/dead-man-chain.md), starts a node once, knows no nodes but the site's, asks one
+question of an SDO server at a time, and leaves what a drive hears and watches alone while the drive is told to run.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ _HEARD: Final = (
     range(0x1F80, 0x1F81),
     range(0x6040, 0x6041),
 )
-"""SYNC, the identifier of emergencies, guarding and heartbeats, SDO and PDO parameters, NMT startup, the control word
-(CiA 301 §7.5, CiA 402)."""
+"""SYNC, the identifier of emergencies, guarding and heartbeats, SDO and PDO parameters, NMT startup, the
+control word (CiA 301 §7.5, CiA 402)."""
 _DOWNLOAD, _UPLOAD, _ABORT = 0x20, 0x40, 0x80
 """Command specifiers in the three highest bits (CiA 301 §7.2.4.3)."""
 
 
 class Services:
-    """One bus. ``nodes`` has the SDO time-out of each node of the site in s; ``is_told_to_run`` says whether the
-    last RPDO of one of a node's drives enables."""
+    """One bus. ``nodes`` has the SDO time-out of each node of the site in s; ``is_told_to_run`` says whether
+    the last RPDO of one of a node's drives enables."""
 
     def __init__(self, nodes: Mapping[int, float], is_told_to_run: Callable[[int], bool]) -> None:
         self._nodes = nodes

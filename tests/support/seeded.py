@@ -1,33 +1,37 @@
 """Seeded faults that single unit tests have to find: ``python -m tests.support.seeded TABLE``.
 
 Each fault is an edit of one function's body or of a module's constant. It goes into the running program, in a
-process of its own that has been forked from one with everything imported: the tests that the table names have to
-fail there. So a fault costs what its tests cost.
+process of its own that has been forked from one with everything imported: the tests that the table names
+have to fail there. So a fault costs what its tests cost.
 """
 
 from __future__ import annotations
 
 import importlib
 import os
+import resource
 import signal
 import sys
-import time
 import tomllib
 from collections.abc import Iterator
+from contextlib import redirect_stdout
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Final
 
 import pytest
+from _pytest.runner import runtestprotocol
 
 from tests.proof.mutants import Edit
 from tests.support.process import REPOSITORY
 
 _MOST_S: Final = 20
-"""Tests that take longer with a fault have noticed it: it is in a loop without an end."""
+"""Processor time; tests that need more with a fault have noticed it: it is in a loop without an end."""
 _PLAIN: Final = (bool, int, float, str, tuple, frozenset)
-_FOUND: Final = (pytest.ExitCode.TESTS_FAILED, -signal.SIGALRM)
+_FAILED, _BROKEN, _SAME = 1, 98, 99
+_FOUND: Final = (_FAILED, -signal.SIGXCPU, -signal.SIGKILL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,52 +99,76 @@ def _functions(module: ModuleType) -> Iterator[tuple[str, FunctionType]]:
                     yield one.__qualname__, one
 
 
-def run(tests: tuple[str, ...], fault: Seeded | None = None) -> int:
-    """Exit code of pytest with this fault, in a process of its own; 99 where the fault changes nothing."""
-    pid = os.fork()
-    if pid:
-        return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-    code = 98
-    try:
-        nothing = os.open(os.devnull, os.O_RDWR)
-        for stream in (0, 1, 2):
-            os.dup2(nothing, stream)
-        if fault is not None:
-            signal.alarm(_MOST_S)
-        if fault is not None and not seed(importlib.import_module(fault.module), fault.source()):
-            code = 99
-        else:
-            code = int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests]))
-    finally:
-        os._exit(code)
+class _Loop:
+    """In place of pytest's own: each fault has a process of its own, with tests that are collected."""
+
+    def __init__(self, faults: tuple[Seeded, ...]) -> None:
+        self._faults = faults
+        self.lives: list[str] = []
+
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        every = tuple({test for fault in self._faults for test in fault.tests})
+        if code := self._run(_chosen(session, every), None):
+            self.lives.append(f"the tests end with {code} on the program as it is")
+            return True
+        for fault in self._faults:
+            code = self._run(_chosen(session, fault.tests), fault)
+            if code not in _FOUND:
+                what = {0: "no test notices", _SAME: "changes nothing"}.get(code, f"ends with {code}")
+                self.lives.append(f"{fault.name}: {what}")
+        return True
+
+    def _run(self, items: list[pytest.Item], fault: Seeded | None) -> int:
+        pid = os.fork()
+        if pid:
+            return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+        code = _BROKEN
+        try:
+            nothing = os.open(os.devnull, os.O_RDWR)
+            for stream in (0, 1, 2):
+                os.dup2(nothing, stream)
+            code = _outcome(items, fault)
+        finally:
+            os._exit(code)
+
+
+def _chosen(session: pytest.Session, tests: tuple[str, ...]) -> list[pytest.Item]:
+    """The items of these files and functions, with all their parameters."""
+    return [
+        item
+        for item in session.items
+        if any(item.nodeid == test or item.nodeid.startswith((f"{test}[", f"{test}::")) for test in tests)
+    ]
+
+
+def _outcome(items: list[pytest.Item], fault: Seeded | None) -> int:
+    if not items:
+        return _BROKEN
+    if fault is not None:
+        resource.setrlimit(resource.RLIMIT_CPU, (_MOST_S, _MOST_S + 1))
+        if not seed(importlib.import_module(fault.module), fault.source()):
+            return _SAME
+    for place, item in enumerate(items):
+        following = items[place + 1] if place + 1 < len(items) else None
+        if any(report.failed for report in runtestprotocol(item, log=False, nextitem=following)):
+            return _FAILED
+    return 0
 
 
 def main() -> int:
     """Print the faults that live. Exit code 1 where there is one."""
     os.chdir(REPOSITORY)
     faults = load(Path(sys.argv[1]))
-    for test in sorted({test.partition("::")[0] for fault in faults for test in fault.tests}):
-        importlib.import_module(test.removesuffix(".py").replace("/", "."))
     for fault in faults:
         importlib.import_module(fault.module)
-    if code := run(tuple(sorted({test for fault in faults for test in fault.tests}))):
-        print(f"the tests end with {code} on the program as it is")
-        return 1
-    lives = False
-    for fault in faults:
-        begin = time.monotonic()
-        code = run(fault.tests, fault)
-        if "--times" in sys.argv:
-            print(f"{time.monotonic() - begin:.1f} s {fault.name}", flush=True)
-        if code not in _FOUND:
-            lives = True
-            print(
-                {0: f"{fault.name}: no test notices", 99: f"{fault.name}: changes nothing"}.get(
-                    code, f"{fault.name}: code {code}"
-                ),
-                flush=True,
-            )
-    return lives
+    loop = _Loop(faults)
+    tests = sorted({test.partition("::")[0] for fault in faults for test in fault.tests})
+    with redirect_stdout(StringIO()):
+        code = pytest.main(["-q", "-s", "-p", "no:cacheprovider", "-p", "no:xdist", *tests], [loop])
+    if code:
+        loop.lives.append(f"the tests cannot be collected: {code}")
+    print("\n".join(loop.lives), end="\n" if loop.lives else "")
+    return bool(loop.lives)
 
 
 if __name__ == "__main__":

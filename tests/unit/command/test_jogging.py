@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import ceil
 
 import pytest
@@ -165,7 +166,7 @@ def test_it_is_named_again_only_after_as_much_time_again() -> None:
         jogged.send(Sent.ENABLES, 1.0)
     times = [verdict.at for verdict in jogged.ignored]
     assert len(times) > 1
-    assert min(b - a for a, b in zip(times, times[1:], strict=False)) > 10.0
+    assert min(b - a for a, b in pairwise(times)) > 10.0
 
 
 def jogged_by_hand(word: Sent = Sent.RAMP, *, has_speed: bool = True) -> Jogged:

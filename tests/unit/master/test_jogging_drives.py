@@ -63,7 +63,7 @@ def running(folder: Path, mapping: str) -> tuple[DeafBench, str]:
     full = sorted({value.full for value in family.value if value.full})
     more = f"parameters = {{ {', '.join(f'{one} = {known[one]}' for one in full)} }}\ntelegram_downtime_s = 0"
     if mapping != "nord/sk-tu4-cao":
-        # At factory Lenze sends on a change only, STÖBER answers RPDOs that it hears, NORD says it every 250 ms.
+        # At factory Lenze sends on a change only, STÖBER answers RPDOs, NORD sends every 250 ms.
         more += "\ntpdo = { event_ms = 50 }"
     kind = "guarding" if mapping.startswith("stoeber/") else "heartbeat"
     node = sites.node(

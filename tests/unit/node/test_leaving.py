@@ -18,7 +18,7 @@ from tests.support.leg_words import NORD_TU4, VELOCITY, LegWords
 
 STOP = NmtCommand.STOP
 TAKEOVER_S = 0.03
-"""A synchronous RPDO: SYNC after 10 ms, and the bridge's own 20 ms ("How long it takes" of the dead-man chain)."""
+"""A synchronous RPDO: SYNC after 10 ms, and the bridge's own 20 ms."""
 
 
 class Wire:

@@ -12,7 +12,7 @@ JOGS = [(1.0, 0.3), (0.5, 0.3), (3.0, 1.0), (60.0, 5.0)]
 
 
 class Drive:
-    """Brakes and speeds up in ``ramp_s`` from or to full speed, ``late_s`` after it was told; None: it goes on."""
+    """Brakes and speeds up in ``ramp_s`` from to full speed, ``late_s`` after a word; None: it goes on."""
 
     def __init__(
         self, ramp_s: float | None, *, tpdo_s: float = 0.05, late_s: float = 0.05, noise: int = 0
@@ -88,6 +88,32 @@ def test_standstill_and_the_other_direction_are_braking(speed: int) -> None:
     jogs = almost()
     jogs.on_speed(speed, 2.95)
     assert not jogs.on_speed(100, 3.2)
+
+
+def test_a_run_at_another_speed_is_no_braking() -> None:
+    jogs = Jogs(RAMP_S, 1.0)
+    for begin, speed in ((0.0, 200), (10.0, 100)):
+        jogs.on_turn(begin, stops=False)
+        jogs.on_speed(speed, begin + 5.0)
+        jogs.on_turn(begin + 6.0, stops=True)
+    assert jogs.on_speed(100, 17.5)
+
+
+def test_what_it_says_at_once_tells_nothing() -> None:
+    jogs = Jogs(RAMP_S, 1.0)
+    for n in range(100):
+        jogs.on_turn(n, stops=False)
+        jogs.on_speed(100, n + 0.4)
+        jogs.on_turn(n + 0.5, stops=True)
+        assert not jogs.on_speed(100, n + 0.55)
+
+
+def test_a_drive_that_stood_in_the_run_is_not_judged() -> None:
+    jogs = Jogs(RAMP_S, 1.0)
+    jogs.on_turn(0.0, stops=False)
+    jogs.on_speed(0, 1.0)
+    jogs.on_turn(2.0, stops=True)
+    assert not jogs.on_speed(0, 9.0)
 
 
 def test_a_report_that_it_is_not_enabled_begins_anew() -> None:

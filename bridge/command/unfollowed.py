@@ -6,8 +6,8 @@ that obeys shows it in each of them, and a deaf one in none:
 - Told to take the voltage off, it has said so ``seen_off_s`` later unless telegrams were lost.
 - On a ramp it says *enabled* to the end, and may never come to rest between two words that enable. But it
   gets slower: from ``seen_s`` on its telegrams tell of the ramp, and what the slowest ramp loses in so much
-  time is known, in one piece or in many. A quarter of that is demanded: an S-curve has lost an eighth of its speed
-  after a quarter of its time.
+  time is known, in one piece or in many. A quarter of that is demanded: an S-curve has lost an eighth
+  of its speed after a quarter of its time.
 
 The time counts that is covered by telegrams. A speed is compared with the one before in the same stop, or
 with that of a drive that went on steadily before it: one that still speeds up when the stop comes gets no

@@ -273,8 +273,7 @@ class Follow:
         if is_late or self._says is not Says.ENABLED or self._sent is Sent.SILENT:
             return
         off_s, ramp_s = self._bounds.off_s, self._bounds.ramp_s
-        takes = self._on_bus is Sent.OFF or self._sent is Sent.ENABLES
-        found = self._unfollowed.seen(at, speed, takes_voltage=takes, off_s=off_s, ramp_s=ramp_s)
+        found = self._unfollowed.seen(at, speed, off_s=off_s, ramp_s=ramp_s)
         self._unfollowed, summed = found
         if summed is not None and self.state is not LastStop.IGNORED:
             self._disobeyed_at = at

@@ -48,9 +48,6 @@ class StopTime:
         seen_at = self.seen_at if self.is_steady else None
         return replace(self, begins_at=begins_at, seen_at=seen_at, has_counted=False, is_steady=False)
 
-    def end(self) -> StopTime:
-        return replace(self.begin(inf), seen_at=None)
-
     def obeyed(self) -> StopTime:
         return StopTime(begins_at=self.begins_at)
 
@@ -83,22 +80,23 @@ class Unfollowed:
     fast: StopTime = StopTime()
 
     def begin(self, on_from: float, fast_from: float) -> Unfollowed:
-        """A stop, another word of it, or a drive that was not heard for a while."""
+        """A stop, another word of it, or a drive that was not heard for a while. ``on_from`` is infinite
+        where the word leaves the voltage on."""
         return Unfollowed(self.on.begin(on_from), self.fast.begin(fast_from))
 
     def end(self) -> Unfollowed:
         """A word that enables: what has been summed stays."""
-        return Unfollowed(self.on.end(), self.fast.end())
+        return self.begin(inf, inf)
 
     def obeyed(self) -> Unfollowed:
         return Unfollowed(self.on.obeyed(), self.fast.obeyed())
 
     def seen(
-        self, at: float, speed: float | None, *, takes_voltage: bool, off_s: float, ramp_s: float
+        self, at: float, speed: float | None, *, off_s: float, ramp_s: float
     ) -> tuple[Unfollowed, StopTime | None]:
         """A telegram that says *enabled*; and the time that makes the stop in force an ignored one.
         ``off_s`` and ``ramp_s`` are the bounds of a single stop, ``speed`` is None where none is known."""
-        on = self.on.seen(at, None) if takes_voltage else self.on
+        on = self.on.seen(at, None)
         fast = self.fast if speed is None else self.fast.seen(at, speed)
         if on.time_s >= off_s:
             return self.obeyed(), on

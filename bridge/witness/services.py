@@ -3,7 +3,7 @@
 The bus does not say who sent a frame. But the bridge stops a node's drives before it sends the node anything
 by NMT (docs/explanation/dead-man-chain.md), starts a node once, knows no nodes but the site's, asks one
 question of an SDO server at a time, and leaves what a drive hears and watches alone while the drive is
-told to run. """
+told to run."""
 
 from __future__ import annotations
 

@@ -153,3 +153,13 @@ def test_stops_that_are_ignored_together_are_told_with_their_time() -> None:
     )
     assert line.told == [(1000, f"{message}{STAYS}")]
     assert line.endings[-1] == ("ignored", f"{message}{STAYS}")
+
+
+def test_one_long_ramp_on_which_a_drive_gets_no_slower_is_told_as_any_ignored_stop() -> None:
+    line = JudgedPlant().enables()
+    line.drive.words[1] = 0x2000
+    line.asks(Action.STOP)
+    line.goes_on(20.0)
+    [(severity, message)] = line.told
+    assert severity == 1000
+    assert message.startswith("ignores its stop: ") and f"is sent since 15.22 s, {SAYS}" in message

@@ -43,6 +43,8 @@ def test_of_a_drive_that_nobody_has_told_anything_nothing_is_judged() -> None:
         # Silence adds nothing to a word that it has had.
         ([(1.0, RAMP), (2.0, SILENT)], 5.0),
         ([(1.0, OFF), (1.25, SILENT)], 1.5),
+        # Sent once more it is no other stop.
+        ([(1.0, RAMP), (4.75, RAMP)], 5.0),
         # Said once more, also with another status word, it is the same.
         ([(1.0, RAMP), (4.75, Deed.SAYS_SO_AGAIN)], 5.0),
     ],

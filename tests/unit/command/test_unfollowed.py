@@ -34,7 +34,7 @@ def test_without_a_stop_nothing_counts() -> None:
 
 
 def test_the_time_of_several_stops_is_summed_and_each_counts_once() -> None:
-    time = counted((1.0, None), (1.25, None), (1.5, None)).end().begin(8.0)
+    time = counted((1.0, None), (1.25, None), (1.5, None)).begin(inf).begin(8.0)
     time = time.seen(7.0, None).seen(8.25, None)
     assert (time.time_s, time.stops) == (0.75, 2)
 
@@ -51,7 +51,7 @@ def test_speeds_before_telegrams_tell_of_the_stop_are_no_loss() -> None:
 
 
 def test_speeds_of_two_stops_are_not_compared() -> None:
-    time = counted((1.0, 200.0), (1.5, 200.0)).end().begin(8.0).seen(8.0, 100.0).seen(8.5, 100.0)
+    time = counted((1.0, 200.0), (1.5, 200.0)).begin(inf).begin(8.0).seen(8.0, 100.0).seen(8.5, 100.0)
     assert (time.time_s, time.lost) == (1.0, 0.0)
 
 
@@ -85,28 +85,26 @@ def test_after_obeying_the_same_stop_may_count_again() -> None:
     assert (time.time_s, time.stops) == (0.5, 1)
 
 
-def judged(
-    time: Unfollowed, at: float, speed: float | None, *, takes: bool
-) -> tuple[Unfollowed, StopTime | None]:
-    return time.seen(at, speed, takes_voltage=takes, off_s=OFF_S, ramp_s=RAMP_S)
+def judged(time: Unfollowed, at: float, speed: float | None) -> tuple[Unfollowed, StopTime | None]:
+    return time.seen(at, speed, off_s=OFF_S, ramp_s=RAMP_S)
 
 
-def begun() -> Unfollowed:
-    return Unfollowed().begin(1.0, 1.0)
+def begun(on_from: float = 1.0) -> Unfollowed:
+    return Unfollowed().begin(on_from, 1.0)
 
 
 def test_who_stays_on_after_a_word_that_takes_the_voltage_is_named_at_the_short_bound() -> None:
-    time, found = judged(begun(), 1.0, None, takes=True)
-    time, found = judged(time, 1.25, None, takes=True)
+    time, found = judged(begun(), 1.0, None)
+    time, found = judged(time, 1.25, None)
     assert found is None
-    time, found = judged(time, 1.5, None, takes=True)
+    time, found = judged(time, 1.5, None)
     assert found is not None and found.time_s == OFF_S
     assert time == Unfollowed(StopTime(begins_at=1.0), StopTime(begins_at=1.0)), "and the count begins anew"
 
 
 def test_a_stop_that_leaves_the_voltage_on_is_not_judged_without_a_speed() -> None:
-    time, found = judged(begun(), 1.0, None, takes=False)
-    _, found = judged(time, 1000.0, None, takes=False)
+    time, found = judged(Unfollowed().begin(inf, 1.0), 1.0, None)
+    _, found = judged(time, 1000.0, None)
     assert found is None
 
 
@@ -117,24 +115,24 @@ def test_a_stop_that_leaves_the_voltage_on_is_not_judged_without_a_speed() -> No
 def test_after_a_quarter_of_the_slowest_ramp_a_quarter_of_its_loss_is_asked_for(
     lost: float, is_named: bool
 ) -> None:
-    time, found = judged(begun(), 1.0, 1024.0, takes=False)
-    time, found = judged(time, 1.0 + LIMIT_S - 1 / 64, 1024.0, takes=False)
+    time, found = judged(begun(inf), 1.0, 1024.0)
+    time, found = judged(time, 1.0 + LIMIT_S - 1 / 64, 1024.0)
     assert found is None
-    time, found = judged(time, 1.0 + LIMIT_S, 1024.0 * (1.0 - lost), takes=False)
+    time, found = judged(time, 1.0 + LIMIT_S, 1024.0 * (1.0 - lost))
     assert (found is not None) is is_named
     assert time.fast == StopTime(begins_at=1.0), "either way the count begins anew"
 
 
 def test_where_the_bounds_are_the_same_the_whole_of_it_is_the_least() -> None:
-    time, _ = begun().seen(1.0, 8.0, takes_voltage=False, off_s=0.5, ramp_s=0.5)
-    time, found = time.seen(1.25, 8.0, takes_voltage=False, off_s=0.5, ramp_s=0.5)
+    time, _ = begun(inf).seen(1.0, 8.0, off_s=0.5, ramp_s=0.5)
+    time, found = time.seen(1.25, 8.0, off_s=0.5, ramp_s=0.5)
     assert found is None
-    assert time.seen(1.5, 8.0, takes_voltage=False, off_s=0.5, ramp_s=0.5)[1] is not None
+    assert time.seen(1.5, 8.0, off_s=0.5, ramp_s=0.5)[1] is not None
 
 
 def test_what_has_been_summed_outlives_a_word_that_enables_and_no_obedience() -> None:
-    time, _ = judged(begun(), 1.0, 8.0, takes=True)
-    time, _ = judged(time, 1.25, 8.0, takes=True)
+    time, _ = judged(begun(), 1.0, 8.0)
+    time, _ = judged(time, 1.25, 8.0)
     kept = time.end()
     assert (kept.on.time_s, kept.fast.time_s) == (0.25, 0.25)
     assert (kept.on.begins_at, kept.fast.begins_at) == (inf, inf)

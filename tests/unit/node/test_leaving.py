@@ -222,3 +222,11 @@ def test_a_node_that_has_started_is_owed_nothing() -> None:
     node.leaving.forget()
     node.leaving.on_bus_back(node.now)
     assert node.wire.sent == []
+
+
+def test_one_drive_that_has_been_told_does_not_speak_for_the_others() -> None:
+    node = Node(NORD_TU4, "fu1", "fu2")
+    node.line.enables()
+    node.line.asks(Action.STOP)
+    assert node.line.drive.following.told_for_s(node.now + 10.0) > 0
+    assert not node.leaving.has_told(node.now + 10.0)

@@ -7,16 +7,13 @@ plant, so nothing is called ignored that may be something else:
 - What counts is when the drive's telegram was received. A drive ignores its stop by a telegram received after
   the bound, never by mere time: a late process must not make a drive look bad. Only a drive that sends on
   change alone is judged by the time, once the bus has been drained.
-- A drive that was not heard for longer than its TPDO's deadline may not have heard us either: its bound
-  restarts with the first telegram after the pause, or when its node is in operation.
+- A drive that was not heard for longer than its TPDO's deadline may not have heard us: its bound restarts.
 - A word that takes the voltage has a short bound; any other stop may be a ramp, with a long one. The bound of
   the weaker word holds as long as the drive may still have that word.
 - A drive that reports that it is not enabled has ended its ramp: enabled again, it has until the short
   bound. One that has not said since the enabling word that it was enabled has perhaps not had it yet.
 - Where the word leaves the voltage on, a drive may hold the motor, and be enabled on its way there.
-- A drive that the bridge itself cuts off, by an NMT stop of its node, is judged by its last report: if that
-  was *enabled* and the drive is not known to stop in that state, it ignores its stop when the bound has
-  passed.
+- A drive that the bridge itself cuts off, by an NMT stop of its node, is judged by its last report.
 - Stops that are shorter than their bound are summed until the drive obeys (``unfollowed.py``).
 - The ramp of a fault may come at any time, and has its bound from then.
 - A status word that fits no state of the family says nothing.

@@ -60,7 +60,7 @@ class DeafBench(Bench):
 def running(folder: Path, mapping: str) -> tuple[DeafBench, str]:
     family = load_family(mapping)
     known = {"P105": 50.0, "P112": 10.0, "C00011": 1500.0, "C01": 3000.0}
-    full = sorted({value.full for value in family.value if value.full})
+    full = sorted({value.full for value in family.value if value.full} & set(known))
     more = f"parameters = {{ {', '.join(f'{one} = {known[one]}' for one in full)} }}\ntelegram_downtime_s = 0"
     if mapping != "nord/sk-tu4-cao":
         # At factory Lenze sends on a change only, STÖBER answers RPDOs, NORD sends every 250 ms.

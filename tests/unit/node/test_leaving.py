@@ -177,51 +177,37 @@ def test_after_a_restart_nothing_waits_and_nobody_is_judged_by_what_was_before()
     assert (node.leaving.is_due, node.line.last_stop) == (False, LastStop.FORWARDED)
 
 
-# the bus
+# stopped words, and then a command
 
 
-def gone_and_back(*commands: NmtCommand, stays_stopped: bool = True) -> Node:
+def test_a_node_is_told_to_stop_before_it_gets_its_command() -> None:
+    node = Node(kind=255)
+    node.leaving.tell(STOP, node.now)
+    assert node.wire.sent == ["stopped words", STOP]
+
+
+def test_it_waits_for_synchronous_words_of_a_node_that_takes_them() -> None:
     node = Node()
-    for command in commands:
-        node.leaving.send(command, node.now)
-    node.leaving.on_bus_gone(stays_stopped=stays_stopped)
-    node.wire.put_off.clear()
-    return node
+    node.leaving.tell(STOP, node.now)
+    assert (node.wire.sent, node.wire.put_off.command) == (["stopped words"], STOP)
 
 
-def test_what_waited_when_the_bus_went_is_owed_after_stopped_words() -> None:
-    node = gone_and_back(STOP)
-    node.leaving.on_bus_back(node.now)
-    assert node.wire.sent == ["stopped words"]
-    assert node.wire.put_off.command is STOP
+@pytest.mark.parametrize(("kind", "waits"), [(1, True), (255, False)])
+def test_it_waits_for_a_node_that_somebody_else_has_started(kind: int, waits: bool) -> None:
+    """Whatever the bridge takes its state to be."""
+    node = Node(kind=kind, takes_words=False)
+    node.leaving.tell(STOP, node.now, takes_words=True)
+    assert node.wire.sent == (["stopped words"] if waits else ["stopped words", STOP])
+    assert node.leaving.is_due is waits
 
 
-def test_it_is_owed_once() -> None:
-    node = gone_and_back(STOP)
-    node.leaving.on_bus_back(node.now)
-    node.wire.put_off.clear()
-    node.leaving.on_bus_back(node.now)
-    assert (node.wire.sent, node.leaving.is_due) == (["stopped words"], False)
-
-
-def test_a_bus_that_goes_twice_does_not_lose_it() -> None:
-    node = gone_and_back(STOP)
-    node.leaving.on_bus_gone(stays_stopped=True)
-    node.leaving.on_bus_back(node.now)
-    assert node.wire.put_off.command is STOP
-
-
-def test_nothing_is_owed_to_a_node_that_is_booted_again_or_was_told_nothing() -> None:
-    for node in (gone_and_back(STOP, stays_stopped=False), gone_and_back()):
-        node.leaving.on_bus_back(node.now)
-        assert node.wire.sent == []
-
-
-def test_a_node_that_has_started_is_owed_nothing() -> None:
-    node = gone_and_back(STOP)
-    node.leaving.forget()
-    node.leaving.on_bus_back(node.now)
-    assert node.wire.sent == []
+def test_after_a_restart_no_stop_is_owed() -> None:
+    node = Node()
+    node.line.enables()
+    node.leaving.owed.note()
+    assert node.leaving.owed.is_open
+    node.leaving.on_restart()
+    assert not node.leaving.owed.is_open
 
 
 def test_one_drive_that_has_been_told_does_not_speak_for_the_others() -> None:
@@ -230,3 +216,21 @@ def test_one_drive_that_has_been_told_does_not_speak_for_the_others() -> None:
     node.line.asks(Action.STOP)
     assert node.line.drive.following.told_for_s(node.now + 10.0) > 0
     assert not node.leaving.has_told(node.now + 10.0)
+
+
+def test_a_stop_is_owed_from_the_enabling_word_until_the_drive_says_that_it_follows() -> None:
+    node = Node()
+    owed = node.leaving.owed
+    owed.note()
+    assert not owed.is_open
+    node.line.enables()
+    owed.note()
+    node.line.asks(Action.DISABLE_VOLTAGE)
+    owed.note()
+    assert owed.is_open
+    node.line.says(NORD_TU4.ready)
+    owed.note()
+    node.line.says(NORD_TU4.enabled)
+    node.line.goes_on(node.now - 1024.0 + 2.0)
+    assert node.line.last_stop is LastStop.IGNORED
+    assert not owed.is_open, "that is another one's word"

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from bridge.parameter.number_text import Language, NumberError, read_number, written
-from tests.support.numbers import CASES
+from tests.support.number_table import CASES
 
 LANGUAGES: tuple[Language, ...] = ("en", "de")
 

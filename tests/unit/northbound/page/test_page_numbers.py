@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import pytest
 
-from tests.support.numbers import CASES
+from tests.support.number_table import CASES
 
 JS: Final = Path("bridge/northbound/page/static/js")
 _READ_ALL: Final = """

@@ -29,7 +29,7 @@ class Axis(Leg):
 
     def __init__(self, reaction: Reaction = "stop", follows: tuple[tuple[int, int], ...] = ((0, 1), (1, 2))):
         given = settings_of("cia402/cyclic-position", on_expiry=reaction, fieldbus_timeout_ms=1000)
-        super().__init__(replace(given, decode=telegram, setpoints=3, follows=follows))
+        super().__init__(replace(given, decode=telegram, setpoints=3, resting=(), follows=follows))
 
     def stands(self, place: tuple[int, int]) -> tuple[int, ...]:
         """What is sent to a drive whose position is this."""

@@ -66,6 +66,7 @@ def _signals(
                 signal.low if not words else None,
                 signal.high if not words else None,
                 signal.unit if not words else "",
+                signal.is_real,
                 signal.states,
                 f"{where} {signal.description}".rstrip(),
             )

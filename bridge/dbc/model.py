@@ -14,7 +14,8 @@ BRIDGE: Final = "DRIVEBRIDGE"
 class Signal:
     """``start`` and ``length`` in bits, little-endian; physical value = raw × factor + offset.
 
-    ``choices`` has the texts of an enumeration. ``low`` and ``high`` are in ``unit``, None where not known.
+    ``is_float``: raw is a floating-point number of IEEE 754. ``choices`` has the texts of an enumeration.
+    ``low`` and ``high`` are in ``unit``, None where not known.
     """
 
     name: str
@@ -26,6 +27,7 @@ class Signal:
     low: float | None = None
     high: float | None = None
     unit: str = ""
+    is_float: bool = False
     choices: Mapping[int, str] = field(default_factory=dict[int, str])
     comment: str = ""
 

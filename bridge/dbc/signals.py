@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from bridge.canopen.datatypes import INTEGERS
 from bridge.dbc.fields import Field, Layout
 from bridge.dbc.model import Signal
 from bridge.drive import ValueCodec
@@ -79,12 +78,13 @@ class PdoSignals:
             field.start,
             field.length,
             # A shorter object fills its word with zeros, unless the mapping file says that it has a sign.
-            field.is_signed or (field.length % WORD_BITS == 0 and INTEGERS[model.raw_type].signed),
+            field.is_signed or (field.length % WORD_BITS == 0 and model.is_signed),
             codec.scale.full / codec.scale.at if codec.scale else 1.0,
             codec.scale.offset if codec.scale else 0.0,
             low,
             high,
             "" if codec.is_unknown else model.unit,
+            model.is_real,
             model.states,
             self._comment(codec),
         )

@@ -54,7 +54,9 @@ def _signal(signal: Signal, receivers: tuple[str, ...]) -> DbcSignal:
         signal.length,
         "little_endian",
         signal.is_signed,
-        conversion=BaseConversion.factory(_number(signal.factor), _number(signal.offset), choices or None),
+        conversion=BaseConversion.factory(
+            _number(signal.factor), _number(signal.offset), choices or None, signal.is_float
+        ),
         minimum=_limit(signal.low),
         maximum=_limit(signal.high),
         unit=_plain(signal.unit) or None,

@@ -27,9 +27,11 @@ from bridge.eds import DataType, Description, read_whole_device_file
 from bridge.errors import Fault, FileFaults, OperationFailed
 from bridge.mapping import Family, load_family
 from bridge.mapping.loader import family_of
+from bridge.mapping.process import REAL
 
 _NEEDED: Final = ("603F", "6007")
-"""Parameters that the base itself speaks of; a device without them refuses to be asked."""
+"""Parameters that the base itself speaks of beside those that decide its values; a device without them
+refuses to be asked."""
 _VALUE_TYPES: Final = {
     DataType.INTEGER8: "int16",
     DataType.INTEGER16: "int16",
@@ -37,6 +39,7 @@ _VALUE_TYPES: Final = {
     DataType.UNSIGNED8: "uint16",
     DataType.UNSIGNED16: "uint16",
     DataType.UNSIGNED32: "uint32",
+    DataType.REAL32: "real32",
 }
 """The types of values in words; a signed byte fills its word with its sign (``signed`` of the PDO)."""
 _INTERPOLATION: Final = 0x60C2
@@ -175,8 +178,10 @@ def _lines(
 
 def _without(description: Description, base: Family, layout: Layout, there: Set[str]) -> Iterator[str]:
     """What the base has and this device has not."""
+    needed = {*_NEEDED, *(one.parameter for one in base.meaning)}
+    needed.update(name for value in base.value for name in (*value.scaled_by, *value.when, *value.steady))
     for parameter in base.parameter:
-        if parameter.name not in there and parameter.name not in _NEEDED:
+        if parameter.name not in there and parameter.name not in needed:
             yield f"parameter:{parameter.name}"
     for own in base.own_supervision:
         if own.object and description.entry(own.object.index, own.object.sub) is None:
@@ -251,8 +256,8 @@ def _rest(rpdo: Sequence[PdoLayout]) -> Iterator[str]:
 
 
 def _further(layout: Layout, taken: Set[tuple[str, str]]) -> Iterator[str]:
-    """A value for each further object of its PDOs, by the type that the file has for it. Real numbers and
-    what is longer than two words have their words alone. ``taken`` are the base's values."""
+    """A value for each further object of its PDOs, by the type that the file has for it. Booleans, strings
+    and the like have their words alone. ``taken`` are the base's values."""
     seen = set(taken)
     for group, pdos in (("command", layout.rpdo), ("actual", layout.tpdo)):
         for one in (one for pdo in pdos for one in pdo.further):
@@ -269,7 +274,8 @@ def _further(layout: Layout, taken: Set[tuple[str, str]]) -> Iterator[str]:
             yield f"word = {string(one.words[0])}" if len(one.words) == 1 else f"words = {strings(one.words)}"
             yield f"data_type = {string(kind)}"
             yield '# unit = ""'
-            yield "# scale = { factor = 1.0 }"
+            if kind != REAL:
+                yield "# scale = { factor = 1.0 }"
             yield f"description = {string(one.title)}"
             yield ""
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final
 
+from bridge.canopen.datatypes import REALS
 from bridge.derive.modes import MODE, MODE_DISPLAY, PROFILE_402, Mode, bits_of
 from bridge.derive.titles import title_of
 from bridge.derive.toml import string, strings, word
@@ -15,6 +16,8 @@ from bridge.parameter.effect import Effect
 from bridge.parameter.profiles import effect_of
 
 _WORD: Final = 16
+_BITS: Final = (8, 16, 32)
+"""Lengths of objects that words are made of."""
 _MOST_WORDS: Final = 4
 _MOST_PROCESS_WORDS: Final = 9
 _FIRST_COB_ID: Final = {True: 0x200, False: 0x180}
@@ -48,11 +51,13 @@ class PdoLayout:
     words: tuple[str, ...]
     objects: tuple[str, ...]
     turn_on: bool = False
-    """The device has it off."""
+    """The device has it off, or with another mapping: the boot-up writes it."""
     further: tuple[Further, ...] = ()
     """What it carries beside what the mode needs."""
     signed: tuple[str, ...] = ()
     """Objects of one byte with a sign."""
+    times: tuple[str, ...] = ()
+    """When it is sent, where it is written: keys of the mapping file with their values."""
 
     def lines(self, direction: str, *, names_words: bool = True) -> list[str]:
         """As an item of ``[[slot]]``."""
@@ -64,7 +69,8 @@ class PdoLayout:
         if self.signed:
             lines.append(f"signed = {strings(self.signed)}")
         if self.turn_on:
-            lines.append("write = true                 # the device has it switched off")
+            lines.append("write = true                 # the device has it off, or maps it otherwise")
+            lines += self.times
         return lines
 
 
@@ -91,7 +97,7 @@ def layout_of(description: Description, mode: Mode) -> Layout:
     rpdo: tuple[PdoLayout, ...] = ()
     tpdo: tuple[PdoLayout, ...] = ()
     if not _is_free(description, mode.commanded, receives=True):
-        rpdo = _own(description, mode, commands, "setpoint", receives=True)
+        rpdo = _own_or_free(description, mode, commands, "setpoint", receives=True)
     if _is_free(description, (*mode.told, (MODE_DISPLAY, 8)), receives=False) and tells_mode:
         told[f"value_{len(told)}"] = (MODE_DISPLAY, 8)
     elif _is_free(description, mode.told, receives=False):
@@ -101,7 +107,7 @@ def layout_of(description: Description, mode: Mode) -> Layout:
     else:
         if tells_mode:
             told[f"value_{len(told)}"] = (MODE_DISPLAY, 8)
-        tpdo = _own(description, mode, told, "value", receives=False)
+        tpdo = _own_or_free(description, mode, told, "value", receives=False)
         tells_mode = any(_ref(MODE_DISPLAY, 8) in pdo.objects for pdo in tpdo)
     rpdo_words = _process(commands, rpdo)
     tpdo_words = _process(told, tpdo)
@@ -136,10 +142,12 @@ def _process(words: _Words, own: Sequence[PdoLayout]) -> tuple[str, ...]:
     return (*first, *(name for name in carried if name not in first))
 
 
-def _is_free(description: Description, objects: Sequence[tuple[int, int]], *, receives: bool) -> bool:
-    """Whether the first PDO of the direction can be made to carry these objects."""
-    mapping = description.object(0x1600 if receives else 0x1A00)
-    communication = description.object(0x1400 if receives else 0x1800)
+def _is_free(
+    description: Description, objects: Sequence[tuple[int, int]], *, receives: bool, number: int = 1
+) -> bool:
+    """Whether a PDO of the direction can be made to carry these objects, and be switched on."""
+    mapping = description.object((0x1600 if receives else 0x1A00) + number - 1)
+    communication = description.object((0x1400 if receives else 0x1800) + number - 1)
     if mapping is None or communication is None:
         return False
     subs = [mapping.entry(sub) for sub in range(len(objects) + 1)]
@@ -152,13 +160,45 @@ def _is_free(description: Description, objects: Sequence[tuple[int, int]], *, re
     return all(entry and entry.pdo_mappable for entry in entries)
 
 
-def _own(
+def _own_or_free(
     description: Description, mode: Mode, words: _Words, others: str, *, receives: bool
 ) -> tuple[PdoLayout, ...]:
-    """The device's own PDOs that carry the objects of ``words``. Raises ``NoLayout``."""
+    """PDOs that carry the objects of ``words``: those that carry them already, else one that can be made to.
+    Raises ``NoLayout``, which is about the former."""
     of_direction = [one for one in pdos(description) if one.receives is receives]
     bases = {one.number: base for one in of_direction if (base := _base(description, one)) is not None}
-    there = [one for one in of_direction if one.number in bases and _is_usable(description, one)]
+    there = [one for one in of_direction if one.number in bases]
+    chosen: list[PdoSummary] = []
+    try:
+        chosen = _own(description, there, words, receives=receives)
+        names = _Names(description, mode, words, others)
+        return tuple(names.layout(one, bases[one.number]) for one in chosen)
+    except NoLayout:
+        wanted = dict.fromkeys(words.values())
+        needed = [one for one in wanted if one[0] != MODE_DISPLAY]
+        free = _free(description, there, list(wanted)) or _free(description, there, needed)
+        if free is None:
+            raise
+    return (_Names(description, mode, words, others).layout(free, bases[free.number]),)
+
+
+def _free(
+    description: Description, there: Sequence[PdoSummary], objects: Sequence[tuple[int, int]]
+) -> PdoSummary | None:
+    """A PDO that the boot-up can map and switch on, one that is in nobody's way first, as it will be."""
+    for one in sorted(there, key=lambda one: one.enabled and bool(one.mapped)):
+        if _is_free(description, objects, receives=one.receives, number=one.number):
+            mapped = tuple(MappedObject(index, 0, bits, "") for index, bits in objects)
+            return replace(one, mapped=mapped, enabled=False)
+    return None
+
+
+def _own(
+    description: Description, of_direction: Sequence[PdoSummary], words: _Words, *, receives: bool
+) -> list[PdoSummary]:
+    """The device's own PDOs that carry the objects of ``words``, and what those that can be mapped have to
+    carry beside them. Raises ``NoLayout``."""
+    there = [one for one in of_direction if _is_usable(description, one)]
     there.sort(key=lambda one: not one.enabled)
     # One that carries nothing else needs nobody to say what is right for the rest of it.
     there.sort(key=lambda one: sum(not _is_wanted(item, words) for item in one.mapped))
@@ -167,24 +207,40 @@ def _own(
     whole = [one for one in there if all(_carries(one, want) for want in needed)]
     whole.sort(key=lambda one: not all(_carries(one, want) for want in wanted))
     chosen = whole[:1]
-    if not whole:
-        for want in needed:
-            if any(_carries(one, want) for one in chosen):
-                continue
-            carriers = [one for one in there if _carries(one, want)]
-            if not carriers:
-                kind = "RPDO" if receives else "TPDO"
-                raise NoLayout(
-                    f"no {kind} of the device carries {want[0]:04X}h, and {kind}1 cannot be made to"
-                )
-            chosen.append(carriers[0])
-    names = _Names(description, mode, words, others)
-    return tuple(names.layout(one, bases[one.number]) for one in sorted(chosen, key=lambda one: one.number))
+    missing: list[tuple[int, int]] = []
+    for want in needed if not whole else ():
+        if any(_carries(one, want) for one in chosen):
+            continue
+        carriers = [one for one in there if _carries(one, want)]
+        chosen += carriers[:1]
+        if not carriers:
+            missing.append(want)
+    if missing:
+        taken = {one.number for one in chosen}
+        free = _free(description, [one for one in of_direction if one.number not in taken], missing)
+        if free is None:
+            raise NoLayout(_why_none(of_direction, missing[0], receives=receives))
+        chosen.append(free)
+    return sorted(chosen, key=lambda one: one.number)
+
+
+def _why_none(of_direction: Sequence[PdoSummary], want: tuple[int, int], *, receives: bool) -> str:
+    """Why no PDO brings or tells an object, with what is wrong with the one that has it."""
+    kind = "RPDO" if receives else "TPDO"
+    why = f"no {kind} of the device carries {want[0]:04X}h, and none can be made to"
+    for one in (one for one in of_direction if _carries(one, want)):
+        odd = next((item for item in one.mapped if item.bits not in _BITS), None)
+        if odd is not None:
+            named = f" ({odd.name})" if odd.name else ""
+            return f"{why}: {one.name} has {odd.index:04X}h:{odd.sub:02X}{named} of {odd.bits} bits beside it"
+        if not one.enabled:
+            return f"{why}: {one.name} is off and cannot be switched on"
+    return why
 
 
 def _is_usable(description: Description, pdo: PdoSummary) -> bool:
     """Whether a mapping can say what it carries, in words and whole objects, and it can be on."""
-    if not pdo.mapped or any(one.bits not in (8, 16, 32) for one in pdo.mapped):
+    if not pdo.mapped or any(one.bits not in _BITS for one in pdo.mapped):
         return False
     if sum(-(-one.bits // _WORD) for one in pdo.mapped) > _MOST_WORDS:
         return False
@@ -212,6 +268,19 @@ def _carries(pdo: PdoSummary, want: tuple[int, int]) -> bool:
     return any((one.index, one.bits) == want and one.sub == 0 for one in pdo.mapped)
 
 
+def _times(description: Description, pdo: PdoSummary) -> Iterator[str]:
+    """How one that is switched on is sent, as far as it can be set: with each change, and a TPDO every
+    100 ms, as those of the base. A PDO that is off has often a type that waits for SYNC or for a request."""
+    index = (0x1400 if pdo.receives else 0x1800) + pdo.number - 1
+    subs = ((2, "transmission_type = 255"),)
+    if not pdo.receives:
+        subs = (*subs, (3, "inhibit_ms = 10.0"), (5, "event_ms = 100"))
+    for sub, line in subs:
+        entry = description.entry(index, sub)
+        if entry and entry.access.writable:
+            yield line
+
+
 class _Names:
     """Gives each word of the chosen PDOs a name, and none twice."""
 
@@ -235,8 +304,9 @@ class _Names:
             words += names
             objects += [_ref(one.index, one.bits, one.sub)] * len(names)
         signed = tuple(_ref(one.index, sub=one.sub) for one in pdo.mapped if self._is_signed_byte(pdo, one))
+        times = () if pdo.enabled else tuple(_times(self._description, pdo))
         return PdoLayout(
-            pdo.number, cob_id, tuple(words), tuple(objects), not pdo.enabled, tuple(further), signed
+            pdo.number, cob_id, tuple(words), tuple(objects), not pdo.enabled, tuple(further), signed, times
         )
 
     def _is_signed_byte(self, pdo: PdoSummary, one: MappedObject) -> bool:
@@ -259,6 +329,8 @@ class _Names:
         if one.index == MODE:
             return Further(words, entry, title, self._mode.number & mask)
         value = entry.current.at(None) if entry.current else None
+        if entry.data_type is DataType.REAL32 and isinstance(value, int | float):
+            return Further(words, entry, title, int.from_bytes(REALS["real32"].encode(value), "little"))
         if isinstance(value, int):
             return Further(words, entry, title, value & mask)
         if effect_of(one.index, PROFILE_402) is Effect.COMMANDS:

@@ -7,7 +7,7 @@ from copy import copy
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.canopen.datatypes import INTEGERS
+from bridge.canopen.datatypes import INTEGERS, REALS
 from bridge.drive.scaling import LinearScale, scale_of
 from bridge.image import DataType
 from bridge.image.limits import shown_range
@@ -15,6 +15,7 @@ from bridge.mapping.model import Family, ProcessValue
 
 _WORD_BITS: Final = 16
 _WORD_MASK: Final = 0xFFFF
+_REAL: Final = REALS["real32"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +35,7 @@ class ValueCodec:
         self.model = model
         self.places = tuple(words.index(word) for word in model.word_names)
         self.scale = scale
-        self._number = INTEGERS[model.raw_type]
+        self._number = None if model.is_real else INTEGERS[model.raw_type]
         self._bit = model.bit
         self._states = model.states
         low, high = model.raw_range
@@ -92,7 +93,7 @@ class ValueCodec:
         """The value that these words stand for; with an unknown scale the bare number, and without words
         nothing but zero."""
         if not self.places:
-            return False if self._bit is not None else 0.0 if self.model.scale is not None else 0
+            return False if self._bit is not None else 0.0 if self.model.point_type is DataType.FLOAT else 0
         word = words[self.places[0]]
         if len(self.places) > 1:
             word |= words[self.places[1]] << _WORD_BITS
@@ -100,6 +101,8 @@ class ValueCodec:
             return bool(word >> self._bit & 1)
         if self.scale is not None:
             return self.scale.from_word(word)
+        if self._number is None:
+            return _REAL.decode(word.to_bytes(_REAL.size, "little"))
         number = self._number.from_word(word)
         return float(number) if self.model.scale is not None else number
 
@@ -120,6 +123,8 @@ class ValueCodec:
     def _whole(self, value: float) -> int:
         if not self._low <= value <= self._high:
             raise ValueError(f"takes {shown_range(self._low, self._high)}, not {value:.10g}")
+        if self._number is None:
+            return int.from_bytes(_REAL.encode(value), "little")
         number = int(value)
         if number != value:
             raise ValueError(f"takes a whole number, not {value:g}")

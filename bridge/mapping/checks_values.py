@@ -106,8 +106,11 @@ def _check_kind(value: ProcessValue, key: Key, file: MergedFile) -> None:
     is_long = value.width == 2
     if value.data_type is not None and value.data_type.endswith("32") is not is_long:
         words = "two words" if is_long else "one word"
-        right = "int32 or uint32" if is_long else "int16 or uint16"
+        right = "int32, uint32 or real32" if is_long else "int16 or uint16"
         file.fault((*key, "data_type"), f"{value.data_type} does not fit {words}", right)
+        return
+    if value.is_real and given:
+        file.fault((*key, given[0]), "has no meaning for a real32", "leave it out: the number is the value")
         return
     if value.bit is not None and is_long:
         file.fault((*key, "bit"), "is a bit of one word", "name it as word")

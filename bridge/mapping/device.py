@@ -57,6 +57,11 @@ class Signal(Table):
         """The type of its point."""
         return DataType.FLOAT if self.is_scaled else VALUE_TYPES[self.data_type]
 
+    @property
+    def is_real(self) -> bool:
+        """It is a floating-point number on the wire."""
+        return self.data_type in _REALS
+
     def decode(self, raw: int) -> Value:
         """``raw`` is the entry of a PDO as an integer, with its sign where the type has one."""
         if self.data_type == "bool":

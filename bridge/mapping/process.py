@@ -14,7 +14,10 @@ from bridge.mapping.fields import Bit, Mapped, Name, ObjectRef, Ref, States, Tab
 
 MOST_WORDS: Final = 9
 """Control or status word and eight values: what Modbus has registers for."""
-ValueKind = Literal["int16", "uint16", "int32", "uint32"]
+ValueKind = Literal["int16", "uint16", "int32", "uint32", "real32"]
+REAL: Final = "real32"
+"""A floating-point number of two words (CiA 301 §7.1.6.6): it is its own value, without a scale."""
+_LARGEST_REAL: Final = float.fromhex("0x1.fffffep+127")
 
 
 class Process(Table):
@@ -241,17 +244,29 @@ class ProcessValue(Table):
         return len(self.code) or len(self.word_names)
 
     @property
+    def is_real(self) -> bool:
+        """Its words are a floating-point number."""
+        return self.data_type == REAL
+
+    @property
     def raw_type(self) -> DataType:
         """How the words are read as a number."""
         if self.data_type is not None:
-            return DataType(self.data_type)
+            return DataType.FLOAT if self.is_real else DataType(self.data_type)
         unsigned = bool(self.bits or self.states)
         if self.width > 1:
             return DataType.UINT32 if unsigned else DataType.INT32
         return DataType.UINT16 if unsigned else DataType.INT16
 
     @property
-    def raw_range(self) -> tuple[int, int]:
+    def is_signed(self) -> bool:
+        """Its words are a number with a sign in the topmost bit of an integer."""
+        return not self.is_real and INTEGERS[self.raw_type].signed
+
+    @property
+    def raw_range(self) -> tuple[int, int] | tuple[float, float]:
+        if self.is_real:
+            return -_LARGEST_REAL, _LARGEST_REAL
         number = INTEGERS[self.raw_type]
         return number.low, number.high
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import pytest
+from cantools import database
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -12,11 +14,14 @@ from bridge.command import Outcome, Request, Start
 from bridge.derive import derive_family
 from bridge.drive import DriveState
 from bridge.errors import OperationFailed
+from bridge.exports import dbc_file, modbus_table
+from bridge.project import load_project
 from tests.support.bench import PLC
 from tests.support.invented_eds import (
     I8,
     I16,
     NODE_ID,
+    REAL32,
     SPIN,
     U16,
     U32,
@@ -154,4 +159,118 @@ def test_a_word_for_which_nobody_knows_a_value_is_refused_by_its_line() -> None:
     )
     sections["6072"] = mapped("max torque", U16)
     with pytest.raises(OperationFailed, match=r"RPDO1 carries 6072h:00 \(max torque\) too, and line \d+ of"):
+        derive_family(described(sections), "spin.eds")
+
+
+OFF_TPDO = "$NODEID+0x80000180"
+MAPPABLE = {"1402": ("$NODEID+0x80000400", ["0", "0"]), "1802": ("$NODEID+0x80000380", ["0", "0", "0"])}
+
+
+def with_type(sections: dict[str, Section], number: str, kind: str) -> None:
+    sections[f"{number}sub2"] = {**sections[f"{number}sub2"], "DefaultValue": kind}
+
+
+def free(sections: dict[str, Section], *numbers: str) -> None:
+    """Let the mapping of these PDOs be written, which carries nothing at the factory."""
+    for number in numbers:
+        mapping = f"{int(number, 16) + 0x200:04X}"
+        for name in [one for one in sections if one.startswith(f"{mapping}sub")]:
+            sections[name] = {**sections[name], "AccessType": "rw"}
+        sections[f"{mapping}sub0"] = {**sections[f"{mapping}sub0"], "DefaultValue": "0"}
+
+
+@pytest.mark.parametrize("kind", ["255", "1", "253"])
+def test_a_tpdo_that_is_off_is_switched_on_and_sent_with_each_change(tmp_path: Path, kind: str) -> None:
+    """Bit 31 of 1800h:01, and a type that waits for SYNC or for a remote frame (CiA 301 §7.5.2.37)."""
+    sections = fixed(
+        {"1400": ("$NODEID+0x200", ["0x60400010", "0x60420010"])},
+        {"1800": (OFF_TPDO, ["0x60410010", "0x60440010", CURRENT])},
+    )
+    with_type(sections, "1800", kind)
+    bench = DerivedBench(tmp_path, described(sections))
+    run_up(bench)
+    (drive,) = bench.plant.drives
+    assert bench.write(drive, velocity=300).ok
+    bench.run(0.3)
+    assert bench.value(f"{drive}/actual/velocity") == 300
+
+
+@pytest.mark.parametrize("number", ["1400", "1800"])
+def test_a_pdo_that_is_off_for_good_is_refused_by_name(number: str) -> None:
+    sections = fixed(
+        {"1400": ("$NODEID+0x200", ["0x60400010", "0x60420010"])},
+        {"1800": ("$NODEID+0x180", ["0x60410010", "0x60440010"])},
+    )
+    off = sections[f"{number}sub1"]["DefaultValue"].replace("+0x", "+0x80000")
+    sections[f"{number}sub1"] |= {"DefaultValue": off, "AccessType": "const"}
+    kind = "RPDO" if number < "1800" else "TPDO"
+    with pytest.raises(OperationFailed, match=f"{kind}1 is off and cannot be switched on"):
+        derive_family(described(sections), "spin.eds")
+
+
+@pytest.mark.parametrize(
+    ("rpdo", "tpdo"),
+    [
+        # the setpoint and the actual value are missing
+        (["0x60400010"], ["0x60410010"]),
+        # nothing is there
+        ([RAMP], [CURRENT]),
+        # a word for which nobody knows a value is beside them
+        (["0x60400010", "0x20080010", "0x60420010"], ["0x60410010", "0x60440010"]),
+    ],
+)
+def test_what_no_pdo_carries_is_mapped_into_one_that_is_free(
+    tmp_path: Path, rpdo: list[str], tpdo: list[str]
+) -> None:
+    sections = fixed(
+        {"1400": ("$NODEID+0x200", rpdo), "1402": MAPPABLE["1402"]},
+        {"1800": ("$NODEID+0x180", tpdo), "1802": MAPPABLE["1802"]},
+    )
+    sections["2008"] = mapped("torque limit", U16)
+    free(sections, "1402", "1802")
+    bench = DerivedBench(tmp_path, described(sections))
+    run_up(bench)
+    (drive,) = bench.plant.drives
+    assert bench.write(drive, velocity=300).ok
+    bench.run(0.3)
+    assert bench.value(f"{drive}/actual/velocity") == 300
+
+
+def test_a_further_real_number_is_a_real_number_in_points_dbc_and_exports(tmp_path: Path) -> None:
+    sections = fixed(
+        {"1400": ("$NODEID+0x200", ["0x60400010", "0x60420010", "0x20150020"])},
+        {"1800": ("$NODEID+0x180", ["0x60410010", "0x60440010", "0x20140020"])},
+    )
+    sections["2014"] = mapped("Motor current", REAL32, "ro", "-1.5")
+    sections["2015"] = mapped("Current limit", REAL32, default="2.5")
+    bench = DerivedBench(tmp_path, described(sections))
+    run_up(bench)
+    (drive,) = bench.plant.drives
+    point = f"{drive}/actual/motor_current"
+    assert bench.value(point) == -1.5
+    frames = [frame.data for frame in bench.log if frame.can_id == 0x200 + NODE_ID]
+    assert {struct.unpack_from("<f", data, 4)[0] for data in frames} == {2.5}
+    assert bench.write(drive, current_limit=0.75).ok
+    bench.run(0.1)
+    last = [frame.data for frame in bench.log if frame.can_id == 0x200 + NODE_ID][-1]
+    assert struct.unpack_from("<f", last, 4) == (0.75,)
+    project = load_project(next(tmp_path.glob("*.toml")))
+    rows = {str(row["name"]): row["type"] for row in modbus_table(project).facts}
+    assert rows["actual/motor_current"] == rows["command/current_limit"] == "float32"
+    found = database.load_string(dbc_file(project, 0), "dbc")
+    assert isinstance(found, database.Database)
+    signals = {one.name: one for message in found.messages for one in message.signals}
+    for name in ("motor_current", "current_limit"):
+        assert signals[name].is_float
+        assert signals[name].length == 32
+
+
+def test_three_bytes_are_refused_by_name() -> None:
+    """INTEGER24 fills no words."""
+    sections = fixed(
+        {"1400": ("$NODEID+0x200", ["0x60400010", "0x60420010"])},
+        {"1800": ("$NODEID+0x180", ["0x60410010", "0x60440010", "0x20160018"])},
+    )
+    sections["2016"] = mapped("Turns", "0x10", "ro")
+    with pytest.raises(OperationFailed, match=r"TPDO1 has 2016h:00 \(Turns\) of 24 bits beside it"):
         derive_family(described(sections), "spin.eds")

@@ -20,6 +20,7 @@ from bridge.lint.own import WorstCase, check_own_supervision, worst_cases
 from bridge.lint.pdos import check_pdos
 from bridge.lint.report import LintFinding, LintReport, Severity
 from bridge.lint.times import check_times
+from bridge.lint.words import check_words
 from bridge.mapping import Family
 from bridge.mapping.loader import mapping_folders
 from bridge.mapping.site import described_file
@@ -82,6 +83,7 @@ def lint(
         bus = view_bus(table, ("bus", b), families, known, downloads)
         check_identifiers(bus, report)
         check_pdos(bus, report)
+        check_words(bus, report)
         check_times(bus, report)
         check_own_supervision(bus, report)
         check_contradictions(bus, report)

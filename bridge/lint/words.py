@@ -1,0 +1,112 @@
+"""Words of the process data that no PDO carries, and those that are sent as 0 where 0 means something."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from bridge.eds.pdos import PdoSummary, pdos
+from bridge.lint.bus import BusView, DriveView, NodeView, PdoView
+from bridge.lint.report import LintReport
+from bridge.mapping.fields import MappedObject
+from bridge.mapping.model import Family, ObjectRef, Pdo, Slot
+from bridge.parameter.effect import Effect
+from bridge.parameter.profiles import effect_of
+
+_PROFILE: Final = range(0x6000, 0x6800)
+_CIA_402: Final = 402
+_MODE: Final = 0x6060
+
+
+def check_words(bus: BusView, report: LintReport) -> None:
+    for node in bus.nodes:
+        known = pdos(node.dictionary, node.table.id) if node.dictionary else ()
+        described = {(one.receives, one.number): one for one in known}
+        for drive in node.drives:
+            slot = node.family.slot_named(drive.table.slot)
+            _check_carried(node, drive, slot, report)
+            for view in (*drive.rpdos, *drive.tpdos):
+                _check_on(drive, slot, view, described.get((view.receives, view.number)), report)
+            _check_zeros(node, drive, slot, report)
+
+
+def _check_carried(node: NodeView, drive: DriveView, slot: Slot, report: LintReport) -> None:
+    """Each word that a value is made from has a PDO. Others may keep the registers where they are in every
+    variant of a family."""
+    process = node.family.process
+    for name, group, words, of_slot in (
+        ("rpdo", "command", process.rpdo, slot.rpdo),
+        ("tpdo", "actual", process.tpdo, slot.tpdo),
+    ):
+        meant = {word for one in node.family.value if one.group == group for word in one.word_names}
+        carried = {word for pdo in of_slot for word in pdo.words or words}
+        if missing := [word for word in words if word in meant - carried]:
+            verb = "is" if len(missing) == 1 else "are"
+            report.error(
+                (*node.key, "mapping"),
+                f"{', '.join(missing)} of {drive.name} {verb} carried by no {name.upper()}",
+                f"in {node.table.mapping}: name it in words of a [[slot.{name}]], or leave its values out",
+            )
+
+
+def _check_on(
+    drive: DriveView, slot: Slot, view: PdoView, described: PdoSummary | None, report: LintReport
+) -> None:
+    """What the device has off is switched on by somebody: the site's table for it, a download, or the
+    mapping file."""
+    pdo = _of(slot, view)
+    is_switched = pdo.write or pdo.optional or view.cob_id_key is not None or view.key != drive.key
+    if described is None or described.enabled or is_switched:
+        return
+    kind = "rpdo" if view.receives else "tpdo"
+    report.error(
+        (*drive.key, kind),
+        f"{view.name} is off in the device's description, and nothing switches it on: "
+        f"{drive.name} has no process data without it",
+        f"write = true in its [[slot.{kind}]] of the mapping file, or a table [bus.node.drive.{kind}]",
+    )
+
+
+def _of(slot: Slot, view: PdoView) -> Pdo:
+    return next(pdo for pdo in (slot.rpdo if view.receives else slot.tpdo) if pdo.number == view.number)
+
+
+def _check_zeros(node: NodeView, drive: DriveView, slot: Slot, report: LintReport) -> None:
+    """An object that is a setting by the profile is not sent as 0 unless that is its value."""
+    for pdo, words, ref in _resting_at_zero(node.family, slot):
+        entry = node.dictionary.entry(ref.index, ref.sub) if node.dictionary else None
+        value = entry.current.at(node.table.id) if entry and entry.current else None
+        is_mode = ref.index == _MODE
+        if value == 0 and not is_mode:
+            continue
+        why = "which is no mode of operation" if is_mode else "until somebody commands it"
+        (report.error if is_mode else report.warning)(
+            (*node.key, "mapping"),
+            f"RPDO{pdo.number} of {drive.name} sends {ref.index:04X}h:{ref.sub:02X} as 0, {why}",
+            f"in {node.table.mapping}: [process] rest = {{ {words[0]} = … }}",
+        )
+
+
+def _resting_at_zero(family: Family, slot: Slot) -> Iterator[tuple[Pdo, tuple[str, ...], ObjectRef]]:
+    """The objects of CiA 402 that command no movement and are 0 while nobody commands their words: the PDO,
+    the words that they are in, and the object. Where several may stand for a word the drive tells which."""
+    for pdo in slot.rpdo:
+        found: dict[ObjectRef, list[tuple[str, int]]] = {}
+        for word, mapped in zip(pdo.words or family.process.rpdo, pdo.objects, strict=True):
+            for ref, rest in _parts(mapped, family.process.rest.get(word, 0)):
+                found.setdefault(ref, []).append((word, rest))
+        for ref, places in found.items():
+            is_setting = ref.index in _PROFILE and effect_of(ref.index, _CIA_402) is not Effect.COMMANDS
+            if is_setting and not any(rest for _, rest in places):
+                yield pdo, tuple(word for word, _ in places), ref
+
+
+def _parts(mapped: Sequence[MappedObject], rest: int) -> Iterator[tuple[ObjectRef, int]]:
+    """The objects in a word, each with what rests in it."""
+    if len(mapped) != 1:
+        return
+    (only,) = mapped
+    shift = 0
+    for ref, length in zip(only.parts, only.lengths, strict=True):
+        yield ref, rest >> shift & ((1 << length) - 1)
+        shift += length

@@ -79,7 +79,9 @@ def seed(module: ModuleType, source: str) -> int:
             old[name].__defaults__ = function.__defaults__
             count += 1
     for name, value in vars(changed).items():
-        if isinstance(value, _PLAIN) and not name.startswith("__") and vars(module)[name] != value:
+        # Members of an enumeration of the module itself are others in the copy, with the same text.
+        is_plain = isinstance(value, _PLAIN) and not name.startswith("__")
+        if is_plain and repr(vars(module)[name]) != repr(value):
             setattr(module, name, value)
             count += 1
     return count

@@ -50,19 +50,21 @@ _DRIVE: Final[Sequence[Row]] = (
     (0x6060, 0x6060, Effect.OPERATES),
 )
 _VALVE: Final[Sequence[Row]] = (
-    # CiA 408: device control word, device mode, device control mode; set-points
+    # CiA 408: device control word, device mode, device control mode; set-point of the spool
     (0x6040, 0x6040, Effect.COMMANDS),
     (0x6042, 0x6043, Effect.COMMANDS),
     (0x6300, 0x6300, Effect.COMMANDS),
+    # zero correction of the spool; its set-point in HOLD and FAULT HOLD
+    (0x6324, 0x6324, Effect.SHAPES),
+    (0x6314, 0x6314, Effect.MAKES_SAFE),
 )
 _NOTHING_MOVES: Final[Sequence[Row]] = ()
-"""CiA 406 and 410: encoders and inclinometers. 6200h is the cyclic timer of an encoder."""
+"""CiA 406: encoders. 6200h is their cyclic timer."""
 PROFILES: Final[Mapping[int, Sequence[Row]]] = {
     401: _IO,
     402: _DRIVE,
     406: _NOTHING_MOVES,
     408: _VALVE,
-    410: _NOTHING_MOVES,
 }
 _ANY: Final = (*_IO, *_DRIVE, *_VALVE)
 """For a node of which nobody says what profile it has."""

@@ -60,7 +60,9 @@ PROFILE_OBJECTS = [
     # CiA 406: 6200h is the cyclic timer of an encoder, 6003h its preset value
     *((406, index, None) for index in (0x6200, 0x6003)),
     # CiA 408
-    *((408, index, COMMANDS) for index in (0x6040, 0x6042, 0x6300)),
+    *((408, index, COMMANDS) for index in (0x6040, 0x6042, 0x6043, 0x6300)),
+    (408, 0x6314, SAFE),
+    (408, 0x6324, SHAPES),
     # CiA 301 §7.4.1: the second logical device, whose profile its own 67FFh says; network variables
     *((402, index, COMMANDS) for index in (0x6840, 0x68FF, 0x6A00, 0x9840, 0xA000, 0xA480)),
 ]
@@ -76,7 +78,7 @@ def test_of_a_node_whose_profile_nobody_knows_an_object_does_the_worst_that_it_d
     profile: int, index: int, effect: Effect | None
 ) -> None:
     order = list(Effect)
-    for unknown in (None, 404, 1):
+    for unknown in (None, 404, 410, 1):
         assert unknown not in PROFILES
         found = effect_of(index, unknown)
         if effect is not None:

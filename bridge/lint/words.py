@@ -92,7 +92,7 @@ def _resting_at_zero(family: Family, slot: Slot) -> Iterator[tuple[Pdo, tuple[st
     the words that they are in, and the object. Where several may stand for a word the drive tells which."""
     for pdo in slot.rpdo:
         found: dict[ObjectRef, list[tuple[str, int]]] = {}
-        for word, mapped in zip(pdo.words or family.process.rpdo, pdo.objects, strict=True):
+        for word, mapped in zip(pdo.words or family.process.rpdo, pdo.objects, strict=False):
             for ref, rest in _parts(mapped, family.process.rest.get(word, 0)):
                 found.setdefault(ref, []).append((word, rest))
         for ref, places in found.items():

@@ -16,6 +16,7 @@ from tests.support.process import drivebridge, free_port, until
 from tests.wire.test_page import DRIVE, users
 
 SHOTS: Final = Path("build/page")
+AXE: Final = Path("tests/wire/node/node_modules/axe-core/axe.min.js")
 
 
 @contextmanager
@@ -103,3 +104,14 @@ def parameter(page: Page, name: str) -> Any:
 
 def owner(page: Page) -> Any:
     return expect(page.locator(".ownership"))
+
+
+def serious(page: Page) -> list[Any]:
+    """What axe finds that keeps people from using the page, each with where."""
+    page.evaluate(AXE.read_text(encoding="utf-8") + "; 0")
+    found = page.evaluate("axe.run().then((one) => one.violations)")
+    return [
+        (one["id"], [node["target"] for node in one["nodes"]])
+        for one in found
+        if one["impact"] in ("serious", "critical")
+    ]

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page, ViewportSize, expect
+from playwright.sync_api import ViewportSize, expect
 
 from tests.browser.hands import (
     SHOTS,
+    serious,
     to,
 )
 from tests.support.desk import Desk
 from tests.wire.test_page import DRIVE
-
-AXE = Path("tests/wire/node/node_modules/axe-core/axe.min.js")
-
 
 PAGES = {
     "plant": ".tile .state",
@@ -59,17 +56,6 @@ def test_axe_finds_nothing_serious_and_nothing_is_wider_than_a_phone(
             page.set_viewport_size(DESKTOP)
             page.screenshot(path=SHOTS / f"{name}-{language}.png", full_page=True)
             page.set_viewport_size(PHONE)
-
-
-def serious(page: Page) -> list[Any]:
-    """What axe finds that keeps people from using the page, each with where."""
-    page.evaluate(AXE.read_text(encoding="utf-8") + "; 0")
-    found = page.evaluate("axe.run().then((one) => one.violations)")
-    return [
-        (one["id"], [node["target"] for node in one["nodes"]])
-        for one in found
-        if one["impact"] in ("serious", "critical")
-    ]
 
 
 def test_axe_finds_nothing_serious_in_what_an_engineer_opens(desk: Desk) -> None:

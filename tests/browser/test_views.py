@@ -12,11 +12,13 @@ from playwright.sync_api import Browser, expect
 from tests.browser.hands import (
     SHOTS,
     pair,
+    serious,
     serving,
     take,
     to,
     to_drive,
 )
+from tests.support import sites
 from tests.support.desk import Desk
 from tests.support.process import Process
 from tests.wire.test_page import Browser as Client
@@ -102,7 +104,32 @@ def test_texts_of_others_are_shown_as_texts(desk: Desk, bridge: tuple[Process, i
         assert "owned" not in page.title()
 
 
-def test_who_watches_whom_is_german_on_the_german_page(desk: Desk) -> None:
+def test_what_the_bridge_says_of_a_drive_that_may_run_on_is_german_on_the_german_page(
+    tmp_path: Path, chromium: Browser
+) -> None:
+    as_delivered = sites.node(sites.drive("fu1", "lease", 1000), name="a")
+    english, german = "the drive runs on: P151 is 0 (off)", "der Antrieb läuft weiter: P151 ist 0 (aus)"
+    with ExitStack() as site:
+        desk = Desk(chromium, site.enter_context(serving(tmp_path, as_delivered)))
+        with desk.sits("operator") as page:
+            expect(page.locator(".sentence")).to_contain_text("a/fu1: may run on if the bridge falls silent")
+            expect(page.locator(".trouble")).to_contain_text(english)
+            to(page, "drive/a/fu1")
+            expect(page.locator(".chain")).to_contain_text(english)
+            page.get_by_role("button", name="Deutsch").click()
+            expect(page.locator(".chain")).to_contain_text(german)
+            expect(page.locator(".sentence")).to_contain_text(
+                "a/fu1: läuft vielleicht weiter, wenn die Bridge schweigt"
+            )
+            to(page, "plant")
+            expect(page.locator(".trouble")).to_contain_text(german)
+            assert not serious(page)
+            page.get_by_role("button", name="English").click()
+            expect(page.locator(".trouble")).to_contain_text(english)
+        assert not desk.complaints
+
+
+def test_a_drive_that_may_run_on_by_agreement_is_said_to_in_both_languages(desk: Desk) -> None:
     with desk.sits("operator") as page:
         to_drive(page)
         expect(page.locator(".chain")).to_contain_text("It runs on.")

@@ -48,7 +48,7 @@ def users() -> str:
 
 
 def write_site(folder: Path, port: int, page: str = "", opcua: str = "", timeout_ms: int = 1000) -> Path:
-    node = sites.node(sites.drive("fu1", "lease", timeout_ms))
+    node = sites.node(sites.drive("fu1", "lease", timeout_ms, f"{sites.ACCEPTED}\n{sites.SCALED}"))
     table = f'[opcua]\nlisten = "127.0.0.1:{free_port()}"\n{opcua}\n{users()}'
     return sites.write(
         folder,

@@ -139,6 +139,24 @@ def test_a_drive_that_may_run_on_by_agreement_is_said_to_in_both_languages(desk:
         expect(page.locator(".chain")).to_contain_text("It runs on.")
 
 
+def test_a_tile_draws_no_share_of_a_range_that_nobody_knows(tmp_path: Path, chromium: Browser) -> None:
+    fan = sites.node(
+        sites.drive("drive", "lease", 1000, sites.ACCEPTED), name="fan", node_id=8, mapping="cia402/velocity"
+    )
+    with ExitStack() as site:
+        desk = Desk(chromium, site.enter_context(serving(tmp_path, pair("a", 5), fan)))
+        with desk.sits("operator") as page:
+            tiles = {
+                name: page.locator(".tile", has=page.get_by_role("link", name=name, exact=True))
+                for name in ("a/fu1", "fan/drive")
+            }
+            for tile in tiles.values():
+                expect(tile.locator(".big")).to_have_text(re.compile("0"))
+            expect(tiles["a/fu1"].locator(".course")).to_have_count(1)
+            expect(tiles["fan/drive"].locator(".course")).to_have_count(0)
+        assert not desk.complaints
+
+
 def test_the_system_shows_the_file_without_its_secrets(desk: Desk) -> None:
     with desk.sits("engineer") as page:
         to(page, "system")

@@ -135,14 +135,14 @@ function Speed({ drive }) {
   const actual = `${drive.name}/actual/${drive.main}`;
   const command = `${drive.name}/command/${drive.main}`;
   const { unit, low, high } = nature(command);
-  const most = Math.max(Math.abs(low ?? 0), Math.abs(high ?? 0)) || 1;
+  const most = Math.max(Math.abs(low ?? 0), Math.abs(high ?? 0));
   const [is, wanted] = [good(actual), good(command)];
   return html`
     <span class=${classes("speed", { old: is === null })}>
       <span class="big">${number(is, unit)}</span> ${unit}
       ${is === null && html`<span class="reason">${maybe(`quality.${quality(actual)}`)}</span>`}
       <span class="setpoint">${t("plant.setpoint", { value: quantity(wanted, unit) })}</span>
-      ${is !== null && html`<${Course} actual=${is / most} setpoint=${wanted === null ? null : wanted / most} />`}
+      ${is !== null && most > 0 && html`<${Course} actual=${is / most} setpoint=${wanted === null ? null : wanted / most} />`}
     </span>
   `;
 }

@@ -17,6 +17,8 @@ from bridge.condition.layout import Layout
 
 Key = tuple[str, str]
 """Kind and place."""
+Occurrence = tuple[Key, float]
+"""One time that something went wrong: what, where, and when it began."""
 BUS_FAULT: Final = "drive_fault of the bus"
 """The kind of a fault with which a drive answers a silent bus, as ``RULES`` has it."""
 KEPT_MS: Final = 600_000.0
@@ -40,6 +42,10 @@ class Known:
     @property
     def key(self) -> Key:
         return self.trouble.kind, self.trouble.place
+
+    @property
+    def occurrence(self) -> Occurrence:
+        return self.key, self.since_ms
 
     @property
     def kind(self) -> str:
@@ -175,28 +181,25 @@ class Causes:
 
     def __init__(self, layout: Layout) -> None:
         self._layout = layout
-        self._causes: dict[tuple[Key, float], Known] = {}
-        """By their keys and when they began: what a first break has left is not of the second. Those that
-        reach furthest come first."""
+        self._causes: dict[Occurrence, Known] = {}
+        """What a first break has left is not of the second. Those that reach furthest come first."""
 
     def fold(self, found: Iterable[Known], now_ms: float, epoch_ms: float) -> list[Shown]:
         """What is wrong, each cause with what it explains: the worst first, and of the same rank what began
-        first."""
-        present = {one.key: one for one in found}
+        first. A cause that came twice and has left something each time is there twice."""
+        present = {one.occurrence: one for one in found}
         self._remember(present, now_ms, epoch_ms)
-        roots: dict[Key, Known] = {}
-        below: dict[Key, list[Known]] = {}
+        roots: dict[Occurrence, Known] = {}
+        below: dict[Occurrence, list[Known]] = {}
         for one in present.values():
             cause = self.of(one, now_ms)
             if cause is None:
-                roots[one.key] = one
+                roots[one.occurrence] = one
             else:
-                below.setdefault(cause.key, []).append(one)
-        for cause in self._causes.values():
-            if cause.key in below and cause.key not in present:
-                roots[cause.key] = cause
+                below.setdefault(cause.occurrence, []).append(one)
+        roots |= {place: cause for place, cause in self._causes.items() if place in below}
         self._forget(below, now_ms)
-        shown = [_shown(one, below.get(key, ())) for key, one in roots.items()]
+        shown = [_shown(one, below.get(place, ())) for place, one in roots.items()]
         return sorted(shown, key=lambda one: (one.rank, one.since_ms))
 
     def of(self, one: Known, now_ms: float) -> Known | None:
@@ -210,20 +213,17 @@ class Causes:
         causes = self._causes.values()
         return next((cause for cause in causes if explains(self._layout, cause, one, now_ms)), None)
 
-    def _remember(self, present: Mapping[Key, Known], now_ms: float, epoch_ms: float) -> None:
+    def _remember(self, present: Mapping[Occurrence, Known], now_ms: float, epoch_ms: float) -> None:
         causes = dict(self._causes)
         for place, one in self._causes.items():
-            is_there = one.key in present and present[one.key].since_ms == one.since_ms
-            if one.until_ms is None and not is_there:
+            if one.until_ms is None and place not in present:
                 causes[place] = replace(one, until_ms=now_ms, until_epoch_ms=epoch_ms)
-        for one in present.values():
-            if one.trouble.kind in _PLACE:
-                causes[one.key, one.since_ms] = one
+        causes |= {place: one for place, one in present.items() if one.trouble.kind in _PLACE}
         self._causes = dict(sorted(causes.items(), key=lambda item: _PLACE[item[1].trouble.kind]))
 
-    def _forget(self, below: Mapping[Key, object], now_ms: float) -> None:
+    def _forget(self, below: Mapping[Occurrence, object], now_ms: float) -> None:
         for place, one in list(self._causes.items()):
-            if one.until_ms is not None and now_ms > one.until_ms + KEPT_MS and one.key not in below:
+            if one.until_ms is not None and now_ms > one.until_ms + KEPT_MS and place not in below:
                 del self._causes[place]
 
 

@@ -72,9 +72,10 @@ def trip(plant: Watched, drive: str) -> None:
     plant.set(f"{drive}/supervision/watchdog_state", 3)
 
 
-def hang(plant: Watched, ms: int) -> None:
+def hang(plant: Watched, ms: int, times: int = 1) -> None:
+    """``times`` counts this one, too."""
     plant.now_ms += ms
-    plant.set("bridge/hangs", 1)
+    plant.set("bridge/hangs", times)
     plant.set("bridge/last_hang_ms", ms)
 
 
@@ -165,6 +166,23 @@ def test_what_a_first_break_left_is_not_of_the_second(plant: Watched) -> None:
     plant.set(f"{BUS}/state", 0)
     assert top(plant) == [("bus_silent", BUS)]
     assert below(plant) == {("drive_fault", DRIVES[0])}
+
+
+@pytest.mark.parametrize("is_over", [False, True])
+def test_what_each_of_two_standstills_left_stands_below_its_own(plant: Watched, *, is_over: bool) -> None:
+    for place, drive in enumerate(DRIVES[:2]):
+        if place:
+            plant.later(60_000.0)
+        hang(plant, 400, place + 1)
+        fault(plant, drive, "E010/10.3")
+        plant.later(500.0)
+    shown = plant.later(10_000.0) if is_over else plant.beat()
+    assert [one["kind"] for one in shown] == ["box_slow", "box_slow"]
+    assert [[known["place"] for known in one["explains"]] for one in shown] == [[one] for one in DRIVES[:2]]
+    assert all(known["since"] >= one["since"] for one in shown for known in one["explains"])
+    acknowledge(plant, DRIVES[0])
+    plant.later(10_000.0)
+    assert below(plant) == {("drive_fault", DRIVES[1])}
 
 
 def test_a_starved_box_blames_itself(plant: Watched) -> None:

@@ -109,11 +109,6 @@ export function explained(trouble) {
   return many(trouble.until ? "plant.left" : "plant.explains", trouble.explains.length);
 }
 
-/** What has caused one of these, and when: "came with can0: no node answers, since 12:36:01". */
-export function cameWith(cause) {
-  return t("plant.came_with", { cause: `${nameOf(cause.place)}: ${headline(cause)}`, time: clock(cause.since) });
-}
-
 /** What people call the place. */
 export function nameOf(place) {
   if (place === "bridge") return t("place.bridge");

@@ -42,7 +42,7 @@ function Bus({ bus }) {
   return html`
     <${Condition} bus=${bus} />
     ${own.length > 0 && html`<section class="attention" aria-label=${t("plant.attention")}><ol>
-      ${own.map((trouble) => html`<${TroubleRow} key=${trouble.kind + trouble.place} trouble=${trouble} />`)}
+      ${own.map((trouble) => html`<${TroubleRow} key=${trouble.kind + trouble.place + trouble.since} trouble=${trouble} />`)}
     </ol></section>`}
     <${Nodes} bus=${bus} />
     <${Traffic} bus=${bus} nodes=${told.value?.nodes ?? []} />

@@ -46,7 +46,7 @@ function Drive({ drive }) {
       <span class="hidden" role="status">${drive.name}: ${t(stateKey(state, drive))}</span>
     </header>
     ${own.length > 0 && html`<section class="attention" aria-label=${t("plant.attention")}><ol>
-      ${own.map((trouble) => html`<${TroubleRow} key=${trouble.kind + trouble.place} trouble=${trouble} />`)}
+      ${own.map((trouble) => html`<${TroubleRow} key=${trouble.kind + trouble.place + trouble.since} trouble=${trouble} />`)}
     </ol></section>`}
     <div class="columns">
       <${Controls} drive=${drive} />

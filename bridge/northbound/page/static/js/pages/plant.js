@@ -11,7 +11,7 @@ import { BusState } from "../bus/state.js";
 import { Icon, shapeOfNode } from "../icons.js";
 import { Meter } from "../meter.js";
 import { ownerOf } from "../owner.js";
-import { cameWith, explained, explanation, faultText, headline, lasting, nameOf, pageOfPlace, rankAt, remedy, since } from "../trouble.js";
+import { explained, explanation, faultText, headline, lasting, nameOf, pageOfPlace, rankAt, remedy, since } from "../trouble.js";
 import { good, goodLabel, stateKey, stateOf } from "../drivestate.js";
 
 export const plant = { path: "plant", topics: () => ["plant"], View: Plant };
@@ -32,7 +32,7 @@ function Attention() {
     <section class=${classes("attention", { old: !isConnected.value })} aria-labelledby="attention">
       <h2 id="attention">${t("plant.attention")}</h2>
       <ol>
-        ${all.map((one) => html`<${TroubleRow} key=${one.kind + one.place} trouble=${one} />`)}
+        ${all.map((one) => html`<${TroubleRow} key=${one.kind + one.place + one.since} trouble=${one} />`)}
       </ol>
     </section>
   `;
@@ -74,8 +74,7 @@ function Explained({ cause }) {
     <details class="explains" open=${Boolean(cause.until)}><summary>${explained(cause)}</summary>
       <ul>
         ${cause.explains.map((one) => html`<li key=${one.kind + one.place}>
-          <a href=${pageOfPlace(one.place)}>${nameOf(one.place)}</a> ${headline(one)}, ${since(one)}
-          ${cause.until && html` <small>(${cameWith(cause)})</small>`}</li>`)}
+          <a href=${pageOfPlace(one.place)}>${nameOf(one.place)}</a> ${headline(one)}, ${since(one)}</li>`)}
       </ul>
     </details>
   `;

@@ -50,7 +50,6 @@ export const de = {
   "plant.explains.other": "Das erklärt {count} weitere Meldungen",
   "plant.left.one": "Eine Meldung ist davon übrig",
   "plant.left.other": "{count} Meldungen sind davon übrig",
-  "plant.came_with": "kam mit {cause} um {time}; quittieren",
   "plant.over.one": "Eine Meldung der letzten zehn Minuten ist vorbei",
   "plant.over.other": "{count} Meldungen der letzten zehn Minuten sind vorbei",
   "plant.times.one": "bis {time}",

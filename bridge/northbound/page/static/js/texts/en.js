@@ -50,7 +50,6 @@ export const en = {
   "plant.explains.other": "It explains {count} more things",
   "plant.left.one": "One thing is left of it",
   "plant.left.other": "{count} things are left of it",
-  "plant.came_with": "came with {cause} at {time}; acknowledge",
   "plant.over.one": "One thing was wrong in the last ten minutes and is over",
   "plant.over.other": "{count} things were wrong in the last ten minutes and are over",
   "plant.times.one": "until {time}",

@@ -11,15 +11,15 @@ import { ownerOf } from "../owner.js";
 import { sendTyped, Setpoints } from "./setpoints.js";
 import { giveBack, isOurs, refusals, request, take } from "./ownership.js";
 
-/** Nothing moves, and nothing would be stopped. */
-const AT_REST = ["not_ready", "switch_on_inhibited", "ready", "switched_on", "fault", "disabled"];
+/** Nothing would be stopped: it stands, or is not heard, and then it is not enabled again without a new start. */
+const NOT_STOPPED = ["not_ready", "switch_on_inhibited", "ready", "switched_on", "fault", "disabled", "lost"];
 
 export function Controls({ drive }) {
   const name = drive.name;
   const isHeld = isOurs(name);
   const form = useRef(null);
   useEffect(() => () => giveBack(name), [name]);
-  useEffect(() => whileMoving(() => isOurs(name) && !AT_REST.includes(ownState(name))), [name]);
+  useEffect(() => whileMoving(() => isOurs(name) && !NOT_STOPPED.includes(ownState(name))), [name]);
   const takes = drive.control === "lease";
   return html`
     <section class="controls" aria-labelledby="controls">

@@ -201,10 +201,12 @@ def seen_and_notified(folder: Path, path: Path) -> Iterator[Process]:
         yield process
 
 
-def test_a_taken_opcua_port_ends_run_before_the_bus_is_opened(
+def test_a_taken_opcua_port_ends_a_run_that_needs_all_before_the_bus_is_opened(
     tmp_path: Path, ports: tuple[int, int], notices: Notices
 ) -> None:
     path = start(tmp_path, ports)
+    text = path.read_text("utf-8").replace("[site]", "[site]\nall_ports = true", 1)
+    path.write_text(text, "utf-8")
     with socket.create_server(("127.0.0.1", ports[1])), seen_and_notified(tmp_path, path) as run:
         assert run.popen.wait(30) == 3
         told = [line for line in run.output().splitlines() if str(ports[1]) in line]

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from bridge.command.drive_channel import DriveChannel
 from bridge.command.following import Following
 from bridge.command.link import FurtherTpdo
-from bridge.drive import Lack, ParameterSet, ValueCodec, codecs
+from bridge.drive import DriveState, Lack, ParameterSet, ValueCodec, codecs
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Meaning, Slot
 
@@ -212,8 +212,9 @@ class ActualData:
     def _judge_stop(self, now: float) -> None:
         """By the TPDO that has just come."""
         self._following.after_pdo(now)
-        speed = None if self._speed is None else float(self._speed.from_words(self.words))
-        self._following.on_telegram(now, speed)
+        if self._channel.leg.drive is DriveState.OPERATION_ENABLED:
+            speed = None if self._speed is None else float(self._speed.from_words(self.words))
+            self._following.on_telegram(now, speed)
 
     def refresh(self, now: float) -> None:
         channel = self._channel

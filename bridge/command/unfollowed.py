@@ -57,6 +57,8 @@ class StopTime:
         now = speed or 0.0
         if speed is not None and (not now or (self.seen_at is not None and now * self.speed < 0)):
             return self.obeyed()
+        if self.is_steady and now == self.speed and self.begins_at == inf:
+            return self
         if self.seen_at is None or at < self.begins_at:
             is_steady = self.seen_at is not None and abs(now - self.speed) <= _STEADY * abs(self.speed)
             return replace(self, seen_at=at, speed=now, is_steady=is_steady and self.begins_at == inf)
@@ -101,6 +103,6 @@ class Unfollowed:
         if on.time_s >= off_s:
             return self.obeyed(), on
         if fast.time_s < max(off_s, ramp_s / _PART):
-            return Unfollowed(on, fast), None
+            return (self if on is self.on and fast is self.fast else Unfollowed(on, fast)), None
         has_kept = fast.lost < fast.time_s / ramp_s / _PART
         return Unfollowed(on, fast.obeyed()), fast if has_kept else None

@@ -161,7 +161,7 @@ class Space:
             assert both == alone, "a refused telegram changes nothing"
         else:
             assert may, f"{request.action} was taken"
-            is_edge = not request.pressed or request.identity != oracle.pressed_by
+            is_edge = not (request.pressed and oracle.pressed(request.identity))
             self._tell(oracle, request)
             sent, command = after.sent, request.command
             if answer is not None:

@@ -101,7 +101,7 @@ def test_one_table_stands_for_a_list_of_one(tmp_path: Path) -> None:
         (
             'words = ["position_low", "position_high"]',
             'words = ["position_low", "position_high"]\ndata_type = "int16"',
-            "value[2].data_type: int16 does not fit two words (int32 or uint32)",
+            "value[2].data_type: int16 does not fit two words (int32, uint32 or real32)",
         ),
         (
             "scale = { factor = 0.01, offset = -5.0 }",

@@ -166,7 +166,13 @@ class Channel:
             why = f"the drive's node is {link.node.value}"
         # It is heard when it has reported: until then what it said before would count.
         is_heard = link.is_heard and self.leg.way.is_heard
-        return Way(link.may_enable, why, self._why_unplaced(now), is_heard)
+        return Way(link.may_enable, why, self._why_unplaced(now), is_heard, link.why_unsent)
+
+    def on_sending(self, why_not: str, now: float) -> None:
+        """Whether ``output`` is repeated on the bus: ``why_not``, or an empty text."""
+        if why_not != self.link.why_unsent:
+            self.link.why_unsent = why_not
+            self._happen(self._way(now), now)
 
     # time
 

@@ -71,6 +71,8 @@ class Link:
         self._downtime_s = telegram_downtime_s
         self._hold_s = hold_ms / 1000
         self.node = NodeState.ABSENT
+        self.why_unsent = ""
+        """Why nothing that belongs on the bus is repeated there; empty where it is."""
         self.pdo_deadline_s: float | None = None
         self.further: Sequence[FurtherTpdo] = ()
         self.last_pdo: float | None = None

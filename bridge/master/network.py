@@ -24,6 +24,7 @@ from bridge.master.charge import Charge
 from bridge.master.farewell import Farewell
 from bridge.master.intruders import Intruders
 from bridge.master.listening import Listening
+from bridge.master.reach import Reach
 from bridge.master.schedule import Schedule
 from bridge.master.startup import StartGate
 from bridge.master.watch import BusWatch
@@ -64,6 +65,8 @@ class Network:
         known = {node.table.id: node.node.name for node in self.nodes}
         self.charge = Charge(bus, self.nodes, plant, self._give_way, listening)
         self.farewell = Farewell(self.nodes)
+        self._reach = Reach(self.nodes, self.charge, self.farewell)
+        self._reach.on_bus(plant.began)
         self._watch = BusWatch(bus.name, own_id, self.charge.acts, known, plant)
         self._intruders = Intruders(bus, self.nodes, plant, self.charge.acts, self._stop_nodes)
         self.ours: frozenset[int] = frozenset()
@@ -115,10 +118,12 @@ class Network:
                 self._frames += node.wire.take_frames(only_commands=not self.charge.acts())
                 self._routes_changed |= node.wire.routes_changed
                 self._schedule.plan(node)
+            self._reach.tell(touched, now)
 
     def on_time(self, now: float) -> None:
         was_left = self.charge.is_left
         self.charge.on_time(now)
+        self._reach.on_bus(now)
         if not self.charge.acts():
             self.farewell.on_time(now)
             self._touch_all(self.farewell.told)
@@ -205,6 +210,7 @@ class Network:
         name = self.bus.name if is_bus else request.target
         if node_commands.answer(request, name, nodes, self._plant, now, reply):
             self._nmt_for_all = nmt.command(node_commands.NMT[request.action], 0)
+        self._reach.tell(nodes, now)
         return True
 
     def _ask_drive(self, request: Request, now: float, reply: Reply) -> bool:
@@ -351,6 +357,7 @@ class Network:
         self._intruders.bus_is_gone()
         self.farewell.bus_is_gone()
         self._forget_bus(now)
+        self._reach.on_bus(now, is_up=False)
 
     def _forget_bus(self, now: float, why: str = "the bus is down") -> None:
         self._frames.clear()
@@ -368,6 +375,7 @@ class Network:
         if self.charge.acts():
             self._return(now)
         self.say_farewell(now)
+        self._reach.on_bus(now, is_up=True)
 
     def _return(self, now: float) -> None:
         for node in self.nodes:

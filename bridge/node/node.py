@@ -60,7 +60,7 @@ class NodeCore:
         self.boot_at: float | None = 0.0
         self.has_concluded = False
         """Whether a boot-up has ended, well or not, since the bus is there."""
-        self._told: NmtCommand | None = None
+        self.told: NmtCommand | None = None
         """The NMT command that it was told last and that keeps it out of Operational."""
         self._held_by_reset_at = float("-inf")
         """When it was reset though it is to stay stopped."""
@@ -94,7 +94,7 @@ class NodeCore:
 
     def _on_boot_up(self, now: float) -> None:
         """The node has started: whatever it was told before is forgotten."""
-        self._told = None
+        self.told = None
         self._memory.may_run = False
         self.leaving.on_restart()
         if now > self._reset_at + _OWN_RESET_S:
@@ -107,7 +107,7 @@ class NodeCore:
         if self.state is NodeState.DISABLED:
             return
         if self.state is NodeState.STOPPED and now <= self._held_by_reset_at + _OWN_RESET_S:
-            self._told = NmtCommand.STOP
+            self.told = NmtCommand.STOP
             self.leaving.send(NmtCommand.STOP, now)
             return
         if self.is_operational:
@@ -164,12 +164,12 @@ class NodeCore:
     @property
     def is_held(self) -> bool:
         """It was told to leave Operational, and nobody has asked for it since."""
-        return self._told is not None and self.state not in (NodeState.OPERATIONAL, NodeState.BOOTING)
+        return self.told is not None and self.state not in (NodeState.OPERATIONAL, NodeState.BOOTING)
 
     def hold_again(self, now: float) -> None:
         """Somebody else may have brought it back."""
-        if self._told is not None:
-            self.leaving.tell(self._told, now, takes_words=True)
+        if self.told is not None:
+            self.leaving.tell(self.told, now, takes_words=True)
             self._touch()
 
     def hold_by_reset(self, now: float) -> None:
@@ -181,7 +181,7 @@ class NodeCore:
 
     def was_told(self, command: NmtCommand) -> None:
         """This NMT command was the last one it got."""
-        self._told = command if command in CANCELS_WORDS else None
+        self.told = command if command in CANCELS_WORDS else None
 
     # time
 
@@ -198,7 +198,7 @@ class NodeCore:
             self._last_boot = now
             self.leaving.forget()
             # A stopped node answers no SDO: it has to be woken before it is asked.
-            if self._told is NmtCommand.STOP or self.error_control.state is NmtState.STOPPED:
+            if self.told is NmtCommand.STOP or self.error_control.state is NmtState.STOPPED:
                 self.wire.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
             self.booting.begin(now)
         self.wire.polling.on_time(now)
@@ -266,7 +266,7 @@ class NodeCore:
         self._enter_operation("; ".join([", ".join(problems) or "ok", *result.notes]), now)
 
     def _enter_operation(self, text: str, now: float) -> None:
-        self._told = None
+        self.told = None
         self._operational_since = now
         self._back_off.entered_operation(now)
         # The guard may have run out between the start command and the node's answer.
@@ -294,7 +294,7 @@ class NodeCore:
         it seems to be absent: it may hear all the same, and our heartbeat would keep it running."""
         self.stop_drives(now)
         self.wire.send_stopped()
-        self._told = NmtCommand.STOP
+        self.told = NmtCommand.STOP
         if self._memory.may_run and not self.leaving.is_stopped_by_nmt:
             self._reset_at = now
             self.wire.send_nmt(NmtCommand.RESET_NODE)
@@ -328,7 +328,7 @@ class NodeCore:
         self.leave_operation(now)
         if reaction == "stop_node":
             self.leaving.send(NmtCommand.STOP, now)
-            self._told = NmtCommand.STOP
+            self.told = NmtCommand.STOP
         elif reaction != "nothing":
             self.boot_at = now + pause_s
         if stops_all:
@@ -387,7 +387,7 @@ class NodeCore:
         """Whether a node that stays stopped has had its command is not known: it gets that once more."""
         self.stop_drives(now)
         if self._stays_stopped:
-            self.leaving.tell(self._told or NmtCommand.STOP, now, takes_words=True)
+            self.leaving.tell(self.told or NmtCommand.STOP, now, takes_words=True)
 
     def set_state(self, state: NodeState, now: float) -> None:
         if state is self.state:

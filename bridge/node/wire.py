@@ -10,7 +10,7 @@ from bridge.canopen import cobid, nmt
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand
 from bridge.canopen.sdo import SdoChannel
-from bridge.command import Event, Kind, Plant
+from bridge.command import Drive, Event, Kind, Plant
 from bridge.command.plant import Node
 from bridge.node import boot
 from bridge.node.emergencies import Emergencies
@@ -60,6 +60,7 @@ class NodeWire:
         self.error_control = ErrorControl(node.table, listener.on_duplicate)
         self.polling = Polling(node.family.poll, self.sdo.for_polls, self._show_poll)
         self.drives: dict[str, DrivePdos] = {}
+        self._left_out: dict[str, str] = {}
         self.outputs: OutputPdos | None = None
         self._emcy_id: int | None = cobid.EMCY + node.table.id
         self.routes: dict[int, Handler] = self._basic_routes()
@@ -83,6 +84,11 @@ class NodeWire:
     def pdos(self) -> Sequence[DrivePdos | OutputPdos]:
         """By which the node is commanded."""
         return [self.outputs] if self.outputs else [*self.drives.values()]
+
+    def why_left_out(self, drive: Drive) -> str:
+        """Why the boot-up has found no PDOs by which this drive can be commanded."""
+        why = self._left_out.get(drive.name, "")
+        return f"no PDOs of the drive can be used: {why}" if why else "no PDOs of the drive can be used"
 
     def take_routes(self) -> dict[int, Handler]:
         """Who gets which identifier; no news any more until it changes."""
@@ -200,6 +206,7 @@ class NodeWire:
         self._emcy_id = self._usable_emcy_id(result)
         self._plant.set(f"{self._node.name}/node/software_version", result.software_version, now)
         self.drives = connect(self._node, result, self.reject, self._listener.is_taken, now)
+        self._left_out = {name: plan.problem for name, plan in result.drives.items()}
         self.routes = self._basic_routes()
         for pdos in self.drives.values():
             self.routes |= pdos.handlers

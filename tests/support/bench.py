@@ -74,7 +74,7 @@ class ClockBus:
         return frames
 
     def send(self, frame: Frame, now: float, deadline: float) -> None:
-        if self.status.state is not ControllerState.DOWN:
+        if self.status.state not in (ControllerState.DOWN, ControllerState.BUS_OFF):
             self._deliver(frame._replace(time=now))
 
     def burst(self, burst: Burst, now: float, *, at_once: bool = False) -> None:

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 from bridge.command.leg.effect import Answer, Effect
 from bridge.command.leg.settings import LegSettings
-from bridge.command.leg.state import Output
+from bridge.command.leg.state import Output, Way
 from bridge.command.request import Code, Outcome
 
 SILENT: Final = "nothing is sent, so that the drive's own supervision stops it"
@@ -39,8 +39,10 @@ class Edge(NamedTuple):
 Asked = Words | Stop | Edge
 
 
-def why_not(settings: LegSettings, asked: Asked, sent: Output) -> str:
-    """Why ``sent`` does not say what is asked; empty where it does."""
+def why_not(settings: LegSettings, asked: Asked, way: Way, sent: Output) -> str:
+    """Why the bus does not say what is asked, where ``sent`` goes this ``way``; empty where it does."""
+    if way.why_unsent:
+        return way.why_unsent
     if sent.silent:
         return SILENT
     words = settings.words
@@ -64,9 +66,11 @@ def _free(settings: LegSettings) -> int:
     return settings.words.acknowledge_mask | (settings.handshake.mask if settings.handshake else 0)
 
 
-def judged(settings: LegSettings, asked: Asked | None, sent: Output, effects: list[Effect]) -> list[Effect]:
-    """``effects`` of a request with its answer as ``sent`` has it."""
-    why = "" if asked is None else why_not(settings, asked, sent)
+def judged(
+    settings: LegSettings, asked: Asked | None, way: Way, sent: Output, effects: list[Effect]
+) -> list[Effect]:
+    """``effects`` of a request with its answer as the bus has it."""
+    why = "" if asked is None else why_not(settings, asked, way, sent)
     if not why:
         return effects
     return [_not_forwarded(one, why) if isinstance(one, Answer) else one for one in effects]
@@ -75,4 +79,5 @@ def judged(settings: LegSettings, asked: Asked | None, sent: Output, effects: li
 def _not_forwarded(answer: Answer, why: str) -> Answer:
     if answer.is_refused or not answer.outcome.forwarded:
         return answer
-    return Answer(Outcome(Code.OK, answer.outcome.message or why, forwarded=False))
+    message = answer.outcome.message
+    return Answer(Outcome(Code.OK, f"{message}; {why}" if message else why, forwarded=False))

@@ -197,12 +197,14 @@ class Order(NamedTuple):
 class Way(NamedTuple):
     """What is known of the way to the drive. ``is_open``: enabling words may go to it as far as its link is
     concerned, ``why`` else not. ``why_unplaced``: why the drive's own position is not known, empty where it
-    is. ``is_heard``: it has reported since its node is operational."""
+    is. ``is_heard``: it has reported since its node is operational. ``why_unsent``: why no words to it are on
+    the bus at all, empty where they are."""
 
     is_open: bool
     why: str
     why_unplaced: str = ""
     is_heard: bool = False
+    why_unsent: str = ""
 
 
 class LegState(NamedTuple):

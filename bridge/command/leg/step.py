@@ -95,7 +95,7 @@ def step(settings: LegSettings, state: LegState, event: Event, now: float) -> tu
             owners.on_connection(turn, event)
             return turn.end(), turn.effects
     turn.settle()
-    effects = judged(settings, turn.asked, turn.sent, turn.effects)
+    effects = judged(settings, turn.asked, turn.way, turn.sent, turn.effects)
     if isinstance(event, StartAnew):
         # What the drive says from now on is from after all that it was told.
         if turn.motion is Motion.EXPECTED:
@@ -336,5 +336,7 @@ def _start(turn: Turn, request: Request, direction: int) -> None:
         raise Refusal(Code.ACKNOWLEDGE_FIRST, "acknowledge first")
     if not turn.may_enable:
         raise Refusal(Code.NOT_READY, turn.why_blocked)
+    if turn.way.why_unsent:
+        raise Refusal(Code.NOT_READY, turn.way.why_unsent)
     owners.hear(turn, request)
     start.begin(turn, words.run | bits)

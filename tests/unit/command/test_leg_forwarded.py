@@ -109,3 +109,40 @@ def test_a_setpoint_that_the_drive_does_not_get_is_not_told_as_forwarded() -> No
     stop(rig)
     taken = rig.write(0x047E, 0x2000)
     assert (taken.ok, taken.forwarded) == (True, False)
+
+
+NOBODY_SENDS = "on can0 the bridge leaves the bus to another bridge"
+
+
+@pytest.mark.parametrize("ignores", [False, True])
+def test_what_no_words_reach_is_told_as_not_forwarded_with_the_reason(*, ignores: bool) -> None:
+    settings: dict[str, Any] = {"telegram_downtime_s": -0.1} if ignores else {}
+    rig = Rig(**settings)
+    rig.run()
+    rig.channel.on_sending(NOBODY_SENDS, rig.now)
+    not_sent = Outcome(Code.OK, NOBODY_SENDS, forwarded=False)
+    assert [stop(rig, action) for action in NORD_STOPS] == [not_sent] * 3
+    assert rig.write(0x047E) == not_sent
+    assert rig.ask(Action.RESET_FAULT) == not_sent
+    rig.channel.on_sending("", rig.now)
+    assert stop(rig) == Outcome(Code.OK)
+
+
+def test_a_drive_that_no_words_reach_is_not_started() -> None:
+    """With every error ignored it may be enabled though its node is lost."""
+    rig = Rig(telegram_downtime_s=-0.1)
+    rig.run()
+    stop(rig)
+    rig.channel.on_sending(NOBODY_SENDS, rig.now)
+    assert rig.ask(Action.START) == Outcome(Code.NOT_READY, NOBODY_SENDS, forwarded=False)
+
+
+def test_an_acknowledge_that_no_words_carry_says_both() -> None:
+    rig = Rig()
+    rig.run()
+    rig.wait(1.0)
+    rig.channel.on_sending(NOBODY_SENDS, rig.now)
+    rig.write(ACKNOWLEDGE & ~0x80)
+    acknowledged = rig.write(ACKNOWLEDGE)
+    assert acknowledged.message == f"acknowledged; the drive stays stopped; {NOBODY_SENDS}"
+    assert not acknowledged.forwarded

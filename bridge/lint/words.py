@@ -24,22 +24,23 @@ def check_words(bus: BusView, report: LintReport) -> None:
         described = {(one.receives, one.number): one for one in known}
         for drive in node.drives:
             slot = node.family.slot_named(drive.table.slot)
-            _check_carried(node, drive, slot, report)
+            _check_carried(node, drive, report)
             for view in (*drive.rpdos, *drive.tpdos):
                 _check_on(drive, slot, view, described.get((view.receives, view.number)), report)
             _check_zeros(node, drive, slot, report)
 
 
-def _check_carried(node: NodeView, drive: DriveView, slot: Slot, report: LintReport) -> None:
-    """Each word that a value is made from has a PDO. Others may keep the registers where they are in every
-    variant of a family."""
-    process = node.family.process
-    for name, group, words, of_slot in (
-        ("rpdo", "command", process.rpdo, slot.rpdo),
-        ("tpdo", "actual", process.tpdo, slot.tpdo),
+def _check_carried(node: NodeView, drive: DriveView, report: LintReport) -> None:
+    """Each word that a value is made from has a PDO, of this drive or of another one behind the node: what
+    one of several has alone is the mapping file's choice. Others may keep the registers where they are in
+    every variant of a family."""
+    process, slots = node.family.process, node.family.slot
+    for name, group, words, pdos_of in (
+        ("rpdo", "command", process.rpdo, [pdo for one in slots for pdo in one.rpdo]),
+        ("tpdo", "actual", process.tpdo, [pdo for one in slots for pdo in one.tpdo]),
     ):
         meant = {word for one in node.family.value if one.group == group for word in one.word_names}
-        carried = {word for pdo in of_slot for word in pdo.words or words}
+        carried = {word for pdo in pdos_of for word in pdo.words or words}
         if missing := [word for word in words if word in meant - carried]:
             verb = "is" if len(missing) == 1 else "are"
             report.error(

@@ -62,7 +62,7 @@ class FamilySite:
         slot = family.slot[0].name
         self.drives[mapping] = f"{name}/{slot if len(family.slot) > 1 else 'drive'}"
         self.units[mapping] = node_id
-        full = sorted({value.full for value in family.value if value.full})
+        full = sorted({value.full for value in family.value if value.full in _PARAMETERS})
         scaled = ", ".join(f"{parameter} = {_PARAMETERS[parameter]}" for parameter in full)
         own = [text for maker, text in _MORE.items() if mapping.startswith(maker)]
         more = [f"unit_id = {node_id}", "telegram_downtime_s = 0", f"parameters = {{ {scaled} }}", *own]

@@ -132,7 +132,8 @@ class Oracle(Model):
                 return False
             if not words.enabling.fit(wanted):
                 return True
-        number = next((value for name, value in values.items() if name != "control_word"), None)
+        others = {"control_word", "life_sign"}
+        number = next((value for name, value in values.items() if name not in others), None)
         if number is None:
             return True
         size = 2 if "position" in values else 1

@@ -31,7 +31,7 @@ SPEED = {"nord/sk-tu4-cao-ds402": 600, "cia402/velocity": 600, "stoeber/5000": 5
 
 def a_bench(folder: Path, mapping: str) -> Bench:
     family = load_family(mapping)
-    full = {value.full: SCALED[value.full] for value in family.value if value.full}
+    full = {value.full: SCALED[value.full] for value in family.value if value.full in SCALED}
     scaled = ", ".join(f"{name} = {number}" for name, number in full.items())
     drive = sites.drive(family.slot[0].name, "modbus", 0, f"parameters = {{ {scaled} }}")
     kind = "guarding" if mapping.startswith("stoeber/") else "heartbeat"

@@ -75,6 +75,9 @@ class TestModbus:
         assert bench.node.number("6200:01") == 0
         carried_out(bench, unit.plan_words(ACKNOWLEDGE, [1], PLC))
         carried_out(bench, unit.plan_words(32, [1], PLC))
+        assert bench.node.number("6200:01") == 0, "an acknowledge takes no stop back"
+        carried_out(bench, unit.plan_words(32, [0], PLC))
+        carried_out(bench, unit.plan_words(32, [1], PLC))
         assert bench.node.number("6200:01") == 1
         carried_out(bench, unit.plan_words(KEEP_ALIVE, [0], PLC))
         assert bench.node.number("6200:01") == 0

@@ -64,8 +64,8 @@ class Model:
     def __init__(self, mapping: str, spread: Sequence[int], deadlines: Sequence[float | None]) -> None:
         family = sites.family(mapping)
         slot = family.slot[0].name
-        full = {value.full: 50.0 for value in family.value if value.full}
-        parameters = f"parameters = {{ {', '.join(f'{name} = {value}' for name, value in full.items())} }}"
+        scaled = sorted({name for value in family.value for name in value.scaled_by})
+        parameters = "parameters = {{ {} }}".format(", ".join(f'"{name}" = 50.0' for name in scaled))
         drive = sites.drive(slot, "modbus", 200, f"unit_id = {UNIT}\ntelegram_downtime_s = 0\n{parameters}")
         self.plant = sites.plant_of(sites.site(sites.bus(sites.node(drive, mapping=mapping))), mapping)
         (self.drive,) = self.plant.drives.values()
@@ -84,6 +84,12 @@ class Model:
             )
             for n, deadline_s in enumerate(deadlines, 1)
         ]
+        self.telling = {
+            process.index(word): meaning.default
+            for meaning in family.meaning
+            if meaning.group == "actual" and (word := family.told_by(family.slot[0], meaning))
+        }
+        """Words that tell what others mean, as the mapping takes them to do."""
         self.came: dict[int, float] = {}
         self.plant.on_node(self.plant.nodes["conveyor"], NodeState.OPERATIONAL, self.now)
         self.drive.on_pdos({}, self.further, self.now, deadline_s=DEADLINE_S, rpdo_type=255)
@@ -98,7 +104,8 @@ class Model:
             self.plant.on_time(self.now)
         elif step == 0:
             self.came[0] = self.now
-            self.drive.on_process_data(list(self.drive.words), self.now)
+            words = [self.telling.get(place, word) for place, word in enumerate(self.drive.words)]
+            self.drive.on_process_data(words, self.now)
         elif step in range(1, len(self.further) + 1):
             self.came[int(step)] = self.now
             self.drive.on_further_data(self.further[int(step) - 1], self.now)

@@ -266,7 +266,7 @@ def test_an_sdo_errand_ends_with_its_answer() -> None:
         ("1017", "belongs to the communication"),
         ("1400:02", "belongs to the communication"),
         ("20A2:02", "stands for 1400:02"),
-        ("3000:01", "commands the drive"),
+        ("3000:01", "is process data, which the drive's controller alone commands"),
         ("2097:01", "P151 decides who commands the drive and what supervises it"),
     ],
 )

@@ -33,7 +33,7 @@ def test_the_mapping_is_beside_the_site_and_named_by_the_device(
     monkeypatch.chdir(tmp_path)
     Path("spin.eds").write_bytes(eds())
     assert new("spin.eds") == (
-        "mappings/acme-gmbh/spin-3000.toml: Spin 3000, cia402/velocity, 9 parameters\n"
+        "mappings/acme-gmbh/spin-3000.toml: Spin 3000, cia402/velocity, 11 parameters\n"
     )
     node = sites.node(sites.drive("drive", "none", 0, ""), mapping="acme-gmbh/spin-3000")
     project = load_project(sites.write(tmp_path, sites.bus(node)))
@@ -75,7 +75,7 @@ def test_half_a_file_becomes_no_mapping(tmp_path: Path, content: bytes, line: in
 def test_a_file_whose_last_line_has_no_end_is_whole(tmp_path: Path, end: bytes) -> None:
     file = tmp_path / "spin.eds"
     file.write_bytes(WHOLE.rstrip() + end)
-    assert "9 parameters" in new(str(file), "--output", str(tmp_path / "spin.toml"))
+    assert "11 parameters" in new(str(file), "--output", str(tmp_path / "spin.toml"))
 
 
 def test_what_could_not_be_read_is_told(tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from bridge.command import Event, Kind
@@ -42,3 +44,9 @@ def test_what_anybody_can_repeat_is_told_ten_times_a_second(kind: Kind):
 def test_what_happens_to_a_drive_is_always_told(kind: Kind):
     gate = EventGate()
     assert all(gate.admits(event(kind, 5.0)) for _ in range(100))
+
+
+def test_the_text_has_the_cause_behind_the_message_where_one_is_known():
+    lost = Event(5.0, Kind.NODE, "conveyor", 700, "node lost")
+    assert lost.text == "node lost"
+    assert replace(lost, cause="can0 is silent").text == "node lost (because: can0 is silent)"

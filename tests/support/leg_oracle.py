@@ -105,6 +105,9 @@ class Oracle(Model):
     ) -> None:
         """*Forwarded* if and only if the wire says what was asked. ``values`` are those of a write;
         ``is_edge``: of two acknowledges by the same register the second is none."""
+        if action == "write" and not values.keys() - {"life_sign"}:
+            # A sign of life asks nothing of the drive.
+            return
         words, word = self.rules.words, sent[0]
         says = not silent
         if action == "write":

@@ -240,8 +240,9 @@ class Channel:
         outcomes: list[tuple[Reply, Outcome]] = []
         for effect in effects:
             match effect:
-                case Heard():
+                case Heard(names=names):
                     self.telegrams = (self.telegrams + 1) & 0xFFFF
+                    self._on_heard(names)
                 case Answer(outcome=outcome, is_refused=is_refused):
                     self.refused_writes += is_refused
                     if reply is not None:
@@ -279,6 +280,9 @@ class Channel:
 
     def _on_ignored(self, now: float) -> None:
         """The controller is silent, and the site file has that ignored."""
+
+    def _on_heard(self, names: tuple[str, ...]) -> None:
+        """A telegram of the owner counts, which has brought these commands."""
 
     def _on_let_go(self) -> None:
         """Somebody has stopped it by a command."""

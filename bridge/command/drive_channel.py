@@ -12,7 +12,6 @@ from bridge.command.leg.settings import leg_settings
 from bridge.command.leg.state import AWAITS_REPORT
 from bridge.command.leg.turn import control_word
 from bridge.command.link import Link, NodeState
-from bridge.command.request import Reply, Request, Write
 from bridge.command.setpoint_doubts import SetpointDoubts
 from bridge.command.status import DriveStatus
 from bridge.command.telegram import TelegramDecoder
@@ -55,17 +54,6 @@ class DriveChannel(Channel):
         link = Link(settings.telegram_downtime_s, hold_ms)
         of_leg = leg_settings(family, settings, decode)
         super().__init__(name, of_leg, link, report, settled=settled, tripped=tripped, due=due)
-
-    # requests
-
-    def handle(self, request: Request, now: float, reply: Reply) -> None:
-        heard = self.telegrams
-        super().handle(request, now, reply)
-        if self.telegrams == heard or not isinstance(request.command, Write):
-            return
-        names = request.command.values
-        if self.doubts.forget(names, [self._places[name] for name in names if name in self._places]):
-            self._settled(now)
 
     # what others may see
 
@@ -213,7 +201,10 @@ class DriveChannel(Channel):
             why = self.link.why_lacking(self._followed, now)
         return f"the drive's own position is not known: {why}" if why else ""
 
-    # what its watchdogs do
+    # its owner and its watchdogs
+
+    def _on_heard(self, names: tuple[str, ...]) -> None:
+        self.doubts.forget(names, [self._places[name] for name in names if name in self._places])
 
     def _is_silent(self, now: float) -> None:
         self._link_is_lost(self.family.faults.telegram_downtime, "no process data from the drive", now)

@@ -50,9 +50,10 @@ class SetpointDoubts:
         """Whether a command is in doubt with these words in force."""
         return any(self.why(name, setpoints) for name in self._doubts)
 
-    def forget(self, names: Iterable[str], written: Iterable[int]) -> bool:
-        """These commands, and those made of the words at these places, have been written. True where one of
-        them was in doubt."""
+    def forget(self, names: Iterable[str], written: Iterable[int]) -> None:
+        """These commands, and those made of the words at these places, have been written."""
+        if not self._doubts:
+            return
         names, places = set(names), set(written)
         gone = [
             name
@@ -61,7 +62,6 @@ class SetpointDoubts:
         ]
         for name in gone:
             del self._doubts[name]
-        return bool(gone)
 
 
 def words_of(places: Iterable[int], setpoints: Sequence[int]) -> tuple[int, ...]:

@@ -3,11 +3,9 @@ brought back: from when that was offered first, for the time-out (``bridge.comma
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final
 
 from bridge.command.leg.turn import Turn
-from bridge.command.life_sign import LEAF
 from bridge.command.request import Action, Code, Identity, Request
 from bridge.command.telegram import Refusal
 from bridge.image import Value
@@ -17,26 +15,24 @@ _PROVES: Final = frozenset((Action.KEEP_ALIVE, Action.RESET_FAULT, Action.START)
 """Commands that have no place for a token, and count as telegrams."""
 
 
-def read(turn: Turn, who: Identity, values: Mapping[str, Value]) -> tuple[Mapping[str, Value], float | None]:
-    """Values of a telegram without its token; and until when telegrams count with it, or with the one that
-    ``who`` has brought back before. Raises ``Refusal``."""
+def read(turn: Turn, who: Identity, token: Value | None) -> float | None:
+    """Until when telegrams count with this token, or with the one that ``who`` has brought back before; None
+    where there is none. Raises ``Refusal``."""
     life = turn.settings.life
     if life is None:
-        if LEAF in values:
+        if token is not None:
             raise Refusal(Code.UNKNOWN_POINT, "this drive asks for no life sign")
-        return values, None
+        return None
     until = turn.owner.alive_until if who.goes_on_as(turn.owner.identity) else None
-    if LEAF not in values:
-        return values, until
-    token = values[LEAF]
+    if token is None:
+        return until
     if isinstance(token, bool) or not isinstance(token, int | float) or token not in range(0x1_0000):
         raise Refusal(Code.OUT_OF_RANGE, "life_sign takes 0…65535")
-    rest = {leaf: value for leaf, value in values.items() if leaf != LEAF}
     issued_at = life.issued_at(int(token), turn.now)
     if issued_at is None:
-        return rest, until
+        return until
     ends_at = issued_at + turn.timer.timeout_ms / 1000
-    return rest, ends_at if until is None else max(until, ends_at)
+    return ends_at if until is None else max(until, ends_at)
 
 
 def is_missing(turn: Turn, until: float | None) -> bool:

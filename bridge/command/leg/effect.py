@@ -28,7 +28,9 @@ class StartEnded:
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """A valid telegram of the owner."""
+    """A valid telegram of the owner, which has brought these commands."""
+
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

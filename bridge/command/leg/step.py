@@ -34,6 +34,7 @@ from bridge.command.leg.state import (
 )
 from bridge.command.leg.table import Deed, Stimulus
 from bridge.command.leg.turn import Turn, control_word
+from bridge.command.life_sign import LEAF
 from bridge.command.request import (
     DONE,
     Action,
@@ -202,7 +203,9 @@ def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome
     is_owner = request.identity.goes_on_as(turn.owner.identity)
     # A new owner inherits no setpoints.
     kept = turn.setpoints if is_owner else turn.rest
-    values, alive_until = alive.read(turn, request.identity, values)
+    alive_until = alive.read(turn, request.identity, values.get(LEAF))
+    if LEAF in values:
+        values = {name: value for name, value in values.items() if name != LEAF}
     telegram = turn.settings.decode(values, kept, control_word(words, turn))
     word = telegram.control_word
     if word is not None and not words.is_valid(word):
@@ -229,7 +232,7 @@ def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome
             return Outcome(Code.OK, "acknowledged; the drive stays stopped")
         if not is_edge and not turn.word & mask:
             word &= ~mask  # what was sent meanwhile would make an edge of a bit that never fell
-    turn.hear(arrival_of(request, turn.now))
+    turn.hear(arrival_of(request, turn.now), tuple(values))
     if _take(turn, word, telegram.setpoints, values) is Deed.FORWARD:
         turn.asked = Words(word, telegram.setpoints)
         return DONE

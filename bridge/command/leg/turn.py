@@ -190,9 +190,9 @@ class Turn:
         self.setpoints = self.rest
         self.order = order.dropped(self.order)
 
-    def hear(self, at: float) -> None:
-        """A valid telegram. ``at`` is when it came, which may be a while ago: its time is up that much
-        earlier. It takes none from a newer one."""
+    def hear(self, at: float, names: tuple[str, ...] = ()) -> None:
+        """A valid telegram, with these commands. ``at`` is when it came, which may be a while ago: its time
+        is up that much earlier. It takes none from a newer one."""
         timeout_ms, heard_at, _, _ = self.timer
         heard_at = at if heard_at is None else max(at, heard_at)
         deadline = heard_at + timeout_ms / 1000 if timeout_ms else None
@@ -200,7 +200,7 @@ class Turn:
         if deadline is not None and alive_until is not None:
             deadline = min(deadline, alive_until)
         self.timer = Timer(timeout_ms, heard_at, deadline)
-        self.effects.append(Heard())
+        self.effects.append(Heard(names))
 
     def leave(self, of_start: str = "control of the drive has changed") -> None:
         """The owner goes; the drive is stopped first."""

@@ -33,11 +33,18 @@ class Answers:
         self._at = float("-inf")
         self._waiting: dict[int, tuple[NodeCore, int]] = {}
 
+    @property
+    def are_asked(self) -> bool:
+        """A node waits to be told."""
+        return bool(self._waiting)
+
     def ask(self, node: NodeCore, identifiers: int) -> None:
         self._waiting[node.table.id] = node, answer_bits(identifiers)
 
     def take(self, now: float) -> list[NodeCore]:
         """Those that may be told now; the others stay."""
+        if not self._waiting:
+            return []
         if now > self._at:
             if self._at > float("-inf"):
                 self._left = min(self._most, self._left + (now - self._at) * self._bits_per_s)

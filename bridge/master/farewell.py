@@ -28,7 +28,7 @@ class Farewell:
     @property
     def awaiting(self) -> tuple[NodeCore, ...]:
         """The nodes that get their stopped words repeated, because they take them over with SYNC."""
-        return tuple(node for node in self.told if node.leaving.is_due)
+        return tuple(node for node in self.told if node.leaving.is_due) if self.told else ()
 
     def begin(self, now: float) -> None:
         """Tell every node that is owed a stop."""

@@ -237,28 +237,29 @@ class Intruders:
         for node in self._answers.take(now):
             series = self._series.get(node.table.id)
             if series is None or now > series.last + _ENDED_S:
-                series = self._series[node.table.id] = _Series(now)
+                series = self._series[node.table.id] = _Series(node, now)
             series.last = now
             series.look_at = now + _PATIENCE_S
-            if series.has_to_reset(node, now):
-                self._reset(node, series, now)
+            if series.has_to_reset(now):
+                self._reset(series, now)
             else:
                 node.hold_again(now)
-        for node in self._nodes:
+        for series in self._series.values():
             # It has ended: its last word may have been the last.
-            series = self._series.get(node.table.id)
-            if series is not None and now >= series.look_at:
+            if now >= series.look_at:
                 series.look_at = float("inf")
-                if series.has_to_reset(node, now):
-                    self._reset(node, series, now)
+                if series.has_to_reset(now):
+                    self._reset(series, now)
 
-    def _reset(self, node: NodeCore, series: _Series, now: float) -> None:
-        series.reset_at = now
+    def _reset(self, series: _Series, now: float) -> None:
+        node, series.reset_at = series.node, now
         node.hold_by_reset(now)
         message = "reset node: an intruder keeps a drive enabled, which an NMT stop does not stop"
         self._plant.report(Event(now, Kind.INTRUDER, node.node.name, _SEVERE, message))
 
     def next_deadline(self) -> float | None:
+        if not self._series and not self._answers.are_asked:
+            return None
         looks = [series.look_at for series in self._series.values() if series.look_at < float("inf")]
         answer_at = self._answers.next_deadline()
         return min(looks + ([] if answer_at is None else [answer_at]), default=None)
@@ -277,14 +278,16 @@ class Intruders:
 class _Series:
     """Answers to an intruder that goes on."""
 
+    node: NodeCore
     since: float
     last: float = float("-inf")
     reset_at: float = float("-inf")
     look_at: float = float("inf")
     """When it is judged though nobody is answered."""
 
-    def has_to_reset(self, node: NodeCore, now: float) -> bool:
+    def has_to_reset(self, now: float) -> bool:
         """The drives of this family run on in Stopped, and one has said last that it is enabled."""
+        node = self.node
         begun = max(self.since, self.reset_at)
         if node.leaving.is_stopped_by_nmt or now < self.reset_at + _RESET_AGAIN_S:
             return False

@@ -121,17 +121,11 @@ class Network:
             self._reach.tell(touched, now)
 
     def on_time(self, now: float) -> None:
-        was_left = self.charge.is_left
-        self.charge.on_time(now)
-        self._reach.on_bus(now)
-        if not self.charge.acts():
+        if not (self.charge.acts() or self._begins_to_act(now)):
             self.farewell.on_time(now)
             self._touch_all(self.farewell.told)
             self._pump(now)
             return
-        if was_left:
-            # The other bridge may have started a node that was to stay stopped.
-            self._return(now)
         if not self._has_booted:
             self._boot_up(now)
         if self._time:
@@ -142,6 +136,15 @@ class Network:
             self._schedule.touch(node)
         self._intruders.on_time(now)
         self._pump(now)
+
+    def _begins_to_act(self, now: float) -> bool:
+        was_left = self.charge.is_left
+        self.charge.on_time(now)
+        self._reach.on_bus(now)
+        if was_left and self.charge.acts():
+            # The other bridge may have started a node that was to stay stopped.
+            self._return(now)
+        return self.charge.acts()
 
     def next_deadline(self) -> float | None:
         if not self.charge.acts():
@@ -340,6 +343,7 @@ class Network:
         """Another bridge is in charge: nothing more is sent than what is owed."""
         self._forget_bus(now, why)
         self.say_farewell(now)
+        self._reach.on_bus(now)
 
     def say_farewell(self, now: float) -> None:
         """Send what is owed, where this bridge acts no more."""

@@ -77,7 +77,7 @@ def test_a_round_in_which_nothing_has_happened_costs_the_same_with_many_nodes(
 ) -> None:
     for crowd in crowds.values():
         after_a_round(crowd)
-        assert calls_of(crowd.bench.master.pump) <= 147
+        assert calls_of(crowd.bench.master.pump) <= 85
 
 
 def test_what_many_nodes_cost_grows_no_faster_than_they_do(crowds: dict[int, Crowd]) -> None:
@@ -94,8 +94,8 @@ def test_what_many_nodes_cost_grows_no_faster_than_they_do(crowds: dict[int, Cro
     few, many = (costs(crowds[count]) for count in (FEW, MANY))
     for what, calls in many.items():
         assert calls <= MANY / FEW * few[what], what
-    assert few["a new status word"] <= 462
-    assert many["a renewal"] <= 13_800
+    assert few["a new status word"] <= 415
+    assert many["a renewal"] <= 12_500
     assert many["a second at rest"] <= 285_000
 
 

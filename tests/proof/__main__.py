@@ -30,8 +30,8 @@ from typing import Any
 
 from tests.proof import hunt, mutants, report
 from tests.proof import kills as kill_table
-from tests.proof.drives import DRIVES
-from tests.proof.faults import FAULTS, Fault, in_turn
+from tests.proof.fault import Fault
+from tests.proof.faults import FAULTS, in_turn
 from tests.proof.machine import is_user_mode
 from tests.proof.measure import Sample
 from tests.proof.rig import HOLD_S, Rig, Stuck
@@ -50,7 +50,7 @@ def run(asked: argparse.Namespace) -> int:
     os.environ["PYTHONPATH"] = str(REPOSITORY)
     names, cycles, out = _names(asked.faults), asked.cycles, asked.out
     faults = [fault for fault in FAULTS if not names or fault.name in names]
-    possible = in_turn([fault for fault in faults if fault.possible()])
+    possible = in_turn([fault for fault in faults if fault.is_here])
     began = time.monotonic()
     samples: list[Sample] = []
     errors: list[str] = []
@@ -68,16 +68,15 @@ def run(asked: argparse.Namespace) -> int:
                 {
                     (
                         fault.name,
-                        drive.family.name + PLANT.label,
-                        drive.protocol,
+                        subject.family_name + PLANT.label,
+                        subject.protocol,
                         fault.per_round * PLANT.share,
                     )
                     for fault in possible
-                    for drive in DRIVES
-                    if fault.concerns(drive)
+                    for subject in fault.subjects
                 }
             ),
-            "faults_missing": [fault.name for fault in faults if fault not in possible],
+            "faults_missing": [fault.name for fault in faults if not fault.possible()],
             "cycles": done,
             "seconds": time.monotonic() - began,
             "by_themselves": rig.by_themselves,
@@ -126,7 +125,7 @@ def _lacks(samples: list[Sample], fault: Fault, least: int) -> bool:
     counts = Counter(
         sample.drive for sample in samples if sample.fault == fault.name and sample.verdict != "void"
     )
-    return any(counts[drive.path] < least for drive in DRIVES if fault.concerns(drive))
+    return any(counts[subject.path] < least for subject in fault.subjects)
 
 
 def _round(rig: Rig, fault: Fault, errors: list[str]) -> list[Sample]:

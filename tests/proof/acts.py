@@ -10,10 +10,12 @@ from collections.abc import Callable
 from typing import Final
 
 from tests.proof import machine
+from tests.proof.board import RELEASE
 from tests.proof.drives import BRIDGE_SIDE, DRIVES, SERVERS, drives_of
+from tests.proof.families import NORD, NORD_INVALID
 from tests.proof.rig import Rig
 from tests.proof.settings import PLANT
-from tests.proof.strangers import Strangers, release
+from tests.proof.strangers import Strangers
 
 Inject = Callable[[Rig], float]
 """Gives the moment of the fault, in seconds of the monotonic clock."""
@@ -123,6 +125,10 @@ def nothing(rig: Rig) -> None:
     pass
 
 
+def now(rig: Rig) -> float:
+    return time.monotonic()
+
+
 def full(rig: Rig) -> None:
     rig.disk.fill()
 
@@ -207,14 +213,26 @@ def continue_owners_alone(rig: Rig) -> None:
 
 
 def release_drives(rig: Rig) -> float:
-    """Their owner gives them back, and goes."""
-    rig.owners["modbus"].signal(signal.SIGSTOP)
-    time.sleep(_HANDED_ON_S)
-    return release(drives_of("modbus"))
+    """Their owner gives them back, over its own connections: no other one owns them."""
+    now = time.monotonic()
+    for drive in drives_of("modbus"):
+        rig.board.command(drive.place, RELEASE)
+    return now
 
 
-def continue_modbus(rig: Rig) -> None:
-    rig.owners["modbus"].signal(signal.SIGCONT)
+def write_run(rig: Rig) -> None:
+    """The Modbus owner goes on with its word that enables."""
+    for drive in drives_of("modbus"):
+        rig.board.command(drive.place, drive.family.run)
+
+
+def write_invalid(rig: Rig) -> float:
+    """The Modbus owner goes on, with telegrams that are none."""
+    now = time.monotonic()
+    for drive in drives_of("modbus"):
+        if drive.family is NORD:
+            rig.board.command(drive.place, NORD_INVALID)
+    return now
 
 
 def pause_across_deadline(rig: Rig) -> float:

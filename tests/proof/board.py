@@ -16,6 +16,8 @@ NUMBERS: Final = 32
 _WORD: Final = struct.Struct("=q")
 _STAMP: Final = struct.Struct("=d")
 _PAIR: Final = struct.Struct("=qq")
+RELEASE: Final = -1
+"""In place of a control word: the owner gives the drive back, over the connection by which it owns it."""
 _BYTES: Final = 1024
 _ACCEPTED: Final = 8
 _STAMPS: Final = 24

@@ -8,11 +8,14 @@ from collections.abc import Coroutine, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
+from tests.proof.board import RELEASE
 from tests.proof.drives import PORTS, SERVERS, Drive, drives_of
 
 _LIMIT_S = 2.5
 """Longer than the bridge or the network is held up here: waiting on is quicker than connecting anew."""
 _CONNECT_S = 20.0
+_KEEP_ALIVE = 10
+"""Holding register (docs/reference/modbus.md): 0 releases the drive."""
 
 
 class ClientFault(Exception):
@@ -23,7 +26,8 @@ class Client(Protocol):
     async def connect(self) -> None: ...
 
     async def write(self, telegrams: Sequence[tuple[Drive, int, int]]) -> list[bool]:
-        """One telegram for each drive: control word and setpoint. Whether each was accepted."""
+        """One telegram for each drive: control word and setpoint; with ``RELEASE``, which only Modbus drives
+        get, their owner gives them back. Whether each was accepted."""
         ...
 
     async def close(self) -> None: ...
@@ -51,10 +55,9 @@ class ModbusClient:
     async def _write(self, drive: Drive, control_word: int, setpoint: int) -> bool:
         from pymodbus.exceptions import ModbusException
 
+        register, *values = (_KEEP_ALIVE, 0) if control_word == RELEASE else (0, control_word, setpoint)
         try:
-            answer = await self._clients[drive].write_registers(
-                0, [control_word, setpoint], device_id=drive.place + 1
-            )
+            answer = await self._clients[drive].write_registers(register, values, device_id=drive.unit)
         except ModbusException as error:
             raise ClientFault from error
         return not answer.isError()

@@ -3,6 +3,7 @@ RPDOs that go by SYNC, and a drive with two of them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -57,6 +58,15 @@ class Drive:
     @property
     def path(self) -> str:
         return f"{self.node}/{self.slot}"
+
+    @property
+    def unit(self) -> int:
+        """Its Modbus unit id."""
+        return self.place + 1
+
+    @property
+    def family_name(self) -> str:
+        return self.family.name
 
     @property
     def number_id(self) -> int:
@@ -189,8 +199,9 @@ def drives_of(protocol: str) -> list[Drive]:
     return [drive for drive in DRIVES if drive.protocol == protocol]
 
 
-def write_site(path: Path, channel: str, state: Path, run: Path) -> Path:
-    """The site file with everything on ``channel``, and its own mapping beside it."""
+def write_site(path: Path, channel: str, state: Path, run: Path, *, others: Sequence[str] = ()) -> Path:
+    """The site file with everything on ``channel``, and its own mapping beside it; ``others`` are the tables
+    of further nodes."""
     (path.parent / "mappings").mkdir(exist_ok=True)
     (path.parent / "mappings" / "split.toml").write_text(_SPLIT, encoding="utf-8")
     nodes: dict[str, list[Drive]] = {}
@@ -201,6 +212,7 @@ def write_site(path: Path, channel: str, state: Path, run: Path) -> Path:
         f'[[bus]]\nname = "can0"\ninterface = "socketcan"\nchannel = "{channel}"\nbitrate = 1000000',
         PLANT.bus,
         *(_node(drives) for drives in nodes.values()),
+        *others,
         f'[modbus]\nlisten = "{SERVERS["modbus"]}:{PORTS["modbus"]}"',
         f'[opcua]\nlisten = "{SERVERS["opcua"]}:{PORTS["opcua"]}"',
         'no_security = true\nanonymous = "operator"',
@@ -210,9 +222,10 @@ def write_site(path: Path, channel: str, state: Path, run: Path) -> Path:
     return path
 
 
-def write_second_site(folder: Path) -> Path:
+def write_second_site(folder: Path, others: Sequence[str]) -> Path:
     """The same bus for a second bridge, with ports and folders of its own."""
-    site = write_site(folder / "first.toml", BRIDGE_SIDE, folder / "second_state", folder / "second_run")
+    state, run = folder / "second_state", folder / "second_run"
+    site = write_site(folder / "first.toml", BRIDGE_SIDE, state, run, others=others)
     text = site.read_text(encoding="utf-8")
     for protocol, server in SERVERS.items():
         text = text.replace(f"{server}:{PORTS[protocol]}", f"{_SECOND}:{PORTS[protocol]}")
@@ -233,7 +246,7 @@ def _node(drives: list[Drive]) -> str:
     for drive in drives:
         slot = {"drive": "axis1"}.get(drive.slot, drive.slot) if family is STOEBER else drive.slot
         lines += [
-            f'[[bus.node.drive]]\nslot = "{slot}"\nunit_id = {drive.place + 1}',
+            f'[[bus.node.drive]]\nslot = "{slot}"\nunit_id = {drive.unit}',
             f'control = "{drive.protocol}"\nfieldbus_timeout_ms = {PLANT.fieldbus_timeout_ms}',
             f'on_expiry = "{drive.reaction}"',
             "fieldbus_timeout_writable = true" if drive.protocol == "modbus" else "",

@@ -21,6 +21,15 @@ Bits = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
+class Reserved:
+    """An object that nobody but an engineer, or nobody at all, writes as a parameter while a drive runs, and
+    a value that it might take."""
+
+    name: str
+    value: int
+
+
+@dataclass(frozen=True, slots=True)
 class Family:
     name: str
     mapping: str
@@ -44,6 +53,7 @@ class Family:
     """When the bridge knows that a node is silent, from the node's last sign of life."""
     own_timeout_ms: int = OWN_TIMEOUT_MS
     """When the drive knows that the bridge is silent."""
+    reserved: tuple[Reserved, ...] = ()
 
 
 _HEARTBEAT_CONSUMER: Final = 0x7F_0000 | OWN_TIMEOUT_MS
@@ -64,7 +74,11 @@ NORD: Final = Family(
     supervision=f'supervision = "heartbeat"\nsupervision_ms = {PLANT.heartbeat_ms}\nsdo_channels = [2, 3, 4]',
     configure=(f'{{ object = "2097:01", type = "uint16", value = {OWN_TIMEOUT_MS} }}',),  # P151
     parameters="P105 = 50.0, P112 = 10.0",
+    # The interface's time-out for us (BU 2500 §8.2.4), and the drive's for its interface.
+    reserved=(Reserved("P151", 0), Reserved("P513", 100)),
 )
+NORD_INVALID: Final = 0x007F
+"""NORD: "run" without bit 10, "control data valid" (BU 2500 §6.5.1)."""
 LENZE: Final = Family(
     "Lenze 8400 motec",
     "lenze/8400-motec",
@@ -117,5 +131,13 @@ CIA402: Final = Family(
     configure=(
         f'{{ object = "1016:01", type = "uint32", value = {_HEARTBEAT_CONSUMER:#x} }}',
         '{ object = "6007:00", type = "int16", value = 3 }',  # quick stop
+    ),
+    # Control word, setpoint; what its supervision and its stops do.
+    reserved=(
+        Reserved("6040:00", 0x000F),
+        Reserved("6042:00", 2000),
+        Reserved("1016:01", 0),
+        Reserved("6007:00", 0),
+        Reserved("605A:00", 0),
     ),
 )

@@ -1,76 +1,16 @@
-"""The faults: how each is brought about and undone, from when its time counts, and its bound."""
+"""The table of the faults, and the order of a cycle."""
 
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Final, Literal
+from collections.abc import Sequence
+from typing import Final
 
-from tests.proof import acts, bounds, machine, others
-from tests.proof.bounds import Bound
-from tests.proof.drives import DRIVES, PROTOCOLS, Drive
+from tests.proof import acts, bounds, examine, machine, others
+from tests.proof.drives import DRIVES, PROTOCOLS
+from tests.proof.fault import Fault
 from tests.proof.rig import Rig
 from tests.proof.settings import PLANT
-
-_SELDOM: Final = 3
-
-Reference = Literal["telegram", "moment", "send", "sign of life", "boot-up"]
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """Drives of other protocols than ``protocols`` are to go on, and of other nodes than ``nodes`` where
-    there are any. ``steady``: what of the fault is to stop no drive comes first. ``at_once``: to how many
-    owners, connections or nodes a round does it; each of them counts. ``leaves_silence``: the bridge does not
-    answer it with a stop: it is not there, or its bus is not. ``new_process``: a process is started anew for
-    it, which takes its time. ``others_may_stop``: drives that it does not concern. Without a ``bus_bound``
-    somebody else speaks there; without a ``drive_bound`` the drive says nothing."""
-
-    name: str
-    reference: Reference
-    inject: acts.Inject
-    undo: Callable[[Rig], None]
-    bus_bound: Bound | None
-    drive_bound: Bound | None
-    protocols: tuple[str, ...] = PROTOCOLS
-    nodes: tuple[str, ...] = ()
-    steady: Callable[[Rig], None] | None = None
-    possible: Callable[[], bool] = lambda: True
-    at_once: int = 1
-    leaves_silence: bool = False
-    new_process: bool = False
-    others_may_stop: bool = False
-
-    @property
-    def per_round(self) -> int:
-        """What a round is worth: a new process takes its time, so such a fault is injected less often."""
-        return self.at_once * (_SELDOM if self.new_process else 1)
-
-    def rounds(self, times: int) -> int:
-        """How many rounds are needed for what is asked for as ``times``."""
-        return -(-times // self.per_round)
-
-    def is_due(self, cycle: int, cycles: int) -> bool:
-        """Whether it has a round in this one of ``cycles``, over which its rounds are spread evenly."""
-        rounds = self.rounds(cycles)
-        return (cycle + 1) * rounds // cycles > cycle * rounds // cycles
-
-    @property
-    def of_controller(self) -> bool:
-        return self.reference in ("telegram", "send")
-
-    def concerns(self, drive: Drive) -> bool:
-        return drive.protocol in self.protocols and (not self.nodes or drive.node in self.nodes)
-
-    def goes_on(self, drive: Drive) -> bool:
-        """The drive is to move on all the time: the fault is not its own, or is only reported."""
-        return not self.concerns(drive) or (self.of_controller and drive.reaction == "hold")
-
-    def falls_silent(self, drive: Drive) -> bool:
-        """What stops the drive is that its RPDOs end."""
-        return self.leaves_silence or (self.of_controller and drive.reaction == "silence")
-
 
 _OF_OWNERS: Final = (bounds.controller, bounds.controller_drive)
 _DEAD: Final = (bounds.dead, bounds.dead_drive)
@@ -78,6 +18,9 @@ _GONE: Final = (bounds.at_once, bounds.gone_drive)
 _ENDING: Final = (bounds.at_once, bounds.at_once_drive)
 _OWNERS: Final = len(PROTOCOLS)
 _NODES: Final = len({drive.node for drive in DRIVES})
+_NOBODY: Final = ("",)
+_SILENT: Final = tuple(drive.node for drive in DRIVES if drive.reaction == "silence") or _NOBODY
+_RESERVED: Final = tuple({drive.node for drive in DRIVES if drive.family.reserved})
 FAULTS: Final = (
     Fault("owner stopped", "telegram", acts.stop_owners, acts.continue_owners, *_OF_OWNERS, at_once=_OWNERS),
     Fault(
@@ -100,10 +43,20 @@ FAULTS: Final = (
         "drive released",
         "moment",
         acts.release_drives,
-        acts.continue_modbus,
+        acts.write_run,
         bounds.asked,
         bounds.asked_drive,
         protocols=("modbus",),
+    ),
+    Fault(
+        "owner's telegrams are not valid",
+        "telegram",
+        acts.write_invalid,
+        acts.write_run,
+        *_OF_OWNERS,
+        protocols=("modbus",),
+        nodes=("conveyor",),
+        is_long=True,
     ),
     Fault(
         "client writes ahead and hangs",
@@ -122,6 +75,80 @@ FAULTS: Final = (
         bounds.controller,
         others.ignored_drive,
         steady=others.make_deaf,
+    ),
+    Fault(
+        "deaf drive whose owner jogs",
+        "moment",
+        others.jog,
+        others.let_hear,
+        None,
+        others.jogged,
+        nodes=(others.VICTIM.node,),
+        steady=others.make_deaf,
+        is_long=True,
+    ),
+    Fault(
+        "stop asked for in a silence",
+        "moment",
+        acts.now,
+        examine.continue_silent,
+        nodes=_SILENT,
+        is_long=True,
+        others_may_stop=True,
+        examine=examine.stop_in_silence,
+        demand="a stop by anybody goes out once, and silence follows; the answer is *forwarded* then, and "
+        "*not forwarded* where nothing was sent",
+    ),
+    Fault(
+        "stop of outputs that their silent owner's time-out holds",
+        "moment",
+        acts.now,
+        acts.nothing,
+        is_long=True,
+        examine=examine.stop_of_held_outputs,
+        demand="a stop by anybody makes them safe, and is answered *forwarded*",
+        of_outputs=True,
+    ),
+    Fault(
+        "acknowledge after somebody's stop",
+        "moment",
+        acts.now,
+        acts.write_run,
+        protocols=("modbus",),
+        is_long=True,
+        examine=examine.acknowledge_after_stop,
+        demand="the drive stays stopped, though its owner acknowledges in each cycle and goes on enabling",
+    ),
+    Fault(
+        "acknowledge after somebody's stop of outputs",
+        "moment",
+        acts.now,
+        acts.nothing,
+        is_long=True,
+        examine=examine.acknowledge_after_stop_of_outputs,
+        demand="they stay safe, though their owner acknowledges in each cycle and goes on with its telegram",
+        of_outputs=True,
+    ),
+    Fault(
+        "second connection of the owner's address",
+        "moment",
+        acts.now,
+        acts.nothing,
+        protocols=("modbus",),
+        is_long=True,
+        examine=examine.alternate,
+        demand="each of its words is refused, and it is named; the drive moves on all the time",
+    ),
+    Fault(
+        "what moves a drive as a parameter",
+        "moment",
+        acts.now,
+        acts.nothing,
+        nodes=_RESERVED,
+        is_long=True,
+        examine=examine.set_what_moves,
+        demand="each write is refused and none reaches the node: command words for everybody, what stops the "
+        "drive for who is no engineer",
     ),
     Fault("network cut", "telegram", acts.cut, acts.uncut, *_OF_OWNERS, at_once=_OWNERS),
     Fault("half-open connection", "telegram", acts.vanish, acts.come_back, *_OF_OWNERS, at_once=_OWNERS),
@@ -228,8 +255,10 @@ FAULTS: Final = (
         others.intrude_as_master,
         others.end_intruder,
         None,
-        bounds.node_stopped,
+        others.answered,
         nodes=(others.VICTIM.node,),
+        is_long=True,
+        brings_back=True,
     ),
     Fault(
         "front killed",

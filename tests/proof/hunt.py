@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from tests.proof.faults import FAULTS, Fault
+from tests.proof.fault import Fault
+from tests.proof.faults import FAULTS
 from tests.proof.mutants import Mutant, Tree
 from tests.proof.rig import NotStopped, Rig, Stuck
 from tests.proof.rounds import run_round
@@ -55,7 +56,7 @@ class Share:
 
 def order(first: str, faults: Sequence[Fault] = FAULTS) -> Iterator[Fault]:
     """The one that is tried first, several times; then all others."""
-    possible = [fault for fault in faults if fault.possible()]
+    possible = [fault for fault in faults if fault.is_here]
     yield from [fault for fault in possible if fault.name == first] * _FIRST_TIMES
     # What takes a new process comes last.
     rest = [fault for fault in possible if fault.name != first]

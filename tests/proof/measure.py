@@ -50,6 +50,8 @@ class Sample:
     """How long the bridge, and for the drive's bound the drives too, waited for the CPU in this time."""
     noise_ms: float = 0.0
     """What is allowed beyond that on a machine that is busy with other things; 0 in the long proof."""
+    demand: str = ""
+    """What has to hold, where that is judged by yes or no."""
     wrong: str = ""
     """What happened that no time excuses: a wrong reaction, a restart. Empty where nothing did."""
 
@@ -94,6 +96,20 @@ class Sample:
 
     def record(self) -> dict[str, object]:
         return {**asdict(self), "verdict": self.verdict}
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """From ``begin`` to ``end``, which may take ``bound_ms``; ``busy`` may have waited for the CPU in it."""
+
+    begin: float
+    end: float
+    bound_ms: float
+    busy: tuple[str, ...]
+
+    @property
+    def ms(self) -> float:
+        return (self.end - self.begin) * 1000
 
 
 def bus_stop(rig: Rig, drive: Drive, since: float, *, silent: bool) -> tuple[float, Run] | None:
@@ -232,6 +248,34 @@ def was_enabled(rig: Rig, drive: Drive, bus: float, own: float) -> bool:
         if run.first >= own
     ]
     return told or (False in turns and True in turns[turns.index(False) :])
+
+
+def longest_turn(rig: Rig, drive: Drive, since: float) -> float:
+    """For how long, in seconds, the drive was enabled and turned at a stretch after ``since``, by what it
+    reports: to its first report that it does not, or that its node is not in operation. What a drive gains
+    that is stopped as soon as it starts is no turning."""
+    least = (1 - _SLOWER) * drive.family.speed
+    looks = [
+        (at, drive.enabled(run.data) and abs(drive.speed(run.data)) > least)
+        for run in rig.said.runs(drive.tpdo, since)
+        for at in (max(run.first, since), run.last)
+    ]
+    signs = rig.said.runs(0x700 + drive.node_id, since)
+    looks += [(run.first, False) for run in signs if run.first >= since and _is_left(run.data)]
+    longest, began = 0.0, since
+    turned = True
+    for at, turns in sorted(looks):
+        if turned:
+            longest = max(longest, at - began)
+        elif turns:
+            began = at
+        turned = turns
+    return max(longest, rig.now() - began if turned else 0.0)
+
+
+def _is_left(sign: bytes) -> bool:
+    """A heartbeat or guarding answer of a node that is not in operation."""
+    return sign[0] & 0x7F != _OPERATIONAL
 
 
 def trace(rig: Rig, drive: Drive, moment: float) -> str:

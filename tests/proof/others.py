@@ -3,6 +3,7 @@ writes ahead, a port that is taken."""
 
 from __future__ import annotations
 
+import math
 import signal
 import socket
 import threading
@@ -20,6 +21,7 @@ from tests.proof.drives import (
     IGNORED_STOP_MS,
     PORTS,
     SERVERS,
+    TPDO_MS,
     Drive,
     drives_of,
     write_second_site,
@@ -32,14 +34,24 @@ from tests.proof.strangers import Connection
 VICTIM: Final = next(drive for drive in DRIVES if drive.family is CIA402)
 """Whose RPDO is not heard any more, or sent by somebody else. It watches our heartbeat, so it goes on."""
 _INTRUDES_S: Final = 0.02
-_MASTERS_S: Final = 1.0
+_MASTERS_S: Final = 3.0
+_LEADS_S: Final = max(0.05, 1.2 * PLANT.rpdo_period_ms / 1000)
+"""Each word of an intruder that leads a drive lasts until the next SYNC."""
 _DOWN_S: Final = 20.0
 _AHEAD: Final = 100
 _WAITS_S: Final = min(0.25, PLANT.short_s)
-_ACCEPTED_S: Final = 0.05
+_ACCEPTED_S: Final = 0.5
 _FED_S: Final = 0.1
 _STARTS_S: Final = 60.0
 _NEVER_SENT: Final = 0x7FF
+_JOG_STOPS_S: Final = 1.0
+_JOG_RUNS_S: Final = 0.8
+"""Two TPDOs tell that it runs steadily."""
+_RAMP_SEEN_MS: Final = PLANT.rpdo_period_ms + 100
+"""From then on a stop counts."""
+_LOOKED_AT_MS: Final = 100
+"""The owner hands on a new word so late, at the most."""
+_JOGS: Final = math.ceil(IGNORED_STOP_MS / (_JOG_STOPS_S * 1000 - _RAMP_SEEN_MS - TPDO_MS - _LOOKED_AT_MS))
 _OPERATIONAL: Final = b"\x05"
 _PRE_OPERATIONAL: Final = b"\x7f"
 _NMT: Final = 0x000
@@ -47,27 +59,38 @@ _START: Final = 0x01
 
 
 class Intruder:
-    """Sends a drive's RPDO with a word that enables, beside the bridge, and before it NMT start if it is a
-    master."""
+    """Sends a drive's RPDO with a word that enables, beside the bridge. With ``is_master`` it starts the node
+    before each of them, and leads the drive: while that is not enabled, it gets the word that makes it ready
+    and the one that enables by turns."""
 
-    def __init__(self, drive: Drive, *, is_master: bool = False) -> None:
+    def __init__(self, rig: Rig, drive: Drive, *, is_master: bool = False) -> None:
+        self._rig = rig
+        self._drive = drive
         self._start = bytes((_START, drive.node_id)) if is_master else b""
-        # None of the setpoints that its owner writes: on the wire what another device sends bears no mark of
-        # this host, here nothing but the data tells it from what the bridge has sent a moment ago.
-        setpoint = drive.family.setpoint + NUMBERS
-        words = drive.family.run.to_bytes(2, "little") + setpoint.to_bytes(2, "little")
-        self._frame = drive.rpdo, words
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True, name="intruder")
-        self.since = machine.send(BRIDGE_SIDE, *self._frame)
+        self.since = self._send(drive.family.run)
         self._thread.start()
+
+    def _send(self, word: int) -> float:
+        # None of the setpoints that its owner writes: on the wire what another device sends bears no mark of
+        # this host, here nothing but the data tells it from what the bridge has sent a moment ago.
+        setpoint = self._drive.family.setpoint + NUMBERS
+        data = word.to_bytes(2, "little") + setpoint.to_bytes(2, "little")
+        return machine.send(BRIDGE_SIDE, self._drive.rpdo, data)
+
+    def _word(self) -> int:
+        family = self._drive.family
+        said = self._rig.said.last(self._drive.tpdo)
+        leads = self._start and not (said and self._drive.enabled(said.data))
+        return family.ready if leads and int(time.monotonic() / _LEADS_S) % 2 else family.run
 
     def _run(self) -> None:
         while not self._ended.wait(_INTRUDES_S):
             with suppress(OSError):
                 if self._start:
                     machine.send(BRIDGE_SIDE, _NMT, self._start)
-                machine.send(BRIDGE_SIDE, *self._frame)
+                self._send(self._word())
 
     def end(self) -> None:
         self._ended.set()
@@ -75,17 +98,24 @@ class Intruder:
 
 
 def intrude(rig: Rig) -> float:
-    intruder = Intruder(VICTIM)
+    intruder = Intruder(rig, VICTIM)
     rig.guests.callback(intruder.end)
     return intruder.since
 
 
 def intrude_as_master(rig: Rig) -> float:
-    """For as long as the drive may come back; it has to be stopped when that ends, and to stay so."""
-    intruder = Intruder(VICTIM, is_master=True)
+    """It starts the drive again and again, until it ends."""
+    intruder = Intruder(rig, VICTIM, is_master=True)
     time.sleep(_MASTERS_S)
     intruder.end()
-    return time.monotonic()
+    time.sleep(answered(rig, VICTIM) / 1000)
+    return intruder.since
+
+
+def answered(rig: Rig, drive: Drive) -> float:
+    """The drive may run until the answer, which has a published bound. Its TPDOs tell of that, or the
+    heartbeat of a node that is stopped, which comes as often."""
+    return rig.intruder_ms + TPDO_MS
 
 
 def pause_beside_twin(rig: Rig) -> float:
@@ -118,6 +148,22 @@ def ignored_drive(rig: Rig, drive: Drive) -> float:
     return bounds.controller_drive(rig, drive) + ignored_ms
 
 
+def jog(rig: Rig) -> float:
+    """Its owner lets it run and stops it by turns. No stop is long enough to be judged by itself."""
+    now = time.monotonic()
+    for _ in range(_JOGS):
+        rig.board.command(VICTIM.place, VICTIM.family.ready)
+        time.sleep(_JOG_STOPS_S)
+        rig.board.command(VICTIM.place, VICTIM.family.run)
+        time.sleep(_JOG_RUNS_S)
+    return now
+
+
+def jogged(rig: Rig, drive: Drive) -> float:
+    """So many stops together are an ignored one (docs/explanation/dead-man-chain.md, "Jogging")."""
+    return _JOGS * (_JOG_STOPS_S + _JOG_RUNS_S) * 1000 + bounds.node_stopped(rig, drive)
+
+
 def let_hear(rig: Rig) -> None:
     machine.reset_nodes(VICTIM.node_id)
     acts.continue_owners(rig)
@@ -125,7 +171,7 @@ def let_hear(rig: Rig) -> None:
 
 def start_second_bridge(rig: Rig) -> None:
     """On the same bus, for the same drives, with ports of its own."""
-    second = rig.guests.enter_context(rig.another_bridge(write_second_site(rig.folder)))
+    second = rig.guests.enter_context(rig.another_bridge(write_second_site(rig.folder, rig.other_nodes)))
     second.wait_output("OPC UA on", _STARTS_S)
 
 
@@ -155,16 +201,19 @@ def let_boot(rig: Rig) -> None:
 
 
 def write_ahead(rig: Rig) -> float:
-    """While the bridge stands still for less than its dead-man time, a client of the Modbus owner's machine
-    writes hundreds of telegrams without waiting for an answer, and hangs. Gives the time of the last one."""
+    """A client takes the place of the Modbus owner, which has ended. While the bridge stands still for less
+    than its dead-man time, it writes hundreds of telegrams without waiting for an answer, and hangs. Gives
+    the time of the last one."""
     assert rig.bridge
-    rig.owners["modbus"].signal(signal.SIGSTOP)
-    drives = [drive for drive in drives_of("modbus") if drive.reaction != "hold"]
-    connections = [Connection.of_owner() for _ in drives]
-    time.sleep(_ACCEPTED_S)
+    rig.owners["modbus"].kill()
+    connections: dict[Drive, Connection] = {}
+    for drive in drives_of("modbus"):
+        if drive.reaction != "hold":
+            connections[drive] = Connection.of_owner()
+            rig.guests.callback(connections[drive].abandon)
+    _take_over(rig, connections)
     rig.bridge.signal(signal.SIGSTOP)
-    for connection, drive in zip(connections, drives, strict=True):
-        rig.guests.callback(connection.abandon)
+    for drive, connection in connections.items():
         connection.write_ahead(drive, _AHEAD)
     moment = time.monotonic()
     time.sleep(_WAITS_S)
@@ -172,9 +221,23 @@ def write_ahead(rig: Rig) -> float:
     return moment
 
 
+def _take_over(rig: Rig, connections: dict[Drive, Connection]) -> None:
+    """Another connection of the owner's machine owns its drives as soon as the bridge has seen the end of the
+    owner's; before that it is refused."""
+
+    def takes_over() -> bool:
+        answers = [
+            connection.write(drive, 0, drive.family.run, drive.family.setpoint)
+            for drive, connection in connections.items()
+        ]
+        return not any(answers)
+
+    rig.wait(takes_over, _ACCEPTED_S, "the bridge sees the end of the owner's connections")
+
+
 def stop_writing_ahead(rig: Rig) -> None:
     rig.send_guests_away()
-    acts.continue_modbus(rig)
+    rig.owners["modbus"].start()
 
 
 def kill_front_and_keep_it_down(rig: Rig) -> float:

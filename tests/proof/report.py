@@ -46,7 +46,13 @@ class Cell:
     def count(self, verdict: str) -> int:
         return sum(record["verdict"] == verdict for record in self.records)
 
-    def row(self) -> list[str]:
+    @property
+    def demand(self) -> str:
+        """What has to hold, where that is judged by yes or no; empty where times are."""
+        return next((record["demand"] for record in (*self.records, *self.void) if record.get("demand")), "")
+
+    @property
+    def verdict(self) -> str:
         bad = self.count("failed")
         notes = [f"**{bad} failed**"] * bool(bad)
         if self.void:
@@ -54,17 +60,21 @@ class Cell:
             notes.append(
                 f"{len(self.void)} void: late by up to {over:.1f} ms, and the machine was in the way for that"
             )
-        return [
-            self.fault,
-            self.family,
-            self.protocol,
-            str(len(self.records)),
+        return "; ".join(notes) or "ok"
+
+    def row(self) -> list[str]:
+        times = (
             *self._triple("way")[1:2],
             *self._triple("sent")[1:],
             *self._triple("bus"),
             *self._triple("drive"),
-            "; ".join(notes) or "ok",
-        ]
+        )
+        return [self.fault, self.family, self.protocol, str(len(self.records)), *times, self.verdict]
+
+    def demand_row(self) -> list[str]:
+        """The same of a fault that is judged by yes or no."""
+        head = self.fault, self.family, self.protocol, self.demand, str(len(self.records))
+        return [*head, *self._triple("bus"), self.verdict]
 
 
 def cells(records: Iterable[Record]) -> list[Cell]:
@@ -114,11 +124,31 @@ _HEAD: Final = (
     "bound",
     "",
 )
+_DEMAND_HEAD: Final = (
+    "fault",
+    "family",
+    "protocol",
+    "what has to hold",
+    "n",
+    "bus: median",
+    "worst",
+    "bound",
+    "",
+)
+
+
+def _table(head: Sequence[str], numbers: slice, rows: Iterable[Sequence[str]]) -> list[str]:
+    """Lines of a table; its columns ``numbers`` are right-aligned."""
+    rules = ["---"] * len(head)
+    rules[numbers] = ["--:"] * len(rules[numbers])
+    lines = ["| " + " | ".join(row) + " |" for row in (head, *rows)]
+    return [lines[0], "|" + "|".join(rules) + "|", *lines[1:]]
 
 
 def markdown(result: dict[str, Any]) -> str:
     """The generated part of docs/explanation/proof.md, markers included."""
-    table = [cell.row() for cell in cells(result["samples"])]
+    found = cells(result["samples"])
+    demands = [cell.demand_row() for cell in found if cell.demand]
     failed = sum(sample["verdict"] == "failed" for sample in result["samples"])
     void = sum(sample["verdict"] == "void" for sample in result["samples"])
     lines = [
@@ -138,10 +168,18 @@ def markdown(result: dict[str, Any]) -> str:
             [f"Not possible on this machine: {', '.join(result['faults_missing'])}.", ""]
             * bool(result["faults_missing"])
         ),
-        "| " + " | ".join(_HEAD) + " |",
-        "|---|---|---|" + "--:|" * 10 + "---|",
-        *("| " + " | ".join(row) + " |" for row in table),
+        *_table(_HEAD, slice(3, 13), (cell.row() for cell in found if not cell.demand)),
         "",
+        *(
+            [
+                "Judged by yes or no; the times are those of a stop that was asked for, from the call to the "
+                "bus:",
+                "",
+                *_table(_DEMAND_HEAD, slice(4, 8), demands),
+                "",
+            ]
+            * bool(demands)
+        ),
         END,
     ]
     return "\n".join(lines)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from tests.proof import machine
+from tests.proof.block import BLOCK
 from tests.proof.board import Board
 from tests.proof.drives import BRIDGE_SIDE, DRIVE_SIDE, DRIVES, PORTS, PROTOCOLS, SERVERS, Drive, write_site
 from tests.proof.recovery import Recovery
@@ -113,12 +114,16 @@ class Rig:
         self.bridge: Process | None = None
         self._front = 0
         self._starts = 0
-        state, run = self.disk.folder / "state", folder / "run"
-        self._site = write_site(folder / "site.toml", BRIDGE_SIDE, state, run)
-        self._drives = write_site(folder / "drives.toml", DRIVE_SIDE, folder / "unused", folder / "unused")
+        state, run, unused = self.disk.folder / "state", folder / "run", folder / "unused"
+        self.other_nodes = [BLOCK.site(folder)]
+        """Tables of nodes that are no drives, for the site file."""
+        self._site = write_site(folder / "site.toml", BRIDGE_SIDE, state, run, others=self.other_nodes)
+        self._drives = write_site(folder / "drives.toml", DRIVE_SIDE, unused, unused, others=self.other_nodes)
         self.worst_case_ms: dict[Drive, int] = {}
         """What the bridge publishes: its own bound, and that of a drive without a bridge."""
         self.worst_case_bridge_ms: dict[Drive, int] = {}
+        self.intruder_ms = 0.0
+        """Within which time the bridge answers an intruder, as ``drivebridge check`` says."""
         self.guests = ExitStack()
         """Whoever is there for one fault alone."""
         self.hours = -1
@@ -139,7 +144,7 @@ class Rig:
         self._stack.callback(self.send_guests_away)
         self.gateway.open()
         rpdos = {can_id for drive in DRIVES for can_id in (drive.rpdo, drive.number_id)}
-        self.told = Witness(BRIDGE_SIDE, sorted({*rpdos, BRIDGE_HEARTBEAT}), self.clock)
+        self.told = Witness(BRIDGE_SIDE, sorted({*rpdos, BLOCK.rpdo, BRIDGE_HEARTBEAT}), self.clock)
         self.heard = Witness(BRIDGE_SIDE, _from_nodes(DRIVES), self.clock)
         self.said = Witness(DRIVE_SIDE, _from_nodes(DRIVES), self.clock)
         for witness in (self.told, self.heard, self.said):
@@ -223,6 +228,9 @@ class Rig:
         return self.bridge.output().count("INFO    OPC UA on")
 
     def _read_bounds(self) -> None:
+        check = [sys.executable, "-m", "bridge", "check", "--json", str(self._site)]
+        said = subprocess.run(check, capture_output=True, text=True, check=True)
+        self.intruder_ms = float(json.loads(said.stdout)["intruders"][0]["within_ms"])
         script = str(REPOSITORY / "tests" / "peers" / "zenoh_ask.py")
         leaves = {"worst_case_stop_ms": self.worst_case_ms, "worst_case_bridge_ms": self.worst_case_bridge_ms}
         points = [f"drives/proof/{drive.path}/supervision/{leaf}=" for drive in DRIVES for leaf in leaves]

@@ -7,16 +7,16 @@ import random
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Final
 
 from tests.proof import measure
 from tests.proof.drives import CLIENT_MS, DRIVES, WAY_MS, Drive
-from tests.proof.faults import Fault
-from tests.proof.measure import Sample
+from tests.proof.examine import Examine
+from tests.proof.fault import Fault
+from tests.proof.measure import Sample, Span
 from tests.proof.rig import BRIDGE, FRONT, SIMULATION, NotStopped, Rig, Stuck
 from tests.proof.settings import PLANT, REACTION_MS
-from tests.proof.waits import paused_ms, waited_ms
+from tests.proof.waits import longest_wait_ms, paused_ms, waited_ms
 
 _STOPPED_S: Final = 5.0
 _QUIET_S: Final = 0.4
@@ -27,11 +27,14 @@ _BEFORE_MS: Final = PLANT.rpdo_period_ms + REACTION_MS
 """The bridge, or the drive, has to begin its stop that long before its bound."""
 _SURELY: Final = 0.8
 _WRITES_S: Final = 30.0
+_TO_HOLD: Final = "with `hold` the drive moves on all the time"
 
 
 def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample]:
     """The samples of one round. Raises ``Stuck`` where the plant does not come back."""
     _all_move(rig, say)
+    if fault.examine:
+        return _examined(rig, fault, fault.examine, say)
     if fault.steady:
         fault.steady(rig)
         since = time.monotonic()
@@ -58,6 +61,14 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     ways = _ways(rig, fault, list(stopped), moment)
     words = {drive: measure.stopping(rig, drive, times[0]) for drive, times in stopped.items()}
     _all_go_on(rig, others, fault, "which it does not concern")
+    ends: dict[Drive, float] = {}
+    if fault.brings_back:
+        # Until now it may have turned now and then; from now on it may not.
+        ends = dict.fromkeys(stopped, rig.now())
+        stopped = {
+            drive: (bus, moment + measure.longest_turn(rig, drive, moment))
+            for drive, (bus, _) in stopped.items()
+        }
     before = {drive: rig.board.accepted(drive.place)[0] for drive in concerned}
     fault.undo(rig)
     _wait_talking(rig, concerned)
@@ -68,14 +79,52 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
         if _was_stopped_before(rig, fault, drive, times[0], moment):
             rig.by_themselves += 1
             continue
-        wrong = _wrong(rig, fault, drive, times, words[drive])
-        samples.append(_sample(rig, fault, drive, moment, ways.get(drive), wrong))
+        wrong = _wrong(rig, fault, drive, (times[0], ends.get(drive, times[1])), words[drive])
+        samples.append(_sample(rig, fault, drive, moment, times[1], ways.get(drive), wrong))
     samples += _held(rig, fault, [drive for drive in holding if drive not in still], moment)
     for sample in samples:
         if sample.verdict != "ok":
             drive = next(drive for drive in DRIVES if drive.path == sample.drive)
             say(f"{sample.verdict.upper()}: {sample}\n{measure.trace(rig, drive, moment)}")
     rig.run_all(anew=holding)
+    say(f"{fault.name}: {time.monotonic() - began:.1f} s")
+    return samples
+
+
+def _examined(rig: Rig, fault: Fault, examine: Examine, say: Callable[[str], None]) -> list[Sample]:
+    """The samples of a fault that is judged by yes or no. Where the machine was so slow that drives had to
+    be stopped, a no proves nothing, and the fault is injected once more."""
+    began = time.monotonic()
+    found = examine(rig)
+    others = [drive for drive in DRIVES if not (fault.concerns(drive) or fault.others_may_stop)]
+    _all_go_on(rig, others, fault, "which it does not concern")
+    samples: list[Sample] = []
+    for finding in found:
+        of, spans = finding.of, finding.spans
+        if finding.wrong and _hung(rig, of if isinstance(of, Drive) else None, began):
+            say(f"the machine was slow: {fault.name}: {of.path}: {finding.wrong}")
+            rig.by_themselves += 1
+            continue
+        paused, waited = _held_up_ms(rig, spans)
+        sample = Sample(
+            fault.name,
+            of.family_name + PLANT.label,
+            of.protocol,
+            of.path,
+            bus_ms=spans[0].ms if spans else None,
+            bus_bound_ms=spans[0].bound_ms if spans else None,
+            paused_ms=paused,
+            waited_ms=waited,
+            noise_ms=rig.noise_ms,
+            demand=fault.demand,
+            wrong=finding.wrong,
+        )
+        if sample.verdict != "ok":
+            trace = measure.trace(rig, of, began) if isinstance(of, Drive) else ""
+            say(f"{sample.verdict.upper()}: {sample}\n{trace}")
+        samples.append(sample)
+    fault.undo(rig)
+    rig.run_all()
     say(f"{fault.name}: {time.monotonic() - began:.1f} s")
     return samples
 
@@ -111,7 +160,14 @@ def _held(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> list[Sa
             continue
         text = f"it is to hold, and {wrong}" if wrong else ""
         samples.append(
-            Sample(fault.name, drive.family.name + PLANT.label, drive.protocol, drive.path, wrong=text)
+            Sample(
+                fault.name,
+                drive.family_name + PLANT.label,
+                drive.protocol,
+                drive.path,
+                demand=_TO_HOLD,
+                wrong=text,
+            )
         )
     return samples
 
@@ -121,6 +177,14 @@ def _was_slow(rig: Rig, drive: Drive, since: float) -> bool:
     now = time.monotonic()
     waited = max(paused_ms(rig.watched, since, now), waited_ms(rig.watched, BRIDGE, since, now))
     return max(waited, measure.longest_pause(rig, drive, since) * 1000) >= PLANT.deadman_ms
+
+
+def _hung(rig: Rig, drive: Drive | None, since: float) -> bool:
+    """The same at a stretch, in what takes seconds; ``drive``: None for outputs, which say nothing."""
+    now = time.monotonic()
+    hung = longest_wait_ms(rig.watched, BRIDGE, since, now)
+    silent = measure.longest_pause(rig, drive, since) * 1000 if drive else 0.0
+    return max(hung, silent) >= PLANT.deadman_ms
 
 
 def _all_move(rig: Rig, say: Callable[[str], None]) -> None:
@@ -235,10 +299,17 @@ def _ways(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> dict[Dr
 
 
 def _sample(
-    rig: Rig, fault: Fault, drive: Drive, moment: float, way: tuple[float, float] | None, wrong: str
+    rig: Rig,
+    fault: Fault,
+    drive: Drive,
+    moment: float,
+    stopped: float,
+    way: tuple[float, float] | None,
+    wrong: str,
 ) -> Sample:
+    """``stopped``: when the drive showed it."""
     bus = measure.bus_stop(rig, drive, moment, silent=fault.falls_silent(drive))
-    own = measure.drive_stop(rig, drive, moment) if fault.drive_bound else None
+    own = stopped if fault.drive_bound else None
     begin = moment
     if way is not None:
         begin = way[1]
@@ -246,23 +317,23 @@ def _sample(
         begin = measure.last_sign(rig, drive, moment)
     elif fault.reference == "boot-up":
         begin = measure.boot_up(rig, drive, moment) or moment
-    spans: list[_Span] = []
+    spans: list[Span] = []
     if bus is not None and fault.bus_bound:
-        spans.append(_Span(begin, bus[0], fault.bus_bound(rig, drive), (BRIDGE,)))
+        spans.append(Span(begin, bus[0], fault.bus_bound(rig, drive), (BRIDGE,)))
     on_bus = spans[0] if spans else None
-    sent: _Span | None = None
+    sent: Span | None = None
     if own is not None and fault.drive_bound:
-        spans.append(_Span(begin, own, fault.drive_bound(rig, drive), (BRIDGE, SIMULATION)))
+        spans.append(Span(begin, own, fault.drive_bound(rig, drive), (BRIDGE, SIMULATION)))
     if way is not None:
         busy = (BRIDGE, drive.protocol, *([FRONT] if drive.protocol == "opcua" else []))
-        spans.append(_Span(*way, WAY_MS[drive.protocol], busy))
+        spans.append(Span(*way, WAY_MS[drive.protocol], busy))
         if on_bus:
-            sent = _Span(way[0], on_bus.end, on_bus.bound_ms + CLIENT_MS, busy)
+            sent = Span(way[0], on_bus.end, on_bus.bound_ms + CLIENT_MS, busy)
             spans.append(sent)
     paused, waited = _held_up_ms(rig, spans)
     return Sample(
         fault.name,
-        drive.family.name + PLANT.label,
+        drive.family_name + PLANT.label,
         drive.protocol,
         drive.path,
         bus_ms=on_bus.ms if on_bus else None,
@@ -280,21 +351,7 @@ def _sample(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Span:
-    """From ``begin`` to ``end``, which may take ``bound_ms``; ``busy`` may have waited for the CPU in it."""
-
-    begin: float
-    end: float
-    bound_ms: float
-    busy: tuple[str, ...]
-
-    @property
-    def ms(self) -> float:
-        return (self.end - self.begin) * 1000
-
-
-def _held_up_ms(rig: Rig, spans: list[_Span]) -> tuple[float, float]:
+def _held_up_ms(rig: Rig, spans: list[Span]) -> tuple[float, float]:
     """The pauses of the machine, and the waiting of those who were busy, from ``_BEFORE_MS`` before a bound
     that was exceeded until the end; the least of them where several were, 0 where none was."""
     found: list[tuple[float, float]] = []

@@ -5,12 +5,10 @@ from __future__ import annotations
 import socket
 import struct
 import threading
-import time
 from contextlib import suppress
-from typing import Final
+from typing import Final, Protocol
 
 from tests.proof.drives import PORTS, SERVERS, Drive, drives_of
-from tests.proof.families import NORD
 from tests.proof.settings import PLANT
 
 _OWNERS_MACHINE: Final = "127.0.0.1"
@@ -19,14 +17,20 @@ _HEAD: Final = struct.Struct(">HHHB")
 _READ: Final = struct.Struct(">BHH")
 _WRITE: Final = struct.Struct(">BHHB")
 _READ_HOLDING, _WRITE_HOLDING = 3, 16
-_KEEP_ALIVE, _TIMEOUT = 10, 12
-"""Holding registers (docs/reference/modbus.md): 0 releases the drive; the owner's time-out."""
+_TIMEOUT: Final = 12
+"""Holding register (docs/reference/modbus.md): the owner's time-out."""
+_EXCEPTION: Final = 0x80
 _LONG_MS: Final = 5 * PLANT.fieldbus_timeout_ms
-_INVALID: Final = 0x007F
-"""NORD: "run" without bit 10, "control data valid" (BU 2500 §6.5.1)."""
 _MOST_BYTES: Final = 260
 _PERIOD_S: Final = 0.1
 _LIMIT_S: Final = 2.0
+
+
+class Unit(Protocol):
+    """What has a Modbus unit of its own: a drive, or a node with outputs."""
+
+    @property
+    def unit(self) -> int: ...
 
 
 class Connection:
@@ -47,7 +51,7 @@ class Connection:
         telegram = _WRITE.pack(_WRITE_HOLDING, 0, 2, 4) + struct.pack(
             ">HH", drive.family.run, drive.family.setpoint
         )
-        frame = _HEAD.pack(1, 0, len(telegram) + 1, drive.place + 1) + telegram
+        frame = _HEAD.pack(1, 0, len(telegram) + 1, drive.unit) + telegram
         with suppress(BlockingIOError):
             self._socket.sendall(frame * times)
 
@@ -60,16 +64,20 @@ class Connection:
         self._send(drive, _READ.pack(_READ_HOLDING, 0, 2))
         self._socket.recv(_MOST_BYTES)
 
-    def write(self, drive: Drive, start: int, *words: int) -> None:
-        self.send_write(drive, start, *words)
-        self._socket.recv(_MOST_BYTES)
-
-    def send_write(self, drive: Drive, start: int, *words: int) -> None:
+    def write(self, to: Unit, start: int, *words: int) -> int:
+        """Holding registers from ``start`` on. The exception code of the answer, 0 where it is none."""
         data = struct.pack(f">{len(words)}H", *words)
-        self._send(drive, _WRITE.pack(_WRITE_HOLDING, start, len(words), len(data)) + data)
+        self._send(to, _WRITE.pack(_WRITE_HOLDING, start, len(words), len(data)) + data)
+        answer = self._socket.recv(_MOST_BYTES)
+        return answer[_HEAD.size + 1] if answer[_HEAD.size] & _EXCEPTION else 0
 
-    def _send(self, drive: Drive, pdu: bytes) -> None:
-        self._socket.sendall(_HEAD.pack(1, 0, len(pdu) + 1, drive.place + 1) + pdu)
+    @property
+    def port(self) -> int:
+        """Our own, by which the bridge names the connection."""
+        return int(self._socket.getsockname()[1])
+
+    def _send(self, to: Unit, pdu: bytes) -> None:
+        self._socket.sendall(_HEAD.pack(1, 0, len(pdu) + 1, to.unit) + pdu)
 
     def close(self) -> None:
         """What has been sent is carried out."""
@@ -80,20 +88,9 @@ class Connection:
         self._socket.close()
 
 
-def release(drives: list[Drive]) -> float:
-    """By the machine of their owner. Gives the time before it."""
-    connections = [Connection(_OWNERS_MACHINE) for _ in drives]
-    now = time.monotonic()
-    for connection, drive in zip(connections, drives, strict=True):
-        connection.send_write(drive, _KEEP_ALIVE, 0)
-    for connection in connections:
-        connection.close()
-    return now
-
-
 class Strangers:
-    """Nothing of what they do is a telegram of the owner: another machine writes "run" to its drives and a
-    longer time-out, its own machine reads them, and writes what is no valid telegram."""
+    """Nothing of what they do is a telegram of the owner: another machine, and another connection of its own,
+    write "run" to its drives and a longer time-out, and read them."""
 
     def __init__(self) -> None:
         self._ended = threading.Event()
@@ -104,16 +101,15 @@ class Strangers:
         # A drive that is to hold may be taken over once it has tripped, and is stopped first then.
         drives = [drive for drive in drives_of("modbus") if drive.reaction != "hold"]
         with suppress(OSError):
-            own, other = Connection(_OWNERS_MACHINE), Connection(_ELSEWHERE)
+            connections = [Connection(_OWNERS_MACHINE), Connection(_ELSEWHERE)]
             while not self._ended.wait(_PERIOD_S):
                 for drive in drives:
-                    other.write(drive, 0, drive.family.run, drive.family.setpoint)
-                    other.write(drive, _TIMEOUT, _LONG_MS)
-                    own.read(drive)
-                    if drive.family is NORD:
-                        own.write(drive, 0, _INVALID)
-            own.close()
-            other.close()
+                    for connection in connections:
+                        connection.write(drive, 0, drive.family.run, drive.family.setpoint)
+                        connection.write(drive, _TIMEOUT, _LONG_MS)
+                    connections[0].read(drive)
+            for connection in connections:
+                connection.close()
 
     def end(self) -> None:
         self._ended.set()

@@ -84,6 +84,12 @@ def waited_ms(folder: Path, name: str, begin: float, end: float) -> float:
     return found * 1000
 
 
+def longest_wait_ms(folder: Path, name: str, begin: float, end: float) -> float:
+    """The longest that this process can have waited at a stretch from ``begin`` to ``end``, in ms."""
+    waits = _lines(folder / f"{name}.waits", begin)
+    return max((waited for first, last, waited in waits if last > begin and first < end), default=0.0) * 1000
+
+
 def paused_ms(folder: Path, begin: float, end: float) -> float:
     """The pauses within this time, in ms."""
     pauses = _lines(folder / "pauses", begin)

@@ -12,7 +12,8 @@ import pytest
 
 from bridge.config import Reaction
 from tests.proof.drives import DRIVES
-from tests.proof.faults import FAULTS, Fault
+from tests.proof.fault import Fault
+from tests.proof.faults import FAULTS
 from tests.support.process import REPOSITORY
 
 _PROOF = Path(REPOSITORY) / "tests" / "proof"
@@ -32,6 +33,17 @@ def test_every_fault_is_injected_as_often_as_there_are_cycles(fault: Fault, cycl
 
 def test_all_faults_of_the_plan_are_there() -> None:
     assert len({fault.name for fault in FAULTS}) == len(FAULTS) >= 20
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_a_fault_is_judged_by_a_bound_or_by_yes_or_no(fault: Fault) -> None:
+    assert fault.subjects
+    if fault.examine:
+        assert fault.demand
+        assert not (fault.bus_bound or fault.drive_bound)
+    else:
+        assert not fault.demand
+        assert fault.bus_bound or fault.drive_bound
 
 
 def test_every_reaction_and_every_kind_of_rpdo_is_there() -> None:

@@ -16,6 +16,7 @@ from tests.proof.measure import (
     handed_on,
     held,
     keeps_setpoint,
+    longest_turn,
     spoken_to,
     stopping,
     was_enabled,
@@ -229,3 +230,17 @@ def test_a_drive_that_silence_stops_is_not_spoken_to() -> None:
     rig.heard.frames[0x700 + PUMP.node_id] = [Run(0.0, 14.1, b"\x05"), Run(14.2, 15.0, b"\x7f")]
     assert spoken_to(rig, PUMP, 12.1, 12.5) is None, "a boot-up of its node"
     assert spoken_to(rig, PUMP, 12.1, 14.1) == bytes(8), "before it had stopped by itself"
+
+
+def test_a_drive_that_is_brought_back_has_turned_as_long_as_it_did_at_a_stretch() -> None:
+    slow = bytes.fromhex("3704640000000000")
+    said = [Run(9.0, 10.1, RUNNING), Run(10.2, 10.3, READY), Run(10.4, 10.7, BRAKING), Run(10.9, 11.0, slow)]
+    assert longest_turn(scene(said=said), FU1, 10.0) == pytest.approx(0.5), "less than a fiftieth is none"
+    assert longest_turn(scene(said=said), FU1, 11.0) == pytest.approx(0.0)
+    assert longest_turn(scene(said=[*said, Run(12.0, 19.9, RUNNING)]), FU1, 10.0) == pytest.approx(8.0)
+
+
+def test_a_node_that_is_not_in_operation_turns_nothing() -> None:
+    rig = scene(said=[Run(9.0, 10.1, RUNNING), Run(11.0, 11.2, RUNNING), Run(11.3, 20.0, READY)])
+    rig.said.frames[0x700 + FU1.node_id] = [Run(9.0, 10.2, b"\x05"), Run(10.3, 10.4, b"\x04")]
+    assert longest_turn(rig, FU1, 10.0) == pytest.approx(0.3), "it is cut off while it turns"

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.proof.fault import Fault
 from tests.proof.faults import FAULTS
 from tests.proof.mutants import Edit, Mutant, Tree, files_of, load
 from tests.support.process import REPOSITORY
@@ -37,6 +38,11 @@ def test_no_mutant_uses_a_name_that_is_not_there() -> None:
 def test_there_are_enough_of_them_and_each_is_another() -> None:
     assert len({mutant.name for mutant in MUTANTS}) == len(MUTANTS) >= 20
     assert len({mutant.edits for mutant in MUTANTS}) == len(MUTANTS)
+
+
+@pytest.mark.parametrize("fault", [one for one in FAULTS if one.examine], ids=lambda fault: fault.name)
+def test_what_is_judged_by_yes_or_no_says_no_to_a_mutant(fault: Fault) -> None:
+    assert fault.name in {mutant.first for mutant in MUTANTS}
 
 
 def test_a_text_that_has_no_place_or_several_is_an_error() -> None:

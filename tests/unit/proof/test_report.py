@@ -123,3 +123,36 @@ def test_a_page_without_marks_is_an_error(tmp_path: Path) -> None:
     page.write_text("nothing\n", encoding="utf-8")
     with pytest.raises(ValueError, match="has no markers"):
         put_into(page, result(record()))
+
+
+def yes(**change: Any) -> dict[str, Any]:
+    judged = record(fault="second connection", drive_ms=None, way_ms=None, sent_ms=None, bus_ms=None)
+    return {**judged, "demand": "each of its words is refused", **change}
+
+
+def test_what_is_judged_by_yes_or_no_has_a_table_of_its_own() -> None:
+    page = markdown(result(record(), yes(), yes()))
+    times, _, demands = page.partition("Judged by yes or no")
+    row = (
+        "| second connection | NORD SK TU4-CAO | modbus | each of its words is refused | 2 | – | – | – | ok |"
+    )
+    assert row in demands
+    assert "second connection" not in times
+    assert "| owner killed |" in times and "| owner killed |" not in demands
+
+
+def test_a_no_is_named_and_fails_the_proof() -> None:
+    found = result(
+        yes(), yes(verdict="failed"), cells=[["second connection", "NORD SK TU4-CAO", "modbus", 1]]
+    )
+    assert "| 2 | – | – | – | **1 failed** |" in markdown(found)
+    assert failures(found, 2) == ["second connection, NORD SK TU4-CAO, modbus: 1 of 2 failed"]
+
+
+def test_a_stop_that_was_asked_for_has_its_time_beside_the_verdict() -> None:
+    page = markdown(result(yes(bus_ms=40.0, bus_bound_ms=320.0)))
+    assert "| each of its words is refused | 1 | 40 | 40 | 320 | ok |" in page
+
+
+def test_a_page_without_such_faults_has_no_such_table() -> None:
+    assert "Judged by yes or no" not in markdown(result(record()))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.proof.waits import Account, follow, paused_ms, waited_ms
+from tests.proof.waits import Account, follow, longest_wait_ms, paused_ms, waited_ms
 from tests.support.process import REPOSITORY
 
 
@@ -25,6 +25,13 @@ def test_what_was_waited_between_two_moments(tmp_path: Path) -> None:
     # Of a look that lies outside in part, no more than can have been inside.
     assert waited_ms(tmp_path, "bridge", 1.05, 1.11) == pytest.approx(20)
     assert waited_ms(tmp_path, "bridge", 1.145, 1.149) == pytest.approx(4)
+
+
+def test_the_longest_wait_is_none_of_many_short_ones(tmp_path: Path) -> None:
+    put(tmp_path / "bridge.waits", "0.50 0.90 0.40", "1.00 1.05 0.02", "1.05 1.50 0.30", "1.50 1.55 0.01")
+    assert longest_wait_ms(tmp_path, "bridge", 1.0, 2.0) == pytest.approx(300)
+    assert longest_wait_ms(tmp_path, "bridge", 1.5, 2.0) == pytest.approx(10)
+    assert longest_wait_ms(tmp_path, "bridge", 2.0, 3.0) == 0.0
 
 
 def test_pauses_count_where_they_lie_between_two_moments(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.command.drive import Identification
 from bridge.command.link import Link, NodeState
-from bridge.command.outputs import Outputs
+from bridge.command.outputs import Outputs, Telling
 from bridge.command.request import Identity, Role
 from bridge.config import NodeTable
 from bridge.image import Image, Quality, Value
@@ -36,6 +36,10 @@ class _Heard:
     shown: list[tuple[int, Signal, int]] = field(default_factory=list[tuple[int, Signal, int]])
     """Entry, what it is, and its point."""
     quality: tuple[Quality, str] | None = None
+    told: tuple[tuple[int, ObjectRef, int], ...] = ()
+    """Of its entries that are outputs: which it is, the object, and the mask that takes its sign away."""
+    told_values: list[tuple[ObjectRef, int]] = field(default_factory=list[tuple[ObjectRef, int]])
+    """What those were the last time."""
 
     @property
     def points(self) -> list[int]:
@@ -90,8 +94,23 @@ class Device:
                 if ref is not None and ref in self._signals and in_charge[ref] == place:
                     heard.shown.append((entry, self._signals[ref], self._points[ref]))
             self._heard.append(heard)
+        if self.outputs:
+            self._find_told(self.outputs, in_charge)
         self._unserved = {self._points[ref]: why for ref, why in unserved.items()}
         self._judge(now)
+
+    def _find_told(self, outputs: Outputs, in_charge: Mapping[ObjectRef, int]) -> None:
+        """Which outputs its TPDOs bring, too."""
+        masks = {one.object: (1 << one.size) - 1 for one in self.family.output}
+        for place, heard in enumerate(self._heard):
+            heard.told = tuple(
+                (entry, ref, masks[ref])
+                for entry, ref in enumerate(heard.pdo.objects)
+                if ref is not None and ref in masks and in_charge[ref] == place
+            )
+        outputs.on_telling(
+            {ref: Telling(one.pdo.name, one.pdo.deadline_s) for one in self._heard for _, ref, _ in one.told}
+        )
 
     def on_node(self, state: NodeState, now: float) -> None:
         self._node = state
@@ -102,11 +121,22 @@ class Device:
     def on_data(self, place: int, values: Sequence[int], now: float) -> None:
         """The TPDO at this place of ``pdos`` has come: the values of its entries, with their signs."""
         heard = self._heard[place]
+        if heard.told:
+            self._tell(heard, values, now)
         heard.link.on_pdo(now)
         if heard.quality != (Quality.GOOD, ""):
             self._judge_one(heard, now)
         shown: list[Value] = [signal.decode(values[entry]) for entry, signal, _ in heard.shown]
         self._image.set_values(heard.points, shown, now)
+
+    def _tell(self, heard: _Heard, values: Sequence[int], now: float) -> None:
+        """The link does not know of the TPDO yet."""
+        told = [(ref, values[entry] & mask) for entry, ref, mask in heard.told]
+        outputs, last, deadline_s = self.outputs, heard.link.last_pdo, heard.pdo.deadline_s
+        if outputs is not None and (outputs.following.is_owed or told != heard.told_values):
+            is_late = last is not None and deadline_s is not None and now - last > deadline_s
+            outputs.on_told(told, now, after_pause=is_late)
+        heard.told_values = told
 
     def on_time(self, now: float) -> None:
         """Judge what is late by now."""

@@ -1,4 +1,5 @@
-"""What is done about a stop that a drive has followed or ignored: audit log, event, NMT."""
+"""What is done about a stop that a drive or the outputs of a node have followed or ignored: audit log,
+event, NMT."""
 
 from __future__ import annotations
 
@@ -6,12 +7,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from bridge.command.audit import AuditTrail
+from bridge.command.drive import Drive
 from bridge.command.event import Event, Kind
 from bridge.command.follow import LastStop, Verdict
+from bridge.command.outputs import Outputs
 from bridge.command.request import Action
 
 if TYPE_CHECKING:
-    from bridge.command.drive import Drive
     from bridge.command.plant import Enforce, Node
 
 _WORST: Final = 1000
@@ -21,28 +23,38 @@ _WORDS: Final = {Action.STOP_NODE: "NMT stop", Action.RESET: "NMT reset node"}
 
 def conclude(
     node: Node,
-    drive: Drive,
+    one: Drive | Outputs,
     verdict: Verdict,
     now: float,
     tell: Callable[[Event], None],
     audit: AuditTrail,
     enforce: Enforce,
 ) -> None:
-    """Report how the drive's last stop ended, and stop the node of a drive that ignores it."""
+    """Report how its last stop ended, and stop the node if it ignores it."""
     took_s = verdict.at - verdict.since
     if verdict.outcome is not LastStop.IGNORED:
-        audit.stop_ended(drive.name, verdict.outcome.label, f"after {took_s:.3f} s", now)
+        audit.stop_ended(one.name, verdict.outcome.label, f"after {took_s:.3f} s", now)
         if verdict.before is LastStop.IGNORED:
-            message = f"follows its stop after all: {_heard(drive)}"
-            tell(Event(now, Kind.WATCHDOG, drive.name, 300, message))
+            says = _heard(one) if isinstance(one, Drive) else "its outputs are as they are sent"
+            message = f"follows its stop after all: {says}"
+            tell(Event(now, Kind.WATCHDOG, one.name, 300, message))
         return
-    action = _reaction(drive, verdict)
-    if verdict.is_cut_off:
-        message = _cut_off(node, drive, took_s)
-        audit.stop_ended(drive.name, verdict.outcome.label, message, now)
-        tell(Event(now, Kind.WATCHDOG, drive.name, _WORST, message))
+    action = _reaction(one, verdict)
+    if verdict.is_cut_off and isinstance(one, Drive):
+        message = _cut_off(node, one, took_s)
+        audit.stop_ended(one.name, verdict.outcome.label, message, now)
+        tell(Event(now, Kind.WATCHDOG, one.name, _WORST, message))
         # What can be done has been done: its node has been told to stop, and takes no more words.
         return
+    of_one = _of_drive(one, verdict, took_s) if isinstance(one, Drive) else _of_outputs(one, verdict, took_s)
+    message = f"{of_one}; {_done(action, node, one)}"
+    audit.stop_ended(one.name, verdict.outcome.label, message, now)
+    tell(Event(now, Kind.WATCHDOG, one.name, _WORST, message))
+    if action is not None:
+        enforce(node.name, action, f"the bridge: {one.name} ignores its stop", now)
+
+
+def _of_drive(drive: Drive, verdict: Verdict, took_s: float) -> str:
     summed = verdict.summed
     if summed is not None and summed.stops > 1:
         stops = f"{summed.stops} stops of together {summed.time_s:.2f} s"
@@ -51,15 +63,18 @@ def conclude(
         what = f"is enabled although nothing that enables was sent: {_sent(drive)} for {took_s:.2f} s"
     else:
         what = f"ignores its stop: {_sent(drive)} since {took_s:.2f} s"
-    message = f"{what}, {_heard(drive)}; {_done(action, node, drive)}"
-    audit.stop_ended(drive.name, verdict.outcome.label, message, now)
-    tell(Event(now, Kind.WATCHDOG, drive.name, _WORST, message))
-    if action is not None:
-        enforce(node.name, action, f"the bridge: {drive.name} ignores its stop", now)
+    return f"{what}, {_heard(drive)}"
 
 
-def _reaction(drive: Drive, verdict: Verdict) -> Action | None:
-    match drive.table.reacts_to_ignored_stop:
+def _of_outputs(outputs: Outputs, verdict: Verdict, took_s: float) -> str:
+    why = outputs.following.why
+    if verdict.before is LastStop.FOLLOWED:
+        return f"has other outputs than it is sent: safe values are sent for {took_s:.2f} s, {why}"
+    return f"ignores its stop: safe values are sent since {took_s:.2f} s, {why}"
+
+
+def _reaction(one: Drive | Outputs, verdict: Verdict) -> Action | None:
+    match one.table.reacts_to_ignored_stop:
         case "report":
             return None
         case "reset_node" if not verdict.again:
@@ -91,10 +106,10 @@ def _heard(drive: Drive) -> str:
     return f"the drive says {channel.drive_status_word:04X}h, {channel.state.label.replace('_', ' ')}"
 
 
-def _done(action: Action | None, node: Node, drive: Drive) -> str:
+def _done(action: Action | None, node: Node, one: Drive | Outputs) -> str:
     if action is None:
         return "reported only (on_ignored_stop)"
-    others = ", ".join(other.slot.name for other in node.drives if other is not drive)
+    others = ", ".join(other.slot.name for other in node.drives if other is not one)
     also = f", which stops {others}, too" if others else ""
     back = "" if action is Action.RESET else "; it stays stopped until an operator starts or resets it"
     return f"{_WORDS[action]} of {node.name}{also}{back}"

@@ -43,6 +43,8 @@ class OutputWords:
             word += span
         self.count = word
         self.held: tuple[int, ...] = self.safe([0] * word)
+        self.has_let_go = False
+        """Somebody has stopped them since they got values: what holds has a value, too."""
 
     @property
     def all_hold(self) -> bool:
@@ -70,8 +72,21 @@ class OutputWords:
                 self.put(words, place, place.safe)
         return tuple(words)
 
+    def take(self, words: tuple[int, ...]) -> None:
+        """An owner's values are sent: what holds its last value holds one of these."""
+        self.held = words
+        self.has_let_go = False
+
+    def hold(self, raw: Mapping[str, int]) -> None:
+        """What the node holds in what is to hold it, as integers without sign, by the output's name."""
+        words = list(self.held)
+        for name, number in raw.items():
+            self.put(words, self.places[name], number)
+        self.take(tuple(words))
+
     def let_go(self) -> None:
         """Nothing is held any more: what holds its last value gets 0, or what is nearest to it."""
+        self.has_let_go = True
         words = list(self.held)
         for place in self.places.values():
             if place.safe is None:

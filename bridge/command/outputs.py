@@ -9,7 +9,7 @@ owner has acknowledged or has sent the safe values once; after a stop by a comma
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 from bridge.command.channel import Channel
 from bridge.command.commanded import Commanded
@@ -19,6 +19,7 @@ from bridge.command.follow import Verdict
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import Output as Sent
 from bridge.command.link import Link, NodeState
+from bridge.command.output_following import Answer, OutputFollowing, Question, StoppedOutput
 from bridge.command.output_words import ACTIVE, OutputWords
 from bridge.command.request import Action, Code, Outcome, Reply, Request
 from bridge.command.worst_case import StopTime, Wire, output_stop_time
@@ -50,6 +51,17 @@ _SUPERVISION: Final = (
     "restart_interlock",
     "refused_writes",
 )
+_TAKEN_S: Final = 0.25
+"""A node may take this long from an RPDO to its objects, as a drive to its status word (``stopping``)."""
+_DEADLINES: Final = 3
+
+
+class Telling(NamedTuple):
+    """The TPDO that brings an output; ``deadline_s`` is the longest regular pause between two of them, None
+    if it is sent on change only."""
+
+    tpdo: str
+    deadline_s: float | None
 
 
 class OutputChannel(Channel):
@@ -145,6 +157,9 @@ class Outputs(Commanded):
             tripped=tripped,
             due=due,
         )
+        self.following = OutputFollowing()
+        self._telling: dict[ObjectRef, Telling] = {}
+        """Outputs that a TPDO of the node carries, too."""
         self.unserved: dict[ObjectRef, str] = {}
         """Outputs that no RPDO carries, with the reason."""
         self.bridge_stop: tuple[int, str] = (0, "has not been read yet")
@@ -161,6 +176,9 @@ class Outputs(Commanded):
         self._left, self._telegrams, self._stop_ms, self._bridge_ms = (
             index[f"{node.name}/supervision/{leaf}"]
             for leaf in ("watchdog_left_ms", "telegrams", "worst_case_stop_ms", "worst_case_bridge_ms")
+        )
+        self._follows, self._last_stop = (
+            index[f"{node.name}/supervision/{leaf}"] for leaf in ("follows", "last_stop")
         )
 
     @property
@@ -196,11 +214,16 @@ class Outputs(Commanded):
         self.rpdo_type = rpdo_type
         self.unserved = dict(unserved)
         self.bridge_stop = bridge_stop
-        words = list(self.words.held)
-        for name, raw in held.items():
-            self.words.put(words, self.words.places[name], raw)
-        self.words.held = tuple(words)
+        self.words.hold(held)
         self.refresh(now)
+
+    def on_telling(self, telling: Mapping[ObjectRef, Telling]) -> None:
+        """What the boot-up has found: the TPDO that brings each of these outputs."""
+        self._telling = {
+            place.output.object: telling[place.output.object]
+            for place in self.words.places.values()
+            if place.output.object in telling
+        }
 
     def on_own_supervision_changed(self, why: str, now: float) -> None:
         """An object that decides what the node does by itself was written: nothing is known of it."""
@@ -213,15 +236,61 @@ class Outputs(Commanded):
         self.wire = wire
         self.refresh(now)
 
+    # its stops
+
+    def on_handed_over(self, now: float) -> None:
+        """What the channel puts out has been handed to the bus."""
+        way_s = self.rpdo_period_ms / 1000
+        stopped = self._stopped()
+        self.following.on_handed_over(now, stopped, way_s=way_s, bound_s=self._bound_s(stopped, way_s))
+        self._judged(now)
+
+    def _stopped(self) -> list[StoppedOutput]:
+        """What has a value by the stop in force, as far as an RPDO carries it. What holds its last value has
+        none, unless somebody has stopped it by a command."""
+        words = self.words.safe(self.words.held)
+        stopped: list[StoppedOutput] = []
+        for name, place in self.words.places.items():
+            ref = place.output.object
+            if ref not in self.unserved and (place.safe is not None or self.words.has_let_go):
+                tpdo, deadline_s = self._telling.get(ref, ("", None))
+                told_by = "" if deadline_s is None else tpdo
+                size, raw = place.output.size, self.words.raw(words, place)
+                stopped.append(StoppedOutput(name, ref, size, raw, told_by))
+        return stopped
+
+    def _bound_s(self, stopped: Sequence[StoppedOutput], way_s: float) -> float:
+        if self.table.ignored_stop_ms is not None:
+            return self.table.ignored_stop_ms / 1000
+        deadlines = [self._telling[one.object].deadline_s or 0.0 for one in stopped if one.told_by]
+        return _DEADLINES * max(deadlines, default=0.0) + way_s + _TAKEN_S
+
+    def on_answer(self, question: Question, answer: Answer, now: float) -> None:
+        """What came of a question of ``following``."""
+        self.following.on_answer(question, answer, now)
+        self._judged(now)
+
+    def on_told(self, values: Sequence[tuple[ObjectRef, int]], now: float, *, after_pause: bool) -> None:
+        """A TPDO holds these outputs, as integers without sign. ``after_pause``: later than it may."""
+        if after_pause:
+            self.following.on_pause(now)
+        self.following.on_told(values, now)
+        self._judged(now)
+
+    def _judged(self, now: float) -> None:
+        self._refresh_follows(now)
+        self.channel.due(NOW)
+
     # time
 
     def on_time(self, now: float) -> Sequence[Verdict]:
-        """Let everything happen that is due by ``now``. Nothing tells whether outputs have followed."""
+        """Let everything happen that is due by ``now``; how stops have ended."""
         self.channel.on_time(now)
-        return ()
+        return self.following.take_verdicts()
 
     def next_deadline(self, now: float) -> float | None:
-        return self.channel.next_deadline(now)
+        at, of_stop = self.channel.next_deadline(now), self.following.next_deadline()
+        return at if of_stop is None else now
 
     # into the image
 
@@ -229,9 +298,13 @@ class Outputs(Commanded):
         """Bring every point up to date; called when something has changed."""
         channel = self.channel
         channel.due(NOW)
-        if self.is_active:
-            self.words.held = channel.output.words[1:]
+        is_active = self.is_active
+        if is_active:
+            self.words.take(channel.output.words[1:])
         sent = channel.on_wire(channel.output)
+        is_there = channel.link.node is NodeState.OPERATIONAL
+        self.following.on_settled(None if is_active else sent, is_there=is_there)
+        self._refresh_follows(now)
         quality = channel.link.quality(now)
         for place, index in self._points:
             why = self.unserved.get(place.output.object, "")
@@ -256,6 +329,13 @@ class Outputs(Commanded):
         ms, why = self.bridge_stop
         self._image.set(self._bridge_ms, ms, now, Quality.GOOD if ms else Quality.CONFIG_ERROR, why)
         self.look(now)
+
+    def _refresh_follows(self, now: float) -> None:
+        """Which stop that is about we know ourselves, and why it is not followed."""
+        following, link = self.following, self.channel.link
+        quality = link.quality(now)
+        self._image.set(self._follows, following.follows, now, quality, link.reason(quality))
+        self._image.set(self._last_stop, int(following.last_stop), now, Quality.GOOD, following.why)
 
     def look(self, now: float) -> None:
         """Bring to this moment what changes by itself."""

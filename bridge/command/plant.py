@@ -6,7 +6,7 @@ Northbounds read the image and submit requests; the master feeds it. Neither kno
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
@@ -141,8 +141,8 @@ class Plant:
         """How often parameters were written; whoever keeps it across restarts fills it first."""
         self._stop_due: float | None = None
         self._changed: dict[str, set[str]] = {bus.name: set() for bus in site.bus}
-        self.unsent_stops: set[Drive] = set()
-        """Drives with a stop that has not been handed to the bus yet."""
+        self.unsent_stops: set[Drive | Outputs] = set()
+        """Drives and outputs with a stop that has not been handed to the bus yet."""
         self._deadlines = Deadlines[Drive | Outputs]()
         self._missed_limit = RateLimit(_MISSED_EVENTS, _MISSED_EVERY_S)
         self._listeners: list[Callable[[Event], None]] = []
@@ -208,6 +208,11 @@ class Plant:
     def _add(self, one: Drive | Outputs) -> None:
         self._deadlines.add(one)
         self._commanded[one.name] = one
+
+    @property
+    def commanded(self) -> Collection[Drive | Outputs]:
+        """All drives, and the outputs of devices."""
+        return self._commanded.values()
 
     def close(self, now: float) -> None:
         """Stop everything, and take no command any more but stops."""
@@ -343,13 +348,11 @@ class Plant:
 
     def on_time(self, now: float, enforce: Enforce = lambda node, action, why, now: None) -> None:
         """Let the timers of every channel run and bring the image up to date. ``enforce`` acts on the node of
-        a drive that ignores its stop."""
+        whoever ignores its stop."""
         for one in self._deadlines.take_due(now):
-            verdicts = one.on_time(now)
-            if isinstance(one, Drive):
-                for verdict in verdicts:
-                    node = self.nodes[one.node_name]
-                    conclude(node, one, verdict, now, self.report, self.audit, enforce)
+            for verdict in one.on_time(now):
+                node = self.nodes[one.node_name]
+                conclude(node, one, verdict, now, self.report, self.audit, enforce)
 
     def refresh(self, now: float) -> None:
         """The slow part: ages, counters and the faults of the nodes; a few times a second."""
@@ -385,6 +388,8 @@ class Plant:
         """Something about the outputs of a node has changed."""
         self._changed[node.bus.name].add(node.name)
         outputs.refresh(now)
+        if outputs.following.awaits_sending:
+            self.unsent_stops.add(outputs)
         self._show_node(node, [outputs], outputs.channel.link.node, now)
 
     def _show_node(
@@ -414,10 +419,10 @@ class Plant:
             self._changed[bus] = set()
         return changed
 
-    def on_handed_over(self, drive: Drive, now: float) -> None:
-        """What this drive is sent has been handed to the bus."""
-        self.unsent_stops.discard(drive)
-        drive.on_handed_over(now)
+    def on_handed_over(self, one: Drive | Outputs, now: float) -> None:
+        """What this drive is sent, or these outputs, has been handed to the bus."""
+        self.unsent_stops.discard(one)
+        one.on_handed_over(now)
 
     def on_node(self, node: Node, state: NodeState, now: float, *, tell: bool = True) -> None:
         """The master says that a node is in another state; ``tell`` makes that an event."""

@@ -138,13 +138,16 @@ _OF_OUTPUTS: Final = (
     "restart_interlock",
     "worst_case_bridge_ms",
     "telegrams",
+    "last_stop",
 )
 
 
 def _output_supervision(name: str) -> list[Point]:
     """What outputs have of a drive's supervision, by the same names."""
     points = {point.name.rpartition("/")[2]: point for point in _supervision_points(name, False)}
-    return [points[leaf] for leaf in _OF_OUTPUTS]
+    follows = "false while an output has not what its last stop gives it, after the bound"
+    shared = [points[leaf] for leaf in _OF_OUTPUTS]
+    return [*shared, _point(f"{name}/supervision", "follows", _FLAG, follows)]
 
 
 def _status_points(name: str, family: Family) -> list[Point]:

@@ -92,6 +92,8 @@ def of_bus(look: Look, bus: str, *, is_down: bool) -> Iterator[Trouble]:
 
 
 def of_node(look: Look, node: str) -> Iterator[Trouble]:
+    if look(f"{node}/supervision/follows") is False:
+        yield Trouble(Rank.DANGER, "outputs_ignore_stop", node)
     state = look.label(f"{node}/node/state")
     status = look(f"{node}/node/boot_status") or ""
     if state == "config_error":

@@ -108,11 +108,25 @@ class AcceptsTable(Table):
     runs_on: Reason | None = Field(None, description="why the drive may run on when the bridge falls silent")
 
 
-class DriveTable(Table):
+class StoppedTable(Table):
+    """What is done about something on a bus that does not follow its stop."""
+
+    control: Control = Field("none", description="modbus, opcua, zenoh, lease or none")
+    on_ignored_stop: OnIgnoredStop = Field("stop_node", description="stop_node, reset_node or report")
+    ignored_stop_ms: int | None = Field(None, ge=50, le=600_000, description="50…600000 ms")
+
+    @property
+    def reacts_to_ignored_stop(self) -> OnIgnoredStop:
+        """What is not commanded here may well be run by somebody else: its node is stopped only if the site
+        file says so."""
+        is_given = "on_ignored_stop" in self.model_fields_set
+        return self.on_ignored_stop if is_given or self.control != "none" else "report"
+
+
+class DriveTable(StoppedTable):
     slot: str = Field(description="the drive as the mapping calls it, such as fu1")
     name: Name | None = None
     unit_id: int | None = Field(None, ge=1, le=247, description="a Modbus unit id, 1…247")
-    control: Control = Field("none", description="modbus, opcua, zenoh, lease or none")
     fieldbus_timeout_ms: int | None = Field(
         None, ge=0, le=LONGEST_TIMEOUT_MS, description="0 (off) or 1…32767 ms, like P151"
     )
@@ -131,19 +145,10 @@ class DriveTable(Table):
         default_factory=dict[str, float], description="scaling, where it is not read from the drive"
     )
     tpdo_deadline_ms: int | None = Field(None, ge=0, le=600_000, description="0 (never late) or a time in ms")
-    on_ignored_stop: OnIgnoredStop = Field("stop_node", description="stop_node, reset_node or report")
-    ignored_stop_ms: int | None = Field(None, ge=50, le=600_000, description="50…600000 ms")
     rtr_poll_ms: int = Field(100, ge=5, le=60_000, description="5…60000 ms")
     accepts: AcceptsTable = Field(default_factory=lambda: AcceptsTable.model_validate({}))
     rpdo: PdoTables = Field(default_factory=list[PdoTable])
     tpdo: PdoTables = Field(default_factory=list[PdoTable])
-
-    @property
-    def reacts_to_ignored_stop(self) -> OnIgnoredStop:
-        """A drive that is not commanded here may well be run by somebody else: its node is stopped only if
-        the site file says so."""
-        is_given = "on_ignored_stop" in self.model_fields_set
-        return self.on_ignored_stop if is_given or self.control != "none" else "report"
 
     @property
     def falls_silent(self) -> bool:
@@ -163,10 +168,9 @@ class DriveTable(Table):
 SafeValue = bool | int | float | Literal["hold"]
 
 
-class OutputsTable(Table):
+class OutputsTable(StoppedTable):
     """Who commands the outputs of a node that is no drive, and what they get when nobody does."""
 
-    control: Control = Field("none", description="modbus, opcua, zenoh, lease or none")
     fieldbus_timeout_ms: int | None = Field(
         None, ge=0, le=LONGEST_TIMEOUT_MS, description="0 (off) or 1…32767 ms, like P151"
     )

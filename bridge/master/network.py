@@ -331,13 +331,14 @@ class Network:
                     self._routes[tpdo.cob_id] = judged(self._routes[tpdo.cob_id])
 
     def on_handed_over(self, now: float) -> None:
-        """What is to be repeated is on the bus: the bounds of stops begin (``command/follow.py``)."""
+        """What is to be repeated is on the bus: the bounds of stops begin, and outputs are to be read back."""
         unsent = self._plant.unsent_stops
         for node in self.nodes:
-            for drive in node.node.drives:
-                is_sent = node.sends_process_data and drive.name in node.wire.drives
-                if drive in unsent and (is_sent or not drive.following.awaits_sending):
-                    self._plant.on_handed_over(drive, now)
+            for one in node.node.commanded:
+                is_sent = node.sends_process_data and node.wire.carries(one)
+                if one in unsent and (is_sent or not one.following.awaits_sending):
+                    self._plant.on_handed_over(one, now)
+                    self._schedule.plan(node)
 
     def _give_way(self, now: float, why: str) -> None:
         """Another bridge is in charge: nothing more is sent than what is owed."""

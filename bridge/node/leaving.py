@@ -51,9 +51,9 @@ class Leaving:
         return max((*known, *(one.takeover_s for one in self._node.commanded)), default=0.0)
 
     def has_told(self, now: float) -> bool:
-        """Every drive that gets process data has had stopped words for long enough to take them over."""
-        told = [drive for drive in self._node.drives if drive.name in self._wire.drives]
-        return all(drive.following.told_for_s(now) >= self.takeover_s for drive in told)
+        """Whatever gets process data has had stopped words for long enough to take them over."""
+        told = [one for one in self._node.commanded if self._wire.carries(one)]
+        return all(one.following.told_for_s(now) >= self.takeover_s for one in told)
 
     def send(self, command: NmtCommand, now: float, *, at_once: bool = False) -> None:
         """A command after which the node takes no words: when it has taken over the stopped ones.

@@ -276,7 +276,7 @@ class NodeCore:
         self.set_state(NodeState.OPERATIONAL, now)
         self.wire.start_polling(now)
         for one in self.node.commanded:
-            if one.name not in self.wire.drives and not self.wire.outputs:
+            if not self.wire.carries(one):
                 one.channel.on_node(NodeState.CONFIG_ERROR, now)
                 one.refresh(now)
         self._view.succeeded(text, now)
@@ -302,7 +302,7 @@ class NodeCore:
             self.leaving.send(NmtCommand.STOP, now)
 
     def enforce(self, action: Action, why: str, now: float) -> None:
-        """Because a drive ignores its stop, whose words have been on the bus for long."""
+        """Because somebody ignores a stop whose words have been on the bus for long."""
         self.carry_out_command(action, why, now, at_once=self.leaving.has_told(now))
 
     # states

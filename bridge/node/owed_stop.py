@@ -14,9 +14,8 @@ from bridge.command.plant import Node
 
 
 class OwedStop:
-    """A debt begins with the first word that enables a drive or an output. It ends when the drive has said
-    that it follows its stop, when the node has started anew, or when stopped words and an NMT stop have gone
-    out. Nothing comes back of an output: for those it takes one of the last two."""
+    """A debt begins with the first word that enables a drive or an output. It ends when that is known to
+    follow its stop, when the node has started anew, or when stopped words and an NMT stop have gone out."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -46,4 +45,4 @@ def _enables(one: Drive | Outputs) -> bool:
 
 
 def _has_followed(one: Drive | Outputs) -> bool:
-    return isinstance(one, Drive) and one.following.last_stop is LastStop.FOLLOWED
+    return one.following.last_stop is LastStop.FOLLOWED

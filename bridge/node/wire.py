@@ -11,6 +11,7 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand
 from bridge.canopen.sdo import SdoChannel
 from bridge.command import Drive, Event, Kind, Plant
+from bridge.command.outputs import Outputs
 from bridge.command.plant import Node
 from bridge.node import boot
 from bridge.node.emergencies import Emergencies
@@ -24,6 +25,7 @@ from bridge.node.process.process_data import DrivePdos, connect
 from bridge.node.process.stop_words import StopWords
 from bridge.node.process.tpdo import node_tpdos
 from bridge.node.put_off import PutOff
+from bridge.node.read_back import ReadBack
 from bridge.node.sdo_channels import SdoChannels
 
 Handler = Callable[[Frame], None]
@@ -56,6 +58,8 @@ class NodeWire:
         self.rejected = 0
         self.faults = FaultReading(node, self.sdo)
         self.meanings = MeaningWatch(node, self.sdo)
+        outputs = node.device.outputs if node.device else None
+        self._read_back = ReadBack(outputs, self.sdo) if outputs else None
         self._emergencies = Emergencies(node, plant, self.reject, self.faults.on_emcy)
         self.error_control = ErrorControl(node.table, listener.on_duplicate)
         self.polling = Polling(node.family.poll, self.sdo.for_polls, self._show_poll)
@@ -79,6 +83,10 @@ class NodeWire:
         if self._emcy_id is not None:
             routes[self._emcy_id] = self._on_emcy
         return routes
+
+    def carries(self, one: Drive | Outputs) -> bool:
+        """The boot-up has found RPDOs by which it is commanded."""
+        return self.outputs is not None or one.name in self.drives
 
     @property
     def pdos(self) -> Sequence[DrivePdos | OutputPdos]:
@@ -136,6 +144,8 @@ class NodeWire:
     def _on_sdo(self, channel: SdoChannel, frame: Frame) -> None:
         unmatched, late = channel.unmatched, channel.late
         self.meanings.now = frame.time
+        if self._read_back:
+            self._read_back.now = frame.time
         channel.on_frame(frame)
         if channel.late == late:
             self.error_control.on_reply(frame, matched=channel.unmatched == unmatched)
@@ -164,6 +174,8 @@ class NodeWire:
         self.meanings.on_time(now)
         if self._node.device:
             self._node.device.on_time(now)
+        if self._read_back:
+            self._read_back.on_time(now)
         self.sdo.on_time(now)
         self.send_put_off(now)
 
@@ -183,6 +195,7 @@ class NodeWire:
             self.meanings.next_deadline(),
             self.put_off.next_deadline(),
             self._node.device.next_deadline() if self._node.device else None,
+            self._read_back.next_deadline() if self._read_back else None,
         )
         return min((time for time in times if time is not None), default=None)
 

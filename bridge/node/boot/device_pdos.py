@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Generator, Mapping
+from types import MappingProxyType
 from typing import Final
 
 from bridge.canopen import cobid
@@ -19,6 +20,8 @@ _MOST: Final = 512
 _ABSENT_IN_A_ROW: Final = 4
 """PDOs are numbered from 1; the four of the predefined connection set may be there in part."""
 
+NONE: Final[Mapping[ObjectRef, Signal]] = MappingProxyType({})
+
 Plan = Generator[Action, bytes | None, SignalPlan]
 
 
@@ -26,12 +29,19 @@ def plan_device(node: Node, result: BootResult) -> Do:
     """Every PDO that is switched on and carries one of the family's inputs or outputs."""
     family = node.family
     yield Step("reading the process data mapping", "J")
-    result.inputs = yield from _plan("TPDO", {one.object: one for one in family.input}, result)
-    if family.output:
-        result.outputs = yield from _plan("RPDO", {one.object: one for one in family.output}, result)
+    inputs = {one.object: one for one in family.input}
+    outputs = {one.object: one for one in family.output}
+    # A TPDO that carries an output tells whether a stop of it is followed.
+    result.inputs = yield from _plan("TPDO", inputs, result, also=outputs)
+    if outputs:
+        result.outputs = yield from _plan("RPDO", outputs, result)
 
 
-def _plan(kind: str, wanted: Mapping[ObjectRef, Signal], result: BootResult) -> Plan:
+def _plan(
+    kind: str, needed: Mapping[ObjectRef, Signal], result: BootResult, also: Mapping[ObjectRef, Signal] = NONE
+) -> Plan:
+    """The PDOs that carry what is ``needed``, which is noted where none does, or something of ``also``."""
+    wanted = {**also, **needed}
     signed = {(ref.index, ref.sub) for ref, signal in wanted.items() if signal.is_signed}
     plan = SignalPlan()
     absent = 0
@@ -57,7 +67,8 @@ def _plan(kind: str, wanted: Mapping[ObjectRef, Signal], result: BootResult) -> 
         if not objects:
             continue
         if cob_id & cobid.PDO_DISABLED:
-            plan.unserved |= dict.fromkeys(objects, f"{name} is switched off in the node")
+            missed = (ref for ref in objects if ref in needed)
+            plan.unserved |= dict.fromkeys(missed, f"{name} is switched off in the node")
             continue
         if cob_id & cobid.PDO_EXTENDED or not cobid.is_for_pdos(cob_id & cobid.COB_ID_MASK):
             result.notes.append(f"{parameter:04X}h:01 is {cob_id:08X}h: no identifier for a PDO")
@@ -73,7 +84,7 @@ def _plan(kind: str, wanted: Mapping[ObjectRef, Signal], result: BootResult) -> 
         plan.pdos.append(
             PdoPlan(cob_id & cobid.COB_ID_MASK, transmission, event_ms, codec, places, name=name)
         )
-    _note_unserved(kind, wanted, plan, result)
+    _note_unserved(kind, needed, plan, result)
     return plan
 
 

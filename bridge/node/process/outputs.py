@@ -56,8 +56,8 @@ class OutputRpdo:
 
 
 class OutputPdos:
-    """All RPDOs of one device, to be used as those of a drive are. There are no TPDOs to tell whether they
-    are followed."""
+    """All RPDOs of one device, to be used as those of a drive are. Whether they are followed is read back
+    (``read_back.py``), or told by TPDOs that are its inputs'."""
 
     tpdos: tuple[Tpdo, ...] = ()
     is_silent = False

@@ -7,7 +7,7 @@ from typing import cast
 import pytest
 
 from bridge.canopen.nmt import NmtCommand, NmtState
-from bridge.command import Action
+from bridge.command import Action, Drive
 from bridge.command.follow import LastStop
 from bridge.node.boot import BootMemory
 from bridge.node.leaving import Leaving
@@ -28,6 +28,9 @@ class Wire:
         self.put_off = PutOff()
         self.drives = {drive.name: object() for drive in line.plant.nodes["conveyor"].drives}
         self.sent: list[NmtCommand | str] = []
+
+    def carries(self, one: Drive) -> bool:
+        return one.name in self.drives
 
     def send_nmt(self, command: NmtCommand) -> None:
         self.sent.append(command)

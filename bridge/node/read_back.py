@@ -1,0 +1,57 @@
+"""Reads the outputs of a node that is no drive: whether they have what the last stop gives them.
+
+``command/output_following.py`` says when, and what it means. One is asked for after the other, so that other
+transfers get their turn.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Final
+
+from bridge.canopen import abort
+from bridge.canopen.sdo import Result, SdoError
+from bridge.command.output_following import Answer, Question, StoppedOutput
+from bridge.command.outputs import Outputs
+from bridge.node.sdo_channels import FIRST, SdoChannels
+
+_EXPEDITED: Final = 4
+"""An expedited answer without a size always has so many bytes (CiA 301 §7.2.4.3.3)."""
+
+
+class ReadBack:
+    """``now`` is the time of the last frame or timer."""
+
+    def __init__(self, outputs: Outputs, sdo: SdoChannels) -> None:
+        self._outputs = outputs
+        self._sdo = sdo[FIRST]
+        self.now = 0.0
+
+    def next_deadline(self) -> float | None:
+        return self._outputs.following.next_reading()
+
+    def on_time(self, now: float) -> None:
+        self.now = now
+        question = self._outputs.following.question(now)
+        if question is not None:
+            ref = question.output.object
+            self._sdo.read(ref.index, ref.sub, now, partial(self._done, question))
+
+    def _done(self, question: Question, result: Result) -> None:
+        self._outputs.on_answer(question, _answer(question.output, result), self.now)
+
+
+def _answer(output: StoppedOutput, result: Result) -> Answer:
+    if isinstance(result, SdoError):
+        if result.by_server:
+            why = f"{abort.text(result.code)} ({result.code:08X}h)"
+            return Answer(None, f"the node does not let {output.place} be read: {why}")
+        return Answer(None, f"{output.place} cannot be read: no valid answer", was_silent=True)
+    size = -(-output.size // 8)
+    data = result[:size] if len(result) == _EXPEDITED and not any(result[size:]) else result
+    raw = int.from_bytes(data, "little")
+    if len(data) != size or (output.size > 1 and raw >> output.size):
+        return Answer(
+            None, f"{output.place} cannot be read: {len(result)} bytes where {output.size} bits belong"
+        )
+    return Answer(min(raw, 1) if output.size == 1 else raw)

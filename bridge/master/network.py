@@ -331,7 +331,7 @@ class Network:
                     self._routes[tpdo.cob_id] = judged(self._routes[tpdo.cob_id])
 
     def on_handed_over(self, now: float) -> None:
-        """What is to be repeated is on the bus: the bounds of stops begin, and outputs are to be read back."""
+        """What is to be repeated is on the bus: bounds of stops begin, and outputs are to be read back."""
         unsent = self._plant.unsent_stops
         for node in self.nodes:
             for one in node.node.commanded:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -17,8 +18,11 @@ from bridge.command.outputs import Outputs
 from bridge.condition.findings import Look, Rank, Trouble, of_node
 from bridge.image import Quality
 from bridge.master.ending import Ending, end, waits_for
+from bridge.project import load_project
+from bridge.sim.catalogue import simulate_description
+from tests.support import sites
 from tests.support.bench import Bench
-from tests.support.devices import IO_BLOCK, OUTPUTS, device_bench, io_block
+from tests.support.devices import DEVICES, IO_BLOCK, OUTPUTS, description_of, device_bench, io_block
 from tests.support.pdo_node import PdoNode
 
 NONE, FORWARDED, FOLLOWED, IGNORED = LastStop
@@ -276,6 +280,25 @@ def test_the_site_file_gives_the_bound(tmp_path: Path) -> None:
     assert last_stop(stop(bench, 0.85)) is FORWARDED
     bench.run(0.1)
     assert last_stop(bench) is IGNORED
+
+
+@pytest.mark.parametrize("more", ["", "sync_period_ms = 10"])
+def test_the_simulated_block_of_an_eds_follows(tmp_path: Path, more: str) -> None:
+    shutil.copy(DEVICES / "io16.eds", tmp_path)
+    keys = '[bus.node.outputs]\ncontrol = "modbus"\nfieldbus_timeout_ms = 200'
+    block = sites.node(name="io", node_id=21, mapping="eds:io16.eds", more=keys)
+    project = load_project(sites.write(tmp_path, sites.bus(block, more=more), sites.modbus()))
+    node = simulate_description(description_of("io16.eds"), 21)
+    families = project.families
+    bench = Bench(project.site, family=families["eds:io16.eds"], mapping="eds:io16.eds", node=node)
+    bench.run(5.0)
+    for value in (0, 3):
+        assert bench.ask(Action.WRITE, "io", values={"digital_outputs_1_to_8": value}).forwarded
+        bench.run(0.05)
+    assert bench.value("io/supervision/last_stop") == NONE
+    bench.run(0.5)
+    assert bench.value("io/supervision/last_stop") == FOLLOWED
+    assert [event.message for event in bench.events if event.severity == 1000] == []
 
 
 # by a TPDO

@@ -3,125 +3,42 @@
 from __future__ import annotations
 
 import shutil
-import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 import pytest
 
-from bridge.canopen.frame import Frame
-from bridge.command import Action, Identity, Source
+from bridge.command import Action
 from bridge.command.audit import AuditEntry
 from bridge.command.follow import LastStop
-from bridge.command.outputs import Outputs
 from bridge.condition.findings import Look, Rank, Trouble, of_node
 from bridge.image import Quality
-from bridge.master.ending import Ending, end, waits_for
 from bridge.project import load_project
 from bridge.sim.catalogue import simulate_description
 from tests.support import sites
 from tests.support.bench import Bench
-from tests.support.devices import DEVICES, IO_BLOCK, OUTPUTS, description_of, device_bench, io_block
-from tests.support.pdo_node import PdoNode
+from tests.support.devices import DEVICES, IO_BLOCK, description_of, device_bench
+from tests.support.output_block import (
+    OTHER,
+    Block,
+    asked,
+    block_bench,
+    block_of,
+    go,
+    last_stop,
+    nmt_stops,
+    stop,
+    told,
+    why,
+)
 
 NONE, FORWARDED, FOLLOWED, IGNORED = LastStop
-OTHER: Final = Identity(Source.MODBUS, "10.0.0.9")
-REQUEST, REPLY, NMT_STOP = 0x614, 0x594, Frame(0, b"\x02\x14")
-WRITE_ONLY: Final = 0x0601_0001
 STOPPED: Final = "; NMT stop of shaft; it stays stopped until an operator starts or resets it"
 
 
-class Block(PdoNode):
-    """``refuses_reading`` are indices that it aborts, ``mute`` those that it does not answer."""
-
-    def __init__(self) -> None:
-        super().__init__(20)
-        self.__dict__ |= vars(io_block())
-        self.refuses_reading: set[int] = set()
-        self.mute: set[int] = set()
-        self.stuck: dict[str, tuple[int, int]] = {}
-        """Objects that keep a number, by their names: size and number."""
-        self._react = lambda node: [self.put(name, *held) for name, held in self.stuck.items()] and None
-
-    def _on_sdo(self, data: bytes, now: float) -> None:
-        command, index, sub = struct.unpack_from("<BHB", data)
-        if command == 0x40 and index in self.mute:
-            return
-        if command == 0x40 and index in self.refuses_reading:
-            self._abort(index, sub, WRITE_ONLY)
-            return
-        super()._on_sdo(data, now)
-
-
-def a_bench(
-    folder: Path,
-    *,
-    outputs: str = "",
-    mapping: str = IO_BLOCK,
-    prepare: Callable[[Block], None] | None = None,
-) -> Bench:
-    block = Block()
-    if prepare:
-        prepare(block)
-    more = OUTPUTS.replace("[modbus]", f"{outputs}\n[modbus]")
-    bench = device_bench(folder, block, mapping, more)
-    bench.run(2.0)
-    return bench
-
-
-def block_of(bench: Bench) -> Block:
-    assert isinstance(bench.node, Block)
-    return bench.node
-
-
-def outputs_of(bench: Bench) -> Outputs:
-    outputs = bench.plant.devices["shaft"].outputs
-    assert outputs is not None
-    return outputs
-
-
-def go(bench: Bench) -> Bench:
-    """Every output is active, and the log begins."""
-    assert bench.ask(Action.WRITE, "shaft", values={"valves": 0}).ok
-    bench.run(0.05)
-    assert bench.ask(Action.WRITE, "shaft", values={"valves": 0x81, "speed": -2.5, "lamp": 3}).forwarded
-    bench.run(0.05)
-    bench.log.clear()
-    bench.events.clear()
-    return bench
-
-
-def stop(bench: Bench, for_s: float) -> Bench:
-    assert bench.ask(Action.STOP, "shaft", OTHER).forwarded
-    bench.run(for_s)
-    return bench
-
-
-def last_stop(bench: Bench) -> LastStop:
-    return LastStop(bench.number("shaft/supervision/last_stop"))
-
-
-def why(bench: Bench) -> str:
-    return bench.plant.image.read("shaft/supervision/last_stop").reason
-
-
-def told(bench: Bench) -> list[tuple[int, str]]:
-    return [(event.severity, event.message) for event in bench.events if event.severity in (300, 1000)]
-
-
-def asked(bench: Bench) -> list[str]:
-    """The objects that were read, in order."""
-    reads = [frame.data for frame in bench.sent(REQUEST) if frame.data[0] == 0x40]
-    return [f"{data[2]:02X}{data[1]:02X}:{data[3]:02X}" for data in reads]
-
-
-def nmt_stops(bench: Bench) -> int:
-    return sum(frame[:2] == NMT_STOP[:2] for frame in bench.sent(0))
-
-
 def test_outputs_that_have_got_their_safe_values_have_followed(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path))
+    bench = go(block_bench(tmp_path))
     assert last_stop(bench) is NONE
     entries: list[AuditEntry] = []
     bench.plant.audit.tell_to(entries.append)
@@ -136,7 +53,7 @@ def test_outputs_that_have_got_their_safe_values_have_followed(tmp_path: Path) -
 
 
 def test_a_deaf_output_is_an_event_and_its_node_gets_nmt_stop(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path))
+    bench = go(block_bench(tmp_path))
     block_of(bench).stuck["6200:01"] = 1, 0x81
     stop(bench, 0.2)
     assert (last_stop(bench), nmt_stops(bench)) == (FORWARDED, 0)
@@ -157,7 +74,7 @@ def test_a_deaf_output_is_an_event_and_its_node_gets_nmt_stop(tmp_path: Path) ->
 
 def test_an_rpdo_that_is_switched_off_is_found(tmp_path: Path) -> None:
     """Whether the cause is a deaf RPDO, another master or a broken node does not matter."""
-    bench = go(a_bench(tmp_path))
+    bench = go(block_bench(tmp_path))
     block_of(bench).put("1401:01", 4, 1 << 31 | 0x314)
     stop(bench, 0.5)
     assert told(bench)[-1][1].startswith("ignores its stop: safe values are sent since 0.26 s, 6411h:0")
@@ -165,14 +82,14 @@ def test_an_rpdo_that_is_switched_off_is_found(tmp_path: Path) -> None:
 
 def test_a_silent_owner_leaves_what_holds_out_of_the_comparison(tmp_path: Path) -> None:
     """``hold`` speaks of silence (shared design, watchdog): the lamp may have any value then."""
-    bench = go(a_bench(tmp_path))
+    bench = go(block_bench(tmp_path))
     block_of(bench).stuck["6411:02"] = 2, 99
     bench.run(0.5)
     assert (last_stop(bench), asked(bench)) == (FOLLOWED, ["6200:01", "6411:01"])
 
 
 def test_a_stop_by_somebody_gives_what_holds_a_value_too(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path))
+    bench = go(block_bench(tmp_path))
     block_of(bench).stuck["6411:02"] = 2, 99
     stop(bench, 0.5)
     assert "6411h:02 (lamp) holds 0063h instead of 0000h" in told(bench)[-1][1]
@@ -180,7 +97,7 @@ def test_a_stop_by_somebody_gives_what_holds_a_value_too(tmp_path: Path) -> None
 
 
 def test_a_stop_after_the_owner_fell_silent_is_judged_by_itself(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path))
+    bench = go(block_bench(tmp_path))
     block_of(bench).stuck["6411:02"] = 2, 3
     bench.run(0.5)
     assert last_stop(bench) is FOLLOWED
@@ -205,7 +122,7 @@ def test_a_stop_after_the_owner_fell_silent_is_judged_by_itself(tmp_path: Path) 
 def test_what_cannot_be_read_leaves_the_stop_forwarded_with_the_reason(
     tmp_path: Path, prepare: Callable[[Block], None], reason: str
 ) -> None:
-    bench = a_bench(tmp_path)
+    bench = block_bench(tmp_path)
     prepare(block_of(bench))
     stop(go(bench), 8.0)
     assert (last_stop(bench), why(bench)) == (FORWARDED, reason)
@@ -215,7 +132,7 @@ def test_what_cannot_be_read_leaves_the_stop_forwarded_with_the_reason(
 
 def test_four_bytes_without_a_size_are_the_value_and_zeros(tmp_path: Path) -> None:
     """An expedited upload without a size (CiA 301 §7.2.4.3.6)."""
-    bench = go(a_bench(tmp_path))
+    bench = go(block_bench(tmp_path))
     block_of(bench).stuck["6200:01"] = 4, 0
     assert last_stop(stop(bench, 0.1)) is FOLLOWED
     go(bench)
@@ -224,7 +141,7 @@ def test_four_bytes_without_a_size_are_the_value_and_zeros(tmp_path: Path) -> No
 
 
 def test_nothing_is_asked_while_no_stop_is_owed(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path))
+    bench = go(block_bench(tmp_path))
     for _ in range(40):
         bench.ask(Action.WRITE, "shaft", values={"valves": 0x81})
         bench.run(0.05)
@@ -237,14 +154,14 @@ def test_nothing_is_asked_while_no_stop_is_owed(tmp_path: Path) -> None:
 
 def test_outputs_that_are_active_when_the_bridge_starts_are_found(tmp_path: Path) -> None:
     """What is there may have been set by another master, and stays where the node does not take our frame."""
-    bench = a_bench(tmp_path, prepare=lambda block: block.stuck.update({"6200:01": (1, 0x40)}))
+    bench = block_bench(tmp_path, prepare=lambda block: block.stuck.update({"6200:01": (1, 0x40)}))
     assert last_stop(bench) is IGNORED
     assert "6200h:01 (valves) holds 40h instead of 00h" in told(bench)[-1][1]
     assert bench.value("shaft/node/state") == 4, "stopped"
 
 
 def test_with_report_nothing_is_done_and_it_may_follow_after_all(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path, outputs='on_ignored_stop = "report"'))
+    bench = go(block_bench(tmp_path, outputs='on_ignored_stop = "report"'))
     block = block_of(bench)
     block.stuck["6200:01"] = 1, 0x81
     stop(bench, 1.0)
@@ -257,7 +174,7 @@ def test_with_report_nothing_is_done_and_it_may_follow_after_all(tmp_path: Path)
 
 
 def test_with_reset_node_it_is_reset_once_and_stopped_if_it_does_not_help(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path, outputs='on_ignored_stop = "reset_node"'))
+    bench = go(block_bench(tmp_path, outputs='on_ignored_stop = "reset_node"'))
     block_of(bench).stuck["6200:01"] = 1, 0x81
     stop(bench, 0.5)
     assert told(bench)[-1][1].endswith("instead of 00h; NMT reset node of shaft")
@@ -275,7 +192,7 @@ def test_outputs_that_nobody_commands_are_only_reported(tmp_path: Path) -> None:
 
 
 def test_the_site_file_gives_the_bound(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path, outputs="ignored_stop_ms = 900"))
+    bench = go(block_bench(tmp_path, outputs="ignored_stop_ms = 900"))
     block_of(bench).stuck["6200:01"] = 1, 0x81
     assert last_stop(stop(bench, 0.85)) is FORWARDED
     bench.run(0.1)
@@ -309,14 +226,14 @@ def with_tpdo(event_ms: int) -> Callable[[Block], None]:
 
 
 def test_a_tpdo_that_brings_the_outputs_counts_and_they_are_not_asked_for(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path, prepare=with_tpdo(50)))
+    bench = go(block_bench(tmp_path, prepare=with_tpdo(50)))
     stop(bench, 0.2)
     assert (last_stop(bench), asked(bench)) == (FOLLOWED, ["6411:02"]), "no TPDO has the lamp"
 
 
 def test_a_deaf_output_is_found_by_its_tpdo(tmp_path: Path) -> None:
     """The bound is that of a drive: three deadlines of the TPDO (75 ms each), and 260 ms."""
-    bench = go(a_bench(tmp_path, prepare=with_tpdo(50)))
+    bench = go(block_bench(tmp_path, prepare=with_tpdo(50)))
     block_of(bench).stuck["6411:01"] = 2, -25 & 0xFFFF
     stop(bench, 0.4)
     assert last_stop(bench) is FORWARDED
@@ -326,7 +243,7 @@ def test_a_deaf_output_is_found_by_its_tpdo(tmp_path: Path) -> None:
 
 
 def test_outputs_that_change_by_themselves_are_found_by_their_tpdo(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path, prepare=with_tpdo(50)))
+    bench = go(block_bench(tmp_path, prepare=with_tpdo(50)))
     stop(bench, 2.0)
     assert last_stop(bench) is FOLLOWED
     block_of(bench).stuck["6200:01"] = 1, 2
@@ -337,7 +254,7 @@ def test_outputs_that_change_by_themselves_are_found_by_their_tpdo(tmp_path: Pat
 
 
 def test_a_tpdo_on_change_alone_may_say_nothing_and_so_they_are_asked_for(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path, prepare=with_tpdo(0)))
+    bench = go(block_bench(tmp_path, prepare=with_tpdo(0)))
     block_of(bench).stuck["6200:01"] = 1, 0x81
     stop(bench, 0.5)
     assert last_stop(bench) is IGNORED
@@ -345,7 +262,7 @@ def test_a_tpdo_on_change_alone_may_say_nothing_and_so_they_are_asked_for(tmp_pa
 
 
 def test_a_tpdo_that_brings_outputs_alone_needs_no_input(tmp_path: Path) -> None:
-    bench = a_bench(tmp_path, prepare=with_tpdo(50))
+    bench = block_bench(tmp_path, prepare=with_tpdo(50))
     assert bench.value("shaft/node/boot_status") == "ok; 1017h was 0, is 66 now"
     assert bench.plant.image.read("shaft/input/inputs").quality is Quality.GOOD
     block_of(bench).put("1801:01", 4, 1 << 31 | 0x294)
@@ -358,7 +275,7 @@ def test_a_tpdo_that_brings_outputs_alone_needs_no_input(tmp_path: Path) -> None
 
 
 def test_deaf_outputs_are_a_danger_of_their_node(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path, outputs='on_ignored_stop = "report"'))
+    bench = go(block_bench(tmp_path, outputs='on_ignored_stop = "report"'))
     assert not list(of_node(Look(bench.plant.image), "shaft"))
     block_of(bench).stuck["6200:01"] = 1, 0x81
     stop(bench, 0.5)
@@ -368,7 +285,7 @@ def test_deaf_outputs_are_a_danger_of_their_node(tmp_path: Path) -> None:
 
 
 def test_a_stop_that_has_been_seen_is_owed_no_more(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path))
+    bench = go(block_bench(tmp_path))
     (node,) = bench.network.nodes
     assert node.leaving.owed.is_open
     stop(bench, 0.2)
@@ -376,51 +293,8 @@ def test_a_stop_that_has_been_seen_is_owed_no_more(tmp_path: Path) -> None:
 
 
 def test_a_stop_that_cannot_be_read_stays_owed(tmp_path: Path) -> None:
-    bench = a_bench(tmp_path)
+    bench = block_bench(tmp_path)
     block_of(bench).refuses_reading.add(0x6200)
     stop(go(bench), 5.0)
     (node,) = bench.network.nodes
     assert node.leaving.owed.is_open
-
-
-def ended(bench: Bench, for_s: float) -> Ending:
-    bench.master.halt(bench.now)
-    bench.run(for_s)
-    return end(bench.plant, bench.now, bench.network.enforce)
-
-
-def test_the_end_waits_for_outputs_and_says_that_all_are_stopped(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path))
-    bench.master.halt(bench.now)
-    assert waits_for(bench.plant)
-    bench.run(0.1)
-    assert not waits_for(bench.plant)
-    ending = end(bench.plant, bench.now, bench.network.enforce)
-    assert (ending.is_good, ending.lines) == (True, ["all drives and outputs are stopped"])
-
-
-def test_the_end_names_outputs_that_do_not_follow(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path))
-    block_of(bench).stuck["6200:01"] = 1, 0x81
-    ending = ended(bench, 1.0)
-    assert (ending.is_good, ending.ignoring, ending.nodes_stopped) == (False, ("shaft",), ("shaft",))
-    assert ending.lines[-1] == "0 of 1 drives and outputs are stopped"
-
-
-def test_the_end_does_not_wait_for_what_cannot_be_read_and_names_it(tmp_path: Path) -> None:
-    bench = a_bench(tmp_path)
-    block_of(bench).refuses_reading.add(0x6200)
-    ending = ended(go(bench), 1.0)
-    assert not waits_for(bench.plant)
-    assert (ending.is_good, nmt_stops(bench)) == (True, 0)
-    reason = "the node does not let 6200h:01 be read: attempt to read a write-only object (06010001h)"
-    assert ending.lines == [
-        f"forwarded, and not known to be followed: shaft ({reason})",
-        "0 of 1 drives and outputs are stopped",
-    ]
-
-
-def test_the_end_names_outputs_that_are_not_heard(tmp_path: Path) -> None:
-    bench = go(a_bench(tmp_path))
-    bench.cut = True
-    assert ended(bench, 1.0).unheard == ("shaft",)

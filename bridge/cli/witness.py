@@ -24,9 +24,8 @@ from bridge.config import Site, load_site
 from bridge.errors import BridgeError, OperationFailed, Unavailable
 from bridge.witness.findings import Alarm, Finding, Kind, Sight, Stop
 from bridge.witness.numbers import Numbers
-from bridge.witness.plan import UnknownFamily, WatchedBus, plan
+from bridge.witness.plan import UNKNOWN_MS, UnknownFamily, WatchedBus, WatchedOutputs, plan
 from bridge.witness.shell import CannotListen, Witness
-from bridge.witness.watch import UNKNOWN_MS
 
 _log = logging.getLogger(__name__)
 
@@ -50,7 +49,8 @@ def witness(
         bool, typer.Option("--frames-only", help="do not ask the bridge for the numbers of telegrams")
     ] = False,
     own_timeout_ms: Annotated[
-        int | None, typer.Option(min=1, help="the drives' own time-out, where SITE does not set it")
+        int | None,
+        typer.Option(min=1, help="the drives' and nodes' own time-out, where SITE does not set it"),
     ] = None,
     record: Annotated[
         Path | None, typer.Option(help="append a JSON line for each stop and each alarm to this file")
@@ -61,7 +61,7 @@ def witness(
     seconds: Annotated[float | None, typer.Option(min=0.1, help="end after that time")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Watch the drives of SITE stop, from another interface or another box.
+    """Watch the drives and outputs of SITE stop, from another interface or another box.
 
     Sends nothing to the bus. Exit code 1 where there was an alarm.
     """
@@ -100,7 +100,7 @@ def _buses(site: Site, path: Path, channels: list[str], own_timeout_ms: int | No
                 f"--channel {bus.name}=INTERFACE"
             )
     try:
-        planned = plan(site, own_timeout_ms=own_timeout_ms)
+        planned = plan(site, path.parent, own_timeout_ms=own_timeout_ms)
     except UnknownFamily as error:
         raise BridgeError(f"{path}: the witness does not know the drives of the mapping {error}") from error
     return [replace(bus, channel=places.get(bus.name, bus.channel)) for bus in planned]
@@ -117,11 +117,12 @@ def _numbers(site: Site, given: str | None, buses: list[WatchedBus]) -> Numbers 
         raise typer.BadParameter(f"--modbus {listen!r}: give address:port")
     units = [drive.unit_id for bus in buses for drive in bus.drives]
     host = host.strip("[]")
-    return Numbers({"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host), int(port), units)
+    outputs = [one.unit_id for bus in buses for one in bus.judged_outputs]
+    return Numbers({"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host), int(port), units, outputs)
 
 
 def _promises(buses: list[WatchedBus], has_numbers: bool) -> list[str]:
-    """The bounds for each drive."""
+    """The bounds for each drive, and for the outputs of each node."""
     lines: list[str] = []
     for bus in buses:
         for drive in bus.drives:
@@ -133,7 +134,17 @@ def _promises(buses: list[WatchedBus], has_numbers: bool) -> list[str]:
                 f"{drive.name}: dead controller: {controller}, dead bridge: {silent}, "
                 f"stop followed within {drive.follow_ms} ms"
             )
+        lines += [_promise_of(outputs, has_numbers) for outputs in bus.outputs]
     return lines
+
+
+def _promise_of(outputs: WatchedOutputs, has_numbers: bool) -> str:
+    if outputs.why_unknown:
+        return f"{outputs.name}: its outputs are not judged: {outputs.why_unknown}"
+    controller = f"{outputs.stop_ms} ms" if has_numbers and outputs.stop_ms else "not judged"
+    own = "" if outputs.silent_ms else " (the node's own time-out is not known, give --own-timeout-ms)"
+    bridge = outputs.why_active or f"{outputs.silent_ms or UNKNOWN_MS} ms{own}"
+    return f"{outputs.name}: outputs: dead controller: {controller}, dead bridge: {bridge}"
 
 
 def _until(seconds: float | None) -> Callable[[float], bool]:

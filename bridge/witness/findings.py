@@ -29,15 +29,16 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """One stop of a drive. ``bus_ms``: from the owner's last telegram to the first RPDO that stops, None
-    where that is not what stopped it; ``drive_ms``: from what stopped it to the drive that says so."""
+    """One stop of a drive, or of a node's outputs that became safe. ``bus_ms``: from the owner's last
+    telegram to the first RPDO that stops, None where that is not what stopped it; ``drive_ms``: from what
+    stopped it to the drive that says so, None where nothing says so."""
 
     drive: str
     cause: Cause
     time: float
     bus_ms: int | None
     bus_bound_ms: int | None
-    drive_ms: int
+    drive_ms: int | None
     drive_bound_ms: int | None
 
     @property
@@ -48,7 +49,7 @@ class Stop:
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """A promise is broken, or somebody else is there. ``source`` is a drive or a bus."""
+    """A promise is broken, or somebody else is there. ``source`` is a drive, a node with outputs, a bus."""
 
     source: str
     kind: Kind

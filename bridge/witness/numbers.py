@@ -36,15 +36,17 @@ class Reading(NamedTuple):
 
 
 class Numbers:
-    """Asks for all units every 50 ms. Non-blocking: the shell waits for ``fileno``.
+    """Asks for all units every 50 ms; those of ``outputs`` have no register for the time-out. Non-blocking:
+    the shell waits for ``fileno``.
 
     ``take_lost`` is true after each time that the bridge was not there or has stopped answering, ``why``
     says what was wrong then; it is called again every two seconds.
     """
 
-    def __init__(self, host: str, port: int, units: Sequence[int]) -> None:
+    def __init__(self, host: str, port: int, units: Sequence[int], outputs: Sequence[int] = ()) -> None:
         self._address = (host, port)
-        self._units = tuple(units)
+        self._questions = [(unit, *question) for unit in units for question in _QUESTIONS]
+        self._questions += [(unit, _READ_INPUTS, NUMBER_REGISTER) for unit in outputs]
         self._socket: socket.socket | None = None
         self.why = "no answer yet"
         self._buffer = bytearray()
@@ -109,8 +111,7 @@ class Numbers:
         assert self._socket is not None
         request = b"".join(
             _REQUEST.pack(unit, 0, 6, unit, function, register, 1)
-            for unit in self._units
-            for function, register in _QUESTIONS
+            for unit, function, register in self._questions
         )
         try:
             self._socket.sendall(request)
@@ -121,7 +122,7 @@ class Numbers:
         except OSError as error:
             self._give_up(now, _text(error))
             return
-        self._asked = {(function, unit): now for unit in self._units for function, _ in _QUESTIONS}
+        self._asked = {(function, unit): now for unit, function, _ in self._questions}
         self._asked_at = now
 
     def receive(self, now: float) -> list[Reading]:

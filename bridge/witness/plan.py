@@ -1,16 +1,18 @@
-"""What the witness looks at: the drives of a site, their frames, and when they have to be stopped."""
+"""What the witness looks at: a site's drives and outputs, their frames, and when they have to be stopped."""
 
 from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
+from pathlib import Path
 from typing import Any, Final
 
 from bridge.config import IGNORE_ALL_S, BusTable, DriveTable, NodeTable, PdoTable, Site
+from bridge.witness.output_plan import OutputFrames, Values, output_frames
 
 REACTION_MS: Final = 20
 """How late the bridge may be itself (docs/explanation/dead-man-chain.md, "How long it takes")."""
@@ -27,6 +29,10 @@ _TPDO_MS: Final = 500
 """How often a drive says what it does, where the site file does not tell."""
 RAMP_MS: Final = 5000
 """How long a drive may take to stand, where the site file does not tell."""
+UNKNOWN_MS: Final = 3000
+"""From the last RPDO to a drive that has stopped, where its own time-out is not known."""
+_SWITCH_MS: Final = 500
+"""How long an output may take to switch."""
 _LOST_MS: Final = 1000
 """So much longer than its supervision a node may be silent: it may have been told to restart."""
 _FIRST_UNITS: Final = range(1, 248)
@@ -96,7 +102,44 @@ class WatchedDrive:
     def stop_ms(self, timeout_ms: int) -> int:
         """From the owner's last telegram to the last enabling RPDO, with this time-out in force; 0 where
         nothing is promised."""
-        return timeout_ms + self.beside_ms if timeout_ms and self.beside_ms is not None else 0
+        return promised_ms(timeout_ms, self.beside_ms)
+
+
+@dataclass(frozen=True, slots=True)
+class WatchedOutputs:
+    """The outputs of one node. Times are in ms, those of ``WatchedDrive``.
+
+    ``silent_ms``: from the last RPDO to a node that is no longer operational, 0 where that is not promised.
+    ``follow_ms``: from safe values in an RPDO to a TPDO that shows them. ``why_active``: why outputs stay as
+    they are when their node is stopped or hears nothing; nothing where they become safe. ``why_unknown``: why
+    they cannot be judged.
+    """
+
+    name: str
+    unit_id: int
+    node_id: int
+    rpdos: Mapping[int, Values] = field(default_factory=dict[int, Values])
+    tpdos: Mapping[int, Values] = field(default_factory=dict[int, Values])
+    timeout_ms: int = 0
+    beside_ms: int | None = None
+    rpdo_ms: float = 0.0
+    silent_ms: int = 0
+    follow_ms: int = 0
+    lost_ms: int = 0
+    why_active: str = ""
+    why_unknown: str = ""
+    written: frozenset[int] = frozenset()
+    """Objects that move them or make them safe."""
+
+    @property
+    def stop_ms(self) -> int:
+        """From the owner's last telegram to the last RPDO with active values; 0 where nothing is promised."""
+        return promised_ms(self.timeout_ms, self.beside_ms)
+
+
+def promised_ms(timeout_ms: int, beside_ms: int | None) -> int:
+    """From an owner's last telegram to the last RPDO that enables; 0 where nothing is promised."""
+    return timeout_ms + beside_ms if timeout_ms and beside_ms is not None else 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +152,12 @@ class WatchedBus:
     drives: tuple[WatchedDrive, ...]
     beats: dict[int, tuple[str, int]]
     nodes: dict[int, float] = field(default_factory=dict[int, float])
+    outputs: tuple[WatchedOutputs, ...] = ()
+
+    @property
+    def judged_outputs(self) -> list[WatchedOutputs]:
+        """Those of which enough is known."""
+        return [one for one in self.outputs if not one.why_unknown]
 
 
 class UnknownFamily(Exception):
@@ -129,16 +178,26 @@ def _family(mapping: str) -> dict[str, Any]:
     raise UnknownFamily(mapping)
 
 
-def plan(site: Site, *, own_timeout_ms: int | None = None) -> list[WatchedBus]:
-    """The buses of a site. ``own_timeout_ms``: what the drives' own time-outs are, where the site file does
-    not set them. Raises ``UnknownFamily``."""
+def plan(site: Site, folder: Path, *, own_timeout_ms: int | None = None) -> list[WatchedBus]:
+    """The buses of a site, whose file is in ``folder``. ``own_timeout_ms``: what the drives' own time-outs
+    are, where the site file does not set them. Raises ``UnknownFamily``."""
     units = _unit_ids(site)
-    return [_bus(bus, units, own_timeout_ms) for bus in site.bus]
+    return [_bus(bus, folder, units, own_timeout_ms) for bus in site.bus]
 
 
-def _bus(bus: BusTable, units: dict[tuple[str, int], int], own_timeout_ms: int | None) -> WatchedBus:
+def _bus(
+    bus: BusTable, folder: Path, units: dict[tuple[str, int], int], own_timeout_ms: int | None
+) -> WatchedBus:
+    plain = [node for node in bus.node if node.enabled and not node.drive]
+    known = {node.name: frames for node in plain if (frames := output_frames(bus, node, folder))}
+    beside_ms = _beside_ms(bus, sum(len(frames.rpdos) for frames in known.values()))
+    outputs = [
+        _outputs(bus, node, known[node.name], units[node.name, 0], beside_ms, own_timeout_ms)
+        for node in plain
+        if node.name in known
+    ]
     drives = [
-        _drive(bus, node, table, _family(node.mapping), units[node.name, place], own_timeout_ms)
+        _drive(bus, node, table, _family(node.mapping), units[node.name, place], beside_ms, own_timeout_ms)
         for node in bus.node
         if node.enabled
         for place, table in enumerate(node.drive)
@@ -149,7 +208,7 @@ def _bus(bus: BusTable, units: dict[tuple[str, int], int], own_timeout_ms: int |
     if bus.heartbeat_ms:
         beats[0x700 + bus.master_node_id] = ("the bridge's heartbeat", bus.heartbeat_ms)
     nodes = {node.id: node.sdo_timeout_ms / 1000 for node in bus.node}
-    return WatchedBus(bus.name, bus.channel or "", tuple(drives), beats, nodes)
+    return WatchedBus(bus.name, bus.channel or "", tuple(drives), beats, nodes, tuple(outputs))
 
 
 def _drive(
@@ -158,6 +217,7 @@ def _drive(
     table: DriveTable,
     family: dict[str, Any],
     unit_id: int,
+    beside_ms: int,
     own_timeout_ms: int | None,
 ) -> WatchedDrive:
     slot = family["slots"].get(table.slot) or next(iter(family["slots"].values()))
@@ -174,7 +234,7 @@ def _drive(
         control=Word(**family["control"]),
         status=Word(**family["status"]),
         timeout_ms=timeout_ms or 0,
-        beside_ms=_beside_ms(bus) if is_watched else None,
+        beside_ms=beside_ms if is_watched else None,
         silent_ms=own_ms + tpdo_ms if own_ms else 0,
         follow_ms=3 * tpdo_ms + RAMP_MS,
         node_id=node.id,
@@ -182,6 +242,37 @@ def _drive(
         speed=_speed(family, node.mapping),
         nmt_stops=family.get("nmt_stops", False),
         lost_ms=_lost_ms(node, table),
+    )
+
+
+def _outputs(
+    bus: BusTable,
+    node: NodeTable,
+    frames: OutputFrames,
+    unit_id: int,
+    beside_ms: int,
+    own_timeout_ms: int | None,
+) -> WatchedOutputs:
+    timeout_ms = node.outputs.fieldbus_timeout_ms or 0
+    is_watched = timeout_ms and any(values.mask for values in frames.rpdos.values())
+    own_ms = frames.own_ms or own_timeout_ms or 0
+    # It begins to count with the last heartbeat, and what it does is seen by the node's own.
+    begins_ms = max(bus.deadman_ms, bus.heartbeat_ms)
+    return WatchedOutputs(
+        name=node.name,
+        unit_id=unit_id,
+        node_id=node.id,
+        rpdos=frames.rpdos,
+        tpdos=frames.tpdos,
+        timeout_ms=timeout_ms,
+        beside_ms=beside_ms if is_watched else None,
+        rpdo_ms=1000 * bus.rpdo_period_s,
+        silent_ms=begins_ms + own_ms + node.supervision_ms if own_ms else 0,
+        follow_ms=3 * frames.event_ms + _SWITCH_MS,
+        lost_ms=0 if node.supervision == "none" else _LOST_MS + _supervised_ms(node),
+        why_active=frames.why_active,
+        why_unknown=frames.why_unknown,
+        written=frames.written,
     )
 
 
@@ -194,20 +285,23 @@ def _lost_ms(node: NodeTable, table: DriveTable) -> int:
     """Its error control, or its TPDO where the site file says how often that comes."""
     if node.supervision == "none":
         return _LOST_MS + 3 * _tpdo_ms(table) if any(pdo.event_ms for pdo in table.tpdo) else 0
-    times = node.life_time_factor if node.supervision == "guarding" else 1
-    return _LOST_MS + times * node.supervision_ms
+    return _LOST_MS + _supervised_ms(node)
 
 
-def _beside_ms(bus: BusTable) -> int:
+def _supervised_ms(node: NodeTable) -> int:
+    return node.supervision_ms * (node.life_time_factor if node.supervision == "guarding" else 1)
+
+
+def _beside_ms(bus: BusTable, output_rpdos: int) -> int:
     """What the bridge, the kernel and the bus may take beside the time-out: two periods, lateness, what is
     sent before our frame, and the interface's queue."""
     period_ms = 1000 * bus.rpdo_period_s
     frame_ms = 1000 * _FRAME_BITS / bus.bitrate
     nodes = [node for node in bus.node if node.enabled]
-    drives = sum(len(node.drive) for node in nodes)
-    # Each period an RPDO of each drive, and SYNC: what comes in while frames wait may go first, too.
-    idle = max(_IDLE_LEAST, 1 - (drives + 1) * frame_ms / period_ms)
-    before_ms = _BEFORE_OF_EACH * (1 + len(nodes) + drives) * frame_ms / idle
+    rpdos = sum(len(node.drive) for node in nodes) + output_rpdos
+    # Each period each RPDO, and SYNC: what comes in while frames wait may go first, too.
+    idle = max(_IDLE_LEAST, 1 - (rpdos + 1) * frame_ms / period_ms)
+    before_ms = _BEFORE_OF_EACH * (1 + len(nodes) + rpdos) * frame_ms / idle
     queue_ms = 0 if bus.interface in ("socketcan", "virtual") else _QUEUE_MS
     return math.ceil(2 * period_ms + REACTION_MS + before_ms + queue_ms)
 

@@ -1,9 +1,9 @@
 """NMT commands and SDO writes that cannot be the bridge's, by what the bridge promises not to do. Sans-IO.
 
 The bus does not say who sent a frame. But the bridge stops a node's drives before it sends the node anything
-by NMT (docs/explanation/dead-man-chain.md), starts a node once, knows no nodes but the site's, asks one
-question of an SDO server at a time, and leaves what a drive hears and watches alone while the drive is
-told to run."""
+by NMT and makes its outputs safe (docs/explanation/dead-man-chain.md), starts a node once, knows no nodes but
+the site's, asks one question of an SDO server at a time, and leaves what a node hears and watches, and what
+its outputs are by, alone while the node is told to run."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Final
 
+START, STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82
+"""NMT commands (CiA 301 §7.2.8.3.1)."""
 _COMMANDS: Final = {
-    0x01: "start",
-    0x02: "stop",
-    0x80: "pre-operational",
-    0x81: "reset",
-    0x82: "reset of communication",
+    START: "start",
+    STOP: "stop",
+    PRE_OPERATIONAL: "pre-operational",
+    RESET: "reset",
+    RESET_COMMUNICATION: "reset of communication",
 }
-"""CiA 301 §7.2.8.3.1."""
-_START: Final = 0x01
+TAKES_OUT: Final = (STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION)
+"""Commands after which a node says nothing of its drives and takes no RPDOs."""
 _STARTS_S: Final = 2.0
 _MOST_STARTS: Final = 3
 _HEARD: Final = (
@@ -36,12 +38,19 @@ _DOWNLOAD, _UPLOAD, _ABORT = 0x20, 0x40, 0x80
 
 
 class Services:
-    """One bus. ``nodes`` has the SDO time-out of each node of the site in s; ``is_told_to_run`` says whether
-    the last RPDO of one of a node's drives enables."""
+    """One bus. ``nodes`` has the SDO time-out of each node of the site in s; ``told_to_run`` gives what of a
+    node is told to run at a time, in words, or nothing; ``written`` has the objects that move outputs of a
+    node or make them safe."""
 
-    def __init__(self, nodes: Mapping[int, float], is_told_to_run: Callable[[int], bool]) -> None:
+    def __init__(
+        self,
+        nodes: Mapping[int, float],
+        told_to_run: Callable[[int, float], str],
+        written: Mapping[int, frozenset[int]],
+    ) -> None:
         self._nodes = nodes
-        self._is_told_to_run = is_told_to_run
+        self._told_to_run = told_to_run
+        self._written = written
         self._starts: dict[int, deque[float]] = {node: deque() for node in nodes}
         self._asked: dict[int, float] = {}
         """When a question was asked that has no answer yet, by node."""
@@ -71,9 +80,9 @@ class Services:
         if node and node not in self._nodes:
             return f"NMT {what} of node {node}, which the site does not have: somebody else sends it"
         for one in (node,) if node else tuple(self._nodes):
-            if self._is_told_to_run(one):
-                return f"NMT {what} of node {one} while a drive of it is told to run: somebody else sends it"
-            if data[0] == _START and self._starts_too_often(one, at):
+            if told := self._told_to_run(one, at):
+                return f"NMT {what} of node {one} while {told}: somebody else sends it"
+            if data[0] == START and self._starts_too_often(one, at):
                 return f"NMT start of node {one} again and again: somebody else sends it"
         return ""
 
@@ -98,6 +107,7 @@ class Services:
         asked_at, self._asked[node] = self._asked.get(node), at
         if asked_at is not None and at - asked_at < self._nodes[node]:
             return f"two SDO requests to node {node} at once: somebody else sends one of them"
-        if kind == _DOWNLOAD and self._is_told_to_run(node) and any(index in part for part in _HEARD):
-            return f"SDO write of {index:04X}h to node {node} while it is told to run: somebody else sends it"
+        is_heard = index in self._written.get(node, ()) or any(index in part for part in _HEARD)
+        if kind == _DOWNLOAD and is_heard and (told := self._told_to_run(node, at)):
+            return f"SDO write of {index:04X}h to node {node} while {told}: somebody else sends it"
         return ""

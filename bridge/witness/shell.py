@@ -32,7 +32,9 @@ class Witness:
         self._tell = tell
         self._lines: list[tuple[Listener, Watch]] = []
         self._places = {
-            drive.unit_id: (place, drive.name) for place, bus in enumerate(buses) for drive in bus.drives
+            one.unit_id: (place, one.name)
+            for place, bus in enumerate(buses)
+            for one in (*bus.drives, *bus.judged_outputs)
         }
         failures: list[str] = []
         for bus in buses:

@@ -4,9 +4,7 @@ A stop is recorded with its time and what is promised of it; an alarm is raised 
 broken, whether or not the drive stops in the end. Times are seconds of one monotonic clock, those of frames
 their reception.
 
-The owner's telegrams are known only by their number, which is read now and then, with the time-out in force.
-A telegram is assumed to be as young as possible, so a stop may have come up to one reading later than it
-seems, and never earlier. Without readings nothing is known of the owner, which is reported.
+Without readings of their telegrams' numbers nothing is known of the owners, which is reported.
 """
 
 from __future__ import annotations
@@ -16,24 +14,17 @@ from typing import Final
 
 from bridge.witness.findings import Alarm, Cause, Finding, Kind, Sight, Stop
 from bridge.witness.jogging import Jogs
-from bridge.witness.plan import RAMP_MS, WatchedBus, WatchedDrive
-from bridge.witness.services import Services
+from bridge.witness.outputs import Outputs
+from bridge.witness.owner import Owner
+from bridge.witness.plan import RAMP_MS, UNKNOWN_MS, WatchedBus, WatchedDrive
+from bridge.witness.rate import Rate
+from bridge.witness.services import TAKES_OUT, Services
 
 _TURNS_S: Final = 0.5
 _MOST_TURNS: Final = 4
 """An RPDO that turns from "run" to "stop" and back so often in ``_TURNS_S`` has two senders."""
-UNKNOWN_MS: Final = 3000
-"""From the last RPDO to a drive that has stopped, where its own time-out is not known."""
 _BOOT_UP, _STOPPED = 0x00, 0x04
 """States that a node says (CiA 301 §7.2.8.3.2.2)."""
-_TAKES_OUT: Final = (0x02, 0x80, 0x81, 0x82)
-"""NMT commands after which a node says nothing of its drives (CiA 301 §7.2.8.3.1)."""
-_BEAT_WINDOW_S: Final = 2.0
-_BEAT_LOAD: Final = 1.5
-_BEAT_SPARE: Final = 5
-"""What comes beside the beat when it changes."""
-_READING_MS: Final = 150
-"""A telegram may seem so much younger than it is."""
 _UNSEEN_S: Final = 1.0
 """An enabled drive gets its RPDO more often than that."""
 BLIND_S: Final = 5.0
@@ -45,20 +36,8 @@ class _Track:
 
     def __init__(self, drive: WatchedDrive) -> None:
         self.drive = drive
-        self.timeout_ms = drive.timeout_ms
-        """The owner's time-out that is in force."""
-        self.timeout_at = float("-inf")
-        """It has been told at this time for the first time."""
-        self.answered_at: float | None = None
-        """When its number was told last, or telling it was waited for first."""
-        self.number: int | None = None
-        self.telegram_at: float | None = None
-        """When the owner's last telegram had come at the latest."""
-        self.read_at: float | None = None
-        """The last reading of its number was asked for at this time."""
+        self.owner = Owner(drive.name, drive.timeout_ms, drive.beside_ms)
         self.rpdo_at: float | None = None
-        self.late_at: float | None = None
-        """The first RPDO that enables later than promised after that telegram."""
         self.stopped_at: float | None = None
         """The first RPDO that does not enable, of those that go on with it."""
         self.tells_run = False
@@ -68,23 +47,14 @@ class _Track:
         self.enabled_since: float | None = None
         self.jogs = Jogs(RAMP_MS / 1000, drive.follow_ms / 1000)
         self.rpdo = b""
-        self.repeats: deque[float] = deque()
-        """When an RPDO came that says what the one before it said."""
+        self.repeats = Rate(drive.rpdo_ms)
+        """Of an RPDO that says what the one before it said."""
         self.node_at: float | None = None
         """Its node's error control was heard last."""
         self.taken_out_at: float | None = None
         """Its node was taken out of operation by NMT while it said "enabled"."""
         self.told: set[Kind] = set()
         """Alarms of what goes on are raised once."""
-
-    def may_run_until(self, telegram_at: float) -> float | None:
-        """The last time for an RPDO that enables; None where nothing is promised. A time-out that has been
-        made shorter holds from when that is known."""
-        stop_ms = self.drive.stop_ms(self.timeout_ms)
-        if not stop_ms:
-            return None
-        beside_s = (stop_ms - self.timeout_ms) / 1000
-        return max(telegram_at + stop_ms / 1000, self.timeout_at + beside_s)
 
 
 class Watch:
@@ -94,30 +64,42 @@ class Watch:
         self._name = bus.name
         self._asks = asks
         self._why_blind = ""
-        self._blind: list[_Track] = []
+        self._blind: list[Owner] = []
         self._tracks = {drive.name: _Track(drive) for drive in bus.drives}
         self._by_rpdo = {track.drive.rpdo: track for track in self._tracks.values()}
         self._by_tpdo = {track.drive.tpdo: track for track in self._tracks.values()}
-        self._services = Services(bus.nodes, self._is_told_to_run)
+        self._outputs = [Outputs(one) for one in bus.judged_outputs]
+        self._by_outputs = {can_id: one for one in self._outputs for can_id in one.identifiers}
+        owners = [track.owner for track in self._tracks.values()] + [one.owner for one in self._outputs]
+        self._owners = {owner.name: owner for owner in owners}
+        written = {one.node_id: one.written for one in bus.outputs}
+        self._services = Services(bus.nodes, self._told_to_run, written)
         self._by_guard: dict[int, list[_Track]] = {}
         for track in self._tracks.values():
             if track.drive.node_id:
                 self._by_guard.setdefault(0x700 + track.drive.node_id, []).append(track)
         self._beats = bus.beats
-        self._beaten: dict[int, deque[float]] = {can_id: deque() for can_id in bus.beats}
+        self._beaten = {can_id: Rate(period_ms) for can_id, (_, period_ms) in bus.beats.items()}
         self._findings: list[Finding] = []
 
     @property
     def identifiers(self) -> list[int]:
         """What it has to see."""
         services = self._services.identifiers
-        return sorted({*self._by_rpdo, *self._by_tpdo, *self._beats, *self._by_guard, *services})
+        drives = {*self._by_rpdo, *self._by_tpdo, *self._by_guard}
+        return sorted({*drives, *self._by_outputs, *self._beats, *services})
 
-    def _is_told_to_run(self, node_id: int) -> bool:
-        return any(one.tells_run for one in self._tracks.values() if one.drive.node_id == node_id)
+    def _told_to_run(self, node_id: int, at: float) -> str:
+        """What of a node is told to run or to be active; nothing where there is no such thing."""
+        if any(one.tells_run for one in self._tracks.values() if one.drive.node_id == node_id):
+            return "a drive of it is told to run"
+        is_active = any(one.is_told(at) for one in self._outputs if one.node_id == node_id)
+        return "its outputs are told to be active" if is_active else ""
 
     def take_findings(self) -> list[Finding]:
         findings, self._findings = self._findings, []
+        for one in self._outputs:
+            findings += one.take_findings()
         return findings
 
     # what comes
@@ -127,6 +109,8 @@ class Watch:
             self._on_rpdo(track, data, at)
         elif (track := self._by_tpdo.get(can_id)) is not None:
             self._on_tpdo(track, data, at)
+        elif (outputs := self._by_outputs.get(can_id)) is not None:
+            outputs.on_frame(can_id, data, at)
         elif can_id in self._beats:
             self._on_beat(can_id, at)
         elif can_id in self._by_guard:
@@ -135,10 +119,16 @@ class Watch:
         elif can_id in self._services.identifiers:
             if why := self._services.on_frame(can_id, data, at):
                 self._alarm(self._name, Kind.INTRUDER, at, why)
-            if can_id == 0x000 and len(data) == 2 and data[0] in _TAKES_OUT:
-                for track in self._tracks.values():
-                    if track.is_enabled and data[1] in (0, track.drive.node_id):
-                        track.taken_out_at = at
+            if can_id == 0x000 and len(data) == 2:
+                self._on_nmt(data[0], data[1], at)
+
+    def _on_nmt(self, command: int, node_id: int, at: float) -> None:
+        for track in self._tracks.values():
+            if command in TAKES_OUT and track.is_enabled and node_id in (0, track.drive.node_id):
+                track.taken_out_at = at
+        for outputs in self._outputs:
+            if node_id in (0, outputs.node_id):
+                outputs.on_nmt(command, at)
 
     def _on_guard(self, track: _Track, data: bytes, at: float) -> None:
         """Heartbeat or guarding answer of its node: the lower seven bits are the state."""
@@ -153,24 +143,13 @@ class Watch:
     ) -> None:
         """The number of the owner's last telegram, as it was between these times, and the time-out in force;
         None where that was not told."""
-        track = self._tracks[name]
-        track.answered_at = answered_at
-        timeout_ms = track.drive.timeout_ms if timeout_ms is None else timeout_ms
-        if timeout_ms != track.timeout_ms:
-            track.timeout_ms, track.timeout_at = timeout_ms, answered_at
-        if number != track.number:
-            # The first reading says only that there may have been one just now.
-            track.telegram_at = answered_at
-            track.number = number
-            track.late_at = None
-            track.told.discard(Kind.LATE)
-        track.read_at = asked_at
+        self._owners[name].on_number(number, asked_at, answered_at, timeout_ms)
 
     def on_numbers_lost(self, why: str = "") -> None:
         """Nobody tells the numbers (any more): nothing is known of the owners."""
         self._why_blind = why
-        for track in self._tracks.values():
-            track.number = track.telegram_at = track.read_at = track.late_at = None
+        for owner in self._owners.values():
+            owner.on_numbers_lost()
 
     def _on_rpdo(self, track: _Track, data: bytes, at: float) -> None:
         enables = track.drive.control.enables(data)
@@ -181,8 +160,7 @@ class Watch:
         track.jogs.on_turn(at, stops=not enables)
         if enables:
             track.stopped_at = None
-            if track.late_at is None and _is_late(track, at):
-                track.late_at = at
+            track.owner.on_enabling(at)
         elif track.stopped_at is None:
             track.stopped_at = at
             track.told.discard(Kind.IGNORED)
@@ -192,15 +170,8 @@ class Watch:
 
     def _on_repeat(self, track: _Track, data: bytes, at: float) -> None:
         """The bridge repeats an RPDO so often, and no more: beside that it sends what is new."""
-        is_same, track.rpdo, period_ms = data == track.rpdo, data, track.drive.rpdo_ms
-        if not is_same or not period_ms:
-            return
-        times = track.repeats
-        times.append(at)
-        while times[0] < at - _BEAT_WINDOW_S:
-            times.popleft()
-        if len(times) > _BEAT_LOAD * _BEAT_WINDOW_S * 1000 / period_ms + _BEAT_SPARE:
-            times.clear()
+        is_same, track.rpdo = data == track.rpdo, data
+        if is_same and track.repeats.is_too_often(at):
             message = f"RPDO {track.drive.rpdo:03X}h comes too often: somebody else sends it, too"
             self._alarm(track.drive.name, Kind.INTRUDER, at, message)
 
@@ -244,14 +215,8 @@ class Watch:
             self._alarm(track.drive.name, Kind.IGNORED, at, found)
 
     def _on_beat(self, can_id: int, at: float) -> None:
-        what, period_ms = self._beats[can_id]
-        times = self._beaten[can_id]
-        times.append(at)
-        while times[0] < at - _BEAT_WINDOW_S:
-            times.popleft()
-        if len(times) > _BEAT_LOAD * _BEAT_WINDOW_S * 1000 / period_ms + _BEAT_SPARE:
-            times.clear()
-            message = f"{what}, {can_id:03X}h, comes too often: somebody else sends it, too"
+        if self._beaten[can_id].is_too_often(at):
+            message = f"{self._beats[can_id][0]}, {can_id:03X}h, comes too often: somebody else sends it, too"
             self._alarm(self._name, Kind.INTRUDER, at, message)
 
     # judging
@@ -259,18 +224,13 @@ class Watch:
     def _stop_of(self, track: _Track, at: float) -> Stop:
         drive = track.drive
         if track.stopped_at is not None:
-            silence_s = None if track.telegram_at is None else track.stopped_at - track.telegram_at
-            is_silent = (
-                silence_s is not None
-                and track.timeout_ms
-                and _ms(silence_s) + _READING_MS >= track.timeout_ms
-            )
+            silence_ms = track.owner.silence_ms(track.stopped_at)
             return Stop(
                 drive.name,
-                Cause.CONTROLLER if is_silent else Cause.COMMAND,
+                Cause.COMMAND if silence_ms is None else Cause.CONTROLLER,
                 at,
-                bus_ms=_ms(silence_s) if is_silent and silence_s is not None else None,
-                bus_bound_ms=_bound_ms(track) if is_silent else None,
+                bus_ms=silence_ms,
+                bus_bound_ms=None if silence_ms is None else track.owner.bound_ms,
                 drive_ms=_ms(at - track.stopped_at),
                 drive_bound_ms=drive.follow_ms,
             )
@@ -289,42 +249,33 @@ class Watch:
     def on_time(self, now: float) -> None:
         """Call it when everything that had come by ``now`` has been handed over."""
         for track in self._tracks.values():
-            self._judge_controller(track, now)
+            if lateness := track.owner.lateness():
+                self._alarm(track.drive.name, Kind.LATE, now, f"told to run {lateness}")
             self._judge_drive(track, now)
             self._judge_unheard(track, now)
+        for outputs in self._outputs:
+            outputs.on_time(now)
         if self._asks:
             self._judge_sight(now)
 
     def _judge_sight(self, now: float) -> None:
         """Who is promised something of its owner, and nobody tells the owner's telegrams."""
-        blind: list[_Track] = []
-        for track in self._tracks.values():
-            if track.drive.beside_ms is None:
+        blind: list[Owner] = []
+        for owner in self._owners.values():
+            if not owner.is_promised:
                 continue
-            if track.answered_at is None:
-                track.answered_at = now
-            if now - track.answered_at > BLIND_S:
-                blind.append(track)
-        if added := [track for track in blind if track not in self._blind]:
+            if owner.answered_at is None:
+                owner.answered_at = now
+            if now - owner.answered_at > BLIND_S:
+                blind.append(owner)
+        if added := [owner for owner in blind if owner not in self._blind]:
             why = f": {self._why_blind}" if self._why_blind else ""
             message = f"the bridge does not tell the owner's telegrams{why}; not judged: {_names(added)}"
             self._alarm(self._name, Kind.BLIND, now, message)
-        if gone := [track for track in self._blind if track not in blind]:
+        if gone := [owner for owner in self._blind if owner not in blind]:
             message = f"the owner's telegrams are told again: {_names(gone)}"
             self._findings.append(Sight(self._name, now, message))
         self._blind = blind
-
-    def _judge_controller(self, track: _Track, now: float) -> None:
-        """An enabling RPDO later than promised, of an owner that had sent nothing when it was asked again."""
-        telegram, late, read = track.telegram_at, track.late_at, track.read_at
-        if telegram is None or late is None or read is None or read < late:
-            return
-        if not _is_late(track, late):
-            # The time-out had been changed meanwhile.
-            track.late_at = None
-            return
-        told = f"told to run {_ms(late - telegram)} ms after its owner's last telegram"
-        self._once(track, Kind.LATE, now, f"{told}; promised: {_bound_ms(track)}")
 
     def _judge_drive(self, track: _Track, now: float) -> None:
         """A drive that says "enabled" longer than it may."""
@@ -368,21 +319,8 @@ class Watch:
         self._findings.append(Alarm(source, kind, at, message))
 
 
-def _is_late(track: _Track, at: float) -> bool:
-    """Whether an RPDO at this time must not enable any more."""
-    until = None if track.telegram_at is None else track.may_run_until(track.telegram_at)
-    return until is not None and _ms(at - until) > 0
-
-
-def _bound_ms(track: _Track) -> int | None:
-    """What is promised after the owner's last telegram; None for nothing."""
-    if track.telegram_at is None or (until := track.may_run_until(track.telegram_at)) is None:
-        return None
-    return _ms(until - track.telegram_at)
-
-
-def _names(tracks: list[_Track]) -> str:
-    return ", ".join(track.drive.name for track in tracks)
+def _names(owners: list[Owner]) -> str:
+    return ", ".join(owner.name for owner in owners)
 
 
 def _ms(seconds: float) -> int:

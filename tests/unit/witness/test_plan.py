@@ -21,7 +21,7 @@ from tests.support.devices import DEVICES
 def watched(folder: Path, mapping: str, slot: str, more: str = "") -> WatchedDrive:
     drive = sites.drive(slot, "modbus", 200, more)
     path = sites.write(folder, sites.bus(sites.node(drive, mapping=mapping)), sites.modbus(0))
-    (bus,) = plan(load_site(path))
+    (bus,) = plan(load_site(path), path.parent)
     (found,) = bus.drives
     return found
 
@@ -92,7 +92,7 @@ def test_nobody_is_held_to_less_than_the_bridge_publishes(
     path = sites.write(tmp_path, sites.bus(*tables, more=f"bitrate = {rate}"), sites.modbus(0))
     project = load_project(path)
     verdict = lint(project.site, project.families, path, project.downloads)
-    (bus,) = plan(project.site)
+    (bus,) = plan(project.site, tmp_path)
     if verdict.loads[0].most_percent > _FULL_PERCENT:
         return
     for drive, case in zip(bus.drives, verdict.worst_cases, strict=True):
@@ -104,7 +104,7 @@ def test_a_family_that_it_does_not_know_is_named(tmp_path: Path) -> None:
     drive = sites.drive("drive", "modbus", 200, "")
     path = sites.write(tmp_path, sites.bus(sites.node(drive, mapping="acme/one")), sites.modbus(0))
     with pytest.raises(UnknownFamily, match="acme/one"):
-        plan(load_site(path))
+        plan(load_site(path), path.parent)
 
 
 @pytest.mark.parametrize("key", ['on_expiry = "hold"', "telegram_downtime_s = -0.1"])
@@ -121,7 +121,7 @@ def test_units_are_counted_as_the_reference_says(tmp_path: Path) -> None:
     drives = [sites.drive("fu1", "modbus", 200, "unit_id = 2"), sites.drive("fu2", "modbus", 200, "")]
     drives += [sites.drive("fu3", "modbus", 200, "")]
     path = sites.write(tmp_path, sites.bus(sites.node(*drives)), sites.modbus(0))
-    (bus,) = plan(load_site(path))
+    (bus,) = plan(load_site(path), path.parent)
     assert [drive.unit_id for drive in bus.drives] == [2, 1, 3]
 
 
@@ -131,7 +131,7 @@ def test_a_node_without_drives_has_a_unit(tmp_path: Path) -> None:
     given = sites.node(name="other", node_id=21, mapping="eds:encoder.eds", more="unit_id = 1")
     drive = sites.node(sites.drive("fu1", "modbus", 200, sites.SCALED))
     path = sites.write(tmp_path, sites.bus(shaft, given, drive), sites.modbus(0))
-    (bus,) = plan(load_site(path))
+    (bus,) = plan(load_site(path), path.parent)
     project = load_project(path)
     plant = Plant(project.site, project.families, "0")
     assert [one.unit_id for one in bus.drives] == list(plant.by_unit) == [3]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from bridge.witness.services import Services
@@ -11,11 +13,15 @@ READ, WRITE = bytes.fromhex("4000100000000000"), bytes.fromhex("2B0D200064000000
 ANSWER, ABORT = bytes.fromhex("60 0D 20 00 00 00 00 00"), bytes.fromhex("80 0D 20 00 00 00 04 05")
 
 
+def _told(runs: tuple[int, ...]) -> Callable[[int, float], str]:
+    return lambda node, at: "a drive of it is told to run" if node in runs else ""
+
+
 class Bus:
     """Nodes 5 and 6."""
 
     def __init__(self, *runs: int) -> None:
-        self.services = Services({5: TIMEOUT_S, 6: TIMEOUT_S}, lambda node: node in runs)
+        self.services = Services({5: TIMEOUT_S, 6: TIMEOUT_S}, _told(runs), {6: frozenset({0x6200})})
         self.told: list[str] = []
 
     def sees(self, can_id: int, data: bytes, at: float) -> str:
@@ -26,7 +32,7 @@ class Bus:
 
 def test_it_looks_at_nmt_and_both_directions_of_sdo() -> None:
     assert Bus().services.identifiers == {0x000, 0x585, 0x586, 0x605, 0x606}
-    assert not Services({}, lambda node: False).identifiers
+    assert not Services({}, _told(()), {}).identifiers
 
 
 @pytest.mark.parametrize("command", [0x01, 0x02, 0x80, 0x81, 0x82])

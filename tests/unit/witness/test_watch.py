@@ -192,7 +192,7 @@ def test_a_stop_that_was_ordered(plant: Plant) -> None:
     plant.run(0.1)
     (stop,) = plant.stops
     assert (stop.cause, stop.bus_ms, stop.drive_bound_ms) == (Cause.COMMAND, None, 1500)
-    assert 290 <= stop.drive_ms <= 320
+    assert stop.drive_ms is not None and 290 <= stop.drive_ms <= 320
 
 
 def test_a_drive_that_does_not_follow_a_stop_is_told(plant: Plant) -> None:

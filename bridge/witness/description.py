@@ -1,0 +1,161 @@
+"""What the witness reads of device descriptions: names, types and numbers of their objects.
+
+EDS and DCF (CiA 306 §4), XDD and XDC (CiA 311). Not more than it takes to know which RPDO carries which
+outputs and what the node does with them: a file that is odd otherwise is read all the same.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final
+from xml.etree import ElementTree
+
+At = tuple[int, int]
+"""Index and sub-index."""
+_SECTION: Final = re.compile(r"\[\s*([0-9a-f]{1,4})\s*(?:sub\s*([0-9a-f]{1,2}))?\s*\]", re.IGNORECASE)
+_INTEGER: Final = re.compile(r"0x([0-9a-f]+)|([0-9]+)|([0-9][0-9a-f]*)h", re.IGNORECASE)
+_NODE_ID: Final = re.compile(r"\$?NODE_?ID", re.IGNORECASE)
+_XML_KEYS: Final = {
+    "name": "parametername",
+    "dataType": "datatype",
+    "defaultValue": "defaultvalue",
+    "actualValue": "parametervalue",
+}
+"""Attributes by the keys of an EDS that mean the same."""
+
+
+class Unreadable(Exception):
+    """The file is no device description."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One object, or one element of it. ``data_type`` is its code (CiA 301 §7.4.7), ``number`` what it holds
+    as far as the file says; ``is_configured`` where that is a ParameterValue."""
+
+    name: str
+    data_type: int | None
+    number: int | None
+    is_configured: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """``entries`` by index and sub-index; ``names`` of the objects that have elements, by index."""
+
+    entries: Mapping[At, Entry]
+    names: Mapping[int, str]
+
+    def number(self, index: int, sub: int) -> int | None:
+        entry = self.entries.get((index, sub))
+        return entry.number if entry else None
+
+    def title(self, at: At) -> str:
+        """The element's name, that of its object first where it does not begin with it."""
+        entry, whole = self.entries[at], self.names.get(at[0], "")
+        return entry.name if entry.name.lower().startswith(whole.lower()) else f"{whole} {entry.name}"
+
+
+def describe(content: bytes, node_id: int) -> Description:
+    """What a file says of the node with this id. Raises ``Unreadable``."""
+    text = _decoded(content)
+    sections = _xml(text) if text.lstrip().startswith("<") else dict(_ini(text))
+    if not sections:
+        raise Unreadable("describes no objects")
+    parts = {index for index, sub in sections if sub is not None}
+    names = {index: sections.get((index, None), {}).get("parametername", "") for index in parts}
+    entries: dict[At, Entry] = {}
+    for (index, sub), keys in sections.items():
+        if sub is not None or index not in parts:
+            kind = keys.get("datatype") or sections.get((index, None), {}).get("datatype")
+            kind = kind or sections.get((index, 1), {}).get("datatype", "")
+            given = keys.get("parametervalue", "")
+            number = _number(given or keys.get("defaultvalue", ""), node_id)
+            name = keys.get("parametername", "")
+            entries[index, sub or 0] = Entry(name, _number(kind, node_id), number, bool(given))
+    return Description(entries, names)
+
+
+def _decoded(content: bytes) -> str:
+    """UTF-8, UTF-16 with its mark, else Windows-1252."""
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return content.decode("utf-16", "replace")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", "replace")
+
+
+_Sections = dict[tuple[int, int | None], dict[str, str]]
+
+
+def _ini(text: str) -> Iterator[tuple[tuple[int, int | None], dict[str, str]]]:
+    """The sections of objects and elements, with their keys in lower case. What is there twice counts once,
+    as it stands first."""
+    found: _Sections = {}
+    keys: dict[str, str] | None = None
+    for line in (one.strip() for one in re.split(r"\r\n|\n|\r", text)):
+        if line.startswith("["):
+            match = _SECTION.match(line)
+            keys = None
+            if match:
+                sub = None if match[2] is None else int(match[2], 16)
+                keys = found.setdefault((int(match[1], 16), sub), {})
+        elif keys is not None and not line.startswith((";", "#")):
+            key, _, value = line.partition("=")
+            if value.strip():
+                keys.setdefault(key.strip().lower(), value.strip())
+    yield from found.items()
+
+
+def _xml(text: str) -> _Sections:
+    if "<!DOCTYPE" in text:
+        raise Unreadable("has a document type")
+    try:
+        root = ElementTree.fromstring(text.encode())
+    except ElementTree.ParseError as error:
+        raise Unreadable(str(error)) from error
+    found: _Sections = {}
+    for element in root.iter():
+        if element.tag.rpartition("}")[2] == "CANopenObject":
+            index = _hexadecimal(element, "index")
+            found.setdefault((index, None), _keys(element))
+            for child in element:
+                if child.tag.rpartition("}")[2] == "CANopenSubObject":
+                    found.setdefault((index, _hexadecimal(child, "subIndex")), _keys(child))
+    return found
+
+
+def _hexadecimal(element: ElementTree.Element, name: str) -> int:
+    text = element.get(name, "")
+    try:
+        return int(text, 16)
+    except ValueError:
+        raise Unreadable(f'{name} = "{text}" is no number') from None
+
+
+def _keys(element: ElementTree.Element) -> dict[str, str]:
+    keys = {key: element.get(name, "") for name, key in _XML_KEYS.items()}
+    if keys["datatype"]:
+        # Hexadecimal with or without 0x (CiA 311).
+        keys["datatype"] = f"0x{keys['datatype'].lower().removeprefix('0x')}"
+    return keys
+
+
+def _number(text: str, node_id: int) -> int | None:
+    """An integer, which may have the node's id added; None for anything else."""
+    total = 0
+    for term in re.sub(r"[\s()]", "", text.partition(";")[0]).split("+"):
+        if _NODE_ID.fullmatch(term):
+            total += node_id
+            continue
+        negative, bare = term.startswith("-"), term.removeprefix("-")
+        match = _INTEGER.fullmatch(bare)
+        if not match:
+            return None
+        hexadecimal, decimal, assembler = match.groups()
+        number = int(decimal) if decimal else int(hexadecimal or assembler, 16)
+        total += -number if negative else number
+    return total

@@ -50,7 +50,8 @@ _IN_ERROR: Final = {
 _DIGITAL: Final = range(0x6200, 0x6400)
 """A bit of their error mode lets the error value's bit through. Others take it where the mode is 1."""
 _BEHAVIOUR: Final = (0x1029, 1)
-"""0 leads to Pre-Operational, 1 leaves it where it is, 2 to Stopped (CiA 301 §7.5.2.32)."""
+_PRE_OPERATIONAL, _STAYS = 0, 1
+"""1029h:01: where an error of communication leads; 2 is Stopped (CiA 301 §7.5.2.32)."""
 _CONSUMER: Final = (0x1016, 1)
 _CIA_401: Final = (
     (0x6200, "uint8", range(1, 9)),
@@ -120,7 +121,10 @@ def output_frames(bus: BusTable, node: NodeTable, folder: Path) -> OutputFrames 
             outputs = _described_outputs(description, node)
         else:
             numbers = _written(node, folder)
-            outputs, profile = _mapped_outputs(node, folder)
+            try:
+                outputs, profile = _mapped_outputs(node, folder)
+            except (KeyError, ValueError, TypeError, AttributeError) as error:
+                raise _Unknown(f"{node.mapping}: is no mapping file ({error})") from error
             numbers = _default_pdos(outputs, node.id, profile) | numbers
         if not outputs:
             return None
@@ -260,6 +264,9 @@ def _written(node: NodeTable, folder: Path) -> dict[At, int]:
     for one in node.configure:
         download = one.download
         numbers[download.index, download.sub] = int.from_bytes(download.data, "little")
+    if node.enforce and node.own_timeout_ms:
+        # With its time-out, that it acts on it.
+        numbers[_BEHAVIOUR] = _PRE_OPERATIONAL
     return numbers
 
 
@@ -318,7 +325,7 @@ def _own_ms(bus: BusTable, node: NodeTable, numbers: Mapping[At, int]) -> int:
 
 def _why_active(numbers: Mapping[At, int], outputs: Mapping[At, _Output]) -> str:
     """Why the outputs would stay as they are when the node leaves Operational, or would not leave it."""
-    if numbers.get(_BEHAVIOUR, 0) == 1:
+    if numbers.get(_BEHAVIOUR, _PRE_OPERATIONAL) == _STAYS:
         return "it stays operational: 1029:01 is 1"
     return next((why for one in outputs.values() if (why := _why_one(numbers, one))), "")
 

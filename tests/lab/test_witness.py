@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.lab.sites import lab_site
+from tests.support.devices import DEVICES
 from tests.support.process import Process, drivebridge, peer, until
 from tests.support.sniffer import sniffing
 
@@ -23,13 +24,12 @@ ENABLED = "370B002000000000"
 class Watched:
     """A witness of the site, with what it has recorded. Nothing else runs yet."""
 
-    def __init__(self, folder: Path, stack: ExitStack, *options: str) -> None:
+    def __init__(self, folder: Path, stack: ExitStack, *options: str, more: str = "") -> None:
         self.folder = folder
         self.stack = stack
         # RPDOs every 20 ms, so that the machine has time for all of these processes.
-        self.site = lab_site(
-            folder, timeout_ms=400, bus="sync_period_ms = 20", node="own_timeout_ms = 500\nenforce = true"
-        )
+        own = "own_timeout_ms = 500\nenforce = true"
+        self.site = lab_site(folder, timeout_ms=400, bus="sync_period_ms = 20", node=own, more=more)
         self.record = folder / "record.jsonl"
         self.called = folder / "called"
         command = f"/bin/sh -c 'echo \"$DRIVEBRIDGE_SOURCE $DRIVEBRIDGE_KIND\" >>{self.called}'"
@@ -51,6 +51,12 @@ class Watched:
         owner = peer(self.folder, "modbus_owner", port, "1", "0.1", stamps, "0x047F", "0x2000")
         process = self.stack.enter_context(owner)
         process.wait_output("it runs", 30.0)
+        return process
+
+    def activate_outputs(self) -> Process:
+        owner = peer(self.folder, "output_owner", str(self.site.modbus_port), "4", "0.1", "0x08")
+        process = self.stack.enter_context(owner)
+        process.wait_output("active", 30.0)
         return process
 
     @property
@@ -139,6 +145,76 @@ def test_a_second_sender_is_told(tmp_path: Path, stack: ExitStack) -> None:
             bus.send(int(RPDO1, 16), bytes.fromhex(RUN))
             bus.send(int(RPDO1, 16), bytes.fromhex(STOP))
     watched.recorded(lambda line: line.get("alarm") == "intruder", "the intruder is recorded")
+
+
+IO = """
+[[bus.node]]
+name = "io"
+id = 21
+unit_id = 4
+mapping = "eds:io16.eds"
+own_timeout_ms = 500
+enforce = true
+[bus.node.outputs]
+control = "modbus"
+fieldbus_timeout_ms = 400
+"""
+OUTPUT_RPDO, ACTIVE, HEARTBEAT, OPERATIONAL = "215", "0800", "715", "05"
+
+
+@pytest.fixture
+def with_outputs(tmp_path: Path) -> Path:
+    (tmp_path / "io16.eds").write_bytes((DEVICES / "io16.eds").read_bytes())
+    return tmp_path
+
+
+def test_outputs_that_a_silent_controller_leaves_active_are_recorded_when_they_are_safe(
+    with_outputs: Path, stack: ExitStack
+) -> None:
+    watched = Watched(with_outputs, stack, more=IO)
+    watched.start()
+    owner = watched.activate_outputs()
+    time.sleep(1.0)
+    owner.signal(signal.SIGSTOP)
+    stop = watched.recorded(lambda line: line.get("cause") == "controller silent", "the stop is recorded")
+    assert (stop["stop"], stop["drive_ms"]) == ("io", None)
+    assert isinstance(stop["bus_ms"], int) and stop["bus_ms"] >= 250
+    assert isinstance(stop["bus_bound_ms"], int) and 460 <= stop["bus_bound_ms"] <= 490
+    alarms = [line for line in watched.lines if line.get("alarm") not in (None, "late", "blind")]
+    assert not alarms, alarms
+
+
+def test_a_killed_bridge_and_a_node_that_makes_its_outputs_safe_are_recorded(
+    with_outputs: Path, stack: ExitStack
+) -> None:
+    watched = Watched(with_outputs, stack, more=IO)
+    bridge = watched.start()
+    watched.activate_outputs()
+    bridge.signal(signal.SIGKILL)
+    stop = watched.recorded(lambda line: line.get("cause") == "bridge silent", "the stop is recorded")
+    assert stop["stop"] == "io"
+    assert isinstance(stop["drive_ms"], int) and stop["drive_ms"] >= 300
+
+
+def test_outputs_that_stay_active_without_a_bridge_are_told(with_outputs: Path, stack: ExitStack) -> None:
+    watched = Watched(with_outputs, stack, "--frames-only", more=IO)
+    send(OUTPUT_RPDO, ACTIVE)
+    for _ in range(20):
+        send(HEARTBEAT, OPERATIONAL)
+        time.sleep(0.1)
+    alarm = watched.recorded(lambda line: line.get("alarm") == "runs on", "the alarm is recorded")
+    assert alarm["source"] == "io"
+    assert watched.end() == 1
+
+
+def test_a_second_sender_of_outputs_is_told(with_outputs: Path, stack: ExitStack) -> None:
+    watched = Watched(with_outputs, stack, "--frames-only", more=IO)
+    with sniffing() as bus:
+        for _ in range(200):
+            bus.send(int(OUTPUT_RPDO, 16), bytes.fromhex(ACTIVE))
+            time.sleep(0.002)
+    alarm = watched.recorded(lambda line: line.get("alarm") == "intruder", "the intruder is recorded")
+    assert alarm["source"] == "io"
 
 
 def test_an_interface_that_is_not_there_is_said(tmp_path: Path, stack: ExitStack) -> None:

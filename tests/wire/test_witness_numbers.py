@@ -62,6 +62,18 @@ async def test_a_reading_has_the_number_and_the_time_out_in_force() -> None:
     assert all(one.asked_at <= one.answered_at for one in found)
 
 
+async def test_of_outputs_the_number_alone_is_asked_for() -> None:
+    """They have no register for a time-out that is in force."""
+    server = await served(make_plant())
+    numbers = Numbers(HOST, server.port, [1], [9])
+    try:
+        found = await readings(numbers, lambda found: len(found) >= 4)
+    finally:
+        numbers.close()
+        await server.close()
+    assert {one.unit: one.timeout_ms for one in found} == {1: 200, 9: None}
+
+
 async def test_a_bridge_that_is_not_there_is_lost_each_time() -> None:
     server = await served(make_plant())
     port = server.port

@@ -1,5 +1,5 @@
-"""The judgement of the witness over outputs: what is told of drives is told of them, and an honest node is left
-alone."""
+"""The judgement of the witness over outputs: what is told of drives is told of them, and an honest node is
+left alone."""
 
 from __future__ import annotations
 

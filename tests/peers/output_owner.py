@@ -1,8 +1,8 @@
 """A PLC: writes the first output of one unit again and again, over one Modbus TCP connection.
 
 output_owner.py PORT UNIT PERIOD_S VALUE
-Until the output is active it writes the safe value in between, and acknowledges a trip (a busy machine may have
-held it up); after that it never does.
+Until the output is active it writes the safe value in between, and acknowledges a trip (a busy machine may
+have held it up); after that it never does.
 """
 
 import sys

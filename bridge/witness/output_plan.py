@@ -20,6 +20,7 @@ from bridge.witness.description import At, Description, Unreadable, describe
 
 _RPDOS, _TPDOS = (0x1400, 0x1600), (0x1800, 0x1A00)
 _MOST_PDOS: Final = 512
+_MOST_MAPPED: Final = 64
 _OFF, _LONG = 0x8000_0000, 0x2000_0000
 """Flags of a COB-ID: the PDO is not used; 29 bits (CiA 301 §7.5.2.35)."""
 _DUMMIES: Final = range(0x0001, 0x0020)
@@ -164,10 +165,11 @@ def _described_outputs(description: Description, node: NodeTable) -> dict[At, _O
     """What its RPDOs carry, those that are switched off as well: all of them have names."""
     found: dict[At, _Output] = {}
     names: set[str] = set()
+    numbers, there = _numbers(description), {index for index, _ in description.entries}
     for number in range(_MOST_PDOS):
-        if not any(index == _RPDOS[0] + number for index, _ in description.entries):
+        if _RPDOS[0] + number not in there:
             continue
-        for index, sub, _ in _entries(_numbers(description), _RPDOS[1] + number):
+        for index, sub, _ in _entries(numbers, _RPDOS[1] + number):
             at = index, sub
             entry = description.entries.get(at)
             kind = _TYPES.get(entry.data_type or 0) if entry else None
@@ -286,7 +288,7 @@ def _safe(value: SafeValue, kind: str, factor: float = 1.0, offset: float = 0.0)
 
 def _entries(numbers: Mapping[At, int], mapping: int) -> Iterator[tuple[int, int, int]]:
     """Index, sub-index and bits of what a PDO carries."""
-    for sub in range(1, numbers.get((mapping, 0), 0) + 1):
+    for sub in range(1, min(numbers.get((mapping, 0), 0), _MOST_MAPPED) + 1):
         if word := numbers.get((mapping, sub), 0):
             yield word >> 16 & 0xFFFF, word >> 8 & 0xFF, word & 0xFF
 

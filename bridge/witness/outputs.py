@@ -13,7 +13,7 @@ from bridge.witness.findings import Alarm, Cause, Finding, Kind, Stop
 from bridge.witness.output_plan import Values
 from bridge.witness.owner import Owner
 from bridge.witness.plan import RAMP_MS, UNKNOWN_MS, WatchedOutputs
-from bridge.witness.rate import SPARE, WINDOW_S, Rate
+from bridge.witness.rate import SPARE, Rate
 from bridge.witness.services import RESET, RESET_COMMUNICATION, START, STOP, TAKES_OUT
 
 _BOOT_UP, _OPERATIONAL = 0x00, 0x05
@@ -50,7 +50,7 @@ class Outputs:
         self._unheard_at: float | None = None
         """They were told to be safe, and the node has said nothing since."""
         self._shows = dict.fromkeys(watched.tpdos, False)
-        self._shown_at: float | None = None
+        self._shown_at = 0.0
         """When a TPDO showed active outputs last."""
         self._shown_since: float | None = None
         self._heard_at: float | None = None
@@ -111,7 +111,7 @@ class Outputs:
         was_active, rpdo.is_active, self._rpdo_at = self._is_active, active, at
         self._told.discard((Kind.UNHEARD, "silence"))
         if active:
-            self._safe_at = self._unheard_at = None
+            self._safe_at = None
             self.owner.on_enabling(at)
         elif not self._is_active and self._safe_at is None:
             self._safe_at = at
@@ -136,7 +136,7 @@ class Outputs:
         self._on_heard(at)
         self._shows[can_id] = active
         if not any(self._shows.values()):
-            self._shown_since = self._shown_at = None
+            self._shown_since = None
             self._told -= {(kind, "") for kind in (Kind.RUNS_ON, Kind.IGNORED, Kind.UNTOLD)}
         elif active:
             self._shown_at = at
@@ -178,7 +178,7 @@ class Outputs:
         for rpdo in self._rpdos.values():
             rpdo.is_active = False
         self._shows = dict.fromkeys(self._shows, False)
-        self._shown_since = self._shown_at = self._unheard_at = self._active_out_at = self._out = None
+        self._shown_since = self._unheard_at = self._active_out_at = self._out = None
         self._told.clear()
 
     def on_nmt(self, command: int, at: float) -> None:
@@ -206,12 +206,13 @@ class Outputs:
         """RPDOs that change more often than telegrams come."""
         told = self.owner.telegrams()
         for can_id, rpdo in self._rpdos.items():
-            while rpdo.changes and rpdo.changes[0] < now - WINDOW_S:
-                rpdo.changes.popleft()
             if told is None:
+                rpdo.changes.clear()
                 continue
             telegrams, first_at, last_at = told
-            if sum(first_at < at < last_at for at in rpdo.changes) > telegrams + SPARE:
+            while rpdo.changes and rpdo.changes[0] <= first_at:
+                rpdo.changes.popleft()
+            if sum(at < last_at for at in rpdo.changes) > telegrams + SPARE:
                 rpdo.changes.clear()
                 message = f"RPDO {can_id:03X}h changes more often than its owner sends telegrams"
                 self._alarm(Kind.INTRUDER, now, f"{message}: somebody else sends it, too")
@@ -219,7 +220,7 @@ class Outputs:
     def _judge_shown(self, now: float) -> None:
         """A TPDO that shows active outputs longer than it may."""
         seen, since, watched = self._shown_at, self._shown_since, self._watched
-        if seen is None or since is None:
+        if since is None:
             return
         if self._rpdo_at is None:
             if seen - since > _UNSEEN_S:

@@ -61,7 +61,7 @@ class Owner:
             # The first reading says only that there may have been one just now.
             self._telegram_at = answered_at
             self._number = number
-            self._late_at, self._is_told = None, False
+            self._is_told = False
         self._read_at = asked_at
         self._readings.append((asked_at, answered_at, number))
         while self._readings[0][0] < asked_at - WINDOW_S:
@@ -84,7 +84,7 @@ class Owner:
         if self._is_told or telegram is None or late is None or read is None or read < late:
             return ""
         if not self._is_late(late):
-            # The time-out had been changed meanwhile.
+            # The time-out had been changed meanwhile, or a telegram was there.
             self._late_at = None
             return ""
         self._is_told = True

@@ -615,3 +615,194 @@ def test_an_honest_node_is_left_alone(events: list[str]) -> None:
             plant.state, plant.digital = PRE_OPERATIONAL, None
             plant.run(0.5)
     assert not plant.alarms
+
+
+# what goes on, and what comes again
+
+
+def test_nmt_of_another_node_is_not_theirs() -> None:
+    plant = moving(KEEPS)
+    plant.send(NMT, b"\x02\x05")
+    plant.run(3.0)
+    assert [alarm.source for alarm in plant.alarms] == ["can0"]
+
+
+def test_telegrams_of_long_ago_are_no_reason() -> None:
+    plant = moving()
+    plant.run(20.0)
+    for _ in range(50):
+        plant.watch.on_frame(DIGITAL, b"\xff\x00", plant.now + 0.005)
+        plant.run(0.01)
+    assert set(plant.kinds) == {Kind.INTRUDER}
+
+
+def test_new_values_may_come_as_often_as_their_owner_likes() -> None:
+    plant = moving()
+    for n in range(400):
+        plant.watch.on_frame(DIGITAL, n.to_bytes(2, "little"), plant.now + 0.005)
+        plant.number += 2
+        plant.run(0.01)
+    assert not plant.alarms
+
+
+def test_an_owner_may_switch_over_the_end_of_the_count() -> None:
+    plant = Plant()
+    plant.number = 0xFFF0
+    for n in range(400):
+        plant.digital = ACTIVE if n % 2 else SAFE
+        plant.number = (plant.number + 1) & 0xFFFF
+        plant.run(0.01)
+    assert not plant.alarms
+
+
+def test_after_an_outage_telegrams_are_counted_anew() -> None:
+    """Another bridge may count from another number: no telegrams came between the two."""
+    plant = moving()
+    plant.watch.on_numbers_lost()
+    plant.number += 1000
+    for _ in range(60):
+        plant.watch.on_frame(DIGITAL, b"\xff\x00", plant.now + 0.005)
+        plant.run(0.01)
+    assert Kind.INTRUDER in plant.kinds
+
+
+def test_who_sends_other_values_between_ours_is_told_now_and_then() -> None:
+    plant = moving()
+    for _ in range(100):
+        plant.watch.on_frame(DIGITAL, b"\xff\x00", plant.now + 0.005)
+        plant.run(0.01)
+    assert 1 <= len(plant.alarms) <= 15
+
+
+def test_one_of_two_rpdos_is_not_all() -> None:
+    plant = moving()
+    plant.analogue = bytes.fromhex("E803 0000")
+    plant.run(0.1)
+    plant.writes = False
+    plant.run(0.2)
+    plant.digital = SAFE
+    plant.run(0.02)
+    assert not plant.stops
+    plant.analogue = HELD
+    plant.run(0.02)
+    assert len(plant.stops) == 1
+
+
+def test_a_silent_owner_of_safe_outputs_is_no_stop() -> None:
+    plant = moving()
+    plant.digital = SAFE
+    plant.run(0.1)
+    plant.writes = False
+    plant.run(3.0)
+    assert not plant.stops
+
+
+def test_the_first_rpdo_that_is_seen_stops_nothing() -> None:
+    plant = Plant()
+    plant.digital = plant.analogue = None
+    plant.run(3.0)
+    plant.digital = SAFE
+    plant.run(1.0)
+    assert not plant.stops
+
+
+def test_outputs_that_follow_late_are_told_each_time() -> None:
+    plant = moving(SHOWN)
+    for count in (1, 2):
+        plant.digital = plant.analogue = None
+        plant.run(1.0)
+        assert plant.kinds == [Kind.RUNS_ON] * count
+        plant.tpdo = SAFE
+        plant.digital, plant.analogue = ACTIVE, HELD
+        plant.run(0.1)
+        plant.tpdo = ACTIVE
+
+
+def test_a_reset_of_its_communication_leaves_them_active() -> None:
+    plant = moving(KEEPS)
+    plant.digital = plant.analogue = None
+    plant.run(0.55)
+    plant.send(NMT, RESET_COMMUNICATION)
+    plant.send(HEARTBEAT, BOOT_UP)
+    plant.state = PRE_OPERATIONAL
+    plant.run(0.4)
+    assert plant.kinds == [Kind.UNHEARD]
+
+
+def test_a_stopped_node_has_them_off() -> None:
+    plant = moving(replace(IO, silent_ms=0))
+    plant.digital = plant.analogue = None
+    plant.run(0.55)
+    plant.send(NMT, STOP)
+    plant.state = STOPPED
+    plant.run(0.5)
+    plant.state = None
+    plant.run(5.0)
+    assert not plant.alarms
+
+
+def test_a_stopped_node_of_which_nothing_is_heard_is_left_alone() -> None:
+    plant = moving(replace(IO, lost_ms=0))
+    plant.digital = plant.analogue = None
+    plant.run(0.55)
+    plant.send(NMT, STOP)
+    plant.state = None
+    plant.run(5.0)
+    assert not plant.alarms
+
+
+def test_a_node_that_leaves_by_itself_is_no_dead_bridge() -> None:
+    plant = moving()
+    plant.state = PRE_OPERATIONAL
+    plant.run(0.1)
+    assert not plant.stops
+
+
+def test_a_bridge_that_dies_with_safe_outputs_is_no_stop() -> None:
+    plant = moving()
+    plant.digital = SAFE
+    plant.run(0.2)
+    plant.die()
+    plant.run(0.6)
+    plant.state = PRE_OPERATIONAL
+    plant.run(0.2)
+    assert not plant.stops
+
+
+def test_each_time_that_it_is_taken_out_is_told() -> None:
+    plant = moving(KEEPS)
+    for count in (1, 2):
+        plant.digital = plant.analogue = None
+        plant.run(0.55)
+        plant.send(NMT, OUT)
+        plant.digital, plant.analogue = SAFE, HELD
+        plant.state = PRE_OPERATIONAL
+        plant.run(0.7)
+        assert plant.kinds == [Kind.UNHEARD] * count
+        plant.send(NMT, START)
+        plant.state = OPERATIONAL
+        plant.digital = ACTIVE
+        plant.run(0.5)
+
+
+def test_a_repeated_command_does_not_put_it_off() -> None:
+    plant = moving(KEEPS)
+    plant.digital = plant.analogue = None
+    plant.run(0.55)
+    plant.digital, plant.analogue, plant.state = ACTIVE, HELD, PRE_OPERATIONAL
+    for _ in range(3):
+        plant.watch.on_frame(NMT, OUT, plant.now)
+        plant.run(0.25)
+    plant.alarms = [alarm for alarm in plant.alarms if alarm.kind is not Kind.INTRUDER]
+    assert plant.kinds == [Kind.UNHEARD]
+
+
+def test_outputs_that_come_on_by_themselves_have_their_time() -> None:
+    plant = moving(SHOWN)
+    plant.digital = plant.tpdo = SAFE
+    plant.run(2.0)
+    plant.tpdo = ACTIVE
+    plant.run(0.4)
+    assert not plant.alarms
+    plant.run(0.2)
+    assert plant.kinds == [Kind.IGNORED]

@@ -438,3 +438,82 @@ def test_two_stops_are_judged_by_themselves(plant: Plant) -> None:
         plant.rpdo = RUN
         plant.run(0.6)
     assert not plant.alarms
+
+
+def test_two_producers_of_sync_are_told_now_and_then(plant: Plant) -> None:
+    plant.beats = 2
+    plant.run(4.0)
+    assert 1 <= len(plant.alarms) <= 5
+
+
+def test_a_telegram_that_was_not_read_in_time_is_no_lateness(plant: Plant) -> None:
+    plant.answers = False
+    plant.run(0.4)
+    plant.answers = True
+    plant.run(1.0)
+    assert not plant.alarms
+
+
+def test_lost_numbers_are_forgotten(plant: Plant) -> None:
+    """The first one that is told again may be of a telegram that has just come."""
+    plant.writes = False
+    plant.run(0.05)
+    plant.answers = False
+    plant.watch.on_numbers_lost()
+    plant.run(0.5)
+    plant.answers = True
+    plant.run(0.15)
+    assert not plant.alarms
+
+
+def test_a_shorter_time_out_gives_the_bridge_its_time() -> None:
+    plant = heard(replace(HEARD, beside_ms=140))
+    plant.timeout_ms = 2000
+    plant.run(1.0)
+    plant.writes = False
+    plant.run(0.5)
+    plant.timeout_ms = 200
+    plant.run(0.12)
+    assert not plant.alarms
+    plant.run(0.2)
+    assert plant.kinds == [Kind.LATE]
+
+
+def test_each_lateness_is_told(plant: Plant) -> None:
+    for count in (1, 2):
+        plant.writes = False
+        plant.run(0.5)
+        assert plant.kinds == [Kind.LATE] * count
+        plant.writes = True
+        plant.run(0.5)
+
+
+def test_late_is_told_from_the_first(plant: Plant) -> None:
+    """RPDOs go on while the number is asked for."""
+    plant.writes = False
+    plant.run(0.15)
+    plant.answers = False
+    plant.run(0.5)
+    plant.answers = True
+    plant.run(0.1)
+    after_ms = int(plant.alarms[0].message.removeprefix("told to run ").split()[0])
+    assert BOUND_MS < after_ms <= BOUND_MS + 20
+
+
+def test_without_a_time_out_no_stop_is_one_of_a_silent_owner(plant: Plant) -> None:
+    plant.timeout_ms = 0
+    plant.writes = False
+    plant.run(5.0)
+    plant.rpdo = STOP
+    plant.run(0.1)
+    plant.tpdo = READY
+    plant.run(0.1)
+    assert plant.stops[0].cause is Cause.COMMAND
+    assert not plant.alarms
+
+
+def test_where_nothing_is_promised_nothing_is_late() -> None:
+    plant = heard(replace(HEARD, beside_ms=None))
+    plant.writes = False
+    plant.run(5.0)
+    assert not plant.alarms

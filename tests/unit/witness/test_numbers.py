@@ -261,3 +261,11 @@ def test_an_answer_of_another_length_is_no_modbus(wire: Wire) -> None:
     one.arrives = [struct.pack(">HHHBBBHH", 1, 0, 7, 1, INPUTS, 4, 5, 6)]
     assert asks.receive(10.06) == []
     assert asks.why == "no Modbus"
+
+
+def test_who_has_answered_all_is_not_lost(wire: Wire) -> None:
+    asks, one = connected(wire)
+    one.arrives = [answer(1, HOLDING, 1500) + answer(1, INPUTS, 77)]
+    asks.receive(10.06)
+    asks.on_time(12.0)
+    assert not asks.take_lost()

@@ -12,7 +12,7 @@ from bridge.drive.own_supervision import OwnVerdict
 from bridge.lint import lint
 from bridge.lint.own import WorstCase
 from bridge.project import load_project
-from bridge.witness.plan import WatchedOutputs, plan
+from bridge.witness.plan import UnknownFamily, WatchedOutputs, plan
 from tests.support import sites
 from tests.support.devices import DEVICES
 
@@ -543,3 +543,150 @@ def test_a_mapping_file_that_cannot_be_read_is_said(tmp_path: Path, base: str, w
 def test_a_mapping_that_extends_itself_ends(tmp_path: Path) -> None:
     found = mapped(tmp_path, base=BASE.replace("generic/device", "acme/io"))
     assert set(found.rpdos) == {DIGITAL, ANALOGUE}
+
+
+# what is odd
+
+
+def test_a_node_with_drives_has_no_outputs(tmp_path: Path) -> None:
+    drive = sites.node(sites.drive("fu1", "modbus", 200), mapping="acme/io")
+    mapped(tmp_path)
+    path = sites.write(tmp_path, sites.bus(drive), sites.modbus(0))
+    with pytest.raises(UnknownFamily):
+        plan(load_site(path), tmp_path)
+    path = sites.write(tmp_path, sites.bus(sites.node(sites.drive("fu1", "modbus", 200))), sites.modbus(0))
+    assert not plan(load_site(path), tmp_path)[0].outputs
+
+
+def test_what_is_on_hold_is_never_active(tmp_path: Path) -> None:
+    outputs = f'{OWNED}on_expiry = {{ digital_outputs_1_to_8 = "hold" }}'
+    values = watched(tmp_path, outputs=outputs).rpdos[DIGITAL]
+    assert values.are_active(b"\xff\x00") is False
+    assert values.are_active(b"\x00\x01") is True
+
+
+def test_a_safe_value_that_does_not_fit_is_said(tmp_path: Path) -> None:
+    eds = with_value("6411sub1", "0x0008", "DataType")
+    outputs = f"{OWNED}on_expiry = {{ analogue_output_1 = 1e300 }}"
+    assert watched(tmp_path, outputs=outputs, eds=eds).why_unknown
+
+
+def test_the_slowest_tpdo_counts(tmp_path: Path) -> None:
+    eds = with_value("1800sub5", "200", eds=with_value("1A00sub2", "0x62000108"))
+    eds = with_value("1801sub5", "300", eds=with_value("1A01sub1", "0x64110110", eds=eds))
+    assert watched(tmp_path, eds=eds).follow_ms == 3 * 300 + 500
+
+
+def test_a_mapping_without_its_rpdo_names_nothing(tmp_path: Path) -> None:
+    """The bridge does not count it: the name of the next one is free."""
+    eds = EDS.replace("[1400", "[2400").replace("[1600", "[1602").replace("[1402", "[1400")
+    eds = eds.replace("Analogue output 1", "Digital outputs 1 to 8")
+    found = watched(tmp_path, outputs=f'{OWNED}on_expiry = {{ {ANALOGUE_NAME} = "hold" }}', eds=eds)
+    assert set(found.rpdos) == {ANALOGUE}
+    assert found.rpdos[ANALOGUE].mask == 0xFFFF_0000
+
+
+ANALOGUE_NAME = "analogue_output_digital_outputs_1_to_8"
+
+
+def test_a_dummy_that_is_described_is_no_output(tmp_path: Path) -> None:
+    """CiA 301 §7.4.7: it fills a gap."""
+    eds = with_value("1600sub1", "0x00050008")
+    eds += "\n[0005]\nParameterName=Unsigned 8\nObjectType=7\nDataType=0x0005\nDefaultValue=0\n"
+    assert watched(tmp_path, eds=eds).rpdos[DIGITAL].mask == 0xFF00
+
+
+def test_what_is_mapped_twice_is_one_output(tmp_path: Path) -> None:
+    eds = with_value("1600sub2", "0x62000108")
+    outputs = f"{OWNED}on_expiry = {{ digital_outputs_1_to_8 = 1 }}"
+    assert watched(tmp_path, outputs=outputs, eds=eds).rpdos[DIGITAL].safe == 0x0101
+
+
+def test_a_parameter_of_the_same_name_is_no_output(tmp_path: Path) -> None:
+    text = MAPPING.replace("[family]", 'without = ["parameter:pressure"]\n[family]', 1)
+    assert set(mapped(tmp_path, text).rpdos) == {DIGITAL, ANALOGUE}
+
+
+def test_an_object_may_have_no_sub_index(tmp_path: Path) -> None:
+    more = (
+        'configure = [{ object = "1400:01", type = "uint32", value = 0x345 }, '
+        '{ object = "1600:00", type = "uint8", value = 1 }, '
+        '{ object = "1600:01", type = "uint32", value = 0x24110010 }]'
+    )
+    found = mapped(tmp_path, base=BASE.replace("6411:01", "2411"), more=more)
+    assert found.rpdos[0x345].mask == 0xFFFF
+
+
+def test_the_default_rpdos_are_those_with_outputs(tmp_path: Path) -> None:
+    more = 'configure = [{ object = "1602:01", type = "uint32", value = 0x62000108 }]'
+    found = mapped(tmp_path, more=more)
+    assert set(found.rpdos) == {DIGITAL, ANALOGUE}
+    more = more.replace("}]", '}, { object = "1602:00", type = "uint8", value = 1 }]')
+    assert set(mapped(tmp_path, more=more).rpdos) == {DIGITAL, ANALOGUE}
+
+
+def test_a_text_in_a_configuration_file_is_no_number(tmp_path: Path) -> None:
+    dcf = with_value("1400sub1", "later", "ParameterValue")
+    (tmp_path / "io.dcf").write_text(dcf, encoding="utf-8")
+    assert set(watched(tmp_path, 'configuration = "io.dcf"').rpdos) == {DIGITAL, ANALOGUE}
+
+
+def test_a_bit_has_no_scale(tmp_path: Path) -> None:
+    base = BASE.replace('data_type = "int16"', 'data_type = "bool"').replace("6411:01", "6220:01")
+    more = (
+        'configure = [{ object = "1401:01", type = "uint32", value = 0x315 }, '
+        '{ object = "1601:00", type = "uint8", value = 1 }, '
+        '{ object = "1601:01", type = "uint32", value = 0x62200101 }]'
+    )
+    found = mapped(tmp_path, base=base, more=more, outputs=f"{OWNED}on_expiry = {{ pressure = true }}")
+    assert (found.rpdos[ANALOGUE].mask, found.rpdos[ANALOGUE].safe) == (1, 1)
+
+
+def test_an_empty_place_is_no_output(tmp_path: Path) -> None:
+    eds = with_value("1600sub2", "0")
+    eds += "\n[0000]\nParameterName=None\nObjectType=7\nDataType=0x0005\nDefaultValue=0\n"
+    assert watched(tmp_path, eds=eds).rpdos[DIGITAL].mask == 0xFF
+    found = watched(tmp_path, eds=with_value("1600sub1", ""))
+    assert (found.rpdos[DIGITAL].bytes, found.rpdos[DIGITAL].mask) == (1, 0xFF)
+
+
+def test_no_more_is_mapped_than_there_may_be(tmp_path: Path) -> None:
+    """CiA 301 §7.5.2.36: 64 at the most, whatever a file says."""
+    eds = with_value("1600sub0", "0xFFFFFFFF")
+    assert watched(tmp_path, eds=eds).rpdos[DIGITAL].mask == 0xFFFF
+
+
+def test_a_mark_before_a_section_is_none(tmp_path: Path) -> None:
+    path = written(tmp_path, io())
+    at = EDS.index("[1400sub1]")
+    section = EDS[at : EDS.index("[1400sub2]")]
+    text = section + EDS.replace(section, "")
+    (tmp_path / "io.eds").write_bytes(text.encode("utf-8-sig"))
+    (bus,) = plan(load_site(path), tmp_path)
+    assert set(bus.outputs[0].rpdos) == {DIGITAL, ANALOGUE}
+
+
+def test_a_comment_is_no_key(tmp_path: Path) -> None:
+    eds = EDS.replace("[1400sub1]\n", "[1400sub1]\n#DefaultValue=1\n;DefaultValue=1\n")
+    assert set(watched(tmp_path, eds=eds).rpdos) == {DIGITAL, ANALOGUE}
+
+
+def test_an_empty_key_is_none(tmp_path: Path) -> None:
+    eds = EDS.replace("[1400sub1]\n", "[1400sub1]\nDefaultValue=\n")
+    assert set(watched(tmp_path, eds=eds).rpdos) == {DIGITAL, ANALOGUE}
+
+
+def test_other_elements_of_an_object_are_none(tmp_path: Path) -> None:
+    eds = XDD.replace('objectType="9">', 'objectType="9">\n <Label lang="en" />')
+    assert set(watched(tmp_path, eds=eds).rpdos) == {0x345}
+
+
+def test_an_xdd_has_hexadecimal_types(tmp_path: Path) -> None:
+    """0011h is a REAL64."""
+    eds = XDD.replace(
+        'dataType="0005">\n <CANopenSubObject subIndex="01" name="V',
+        'dataType="0011">\n <CANopenSubObject subIndex="01" name="V',
+    )
+    eds = eds.replace("0x62000108", "0x62000140")
+    found = watched(tmp_path, eds=eds)
+    assert found.rpdos[0x345].mask == (1 << 64) - 1

@@ -13,7 +13,7 @@ from bridge.lint import lint
 from bridge.mapping import load_family
 from bridge.mapping.loader import family_names
 from bridge.project import load_project
-from bridge.witness.plan import UnknownFamily, WatchedDrive, plan
+from bridge.witness.plan import Speed, UnknownFamily, WatchedBus, WatchedDrive, plan
 from tests.support import sites
 from tests.support.devices import DEVICES
 
@@ -136,3 +136,155 @@ def test_a_node_without_drives_has_a_unit(tmp_path: Path) -> None:
     plant = Plant(project.site, project.families, "0")
     assert [one.unit_id for one in bus.drives] == list(plant.by_unit) == [3]
     assert {one.name: one.unit_id for one in plant.devices.values()} == {"shaft": 2, "other": 1}
+
+
+def bus_of(folder: Path, node: str, more: str = "", *, own: int | None = None) -> WatchedBus:
+    path = sites.write(folder, sites.bus(node, more=more), sites.modbus(0))
+    (bus,) = plan(load_site(path), folder, own_timeout_ms=own)
+    return bus
+
+
+FU1 = sites.drive("fu1", "modbus", 200)
+
+
+def test_a_frame_that_is_too_short_has_no_speed() -> None:
+    assert Speed(2, 2).of(b"\x37\x0b\x00") is None
+
+
+def test_a_speed_has_a_sign() -> None:
+    assert Speed(2, 2).of(bytes.fromhex("37 0B FE FF 01")) == -2
+
+
+@pytest.mark.parametrize("mapping", ["cia402/acme", "cia402/velocity"])
+def test_every_mapping_of_a_folder_is_its_family(tmp_path: Path, mapping: str) -> None:
+    assert watched(tmp_path, mapping, "drive").status.mask == 0x006F
+
+
+@pytest.mark.parametrize("mapping", ["nord/sk-tu4-cao-mine", "acme/cia402/"])
+def test_a_name_that_only_begins_like_a_family_is_none(tmp_path: Path, mapping: str) -> None:
+    with pytest.raises(UnknownFamily):
+        watched(tmp_path, mapping, "fu1")
+
+
+def test_a_node_that_is_not_used_has_no_drives(tmp_path: Path) -> None:
+    assert not bus_of(tmp_path, sites.node(FU1, more="enabled = false")).drives
+
+
+@pytest.mark.parametrize(("sync", "heartbeat"), [(10, 0), (0, 100), (20, 50)])
+def test_what_the_bridge_sends_alone_is_watched(tmp_path: Path, sync: int, heartbeat: int) -> None:
+    bus = bus_of(
+        tmp_path,
+        sites.node(FU1),
+        f"sync_period_ms = {sync}\nheartbeat_ms = {heartbeat}\nmaster_node_id = 126",
+    )
+    assert {can_id: period for can_id, (_, period) in bus.beats.items()} == {
+        can_id: period for can_id, period in ((0x080, sync), (0x77E, heartbeat)) if period
+    }
+
+
+def test_what_the_bridge_does_not_send_is_not_watched(tmp_path: Path) -> None:
+    assert not bus_of(tmp_path, sites.node(FU1), "sync_period_ms = 0\nheartbeat_ms = 0").beats
+
+
+def test_a_time_out_that_nobody_may_set_is_the_sites(tmp_path: Path) -> None:
+    assert watched(tmp_path, "nord/sk-tu4-cao", "fu1").timeout_ms == 200
+
+
+@pytest.mark.parametrize(
+    ("node", "drive", "own", "silent_ms"),
+    [
+        ("", "", None, 0),
+        ("", "", 500, 1000),
+        ("own_timeout_ms = 400", "", 500, 900),
+        ("own_timeout_ms = 400", "tpdo = { event_ms = 50 }", None, 450),
+        ("own_timeout_ms = 400", "tpdo_deadline_ms = 70", None, 470),
+        ("own_timeout_ms = 400", "tpdo = [{ event_ms = 50 }, { number = 2, event_ms = 90 }]", None, 490),
+        ("own_timeout_ms = 400", "tpdo = { transmission_type = 1 }\ntpdo_deadline_ms = 70", None, 470),
+    ],
+)
+def test_after_what_time_a_drive_stops_by_itself(
+    tmp_path: Path, node: str, drive: str, own: int | None, silent_ms: int
+) -> None:
+    """One TPDO later that is seen."""
+    bus = bus_of(tmp_path, sites.node(sites.drive("fu1", "modbus", 200, drive), more=node), own=own)
+    assert bus.drives[0].silent_ms == silent_ms
+
+
+@pytest.mark.parametrize(
+    ("node", "drive", "lost_ms"),
+    [
+        ("supervision_ms = 300", "", 1300),
+        ("supervision_ms = 300\nlife_time_factor = 4", "", 1300),
+        ('supervision = "guarding"\nsupervision_ms = 300\nlife_time_factor = 4', "", 2200),
+        ('supervision = "none"', "tpdo = { event_ms = 50 }", 1150),
+        ('supervision = "none"', "tpdo = { transmission_type = 1 }", 0),
+    ],
+)
+def test_after_what_time_a_drive_is_cut_off(tmp_path: Path, node: str, drive: str, lost_ms: int) -> None:
+    bus = bus_of(tmp_path, sites.node(sites.drive("fu1", "modbus", 200, drive), more=node))
+    assert bus.drives[0].lost_ms == lost_ms
+
+
+def test_drives_are_called_as_the_bridge_calls_them(tmp_path: Path) -> None:
+    named = sites.drive("fu2", "modbus", 200, 'name = "lift"')
+    assert [one.name for one in bus_of(tmp_path, sites.node(FU1, named)).drives] == [
+        "conveyor/fu1",
+        "conveyor/lift",
+    ]
+    assert [one.name for one in bus_of(tmp_path, sites.node(FU1)).drives] == ["conveyor/drive"]
+
+
+@pytest.mark.parametrize(
+    ("mapping", "slot", "stops"), [("nord/sk-tu4-cao", "fu1", False), ("cia402/velocity", "drive", True)]
+)
+def test_which_drives_nmt_stops(tmp_path: Path, mapping: str, slot: str, stops: bool) -> None:
+    assert watched(tmp_path, mapping, slot).nmt_stops is stops
+
+
+@pytest.mark.parametrize(
+    ("mapping", "slot", "speed"),
+    [
+        ("nord/sk-tu4-cao", "fu1", Speed(2, 2)),
+        ("nord/sk-tu4-cao-posicon", "fu1", None),
+        ("cia402/profile-velocity", "drive", Speed(2, 4)),
+    ],
+)
+def test_which_drives_tell_their_speed(tmp_path: Path, mapping: str, slot: str, speed: Speed | None) -> None:
+    assert watched(tmp_path, mapping, slot).speed == speed
+
+
+def beside_ms(folder: Path, *nodes: str, more: str = "") -> int:
+    found = bus_of(folder, "".join(nodes), more).drives[0].beside_ms
+    assert found is not None
+    return found
+
+
+def test_nodes_that_are_not_used_send_nothing(tmp_path: Path) -> None:
+    unused = sites.node(FU1, name="spare", node_id=6, more="enabled = false")
+    assert beside_ms(tmp_path, sites.node(FU1), unused) == beside_ms(tmp_path, sites.node(FU1))
+
+
+def test_a_full_bus_is_reckoned_with_to_an_end(tmp_path: Path) -> None:
+    """Five frames of 13.5 ms for the bus, the node and the drive, on a fifth of it."""
+    rate = "bitrate = 10000\nsync_period_ms = 10"
+    assert beside_ms(tmp_path, sites.node(FU1), more=rate) == 2 * 10 + 20 + 15 * 13.5 / 0.2 + 0.5
+    assert (
+        beside_ms(tmp_path, sites.node(FU1), more="bitrate = 10000\nsync_period_ms = 100\ndeadman_ms = 300")
+        == 498
+    )
+
+
+def test_a_foreign_interface_has_a_queue(tmp_path: Path) -> None:
+    tables = [
+        sites.bus(sites.node(FU1), interface=name, more='channel = "x"') for name in ("socketcan", "pcan")
+    ]
+    own, foreign = (
+        plan(load_site(sites.write(tmp_path, table, sites.modbus(0))), tmp_path)[0].drives[0].beside_ms
+        for table in tables
+    )
+    assert own is not None and foreign == own + 50
+
+
+def test_the_identifiers_of_the_site_file_count_where_it_has_them(tmp_path: Path) -> None:
+    drive = watched(tmp_path, "nord/sk-tu4-cao", "fu1", "tpdo = { event_ms = 100 }")
+    assert drive.tpdo == 0x185

@@ -103,7 +103,7 @@ def _ini(text: str) -> Iterator[tuple[tuple[int, int | None], dict[str, str]]]:
             if match:
                 sub = None if match[2] is None else int(match[2], 16)
                 keys = found.setdefault((int(match[1], 16), sub), {})
-        elif keys is not None and not line.startswith((";", "#")):
+        elif keys is not None:
             key, _, value = line.partition("=")
             if value.strip():
                 keys.setdefault(key.strip().lower(), value.strip())

@@ -114,7 +114,7 @@ class _Unknown(Exception):
 
 
 def output_frames(bus: BusTable, node: NodeTable, folder: Path) -> OutputFrames | None:
-    """Of a node without drives, whose site file is in ``folder``; None where it has no outputs."""
+    """Of a node, whose site file is in ``folder``; None where it has no outputs."""
     try:
         if node.mapping.startswith("eds:"):
             description = _described(folder / node.mapping.removeprefix("eds:"), node.id)
@@ -289,8 +289,8 @@ def _safe(value: SafeValue, kind: str, factor: float = 1.0, offset: float = 0.0)
 def _entries(numbers: Mapping[At, int], mapping: int) -> Iterator[tuple[int, int, int]]:
     """Index, sub-index and bits of what a PDO carries."""
     for sub in range(1, min(numbers.get((mapping, 0), 0), _MOST_MAPPED) + 1):
-        if word := numbers.get((mapping, sub), 0):
-            yield word >> 16 & 0xFFFF, word >> 8 & 0xFF, word & 0xFF
+        word = numbers.get((mapping, sub), 0)
+        yield word >> 16 & 0xFFFF, word >> 8 & 0xFF, word & 0xFF
 
 
 def _pdos(

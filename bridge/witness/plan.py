@@ -188,18 +188,15 @@ def plan(site: Site, folder: Path, *, own_timeout_ms: int | None = None) -> list
 def _bus(
     bus: BusTable, folder: Path, units: dict[tuple[str, int], int], own_timeout_ms: int | None
 ) -> WatchedBus:
-    plain = [node for node in bus.node if node.enabled and not node.drive]
-    known = {node.name: frames for node in plain if (frames := output_frames(bus, node, folder))}
-    beside_ms = _beside_ms(bus, sum(len(frames.rpdos) for frames in known.values()))
+    used = [node for node in bus.node if node.enabled]
+    known = [(node, frames) for node in used if (frames := output_frames(bus, node, folder))]
+    beside_ms = _beside_ms(bus, sum(len(frames.rpdos) for _, frames in known))
     outputs = [
-        _outputs(bus, node, known[node.name], units[node.name, 0], beside_ms, own_timeout_ms)
-        for node in plain
-        if node.name in known
+        _outputs(bus, node, frames, units[node.name, 0], beside_ms, own_timeout_ms) for node, frames in known
     ]
     drives = [
         _drive(bus, node, table, _family(node.mapping), units[node.name, place], beside_ms, own_timeout_ms)
-        for node in bus.node
-        if node.enabled
+        for node in used
         for place, table in enumerate(node.drive)
     ]
     beats: dict[int, tuple[str, int]] = {}

@@ -129,7 +129,7 @@ def test_a_reading_has_both_and_when_they_were_asked_for(wire: Wire) -> None:
 def test_an_answer_may_come_in_parts(wire: Wire) -> None:
     asks, one = connected(wire)
     whole = answer(1, HOLDING, 1500) + answer(1, INPUTS, 77)
-    one.arrives = [whole[:3], whole[3:16], whole[16:]]
+    one.arrives = [whole[:3], whole[3:20], whole[20:]]
     assert [len(asks.receive(10.06 + n)) for n in range(3)] == [0, 0, 1]
 
 

@@ -331,12 +331,8 @@ def test_where_nothing_is_promised_nothing_is_expected(tmp_path: Path, outputs: 
 
 
 def test_their_frames_may_go_first(tmp_path: Path) -> None:
-    drive = sites.node(sites.drive("fu1", "modbus", 200))
-    alone, beside = (
-        plan(load_site(written(tmp_path, *nodes)), tmp_path)[0].drives[0].beside_ms
-        for nodes in ((drive,), (drive, io()))
-    )
-    assert alone is not None and beside is not None and beside > alone
+    one, two = (watched(tmp_path, eds=eds).beside_ms for eds in (with_value("1401sub1", "0x80000000"), EDS))
+    assert one is not None and two is not None and two > one
 
 
 def test_units_are_those_of_the_reference(tmp_path: Path) -> None:
@@ -578,15 +574,11 @@ def test_the_slowest_tpdo_counts(tmp_path: Path) -> None:
 
 
 def test_a_mapping_without_its_rpdo_names_nothing(tmp_path: Path) -> None:
-    """The bridge does not count it: the name of the next one is free."""
-    eds = EDS.replace("[1400", "[2400").replace("[1600", "[1602").replace("[1402", "[1400")
-    eds = eds.replace("Analogue output 1", "Digital outputs 1 to 8")
-    found = watched(tmp_path, outputs=f'{OWNED}on_expiry = {{ {ANALOGUE_NAME} = "hold" }}', eds=eds)
-    assert set(found.rpdos) == {ANALOGUE}
+    """The bridge does not count it: the name is free for the next one."""
+    eds = with_value("1600sub1", "0x24000008").replace("[1400", "[2401")
+    eds += "\n[2400]\nParameterName=Analogue output 1\nObjectType=7\nDataType=0x0005\nDefaultValue=0\n"
+    found = watched(tmp_path, outputs=f'{OWNED}on_expiry = {{ analogue_output_1 = "hold" }}', eds=eds)
     assert found.rpdos[ANALOGUE].mask == 0xFFFF_0000
-
-
-ANALOGUE_NAME = "analogue_output_digital_outputs_1_to_8"
 
 
 def test_a_dummy_that_is_described_is_no_output(tmp_path: Path) -> None:
@@ -643,17 +635,19 @@ def test_a_bit_has_no_scale(tmp_path: Path) -> None:
 
 
 def test_an_empty_place_is_no_output(tmp_path: Path) -> None:
-    eds = with_value("1600sub2", "0")
-    eds += "\n[0000]\nParameterName=None\nObjectType=7\nDataType=0x0005\nDefaultValue=0\n"
-    assert watched(tmp_path, eds=eds).rpdos[DIGITAL].mask == 0xFF
     found = watched(tmp_path, eds=with_value("1600sub1", ""))
     assert (found.rpdos[DIGITAL].bytes, found.rpdos[DIGITAL].mask) == (1, 0xFF)
 
 
 def test_no_more_is_mapped_than_there_may_be(tmp_path: Path) -> None:
     """CiA 301 §7.5.2.36: 64 at the most, whatever a file says."""
-    eds = with_value("1600sub0", "0xFFFFFFFF")
-    assert watched(tmp_path, eds=eds).rpdos[DIGITAL].mask == 0xFFFF
+    eds = with_value("1600sub0", "65") + "\n[1600sub41]\nDefaultValue=0x62000108\n"
+    assert watched(tmp_path, eds=eds).rpdos[DIGITAL].bytes == 2
+
+
+def test_a_section_of_another_kind_is_none_of_an_object(tmp_path: Path) -> None:
+    eds = EDS.replace("[1400sub2]", "[Comments]\nParameterValue=0x345\n\n[1400sub2]")
+    assert set(watched(tmp_path, eds=eds).rpdos) == {DIGITAL, ANALOGUE}
 
 
 def test_a_mark_before_a_section_is_none(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ from typing import Final
 
 SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
 _MOST_BYTES: Final = 16 << 20
-_PATIENCE_S: Final = 300
+_PATIENCE_S: Final = 1200
 
 
 @dataclass(frozen=True, slots=True)

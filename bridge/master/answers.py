@@ -46,8 +46,7 @@ class Answers:
         if not self._waiting:
             return []
         if now > self._at:
-            if self._at > float("-inf"):
-                self._left = min(self._most, self._left + (now - self._at) * self._bits_per_s)
+            self._left = min(self._most, self._left + (now - self._at) * self._bits_per_s)
             self._at = now
         taken: list[NodeCore] = []
         while self._waiting and self._left >= 0:

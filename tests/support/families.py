@@ -54,7 +54,8 @@ class FamilySite:
         # Families with few addresses take the lowest.
         ordered = sorted(mappings, key=lambda mapping: self.families[mapping].family.node_id_high)
         nodes = [self._node(node_id, mapping) for node_id, mapping in enumerate(ordered, 1)]
-        bus = sites.bus(*nodes, more="bitrate = 1000000\nsync_period_ms = 20")
+        # Twenty drives and the test's client share a process: one may hold up the other.
+        bus = sites.bus(*nodes, more="bitrate = 1000000\nsync_period_ms = 20\ndeadman_ms = 1000")
         self.path = sites.write(folder, bus, _SERVERS[protocol](self.port), name="families")
 
     def _node(self, node_id: int, mapping: str) -> str:

@@ -107,17 +107,16 @@ def starts(bus: Sniffer, since: float) -> list[Seen]:
 def test_own_frames_are_never_an_intruders_however_the_words_change(make_lab) -> None:
     """Setpoints that change at full speed, starts and stops, and a hang."""
     lab = make_lab()
-    lab.run_drive()
     begin = time.time()
     with ModbusTcpClient("127.0.0.1", port=lab.site.modbus_port, timeout=10) as client:
         for n in range(60):
             word = 0x047F if n % 5 else 0x047E
             assert not client.write_registers(0, [word, 100 * n], device_id=1).isError()
             time.sleep(0.01)
-    lab.bridge.signal(signal.SIGSTOP)
-    time.sleep(0.5)
-    lab.bridge.signal(signal.SIGCONT)
-    time.sleep(1.5)
+        lab.bridge.signal(signal.SIGSTOP)
+        time.sleep(0.5)
+        lab.bridge.signal(signal.SIGCONT)
+        time.sleep(1.5)
     lab.wait_intruders(lambda count: count == 0)
     assert not stops(lab.bus, begin)
     assert "intruder" not in lab.bridge.output() and "passive" not in lab.bridge.output()

@@ -69,7 +69,7 @@ def test_what_is_wrong_is_told_with_its_exit_code(commands: Commands) -> None:
         (2, "did you mean P102", ("read", "P1002")),
         (1, "object does not exist", ("read", "P999")),
         (1, "takes 0…320 s, not 400", ("write", "P102", "400", "--yes")),
-        (2, "takes a number", ("write", "P102", "fast", "--yes")),
+        (2, "'fast' is no number", ("write", "P102", "fast", "--yes")),
         (1, "is read-only", ("write", "P700[1]", "0", "--yes")),
     ):
         done = commands.call(*arguments)

@@ -98,7 +98,7 @@ def exchange(
     _open_channels(project, bus, node)
     for place in places:
         _restore(place, done, wait, force=force, quiet=as_json)
-    _save(places[0].target, done, force=force)
+    _save(places[0].target, done)
     plant, test = drop_test.perform(project, bus, table)
     dropped = drop_report.facts(occasion, plant.nodes[table.name], test)
     audited = list(audit_drives(project, bus.name, [], of_node=table.name))
@@ -218,11 +218,12 @@ def _facts(restored: backups.Restored) -> dict[str, Any]:
     return restored_facts(restored) | {"warnings": sorted(warnings)}
 
 
-def _save(target: Target, done: Exchange, *, force: bool) -> None:
+def _save(target: Target, done: Exchange) -> None:
     """Have the node keep what was written, where its family has a command for that."""
     eeprom = target.family.eeprom
     if eeprom is None or not eeprom.can_save or not done.is_unsaved:
         return
-    gate = target.alone(force=force).gate
+    # Written is written: only a drive that is known to be enabled does not save it now.
+    gate = target.alone(force=True).gate
     warning = target.run(lambda now: target.access.save(now, gate), writes=True)
     done.saved(warning)

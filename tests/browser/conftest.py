@@ -7,14 +7,11 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser
 
-from tests.browser.hands import pair, serving
+from tests.browser.hands import PATIENT_MS, pair, serving
 from tests.support import sites
 from tests.support.desk import Desk, browser
 from tests.support.process import Process, drivebridge, free_port, until
 from tests.wire.test_page import write_site
-
-PATIENT_MS = 2000
-"""A tab beside other browsers may be silent for longer than a controller would be. Its lease is longer."""
 
 
 @pytest.fixture(scope="session")
@@ -23,6 +20,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Process, 
     site = write_site(folder, port, timeout_ms=PATIENT_MS)
     with drivebridge(folder, "run", "run", str(site), notify=True) as process:
         process.wait_ready()
+        process.prefer()
         until(lambda: "is served on" in process.output(), 30.0, "the page is served")
         yield process, port
 

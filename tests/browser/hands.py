@@ -17,6 +17,8 @@ from tests.wire.test_page import DRIVE, users
 
 SHOTS: Final = Path("build/page")
 AXE: Final = Path("tests/wire/node/node_modules/axe-core/axe.min.js")
+PATIENT_MS: Final = 2000
+"""A tab beside other browsers may be silent for longer than a controller would be. Its lease is longer."""
 
 
 @contextmanager
@@ -28,6 +30,7 @@ def serving(folder: Path, *nodes: str) -> Iterator[int]:
     site = sites.write(folder, sites.bus(*nodes, more=sites.BESIDE_A_BROWSER), opcua, page)
     with drivebridge(folder, "run", "run", str(site), notify=True) as process:
         process.wait_ready()
+        process.prefer()
         until(lambda: "is served on" in process.output(), 30.0, "the page is served")
         yield port
 
@@ -38,10 +41,10 @@ def pair(name: str, node_id: int) -> str:
         sites.drive(
             "fu1",
             "lease",
-            1000,
+            PATIENT_MS,
             f'on_expiry = "hold"\ntelegram_downtime_s = 0\n{sites.ACCEPTED}\n{sites.SCALED}',
         ),
-        sites.drive("fu2", "lease", 1000, f"stop_by_anyone = false\n{sites.ACCEPTED}\n{sites.SCALED}"),
+        sites.drive("fu2", "lease", PATIENT_MS, f"stop_by_anyone = false\n{sites.ACCEPTED}\n{sites.SCALED}"),
     )
     return sites.node(*drives, name=name, node_id=node_id)
 

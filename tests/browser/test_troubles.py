@@ -71,6 +71,7 @@ def broken(
     )
     with peer(folder, "broken_plant", str(site), str(commands)) as process:
         process.wait_output("is served on")
+        process.prefer()
         until(lambda: "node operational" in process.output(), 30.0, "the node is operational")
         desk = Desk(chromium, port)
         with desk.sits("operator", viewport={"width": 1280, "height": 720}) as page:

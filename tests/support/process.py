@@ -107,6 +107,11 @@ class Process:
     def pid(self) -> int:
         return self.popen.pid
 
+    def prefer(self) -> None:
+        """Let it run before all others, as the systemd unit does, where that is allowed."""
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(self.pid, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(10))
+
     def output(self) -> str:
         return self.log.read_text(encoding="utf-8", errors="replace")
 

@@ -90,7 +90,8 @@ class Connection:
 
 class Strangers:
     """Nothing of what they do is a telegram of the owner: another machine, and another connection of its own,
-    write "run" to its drives and a longer time-out, and read them."""
+    write "run" to its drives and read them. The other machine writes a longer time-out as well: what goes on
+    for the owner is what its own machine sets once it is silent."""
 
     def __init__(self) -> None:
         self._ended = threading.Event()
@@ -106,8 +107,8 @@ class Strangers:
                 for drive in drives:
                     for connection in connections:
                         connection.write(drive, 0, drive.family.run, drive.family.setpoint)
-                        connection.write(drive, _TIMEOUT, _LONG_MS)
                     connections[0].read(drive)
+                    connections[1].write(drive, _TIMEOUT, _LONG_MS)
             for connection in connections:
                 connection.close()
 

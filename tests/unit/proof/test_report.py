@@ -23,6 +23,7 @@ def record(**change: Any) -> dict[str, Any]:
         "sent_ms": 503.0,
         "sent_bound_ms": 820.0,
         "over_ms": 0.0,
+        "noise_ms": 0.0,
         "verdict": "ok",
         **change,
     }
@@ -99,6 +100,13 @@ def test_drives_that_stop_without_a_fault_of_theirs_fail_the_proof_where_they_ar
         "6 drives stopped beside a fault that did not concern them, 5 may",
         "6 drives were found stopped before a fault, 5 may be",
     ]
+
+
+def test_on_a_busy_machine_each_drive_may_stop_twice_by_itself() -> None:
+    busy = record(noise_ms=150.0)
+    assert failures(result(busy, by_themselves=26, stopped_in_vain=["a"] * 26), 1) == []
+    assert len(failures(result(busy, by_themselves=27, stopped_in_vain=["a"] * 27), 1)) == 2
+    assert len(failures(result(record(), by_themselves=4, stopped_in_vain=["a"] * 4), 1)) == 2
 
 
 def test_errors_of_any_machine_fail_the_proof() -> None:

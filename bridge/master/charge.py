@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from bridge.command import Event, Kind, Plant
 from bridge.config import BusTable
-from bridge.master.listening import Listening, listen_s
+from bridge.master.listening import Listening, Part, listen_s
 from bridge.node.node import NodeCore
 
 
@@ -30,7 +30,7 @@ class Charge:
 
     def acts(self) -> bool:
         """Whether this bridge acts: otherwise nothing is sent."""
-        return self._listening.acts
+        return self._listening.part is Part.ACTING
 
     @property
     def is_left(self) -> bool:

@@ -23,6 +23,7 @@ Inject = Callable[[Rig], float]
 _TIMEOUT_S: Final = PLANT.fieldbus_timeout_ms / 1000
 _FLAP_S: Final = 0.05
 _BEFORE_S: Final = 0.03
+_SOON_S: Final = 0.001
 _HANDED_ON_S: Final = 0.15
 _BLOCKED_S: Final = 1.0
 _HOUR_S: Final = 3600.0
@@ -213,11 +214,16 @@ def continue_owners_alone(rig: Rig) -> None:
 
 
 def release_drives(rig: Rig) -> float:
-    """Their owner gives them back, over its own connections: no other one owns them."""
-    now = time.monotonic()
-    for drive in drives_of("modbus"):
-        rig.board.command(drive.place, RELEASE)
-    return now
+    """Their owner gives them back, over its own connections: no other one owns them. It looks at what it is
+    to write now and then, so what counts is when it sends that."""
+    places = [drive.place for drive in drives_of("modbus")]
+    asked = time.monotonic()
+    for place in places:
+        rig.board.command(place, RELEASE)
+    until = asked + _TIMEOUT_S
+    while time.monotonic() < until and any(rig.board.last_sent(place) <= asked for place in places):
+        time.sleep(_SOON_S)
+    return max(asked, min(rig.board.last_sent(place) for place in places))
 
 
 def write_run(rig: Rig) -> None:

@@ -37,9 +37,9 @@ class _Heard:
     """Entry, what it is, and its point."""
     quality: tuple[Quality, str] | None = None
     told: tuple[tuple[int, ObjectRef, int], ...] = ()
-    """Of its entries that are outputs: which it is, the object, and the mask that takes its sign away."""
+    """Entries that are outputs: the entry, its object, and the mask that takes its sign away."""
     told_values: list[tuple[ObjectRef, int]] = field(default_factory=list[tuple[ObjectRef, int]])
-    """What those were the last time."""
+    """Values of those the last time."""
 
     @property
     def points(self) -> list[int]:
@@ -100,7 +100,7 @@ class Device:
         self._judge(now)
 
     def _find_told(self, outputs: Outputs, in_charge: Mapping[ObjectRef, int]) -> None:
-        """Which outputs its TPDOs bring, too."""
+        """Note the outputs that its TPDOs bring, too."""
         masks = {one.object: (1 << one.size) - 1 for one in self.family.output}
         for place, heard in enumerate(self._heard):
             heard.told = tuple(

@@ -1,5 +1,5 @@
-"""What is done about a stop that a drive or the outputs of a node have followed or ignored: audit log,
-event, NMT."""
+"""Consequences of a stop that a drive or the outputs of a node have followed or ignored: audit log, event,
+NMT."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ from bridge.command.follow import LastStop, Verdict
 from bridge.mapping.fields import ObjectRef
 
 _AGAIN_S: Final = 1.0
-"""How often is read what was ignored, or what has not been answered."""
+"""Pause before what was ignored, or has not been answered, is read again."""
 _UNREAD: Final = "its outputs have not been read back yet"
 _AWAY: Final = "the node left operation before its outputs were read back"
 
@@ -62,7 +62,7 @@ class Question:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What the node's object holds, an integer without sign, or ``why`` that is not known: because the node
+    """Content of the node's object, an integer without sign, or ``why`` that is not known: because the node
     said so, or because it was silent."""
 
     raw: int | None
@@ -72,7 +72,7 @@ class Answer:
 
 @dataclass(slots=True)
 class _Seen:
-    """Of one output: what it held ``at`` that time or later, None with the reason where that is not known."""
+    """Content of one output ``at`` that time or later, None with the reason where that is not known."""
 
     raw: int | None = None
     at: float = -inf
@@ -90,7 +90,7 @@ class OutputFollowing:
         self.follows = True
         self.why = ""
         self.awaits_sending = False
-        """What is to be sent has changed, and has not been handed to the bus yet."""
+        """Another stop is to be sent, and has not been handed to the bus yet."""
         self.is_owed = False
         """A stop is on the bus that is not known to be followed: what the node tells is of interest."""
         self._sent: tuple[int, ...] | None = None
@@ -100,7 +100,7 @@ class OutputFollowing:
         self._since: float | None = None
         """When the stop was handed to the bus; None where there is none, or the node is not there."""
         self._counts_from = inf
-        """What was asked or told before may be older than the stop."""
+        """Answers and telegrams from before may be older than the stop."""
         self._until = inf
         self._bound_s = 0.0
         self._outputs: Sequence[StoppedOutput] = ()
@@ -294,7 +294,7 @@ class OutputFollowing:
     # time
 
     def take_verdicts(self) -> list[Verdict]:
-        """How stops have ended since the last call."""
+        """Ends of stops since the last call."""
         verdicts, self._verdicts = self._verdicts, []
         return verdicts
 

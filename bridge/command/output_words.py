@@ -78,7 +78,7 @@ class OutputWords:
         self.has_let_go = False
 
     def hold(self, raw: Mapping[str, int]) -> None:
-        """What the node holds in what is to hold it, as integers without sign, by the output's name."""
+        """Take over what the node holds: integers without sign, by the name of an output that holds."""
         words = list(self.held)
         for name, number in raw.items():
             self.put(words, self.places[name], number)

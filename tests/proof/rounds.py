@@ -16,7 +16,7 @@ from tests.proof.fault import Fault
 from tests.proof.measure import Sample, Span
 from tests.proof.rig import BRIDGE, FRONT, SIMULATION, NotStopped, Rig, Stuck
 from tests.proof.settings import PLANT, REACTION_MS
-from tests.proof.waits import longest_wait_ms, paused_ms, waited_ms
+from tests.proof.waits import longest_wait_ms, most_waited_ms, paused_ms, waited_ms
 
 _STOPPED_S: Final = 5.0
 _QUIET_S: Final = 0.4
@@ -60,7 +60,7 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
         )
     ways = _ways(rig, fault, list(stopped), moment)
     words = {drive: measure.stopping(rig, drive, times[0]) for drive, times in stopped.items()}
-    _all_go_on(rig, others, fault, "which it does not concern")
+    _all_go_on(rig, others, fault, "which it does not concern", began)
     ends: dict[Drive, float] = {}
     if fault.brings_back:
         # Until now it may have turned now and then; from now on it may not.
@@ -97,7 +97,7 @@ def _examined(rig: Rig, fault: Fault, examine: Examine, say: Callable[[str], Non
     began = time.monotonic()
     found = examine(rig)
     others = [drive for drive in DRIVES if not (fault.concerns(drive) or fault.others_may_stop)]
-    _all_go_on(rig, others, fault, "which it does not concern")
+    _all_go_on(rig, others, fault, "which it does not concern", began)
     samples: list[Sample] = []
     for finding in found:
         of, spans = finding.of, finding.spans
@@ -196,17 +196,38 @@ def _all_move(rig: Rig, say: Callable[[str], None]) -> None:
         rig.run_all()
 
 
-def _all_go_on(rig: Rig, drives: list[Drive] | tuple[Drive, ...], fault: Fault, which: str) -> None:
-    rig.stopped_in_vain += [
-        f"{fault.name}: {drive.path} ({drive.protocol}), {which}" for drive in drives if not rig.moves(drive)
-    ]
+def _all_go_on(
+    rig: Rig, drives: list[Drive] | tuple[Drive, ...], fault: Fault, which: str, since: float
+) -> None:
+    """One that the machine itself has stopped since then is none of the fault's."""
+    for drive in drives:
+        if rig.moves(drive):
+            continue
+        if _was_starved(rig, drive, since):
+            rig.by_themselves += 1
+        else:
+            rig.stopped_in_vain.append(f"{fault.name}: {drive.path} ({drive.protocol}), {which}")
+
+
+def _was_starved(rig: Rig, drive: Drive, since: float) -> bool:
+    """Those who keep it moving waited for the CPU for as long as stops it: the bridge, the drives, or its
+    owner, who may be late by what its time-out is longer than its period."""
+    now = time.monotonic()
+    owner_ms = PLANT.fieldbus_timeout_ms - PLANT.owner_period_s * 1000
+    stops = {BRIDGE: PLANT.deadman_ms, SIMULATION: PLANT.heartbeat_ms / 2, drive.protocol: owner_ms}
+    if drive.protocol == "opcua":
+        stops[FRONT] = owner_ms
+    return paused_ms(rig.watched, since, now) >= PLANT.deadman_ms or any(
+        most_waited_ms(rig.watched, name, since, now, 2 * stop_ms / 1000) >= stop_ms
+        for name, stop_ms in stops.items()
+    )
 
 
 def _wait_handed_on(rig: Rig, fault: Fault, since: float, say: Callable[[str], None]) -> None:
     """Every drive moves by a telegram that its owner sent after ``since``. One that is stopped meanwhile,
     be it by a slow machine, gets none: that is told, and it is brought back."""
     for _ in range(_LOOKS):
-        _all_go_on(rig, DRIVES, fault, "whose owners were there")
+        _all_go_on(rig, DRIVES, fault, "whose owners were there", since)
         _all_move(rig, say)
         with suppress(Stuck):
             rig.wait(lambda: all(_was_handed_on(rig, drive, since) for drive in DRIVES), _LOOK_S, "telegrams")

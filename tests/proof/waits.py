@@ -90,6 +90,14 @@ def longest_wait_ms(folder: Path, name: str, begin: float, end: float) -> float:
     return max((waited for first, last, waited in waits if last > begin and first < end), default=0.0) * 1000
 
 
+def most_waited_ms(folder: Path, name: str, begin: float, end: float, within_s: float) -> float:
+    """The most that this process waited within so many seconds, from ``begin`` to ``end``, in ms."""
+    lines = _lines(folder / f"{name}.waits", begin)
+    waits = [(last, waited) for first, last, waited in lines if first < end and last > begin]
+    sums = [sum(other for at, other in waits if last - within_s < at <= last) for last, _ in waits]
+    return max(sums, default=0.0) * 1000
+
+
 def paused_ms(folder: Path, begin: float, end: float) -> float:
     """The pauses within this time, in ms."""
     pauses = _lines(folder / "pauses", begin)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.proof.waits import Account, follow, longest_wait_ms, paused_ms, waited_ms
+from tests.proof.waits import Account, follow, longest_wait_ms, most_waited_ms, paused_ms, waited_ms
 from tests.support.process import REPOSITORY
 
 
@@ -32,6 +32,20 @@ def test_the_longest_wait_is_none_of_many_short_ones(tmp_path: Path) -> None:
     assert longest_wait_ms(tmp_path, "bridge", 1.0, 2.0) == pytest.approx(300)
     assert longest_wait_ms(tmp_path, "bridge", 1.5, 2.0) == pytest.approx(10)
     assert longest_wait_ms(tmp_path, "bridge", 2.0, 3.0) == 0.0
+
+
+def test_many_short_waits_in_a_row_hold_a_process_up_as_a_long_one_does(tmp_path: Path) -> None:
+    put(
+        tmp_path / "bridge.waits",
+        "0.5 0.9 0.4",
+        "1.0 1.1 0.05",
+        "1.1 1.2 0.1",
+        "1.2 1.3 0.06",
+        "1.9 2.0 0.07",
+    )
+    assert most_waited_ms(tmp_path, "bridge", 1.0, 2.0, 0.35) == pytest.approx(210)
+    assert most_waited_ms(tmp_path, "bridge", 1.0, 2.0, 0.15) == pytest.approx(160)
+    assert most_waited_ms(tmp_path, "bridge", 3.0, 4.0, 1.0) == 0.0
 
 
 def test_pauses_count_where_they_lie_between_two_moments(tmp_path: Path) -> None:

@@ -508,7 +508,7 @@ async def test_pymodbus_sees_which_words_and_values_are_not_good(plant: Plant, s
 async def test_who_writes_to_made_up_units_washes_nothing_out_of_the_audit_log(
     plant: Plant, server: ModbusServer, tmp_path: Path
 ):
-    settings = {"file": str(tmp_path / "audit.jsonl"), "max_bytes": 10_000, "keep": 0}
+    settings = {"file": str(tmp_path / "audit.jsonl"), "max_bytes": 20_000, "keep": 0}
     site = plant.site.model_copy(update={"audit": AuditTable.model_validate(settings)})
     audit = AuditLog(plant, site, time.monotonic, lambda at: round(at * 1e9))
     audit.start()

@@ -13,6 +13,7 @@ from bridge.northbound.modbus.registers import (
     ABORT_CODE,
     ACKNOWLEDGE,
     KEEP_ALIVE,
+    MOST_PARAMETERS,
     PARAMETERS,
     STOP,
     TELEGRAMS,
@@ -78,7 +79,8 @@ class DeviceMap:
             for leaf, point in own.items()
             if leaf.startswith("parameter/") and point.writable and point.data_type is not DataType.STRING
         ]
-        self.parameters = value_rows(Table.HOLDING_REGISTER, writable, own, allows, PARAMETERS)
+        shown = writable[:MOST_PARAMETERS]
+        self.parameters = value_rows(Table.HOLDING_REGISTER, shown, own, allows, PARAMETERS)
 
     def end(self, table: Table) -> int:
         """Where its inputs or outputs end."""

@@ -3,8 +3,10 @@
 Input registers 10 … 31 are what the bridge knows, as those of a drive as far as they apply: a read within
 them always succeeds. Inputs stand in input registers from 32 on in the order of the mapping, each as wide as
 it is, and those with named bits as discrete inputs from 0 on; outputs in the same way in holding registers
-and coils. Each follows its own quality: a read that touches one that is waiting, dead or disabled is answered
-0Bh, one that no PDO carries 0Ah. A range that begins or ends within a value is 02h.
+and coils. Each follows its own quality: one that is not there reads as 0 beside others; registers 22 and 23
+and the discrete inputs from 4096 and 8192 on say which. A read of nothing else is answered 0Bh where it is
+waiting, dead or disabled, 0Ah where no PDO carries it, and so is one that touches a value while the node has
+none at all. A range that begins or ends within a value is 02h.
 
 Everything that one write has of the outputs is one telegram. Holding registers 10, 11 and 13 are keep-alive,
 acknowledge and stop as those of a drive, parameters stand from 1000 on.
@@ -33,18 +35,20 @@ from bridge.northbound.modbus.registers import (
     ABORT_CODE,
     ACKNOWLEDGE,
     DIAGNOSTICS,
+    INPUT_FLAGS,
     KEEP_ALIVE,
     PARAMETERS,
     STOP,
     TELEGRAMS,
+    VALUE_FLAGS,
     VALUES,
     VALUES_NOT_GOOD,
     Row,
     Table,
     Words32,
 )
-from bridge.northbound.modbus.unit import Unit, refuse_quality
-from bridge.northbound.modbus.values32 import Values32, value_of, words_of
+from bridge.northbound.modbus.unit import Unit, refuse_all_absent
+from bridge.northbound.modbus.values32 import Values32, value_of, words_read
 from bridge.northbound.view import View
 
 _FLAGS: Final = 32
@@ -94,15 +98,29 @@ class DeviceUnit(Unit):
         bits = self._bits[table]
         if table is Table.COIL and not self._map.has_outputs:
             raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+        self._view.look(self._name)
+        if table is Table.DISCRETE_INPUT and start >= VALUE_FLAGS:
+            return self._flags(start, count)
         if start + count > len(bits):
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
-        self._view.look(self._name)
-        found: list[bool] = []
-        for signal, index in bits[start : start + count]:
-            reading = self._image[index]
-            refuse_quality(reading.quality)
-            found.append(bool(int(reading.value) >> (signal.bit or 0) & 1))
-        return found
+        readings = [(signal, self._image[index]) for signal, index in bits[start : start + count]]
+        refuse_all_absent([reading.quality for _, reading in readings])
+        return [
+            reading.quality.has_value and bool(int(reading.value) >> (signal.bit or 0) & 1)
+            for signal, reading in readings
+        ]
+
+    def _flags(self, start: int, count: int) -> Sequence[bool]:
+        """Which values are not good: those of the input registers and then the parameters, or the discrete
+        inputs."""
+        first, indices = INPUT_FLAGS, [index for _, index in self._bits[Table.DISCRETE_INPUT]]
+        if start < INPUT_FLAGS:
+            of_rows = [index for _, index in self._rows[Table.INPUT_REGISTER]]
+            first, indices = VALUE_FLAGS, of_rows + self._parameters.indices
+        if start - first + count > len(indices):
+            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+        qualities = self._image.qualities(indices[start - first : start - first + count])
+        return [quality is not Quality.GOOD for quality in qualities]
 
     def read_words(self, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]:
         end = start + count
@@ -117,12 +135,18 @@ class DeviceUnit(Unit):
         if start < VALUES:
             known = self._diagnostics() if table is Table.INPUT_REGISTER else self._command_words(caller)
             words = known[start - DIAGNOSTICS : end - DIAGNOSTICS]
-        for row, index in self._rows[table]:
-            if start <= row.address < end:
-                reading = self._image[index]
-                refuse_quality(reading.quality)
-                words += words_of(row, reading.value, self._words32)
-        return words
+        return words + self._value_words(table, start, end)
+
+    def _value_words(self, table: Table, start: int, end: int) -> list[int]:
+        """Registers from 32 on that are in the range."""
+        touched = [
+            (row, self._image[index]) for row, index in self._rows[table] if start <= row.address < end
+        ]
+        if touched:
+            refuse_all_absent(self._image.qualities(index for _, index in self._rows[table]))
+        if start >= VALUES:
+            refuse_all_absent([reading.quality for _, reading in touched])
+        return [word for row, reading in touched for word in words_read(row, reading, self._words32)]
 
     def _check_range(self, table: Table, start: int, end: int) -> None:
         last = self._map.end(table)

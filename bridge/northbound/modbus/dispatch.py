@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import unicodedata
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -30,10 +31,14 @@ from bridge.northbound.modbus.pdu import (
     refusal,
     words_answer,
 )
-from bridge.northbound.modbus.registers import BRIDGE_UNITS, Table, Words32
+from bridge.northbound.modbus.registers import BRIDGE_UNITS, MIRROR, Table, Words32
 from bridge.northbound.modbus.unit import BridgeUnit, Unit
 from bridge.northbound.modbus.units import Units
+from bridge.northbound.sources import source_of
 from bridge.northbound.view import View
+from bridge.quietlog import about
+
+_log = logging.getLogger(__name__)
 
 Answer = Callable[[bytes], None]
 
@@ -100,6 +105,8 @@ class Dispatcher:
         for device in units.devices:
             self._names[device.unit_id] = device.device_name
             self._units[device.unit_id] = DeviceUnit(device, view, words32)
+        known = _ranges(self._names) or "no drives"
+        self._served = f"this site has {known}, and {BRIDGE_UNITS[0]} for the bridge itself"
         for unit_id in BRIDGE_UNITS:
             self._units[unit_id] = BridgeUnit(units, view)
 
@@ -113,6 +120,8 @@ class Dispatcher:
         try:
             unit = self._units.get(unit_id)
             if unit is None:
+                if pdu[0] not in WRITES:  # a refused write is an event
+                    self._note_unknown(unit_id, caller)
                 raise Refused(ExceptionCode.PATH_UNAVAILABLE)
             request = parse(pdu)
             if isinstance(request, _Write):
@@ -126,11 +135,26 @@ class Dispatcher:
         answer(given)
 
     def _note_refusal(self, unit_id: int, function: int, caller: Identity, code: ExceptionCode) -> None:
-        """A write that was refused before it became a request, for the audit log."""
+        """A write that was refused before it became a request, for the audit log and the events."""
         target = self._names.get(unit_id, f"unit {unit_id}")
-        message = f"function {function} refused with exception {code.value:02X}h"
-        ending = _CODES.get(code, Code.NOT_READY)
+        ending, message = _CODES.get(code, Code.NOT_READY), self._why(unit_id)
+        if unit_id in BRIDGE_UNITS:
+            ending = Code.READ_ONLY
+        message = message or f"function {function} refused with exception {code.value:02X}h"
         self._view.rejected(Rejection(caller, target, Action.WRITE, ending, message))
+
+    def _note_unknown(self, unit_id: int, caller: Identity) -> None:
+        """A PLC that asks for a unit which is not there is set up wrongly, and shows its user a number."""
+        source, why = source_of(caller.user), self._why(unit_id)
+        _log.warning("Modbus: %s is refused: %s", caller.address, why, extra=about(source, unit_id))
+
+    def _why(self, unit_id: int) -> str:
+        """Why nothing can be written to a unit id; empty for that of a drive or device."""
+        if unit_id in self._names:
+            return ""
+        if unit_id in BRIDGE_UNITS:
+            return f"unit {unit_id} is the bridge itself, which is only read; {self._served}"
+        return f"no drive or device has unit id {unit_id}; {self._served}"
 
     def _read(self, unit: Unit, request: Read | Identify | Loopback, caller: Identity) -> bytes:
         match request:
@@ -138,7 +162,7 @@ class Dispatcher:
                 table = _TABLES[function]
                 if table in (Table.COIL, Table.DISCRETE_INPUT):
                     return bits_answer(function, unit.read_bits(table, start, count))
-                return words_answer(function, unit.read_words(table, start, count, caller))
+                return words_answer(function, _words(unit, table, start, count, caller))
             case Identify():
                 objects = {number: _ascii(text) for number, text in unit.identify().items()}
                 return identification_answer(request, objects)
@@ -184,7 +208,7 @@ class Dispatcher:
 
     def _read_back(self, unit: Unit, request: ReadWrite, caller: Identity) -> bytes:
         start, count = request.read_start, request.read_count
-        words = unit.read_words(Table.HOLDING_REGISTER, start, count, caller)
+        words = _words(unit, Table.HOLDING_REGISTER, start, count, caller)
         return words_answer(Function.READ_WRITE, words)
 
     def _submit(self, plan: Sequence[Request], conclude: Callable[[Outcome], None]) -> None:
@@ -199,6 +223,24 @@ class Dispatcher:
                 conclude(outcome)
 
         self._view.submit(first, on_outcome)
+
+
+def _words(unit: Unit, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]:
+    """Registers of a unit; holding registers from ``MIRROR`` on are its input registers."""
+    if table is Table.HOLDING_REGISTER and start >= MIRROR:
+        return unit.read_words(Table.INPUT_REGISTER, start - MIRROR, count, caller)
+    return unit.read_words(table, start, count, caller)
+
+
+def _ranges(numbers: Iterable[int]) -> str:
+    """Numbers as people write them: 1-4, 7."""
+    runs: list[list[int]] = []
+    for number in sorted(numbers):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1][1:] = [number]
+        else:
+            runs.append([number])
+    return ", ".join("-".join(map(str, run)) for run in runs)
 
 
 def _ascii(text: str) -> bytes:

@@ -2,12 +2,13 @@
 
 Which quality is served how: input registers 0 … 9, the scaled actual values and the discrete inputs of
 the status word are the drive's data. While the drive's quality is waiting, dead or disabled a read that
-touches one of them is answered 0Bh, with config_error 0Ah (for a scaled value whose scale alone is not
-known, or that comes by a TPDO of its own which never came, only where it is touched). Registers 10 … 31
-and the discrete inputs of the quality are what the bridge knows: a read wholly within them always succeeds,
-so that a control program can see *why*. A read of 0 … 31 therefore fails while there is no data, a read of
-10 … 31 does not. Values from register 32 on that are not the drive's actual values (supervision, identity)
-follow their own quality.
+touches one of them is answered 0Bh, with config_error 0Ah. Registers 10 … 31 and the discrete inputs of the
+quality are what the bridge knows: a read wholly within them always succeeds, so that a control program can
+see *why*. A read of 0 … 31 therefore fails while there is no data, a read of 10 … 31 does not.
+
+While the drive has data, a value from register 32 on that is not there (its scale is not known, its own TPDO
+never came, it was not read yet) reads as 0 within a longer request; registers 22 and 23 and the discrete
+inputs from 4096 on say so. A request for nothing but such values is refused with the exception of the first.
 
 Ranges: 02h where a range leaves the map, begins or ends within a 32-bit value (read or write), or a
 write touches what is not writable, or more than one parameter. Gaps inside the first 32 registers read
@@ -38,6 +39,7 @@ from bridge.northbound.modbus.registers import (
     STOP,
     TIMEOUT,
     TOKEN,
+    VALUE_FLAGS,
     VALUES,
     WORDS_NOT_GOOD,
     DriveMap,
@@ -101,6 +103,7 @@ class DriveUnit(Unit):
         self._owner, self._timeout = place("supervision/owner"), place("supervision/fieldbus_timeout_ms")
         self._identity: Final = [place(f"identity/{leaf}") for leaf in _IDENTITY]
         self._inputs: Final = values(drive_map.inputs)
+        self._drives_own: Final = [row.address for row in drive_map.inputs if _is_drives_own(row)]
         self._flagged: Final = self._inputs.indices[:_FLAGS]
         self._setpoints: Final = values(drive_map.setpoints)
         self._parameters: Final = values(drive_map.parameters, PARAMETERS)
@@ -114,16 +117,20 @@ class DriveUnit(Unit):
         return self._image[self._status].quality
 
     def read_bits(self, table: Table, start: int, count: int) -> Sequence[bool]:
+        first = 0
         if table is Table.COIL:
             bits, quality = _bits(self._control_word), Quality.GOOD
+        elif start >= VALUE_FLAGS:
+            self._look()
+            first, bits, quality = VALUE_FLAGS, self._inputs.not_good(), Quality.GOOD
         else:
             quality = self._look()
             bits = _bits(int(self._image[self._status].value)) + [quality is each for each in Quality]
-        if start + count > len(bits):
+        if start - first + count > len(bits):
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
         if start < QUALITY_BITS:
             refuse_quality(quality)
-        return bits[start : start + count]
+        return bits[start - first : start - first + count]
 
     def read_words(self, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]:
         is_input = table is Table.INPUT_REGISTER
@@ -136,13 +143,13 @@ class DriveUnit(Unit):
             if quality.has_value:
                 self._check_words(table, start, end)
             words = self._input_words(start, end, quality)
-            if end > VALUES:
-                words += self._inputs.read(start, end)
+            if any(start <= address < end for address in self._drives_own):
+                refuse_quality(quality)
+            words += self._inputs.read(start, end, beside=start < VALUES)
         else:
             self._check_words(table, start, end)
             words = self._holding_words(caller)[start:end] if start < VALUES else []
-            if end > VALUES:
-                words += self._setpoints.read(start, end)
+            words += self._setpoints.read(start, end, beside=start < VALUES)
         return words
 
     def _check_range(self, table: Table, start: int, end: int) -> None:
@@ -364,6 +371,11 @@ class DriveUnit(Unit):
 def _unpressed(telegram: list[Request]) -> list[Request]:
     """The requests of a telegram that does not write 1 to the acknowledge register."""
     return [replace(telegram[0], pressed=False), *telegram[1:]]
+
+
+def _is_drives_own(row: Row) -> bool:
+    """True for a value of which there is none while the drive is not heard."""
+    return row.name.startswith(("actual/", "status/")) or row.name == "supervision/follows"
 
 
 def _bits(word: int) -> list[bool]:

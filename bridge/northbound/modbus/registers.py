@@ -40,6 +40,15 @@ VALUES: Final = 32
 """First register of the 32-bit values, input and holding alike."""
 PARAMETERS: Final = 1000
 """First holding register of the writable parameters, two registers each."""
+MIRROR: Final = 4096
+"""First holding register of the copy of the input registers, for clients that know function 3 alone and for
+function 23, whose read is of holding registers. The machine unit has its status blocks there, too."""
+MOST_PARAMETERS: Final = (MIRROR - PARAMETERS) // 2
+"""Parameters that have registers; further ones are reached over the other protocols."""
+VALUE_FLAGS: Final = 4096
+"""First discrete input of those that say which values are not good: one for each 32-bit value."""
+INPUT_FLAGS: Final = 8192
+"""First discrete input of those that say which discrete inputs are not good."""
 QUALITY_BITS: Final = 16
 """First discrete input of the quality."""
 ABORT_CODE: Final = "supervision/sdo_abort_code"
@@ -155,7 +164,8 @@ class DriveMap:
             for leaf, point in points.items()
             if leaf.startswith("parameter/") and point.writable and point.data_type is not DataType.STRING
         ]
-        self.parameters = value_rows(Table.HOLDING_REGISTER, writable, points, allows, PARAMETERS)
+        shown = writable[:MOST_PARAMETERS]
+        self.parameters = value_rows(Table.HOLDING_REGISTER, shown, points, allows, PARAMETERS)
         self.rows: tuple[Row, ...] = (
             *(row for row in fixed if row.table is Table.INPUT_REGISTER),
             *self.inputs,

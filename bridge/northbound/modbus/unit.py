@@ -60,6 +60,13 @@ def refuse_quality(quality: Quality) -> None:
         raise Refused(ExceptionCode.NOT_RESPONDING if configured else ExceptionCode.PATH_UNAVAILABLE)
 
 
+def refuse_all_absent(qualities: Sequence[Quality]) -> None:
+    """Raise ``Refused`` if none of these values is served: one that is not must not cost a client its
+    neighbours, which tools read with it in one request."""
+    if qualities and not any(quality.has_value for quality in qualities):
+        refuse_quality(qualities[0])
+
+
 def state_code(state: Value, watchdog_state: Value, quality: Quality) -> int:
     """The state as served: the last known state of a drive that is not heard any more does not count."""
     is_known = quality.has_value or watchdog_state == WatchdogState.TRIPPED

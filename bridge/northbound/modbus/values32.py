@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from bridge.image import Image, Value
+from bridge.image import Image, Quality, Reading, Value
 from bridge.northbound.modbus.registers import Row, Words32
-from bridge.northbound.modbus.unit import refuse_quality
+from bridge.northbound.modbus.unit import refuse_all_absent
 
 
 class Values32:
@@ -20,15 +20,21 @@ class Values32:
         self._words32 = words32
         self._first = first
 
-    def read(self, start: int, end: int) -> list[int]:
-        """Raises ``Refused`` where the quality of one of them is none that is served."""
-        words: list[int] = []
+    def read(self, start: int, end: int, *, beside: bool = False) -> list[int]:
+        """Registers from ``start`` up to ``end``: a value that is not there reads as 0. Raises ``Refused``
+        where none is, unless the request reads other registers ``beside`` them."""
         places = slice(max(start - self._first, 0) // 2, max(end - self._first, 0) // 2)
-        for row, index in zip(self.rows[places], self.indices[places], strict=True):
-            reading = self._image[index]
-            refuse_quality(reading.quality)
-            words += words_of(row, reading.value, self._words32)
+        readings = [self._image[index] for index in self.indices[places]]
+        if not beside:
+            refuse_all_absent([reading.quality for reading in readings])
+        words: list[int] = []
+        for row, reading in zip(self.rows[places], readings, strict=True):
+            words += words_read(row, reading, self._words32)
         return words
+
+    def not_good(self) -> list[bool]:
+        """One for each row."""
+        return [quality is not Quality.GOOD for quality in self._image.qualities(self.indices)]
 
     def written(self, start: int, words: Sequence[int]) -> list[tuple[Row, Value]]:
         """What is written to each, by its type."""
@@ -36,6 +42,11 @@ class Values32:
         pairs = zip(words[::2], words[1::2], strict=True)
         rows = self.rows[first : first + len(words) // 2]
         return [(row, value_of(row, pair, self._words32)) for row, pair in zip(rows, pairs, strict=True)]
+
+
+def words_read(row: Row, reading: Reading, words32: Words32) -> tuple[int, ...]:
+    """The registers of a row as they are read: 0 where its value is not there."""
+    return words_of(row, reading.value, words32) if reading.quality.has_value else (0,) * row.size
 
 
 def words_of(row: Row, value: Value, words32: Words32) -> tuple[int, ...]:

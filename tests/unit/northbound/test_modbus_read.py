@@ -67,7 +67,7 @@ def test_a_value_without_scale_is_not_configured_and_only_it():
     rig.runs(ENABLED, 0x2000, 0x2000)
     assert rig.read(4, 32, 2) == list(float_words(25.0))
     assert rig.read(4, 34, 2) == [NOT_CONFIGURED]
-    assert rig.read(4, 32, 4) == [NOT_CONFIGURED]
+    assert rig.read(4, 32, 4) == [*float_words(25.0), 0, 0]
     assert rig.read(3, 32, 2, unit=9) == [NOT_CONFIGURED]
 
 

@@ -32,21 +32,23 @@ def as_line(entry: AuditEntry, epoch_ns: int) -> bytes:
         "t": f"{at}.{ns // 1000:06d}Z",
         "mono": round(entry.time, 6),
         "source": who.source.label,
+    }
+    # Empty where one line stands for several requests that differ in it.
+    where_known: dict[str, object] = {
         "user": _cut(who.user),
-        "role": who.role.name.lower(),
+        "role": who.role.name.lower() if who.user else None,
         "target": _cut(entry.target),
         "action": _cut(entry.action),
         "code": ending.code,
         "forwarded": ending.forwarded,
-    }
-    where_known: dict[str, object] = {
         "address": _cut(who.address),
         "old": {_cut(leaf): _shown(value) for leaf, value in entry.old.items()},
         "new": {_cut(leaf): _shown(value) for leaf, value in entry.new.items()},
         "message": _cut(ending.message),
         "count": entry.count if entry.count != 1 else None,
     }
-    return _encode(line | {key: value for key, value in where_known.items() if value}) + b"\n"
+    known = {key: value for key, value in where_known.items() if value or value is False}
+    return _encode(line | known) + b"\n"
 
 
 def _cut(text: str) -> str:

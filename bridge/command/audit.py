@@ -44,6 +44,9 @@ for and whatever it calls itself; for what it has done with one drive or node in
 REFUSED_EVERY_S: Final = 3.0
 DONE_EVERY_S: Final = 1.0
 _MOST_SHARES: Final = 1000
+_MOST_SUMS: Final = 10
+"""Pairs of user and target that a summary of one client, action and code tells apart."""
+_OTHERS: Final = "others"
 _CARRIED_OUT: Final = (Code.OK, Code.TIMED_OUT, Code.CANCELLED, Code.REFUSED_BY_DRIVE, IGNORED)
 """Outcomes of requests that reached a drive or node; the others were refused before."""
 _BRIDGE: Final = Identity(Source.NONE, "drivebridge", Role.ENGINEER)
@@ -107,6 +110,35 @@ class _Telegrams:
     waiting: AuditEntry | None = None
 
 
+_Sum = tuple[str, Role, str, str, bool] | None
+"""User, role, target, action, and whether it was forwarded; None: all others."""
+
+
+def shared_by(one: Identity, other: Identity) -> Identity:
+    """What is true of both, of one protocol: ``user`` is empty where they are not the same with the same
+    role, ``address`` where they are not at the same address, without its port where that is another one."""
+    is_same = one.is_same(other) and one.role is other.role
+    address = one.address
+    if address != other.address:
+        address = client_of(one) if client_of(one) == client_of(other) else ""
+    connection = one.connection if one.connection == other.connection else ""
+    return replace(other, user=other.user if is_same else "", address=address, connection=connection)
+
+
+def _sum_of(one: AuditEntry, other: AuditEntry) -> AuditEntry:
+    """An entry for both, of one protocol, with one code; empty in what they differ."""
+    first, last = one.ending, other.ending
+    message = last.message if first.message == last.message else ""
+    return replace(
+        other,
+        identity=shared_by(one.identity, other.identity),
+        target=other.target if one.target == other.target else "",
+        action=other.action if one.action == other.action else "",
+        ending=Ending(last.code, message, first.forwarded and last.forwarded),
+        count=one.count + other.count,
+    )
+
+
 @dataclass(slots=True)
 class _Share:
     """Entries with a common limit: how many may be written, and those beyond it since the last summary."""
@@ -114,8 +146,8 @@ class _Share:
     limit: RateLimit
     is_new: bool = True
     is_used: bool = True
-    left_out: int = 0
-    last: AuditEntry | None = None
+    left_out: dict[_Sum, AuditEntry] = field(default_factory=dict[_Sum, AuditEntry])
+    """What was counted for each, as one entry; beyond ``_MOST_SUMS`` for all others."""
 
     def allows(self, now: float) -> bool:
         """Whether one more is written at once."""
@@ -128,15 +160,19 @@ class _Share:
         is_new = self.is_new
         if self.allows(entry.time) or is_new:
             return True
-        self.left_out += entry.count
-        self.last = entry
+        who = entry.identity
+        key: _Sum | None = (who.user, who.role, entry.target, entry.action, entry.ending.forwarded)
+        if key not in self.left_out and len(self.left_out) >= _MOST_SUMS:
+            key = None
+        before = self.left_out.get(key)
+        self.left_out[key] = _sum_of(before, entry) if before else entry
         return False
 
-    def sum_up(self, now: float) -> AuditEntry | None:
-        """The last of those that were left out, standing for all of them."""
-        last, left_out = self.last, self.left_out
-        self.is_used, self.left_out, self.last = False, 0, None
-        return replace(last, time=now, old={}, new={}, count=left_out) if last else None
+    def sum_up(self, now: float) -> list[AuditEntry]:
+        """Those that were left out, one for each user and target, with what is true of all that it counts."""
+        sums = [replace(one, time=now, old={}, new={}) for one in self.left_out.values()]
+        self.is_used, self.left_out = False, {}
+        return sums
 
 
 class AuditTrail:
@@ -265,7 +301,8 @@ class AuditTrail:
         kind = (entry.action if entry.action in _ACTIONS else "", str(entry.ending.code))
         key = (*client, *kind) if entry.is_refused else (*client, *kind, entry.target)
         if key not in self._shares and len(self._shares) >= _MOST_SHARES:
-            client, key = ("", ""), ("", "", *kind)
+            client = (client[0], _OTHERS)
+            key = (*client, *kind)
         share = self._shares.get(key)
         if share is None:
             limit = RateLimit(AT_ONCE, DONE_EVERY_S)
@@ -293,9 +330,8 @@ class AuditTrail:
             if not share.is_used:
                 del self._shares[key]
                 continue
-            left_out = share.sum_up(now)
-            if left_out is not None:
-                self._tell(left_out)
+            for entry in share.sum_up(now):
+                self._tell(entry)
         used = {key[:2] for key in self._shares}
         for client in [client for client in self._limits if client not in used]:
             del self._limits[client]  # a minute has filled it

@@ -327,9 +327,14 @@ class Plant:
     ) -> None:
         is_known = target in self.drives or target in self.nodes or target in self._buses
         source = target.removeprefix("bus/") if is_known else "bridge"
-        what = what if is_known else f"{what} on {target[:_LONGEST_NAME]!r}"
+        # Several requests that are told as one have nothing in what they differ.
+        what = what or "requests"
+        if target and not is_known:
+            what = f"{what} on {target[:_LONGEST_NAME]!r}"
+        who = identity if identity.user else identity.source.label
         self._refused_by_others += count
-        self.report(Event(now, Kind.REFUSED, source, 300, f"{what} by {identity} refused: {why}"))
+        message = f"{what} by {who} refused"
+        self.report(Event(now, Kind.REFUSED, source, 300, f"{message}: {why}" if why else message))
 
     def _counting_refusals(self, request: Request, now: float, reply: Reply) -> Reply:
         """``reply`` for what no drive refuses by itself: a refusal is an event and counts as a drive's."""

@@ -150,6 +150,21 @@ def test_a_line_is_json_with_both_times() -> None:
     }
 
 
+def test_a_line_for_several_leaves_out_in_what_they_differ() -> None:
+    who = Identity(Source.OPCUA, "", address="10.0.0.9")
+    line = as_line(AuditEntry(1.0, who, "", "stop", Ending("unknown_target"), count=190), NOON_NS)
+    assert json.loads(line).keys() == {
+        "t",
+        "mono",
+        "source",
+        "address",
+        "action",
+        "code",
+        "forwarded",
+        "count",
+    }
+
+
 @pytest.mark.parametrize("name", ["a\nb", "\x00", "ü" * 5000, "\ud800", '"}'])
 def test_whatever_a_client_calls_itself_it_is_one_line(name: str) -> None:
     who = Identity(Source.OPCUA, name)

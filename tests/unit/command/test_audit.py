@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bridge.command import (
     Action,
@@ -177,6 +181,13 @@ def test_what_a_protocol_refuses_by_itself_is_told_as_an_event_and_counts(hall: 
     assert hall.plant.image.read("bridge/refused_writes").value == 4
 
 
+def test_several_requests_that_are_told_as_one_name_nobody(hall: Hall) -> None:
+    nobody = Identity(Source.OPCUA, "", address="10.0.0.9")
+    hall.plant.rejected(Rejection(nobody, "", "", Code.UNKNOWN_POINT, ""), hall.now, 7)
+    (event,) = [event for event in hall.events if event.kind is Kind.REFUSED]
+    assert (event.source, event.message) == ("bridge", "requests by opcua refused")
+
+
 def test_without_a_listener_nothing_is_followed(hall: Hall) -> None:
     hall.plant.audit.tell_to(None)
     hall.write(control_word=SHUT_DOWN)
@@ -264,6 +275,62 @@ class TestBusyControllers:
         assert len(hall.entries) <= 1000 + 20
         hall.plant.audit.sum_up(hall.now)
         assert sum(entry.count for entry in hall.entries) == 5000
+
+    def test_a_summary_names_each_who_was_refused_and_each_target(self, hall: Hall) -> None:
+        """Users behind one address: none is told for what another one did."""
+        clerks = [Identity(Source.OPCUA, name, address="10.0.0.9:1") for name in ("ann", "bob", "demo")]
+        targets = [f"attic/fu{number}" for number in range(3)]
+        for _ in range(100):
+            for who, target in zip(clerks, targets, strict=True):
+                assert not hall.ask(Action.STOP, who, target).ok
+        hall.told()
+        hall.plant.audit.sum_up(hall.now)
+        sums = {(entry.identity.user, entry.target): entry.count for entry in hall.entries}
+        assert sums.keys() == {("ann", "attic/fu0"), ("bob", "attic/fu1"), ("demo", "attic/fu2")}
+        assert sum(sums.values()) == 300 - 20
+        assert max(sums.values()) - min(sums.values()) <= 1
+
+    def test_a_summary_of_many_leaves_out_what_differs(self, hall: Hall) -> None:
+        for number in range(500):
+            who = Identity(Source.OPCUA, f"user{number}", address=f"10.0.0.9:{1000 + number}")
+            hall.ask(Action.STOP, who, f"attic/fu{number}")
+        hall.told()
+        hall.plant.audit.sum_up(hall.now)
+        *named, rest = hall.entries
+        assert len(named) == 10
+        assert {entry.count for entry in named} == {1}
+        assert (rest.identity.user, rest.identity.address, rest.target) == ("", "10.0.0.9", "")
+        assert (rest.action, rest.ending.code, rest.count) == ("stop", Code.UNKNOWN_TARGET, 500 - 20 - 10)
+
+    @given(
+        st.lists(
+            st.tuples(
+                st.integers(0, 3),
+                st.integers(0, 30),
+                st.integers(0, 30),
+                st.sampled_from(("stop", "reset", "x")),
+            ),
+            max_size=300,
+        )
+    )
+    def test_no_line_says_of_anybody_what_others_did(self, asked: list[tuple[int, int, int, str]]) -> None:
+        """Every field that a line has is true of as many requests as it counts."""
+        hall = Hall()
+        made: list[tuple[str, str, str, str]] = []
+        for host, user, target, action in asked:
+            name, place = f"user{user}", f"attic/{target}"
+            who = Identity(Source.OPCUA, name, address=f"10.0.0.{host}:{user}")
+            made.append((f"10.0.0.{host}", name, place, action))
+            hall.plant.rejected(Rejection(who, place, action, Code.UNKNOWN_TARGET, "no such"), hall.now)
+        hall.plant.audit.sum_up(hall.now)
+        told: Counter[tuple[str, str, str, str]] = Counter()
+        for entry in hall.entries:
+            address = entry.identity.address.partition(":")[0]
+            told[address, entry.identity.user, entry.target, entry.action] += entry.count
+        assert sum(told.values()) == len(made)
+        for fields, count in told.items():
+            fitting = sum(all(a in ("", b) for a, b in zip(fields, one, strict=True)) for one in made)
+            assert count <= fitting, fields
 
     def test_every_telegram_is_told_where_the_site_wants_it(self) -> None:
         hall = Hall(every_telegram=True)

@@ -31,6 +31,19 @@ def test_who_invents_targets_is_told_in_sum() -> None:
     assert sum(one.count for one in told) == 10_000
 
 
+def test_what_is_told_in_sum_names_only_what_is_true_of_all() -> None:
+    waiting = Rejections()
+    for number in range(100):
+        who = Identity(Source.OPCUA, f"user{number}", address=f"10.0.0.9:{number}")
+        waiting.add(Rejection(who, f"attic/{number}", Action.WRITE, Code.READ_ONLY, f"no {number}"), 10.0)
+    *named, rest = waiting.take()
+    assert {one.count for one in named} == {1}
+    told = rest.rejection
+    assert rest.count == 100 - len(named)
+    assert (told.identity.user, told.identity.address, told.target, told.message) == ("", "10.0.0.9", "", "")
+    assert (told.action, told.code, told.values) == (Action.WRITE, Code.READ_ONLY, {})
+
+
 def test_who_floods_hides_no_other_client() -> None:
     waiting = Rejections()
     for number in range(1000):

@@ -5,7 +5,12 @@ The command line turns each into its exit code; nothing below it decides how a p
 
 from __future__ import annotations
 
+import errno
 from dataclasses import dataclass
+from typing import Final
+
+EXHAUSTED: Final = frozenset((errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM))
+"""Error numbers that say that this process, or the machine, has no descriptor or no memory left."""
 
 
 class BridgeError(Exception):

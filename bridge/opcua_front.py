@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import gc
-import socket
 from contextlib import AsyncExitStack
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from bridge.errors import OperationFailed
 from bridge.front_process import give_signs
 from bridge.mirror.client import MirrorClient
 from bridge.mirror.endpoint import socket_endpoint
+from bridge.northbound.listening import ListeningSocket
 from bridge.northbound.opcua.server import OpcUaServer
 
 
@@ -33,7 +33,7 @@ async def run_opcua(site: Site, signs: int | None = None, listening: int | None 
         # Nothing of what is built here is garbage, and looking for it takes a quarter of the time.
         gc.disable()
         stack.callback(gc.enable)
-        bound = None if listening is None else socket.socket(fileno=listening)
+        bound = None if listening is None else ListeningSocket(listening, "opcua.listen")
         server = OpcUaServer(mirror, site.opcua, Path(site.site.state_dir), site.site.name, bound)
         await server.start()
         stack.push_async_callback(server.close)

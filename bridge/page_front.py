@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import socket
 from contextlib import AsyncExitStack
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,7 +19,7 @@ from bridge.lint import dictionary_files
 from bridge.mapping import Family
 from bridge.mirror.client import MirrorClient
 from bridge.mirror.endpoint import socket_endpoint
-from bridge.northbound.listening import listen
+from bridge.northbound.listening import ListeningSocket, listen
 from bridge.northbound.page.integration import Export
 from bridge.northbound.page.server import PageServer
 from bridge.northbound.page.web import Backstage, FaultTexts, Page
@@ -93,7 +92,8 @@ async def run_page(project: Project, signs: int | None = None, listening: int | 
         await mirror.open()
         stack.push_async_callback(mirror.close)
         table = site.page
-        bound = listen(table.listen, "page.listen") if listening is None else socket.socket(fileno=listening)
+        key = "page.listen"
+        bound = listen(table.listen, key) if listening is None else ListeningSocket(listening, key)
         page = Page(mirror, site, project.families, backstage_of(project), clock.now, _kept_sessions(site))
         server = PageServer(page, bound, table.certificate, table.private_key)
         await server.start()

@@ -8,6 +8,7 @@ import os
 from typing import Any, Final
 
 from bridge.cli.terminal import printable, printable_lines
+from bridge.errors import EXHAUSTED
 from bridge.quietlog import QuietHandler, about
 
 _log = logging.getLogger(__name__)
@@ -65,8 +66,11 @@ def write_counts(loop: asyncio.AbstractEventLoop) -> None:
 
 def log_fault(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
     """An event loop's exception handler, for what nobody awaited or caught. The first from each place is
-    logged with its traceback."""
+    logged with its traceback; that there is no descriptor left is one trouble, wherever it is met."""
     error: BaseException | None = context.get("exception")
+    if isinstance(error, OSError) and error.errno in EXHAUSTED:
+        _log.error("%s: %s", context.get("message"), error.strerror, extra=about("event loop", "exhausted"))
+        return
     place = _place(error) or str(context.get("message"))
     message = f"unexpected: {context.get('message')}: {error!r}" if error else str(context.get("message"))
     _log.error("%s", message, exc_info=error, extra=about("event loop", place))

@@ -1,20 +1,87 @@
-"""Listening sockets: opening them, with advice if that fails, and watching them."""
+"""Listening sockets: opening them, with advice if that fails, watching them, and turning clients away while
+this process has no descriptor left."""
 
 from __future__ import annotations
 
 import asyncio
 import errno
+import logging
 import os
 import socket
-from typing import Final
+from typing import Any, Final
 
-from bridge.errors import OperationFailed, Unavailable
+from bridge.errors import EXHAUSTED, OperationFailed, Unavailable
+from bridge.quietlog import about
+
+_log = logging.getLogger(__name__)
 
 _BACKLOG: Final = 64
 _LOOK_EVERY_S: Final = 1.0
 
 
-def listen(endpoint: str, key: str) -> socket.socket:
+class ListeningSocket(socket.socket):
+    """A listening socket on which running out of descriptors is one trouble with one line in the log.
+
+    While there are none, whoever connects is turned away at once with one that is held for that: otherwise
+    the kernel would go on reporting the connection, and asyncio try again without a pause. Where even that
+    one does not help, as when the whole machine has none, asyncio leaves the socket alone for a second.
+    """
+
+    def __init__(self, descriptor: int, name: str) -> None:
+        """Takes over a socket that listens; ``name`` is for the log."""
+        super().__init__(fileno=descriptor)
+        self._name = name
+        self._spare: int | None = _spare()
+        self._has_failed = False
+
+    def accept(self) -> tuple[socket.socket, Any]:
+        """As that of ``socket``; raises BlockingIOError where a client was turned away."""
+        if self._has_failed:
+            # asyncio asks again, up to its backlog, also after an error.
+            self._has_failed = False
+            raise BlockingIOError
+        try:
+            return super().accept()
+        except OSError as error:
+            if error.errno not in EXHAUSTED:
+                raise
+            _log.error("%s: no client can connect: %s", self._name, error.strerror, extra=about(self._name))
+            if self._turn_away():
+                raise BlockingIOError from error
+            self._has_failed = True
+            raise
+
+    def _turn_away(self) -> bool:
+        """Accept the next client with the spare descriptor and close it. False where that fails."""
+        if self._spare is None:
+            self._spare = _spare()
+        if self._spare is None:
+            return False
+        os.close(self._spare)
+        try:
+            client, _ = super().accept()
+            client.close()
+        except OSError as error:
+            return error.errno not in EXHAUSTED
+        finally:
+            self._spare = _spare()
+        return True
+
+    def close(self) -> None:
+        super().close()
+        spare, self._spare = self._spare, None
+        if spare is not None:
+            os.close(spare)
+
+
+def _spare() -> int | None:
+    try:
+        return os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC)
+    except OSError:
+        return None
+
+
+def listen(endpoint: str, key: str) -> ListeningSocket:
     """A socket that listens on ``endpoint``, which is ``key`` of the site file. Raises ``Unavailable``.
 
     It listens at once, because two processes may bind one port as long as neither does.
@@ -23,7 +90,7 @@ def listen(endpoint: str, key: str) -> socket.socket:
     host = host.strip("[]")
     is_v6 = ":" in host
     try:
-        return socket.create_server(
+        bound = socket.create_server(
             (host, int(port)),
             family=socket.AF_INET6 if is_v6 else socket.AF_INET,
             backlog=_BACKLOG,
@@ -31,6 +98,7 @@ def listen(endpoint: str, key: str) -> socket.socket:
         )
     except OSError as error:
         raise Unavailable(f"{key} = {endpoint!r}: {_advice(error, host, port)}") from error
+    return ListeningSocket(bound.detach(), key)
 
 
 def _advice(error: OSError, host: str, port: str) -> str:

@@ -20,6 +20,7 @@ from bridge.command import Event, Outcome, Plant, Reply, Request
 from bridge.command.request import DONE
 from bridge.config import Site
 from bridge.mapping import Family
+from bridge.northbound.listening import listen
 from bridge.northbound.page.server import PageServer
 from bridge.northbound.page.web import Backstage, Page
 from tests.support import sites
@@ -127,7 +128,7 @@ class Served:
         site: Site = plant.site
         backstage = Backstage({}, {}, [], {"can0": {}}, capture, dict, {}, self.system)
         self.page = Page(self.view, site, families, backstage, lambda: time.monotonic() + self.later_s, kept)
-        self.bound = socket.create_server(("127.0.0.1", 0))
+        self.bound = listen("127.0.0.1:0", "page.listen")
         self.port = self.bound.getsockname()[1]
         self.origin = f"http://127.0.0.1:{self.port}"
 

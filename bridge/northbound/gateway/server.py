@@ -13,7 +13,7 @@ from typing import Final, cast
 from bridge.command import Identity, Role, Source
 from bridge.errors import Unavailable
 from bridge.northbound.gateway.session import Net, Session
-from bridge.northbound.listening import listen, until_deaf
+from bridge.northbound.listening import ListeningSocket, listen, until_deaf
 from bridge.northbound.view import View
 from bridge.quietlog import about
 
@@ -80,7 +80,7 @@ class GatewayServer:
         except OSError as error:
             sock.close()
             raise Unavailable(f"{_KEY}: {self._path}: {error.strerror}") from error
-        return sock
+        return ListeningSocket(sock.detach(), _KEY)
 
     async def failed(self) -> None:
         """Wait until nobody can connect any more, then raise ``OperationFailed``."""

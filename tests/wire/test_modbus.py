@@ -362,7 +362,7 @@ async def test_idle_connections_make_room_and_the_owner_goes_last(
         for _ in range(5):
             idle += [await asyncio.open_connection(HOST, server.port, local_addr=("127.0.0.3", 0))]
         assert not (await plc.write_registers(0, [0x047F, 0], device_id=1)).isError(), "the owner stays"
-        said = [source_of(record) for record in caplog.records if "closed to make room" in record.message]
+        said = [source_of(record) for record in caplog.records if "made room" in record.message]
         assert set(said) == {"127.0.0.3"}, "of one kind and source: the log has one line and a count"
         for _, writer in idle:
             writer.close()

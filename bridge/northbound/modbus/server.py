@@ -6,16 +6,19 @@ import asyncio
 import ipaddress
 import logging
 import socket
-from collections import Counter
 from collections.abc import Callable
+from math import inf
 from typing import Final
 
 from bridge.command import Identity, Role, Source
 from bridge.config import ModbusTable
+from bridge.northbound.admission import Admission, Limits, Stage, Visitor
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.modbus.dispatch import Dispatcher
+from bridge.northbound.modbus.rounds import Rounds
 from bridge.northbound.modbus.session import READ_MOST, Session
 from bridge.northbound.modbus.units import Units
+from bridge.northbound.notices import teller
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.sources import source_of
 from bridge.northbound.view import View
@@ -37,11 +40,19 @@ class ModbusServer:
         self._settings = settings
         self._view = view
         self._dispatcher = Dispatcher(view, units, settings.word_order, clock)
-        self._owners = [view.image.index[f"{drive.drive_name}/supervision/owner"] for drive in units.drives]
+        owned = [drive.drive_name for drive in units.drives]
+        owned += [device.device_name for device in units.devices if device.has_outputs]
+        self._owners = [view.image.index[f"{name}/supervision/owner"] for name in owned]
         self._allowed = [ipaddress.ip_network(network) for network in settings.allow]
         self._clock = clock
         self._pulse = Pulse(clock)
         self._sessions: set[Session] = set()
+        self._admission = Admission(
+            _limits(settings.max_connections), teller("Modbus"), self._count_refused, self._count_broken
+        )
+        self._owner_names: frozenset[str] = frozenset()
+        self.rounds = Rounds(lambda go_on: asyncio.get_running_loop().call_soon(go_on))
+        """Whose requests are handled next."""
         self._writers: dict[str, set[Session]] = {}
         """Those of each address that have written."""
         self._server: asyncio.Server | None = None
@@ -93,16 +104,22 @@ class ModbusServer:
         """The identity of a client, or None if its address may not connect."""
         address = _normalised(host)
         if not any(address in network for network in self._allowed):
-            self._view.count("modbus_refused_connections")
+            self._count_refused()
             _log.warning(
                 "connection of %s refused: it is in none of the networks of modbus.allow",
                 address,
                 extra=about(source_of(str(address))),
             )
             return None
-        if len(self._sessions) >= self._settings.max_connections:
-            self._make_room(source_of(str(address)))
+        self._owner_names = frozenset(map(str, self._view.image.values(self._owners)))
+        source = source_of(str(address))
+        visitor = session.visitor = Visitor(
+            source, self._clock(), lambda: self._stage(session), lambda: self._end(session)
+        )
+        if not self._admission.admit(visitor, visitor.since):
+            return None
         self._sessions.add(session)
+        self.rounds.enter(session, source)
         shown = f"[{address}]" if address.version == 6 else str(address)
         sets = self._settings.parameters == "write"
         who = Source.MODBUS, str(address), Role.OPERATOR, f"{shown}:{port}"
@@ -112,7 +129,7 @@ class ModbusServer:
 
     def leave(self, session: Session) -> None:
         """Its client has closed the connection, or it is closed for another reason."""
-        self._sessions.discard(session)
+        self._forget(session)
         identity = session.identity
         if identity is None:
             return
@@ -138,33 +155,42 @@ class ModbusServer:
 
     def on_fault(self, session: Session, fault: str) -> None:
         """The session is closed for this reason."""
-        self._view.count("modbus_broken_connections")
+        self._count_broken()
         _log.warning("connection of %s closed: %s", session.address, fault, extra=about(session.source))
 
-    def _make_room(self, newcomer: str) -> None:
-        """End the connection that matters least: one of the address that has the most, so that a crowd pushes
-        out itself; of these, one that has sent nothing yet, else the one that has been idle longest."""
-        owners = self._view.image.values(self._owners)
-        crowds = Counter(session.source for session in self._sessions)
-        crowds[newcomer] += 1
+    def _count_refused(self) -> None:
+        self._view.count("modbus_refused_connections")
 
-        def is_missed(session: Session) -> tuple[bool, int, bool, float]:
-            identity, crowd = session.identity, crowds[session.source]
-            # Addresses of owners come last, but only for their share of the connections.
-            owns = identity is not None and str(identity) in owners
-            has_share = crowd <= max(1, self._settings.max_connections // 2)
-            return owns and has_share, -crowd, session.has_spoken, session.heard_at
-
-        idlest = min(self._sessions, key=is_missed)
+    def _count_broken(self) -> None:
         self._view.count("modbus_broken_connections")
-        _log.warning(
-            "connection of %s closed to make room: there are %d, and it is missed least",
-            idlest.address,
-            len(self._sessions),
-            extra=about(idlest.source),
+
+    def _stage(self, session: Session) -> Stage:
+        """Connections of addresses that own a drive stay, as long as the address has no more than half of
+        all."""
+        identity, visitor = session.identity, session.visitor
+        has_share = visitor is not None and self._admission.count_of(visitor.source) <= max(
+            1, self._settings.max_connections // 2
         )
-        self._sessions.discard(idlest)
-        idlest.close()
+        if has_share and identity is not None and str(identity) in self._owner_names:
+            return Stage.SESSION
+        return Stage.GREETED if session.has_spoken else Stage.CONNECTED
+
+    def _end(self, session: Session) -> None:
+        """It makes room for another one."""
+        self._forget(session)
+        session.close()
+
+    def _forget(self, session: Session) -> None:
+        self._sessions.discard(session)
+        self.rounds.leave(session)
+        if session.visitor is not None:
+            self._admission.leave(session.visitor)
+
+
+def _limits(connections: int) -> Limits:
+    """Whoever has most makes room, so that a crowd pushes out itself: of it who has said nothing yet, else
+    who has been idle longest. Clients connect once and stay, so idle ones have no time that is up."""
+    return Limits(connections, connections, connections, slow_s=inf, all_yield=True)
 
 
 def _normalised(host: str) -> IpAddress:

@@ -17,15 +17,13 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 from bridge.command import Identity
 from bridge.command.freshness import Inflow
+from bridge.northbound.admission import Visitor
 from bridge.northbound.modbus.dispatch import WRITES, Answer, Dispatcher
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.sources import source_of
 
 if TYPE_CHECKING:
     from bridge.northbound.modbus.server import ModbusServer
-
-TURN: Final = 16
-"""Requests of one connection that are handled before all others get their turn: about 0.3 ms."""
 
 STALL_LIMIT_S: Final = 5.0
 """How long a client may leave its answers unread; then it is disconnected."""
@@ -34,6 +32,7 @@ READ_MOST: Final = 16 * 1024
 """Bytes that are read at once, and that may wait here before reading stops: 64 requests of the longest
 kind."""
 
+_LAST: Final = 16  # requests of a client that has closed its side, which are handled all the same
 _UNREAD_MOST: Final = 32 * 1024  # bytes of answers that may wait for a client; beyond that it is not served
 _ESTABLISHED: Final = 1  # of TCP_INFO's first byte (linux/tcp.h)
 _KEEPALIVE: Final = (("TCP_KEEPIDLE", 30), ("TCP_KEEPINTVL", 10), ("TCP_KEEPCNT", 3))
@@ -63,7 +62,7 @@ class Conversation:
     A request has the time of its last byte, however long it waits here.
 
     ``backlog``: more requests can be handled now. ``is_full``: none is handled until an answer comes.
-    ``fault``: why the stream cannot be understood any more, or empty.
+    ``handled``: requests so far. ``fault``: why the stream cannot be understood any more, or empty.
     """
 
     def __init__(self, handle: Handle, on_late_answer: Callable[[], None]) -> None:
@@ -78,6 +77,7 @@ class Conversation:
         self._exchanges: deque[_Exchange] = deque()
         self._working = False
         self.backlog = False
+        self.handled = 0
         self.fault = ""
 
     @property
@@ -136,6 +136,7 @@ class Conversation:
             return False
         pdu = bytes(self._buffer[begin + _HEADER.size : end])
         self._offset = end
+        self.handled += 1
         exchange = _Exchange(transaction, unit_id)
         self._exchanges.append(exchange)
         received_at = self._arrival(self._dropped + end) if self._earlier else self._received_at
@@ -160,7 +161,7 @@ class Session(asyncio.BufferedProtocol):
     """Pumps bytes between a socket and a ``Conversation``. ``clock`` is the plant's.
 
     From a client that does not read its answers nothing is read either, and after a while it is disconnected.
-    One that floods is handled ``TURN`` requests at a time, and its writes do not count as fresh.
+    One that floods has its turn as all others, and its writes do not count as fresh.
     """
 
     def __init__(
@@ -172,15 +173,14 @@ class Session(asyncio.BufferedProtocol):
         self._pulse = pulse
         self._inflow = Inflow(clock(), pulse.look)
         self._room = bytearray(READ_MOST)
-        self._conversation = Conversation(self._handle, self._go_on)
+        self._conversation = Conversation(self._handle, self._wish)
         self.identity: Identity | None = None
         """The identity given by the server; None until the client is admitted."""
-        self.heard_at = float("-inf")
-        """When the client last sent something, or connected; in the plant's time."""
+        self.visitor: Visitor | None = None
+        """Its place among the connections, while it has one."""
         self.has_spoken = False
         self._transport: asyncio.Transport | None = None
         self._stalled: asyncio.TimerHandle | None = None
-        self._scheduled = False
 
     @property
     def address(self) -> str:
@@ -219,7 +219,6 @@ class Session(asyncio.BufferedProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         stream = cast(asyncio.Transport, transport)
         self._transport = stream
-        self.heard_at = self._clock()
         peer: Any = stream.get_extra_info("peername")
         self.identity = self._server.admit(self, peer[0], peer[1]) if peer else None
         if self.identity is None:
@@ -232,14 +231,18 @@ class Session(asyncio.BufferedProtocol):
         return self._room
 
     def buffer_updated(self, nbytes: int) -> None:
-        self.heard_at = now = self._clock()
+        now = self._clock()
         self.has_spoken = True
+        if self.visitor is not None:
+            self.visitor.since = now
         received_at = self._inflow.arrive(now, self._pulse.look, crowded=nbytes == READ_MOST)
         self._conversation.receive(memoryview(self._room)[:nbytes], received_at)
-        self._go_on()
+        self._wish()
 
     def eof_received(self) -> None:
-        # The transport is closed when the answers are sent; the client has gone now.
+        # The transport is closed when the answers are sent; the client has gone now. What it has asked in its
+        # last message is answered first, whoever waits: nobody would know whether it was carried out.
+        self._server.rounds.serve_now(self, _LAST)
         self._server.leave(self)
 
     def pause_writing(self) -> None:
@@ -249,7 +252,7 @@ class Session(asyncio.BufferedProtocol):
         if self._stalled:
             self._stalled.cancel()
             self._stalled = None
-            self._go_on()
+            self._wish()
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._transport = None
@@ -269,20 +272,20 @@ class Session(asyncio.BufferedProtocol):
             self._server.on_write(self, identity)
         self._dispatcher.handle(unit_id, pdu, identity, answer, received_at)
 
-    def _go_on(self) -> None:
-        """There is work: do it now, unless a turn is scheduled anyway."""
-        if not self._scheduled:
-            self._advance()
+    def _wish(self) -> None:
+        """There are requests, or answers."""
+        self._server.rounds.wish(self)
 
-    def _advance(self) -> None:
-        """Handle some requests, send the answers that are due, and see whether more can be read."""
-        self._scheduled = False
+    def serve(self, most: int) -> int:
+        """Handle up to ``most`` requests, send the answers that are due, and see whether more can be read.
+        How many were handled."""
         transport = self._transport
         if transport is None or self.identity is None or self._stalled or transport.is_closing():
-            return
+            return 0
         conversation = self._conversation
+        before = conversation.handled
         try:
-            answers = conversation.advance(TURN)
+            answers = conversation.advance(most)
         except Exception:
             transport.abort()  # a bug of ours: better no connection than one that is out of step
             raise
@@ -291,11 +294,11 @@ class Session(asyncio.BufferedProtocol):
         if conversation.fault:
             self._server.on_fault(self, conversation.fault)
             self.close()
-            return
+            return conversation.handled - before
         self._read_on(transport)
         if conversation.backlog and not self._stalled:
-            self._scheduled = True
-            asyncio.get_running_loop().call_soon(self._advance)
+            self._wish()
+        return conversation.handled - before
 
     def _read_on(self, transport: asyncio.Transport) -> None:
         """Keep reading as long as possible: bytes that wait here have a time of arrival, those in the kernel

@@ -14,12 +14,14 @@ from asyncua.server.binary_server_asyncio import BinaryServer, OPCUAProtocol
 from asyncua.ua.ua_binary import uatcp_to_binary
 
 from bridge import clock
+from bridge.command import Role
 from bridge.command.freshness import Inflow
-from bridge.northbound.opcua.admission import Admission, Stage, Visitor
+from bridge.northbound.admission import Admission, Stage, Visitor
+from bridge.northbound.opcua.admission import limits as admission_limits
 from bridge.northbound.opcua.inbox import Inbox
 from bridge.northbound.opcua.library import StatusCodes, make, status, ua
 from bridge.northbound.opcua.notices import tell
-from bridge.northbound.opcua.session import Server
+from bridge.northbound.opcua.session import Server, Session
 from bridge.northbound.opcua.transport import MOST_BEFORE_SESSION, Processor
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.sources import source_of
@@ -53,7 +55,9 @@ class _Protocol(OPCUAProtocol):
         self._source = source_of(str(peer[0]) if isinstance(peer, tuple) else str(peer))
         assert isinstance(transport, asyncio.Transport)
         now = clock.now()
-        visitor = Visitor(self._source, now, self._stage, self._held, lambda: _end(transport))
+        visitor = Visitor(
+            self._source, now, self._stage, lambda: _end(transport), self._held, self._has_rights
+        )
         if not self._admission.admit(visitor, now):
             _end(transport, StatusCodes.BadTcpServerTooBusy)
             return
@@ -71,6 +75,11 @@ class _Protocol(OPCUAProtocol):
 
     def _stage(self) -> Stage:
         return self.processor.stage if isinstance(self.processor, Processor) else Stage.CONNECTED
+
+    def _has_rights(self) -> bool:
+        """True for a user who may command."""
+        session = self.processor.session if isinstance(self.processor, Processor) else None
+        return isinstance(session, Session) and session.identity.role >= Role.OPERATOR
 
     def _held(self) -> int:
         transport, processor = self.transport, self.processor
@@ -129,7 +138,12 @@ class Listener(BinaryServer):
         super().__init__(server, host, port, limits)
         self._socket = bound
         self._pulse = pulse
-        self._admission = Admission(tell, server.count)
+        self._admission = Admission(
+            admission_limits(),
+            tell,
+            lambda: server.count("opcua_refused_connections"),
+            lambda: server.count("opcua_broken_connections"),
+        )
         self._timer: asyncio.TimerHandle | None = None
 
     def _make_protocol(self) -> OPCUAProtocol:

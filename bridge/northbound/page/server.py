@@ -16,6 +16,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from bridge.errors import OperationFailed
 from bridge.northbound.listening import until_deaf
+from bridge.northbound.notices import teller
 from bridge.northbound.page.guards import MOST_HEAD
 from bridge.northbound.page.shares import MOST_CONNECTIONS, Connections, Doing
 from bridge.northbound.page.viewer import MOST_BYTES
@@ -44,8 +45,8 @@ class _Protocol(H11Protocol):
         super().connection_made(transport)
         self._expect_head()
         address = source_of(self.client[0] if self.client else "")
-        for other in self._shares.opened(transport, address, time.monotonic()):
-            other.abort()
+        if not self._shares.opened(transport, address):
+            transport.abort()
 
     def data_received(self, data: bytes) -> None:
         before = self._request
@@ -62,7 +63,7 @@ class _Protocol(H11Protocol):
             self._does(Doing.KEPT)
 
     def _does(self, doing: Doing) -> None:
-        self._shares.does(self.transport, doing, time.monotonic())
+        self._shares.does(self.transport, doing)
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._forget()
@@ -136,7 +137,11 @@ class PageServer:
         self, page: Page, bound: socket.socket, certificate: str | None = None, private_key: str | None = None
     ) -> None:
         self._bound = bound
-        shares = {"_shares": Connections[asyncio.Transport]()}
+        shares = {
+            "_shares": Connections[asyncio.Transport](
+                lambda transport: transport.abort(), teller("page"), time.monotonic
+            )
+        }
         config = uvicorn.Config(
             page.app,
             http=type("_Shared", (_Protocol,), shares),

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from bridge.command import Role
 from bridge.northbound.page.shares import (
     MOST_CONNECTIONS,
-    MOST_IDLE_OF_ADDRESS,
     MOST_OF_USER,
     MOST_TABS,
+    MOST_WAITING_OF_ADDRESS,
     UNPROVED_S,
     Connections,
     Doing,
@@ -99,31 +99,76 @@ def test_an_engineer_always_gets_in_unless_engineers_or_commanders_have_all(
 # connections
 
 
+class Front:
+    """The connections of a page, numbered, on a clock of its own."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.closed: list[int] = []
+        self.told: list[str] = []
+        self.connections = Connections[int](
+            self.closed.append, lambda kind, source, detail: self.told.append(source), lambda: self.now
+        )
+
+    def opens(self, one: int, address: str = HERE, doing: Doing = Doing.SILENT) -> bool:
+        is_in = self.connections.opened(one, address)
+        self.connections.does(one, doing)
+        return is_in
+
+
 def test_idle_connections_of_one_address_end_the_oldest_of_its_own() -> None:
-    connections = Connections[int]()
-    connections.opened(-1, "10.0.0.2", 0.0)
-    closed = [one for number in range(400) for one in connections.opened(number, HERE, number / 100)]
-    assert closed == list(range(400 - MOST_IDLE_OF_ADDRESS)), "the oldest, and nobody else's"
-    assert len(connections) == MOST_IDLE_OF_ADDRESS + 1
+    front = Front()
+    front.opens(-1, "10.0.0.2")
+    for number in range(400):
+        front.now = number / 100
+        assert front.opens(number)
+    assert front.closed == list(range(400 - MOST_WAITING_OF_ADDRESS)), "the oldest, and nobody else's"
+    assert len(front.connections) == MOST_WAITING_OF_ADDRESS + 1
+    assert set(front.told) == {HERE}
+
+
+def test_beside_idle_connections_of_its_own_address_a_browser_is_served() -> None:
+    """Each that opens and asks at once is among the youngest."""
+    front = Front()
+    for number in range(400):
+        front.opens(number)
+    for number in range(1000, 1060):
+        front.now += 0.001
+        assert front.opens(number)
+        front.connections.does(number, Doing.BUSY)
+        assert number not in front.closed
+        front.connections.does(number, Doing.KEPT)
+        front.connections.closed(number)
 
 
 def test_a_crowd_of_addresses_takes_no_connection_on_which_something_is_asked() -> None:
-    connections = Connections[int]()
-    connections.opened(-1, HERE, 0.0)
-    connections.does(-1, Doing.BUSY, 0.0)
-    connections.opened(-2, HERE, 0.0)
-    connections.does(-2, Doing.UNPROVED, 0.0)
-    now = 2 * UNPROVED_S
-    closed = {one for n in range(2000) for one in connections.opened(n, f"10.1.{n % 250}.{n // 250}", now)}
-    assert len(connections) == MOST_CONNECTIONS
-    assert not {-1, -2} & closed
+    front = Front()
+    front.opens(-1, doing=Doing.BUSY)
+    front.opens(-2, doing=Doing.UNPROVED)
+    front.now = 2 * UNPROVED_S
+    for number in range(2000):
+        front.opens(number, f"10.1.{number % 250}.{number // 250}")
+    assert len(front.connections) == MOST_CONNECTIONS
+    assert not {-1, -2} & set(front.closed)
 
 
 def test_tabs_that_prove_nothing_end_before_anybody_is_refused() -> None:
-    connections = Connections[int]()
+    front = Front()
     for number in range(MOST_CONNECTIONS):
-        connections.opened(number, HERE, 0.0)
-        connections.does(number, Doing.UNPROVED, 0.0)
-    assert connections.opened(1000, "10.0.0.2", 1.0) == [0]
-    connections.does(1000, Doing.BUSY, 1.0)
-    assert connections.opened(1001, HERE, 1.0) == [1]
+        front.opens(number, f"10.0.1.{number % 8}", Doing.UNPROVED)
+    front.now = 1.0
+    assert front.opens(1000, "10.0.0.2", Doing.BUSY)
+    assert front.closed == [0]
+    assert front.opens(1001, "10.0.1.3")
+    assert front.closed[1:] == [3]
+
+
+def test_where_all_are_busy_a_newcomer_is_refused_with_a_line() -> None:
+    front = Front()
+    for number in range(MOST_CONNECTIONS):
+        front.opens(number, f"10.0.1.{number % 8}", Doing.BUSY)
+    assert not front.opens(1000, "10.0.0.2")
+    assert front.told == ["10.0.0.2"]
+    front.connections.closed(0)
+    front.connections.closed(0)
+    assert front.opens(1001, "10.0.0.2")

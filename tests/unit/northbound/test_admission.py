@@ -4,24 +4,31 @@ from __future__ import annotations
 
 import pytest
 
+from bridge.northbound.admission import Admission, Limits, Stage, Visitor
 from bridge.northbound.opcua.admission import (
     DEADLINE_S,
+    FOR_RIGHTS,
     MOST_CONNECTIONS,
     MOST_HELD,
     MOST_OF_ADDRESS,
     MOST_WAITING,
-    Admission,
-    Stage,
-    Visitor,
+    limits,
 )
 from bridge.northbound.sources import source_of
 
 
 class Rig:
-    def __init__(self) -> None:
+    """A server with the limits of OPC UA, unless others are given."""
+
+    def __init__(self, of: Limits | None = None) -> None:
         self.told: list[tuple[str, str, str]] = []
         self.counted: list[str] = []
-        self.admission = Admission(lambda *what: self.told.append(what), self.counted.append)
+        self.admission = Admission(
+            of or limits(),
+            lambda *what: self.told.append(what),
+            lambda: self.counted.append("refused"),
+            lambda: self.counted.append("broken"),
+        )
         self.closed: list[Client] = []
         self.now = 0.0
 
@@ -36,8 +43,14 @@ class Client:
     def __init__(self, rig: Rig, source: str, stage: Stage) -> None:
         self.stage = stage
         self.held = 0
+        self.has_rights = False
         self.visitor = Visitor(
-            source, rig.now, lambda: self.stage, lambda: self.held, lambda: rig.closed.append(self)
+            source,
+            rig.now,
+            lambda: self.stage,
+            lambda: rig.closed.append(self),
+            lambda: self.held,
+            lambda: self.has_rights,
         )
         self.is_in = rig.admission.admit(self.visitor, rig.now)
 
@@ -118,7 +131,7 @@ def test_who_holds_the_most_of_the_address_that_does_is_closed(rig: Rig) -> None
     assert reader not in rig.closed
     left = sum(one.held for one in [reader, *crowd] if one not in rig.closed)
     assert MOST_HELD * 0.9 < left <= MOST_HELD
-    assert rig.counted == ["opcua_broken_connections"] * len(rig.closed)
+    assert rig.counted == ["broken"] * len(rig.closed)
     before = len(rig.closed)
     rig.admission.weigh()
     assert len(rig.closed) == before
@@ -150,6 +163,46 @@ def test_when_all_are_taken_only_who_waits_makes_room(rig: Rig) -> None:
     assert rig.closed == [waiting]
     assert not rig.client("10.0.2.2").is_in
     assert len(rig.admission) == MOST_CONNECTIONS
+
+
+def test_one_place_is_kept_for_who_has_rights(rig: Rig) -> None:
+    readers = [rig.client(f"10.0.1.{number}", Stage.SESSION) for number in range(MOST_CONNECTIONS)]
+    rig.admission.look(0.0)
+    assert rig.closed == readers[-FOR_RIGHTS:], "anybody may try the last place, none of them keeps it"
+    operator = rig.client("10.0.2.1", Stage.CHANNEL)
+    assert operator.is_in
+    operator.stage, operator.has_rights = Stage.SESSION, True
+    rig.admission.look(1.0)
+    assert operator not in rig.closed
+    assert not rig.client("10.0.2.2").is_in
+
+
+def test_where_somebody_has_rights_others_may_have_the_rest(rig: Rig) -> None:
+    rig.client("10.0.2.1", Stage.SESSION).has_rights = True
+    for number in range(MOST_CONNECTIONS - 1):
+        rig.client(f"10.0.1.{number}", Stage.SESSION)
+    rig.admission.look(0.0)
+    assert rig.closed == []
+
+
+def test_where_all_yield_a_newcomer_always_gets_in_at_the_expense_of_the_largest_crowd() -> None:
+    rig = Rig(Limits(4, 4, 4, all_yield=True))
+    owner = rig.client("10.0.0.2", Stage.SESSION)
+    crowd = rig.crowd(3, "10.0.0.3", Stage.SESSION)
+    assert rig.client("10.0.0.4").is_in
+    assert rig.closed == crowd[:1]
+    assert rig.client("10.0.0.3").is_in
+    assert owner not in rig.closed
+
+
+def test_a_refusal_and_an_end_have_one_kind_of_line_each(rig: Rig) -> None:
+    for _ in range(MOST_OF_ADDRESS):
+        rig.client(stage=Stage.SESSION)
+    for _ in range(20):
+        rig.client()
+    assert {(kind, source) for kind, source, _ in rig.told} == {("refused connections", "10.0.0.1")}
+    assert rig.counted == ["refused"] * 20
+    assert rig.admission.count_of("10.0.0.1") == MOST_OF_ADDRESS
 
 
 @pytest.mark.parametrize(

@@ -92,7 +92,7 @@ _LINK, _WORKER = "zenohlink/link.py", "zenohlink/worker.py"
 _SESSION: Final = "northbound/modbus/session.py"
 WAYS: Final = {
     "A TPDO into a Modbus register": Way(
-        _READ, (_IMAGE, Rest(_SESSION, "Conversation._on_answer"), Rest(_SESSION, "Session._advance"))
+        _READ, (_IMAGE, Rest(_SESSION, "Conversation._on_answer"), Rest(_SESSION, "Session.serve"))
     ),
     "A TPDO into an OPC UA node": Way(
         _READ,

@@ -12,8 +12,10 @@ from typing import Final, cast
 
 from bridge.command import Identity, Role, Source
 from bridge.errors import Unavailable
+from bridge.northbound.admission import Admission, Limits, Stage, Visitor
 from bridge.northbound.gateway.session import Net, Session
 from bridge.northbound.listening import ListeningSocket, listen, until_deaf
+from bridge.northbound.notices import teller
 from bridge.northbound.view import View
 from bridge.quietlog import about
 
@@ -47,6 +49,9 @@ class GatewayServer:
         self._servers: list[asyncio.Server] = []
         self._sockets: list[socket.socket] = []
         self._clients: set[_Client] = set()
+        # Who has sent nothing yet makes room for who may; those at work do not.
+        limits = Limits(MOST_CLIENTS, MOST_CLIENTS, MOST_CLIENTS)
+        self._admission = Admission(limits, teller(f"gateway of {net.target}"))
 
     @property
     def port(self) -> int | None:
@@ -117,16 +122,17 @@ class GatewayServer:
 
     def admit(self, client: _Client, on_lines: Callable[[], None]) -> Session | None:
         """None where there are clients enough."""
-        if len(self._clients) >= MOST_CLIENTS:
-            _log.warning(
-                "gateway connection refused: there are %d", len(self._clients), extra=about(self._net.target)
-            )
+        visitor = Visitor(client.identity.user, self._clock(), client.stage, client.abort)
+        if not self._admission.admit(visitor, visitor.since):
             return None
+        client.visitor = visitor
         self._clients.add(client)
         return Session(self._net, client.identity, self._view.submit, on_lines)
 
     def leave(self, client: _Client) -> None:
         self._clients.discard(client)
+        if client.visitor is not None:
+            self._admission.leave(client.visitor)
 
     def now(self) -> float:
         return self._clock()
@@ -137,6 +143,9 @@ class _Client(asyncio.BufferedProtocol):
 
     def __init__(self, server: GatewayServer, identity: Identity) -> None:
         self.identity = identity
+        self.visitor: Visitor | None = None
+        """Its place among the connections, while it has one."""
+        self._has_spoken = False
         self._server = server
         self._buffer = bytearray(_READ_MOST)
         self._transport: asyncio.Transport | None = None
@@ -158,6 +167,9 @@ class _Client(asyncio.BufferedProtocol):
             self._session.close()
         self._session = self._transport = None
 
+    def stage(self) -> Stage:
+        return Stage.SESSION if self._has_spoken else Stage.CONNECTED
+
     def abort(self) -> None:
         if self._transport:
             self._transport.abort()
@@ -166,6 +178,7 @@ class _Client(asyncio.BufferedProtocol):
         return self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
+        self._has_spoken = True
         session = self._session
         if session is not None:
             self._carry_on(lambda: session.receive(bytes(self._buffer[:nbytes]), self._server.now()))

@@ -94,6 +94,18 @@ async def test_there_are_so_many_clients(server: GatewayServer) -> None:
         end[1].close()
 
 
+async def test_who_says_nothing_makes_room_for_who_does(server: GatewayServer) -> None:
+    silent = [await asyncio.open_connection("127.0.0.1", server.port) for _ in range(MOST_CLIENTS)]
+    busy: list[tuple[asyncio.StreamReader, asyncio.StreamWriter]] = []
+    for _ in range(MOST_CLIENTS):
+        busy.append(await asyncio.open_connection("127.0.0.1", server.port))
+        assert await ask(*busy[-1], "[1] set node 5") == "[1] OK"
+    for reader, _ in silent:
+        assert await reader.read() == b""
+    for _, writer in (*silent, *busy):
+        writer.close()
+
+
 async def test_a_socket_left_behind_is_no_obstacle_and_a_folder_is(tmp_path: Path, bridge: Bridge) -> None:
     path = tmp_path / "left.gateway"
     for _ in range(2):

@@ -10,6 +10,7 @@ from bridge.config.fields import WordOrder as WordOrder
 from bridge.config.load import load_site as load_site
 from bridge.config.load import read_site as read_site
 from bridge.config.model import BusTable as BusTable
+from bridge.config.model import CableTable as CableTable
 from bridge.config.model import DriveTable as DriveTable
 from bridge.config.model import ModbusTable as ModbusTable
 from bridge.config.model import NodeTable as NodeTable

@@ -261,6 +261,17 @@ class NodeTable(Table):
     )
 
 
+class CableTable(Table):
+    """A segment of the cable, from the repeater before it on."""
+
+    length_m: float = Field(ge=0.1, le=10_000, description="0.1…10000 m")
+    cross_section_mm2: float | None = Field(None, ge=0.1, le=10, description="0.1…10 mm²")
+    nodes: int | None = Field(None, ge=2, le=127, description="2…127, the bridge included")
+    terminations: int | None = Field(None, ge=0, le=127, description="terminating resistors")
+    longest_stub_m: float = Field(0.0, ge=0, le=1000, description="0 (none) or a length in m")
+    repeater_m: float = Field(30.0, ge=0, le=1000, description="0…1000 m")
+
+
 class BusTable(Table):
     name: Name = Field(description="a name for this bus, lower_snake_case")
     interface: str = Field(description='"socketcan", "virtual", or a python-can interface')
@@ -280,6 +291,9 @@ class BusTable(Table):
     )
     on_intruder: OnIntruder = Field("stop_node", description="stop_node, stop_all or report")
     gateway: Gateway | None = Field(None, description='"socket", or address:port on loopback')
+    cable: list[CableTable] = Field(
+        default_factory=list[CableTable], description="a [[bus.cable]] table for each segment"
+    )
     node: list[NodeTable] = Field(default_factory=list[NodeTable])
 
     @property

@@ -9,6 +9,7 @@ from pathlib import Path
 from bridge.config import Site
 from bridge.eds import Description, read_device_file
 from bridge.lint.bus import Downloads, view_bus
+from bridge.lint.cable import check_cable
 from bridge.lint.contradictions import check_contradictions
 from bridge.lint.decisions import check_decisions
 from bridge.lint.identifiers import check_identifiers
@@ -89,6 +90,7 @@ def lint(
         check_contradictions(bus, report)
         check_outputs(bus, report)
         check_moving(bus, report)
+        check_cable(bus, report)
         cases += [*worst_cases(bus), *output_cases(bus)]
         loads.append(check_load(bus, report))
         exposures.append(exposure(bus))

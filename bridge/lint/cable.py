@@ -1,0 +1,177 @@
+"""The cable of a bus beside what the manuals of its nodes allow at its bit rate.
+
+Where several makers' nodes are on a bus the smallest length counts (EDS84DMOTCAN §5.2.4, "Mischbetrieb").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+from bridge.config import CableTable
+from bridge.lint.bus import BusView
+from bridge.lint.report import LintReport
+from bridge.tomlfile import Key
+
+_TERMINATIONS: Final = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Manual:
+    """What a maker's manual says. ``lengths`` are (bit/s, m) of the whole bus; ``wires`` (m, mm²): up to this
+    length at least this cross-section, ``segments`` (nodes, m) by cross-section in mm²: up to so many nodes
+    a segment without a repeater may be so long. ``line`` is the section by which nodes are in a line."""
+
+    source: str
+    line: str
+    lengths: Sequence[tuple[int, float]]
+    wires: Sequence[tuple[float, float]] = ()
+    segments: Mapping[float, Sequence[tuple[int, float]]] = field(
+        default_factory=dict[float, Sequence[tuple[int, float]]]
+    )
+
+    def longest_m(self, bitrate: int) -> float:
+        """Length of a bus at this bit rate: that of the next higher one in the table."""
+        return max((length for rate, length in self.lengths if rate >= bitrate), default=0.0)
+
+    def fastest(self, length_m: float) -> int | None:
+        """Highest bit rate of the table at which a bus may be so long; None where there is none."""
+        return max((rate for rate, length in self.lengths if length >= length_m), default=None)
+
+    def thinnest_mm2(self, length_m: float) -> float | None:
+        """Least cross-section for wires of this length; None where the manual does not say."""
+        return next((area for length, area in self.wires if length_m <= length), None)
+
+    def segment_m(self, area_mm2: float, nodes: int) -> float | None:
+        """Length of a segment: by the next smaller cross-section and the next higher number of nodes. None
+        where the manual does not say."""
+        area = max((one for one in self.segments if one <= area_mm2), default=None)
+        if area is None:
+            return None
+        return next((length for most, length in self.segments[area] if nodes <= most), None)
+
+
+_ROWS: Final = (2, 5, 10, 20, 32, 63)
+MANUALS: Final[Mapping[str, Manual]] = {
+    "Getriebebau NORD": Manual(
+        "BU 2500 §5.2",
+        "BU 2500 §3.2",
+        ((1_000_000, 25), (800_000, 50), (500_000, 80), (250_000, 230), (125_000, 480), (50_000, 1000)),
+        ((50, 0.25), (80, 0.34), (230, 0.5), (480, 0.75), (1000, 1.0)),
+    ),
+    "Lenze": Manual(
+        "EDS84DMOTCAN §5.2.4",
+        "EDS84DMOTCAN §5.2.1",
+        (
+            (1_000_000, 13),
+            (800_000, 38),
+            (500_000, 113),
+            (250_000, 275),
+            (125_000, 600),
+            (50_000, 1575),
+            (20_000, 4013),
+        ),
+        ((300, 0.25), (1000, 0.5)),  # §5.2.3
+        {
+            0.25: tuple(zip(_ROWS, (240, 230, 230, 210, 200, 170), strict=True)),
+            0.5: tuple(zip(_ROWS, (430, 420, 410, 390, 360, 310), strict=True)),
+            0.75: tuple(zip(_ROWS, (650, 640, 620, 580, 550, 470), strict=True)),
+            1.0: tuple(zip(_ROWS, (940, 920, 900, 850, 800, 690), strict=True)),
+        },
+    ),
+    "STÖBER Antriebstechnik": Manual(
+        "ID 441684.06 §4.1",
+        "ID 441684.06 §4.1",
+        (
+            (1_000_000, 10),
+            (800_000, 30),
+            (500_000, 100),
+            (250_000, 250),
+            (125_000, 500),
+            (100_000, 800),
+            (50_000, 1000),
+            (20_000, 2500),
+            (10_000, 5000),
+        ),
+    ),
+}
+"""By the vendor of a family."""
+
+
+def check_cable(bus: BusView, report: LintReport) -> None:
+    """Judge what the site file says of the cable; nothing where it says nothing."""
+    cable, key = bus.table.cable, (*bus.key, "cable")
+    if not cable:
+        return
+    vendors = dict.fromkeys(node.family.family.vendor for node in bus.nodes)
+    manuals = [MANUALS[vendor] for vendor in vendors if vendor in MANUALS]
+    if manuals:
+        _check_length(bus, manuals, report)
+    else:
+        message = "its length is not judged: of no maker of this bus's nodes a table is known here"
+        report.warning(key, message)
+    for place, segment in enumerate(cable):
+        nodes = segment.nodes or len(bus.nodes) + 1
+        for manual in manuals:
+            _check_wires(segment, (*key, place), manual, report)
+            _check_segment(segment, (*key, place), manual, nodes, report, is_first=not place)
+        if segment.terminations not in (None, _TERMINATIONS):
+            report.warning(
+                (*key, place, "terminations"),
+                f"{segment.terminations} terminating resistors: two of 120 Ω, one at each end of a segment",
+            )
+        if segment.longest_stub_m and manuals:
+            report.warning(
+                (*key, place, "longest_stub_m"),
+                f"a stub of {segment.longest_stub_m:g} m: nodes are in a line, without branches "
+                f"({manuals[0].line})",
+            )
+
+
+def _check_length(bus: BusView, manuals: Sequence[Manual], report: LintReport) -> None:
+    """A repeater delays the signal as much as some length of cable does (EDS84DMOTCAN §5.2.4)."""
+    cable, rate = bus.table.cable, bus.table.bitrate
+    total_m = sum(segment.length_m for segment in cable)
+    repeaters_m = sum(segment.repeater_m for segment in cable[1:])
+    strictest = min(manuals, key=lambda manual: manual.longest_m(rate))
+    most_m = strictest.longest_m(rate) - repeaters_m
+    if total_m <= most_m:
+        return
+    slower = [manual.fastest(total_m + repeaters_m) for manual in manuals]
+    rates = [one for one in slower if one is not None]
+    hint = "a shorter cable"
+    if len(rates) == len(slower):
+        hint = f"bitrate = {min(rates)}, or a shorter cable"
+    message = (
+        f"{total_m:g} m of cable are too long for {rate / 1000:g} kbit/s: {max(0.0, most_m):g} m at most"
+    )
+    report.warning((*bus.key, "cable"), f"{message} ({strictest.source})", hint)
+
+
+def _check_wires(segment: CableTable, key: Key, manual: Manual, report: LintReport) -> None:
+    least_mm2 = manual.thinnest_mm2(segment.length_m)
+    area_mm2 = segment.cross_section_mm2
+    if area_mm2 is None or least_mm2 is None or area_mm2 >= least_mm2:
+        return
+    message = f"{area_mm2:g} mm² are too thin for {segment.length_m:g} m: {least_mm2:g} mm² at least"
+    report.warning(
+        (*key, "cross_section_mm2"), f"{message} ({manual.source})", "thicker wires, or a repeater"
+    )
+
+
+def _check_segment(
+    segment: CableTable, key: Key, manual: Manual, nodes: int, report: LintReport, *, is_first: bool
+) -> None:
+    area_mm2 = segment.cross_section_mm2
+    longest_m = None if area_mm2 is None else manual.segment_m(area_mm2, nodes)
+    if area_mm2 is None or longest_m is None:
+        return
+    most_m = longest_m if is_first else longest_m - segment.repeater_m
+    if segment.length_m <= most_m:
+        return
+    message = (
+        f"{segment.length_m:g} m are too long a segment for {nodes} nodes with {area_mm2:g} mm²: "
+        f"{max(0.0, most_m):g} m at most ({manual.source})"
+    )
+    report.warning((*key, "length_m"), message, "thicker wires, or a repeater")

@@ -9,8 +9,12 @@ import errno
 from dataclasses import dataclass
 from typing import Final
 
-EXHAUSTED: Final = frozenset((errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM))
-"""Error numbers that say that this process, or the machine, has no descriptor or no memory left."""
+_EXHAUSTED: Final = frozenset((errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM))
+
+
+def is_exhausted(error: BaseException | None) -> bool:
+    """True if this process, or the machine, has no descriptor or no memory left."""
+    return isinstance(error, OSError) and error.errno in _EXHAUSTED
 
 
 class BridgeError(Exception):

@@ -8,7 +8,7 @@ import os
 from typing import Any, Final
 
 from bridge.cli.terminal import printable, printable_lines
-from bridge.errors import EXHAUSTED
+from bridge.errors import is_exhausted
 from bridge.quietlog import QuietHandler, about
 
 _log = logging.getLogger(__name__)
@@ -28,6 +28,11 @@ class _Formatter(logging.Formatter):
 
     def formatMessage(self, record: logging.LogRecord) -> str:
         return printable(super().formatMessage(record))
+
+    def formatException(self, ei: Any) -> str:
+        """Nothing where a descriptor or memory was lacking: any line of the code may be the one to meet
+        it."""
+        return "" if is_exhausted(ei[1]) else super().formatException(ei)
 
     def format(self, record: logging.LogRecord) -> str:
         return printable_lines(super().format(record))
@@ -68,8 +73,8 @@ def log_fault(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
     """An event loop's exception handler, for what nobody awaited or caught. The first from each place is
     logged with its traceback; that there is no descriptor left is one trouble, wherever it is met."""
     error: BaseException | None = context.get("exception")
-    if isinstance(error, OSError) and error.errno in EXHAUSTED:
-        _log.error("%s: %s", context.get("message"), error.strerror, extra=about("event loop", "exhausted"))
+    if error is not None and is_exhausted(error):
+        _log.error("%s: %s", context.get("message"), error, extra=about("event loop", "exhausted"))
         return
     place = _place(error) or str(context.get("message"))
     message = f"unexpected: {context.get('message')}: {error!r}" if error else str(context.get("message"))

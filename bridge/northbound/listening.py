@@ -10,7 +10,7 @@ import os
 import socket
 from typing import Any, Final
 
-from bridge.errors import EXHAUSTED, OperationFailed, Unavailable
+from bridge.errors import OperationFailed, Unavailable, is_exhausted
 from bridge.quietlog import about
 
 _log = logging.getLogger(__name__)
@@ -43,7 +43,7 @@ class ListeningSocket(socket.socket):
         try:
             return super().accept()
         except OSError as error:
-            if error.errno not in EXHAUSTED:
+            if not is_exhausted(error):
                 raise
             _log.error("%s: no client can connect: %s", self._name, error.strerror, extra=about(self._name))
             if self._turn_away():
@@ -62,7 +62,7 @@ class ListeningSocket(socket.socket):
             client, _ = super().accept()
             client.close()
         except OSError as error:
-            return error.errno not in EXHAUSTED
+            return not is_exhausted(error)
         finally:
             self._spare = _spare()
         return True

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import logging
+import os
 from collections.abc import Iterator
 
 import pytest
 
-from bridge.cli.logs import log_fault, write_counts
+from bridge.cli.logs import _Formatter, log_fault, write_counts
 from bridge.quietlog import A_FEW, about
 from bridge.ratelimit import PAUSE_S
 from tests.support.quiet import QuietLog, quiet_log
@@ -160,3 +162,18 @@ def test_what_has_no_exception_is_told_too(loop: asyncio.AbstractEventLoop, log:
     for _ in range(3):
         faults(loop, {"message": "Task was destroyed but it is pending!"})
     assert log.lines == ["Task was destroyed but it is pending!"]
+
+
+@pytest.mark.parametrize(
+    ("number", "has_traceback"), [(errno.EMFILE, False), (errno.ENFILE, False), (errno.EIO, True)]
+)
+def test_no_descriptor_left_is_one_line_without_a_traceback(number: int, has_traceback: bool) -> None:
+    """Any line of the code may be the one to meet it."""
+    try:
+        raise OSError(number, os.strerror(number))
+    except OSError as error:
+        about_it = (OSError, error, error.__traceback__)
+    record = logging.LogRecord("x", logging.WARNING, "", 0, "zenoh: it failed", None, about_it)
+    said = _Formatter("%(message)s").format(record)
+    assert ("Traceback" in said) == has_traceback
+    assert said.startswith("zenoh: it failed") and (has_traceback or "\n" not in said)

@@ -46,7 +46,7 @@ class Rounds:
             self._serve()
 
     def serve_now(self, one: Served, most: int) -> None:
-        """Out of turn, for a connection that ends."""
+        """Out of turn, for a connection that ends. To be called by the event loop."""
         self._is_serving = True
         try:
             one.serve(most)

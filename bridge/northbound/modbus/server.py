@@ -143,12 +143,13 @@ class ModbusServer:
     def on_write(self, session: Session, identity: Identity) -> None:
         """``session`` is about to write. A client that has closed one connection before it goes on over the
         next must not depend on which of the two the loop reads first: those that the kernel knows to be
-        closed end now."""
+        closed end now, and nothing that still waits on them comes after what it has said since."""
         writers = self._writers.setdefault(identity.user, set())
         writers.add(session)
         if len(writers) > 1:
             for other in [one for one in writers if one is not session and one.has_been_closed]:
                 self.leave(other)
+                other.close()
 
     def _has_others(self, identity: Identity, session: Session) -> bool:
         return any(one is not session and identity.is_same(one.identity) for one in self._sessions)

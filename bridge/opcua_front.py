@@ -27,7 +27,8 @@ async def run_opcua(site: Site, signs: int | None = None, listening: int | None 
     if site.opcua is None:
         raise OperationFailed("the site file has no [opcua] table")
     async with AsyncExitStack() as stack:
-        mirror = MirrorClient(socket_endpoint(Path(site.site.runtime_dir), site.site.name), clock.now)
+        endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
+        mirror = MirrorClient(endpoint, clock.now, "opcua")
         await mirror.open()
         stack.push_async_callback(mirror.close)
         # Nothing of what is built here is garbage, and looking for it takes a quarter of the time.

@@ -88,7 +88,8 @@ async def run_page(project: Project, signs: int | None = None, listening: int | 
     if site.page is None:
         raise OperationFailed("the site file has no [page] table")
     async with AsyncExitStack() as stack:
-        mirror = MirrorClient(socket_endpoint(Path(site.site.runtime_dir), site.site.name), clock.now)
+        endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
+        mirror = MirrorClient(endpoint, clock.now, "page")
         await mirror.open()
         stack.push_async_callback(mirror.close)
         table = site.page

@@ -468,6 +468,9 @@ class PlantView:
         self.epoch_ns = epoch_ns
         self.on_event, self.forget = plant.on_event, plant.forget
 
+    def hurry(self, *, is_wanted: bool) -> None:
+        """Changes are here at once anyway."""
+
     def look(self, drive: str) -> None:
         if drive in self._plant.devices:
             self._plant.devices[drive].on_time(self._clock())

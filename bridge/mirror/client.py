@@ -43,18 +43,23 @@ class PointsChanged(OperationFailed):
 
 
 class MirrorClient:
-    """The plant as a front sees it; satisfies ``bridge.northbound.view.View``.
+    """The plant as ``front`` sees it; satisfies ``bridge.northbound.view.View``.
 
     Times in the image and in events are seconds since 1970 UTC; ``clock`` is the machine's monotonic clock,
     which is that of the bus process, too.
     """
 
-    def __init__(self, endpoint: str, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, endpoint: str, clock: Callable[[], float] = time.monotonic, front: str = "front"
+    ) -> None:
         self.gaps = 0
         """Deltas that were missed."""
         self.malformed = 0
         self._clock = clock
         self._endpoint = endpoint
+        self._request_key = protocol.key_of(protocol.REQUESTS, front)
+        self._connection_key = protocol.key_of(protocol.CONNECTIONS, front)
+        self._is_hurried = False
         self._link = self._new_link()
         self._image: Image | None = None
         self._instance = 0
@@ -88,6 +93,18 @@ class MirrorClient:
     def look(self, drive: str) -> None:
         """What was told last is all that is known here."""
 
+    def hurry(self, *, is_wanted: bool) -> None:
+        if is_wanted is self._is_hurried:
+            return
+        self._is_hurried = is_wanted
+        if is_wanted:
+            self._follow_promptly(self._link)
+        else:
+            self._link.drop_subscriber(protocol.PROMPT)
+
+    def _follow_promptly(self, link: ZenohLink) -> None:
+        link.declare_subscriber(protocol.PROMPT, self._on_told)
+
     def on_event(self, listener: Callable[[Event], None]) -> None:
         self._listeners.append(listener)
 
@@ -116,7 +133,7 @@ class MirrorClient:
             payload = protocol.encode_request(request, self._clock() + timeout_s)
         except Malformed as error:
             return Outcome(Code.NOT_VALID, str(error), forwarded=False)
-        answers = await self._link.get(protocol.REQUEST, payload, timeout_s=timeout_s)
+        answers = await self._link.get(self._request_key, payload, timeout_s=timeout_s)
         for answer in answers:
             if answer.ok and (outcome := self._read(partial(protocol.decode, Outcome), answer.message)):
                 return outcome
@@ -136,7 +153,7 @@ class MirrorClient:
         """Told to the bus process before whatever is submitted afterwards. While that is away nobody is told:
         the owner's time decides."""
         told = protocol.encode(Connected(identity, is_there, has_others))
-        telling = asyncio.get_running_loop().create_task(self._link.get(protocol.CONNECTION, told))
+        telling = asyncio.get_running_loop().create_task(self._link.get(self._connection_key, told))
         self._telling.add(telling)
         telling.add_done_callback(self._telling.discard)
 
@@ -171,8 +188,10 @@ class MirrorClient:
     async def _open(self, link: ZenohLink) -> None:
         await link.open()
         self._connected_at = self._clock()
-        link.declare_subscriber(protocol.DELTA, self._on_delta)
+        link.declare_subscriber(protocol.DELTA, self._on_told)
         link.declare_subscriber(protocol.EVENT, self._on_event)
+        if self._is_hurried:
+            self._follow_promptly(link)
         link.follow_liveliness(protocol.TOKEN, self._on_token)
 
     async def _catch_up(self) -> None:
@@ -246,6 +265,12 @@ class MirrorClient:
             if delta.instance == self._instance:
                 self._follow(delta)
 
+    def _on_told(self, message: Message) -> None:
+        if message.key == protocol.PROMPT:
+            self._on_prompt(message)
+        else:
+            self._on_delta(message)
+
     def _on_delta(self, message: Message) -> None:
         count = 0 if self._image is None else len(self._image.points)
         if not count:
@@ -258,6 +283,13 @@ class MirrorClient:
             self._follow(delta)
         elif len(self._pending) < _MOST_PENDING:
             self._pending.append(delta)
+
+    def _on_prompt(self, message: Message) -> None:
+        if not self._in_step:
+            return
+        prompt = self._read(partial(protocol.decode_prompt, count=len(self.image.points)), message)
+        if prompt and prompt.instance == self._instance:
+            self._apply(prompt.readings)
 
     def _follow(self, delta: Delta) -> None:
         """Apply ``delta`` if it is the next one; after a gap a new snapshot is due."""

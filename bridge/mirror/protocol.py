@@ -18,11 +18,13 @@ from bridge.image import Point, Quality, Value
 
 SNAPSHOT: Final = "mirror/snapshot"
 DELTA: Final = "mirror/delta"
+PROMPT: Final = "mirror/prompt"
+"""Of who cannot wait for the next delta; that one has the same readings again."""
 EVENT: Final = "mirror/event"
-REQUEST: Final = "mirror/request"
+REQUESTS: Final = "mirror/request/*"
 REJECTED: Final = "mirror/rejected"
 COUNTED: Final = "mirror/counted"
-CONNECTION: Final = "mirror/connection"
+CONNECTIONS: Final = "mirror/connection/*"
 TOKEN: Final = "mirror/@/bus"
 
 _LEAST_INT: Final = -(2**63)
@@ -59,6 +61,13 @@ class Delta(msgspec.Struct, array_like=True, frozen=True):
 
     instance: int
     sequence: int
+    readings: tuple[Changed, ...]
+
+
+class Prompt(msgspec.Struct, array_like=True, frozen=True):
+    """What has changed just now."""
+
+    instance: int
     readings: tuple[Changed, ...]
 
 
@@ -101,17 +110,38 @@ class Connected(msgspec.Struct, array_like=True, frozen=True):
 _encoder = msgspec.msgpack.Encoder()
 _decoders: dict[type, msgspec.msgpack.Decoder[Any]] = {
     kind: msgspec.msgpack.Decoder(kind)
-    for kind in (Snapshot, Delta, Event, Rejected, Counted, Connected, Outcome, _Asked, *COMMANDS.values())
+    for kind in (
+        Snapshot,
+        Delta,
+        Prompt,
+        Event,
+        Rejected,
+        Counted,
+        Connected,
+        Outcome,
+        _Asked,
+        *COMMANDS.values(),
+    )
 }
 
 
-def encode(message: Snapshot | Delta | Event | Rejected | Counted | Connected | Outcome) -> bytes:
+def encode(message: Snapshot | Delta | Prompt | Event | Rejected | Counted | Connected | Outcome) -> bytes:
     """Raises nothing: a text that is not Unicode, or a number too long for MessagePack, is changed, because
     one bad value of a client must not cost the whole message."""
     try:
         return _encoder.encode(message)
     except (UnicodeError, OverflowError):
         return _encoder.encode(_encodable(msgspec.to_builtins(message)))
+
+
+def key_of(keys: str, front: str) -> str:
+    """That of ``REQUESTS`` or ``CONNECTIONS`` that belongs to this front."""
+    return keys.replace("*", front)
+
+
+def front_of(key: str) -> str:
+    """The other way round."""
+    return key.rpartition("/")[2]
 
 
 def encode_request(request: Request, deadline_s: float) -> bytes:
@@ -158,6 +188,13 @@ def decode_delta(data: bytes, count: int) -> Delta:
     delta = decode(Delta, data)
     _check_indices(delta.readings, count)
     return delta
+
+
+def decode_prompt(data: bytes, count: int) -> Prompt:
+    """``count`` is the number of points there are."""
+    prompt = decode(Prompt, data)
+    _check_indices(prompt.readings, count)
+    return prompt
 
 
 def decode_request(data: bytes) -> tuple[Request, float]:

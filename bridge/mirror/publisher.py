@@ -13,9 +13,10 @@ from bridge.beat import LOOK_EVERY_S, next_before_look
 from bridge.command import Code, Event, Outcome, PlantView
 from bridge.command.freshness import NEVER, TAKEN_LATE
 from bridge.errors import Unavailable
+from bridge.image import Feed
 from bridge.mirror import protocol
 from bridge.mirror.endpoint import close_to_others, prepare_folder
-from bridge.mirror.protocol import Changed, Connected, Delta, Malformed, Rejected, Snapshot
+from bridge.mirror.protocol import Changed, Connected, Delta, Malformed, Prompt, Rejected, Snapshot
 from bridge.zenohlink import Asked, Message, Pace, ZenohLink, zenoh_config
 
 _POINTS_PER_DELTA: Final = 500
@@ -32,9 +33,13 @@ class MirrorPublisher:
     Unix socket. So a request's time and deadline are taken as they are, and what it has waited on the link
     counts: an age would leave that out, and a delayed enabling word would look fresh. A front on another
     machine would need its times translated.
+
+    A front that asks for it is told of changes as soon as they are made, at most every ``prompt_s``.
     """
 
-    def __init__(self, view: PlantView, endpoint: str, clock: Callable[[], float]) -> None:
+    def __init__(
+        self, view: PlantView, endpoint: str, clock: Callable[[], float], prompt_s: float = LOOK_EVERY_S
+    ) -> None:
         self.malformed = 0
         """Messages of fronts that could not be read."""
         self._view = view
@@ -45,6 +50,9 @@ class MirrorPublisher:
         self._pace = Pace(self._tick, LOOK_EVERY_S, _HEARTBEAT_S, beat=next_before_look)
         self._feed = self._image.feed(self._pace.wake)
         self._has_fronts = False
+        self._prompt_pace = Pace(self._tell_promptly, prompt_s)
+        self._prompt_feed: Feed | None = None
+        """While somebody asks for it."""
         self._instance = random.getrandbits(63)
         self._sequence = 0
         self._snapshots: set[asyncio.Task[None]] = set()
@@ -68,19 +76,22 @@ class MirrorPublisher:
             raise Unavailable(f"{error} (is this site already being run?)") from None
         close_to_others(self._endpoint)
         # A front that has a snapshot may send requests.
-        self._link.declare_queryable(protocol.REQUEST, self._on_request)
-        self._link.declare_queryable(protocol.CONNECTION, self._on_connection)
+        # What one front says keeps its order, and waits for nothing that another says.
+        self._link.declare_queryable(protocol.REQUESTS, self._on_request, _by_front)
+        self._link.declare_queryable(protocol.CONNECTIONS, self._on_connection, _by_front)
         self._link.declare_queryable(protocol.SNAPSHOT, self._on_snapshot)
         self._link.declare_subscriber(protocol.REJECTED, self._on_rejected)
         self._link.declare_subscriber(protocol.COUNTED, self._on_counted)
         self._link.declare_token(protocol.TOKEN)
         self._link.follow_readers(protocol.DELTA, self._on_fronts)
+        self._link.follow_readers(protocol.PROMPT, self._on_hurried)
         self._view.on_event(self._on_event)
         self._pace.wake()
         self._pace.start()
 
     async def close(self) -> None:
         self._pace.stop()
+        self._on_hurried(False)
         self._has_fronts = False
         for task in tuple(self._snapshots):
             task.cancel()
@@ -98,6 +109,27 @@ class MirrorPublisher:
         self._has_fronts = are_there
         if are_there:
             self._pace.wake()
+
+    def _on_hurried(self, are_there: bool) -> None:
+        feed, self._prompt_feed = self._prompt_feed, None
+        self._prompt_pace.stop()
+        if feed:
+            self._image.drop_feed(feed)
+        if are_there:
+            self._prompt_feed = self._image.feed(self._prompt_pace.wake)
+            self._prompt_pace.wake()
+            self._prompt_pace.start()
+
+    def _tell_promptly(self) -> None:
+        """Where one of these is lost, the delta that follows has the same."""
+        feed = self._prompt_feed
+        if feed is None:
+            return
+        at_zero_ns = self._view.epoch_ns(0.0)
+        readings = tuple(self._changed(index, at_zero_ns) for index in feed.take(_POINTS_PER_DELTA))
+        self._send(protocol.PROMPT, Prompt(self._instance, readings))
+        if feed:
+            self._prompt_pace.wake()
 
     def _tick(self) -> None:
         """What has changed waits while nobody listens."""
@@ -130,7 +162,7 @@ class MirrorPublisher:
     def _on_event(self, event: Event) -> None:
         self._send(protocol.EVENT, replace(event, time=self._view.epoch_ns(event.time) / 1e9))
 
-    def _send(self, key: str, message: Delta | Event) -> None:
+    def _send(self, key: str, message: Delta | Prompt | Event) -> None:
         self._link.send(Message(key, protocol.encode(message)))
 
     # in
@@ -190,7 +222,7 @@ class MirrorPublisher:
         def reply(outcome: Outcome) -> None:
             if outcome.value is not None:
                 outcome = replace(outcome, time=self._view.epoch_ns(outcome.time) / 1e9)
-            asked.send([Message(protocol.REQUEST, protocol.encode(outcome))])
+            asked.send([Message(asked.key, protocol.encode(outcome))])
             asked.finish()
 
         try:
@@ -210,3 +242,7 @@ class MirrorPublisher:
             # Too late, no time, or one that is still to come: nobody knows how old it is.
             request = replace(request, received_at=NEVER)
         self._view.submit(request, reply)
+
+
+def _by_front(key: str, _: bytes | None) -> str:
+    return protocol.front_of(key)

@@ -26,6 +26,11 @@ class View(Protocol):
         before that, a deadline that has passed since the last round is not seen in them."""
         ...
 
+    def hurry(self, *, is_wanted: bool) -> None:
+        """Have changes come as soon as they are made, until it is not wanted any more: that has its price. A
+        view that has them at once anyway does nothing."""
+        ...
+
     def epoch_ns(self, time: float, /) -> int:
         """Wall clock, in ns since 1970 UTC, of a time that the view has given."""
         ...

@@ -255,7 +255,8 @@ class ZenohLink:
         *,
         from_others: bool = False,
     ) -> None:
-        """Subscribe to ``key``; ``from_others`` leaves out what this session itself publishes."""
+        """Subscribe to ``key``, once, until ``drop_subscriber``; ``from_others`` leaves out what this session
+        itself publishes."""
         origin = zenoh.Locality.REMOTE if from_others else zenoh.Locality.ANY
 
         def on_sample(sample: zenoh.Sample) -> None:
@@ -265,9 +266,20 @@ class ZenohLink:
 
         def declare(session: zenoh.Session) -> None:
             callback = zenoh.handlers.Callback(on_sample, indirect=False)
-            self._worker.declared.append(session.declare_subscriber(key, callback, allowed_origin=origin))
+            subscriber = session.declare_subscriber(key, callback, allowed_origin=origin)
+            self._worker.subscribers[key] = subscriber
 
         self.submit(declare)
+
+    def drop_subscriber(self, key: str) -> None:
+        """Of samples that have come already, some may still be handed over."""
+
+        def undeclare(_: zenoh.Session) -> None:
+            subscriber = self._worker.subscribers.pop(key, None)
+            if subscriber:
+                subscriber.undeclare()
+
+        self.submit(undeclare)
 
     def follow_liveliness(self, key: str, handler: Callable[[str, bool], None]) -> None:
         """Call ``handler(key, is_alive)`` for each existing token, and whenever one appears or disappears."""

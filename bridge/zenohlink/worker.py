@@ -74,6 +74,7 @@ class Worker:
         self.declared: list[Declared] = []
         """Undeclared before the session is closed; only jobs touch it."""
         self.tokens: dict[str, zenoh.LivelinessToken] = {}
+        self.subscribers: dict[str, Declared] = {}
         self._config = config
         self._on_strangers = on_strangers
         self._connections = Connections()
@@ -186,7 +187,7 @@ class Worker:
         for lane in lanes:
             lane.stop()
         # Undeclared first: zenoh-python issue 624.
-        for declared in (*self.tokens.values(), *self.declared):
+        for declared in (*self.tokens.values(), *self.subscribers.values(), *self.declared):
             self._try(declared.undeclare)
         self._try(session.close)
         end = time.monotonic() + _LANES_END_S

@@ -44,6 +44,8 @@ class PlantView:
 
     def look(self, drive: str) -> None: ...
 
+    def hurry(self, *, is_wanted: bool) -> None: ...
+
     def epoch_ns(self, time: float, /) -> int:
         return round(time * 1e9)
 

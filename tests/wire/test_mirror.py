@@ -121,6 +121,38 @@ async def test_the_front_sees_what_the_bus_process_sees(endpoint: str) -> None:
         assert abs(view.epoch_ns(reading.time) / 1e9 - reading.time) < 1e-6
 
 
+async def test_a_front_that_hurries_need_not_wait_for_the_next_delta(endpoint: str) -> None:
+    plant = make_plant()
+    node_is(plant, NodeState.OPERATIONAL)
+    async with publishing(endpoint, plant) as publisher, front(endpoint) as client:
+        client.hurry(is_wanted=True)
+        await until(lambda: publisher._prompt_feed is not None, "it is known that it hurries")
+        publisher._pace.stop()
+        for hz in (25.0, 12.5):
+            drive_says(plant.drives["conveyor/fu1"], ENABLED, round(hz / 50 * 0x4000))
+            await until(
+                lambda hz=hz: client.image.read("conveyor/fu1/actual/frequency").value == hz, "the value"
+            )
+        client.hurry(is_wanted=False)
+        await until(lambda: publisher._prompt_feed is None, "and that it does no more")
+        publisher._pace.start()
+        await until(
+            lambda: in_step(client) and shown(client.image) == shown(plant.image), "the deltas have it all"
+        )
+        assert client.gaps == 0
+
+
+async def test_what_is_told_in_a_hurry_and_lost_comes_with_the_next_delta(endpoint: str) -> None:
+    plant = make_plant()
+    node_is(plant, NodeState.OPERATIONAL)
+    async with publishing(endpoint, plant) as publisher, front(endpoint) as client:
+        client.hurry(is_wanted=True)
+        await until(lambda: publisher._prompt_feed is not None, "it is known that it hurries")
+        publisher._prompt_pace._turn = lambda: None
+        drive_says(plant.drives["conveyor/fu1"], ENABLED, 0x2000)
+        await until(lambda: client.image.read("conveyor/fu1/actual/frequency").value == 25.0, "25 Hz")
+
+
 def mode(path: Path) -> int:
     return stat.S_IMODE(path.stat().st_mode)
 
@@ -295,9 +327,9 @@ async def test_garbage_on_the_link_does_no_harm(endpoint: str) -> None:
     async with publishing(endpoint, plant) as publisher, front(endpoint) as client:
         other = ZenohLink(zenoh_config(connect=[endpoint]), "other")
         await other.open()
-        (answer,) = await other.get(protocol.REQUEST, b"\x93\x01\x02")
+        (answer,) = await other.get(protocol.key_of(protocol.REQUESTS, "front"), b"\x93\x01\x02")
         assert not answer.ok
-        assert not (await other.get(protocol.REQUEST))[0].ok
+        assert not (await other.get(protocol.key_of(protocol.REQUESTS, "front")))[0].ok
         assert publisher.malformed == 2
         await other.close()
         publisher._link.send(Message(protocol.DELTA, b"nonsense"))

@@ -1,4 +1,4 @@
-"""Front processes: started, heard, killed where they hang, and stopped.
+"""Front processes: started, heard, killed where they hang or grow too large, and stopped.
 
 A front is heavy and may crash; it holds nothing up. It is a child of the bus process, with a lower
 priority, and dies with it.
@@ -10,10 +10,12 @@ import asyncio
 import contextlib
 import ctypes
 import os
+import resource
 import signal
 import socket
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Final
 
 from bridge.errors import BridgeError, OperationFailed
@@ -25,6 +27,15 @@ _REASON: Final = b"!"
 _LONGEST_REASON: Final = 1000
 _STOP_S: Final = 3.0
 _NICE: Final = 5
+_PROMPT: Final = ("zenoh",)
+"""Roles whose clients command drives over and over, and wait for each answer: as important as the bus process
+itself, which is ahead of them all the same where its unit gives it a real-time priority."""
+_FIRST_TO_GO: Final = 500
+"""``oom_score_adj`` (proc(5)): where the machine or the unit has no memory left, a front is what the kernel
+kills, and not the process that stops the drives."""
+_MB: Final = 1024 * 1024
+_BEYOND: Final = 2
+"""A front that grows faster than it is looked at is refused memory beyond this many times its limit."""
 _PR_SET_PDEATHSIG: Final = 1
 
 
@@ -33,6 +44,7 @@ class Front:
 
     A ``watched`` one is given a pipe (``--signs``) on which it shows that its event loop runs, and says why
     it ends. ``listening`` gives the socket that it is to serve on (``--listening``), which stays ours, too.
+    One that holds more than ``most_mb`` of memory is killed.
     """
 
     def __init__(
@@ -42,12 +54,14 @@ class Front:
         *,
         watched: bool = False,
         listening: Callable[[], socket.socket] | None = None,
+        most_mb: int | None = None,
     ) -> None:
         self.name = role
         self.title = f"the {role} front"
         self._arguments = list(arguments)
         self._watched = watched
         self._listening = listening
+        self._most_mb = most_mb
         self._process: asyncio.subprocess.Process | None = None
 
     @property
@@ -107,13 +121,14 @@ class Front:
                     return f"ended ({_how(ended.result())})" + (
                         f": {ear.reason}" if ear and ear.reason else ""
                     )
+                if self._most_mb is not None and (held_mb := _resident_mb(process.pid)) > self._most_mb:
+                    await _kill(process, ended)
+                    return f"held {held_mb} MB of memory, more than {self._most_mb} MB, and was killed"
                 if ear:
                     ear.look()
                 else:
                     serves()
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await ended
+            await _kill(process, ended)
         finally:
             ended.cancel()
         return f"gave no sign of life for {_SILENT_LOOKS * SIGN_PERIOD_S:g} s and was killed"
@@ -204,14 +219,38 @@ def give_reason(pipe: int, reason: str) -> None:
         os.write(pipe, _REASON + " ".join(reason.split()).encode("utf-8", "replace")[:_LONGEST_REASON])
 
 
-def become_front(parent: int) -> None:
+def become_front(parent: int, role: str) -> None:
     """Called by a front about itself: less important than the bus process, and not to outlive it."""
+    if role not in _PROMPT:
+        with contextlib.suppress(OSError):
+            os.nice(_NICE)
     with contextlib.suppress(OSError):
-        os.nice(_NICE)
+        Path("/proc/self/oom_score_adj").write_text(str(_FIRST_TO_GO), encoding="ascii")
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
         if parent and os.getppid() != parent:  # it died before we asked
             raise SystemExit(0)
+
+
+def limit_memory(most_mb: int) -> None:
+    """Called by a front about itself: memory far beyond ``most_mb`` is refused to it, and that is its end."""
+    with contextlib.suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_DATA, (_BEYOND * most_mb * _MB,) * 2)
+
+
+async def _kill(process: asyncio.subprocess.Process, ended: asyncio.Task[int]) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        process.kill()
+    await ended
+
+
+def _resident_mb(pid: int) -> int:
+    """Memory that the process holds, in MB; 0 where that cannot be read, because it has just ended."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0
+    return pages * resource.getpagesize() // _MB
 
 
 def _how(code: int) -> str:

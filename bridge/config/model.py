@@ -61,6 +61,7 @@ class SiteTable(Table):
     state_dir: str = "/var/lib/drivebridge"
     runtime_dir: str = Field("/run/drivebridge", description="folder for the socket between our processes")
     all_ports: bool = Field(False, description="whether to start only where each port can be opened")
+    front_memory_mb: int = Field(400, ge=200, le=1_000_000, description="200…1000000 MB")
 
 
 def _mapped(text: object) -> object:

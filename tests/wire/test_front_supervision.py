@@ -6,8 +6,10 @@ import asyncio
 import contextlib
 import gc
 import os
+import re
 import signal
 import socket
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -108,6 +110,38 @@ async def test_one_that_does_not_stay_up_is_told_once_a_minute(monkeypatch: pyte
     await until_in_loop(lambda: spawns.count >= 5, "some more starts")
     await kept.end()
     assert len(kept.events) <= 2
+
+
+async def test_a_front_that_grows_too_large_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
+    grows = (
+        "import os, sys, time; os.write(int(sys.argv[-1]), b'.'); kept = b'x' * (300 << 20); time.sleep(60)"
+    )
+    Spawns(monkeypatch, grows)
+    monkeypatch.setattr(front_process, "SIGN_PERIOD_S", 0.05)
+    monkeypatch.setattr(front_process, "_SILENT_LOOKS", 1000)
+    how = await Front("zenoh", [], watched=True, most_mb=200).run_once(lambda: None)
+    assert re.fullmatch(r"held (2|3)\d\d MB of memory, more than 200 MB, and was killed", how), how
+
+
+def as_front(script: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", f"from bridge.front_process import become_front, limit_memory; {script}"]
+    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=REPOSITORY)
+
+
+def test_a_front_that_grows_at_once_is_refused_the_memory() -> None:
+    assert as_front("limit_memory(200); kept = b'x' * (300 << 20); print('has it')").stdout == "has it\n"
+    refused = as_front("limit_memory(200); kept = b'x' * (500 << 20); print('has it')")
+    assert refused.returncode == 1 and "MemoryError" in refused.stderr
+
+
+def test_what_the_kernel_kills_where_memory_is_short_is_a_front() -> None:
+    look = "print(open('/proc/self/oom_score_adj').read(), os.nice(0))"
+    here = int(Path("/proc/self/oom_score_adj").read_text()), os.nice(0)
+    adjusted, nice = as_front(f"import os; become_front(0, 'opcua'); {look}").stdout.split()
+    assert int(adjusted) == max(500, here[0])
+    assert int(nice) == min(19, here[1] + 5), "ahead of it comes who stops drives"
+    _, nice = as_front(f"import os; become_front(0, 'zenoh'); {look}").stdout.split()
+    assert int(nice) == here[1], "its clients wait for each answer"
 
 
 async def test_looking_after_a_front_for_long_keeps_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,6 +12,7 @@ from bridge.config import Site
 from bridge.errors import Unavailable
 from bridge.northbound.opcua.preflight import check_opcua
 from bridge.northbound.page.preflight import check_page
+from bridge.northbound.zenoh.preflight import check_zenoh
 
 _log = logging.getLogger(__name__)
 
@@ -28,6 +29,8 @@ def check_files(site: Site, path: Path, *, fronts: bool) -> None:
         check_opcua(site.opcua, folder, path)
     if fronts and site.page:
         check_page(site.page, path)
+    if fronts and site.zenoh:
+        check_zenoh(site.zenoh)
 
 
 def _check_state_folder(folder: Path) -> None:

@@ -7,6 +7,7 @@ import gc
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import AsyncExitStack, suppress
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -32,7 +33,7 @@ from bridge.northbound.gateway.server import GatewayServer
 from bridge.northbound.listening import Port
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
-from bridge.northbound.zenoh.session import ZenohServer
+from bridge.northbound.zenoh.preflight import check_ports
 from bridge.notify import Notifier
 from bridge.parts import Parts, Ports, ServerPart
 from bridge.plantcondition import PlantCondition
@@ -44,6 +45,8 @@ _log = logging.getLogger(__name__)
 
 _START_S: Final = 45.0
 """How long "ready" waits for fronts that neither serve nor fail; less than the unit's TimeoutStartSec."""
+
+_NOBODY_HURRIES_MS: Final = 1000
 
 MakeBus = Callable[[BusTable], Bus]
 
@@ -60,8 +63,8 @@ def make_bus(table: BusTable) -> Bus:
 class Service:
     """The bus process of one site.
 
-    ``make_bus`` gives the buses; without ``fronts`` this process serves Modbus and zenoh alone, and
-    whoever started it looks after the fronts. ``alarm`` is the master's.
+    ``make_bus`` gives the buses; without ``fronts`` this process serves Modbus alone, and whoever started it
+    looks after the fronts. ``alarm`` is the master's.
     """
 
     def __init__(
@@ -90,9 +93,9 @@ class Service:
         self.modbus = (
             ModbusServer(self.view, units_of(self.plant), site.modbus, clock.now) if site.modbus else None
         )
-        self.zenoh = ZenohServer(self.view, site.zenoh, site.site.name, clock.now) if site.zenoh else None
         endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
-        self.mirror = MirrorPublisher(self.view, endpoint, clock.now)
+        period_ms = site.zenoh.period_ms if site.zenoh else _NOBODY_HURRIES_MS
+        self.mirror = MirrorPublisher(self.view, endpoint, clock.now, period_ms / 1000)
         self.gateways = {
             table.name: GatewayServer(
                 self.view,
@@ -122,11 +125,18 @@ class Service:
             self._add_front("opcua", Port(site.opcua.listen, "opcua.listen"))
         if fronts and site.page:
             self._add_front("page", Port(site.page.listen, "page.listen"))
+        self._zenoh = site.zenoh if fronts else None
+        if self._zenoh:
+            self._add_front("zenoh")
 
-    def _add_front(self, role: str, port: Port) -> None:
-        self._ports[role] = port
+    def _add_front(self, role: str, port: Port | None = None) -> None:
+        """``port`` is what this process holds for it."""
+        if port:
+            self._ports[role] = port
         command = ["run", str(self.project.path), "--role", role]
-        self.fronts.append(Front(role, command, watched=True, listening=port.socket))
+        most_mb = self.project.site.site.front_memory_mb
+        listening = port.socket if port else None
+        self.fronts.append(Front(role, command, watched=True, listening=listening, most_mb=most_mb))
 
     async def run(self, ready: Callable[[], None] = lambda: None) -> None:
         """Serve until cancelled; ``ready`` is called as soon as the buses are open.
@@ -165,9 +175,8 @@ class Service:
         for role, port in self._ports.items():
             stack.callback(port.close)
             await ports.open(role, port.open)
-        if self.zenoh:
-            stack.push_async_callback(self.zenoh.close)
-            await ports.open("zenoh", self.zenoh.start)
+        if self._zenoh:
+            await ports.open("zenoh", partial(check_ports, self._zenoh))
         ports.check(needs_all=needs_all)
         await self.mirror.start()
         stack.push_async_callback(self.mirror.close)
@@ -210,8 +219,6 @@ class Service:
         has = self._opened.has
         if self.modbus:
             yield ServerPart("modbus", "the Modbus server", self.modbus, is_started=has("modbus"))
-        if self.zenoh:
-            yield ServerPart("zenoh", "the zenoh session", self.zenoh, is_started=has("zenoh"))
         for bus, gateway in self.gateways.items():
             name = f"gateway {bus}"
             yield ServerPart(name, f"the gateway of {bus}", gateway, is_started=has(name))

@@ -30,6 +30,7 @@ from bridge.command import Kind
 from bridge.mirror.client import MirrorClient
 from bridge.mirror.endpoint import socket_endpoint
 from bridge.northbound.opcua.server import OpcUaServer
+from bridge.northbound.zenoh import ZenohServer
 from bridge.project import load_project
 from bridge.service import Service
 from bridge.sim.nord_tu4 import NordTu4
@@ -90,25 +91,25 @@ class Way(NamedTuple):
 _IMAGE: Final = Rest("image/image.py", "Image.set_values")
 _LINK, _WORKER = "zenohlink/link.py", "zenohlink/worker.py"
 _SESSION: Final = "northbound/modbus/session.py"
+_TO_A_FRONT: Final = (
+    _IMAGE,
+    Rest(_LINK, "ZenohLink.send"),
+    Rest(_LINK, "_publish", "ZenohLink.send"),
+    Rest(_WORKER, "Inbox.take_in"),
+    Rest("image/image.py", "Image.set"),
+)
 WAYS: Final = {
     "A TPDO into a Modbus register": Way(
         _READ, (_IMAGE, Rest(_SESSION, "Conversation._on_answer"), Rest(_SESSION, "Session.serve"))
     ),
     "A TPDO into an OPC UA node": Way(
         _READ,
-        (
-            _IMAGE,
-            Rest(_LINK, "ZenohLink.send"),
-            Rest(_LINK, "_publish", "ZenohLink.send"),
-            Rest(_WORKER, "Inbox.take_in"),
-            Rest("image/image.py", "Image.set"),
-            Rest("northbound/opcua/values.py", "present_value", gives=True),
-        ),
+        (*_TO_A_FRONT, Rest("northbound/opcua/values.py", "present_value", gives=True)),
     ),
     "A TPDO to a zenoh key": Way(
         _READ,
         (
-            _IMAGE,
+            *_TO_A_FRONT,
             Rest(_LINK, "ZenohLink.publish"),
             Rest(_WORKER, "Worker.do", "ZenohLink.submit"),
             Rest("zenohlink/publishers.py", "Publishers.put"),
@@ -244,7 +245,7 @@ def _ports() -> dict[str, int]:
 
 @asynccontextmanager
 async def running(folder: Path) -> AsyncIterator[Bridge]:
-    """A bus process with a booted node, and an OPC UA server at the end of its link."""
+    """A bus process with a booted node, and the OPC UA and zenoh servers at the other end of its link."""
     ports = _ports()
     path = folder / "ways.toml"
     path.write_text(_SITE.format(folder=folder, **ports), encoding="utf-8")
@@ -257,14 +258,16 @@ async def running(folder: Path) -> AsyncIterator[Bridge]:
         for work in (Simulation(wire.end("simulation"), [NordTu4(5)]).run(), service.run()):
             stack.push_async_callback(_end, asyncio.create_task(work))
         await asyncio.wait_for(booted.wait(), _PATIENCE_S)
-        mirror = MirrorClient(socket_endpoint(Path(project.site.site.runtime_dir), "ways"), clock.now)
+        site = project.site
+        mirror = MirrorClient(socket_endpoint(Path(site.site.runtime_dir), "ways"), clock.now)
         await mirror.open()
         stack.push_async_callback(mirror.close)
         stack.push_async_callback(_end, asyncio.create_task(mirror.run()))
-        assert project.site.opcua is not None
-        server = OpcUaServer(mirror, project.site.opcua, folder, "ways")
-        await server.start()
-        stack.push_async_callback(server.close)
+        assert site.opcua is not None and site.zenoh is not None
+        opcua = OpcUaServer(mirror, site.opcua, folder, "ways")
+        for server in (opcua, ZenohServer(mirror, site.zenoh, "ways", clock.now)):
+            await server.start()
+            stack.push_async_callback(server.close)
         bridge = Bridge(wire, ports)
         stack.push_async_callback(bridge.close)
         await bridge.connect()

@@ -16,9 +16,9 @@ import typer
 from bridge.cli import logs
 from bridge.cli.signals import ending_signals
 from bridge.cli.stopping import Ending, until_stopped
-from bridge.config import BusTable, ZenohTable, load_site
+from bridge.config import BusTable, Site, ZenohTable, load_site
 from bridge.errors import BridgeError, OperationFailed
-from bridge.front_process import Front, become_front, give_reason
+from bridge.front_process import Front, become_front, give_reason, limit_memory
 
 # The service is not imported for a front: after one has ended, its clients wait for the next.
 if TYPE_CHECKING:
@@ -41,7 +41,8 @@ _DEMO_MOVES = (
 def run(
     site: SiteArgument,
     role: Annotated[
-        Literal["all", "bus", "opcua", "page"], typer.Option(help="run one process alone: bus, opcua or page")
+        Literal["all", "bus", "opcua", "page", "zenoh"],
+        typer.Option(help="run one process alone: bus, opcua, page or zenoh"),
     ] = "all",
     parent: Annotated[int, typer.Option(hidden=True)] = 0,
     signs: Annotated[int | None, typer.Option(hidden=True)] = None,
@@ -50,8 +51,8 @@ def run(
 ) -> None:
     """Run the bridge for SITE. Nodes of a virtual bus are simulated in the same process."""
     logs.set_up(verbose=verbose)
-    if role in ("opcua", "page"):
-        _become_front(parent)
+    if role in ("opcua", "page", "zenoh"):
+        _become_front(parent, role)
         try:
             until_stopped(_front_of(role, site, signs, listening))
         except BridgeError as error:
@@ -70,11 +71,23 @@ def _front_of(role: str, site: Path, signs: int | None, listening: int | None) -
     if role == "opcua":
         from bridge.opcua_front import run_opcua
 
-        return run_opcua(load_site(site), signs, listening)
+        return run_opcua(_limited(load_site(site)), signs, listening)
+    if role == "zenoh":
+        from bridge.zenoh_front import run_zenoh
+
+        return run_zenoh(_limited(load_site(site)), signs)
     from bridge.page_front import run_page
     from bridge.project import load_project
 
-    return run_page(load_project(site), signs, listening)
+    project = load_project(site)
+    _limited(project.site)
+    return run_page(project, signs, listening)
+
+
+def _limited(site: Site) -> Site:
+    """The site of this front, which gets no more memory than that says."""
+    limit_memory(site.site.front_memory_mb)
+    return site
 
 
 def demo(verbose: Verbose = False) -> None:
@@ -120,14 +133,14 @@ def demo_controller(endpoint: str, moves: list[str], parent: int = 0) -> None:
     from bridge.sim.controller import Move, run_controller
 
     logs.set_up(verbose=False)
-    _become_front(parent)
+    _become_front(parent, "demo controller")
     run_controller(endpoint, [Move.from_text(move) for move in moves])
 
 
-def _become_front(parent: int) -> None:
+def _become_front(parent: int, role: str) -> None:
     """A front that is still starting has nothing to clean up."""
     ending_signals.let_kill()
-    become_front(parent)
+    become_front(parent, role)
 
 
 async def _serve(

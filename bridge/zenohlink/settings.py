@@ -28,8 +28,8 @@ _STALLED_AMONG_OTHERS_US: Final = 100_000
 
 _WAIT: Final = "transport/link/tx/queue/congestion_control/block/wait_before_close"
 _MOST_BATCHES: Final = 16
-"""Buffers of 64 KiB, allocated when needed. With zenoh's default of two, an answer would be dropped whenever
-the machine is busy for a moment."""
+"""Buffers for what waits to be sent, allocated when needed. With zenoh's default of two, an answer would be
+dropped whenever the machine is busy for a moment."""
 
 
 def zenoh_config(
@@ -41,6 +41,7 @@ def zenoh_config(
     access: Mapping[str, object] | None = None,
     prompt: Sequence[str] = (),
     waiting: Sequence[str] = (),
+    longest: int | None = None,
 ) -> zenoh.Config:
     """Settings of a session without discovery that notices a silent peer within a second.
 
@@ -49,6 +50,10 @@ def zenoh_config(
 
     With ``prompt``, answers are dropped if the client does not read. On the keys of ``prompt`` they go ahead
     of published values. On keys of ``waiting`` that are not in ``prompt``, they wait for the client instead.
+
+    Nothing of more than ``longest`` bytes is taken from others, keys included: zenoh walks a tree of the
+    words of each key by calling itself, and ends the process with one of many thousand. It is also the size
+    of the buffers in which answers and values wait.
 
     Raises Unavailable if an endpoint is not valid.
     """
@@ -76,6 +81,12 @@ def zenoh_config(
         settings[_WAIT] = _STALLED_AMONG_OTHERS_US
         settings["transport/link/tx/queue/size/interactive_high"] = _MOST_BATCHES
         settings["transport/link/tx/queue/size/background"] = _MOST_BATCHES
+        settings["transport/link/tx/queue/size/data"] = _MOST_BATCHES
+    if longest:
+        # Both ends take the smaller of their sizes of a batch, and end a connection that brings a larger one;
+        # what needs several batches is put together up to the second of these.
+        settings["transport/link/tx/batch_size"] = longest
+        settings["transport/link/rx/max_message_size"] = longest
     if users:
         user, password, file = users
         settings["transport/auth/usrpwd/user"] = user

@@ -46,6 +46,8 @@ ENDING_S: Final = 0.5
 STARVED: Final = 0.5
 """Part of the time between two looks for which the main thread of a process of the bridge, or of the good
 clients, was ready and did not run. What takes long then is no fault of the bridge."""
+_OF_A_WORD_MB: Final = 0.0016
+"""Memory that zenoh keeps of each word of a key that somebody has named, at most."""
 _PAGE_MB: Final = 4096 / 2**20
 _FAMILIES: Final = {6: "lenze/8400-motec", 7: "stoeber/5000", 8: "cia402/velocity"}
 """Of the nodes that nobody may move."""
@@ -149,7 +151,7 @@ class Judge:
                 faults.append(f"the good client on {name} has had no answer at all")
         for pid, samples in self.figures.memory_mb.items():
             grown = growth_mb(samples)
-            if grown > MOST_GROWTH_MB:
+            if grown > MOST_GROWTH_MB + self._of_names_mb(pid):
                 faults.append(f"memory of process {pid} is not flat: {grown:.1f} MB more after the warm-up")
         for name, late in self.figures.late.items():
             judged = self.figures.judged[name]
@@ -186,10 +188,17 @@ class Judge:
                 continue
             self.figures.memory_mb.setdefault(pid, []).append(pages * _PAGE_MB)
             self.figures.peak_mb[pid] = peak
-            if peak - self._first_mb[pid] > MOST_SPIKE_MB:
+            if peak - self._first_mb[pid] > MOST_SPIKE_MB + self._of_names_mb(pid):
                 first = self._first_mb[pid]
                 faults.append(f"memory of process {pid}: {first:.1f} MB before, {peak:.1f} MB at most")
         return faults
+
+    def _of_names_mb(self, pid: int) -> float:
+        """What zenoh keeps of each distinct key for ever; of no process but its own."""
+        with suppress(OSError):
+            if b"--role\0zenoh\0" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                return self._rig.named_words * _OF_A_WORD_MB
+        return 0.0
 
     def _look_at_log(self) -> list[str]:
         lines = self._log.take()

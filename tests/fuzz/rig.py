@@ -43,6 +43,8 @@ class Rig:
     modbus: int
     opcua: int
     zenoh: int
+    named_words: int = 0
+    """Words of the distinct keys that strangers have named by zenoh, which keeps them."""
 
     @property
     def wire(self) -> Path:

@@ -18,6 +18,7 @@ from tests.proof.settings import PLANT
 from tests.proof.strangers import Strangers
 
 Inject = Callable[[Rig], float]
+Undo = Callable[[Rig], None]
 """Gives the moment of the fault, in seconds of the monotonic clock."""
 
 _TIMEOUT_S: Final = PLANT.fieldbus_timeout_ms / 1000
@@ -75,22 +76,25 @@ def come_back(rig: Rig) -> None:
     new_owners(rig)
 
 
-def signal_front(number: signal.Signals) -> Inject:
+def signal_front(protocol: str, number: signal.Signals) -> Inject:
     def inject(rig: Rig) -> float:
         now = time.monotonic()
-        os.kill(rig.front, number)
+        os.kill(rig.front(protocol), number)
         return now
 
     return inject
 
 
-def wait_front(rig: Rig) -> None:
-    """The owners stand still meanwhile: on one CPU a front takes twice as long to start beside them."""
-    before = rig.fronts_started()
-    stop_owners(rig)
-    rig.wait(lambda: rig.fronts_started() > before, _FRONT_S, "the front is back")
-    rig.follow_front()
-    continue_owners(rig)
+def wait_front(protocol: str) -> Undo:
+    def wait(rig: Rig) -> None:
+        """The owners stand still meanwhile: on one CPU a front takes twice as long to start beside them."""
+        before = rig.fronts_started(protocol)
+        stop_owners(rig)
+        rig.wait(lambda: rig.fronts_started(protocol) > before, _FRONT_S, "the front is back")
+        rig.follow_fronts()
+        continue_owners(rig)
+
+    return wait
 
 
 def renew_bridge(rig: Rig) -> None:
@@ -99,8 +103,11 @@ def renew_bridge(rig: Rig) -> None:
     continue_owners(rig)
 
 
-def continue_front(rig: Rig) -> None:
-    signal_front(signal.SIGCONT)(rig)
+def continue_front(protocol: str) -> Undo:
+    def go_on(rig: Rig) -> None:
+        signal_front(protocol, signal.SIGCONT)(rig)
+
+    return go_on
 
 
 def stop_bridge(rig: Rig) -> float:

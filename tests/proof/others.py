@@ -245,7 +245,7 @@ def kill_front_and_keep_it_down(rig: Rig) -> float:
     key = _own_key(rig)
     key.rename(key.with_name("kept"))
     key.write_text("-----BEGIN", encoding="ascii")
-    moment = acts.signal_front(signal.SIGKILL)(rig)
+    moment = acts.signal_front("opcua", signal.SIGKILL)(rig)
     taker = rig.guests.enter_context(socket.socket())
     taker.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -269,4 +269,4 @@ def let_front_up(rig: Rig) -> None:
     if rig.bridge.popen.poll() is not None:
         raise Stuck("the service has ended: a front could not start")
     rig.send_guests_away()
-    acts.wait_front(rig)
+    acts.wait_front("opcua")(rig)

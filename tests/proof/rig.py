@@ -29,7 +29,9 @@ _HOUR_S: Final = 3600.0
 BRIDGE_HEARTBEAT: Final = 0x77F
 BRIDGE: Final = "bridge"
 SIMULATION: Final = "drives"
-FRONT: Final = "front"
+FRONTS: Final = {"opcua": "opcua_front", "zenoh": "zenoh_front"}
+"""The process of each protocol that has one of its own."""
+_SERVES: Final = {"opcua": "INFO    OPC UA on", "zenoh": "INFO    zenoh on"}
 _MAIN_THREAD: Final = ("chrt", "--reset-on-fork", "--other", "0")
 """What it may do more than others is not handed on to what it starts."""
 _LAST: Final = ("nice", "-n", "15")
@@ -112,7 +114,7 @@ class Rig:
         """What held bridge and drives up (``tests.proof.waits``)."""
         self.board = Board(folder / "board", len(DRIVES))
         self.bridge: Process | None = None
-        self._front = 0
+        self._fronts: tuple[int, ...] = ()
         self._starts = 0
         state, run, unused = self.disk.folder / "state", folder / "run", folder / "unused"
         self.other_nodes = [BLOCK.site(folder)]
@@ -151,7 +153,7 @@ class Rig:
             self._stack.callback(witness.close)
         self.watched.mkdir()
         watch = [sys.executable, "-m", "tests.proof.waits", str(self.watched)]
-        watch += [BRIDGE, FRONT, SIMULATION, *PROTOCOLS]
+        watch += [BRIDGE, *FRONTS.values(), SIMULATION, *PROTOCOLS]
         self._stack.enter_context(running(self.folder, "watch", *watch))
         drives = [sys.executable, "-m", "bridge", "simulate", str(self._drives)]
         simulate = running(self.folder, "simulate", *_DRIVES_AHEAD, *drives)
@@ -175,16 +177,19 @@ class Rig:
         source = ("env", f"PYTHONPATH={self.tree}")
         command = [*source, *_MAIN_THREAD, sys.executable, "-m", "bridge", "run", str(self._site)]
         self.bridge = self._bridges.enter_context(running(self.disk.folder, name, *command))
-        self.bridge.wait_output("OPC UA on", _LIMIT_S)
+        for line in _SERVES.values():
+            self.bridge.wait_output(line, _LIMIT_S)
         with suppress(PermissionError):
             os.setpriority(os.PRIO_PROCESS, self.bridge.pid, _AHEAD)
         follow(self.watched, BRIDGE, self.bridge.pid)
-        self.follow_front()
+        self.follow_fronts()
 
-    def follow_front(self) -> None:
-        """It may be another one."""
-        self._front = self.front
-        follow(self.watched, FRONT, self._front)
+    def follow_fronts(self) -> None:
+        """They may be others."""
+        fronts = {protocol: self.front(protocol) for protocol in FRONTS}
+        self._fronts = tuple(fronts.values())
+        for protocol, front in fronts.items():
+            follow(self.watched, FRONTS[protocol], front)
 
     def another_bridge(self, site: Path) -> AbstractContextManager[Process]:
         """Beside the first one, on the same bus. On a box of its own it would take no time from anybody."""
@@ -195,10 +200,10 @@ class Rig:
         self.guests.pop_all().close()
 
     def kill_bridge(self) -> float:
-        """The bus process dies; its front goes with it."""
+        """The bus process dies; its fronts go with it."""
         assert self.bridge
-        with suppress(OSError, IndexError):
-            self._front = self.front
+        with suppress(OSError, Stuck):
+            self._fronts = tuple(self.front(protocol) for protocol in FRONTS)
         now = time.monotonic()
         self.bridge.popen.kill()
         self.bridge.popen.wait()
@@ -211,21 +216,24 @@ class Rig:
         kept = self.folder / log.name
         kept.write_bytes(log.read_bytes())
         log.unlink()
-        # Its port is free then.
-        self.wait(lambda: _has_ended(self._front), _FRONT_ENDS_S, "the front has ended")
-        self._front = 0
+        # Their ports are free then.
+        self.wait(lambda: all(map(_has_ended, self._fronts)), _FRONT_ENDS_S, "the fronts have ended")
+        self._fronts = ()
         self.start_bridge()
 
-    @property
-    def front(self) -> int:
-        """Process id of the OPC UA front."""
+    def front(self, protocol: str) -> int:
+        """Process id of the front that serves it. Raises ``Stuck`` where there is none."""
         assert self.bridge
         children = Path(f"/proc/{self.bridge.pid}/task/{self.bridge.pid}/children")
-        return int(children.read_text(encoding="ascii").split()[0])
+        for child in children.read_text(encoding="ascii").split():
+            command = Path(f"/proc/{child}/cmdline").read_bytes()
+            if f"--role\0{protocol}\0".encode() in command:
+                return int(child)
+        raise Stuck(f"there is no front for {protocol}")
 
-    def fronts_started(self) -> int:
+    def fronts_started(self, protocol: str) -> int:
         assert self.bridge
-        return self.bridge.output().count("INFO    OPC UA on")
+        return self.bridge.output().count(_SERVES[protocol])
 
     def _read_bounds(self) -> None:
         check = [sys.executable, "-m", "bridge", "check", "--json", str(self._site)]
@@ -262,8 +270,9 @@ class Rig:
         self.gateway.open()
         self.disk.empty()
         self.kill_bridge()
-        if not _has_ended(self._front):
-            os.kill(self._front, signal.SIGKILL)
+        for front in self._fronts:
+            if not _has_ended(front):
+                os.kill(front, signal.SIGKILL)
         machine.reset_nodes()
         self.renew_bridge()
         for owner in self.owners.values():

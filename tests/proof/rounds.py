@@ -14,7 +14,7 @@ from tests.proof.drives import CLIENT_MS, DRIVES, WAY_MS, Drive
 from tests.proof.examine import Examine
 from tests.proof.fault import Fault
 from tests.proof.measure import Sample, Span
-from tests.proof.rig import BRIDGE, FRONT, SIMULATION, NotStopped, Rig, Stuck
+from tests.proof.rig import BRIDGE, FRONTS, SIMULATION, NotStopped, Rig, Stuck
 from tests.proof.settings import PLANT, REACTION_MS
 from tests.proof.waits import longest_wait_ms, most_waited_ms, paused_ms, waited_ms
 
@@ -215,8 +215,8 @@ def _was_starved(rig: Rig, drive: Drive, since: float) -> bool:
     now = time.monotonic()
     owner_ms = PLANT.fieldbus_timeout_ms - PLANT.owner_period_s * 1000
     stops = {BRIDGE: PLANT.deadman_ms, SIMULATION: PLANT.heartbeat_ms / 2, drive.protocol: owner_ms}
-    if drive.protocol == "opcua":
-        stops[FRONT] = owner_ms
+    if drive.protocol in FRONTS:
+        stops[FRONTS[drive.protocol]] = owner_ms
     return paused_ms(rig.watched, since, now) >= PLANT.deadman_ms or any(
         most_waited_ms(rig.watched, name, since, now, 2 * stop_ms / 1000) >= stop_ms
         for name, stop_ms in stops.items()
@@ -346,7 +346,7 @@ def _sample(
     if own is not None and fault.drive_bound:
         spans.append(Span(begin, own, fault.drive_bound(rig, drive), (BRIDGE, SIMULATION)))
     if way is not None:
-        busy = (BRIDGE, drive.protocol, *([FRONT] if drive.protocol == "opcua" else []))
+        busy = (BRIDGE, drive.protocol, *([FRONTS[drive.protocol]] if drive.protocol in FRONTS else []))
         spans.append(Span(*way, WAY_MS[drive.protocol], busy))
         if on_bus:
             sent = Span(way[0], on_bus.end, on_bus.bound_ms + CLIENT_MS, busy)

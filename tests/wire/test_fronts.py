@@ -99,7 +99,7 @@ def test_the_demo_stops_without_leaving_anything_behind(tmp_path: Path) -> None:
         wait_for_front(demo)
         demo.wait_output("conveyor/fu4: controlled by zenoh:demo")
         started = children(demo.pid)
-        assert len(started) == 3, "two fronts and the controller"
+        assert len(started) == 4, "three fronts and the controller"
         demo.signal(signal.SIGINT)
         assert demo.popen.wait(15) == 0
         assert not any(Path(f"/proc/{child}").exists() for child in started)

@@ -24,9 +24,9 @@ from tests.support.zenoh_peer import until
 
 RPDO1 = 0x205
 PLC = Identity(Source.MODBUS, "127.0.0.1")
-TASKS = {"master", "EEPROM counts", "audit log", "condition", "start", "modbus", "zenoh", "mirror", "slow"}
+TASKS = {"master", "EEPROM counts", "audit log", "condition", "start", "modbus", "mirror", "slow"}
 """What the service runs side by side."""
-PARTS = {"modbus", "zenoh", "mirror", "slow"}
+PARTS = {"modbus", "mirror", "slow"}
 """What is started again where it fails."""
 
 
@@ -83,7 +83,7 @@ class Moving:
 @asynccontextmanager
 async def moving(folder: Path) -> AsyncIterator[Moving]:
     node = sites.node(sites.drive("fu1", "modbus", 20_000), more="supervision_ms = 1000")
-    path = sites.write(folder, sites.bus(node), sites.modbus(free_port()), sites.zenoh(free_port()))
+    path = sites.write(folder, sites.bus(node), sites.modbus(free_port()))
     wire = VirtualWire()
     service = Service(load_project(path), lambda table: wire.end(table.name))
     booted, enabled = asyncio.Event(), asyncio.Event()

@@ -82,6 +82,9 @@ class KeySpace:
         self._places = {owner: place for place, owner in enumerate(self.owners)}
         self.owner_of: tuple[int, ...] = tuple(self._places[owner] for owner in owners)
         """The place of each point's in ``owners``."""
+        self._of_owner: dict[str, list[int]] = {owner: [] for owner in self.owners}
+        for index, owner in enumerate(owners):
+            self._of_owner[owner].append(index)
         self.prompt = (*(f"{self.top}/{owner}/**" for owner in self.owners), self.controllers)
         """The keys of one drive, node, bus or the bridge: so few points that the answer fits into the queue
         to any client that reads at all."""
@@ -97,6 +100,11 @@ class KeySpace:
         if "/@" in own:  # which ** does not include
             return False
         return _owner(tail) in self._places or (own != tail and own[:1] in ("", "/"))
+
+    def of_owner(self, key: str) -> Sequence[int]:
+        """The points of the drive, node or bus, or of the bridge, to which ``key`` belongs; none for keys of
+        controllers, which are no values."""
+        return self._of_owner.get(_owner(self.tail(key)), ())
 
     def share(self, key: str, payload: bytes | None) -> str:
         """In whose queue a query or put waits. zenoh does not tell who sent it, but each user has command

@@ -14,6 +14,8 @@ from bridge.northbound.view import View
 from bridge.northbound.zenoh import keys
 from bridge.zenohlink import Pace, Value, ZenohLink
 
+_BRIDGE: Final = "bridge/version"
+"""Good as long as the bus process is there."""
 _NODE_STATE: Final = "/node/state"
 _OPERATIONAL: Final = NODE_CODES[NodeState.OPERATIONAL]
 _MOST_AT_ONCE: Final = 500
@@ -23,8 +25,8 @@ class Publication:
     """Follows the image for one session of zenoh.
 
     What belongs to a drive, a node or a bus is rendered and sent only while somebody subscribes to some of
-    it; whoever is the first to do so gets what has changed meanwhile. A node has a token while it is
-    operational.
+    it; whoever is the first to do so gets what has changed meanwhile. The bridge has a token while the
+    process that knows its points can be reached, a node while it is operational.
     """
 
     def __init__(self, view: View, space: keys.KeySpace, settings: ZenohTable, link: ZenohLink) -> None:
@@ -40,12 +42,13 @@ class Publication:
         self._has_readers = [False] * len(space.owners)
         self._held: list[dict[int, None]] = [{} for _ in space.owners]
         """Of each owner, what has changed since nobody reads it."""
-        self._nodes = {
-            index: name.removesuffix(_NODE_STATE)
+        self._bridge = self._image.index[_BRIDGE]
+        self._tokens = {
+            index: space.node_token(name.removesuffix(_NODE_STATE))
             for name, index in self._image.index.items()
             if name.endswith(_NODE_STATE) and not name.startswith("bus/")
-        }
-        self._present: set[str] = set()
+        } | {self._bridge: space.bridge_token}
+        self._held_tokens: set[str] = set()
 
     def start(self) -> None:
         for place, owner in enumerate(self._keys.owners):
@@ -56,10 +59,12 @@ class Publication:
     def stop(self) -> None:
         """May be called again, also before ``start``."""
         self._pace.stop()
+        self._view.hurry(is_wanted=False)
         self._image.drop_feed(self._feed)
 
     def _on_readers(self, place: int, are_there: bool) -> None:
         self._has_readers[place] = are_there
+        self._view.hurry(is_wanted=any(self._has_readers))
         if are_there and self._held[place]:
             self._feed.mark_all(self._held[place])
             self._held[place] = {}
@@ -72,7 +77,7 @@ class Publication:
             self._pace.wake()
 
     def _publish(self, changed: list[int]) -> None:
-        owner_of, nodes = self._keys.owner_of, self._nodes
+        owner_of, tokens = self._keys.owner_of, self._tokens
         read = list[int]()
         for index in changed:
             place = owner_of[index]
@@ -80,8 +85,8 @@ class Publication:
                 read.append(index)
             else:
                 self._held[place][index] = None
-            if index in nodes:
-                self._follow_node(nodes[index], index)
+            if index in tokens:
+                self._follow_token(tokens[index], index)
         if read and not self._link.publish(self._values(read)):
             self._feed.mark_all(dict.fromkeys(read))
 
@@ -97,12 +102,12 @@ class Publication:
             for name, index, reading in zip(names, indices, readings, strict=True)
         ]
 
-    def _follow_node(self, name: str, index: int) -> None:
+    def _follow_token(self, token: str, index: int) -> None:
         state = self._image[index]
-        is_operational = state.quality is Quality.GOOD and state.value == _OPERATIONAL
-        if is_operational and name not in self._present:
-            self._present.add(name)
-            self._link.declare_token(self._keys.node_token(name))
-        elif not is_operational and name in self._present:
-            self._present.discard(name)
-            self._link.drop_token(self._keys.node_token(name))
+        is_due = state.quality is Quality.GOOD and (index == self._bridge or state.value == _OPERATIONAL)
+        if is_due and token not in self._held_tokens:
+            self._held_tokens.add(token)
+            self._link.declare_token(token)
+        elif not is_due and token in self._held_tokens:
+            self._held_tokens.discard(token)
+            self._link.drop_token(token)

@@ -11,7 +11,7 @@ import asyncio
 import logging
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -30,6 +30,7 @@ from bridge.northbound.zenoh import keys
 from bridge.northbound.zenoh.access import access_control
 from bridge.northbound.zenoh.askers import Askers
 from bridge.northbound.zenoh.commands import MALFORMED, BadCommand, Commands, identity_of, session_of
+from bridge.northbound.zenoh.gets import Gets
 from bridge.northbound.zenoh.publication import Publication
 from bridge.northbound.zenoh.sessions import Sessions
 from bridge.northbound.zenoh.users import ANONYMOUS, Users, read_users
@@ -39,10 +40,8 @@ from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 _log = logging.getLogger(__name__)
 
 _REPLIES_AT_ONCE: Final = 200
-_GETS_AT_ONCE: Final = 16
-"""Gets with wildcards that are answered at the same time."""
-_SLOW_GET_S: Final = 5.0
-"""After this time one of them makes room for another; until then further ones are told to try again."""
+_LONGEST: Final = 8192
+"""Bytes of a message with all that is in it: twice the longest command."""
 
 
 class ZenohServer:
@@ -61,8 +60,7 @@ class ZenohServer:
         self._askers = Askers()
         self._sessions = Sessions()
         self._publication = self._new_publication()
-        self._gets: dict[asyncio.Task[None], float] = {}
-        """When each was begun, the oldest first."""
+        self._gets = Gets[asyncio.Task[None]]()
         self._was_started = False
 
     def _new_link(self) -> ZenohLink:
@@ -93,7 +91,6 @@ class ZenohServer:
             self._link.declare_queryable(space.controllers, self._on_query, share)
             if self._settings.accept_put:
                 self._link.declare_subscriber(space.own_commands, self._on_put, share, from_others=True)
-        self._link.declare_token(space.bridge_token)
         self._link.follow_endings(self._on_ending)
         self._view.on_event(self._on_event)
         self._publication.start()
@@ -107,7 +104,7 @@ class ZenohServer:
 
     async def close(self) -> None:
         self._pulse.stop()
-        for task in tuple(self._gets):
+        for task in self._gets.all:
             task.cancel()
         self._view.forget(self._on_event)
         self._publication.stop()
@@ -165,41 +162,37 @@ class ZenohServer:
             asked.finish()
         elif not is_pattern:
             _refuse(asked, BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}"))
-        elif not self._has_room_for_get():
-            _refuse(asked, BadCommand("busy", "too many gets with wildcards at once; ask again"))
+        elif self._keys.is_prompt(asked.key):
+            # At once: so few that they fit into the queue to their reader.
+            asked.send(self._matching(self._keys.of_owner(asked.key), asked.key))
+            asked.finish()
+        elif not self._gets.has_room(asked.source, self._clock()):
+            _refuse(asked, BadCommand("busy", "too many gets across drives at once; ask again"))
         else:
             task = asyncio.get_running_loop().create_task(self._answer_get(asked.apart()))
-            self._gets[task] = self._clock()
-            task.add_done_callback(lambda task: self._gets.pop(task, None))
-
-    def _has_room_for_get(self) -> bool:
-        """A slow reader must not keep all others waiting."""
-        if len(self._gets) < _GETS_AT_ONCE:
-            return True
-        oldest, since = next(iter(self._gets.items()))
-        if self._clock() - since < _SLOW_GET_S:
-            return False
-        del self._gets[oldest]
-        oldest.cancel()
-        return True
+            ending = self._gets.add(task, asked.source, self._clock())
+            if ending:
+                ending.cancel()
+            task.add_done_callback(self._gets.done)
 
     async def _answer_get(self, asked: Asked) -> None:
         """The present values of all points that match, a portion at a time."""
         # A part of the answer must not look like all of it.
         end = partial(_refuse, asked, BadCommand("busy", "others wait and this is read slowly; ask for less"))
         try:
-            for portion in self._matching(zenoh.KeyExpr(asked.key)):
-                at_zero_ns = self._view.epoch_ns(0.0)
-                asked.send([self._render(index, at_zero_ns) for index in portion])
+            for start in range(0, len(self._keys.keys), _REPLIES_AT_ONCE):
+                portion = range(start, min(start + _REPLIES_AT_ONCE, len(self._keys.keys)))
+                if messages := self._matching(portion, asked.key):
+                    asked.send(messages)
                 await asked.settle()
             end = asked.finish
         finally:
             end()
 
-    def _matching(self, wanted: zenoh.KeyExpr) -> Iterator[list[int]]:
-        for start in range(0, len(self._keys.keys), _REPLIES_AT_ONCE):
-            some = self._keys.keys[start : start + _REPLIES_AT_ONCE]
-            yield [start + i for i, key in enumerate(some) if wanted.intersects(key)]
+    def _matching(self, indices: Iterable[int], pattern: str) -> list[Message]:
+        """The present values of those points whose keys match."""
+        wanted, all_keys, at_zero_ns = zenoh.KeyExpr(pattern), self._keys.keys, self._view.epoch_ns(0.0)
+        return [self._render(index, at_zero_ns) for index in indices if wanted.intersects(all_keys[index])]
 
     def _command(self, asked: Asked, owner: str, tail: str) -> None:
         def reply(outcome: Outcome) -> None:
@@ -294,12 +287,15 @@ def _refuse(asked: Asked, bad: BadCommand) -> None:
 
 def _config(settings: ZenohTable, space: keys.KeySpace, users: Users) -> zenoh.Config:
     login = users.login
+    listen = settings.listen if settings.mode == "peer" else ()
     return zenoh_config(
-        mode=settings.mode,
-        listen=settings.listen if settings.mode == "peer" else (),
+        # Not as a peer: one that a router connects to waits for it before it tells a client who is alive.
+        mode="router" if listen else settings.mode,
+        listen=listen,
         connect=settings.connect,
         users=(login.user, login.password, login.file) if login else None,
         access=access_control(space, users, accept_put=settings.accept_put),
         prompt=space.prompt,
         waiting=(space.everything,),
+        longest=_LONGEST,
     )

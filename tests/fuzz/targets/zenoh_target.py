@@ -18,7 +18,13 @@ from tests.fuzz.case import Case, load
 from tests.fuzz.mutate import Mutator
 from tests.fuzz.rig import STRANGER, Rig
 
-_KINDS: Final = {"get": 70, "put": 12, "declare": 8, "tampered": 3, "raw": 7}
+_KINDS: Final = {"get": 70, "put": 12, "declare": 8, "tampered": 3, "raw": 7, "keys": 0.3}
+_MODES: Final = ("client", "peer", "router")
+_DOINGS: Final = ("token", "queryable", "subscriber", "alias", "publisher")
+_DEEPEST: Final = 9000
+"""Words of a key. It fits into no message that the bridge takes, and ended its process when it did."""
+_MOST_WORDS: Final = 100_000
+"""Of all keys of a run that are taken: zenoh keeps each word of each for ever."""
 _ANSWER_S: Final = 0.3
 _MOST_ASKED: Final = 8
 _PATIENCE_S: Final = 10.0
@@ -34,9 +40,10 @@ _LONGEST_ENCODING: Final = 60
 """The library panics at more than 255 bytes."""
 
 
-def configure(port: int) -> zenoh.Config:
+def configure(port: int, mode: str = "client") -> zenoh.Config:
     config = zenoh.Config()
-    config.insert_json5("mode", '"client"')
+    config.insert_json5("mode", json.dumps(mode))
+    config.insert_json5("listen/endpoints", "[]")
     config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{port}"]))
     config.insert_json5("connect/timeout_ms", "2000")
     config.insert_json5("scouting/multicast/enabled", "false")
@@ -45,9 +52,14 @@ def configure(port: int) -> zenoh.Config:
 
 class Thrower:
     """The parts of a ``get`` or a ``put`` are key, parameters, payload, attachment and encoding; ``raw`` ones
-    are batches with their length; that of ``tampered`` is the seed of what is changed."""
+    are batches with their length; that of ``tampered`` is the seed of what is changed. Those of ``keys`` are
+    the mode of a session of its own, and for each declaration on it what it declares and how many words its
+    key has."""
 
     def __init__(self, rig: Rig, random: Random) -> None:
+        self._rig = rig
+        self._named = 0
+        """Distinct keys so far."""
         self._port = rig.zenoh
         self._random = random
         self._mutator = Mutator(random, "little")
@@ -62,6 +74,8 @@ class Thrower:
         kind = self._random.choices(tuple(_KINDS), tuple(_KINDS.values()))[0]
         if kind == "tampered":
             return Case(kind, (self._random.randbytes(8),))
+        if kind == "keys":
+            return Case(kind, (self._random.choice(_MODES).encode(), *self._declarations()))
         if kind == "raw":
             raw = self._mutator.mutate(self._random.choice(self._batches), self._batches)
             return Case(kind, tuple(self._mutator.cut(raw, 3)))
@@ -72,6 +86,13 @@ class Thrower:
         for place in changed:
             parts[place] = self._mutator.mutate_text(parts[place])
         return Case(kind, (key, *parts))
+
+    def _declarations(self) -> list[bytes]:
+        words = [1, 3, 30, 300, 3000, _DEEPEST]
+        return [
+            f"{self._random.choice(_DOINGS)} {self._random.choice(words)}".encode()
+            for _ in range(self._random.choice((1, 5, 20)))
+        ]
 
     def _key(self, key: bytes) -> bytes:
         _, found, leaf = key.rpartition(b"/command")
@@ -86,6 +107,8 @@ class Thrower:
                 self._throw_raw(case)
             elif case.kind == "tampered":
                 self._tamper(case)
+            elif case.kind == "keys":
+                self._name_keys(case)
             else:
                 self._throw_call(case)
         except (OSError, zenoh.ZError, ValueError, TypeError):
@@ -103,6 +126,21 @@ class Thrower:
             arguments = (self._port, Random(case.parts[0]))
             self._tampering = threading.Thread(target=tamper, args=arguments, daemon=True)
             self._tampering.start()
+
+    def _name_keys(self, case: Case) -> None:
+        """Distinct ones, on a session of its own that ends with them."""
+        mode, *declarations = case.parts
+        with zenoh.open(configure(self._port, mode.decode())) as session:
+            for declaration in declarations:
+                doing, words = declaration.decode().split()
+                if int(words) < _DEEPEST:
+                    if self._rig.named_words + int(words) > _MOST_WORDS:
+                        continue
+                    self._rig.named_words += int(words)
+                self._named += 1
+                key = "/".join([f"fuzz{self._named}", *"k" * (int(words) - 1)])
+                with contextlib.suppress(zenoh.ZError):
+                    _declare(session, doing, key)
 
     def _throw_call(self, case: Case) -> None:
         key, parameters, payload, attachment, encoding = case.parts
@@ -162,6 +200,21 @@ class Thrower:
             self._session = None
         if self._tampering is not None:
             self._tampering.join(_GIVEN_UP_S)
+
+
+def _declare(session: zenoh.Session, doing: str, key: str) -> object:
+    ignored = zenoh.handlers.Callback(lambda _: None, indirect=False)
+    match doing:
+        case "token":
+            return session.liveliness().declare_token(key)
+        case "queryable":
+            return session.declare_queryable(key, ignored)
+        case "subscriber":
+            return session.declare_subscriber(key, ignored)
+        case "alias":
+            return session.declare_keyexpr(key)
+        case _:
+            return session.declare_publisher(key)
 
 
 def _text(raw: bytes) -> str:

@@ -17,8 +17,9 @@ PLACES = 16
 class Get:
     """Is read by nobody until it is told to be."""
 
-    def __init__(self) -> None:
-        self.key = "drives/demo/**"
+    def __init__(self, key: str = "drives/demo/**", source: str = "") -> None:
+        self.key = key
+        self.source = source
         self.payload = self.attachment = None
         self.parameters = ""
         self.received_at = 100.0
@@ -50,10 +51,18 @@ async def turns() -> None:
 class Hall:
     def __init__(self) -> None:
         self.now = 100.0
+        self._asked: list[Get] = []
         self._server = ZenohServer(view_of(make_plant()), ZenohTable(), "demo", lambda: self.now)
 
-    async def ask(self) -> Get:
-        get = Get()
+    async def end(self) -> None:
+        """Everything is read."""
+        for get in self._asked:
+            get.is_read.set()
+        await turns()
+
+    async def ask(self, *what: str) -> Get:
+        get = Get(*what)
+        self._asked.append(get)
         self._server._on_query(cast(Any, get))
         await turns()
         return get
@@ -84,3 +93,25 @@ async def test_a_slow_get_is_answered_in_whole_where_nobody_else_wants_its_place
         get.is_read.set()
     await turns()
     assert all(get.said[-1] == "end" for get in slow)
+
+
+async def test_a_get_of_one_drive_is_answered_whatever_the_others_do() -> None:
+    hall = Hall()
+    for asker in range(PLACES):
+        await hall.ask("drives/demo/**", f"session {asker}")
+    for key in ("drives/demo/conveyor/fu3/**", "drives/demo/conveyor/fu3/*/value_1", "drives/demo/bridge/*"):
+        assert (await hall.ask(key)).said == ["values", "end"]
+    await hall.end()
+
+
+async def test_whoever_has_most_gets_makes_room_for_who_has_few() -> None:
+    """Twelve of one session must not keep another from its only one."""
+    hall = Hall()
+    greedy = [await hall.ask("drives/demo/**", "greedy") for _ in range(PLACES)]
+    honest = [await hall.ask("drives/demo/**", "honest") for _ in range(PLACES // 2)]
+    assert all(get.said == ["values"] for get in honest)
+    assert [get.said for get in greedy] == [["values", "busy"]] * 8 + [["values"]] * 8
+    assert (await hall.ask("drives/demo/**", "honest")).said == ["busy"], "each has its share"
+    assert (await hall.ask("drives/demo/**", "greedy")).said == ["busy"]
+    assert (await hall.ask("drives/demo/**", "third")).said == ["values"]
+    await hall.end()

@@ -472,10 +472,14 @@ class PlantView:
         """Changes are here at once anyway."""
 
     def look(self, drive: str) -> None:
-        if drive in self._plant.devices:
-            self._plant.devices[drive].on_time(self._clock())
-        else:
-            self._plant.drives[drive].look(self._clock())
+        now = self._clock()
+        device = self._plant.devices.get(drive)
+        if device is None:
+            self._plant.drives[drive].look(now)
+            return
+        device.on_time(now)
+        if device.outputs:
+            device.outputs.look(now)
 
     def submit(self, request: Request, reply: Reply) -> None:
         is_changed = True

@@ -59,6 +59,13 @@ class Feed:
             del self._dirty[index]
         return taken
 
+    def take_of(self, indices: Iterable[int]) -> list[int]:
+        """Those of ``indices`` that have changed; they count as seen from now on."""
+        taken = [index for index in indices if index in self._dirty]
+        for index in taken:
+            del self._dirty[index]
+        return taken
+
     def __len__(self) -> int:
         return len(self._dirty)
 
@@ -159,6 +166,15 @@ class Image:
             for feed in self._feeds:
                 feed.mark_all(self._untold)
             self._untold.clear()
+
+    def tell_kept_of(self, indices: Iterable[int]) -> None:
+        """As ``tell_kept``, of these points alone: what others keep can wait."""
+        told = {index: None for index in indices if index in self._untold}
+        if told:
+            for feed in self._feeds:
+                feed.mark_all(told)
+            for index in told:
+                del self._untold[index]
 
     def set_values(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:
         """Store values of points whose quality stays as it is; ``indices`` and ``values`` go together."""

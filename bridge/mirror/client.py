@@ -16,7 +16,7 @@ from bridge.errors import OperationFailed
 from bridge.guard import Guard
 from bridge.image import Image, Quality
 from bridge.mirror import protocol
-from bridge.mirror.protocol import Changed, Connected, Counted, Delta, Malformed, Snapshot
+from bridge.mirror.protocol import Answered, Changed, Connected, Counted, Delta, Malformed, Snapshot
 from bridge.mirror.rejections import Rejections
 from bridge.quietlog import about
 from bridge.zenohlink import Answer, Message, ZenohLink, zenoh_config
@@ -26,6 +26,8 @@ _log = logging.getLogger(__name__)
 SILENCE_S: Final = 1.0
 """After this long out of step the bus process counts as gone."""
 _LOOK_EVERY_S: Final = 0.1
+_MOST_BEHIND_S: Final = SILENCE_S + 2 * _LOOK_EVERY_S
+"""Longest wait for the deltas that an outcome names: those that are missed are known to be by then."""
 _SNAPSHOT_TIMEOUT_S: Final = 2.0
 _RENEW_S: Final = 4.0
 """Out of step for this long, a front connects anew under another identity. When its peer was stopped for
@@ -66,6 +68,8 @@ class MirrorClient:
         self._sequence = 0
         self._in_step = False
         self._pending: list[Delta] = []
+        self._waiting: dict[asyncio.Future[None], Answered] = {}
+        """Outcomes that the image does not show yet."""
         self._last_in_step = float("-inf")
         self._connected_at = float("-inf")
         self._is_dead = False
@@ -125,7 +129,8 @@ class MirrorClient:
     async def request(self, request: Request, timeout_s: float = 5.0) -> Outcome:
         """Send ``request`` to the bus process; any number may be under way at once.
 
-        A request without a time has arrived now; its wait from here on counts.
+        A request without a time has arrived now; its wait from here on counts. When the outcome is returned,
+        the image shows what the request has changed, or its points are dead.
         """
         if request.received_at is None:
             request = replace(request, received_at=self._clock())
@@ -135,11 +140,35 @@ class MirrorClient:
             return Outcome(Code.NOT_VALID, str(error), forwarded=False)
         answers = await self._link.get(self._request_key, payload, timeout_s=timeout_s)
         for answer in answers:
-            if answer.ok and (outcome := self._read(partial(protocol.decode, Outcome), answer.message)):
-                return outcome
+            if answer.ok and (answered := self._read(partial(protocol.decode, Answered), answer.message)):
+                await self._follow_to(answered)
+                return answered.outcome
         # The deltas may still come where nothing is answered: a snapshot will tell.
         self._in_step = False
         return Outcome(Code.TIMED_OUT, "the bus process did not answer", forwarded=False)
+
+    async def _follow_to(self, answered: Answered) -> None:
+        """Wait until the image shows what ``answered`` is about. Where that takes too long, no value may
+        look current."""
+        if self._shows(answered):
+            return
+        shown: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._waiting[shown] = answered
+        try:
+            await asyncio.wait((shown,), timeout=_MOST_BEHIND_S)
+        finally:
+            del self._waiting[shown]
+        if not shown.done():
+            self._mark_dead()
+
+    def _shows(self, answered: Answered) -> bool:
+        is_applied = answered.instance == self._instance and answered.sequence <= self._sequence
+        return is_applied or self._is_dead
+
+    def _tell_waiting(self) -> None:
+        for shown, answered in self._waiting.items():
+            if self._shows(answered) and not shown.done():
+                shown.set_result(None)
 
     def rejected(self, rejection: Rejection) -> None:
         """Told to the bus process within 0.1 s. While that is away nobody keeps a log, and it is lost."""
@@ -264,6 +293,7 @@ class MirrorClient:
         for delta in pending:
             if delta.instance == self._instance:
                 self._follow(delta)
+        self._tell_waiting()
 
     def _on_told(self, message: Message) -> None:
         if message.key == protocol.PROMPT:
@@ -302,6 +332,7 @@ class MirrorClient:
         self._last_in_step = self._clock()
         self._sequence = delta.sequence
         self._apply(delta.readings)
+        self._tell_waiting()
 
     def _apply(self, readings: tuple[Changed, ...]) -> None:
         image = self.image
@@ -318,6 +349,7 @@ class MirrorClient:
         _log.warning("mirror: %s", UNREACHABLE)
         everything = range(len(self.image.points))
         self.image.judge(everything, Quality.DEAD, time.time(), UNREACHABLE)
+        self._tell_waiting()
 
     def _on_token(self, _: str, is_alive: bool) -> None:
         if not is_alive and self._image is not None:

@@ -71,6 +71,15 @@ class Prompt(msgspec.Struct, array_like=True, frozen=True):
     readings: tuple[Changed, ...]
 
 
+class Answered(msgspec.Struct, array_like=True, frozen=True):
+    """The outcome of a request. The image that has applied delta ``sequence`` of ``instance`` shows what the
+    request has changed."""
+
+    outcome: Outcome
+    instance: int
+    sequence: int
+
+
 class _Asked(msgspec.Struct, array_like=True, frozen=True):
     """A request that is valid until ``deadline_s``; what the fields of its command are is told by its
     action."""
@@ -118,14 +127,14 @@ _decoders: dict[type, msgspec.msgpack.Decoder[Any]] = {
         Rejected,
         Counted,
         Connected,
-        Outcome,
+        Answered,
         _Asked,
         *COMMANDS.values(),
     )
 }
 
 
-def encode(message: Snapshot | Delta | Prompt | Event | Rejected | Counted | Connected | Outcome) -> bytes:
+def encode(message: Snapshot | Delta | Prompt | Event | Rejected | Counted | Connected | Answered) -> bytes:
     """Raises nothing: a text that is not Unicode, or a number too long for MessagePack, is changed, because
     one bad value of a client must not cost the whole message."""
     try:

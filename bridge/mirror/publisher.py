@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import random
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Final, TypeVar
@@ -13,10 +14,10 @@ from bridge.beat import LOOK_EVERY_S, next_before_look
 from bridge.command import Code, Event, Outcome, PlantView
 from bridge.command.freshness import NEVER, TAKEN_LATE
 from bridge.errors import Unavailable
-from bridge.image import Feed
+from bridge.image import Feed, Point
 from bridge.mirror import protocol
 from bridge.mirror.endpoint import close_to_others, prepare_folder
-from bridge.mirror.protocol import Changed, Connected, Delta, Malformed, Prompt, Rejected, Snapshot
+from bridge.mirror.protocol import Answered, Changed, Connected, Delta, Malformed, Prompt, Rejected, Snapshot
 from bridge.zenohlink import Asked, Message, Pace, ZenohLink, zenoh_config
 
 _POINTS_PER_DELTA: Final = 500
@@ -56,6 +57,7 @@ class MirrorPublisher:
         self._instance = random.getrandbits(63)
         self._sequence = 0
         self._snapshots: set[asyncio.Task[None]] = set()
+        self._of = _by_owner(self._image.points)
         self._was_started = False
 
     def _new_link(self) -> ZenohLink:
@@ -135,21 +137,43 @@ class MirrorPublisher:
         """What has changed waits while nobody listens."""
         self._publish(len(self._feed))
 
-    def _publish(self, left: int) -> None:
-        """A delta, or several: the bus has its turn between two of them."""
-        if not self._has_fronts:
-            return
-        self._publish_delta()
-        left -= _POINTS_PER_DELTA
-        if left > 0:
-            asyncio.get_running_loop().call_soon(self._publish, left)
-        elif self._feed:
-            self._pace.wake()
+    def _publish(self, left: int, then: Callable[[], None] | None = None) -> None:
+        """A delta, or several, and ``then``: the bus has its turn between two of them."""
+        if self._has_fronts or then:
+            self._publish_delta(self._feed.take(_POINTS_PER_DELTA))
+            left -= _POINTS_PER_DELTA
+            if left > 0:
+                asyncio.get_running_loop().call_soon(self._publish, left, then)
+                return
+            if self._feed:
+                self._pace.wake()
+        if then:
+            then()
 
-    def _publish_delta(self) -> None:
+    def _show(self, target: str, then: Callable[[], None]) -> None:
+        """Publish at once what has changed of a request's target, and do ``then``: after the answer
+        nobody may read it as it was before. Of a whole bus that is everything; of a drive or a node only its
+        own points, however much else waits for its turn.
+        """
+        if target.startswith("bus/"):
+            self._publish(len(self._feed), then)
+            return
+        node, _, drive = target.partition("/")
+        own = self._of.get(target, [])
+        if drive:
+            own = [*own, *self._of.get(f"{node}/node", [])]
+        if f"{target}/supervision/telegrams" in self._image.index:
+            self._view.look(target)
+            self._image.tell_kept_of(own)
+        waiting = self._feed.take_of(own)
+        for first in range(0, len(waiting), _POINTS_PER_DELTA):
+            self._publish_delta(waiting[first : first + _POINTS_PER_DELTA])
+        then()
+
+    def _publish_delta(self, indices: Sequence[int]) -> None:
         self._sequence += 1
         at_zero_ns = self._view.epoch_ns(0.0)
-        readings = tuple(self._changed(index, at_zero_ns) for index in self._feed.take(_POINTS_PER_DELTA))
+        readings = tuple(self._changed(index, at_zero_ns) for index in indices)
         # Where a front or the worker cannot follow, a delta is lost; the gap makes the front ask for
         # a new snapshot.
         self._send(protocol.DELTA, Delta(self._instance, self._sequence, readings))
@@ -222,8 +246,7 @@ class MirrorPublisher:
         def reply(outcome: Outcome) -> None:
             if outcome.value is not None:
                 outcome = replace(outcome, time=self._view.epoch_ns(outcome.time) / 1e9)
-            asked.send([Message(asked.key, protocol.encode(outcome))])
-            asked.finish()
+            self._show(request.target, partial(self._answer, asked, outcome))
 
         try:
             request, deadline_s = protocol.decode_request(asked.payload or b"")
@@ -242,6 +265,21 @@ class MirrorPublisher:
             # Too late, no time, or one that is still to come: nobody knows how old it is.
             request = replace(request, received_at=NEVER)
         self._view.submit(request, reply)
+
+    def _answer(self, asked: Asked, outcome: Outcome) -> None:
+        answered = Answered(outcome, self._instance, self._sequence)
+        asked.send([Message(asked.key, protocol.encode(answered))])
+        asked.finish()
+
+
+def _by_owner(points: Sequence[Point]) -> dict[str, list[int]]:
+    """Indices of the points below ``<node>`` and ``<node>/<drive>``."""
+    found = defaultdict[str, list[int]](list)
+    for index, point in enumerate(points):
+        node, part, *_ = point.path
+        found[node].append(index)
+        found[f"{node}/{part}"].append(index)
+    return dict(found)
 
 
 def _by_front(key: str, _: bytes | None) -> str:

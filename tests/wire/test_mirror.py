@@ -203,6 +203,22 @@ async def test_a_request_carries_its_identity_and_brings_one_outcome(endpoint: s
         assert (await client.request(Request(engineer, "conveyor/fu4", TakeControl(ttl_ms=500)))).ok
 
 
+async def test_when_an_outcome_comes_the_front_shows_what_it_is_about(endpoint: str) -> None:
+    plant = make_plant()
+    node_is(plant, NodeState.OPERATIONAL)
+    drive_says(plant.drives["conveyor/fu4"], READY)
+    async with publishing(endpoint, plant), front(endpoint) as client:
+        assert (await client.request(Request(SCADA, "conveyor/fu4", TakeControl(ttl_ms=60_000)))).ok
+        assert client.image.read("conveyor/fu4/supervision/owner").value == "opcua:ann"
+        for setpoint in range(0x1000, 0x1000 + 300):
+            write = Write({"control_word": 0x047E, "setpoint_1": setpoint})
+            assert (await client.request(Request(SCADA, "conveyor/fu4", write))).ok
+            assert client.image.read("conveyor/fu4/command/setpoint_1").value == setpoint
+        assert (await client.request(Request(SCADA, "conveyor/fu4", Do(Action.RELEASE_CONTROL)))).ok
+        assert client.image.read("conveyor/fu4/supervision/owner").value == ""
+        assert client.gaps == 0
+
+
 async def test_a_start_that_takes_its_time_holds_up_no_other_request(endpoint: str) -> None:
     plant = make_plant()
     node_is(plant, NodeState.OPERATIONAL)

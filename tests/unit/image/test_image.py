@@ -137,6 +137,22 @@ class TestFeed:
         image.tell_kept()
         assert seen(feed) == [1]
 
+    def test_what_changes_by_itself_is_told_of_some_points_alone(self, image: Image):
+        feed = image.feed()
+        seen(feed)
+        image.keep(1, 7, 1.0)
+        image.keep(2, True, 1.0)
+        image.tell_kept_of([0, 1])
+        assert seen(feed) == [1]
+        image.tell_kept()
+        assert seen(feed) == [2], "each of them once"
+
+    def test_some_points_are_taken_out_of_turn(self, image: Image):
+        feed = image.feed()
+        assert feed.take_of([3, 1]) == [3, 1]
+        assert feed.take_of([3, 1]) == []
+        assert seen(feed) == [0, 2]
+
     def test_it_is_told_of_the_first_change_since_it_took_all(self, image: Image):
         told: list[int] = []
         feed = image.feed(lambda: told.append(len(feed)))

@@ -36,7 +36,7 @@ from bridge.errors import Unavailable
 from bridge.image import DataType, Point, Quality
 from bridge.mirror import protocol, socket_endpoint
 from bridge.mirror.endpoint import prepare_folder
-from bridge.mirror.protocol import Changed, Connected, Counted, Delta, Malformed, Rejected, Snapshot
+from bridge.mirror.protocol import Answered, Changed, Connected, Counted, Delta, Malformed, Rejected, Snapshot
 from tests.support.zenoh_site import make_plant
 
 values = st.booleans() | st.integers(-(2**31), 2**32 - 1) | st.floats(allow_nan=False) | st.text(max_size=20)
@@ -88,9 +88,12 @@ def test_rejections_read_back(identity: Identity, target: str, written: dict[str
     assert protocol.decode(Rejected, protocol.encode(told)) == told
 
 
-@given(st.builds(Outcome, st.sampled_from(Code), st.text(), st.booleans()))
-def test_outcomes_read_back(outcome: Outcome) -> None:
-    assert protocol.decode(Outcome, protocol.encode(outcome)) == outcome
+outcomes = st.builds(Outcome, st.sampled_from(Code), st.text(), st.booleans())
+
+
+@given(st.builds(Answered, outcomes, st.integers(0, 2**63 - 1), st.integers(0, 10**9)))
+def test_outcomes_read_back(answered: Answered) -> None:
+    assert protocol.decode(Answered, protocol.encode(answered)) == answered
 
 
 any_text = st.text(st.characters(), max_size=10)
@@ -113,7 +116,7 @@ def test_whatever_was_refused_can_be_told(
 @given(any_text, any_text, any_text | st.integers() | st.floats(allow_nan=False))
 def test_whatever_happens_can_be_told(source: str, message: str, value: str | int | float) -> None:
     protocol.decode(Event, protocol.encode(Event(1.5, Kind.REFUSED, source, 300, message)))
-    protocol.decode(Outcome, protocol.encode(Outcome(Code.NOT_VALID, message)))
+    protocol.decode(Answered, protocol.encode(Answered(Outcome(Code.NOT_VALID, message), 1, 1)))
     delta = Delta(1, 1, (Changed(0, 5, Quality.GOOD, 0, ""), Changed(1, value, Quality.GOOD, 0, message)))
     back = protocol.decode_delta(protocol.encode(delta), 2)
     assert back.readings[0] == delta.readings[0], "what is well is as it was"
@@ -170,7 +173,7 @@ DECODERS = (
     lambda data: protocol.decode_delta(data, 10),
     lambda data: protocol.decode(Event, data),
     protocol.decode_request,
-    lambda data: protocol.decode(Outcome, data),
+    lambda data: protocol.decode(Answered, data),
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
 import re
 from typing import Annotated, Final, Literal, cast
@@ -34,6 +35,8 @@ _OBJECT: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})")
 _MOST_COUNTER: Final = 240
 _SHORTEST_REASON: Final = 10
 _LOCATOR: Final = re.compile(r"[a-z][a-z0-9-]*/.+")
+_HOST_NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,63}(\.[A-Za-z0-9_-]{1,63})*")
+_URI: Final = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:[!-~]+")
 
 
 def _regular_expression(text: str) -> str:
@@ -121,6 +124,20 @@ def _locator(text: str) -> str:
     return text
 
 
+def _host_name(text: str) -> str:
+    with contextlib.suppress(ValueError):
+        return str(ipaddress.ip_address(text))
+    if not _HOST_NAME.fullmatch(text):
+        raise ValueError("must be a host name such as bridge.plant.example, or an IP address")
+    return text
+
+
+def _uri(text: str) -> str:
+    if not _URI.fullmatch(text):
+        raise ValueError("must be a URI such as urn:hall-3:drivebridge")
+    return text
+
+
 def _controller(text: str) -> str:
     if not _CONTROLLER.fullmatch(text) or text == "anonymous":
         raise ValueError("must be a user's name of 1…64 letters, digits and _ . -")
@@ -152,6 +169,8 @@ Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Gateway = Annotated[str, AfterValidator(_gateway)]
 Network = Annotated[str, AfterValidator(_network)]
 Locator = Annotated[str, AfterValidator(_locator)]
+HostName = Annotated[str, AfterValidator(_host_name)]
+Uri = Annotated[str, AfterValidator(_uri)]
 ControllerName = Annotated[str, AfterValidator(_controller)]
 Timeout = Annotated[int, Field(ge=0, le=LONGEST_TIMEOUT_MS)]
 Full = Annotated[float, Field(gt=0, allow_inf_nan=False)]

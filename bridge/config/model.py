@@ -28,6 +28,7 @@ from bridge.config.fields import (
     Endpoint,
     Full,
     Gateway,
+    HostName,
     Locator,
     MandatoryMissing,
     Name,
@@ -45,6 +46,7 @@ from bridge.config.fields import (
     RegularExpression,
     SyncCounter,
     TimeoutRange,
+    Uri,
     WordOrder,
     listed,
 )
@@ -323,6 +325,10 @@ class OpcUaTable(Table):
     listen: Endpoint = Field("127.0.0.1:4840", description="address:port")
     no_security: bool = Field(False, description="true opens an endpoint without encryption")
     anonymous: Literal["none", "observer", "operator"] = "none"
+    application_uri: Uri | None = None
+    names: list[HostName] = Field(
+        default_factory=list[str], description="host names and addresses by which it is reached"
+    )
     certificate: str | None = None
     private_key: str | None = None
     trusted_dir: str | None = None

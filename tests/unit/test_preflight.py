@@ -147,7 +147,7 @@ def test_without_one_the_bridge_s_own_is_made_before_the_bus_is_opened(tmp_path:
 
 
 def test_our_own_certificate_says_what_opcua_asks_for() -> None:
-    made = self_signed(KEY, "urn:box:drivebridge")
+    made = self_signed(KEY, "urn:box:drivebridge", ["box"])
     assert made.public_key() == KEY.public_key()
     usage = made.extensions.get_extension_for_class(x509.KeyUsage).value
     assert usage.digital_signature
@@ -180,7 +180,8 @@ def test_a_full_disk_is_told_and_stops_only_who_needs_it(
     [record] = caplog.records
     assert "audit log and EEPROM counts are not kept" in record.message
     # Without a certificate of its own yet, OPC UA cannot be served at all.
-    (tmp_path / "state" / "opcua" / "own_key.pem").unlink()
+    for file in (tmp_path / "state" / "opcua").iterdir():
+        file.unlink()
     monkeypatch.setattr(os, "open", full)
     error = told(tmp_path, "")
     assert isinstance(error, Unavailable)

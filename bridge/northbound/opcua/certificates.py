@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-import socket
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,8 +20,7 @@ from cryptography.hazmat.primitives.serialization import (
     load_pem_private_key,
 )
 
-from bridge.config import OpcUaTable
-from bridge.errors import Fault, FileFaults, Unavailable
+from bridge.errors import Fault, FileFaults
 from bridge.northbound.opcua.selfsigned import KEY_BITS, new_key, self_signed
 
 _log = logging.getLogger(__name__)
@@ -33,23 +32,6 @@ _PEM: Final = b"-----BEGIN"
 class OwnCertificate:
     certificate: x509.Certificate
     private_key: RSAPrivateKey
-
-
-def application_uri() -> str:
-    return f"urn:{socket.gethostname()}:drivebridge"
-
-
-def configured_or_own(settings: OpcUaTable, folder: Path, uri: str) -> OwnCertificate:
-    """The certificate that the site file names, or else the bridge's own in ``folder``. Raises ``FileFaults``
-    and ``Unavailable``."""
-    certificate, key = settings.certificate, settings.private_key
-    if certificate and key:
-        return load_own(Path(certificate), Path(key))
-    if certificate or key:
-        missing = "private_key" if certificate else "certificate"
-        fault = Fault("site file", 0, f"opcua.{missing}", "is missing", "certificate and key go together")
-        raise FileFaults([fault])
-    return own_or_new(folder, uri)
 
 
 def load_own(certificate: Path, private_key: Path) -> OwnCertificate:
@@ -74,44 +56,27 @@ def load_own(certificate: Path, private_key: Path) -> OwnCertificate:
     return OwnCertificate(loaded, key)
 
 
-def own_or_new(folder: Path, application_uri: str) -> OwnCertificate:
-    """The bridge's own certificate in ``folder``, made where there is none that still fits.
+def new_own(certificate: Path, key: Path, application_uri: str, names: Sequence[str]) -> OwnCertificate:
+    """A certificate of our own, put into ``certificate``, for the key in ``key``, which outlives it and is
+    made where there is none. Both files are for this machine alone (mode 0600).
 
-    The key is made for this machine alone (mode 0600) and outlives a new certificate.
-    Raises ``Unavailable`` where the folder or a file in it cannot be read or written, ``FileFaults``
-    where the key in it is none.
+    Raises OSError, and ``FileFaults`` for a key that is none.
     """
-    certificate, key = folder / "own_certificate.der", folder / "own_key.pem"
+    if not key.exists():
+        write_private(key, new_key()[1])
     try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if not key.exists():
-            _write_private(key, new_key()[1])
-            certificate.unlink(missing_ok=True)
-        if certificate.exists():
-            own = load_own(certificate, key)
-            if _fits(own.certificate, application_uri):
-                return own
-            _log.warning("%s does not fit %s any more: a new one is made", certificate, application_uri)
         private_key = _read_key(key)
-        new = self_signed(private_key, application_uri)
-        _write_private(certificate, new.public_bytes(Encoding.DER))
-        _log.info("made an OPC UA certificate: %s, SHA-256 %s", certificate, fingerprint(new))
-        return OwnCertificate(new, private_key)
-    except OSError as error:
-        hint = "the folder is state_dir of the site file and must be writable for the service"
-        raise Unavailable(f"{error.filename or folder}: {_reason(error)} ({hint})") from error
     except (ValueError, TypeError) as error:
         hint = "delete it and a new one is made; clients must trust that one anew"
         raise FileFaults([Fault(str(key), 0, "", f"cannot be used: {error}", hint)]) from error
+    made = self_signed(private_key, application_uri, names)
+    write_private(certificate, made.public_bytes(Encoding.DER))
+    _log.info("made an OPC UA certificate: %s, SHA-256 %s", certificate, fingerprint(made))
+    return OwnCertificate(made, private_key)
 
 
-def _fits(certificate: x509.Certificate, application_uri: str) -> bool:
-    now = datetime.now(UTC)
-    in_time = certificate.not_valid_before_utc <= now < certificate.not_valid_after_utc
-    return in_time and application_uri in _uris(certificate)
-
-
-def _uris(certificate: x509.Certificate) -> list[str]:
+def uris_of(certificate: x509.Certificate) -> list[str]:
+    """Application URIs in the certificate."""
     try:
         names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName)
     except x509.ExtensionNotFound:
@@ -119,7 +84,7 @@ def _uris(certificate: x509.Certificate) -> list[str]:
     return names.value.get_values_for_type(x509.UniformResourceIdentifier)
 
 
-def _write_private(path: Path, content: bytes) -> None:
+def write_private(path: Path, content: bytes) -> None:
     """Whole or not at all, and never readable for others, not even for a moment."""
     new = path.with_name(f"{path.name}.new")
     with contextlib.suppress(FileNotFoundError):
@@ -152,14 +117,15 @@ def fingerprint(certificate: x509.Certificate) -> str:
     return certificate.fingerprint(SHA256()).hex()
 
 
-def _reason(error: Exception) -> str:
+def reason(error: Exception) -> str:
+    """What went wrong, as the end of a sentence."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror.lower()
     return str(error)
 
 
 def _fault(path: Path, error: Exception, hint: str) -> Fault:
-    return Fault(str(path), 0, "", f"cannot be used: {_reason(error)}", hint)
+    return Fault(str(path), 0, "", f"cannot be used: {reason(error)}", hint)
 
 
 class TrustedCertificates:
@@ -181,13 +147,13 @@ class TrustedCertificates:
             files = sorted(path for path in self._folder.iterdir() if path.is_file())
         except OSError as error:
             hint = "trusted_dir is a folder with the certificates of the clients"
-            raise FileFaults([Fault(str(self._folder), 0, "", _reason(error), hint)]) from error
+            raise FileFaults([Fault(str(self._folder), 0, "", reason(error), hint)]) from error
         known: set[bytes] = set()
         for path in files:
             try:
                 known.add(read_certificate(path).public_bytes(Encoding.DER))
             except (OSError, ValueError) as error:
-                _log.warning("%s is not a certificate and is left out: %s", path, _reason(error))
+                _log.warning("%s is not a certificate and is left out: %s", path, reason(error))
         self._known = frozenset(known)
 
     def refusal(self, certificate: x509.Certificate) -> str | None:

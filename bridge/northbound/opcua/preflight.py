@@ -10,7 +10,8 @@ from pathlib import Path
 from bridge.config import OpcUaTable
 from bridge.errors import FileFaults
 from bridge.northbound.certificatefiles import check_validity, placed
-from bridge.northbound.opcua.certificates import TrustedCertificates, application_uri, configured_or_own
+from bridge.northbound.opcua.certificates import TrustedCertificates
+from bridge.northbound.opcua.identity import server_identity
 from bridge.northbound.passwords import check_users
 
 
@@ -19,7 +20,7 @@ def check_opcua(settings: OpcUaTable, state_dir: Path, site: Path) -> None:
     ``Unavailable`` where a certificate has to be made and ``state_dir`` does not take it."""
     try:
         check_users(settings.user)
-        own = configured_or_own(settings, state_dir / "opcua", application_uri())
+        own = server_identity(settings, state_dir / "opcua")
         if settings.trusted_dir:
             TrustedCertificates(Path(settings.trusted_dir))
         if settings.certificate:

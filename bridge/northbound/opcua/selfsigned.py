@@ -5,8 +5,8 @@ With cryptography alone: the bus process makes it, and asyncua stays out of that
 
 from __future__ import annotations
 
-import ipaddress
 import socket
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Final
 
@@ -15,6 +15,8 @@ from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey, generat
 from cryptography.hazmat.primitives.hashes import SHA256
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from bridge.northbound.opcua.ownnames import general_name
 
 KEY_BITS: Final = 2048
 _VALID_DAYS: Final = 3650
@@ -28,7 +30,8 @@ def new_key() -> tuple[RSAPrivateKey, bytes]:
     return key, key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
 
 
-def self_signed(key: RSAPrivateKey, application_uri: str) -> x509.Certificate:
+def self_signed(key: RSAPrivateKey, application_uri: str, names: Sequence[str]) -> x509.Certificate:
+    """``names`` are host names and addresses by which the server is reached."""
     host = socket.gethostname()
     name = x509.Name(
         [
@@ -36,19 +39,14 @@ def self_signed(key: RSAPrivateKey, application_uri: str) -> x509.Certificate:
             x509.NameAttribute(NameOID.ORGANIZATION_NAME, "drivebridge"),
         ]
     )
-    names: list[x509.GeneralName] = [
-        x509.UniformResourceIdentifier(application_uri),
-        x509.DNSName(host),
-        x509.DNSName("localhost"),
-        x509.IPAddress(ipaddress.ip_address("127.0.0.1")),
-    ]
+    known_by = [x509.UniformResourceIdentifier(application_uri), *map(general_name, names)]
     now = datetime.now(UTC)
     serial, public = x509.random_serial_number(), key.public_key()
     key_id = x509.SubjectKeyIdentifier.from_public_key(public)
     extensions: list[x509.ExtensionType] = [
         key_id,
         x509.AuthorityKeyIdentifier(key_id.digest, [x509.DirectoryName(name)], serial),
-        x509.SubjectAlternativeName(names),
+        x509.SubjectAlternativeName(known_by),
         x509.BasicConstraints(ca=True, path_length=0),
         _USAGE,
         x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]),

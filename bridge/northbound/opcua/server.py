@@ -21,13 +21,9 @@ from bridge.errors import OperationFailed
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua import decoding
 from bridge.northbound.opcua.browsing import MOST_CONTINUATION_POINTS
-from bridge.northbound.opcua.certificates import (
-    OwnCertificate,
-    TrustedCertificates,
-    application_uri,
-    configured_or_own,
-)
+from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
+from bridge.northbound.opcua.identity import ServerIdentity, server_identity
 from bridge.northbound.opcua.items import LEAST_SAMPLING_MS
 from bridge.northbound.opcua.library import ObjectIds, get, make, node_id, text, ua, variant
 from bridge.northbound.opcua.librarylog import quieten
@@ -117,7 +113,9 @@ class OpcUaServer:
 
     @property
     def endpoint_url(self) -> str:
-        host = socket.gethostname() if self._host in ("0.0.0.0", "::") else self._host
+        host = self._host
+        if host in ("0.0.0.0", "::"):
+            host = next(iter(self._settings.names), socket.gethostname())
         return f"opc.tcp://{f'[{host}]' if ':' in host else host}:{self.port}/drivebridge"
 
     async def start(self) -> None:
@@ -127,8 +125,7 @@ class OpcUaServer:
         where the port cannot be opened or the folder not be written.
         """
         self._users = Users(self._settings)
-        uri = application_uri()
-        own = await asyncio.to_thread(configured_or_own, self._settings, self._folder, uri)
+        own = await asyncio.to_thread(server_identity, self._settings, self._folder)
         trusted_dir = self._settings.trusted_dir
         trusted = TrustedCertificates(Path(trusted_dir)) if trusted_dir else None
         bound = self._socket = self._socket or listen(self._settings.listen, "opcua.listen")
@@ -177,7 +174,7 @@ class OpcUaServer:
     # steps of start
 
     async def _serve(
-        self, bound: socket.socket, own: OwnCertificate, trusted: TrustedCertificates | None, users: Users
+        self, bound: socket.socket, own: ServerIdentity, trusted: TrustedCertificates | None, users: Users
     ) -> None:
         quieten()
         decoding.install()
@@ -185,7 +182,7 @@ class OpcUaServer:
         inner.count = self._view.count
         inner.certificate, inner.private_key = own.certificate, own.private_key
         server = _Outer(inner, bound, trusted, self._pulse)
-        await self._describe(server, users)
+        await self._describe(server, own.application_uri, users)
         namespace = await server.register_namespace(NAMESPACE)
         image = self._view.image
         tree = Tree(inner.aspace, namespace, image, self._view.epoch_ns, layout(image.points))
@@ -204,14 +201,14 @@ class OpcUaServer:
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
 
-    async def _describe(self, server: _Outer, users: Users) -> None:
+    async def _describe(self, server: _Outer, application_uri: str, users: Users) -> None:
         server.set_endpoint(self.endpoint_url)
         server.name = f"drivebridge {self._site_name}"
         server.application_type = ua.ApplicationType.Server
         server.product_uri = _PRODUCT
         server.manufacturer_name = "drivebridge"
         await server.init()
-        await server.set_application_uri(application_uri())
+        await server.set_application_uri(application_uri)
         version = bridge.__version__
         now = datetime.now(UTC)
         await server.set_build_info(_PRODUCT, "drivebridge", "drivebridge", version, version, now)

@@ -17,8 +17,8 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 
 from bridge.command import Role
 from bridge.config import OpcUaTable, UserTable
-from bridge.errors import FileFaults, Unavailable
-from bridge.northbound.opcua.certificates import OwnCertificate, TrustedCertificates, load_own, own_or_new
+from bridge.errors import FileFaults
+from bridge.northbound.opcua.certificates import OwnCertificate, TrustedCertificates, load_own, new_own
 from bridge.northbound.opcua.security import Users, read_password, security_policies
 from bridge.northbound.opcua.transport import Processor
 from bridge.northbound.passwords import hash_password, verify_password
@@ -29,7 +29,8 @@ Policy = ua.SecurityPolicyType
 
 @pytest.fixture(scope="module")
 def own(tmp_path_factory: pytest.TempPathFactory) -> OwnCertificate:
-    return own_or_new(tmp_path_factory.mktemp("state") / "opcua", URI)
+    folder = tmp_path_factory.mktemp("own")
+    return new_own(folder / "c", folder / "k", URI, ["localhost"])
 
 
 class TestPasswords:
@@ -128,18 +129,6 @@ class TestReadPassword:
 
 
 class TestOwnCertificate:
-    def test_the_key_is_for_the_service_alone(self, tmp_path: Path) -> None:
-        own_or_new(tmp_path / "opcua", URI)
-        assert (tmp_path / "opcua" / "own_key.pem").stat().st_mode & 0o777 == 0o600
-        assert (tmp_path / "opcua").stat().st_mode & 0o777 == 0o700
-
-    def test_it_stays_until_it_does_not_fit_any_more(self, tmp_path: Path) -> None:
-        first = own_or_new(tmp_path, URI)
-        assert own_or_new(tmp_path, URI).certificate == first.certificate
-        renamed = own_or_new(tmp_path, "urn:other:drivebridge")
-        assert renamed.certificate != first.certificate
-        assert renamed.private_key.public_key() == first.private_key.public_key()
-
     @pytest.mark.parametrize("encoding", [Encoding.DER, Encoding.PEM])
     def test_one_that_the_site_names_is_taken(
         self, own: OwnCertificate, tmp_path: Path, encoding: Encoding
@@ -163,17 +152,6 @@ class TestOwnCertificate:
         key.write_bytes(key_content(generate_private_key(65537, 2048), Encoding.PEM))
         with pytest.raises(FileFaults, match="is not the key of"):
             load_own(certificate, key)
-
-    def test_a_state_folder_that_is_a_file_is_named(self, tmp_path: Path) -> None:
-        (tmp_path / "state").write_text("")
-        with pytest.raises(Unavailable, match="state"):
-            own_or_new(tmp_path / "state" / "opcua", URI)
-
-    def test_a_torn_key_is_named(self, tmp_path: Path) -> None:
-        own_or_new(tmp_path, URI)
-        (tmp_path / "own_key.pem").write_text("-----BEGIN PRIVATE KEY-----\n")
-        with pytest.raises(FileFaults, match=r"own_key\.pem"):
-            own_or_new(tmp_path, URI)
 
 
 def key_content(key: RSAPrivateKey, encoding: Encoding) -> bytes:

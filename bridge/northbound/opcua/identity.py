@@ -1,0 +1,124 @@
+"""Identity of the server: its application URI and its certificate. They are the installation's, and stay when
+the machine gets another name: every client would have to trust it anew."""
+
+from __future__ import annotations
+
+import logging
+import socket
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+from urllib.parse import quote
+
+from cryptography import x509
+from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
+
+from bridge.config import OpcUaTable
+from bridge.errors import Fault, FileFaults, Unavailable
+from bridge.northbound.opcua.certificates import (
+    OwnCertificate,
+    load_own,
+    new_own,
+    reason,
+    uris_of,
+    write_private,
+)
+from bridge.northbound.opcua.ownnames import addresses_of, missing_in, names_of
+
+_log = logging.getLogger(__name__)
+
+CERTIFICATE: Final = "own_certificate.der"
+KEY: Final = "own_key.pem"
+URI: Final = "application_uri"
+"""Files in the folder of the server."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServerIdentity:
+    application_uri: str
+    certificate: x509.Certificate
+    private_key: RSAPrivateKey
+
+
+def server_identity(settings: OpcUaTable, folder: Path) -> ServerIdentity:
+    """The identity that the site file names, or else the one that is kept in ``folder``, made where there is
+    none yet. A certificate that is there is never overwritten.
+
+    Raises ``FileFaults`` for a certificate or key that cannot be used and for a URI that is not that of the
+    certificate, ``Unavailable`` where the folder cannot be read or written.
+    """
+    certificate, key = settings.certificate, settings.private_key
+    if bool(certificate) is not bool(key):
+        missing = "private_key" if certificate else "certificate"
+        fault = Fault("site file", 0, f"opcua.{missing}", "is missing", "certificate and key go together")
+        raise FileFaults([fault])
+    try:
+        if certificate and key:
+            own, file = load_own(Path(certificate), Path(key)), certificate
+        else:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            own, file = _kept_or_new(settings, folder), str(folder / CERTIFICATE)
+    except OSError as error:
+        hint = "the folder is state_dir of the site file and must be writable for the service"
+        raise Unavailable(f"{error.filename or folder}: {reason(error)} ({hint})") from error
+    _look_at(own.certificate, file, settings)
+    return ServerIdentity(_uri_of(own.certificate, file, settings, folder), own.certificate, own.private_key)
+
+
+def _kept_or_new(settings: OpcUaTable, folder: Path) -> OwnCertificate:
+    """Raises OSError and FileFaults."""
+    certificate, key = folder / CERTIFICATE, folder / KEY
+    if certificate.exists():
+        try:
+            return load_own(certificate, key)
+        except FileFaults as error:
+            hint = f"take {CERTIFICATE} and {KEY} away: new ones are made, which clients have to trust anew"
+            raise FileFaults([replace(fault, hint=hint) for fault in error.faults]) from None
+    uri = settings.application_uri or _kept_uri(folder) or _first_uri()
+    own = new_own(certificate, key, uri, names_of(settings.listen, settings.names))
+    if not settings.application_uri:
+        write_private(folder / URI, f"{uri}\n".encode())
+    return own
+
+
+def _first_uri() -> str:
+    return f"urn:{quote(socket.gethostname())}:drivebridge"
+
+
+def _kept_uri(folder: Path) -> str:
+    """The one of before, where a certificate has been taken away to be renewed."""
+    try:
+        return (folder / URI).read_text(encoding="utf-8", errors="replace").strip()
+    except FileNotFoundError:
+        return ""
+
+
+def _uri_of(certificate: x509.Certificate, file: str, settings: OpcUaTable, folder: Path) -> str:
+    """A client compares the application URI with the one in the certificate (Part 4 §6.1.3)."""
+    held, wanted = uris_of(certificate), settings.application_uri
+    if wanted and held and wanted not in held:
+        hint = f"leave it out, or take {file} away: another one is made, which clients have to trust anew"
+        message = f"{wanted!r} is not that of {file}, {held[0]!r}"
+        raise FileFaults([Fault("site file", 0, "opcua.application_uri", message, hint)])
+    return wanted or (held[0] if held else _kept_uri(folder) or _first_uri())
+
+
+def _look_at(certificate: x509.Certificate, file: str, settings: OpcUaTable) -> None:
+    """Say what clients may find wrong with a certificate that is used as it is."""
+    renew = "take it away and the bridge makes a new one with the same key, which clients have to trust anew"
+    if settings.certificate:
+        renew = "renew it"
+    elif certificate.not_valid_after_utc <= datetime.now(UTC):
+        _log.warning(
+            "%s was valid until %s, and clients may refuse it: %s",
+            file,
+            f"{certificate.not_valid_after_utc:%Y-%m-%d}",
+            renew,
+        )
+    # Of a certificate that the site file names its owner knows by which addresses it is reached.
+    addresses = [] if settings.certificate else addresses_of(settings.listen)
+    missing = missing_in(certificate, [*settings.names, *addresses])
+    if missing:
+        what = "does not name %s, and clients that compare names refuse it: %s"
+        _log.warning(f"%s {what}", file, ", ".join(missing), renew)

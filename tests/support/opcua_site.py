@@ -113,7 +113,8 @@ async def serving(
 
 @asynccontextmanager
 async def connected(server: OpcUaServer, **how: object) -> AsyncIterator[Client]:
-    client = Client(server.endpoint_url, timeout=10, **how)
+    # By default it gives itself up where the server, in the same process, says nothing for a second.
+    client = Client(server.endpoint_url, timeout=10, watchdog_intervall=10, **how)
     await client.connect()
     try:
         yield client

@@ -29,6 +29,7 @@ from bridge.northbound.modbus.units import drive_maps, units_of
 from bridge.northbound.opcua.events import type_name
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, layout
 from bridge.northbound.opcua.services import SERVICES
+from bridge.northbound.opcua.states import REFUSALS, Need, State
 from bridge.northbound.opcua.values import OUTCOME_STATUS, QUALITY_STATUS
 from bridge.northbound.zenoh.commands import MALFORMED, METHODS, NODE_METHODS
 from bridge.project import load_project
@@ -223,6 +224,23 @@ def test_the_services_are_those_of_the_table_in_the_code() -> None:
         for name, services in SERVICES.items()
         for service in services
     ]
+
+
+def test_the_codes_of_sessions_are_those_of_the_table_in_the_code() -> None:
+    needs = {
+        "CreateSession": Need.CREATE,
+        "ActivateSession": Need.ACTIVATE,
+        "CloseSession": Need.CLOSE,
+        "every other service": Need.USE,
+    }
+    rows = page("reference/opcua.md").table("Which code when")
+    assert [row["session"] for row in rows] == [state.value for state in State]
+    for row, state in zip(rows, State, strict=True):
+        for name, need in needs.items():
+            code = REFUSALS[need].get(state)
+            is_elsewhere = need is Need.ACTIVATE and state in (State.NONE, State.ENDED, State.MOVED)
+            expected = status_name(code) if code else "BadSessionIdInvalid" if is_elsewhere else "done"
+            assert row[name].partition(",")[0] == expected, (state, name)
 
 
 # reference: zenoh

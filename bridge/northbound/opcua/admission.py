@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.northbound.admission import Deadline, Limits, Stage
+from bridge.northbound.opcua.shares import MOST_SESSIONS, MOST_SESSIONS_OF_ADDRESS
 
-MOST_CONNECTIONS: Final = 100
-MOST_OF_ADDRESS: Final = 50
+_SPARE: Final = 1
+"""Connections beside those with a session, for a client to come back to its session on (Part 4 §5.5.2)."""
+MOST_CONNECTIONS: Final = MOST_SESSIONS + _SPARE
+MOST_OF_ADDRESS: Final = MOST_SESSIONS_OF_ADDRESS + _SPARE
 MOST_WAITING: Final = 25
 """Connections of one address that have no session yet."""
 MOST_HELD: Final = 64 * 1024 * 1024

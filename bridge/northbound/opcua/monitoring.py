@@ -22,7 +22,6 @@ from bridge.northbound.opcua.library import (
     StatusCodes,
     change,
     get,
-    make,
     status,
     ua,
 )
@@ -47,14 +46,20 @@ class MonitoredItems:
         self._listening = Listening()
         self.event_types = EventTypes(space)
 
+    @property
+    def is_full(self) -> bool:
+        """Items for events: there may be no more of them, whoever asks."""
+        return self._listening.is_full
+
     async def create(
         self,
         find: Callable[[], Subscription],
         params: ua.CreateMonitoredItemsParameters,
         room: Callable[[], int],
+        make_room: Callable[[], bool],
     ) -> list[ua.MonitoredItemCreateResult]:
-        """``room`` tells how much there is now, ``find`` the subscription; ServiceError where that has been
-        deleted meanwhile."""
+        """``room`` tells how much there is now, ``make_room`` whether there is more, ``find`` the
+        subscription; ServiceError where that has been deleted meanwhile."""
         times = checked_times(params)
         found, left = find(), room()
         results: list[ua.MonitoredItemCreateResult] = []
@@ -62,12 +67,12 @@ class MonitoredItems:
             if place and place % _BATCH == 0:
                 await asyncio.sleep(0)
                 found, left = find(), room()
-            if left <= 0:
-                code = status(StatusCodes.BadTooManyMonitoredItems)
-                results.append(make(ua.MonitoredItemCreateResult, StatusCode=code))
-            else:
-                left -= 1
-                results.append(self._create(found, wanted, times))
+            result = self._create(found, wanted, times, left)
+            while _is_too_many(result) and make_room():
+                left = room()
+                result = self._create(found, wanted, times, left)
+            left -= 1
+            results.append(result)
         return results
 
     def _create(
@@ -75,9 +80,12 @@ class MonitoredItems:
         subscription: Subscription,
         wanted: ua.MonitoredItemCreateRequest,
         times: ua.TimestampsToReturn,
+        room: int,
     ) -> ua.MonitoredItemCreateResult:
         target: ua.ReadValueId = get(wanted, "ItemToMonitor")
         try:
+            if room <= 0:
+                raise ServiceError(StatusCodes.BadTooManyMonitoredItems)
             node = self._space.get(get(target, "NodeId"))
             if node is None:
                 raise ServiceError(StatusCodes.BadNodeIdUnknown)
@@ -215,6 +223,10 @@ class MonitoredItems:
 
 def loop_time() -> float:
     return asyncio.get_running_loop().time()
+
+
+def _is_too_many(result: ua.MonitoredItemCreateResult) -> bool:
+    return get(result, "StatusCode").value == StatusCodes.BadTooManyMonitoredItems
 
 
 def _item(subscription: Subscription, number: int) -> Item:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, NoReturn
 
+from asyncua.common.connection import SecureConnection
 from cryptography.hazmat.primitives.asymmetric.padding import MGF1, OAEP
 from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
 from cryptography.hazmat.primitives.hashes import SHA1, SHA256
@@ -14,7 +15,15 @@ from bridge.command.request import Identity, Role, Source
 from bridge.config import OpcUaTable
 from bridge.northbound.logins import PasswordChecks
 from bridge.northbound.opcua.certificates import TrustedCertificates, fingerprint
-from bridge.northbound.opcua.library import ServiceError, StatusCodes, first_certificate, get, ua
+from bridge.northbound.opcua.library import (
+    ObjectIds,
+    ServiceError,
+    StatusCodes,
+    first_certificate,
+    get,
+    node_id,
+    ua,
+)
 from bridge.northbound.opcua.notices import tell
 from bridge.northbound.passwords import ANONYMOUS, check_users
 from bridge.northbound.sources import source_of
@@ -77,6 +86,40 @@ class CheckedPolicy:
             tell("refused certificates", self._source, f"{whose}: {why}")
             # Part 4 §6.1.3: the client is not told more than this.
             raise ServiceError(StatusCodes.BadSecurityChecksFailed)
+
+
+_NO_SECURITY: Final = "http://opcfoundation.org/UA/SecurityPolicy#None"
+
+
+class Channel(SecureConnection):
+    """asyncua's, which takes a policy or a mode that is not offered for a malformed message.
+
+    ``source`` is whom the log counts it for.
+    """
+
+    source: str = ""
+
+    def select_policy(
+        self, uri: str, peer_certificate: bytes | None, mode: ua.MessageSecurityMode | None = None
+    ) -> None:
+        """Raises ServiceError. Without security there is always a channel, if only to ask for endpoints."""
+        is_open = uri == _NO_SECURITY
+        if not is_open and not self._offers(uri):
+            self._refuse(
+                f"security policy {str(uri)[:_LONGEST_NAME]!r}", StatusCodes.BadSecurityPolicyRejected
+            )
+        is_none = is_open and mode is ua.MessageSecurityMode.None_
+        if mode is not None and not is_none and not self._offers(uri, mode):
+            words = f"mode {mode.name} with {uri.rpartition('#')[2]}"
+            self._refuse(words, StatusCodes.BadSecurityModeRejected)
+        super().select_policy(uri, peer_certificate, mode)
+
+    def _offers(self, uri: str, mode: ua.MessageSecurityMode | None = None) -> bool:
+        return any(policy.matches(uri, mode) for policy in self._policies)
+
+    def _refuse(self, what: str, code: int) -> NoReturn:
+        tell("refused channels", self.source, f"{what} is not offered")
+        raise ServiceError(code)
 
 
 _OAEP: Final = {
@@ -146,6 +189,19 @@ class Users:
         if self._anonymous is not None:
             tokens.append(ua.AnonymousIdentityToken)
         return tokens or [ua.UserNameIdentityToken]
+
+    async def identify(
+        self, token: object, nonce: bytes, key: RSAPrivateKey, address: str, *, encrypted: bool
+    ) -> Identity:
+        """Whose identity token this is; ``nonce``, ``key`` and ``encrypted`` as for ``read_password``. Raises
+        ServiceError."""
+        if isinstance(token, ua.UserNameIdentityToken):
+            password = read_password(token, nonce, key, encrypted=encrypted)
+            return await self.login(get(token, "UserName") or "", password, address)
+        is_null = isinstance(token, ua.ExtensionObject) and token.TypeId == node_id(ObjectIds.Null)
+        if is_null or isinstance(token, ua.AnonymousIdentityToken):
+            return self.anonymous(address)
+        raise ServiceError(StatusCodes.BadIdentityTokenRejected)
 
     def anonymous(self, address: str) -> Identity:
         """Raises ServiceError where the site file wants everyone to have a name."""

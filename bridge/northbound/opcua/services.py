@@ -44,9 +44,14 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
     ),
     "Session": (
         Service("CreateSession", "one for each connection"),
-        Service("ActivateSession", "also on a new connection: the session and its subscriptions move there"),
         Service(
-            "CloseSession", "without `deleteSubscriptions` they live on for their lifetime, for a transfer"
+            "ActivateSession",
+            "also on a new connection, by the same user: the session and its subscriptions move there",
+        ),
+        Service(
+            "CloseSession",
+            "without `deleteSubscriptions`, and after a time-out, they live on for their lifetime, for a "
+            "transfer",
         ),
         _no("Cancel", "a request under way has its outcome"),
     ),

@@ -1,7 +1,7 @@
 """A client's session: its identity, what it may see, and what it holds.
 
 Corrected here, each with a test in ``tests/wire/opcua/test_security.py``: sequential session tokens, and
-reads of what is not readable.
+reads of what is not readable, subscriptions that end with a session's time-out.
 """
 
 from __future__ import annotations
@@ -199,6 +199,16 @@ class Session(InternalSession):
         self.subscriptions.drop_left_behind()
         await make_room(self, self._server.sessions, self.subscriptions.subscriptions)
         return self.subscriptions.create(self, params)
+
+    async def _timeout_loop(self) -> None:
+        """In place of asyncua's, which deletes the subscriptions with the session: they are there for a
+        transfer as long as they live (Part 4 §5.6.4)."""
+        while self.state is not SessionState.Closed:
+            left_s = (self.session_timeout or 0.0) + self._last_activity - loop_time()
+            if left_s <= 0:
+                await self.close_session(delete_subs=False)
+                return
+            await asyncio.sleep(left_s)
 
     async def close_session(self, delete_subs: bool = True) -> None:
         # asyncua closes it again when its connection ends, and would have the subscriptions deleted then.

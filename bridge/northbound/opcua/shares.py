@@ -1,4 +1,4 @@
-"""What one client may have of the subscriptions and monitored items that all share."""
+"""What one client may have of the sessions, subscriptions and monitored items that all share."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from bridge.northbound.opcua.library import ServiceError, StatusCodes
 from bridge.northbound.opcua.subscription import Owner, Subscription
 from bridge.northbound.sources import source_of
 
+MOST_SESSIONS: Final = 100
+"""Also of clients that have lost their connection, for the session's time-out."""
+MOST_SESSIONS_OF_ADDRESS: Final = 50
 MOST_SUBSCRIPTIONS: Final = 200
 MOST_OF_SESSION: Final = 50
 MOST_OF_ADDRESS: Final = 100
@@ -21,6 +24,20 @@ MOST_ON_ONE: Final = 1_000
 MOST_LISTENERS: Final = 1_000
 """What the items for events of all clients weigh: each is asked about every event."""
 MOST_LISTENERS_OF_ADDRESS: Final = 500
+
+
+async def make_room_for_session(address: str, sessions: Sequence[Owner]) -> None:
+    """See that there can be one more session of this address: one without a connection, which a client that
+    was started anew has left behind, ends first. Raises ServiceError."""
+    same = [one for one in sessions if source_of(one.address) == source_of(address)]
+    if len(same) >= MOST_SESSIONS_OF_ADDRESS:
+        sessions = same
+    elif len(sessions) < MOST_SESSIONS:
+        return
+    left = [one for one in sessions if one.holder is None]
+    if not left:
+        raise ServiceError(StatusCodes.BadTooManySessions)
+    await min(left, key=lambda one: one.left_at).close_session(delete_subs=False)
 
 
 async def make_room(
@@ -59,9 +76,13 @@ class Listening:
     def __init__(self) -> None:
         self._weights: Counter[str] = Counter()
 
+    @property
+    def is_full(self) -> bool:
+        return self._weights.total() >= MOST_LISTENERS
+
     def change(self, source: str, by: int) -> None:
         """Raises ServiceError for more where there is no room. What comes last may go beyond it."""
-        full = self._weights.total() >= MOST_LISTENERS or self._weights[source] >= MOST_LISTENERS_OF_ADDRESS
+        full = self.is_full or self._weights[source] >= MOST_LISTENERS_OF_ADDRESS
         if by > 0 and full:
             raise ServiceError(StatusCodes.BadTooManyMonitoredItems)
         self._weights[source] += by

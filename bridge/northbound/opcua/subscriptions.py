@@ -7,7 +7,7 @@ What each service does is in ``services``; the tests are ``tests/wire/opcua/test
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import count
 from typing import TypeVar
 
@@ -17,9 +17,10 @@ from bridge.beat import cycle_by
 from bridge.northbound.opcua.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.northbound.opcua.monitoring import MonitoredItems, code_of, loop_time
 from bridge.northbound.opcua.publishing import PublishRequest
-from bridge.northbound.opcua.shares import MOST_SUBSCRIPTIONS, room_for_items
+from bridge.northbound.opcua.shares import MOST_ITEMS, MOST_SUBSCRIPTIONS, room_for_items
 from bridge.northbound.opcua.subscription import Owner, Subscription, terms
 from bridge.northbound.passwords import ANONYMOUS
+from bridge.northbound.sources import source_of
 
 _T = TypeVar("_T")
 
@@ -87,9 +88,12 @@ class Subscriptions:
 
     def drop_left_behind(self) -> None:
         """Where there are as many as there may be, the oldest one that nobody has come for goes."""
-        left = (found for found in self.subscriptions.values() if found.owner.is_gone)
-        if len(self.subscriptions) >= MOST_SUBSCRIPTIONS and (oldest := next(left, None)):
+        if len(self.subscriptions) >= MOST_SUBSCRIPTIONS and (oldest := next(self._left_behind(), None)):
             self._close(oldest)
+
+    def _left_behind(self) -> Iterator[Subscription]:
+        """Those whose session has ended, the oldest first."""
+        return (found for found in self.subscriptions.values() if found.owner.is_gone)
 
     def end(self, owner: Owner, *, delete: bool) -> None:
         """The session ends. What it leaves behind is for the same client; without one it goes, too."""
@@ -146,8 +150,25 @@ class Subscriptions:
         def room() -> int:
             return room_for_items(owner.address, self.subscriptions.values())
 
+        def make_room() -> bool:
+            """What has been left behind ends before anything is refused: that of this address, or where all
+            together have too much, of any."""
+            left = list(self._left_behind())
+            ending = [found for found in left if source_of(found.owner.address) == source]
+            if not ending and self._is_full:
+                ending = left
+            for oldest in ending[:1]:
+                self._close(oldest)
+            return bool(ending)
+
+        source = source_of(owner.address)
         number: int = get(params, "SubscriptionId")
-        return await self.items.create(lambda: self.own(owner, number), params, room)
+        return await self.items.create(lambda: self.own(owner, number), params, room, make_room)
+
+    @property
+    def _is_full(self) -> bool:
+        """All together have as many items as there may be."""
+        return self.items.is_full or sum(len(one.items) for one in self.subscriptions.values()) >= MOST_ITEMS
 
     # cycles and ends
 

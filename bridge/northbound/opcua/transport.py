@@ -1,7 +1,7 @@
 """A connection's messages: what may pass a channel, who may open a session on it, answers out of turn.
 
-Corrected here (``tests/wire/opcua/test_security.py``): sessions on a channel without security that
-no endpoint offers, a session taken over from another channel, a Call of three
+Corrected here (``tests/wire/opcua/test_security.py``, ``test_sessions.py``): sessions on a channel without
+security that no endpoint offers, a session taken over from another channel, a Call of three
 seconds that held up its own session's keep-alives, connections left hanging after an error, buffers of
 any size, a session that ended with a connection it had left.
 """
@@ -33,7 +33,6 @@ from bridge.northbound.opcua.admission import Stage
 from bridge.northbound.opcua.encoding import encode
 from bridge.northbound.opcua.library import (
     InvalidSignature,
-    ObjectIds,
     ServiceError,
     StatusCodes,
     UaError,
@@ -41,22 +40,19 @@ from bridge.northbound.opcua.library import (
     first_certificate,
     get,
     make,
-    node_id,
     status,
     ua,
 )
 from bridge.northbound.opcua.notices import tell
 from bridge.northbound.opcua.routes import ROUTES, Request, Route
-from bridge.northbound.opcua.security import read_password
+from bridge.northbound.opcua.security import Channel
 from bridge.northbound.opcua.services import REFUSED, request_type
 from bridge.northbound.opcua.session import Server, Session
+from bridge.northbound.opcua.shares import make_room_for_session
+from bridge.northbound.opcua.states import REFUSALS, Need, State, need_of
 from bridge.northbound.opcua.writes import received_at
 from bridge.northbound.sources import source_of
 
-_CREATE: Final = request_type("CreateSession")
-_ACTIVATE: Final = request_type("ActivateSession")
-_CLOSE: Final = request_type("CloseSession")
-_DISCOVERY: Final = tuple(map(request_type, ("GetEndpoints", "FindServers", "CloseSecureChannel")))
 _SLOW: Final = (request_type("Write"), request_type("Call"))
 """Services that wait for the bus process."""
 
@@ -91,8 +87,10 @@ class Processor(UaProcessor):
     def __init__(self, server: Server, transport: asyncio.Transport, limits: TransportLimits) -> None:
         super().__init__(server, transport, limits)
         self._server = server
+        self._connection = Channel(self._connection.security_policy, self._limits)
         self._waiting: set[asyncio.Task[Any]] = set()
         self._source = source_of(str(self.name[0]) if isinstance(self.name, tuple) else str(self.name))
+        self._connection.source = self._source
         self._was_greeted = False
         self.arrivals: deque[float] = deque()
         """When the messages that are still to be processed can have come at the earliest, in their order."""
@@ -242,18 +240,20 @@ class Processor(UaProcessor):
         self._transport.write(self._connection.message_to_binary(body, msgtype, seqhdr.RequestId))
 
     async def _process_message(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> Any:
-        self._check(typeid, requesthdr)
+        need = need_of(typeid)
+        self._check(typeid, need, requesthdr)
         self._begin()
-        if typeid == _CREATE:
+        if need is Need.CREATE:
             params = struct_from_binary(ua.CreateSessionParameters, body.copy())
             certificate = self._channel_certificate()
             self._check_client_certificate(params, certificate)
+            await self._make_room()
             answer = await super()._process_message(typeid, requesthdr, seqhdr, body)
             if isinstance(self.session, Session):
                 self.session.channel_certificate = certificate
                 self._hold(self.session)
             return answer
-        if typeid == _ACTIVATE:
+        if need is Need.ACTIVATE:
             session = self._session_to_activate(requesthdr)
             params = struct_from_binary(ua.ActivateSessionParameters, body.copy())
             # Nothing awaits between here and activate_session, so this login is for this call.
@@ -269,9 +269,17 @@ class Processor(UaProcessor):
             answer = await super()._process_message(typeid, requesthdr, seqhdr, body)
         except InvalidSignature:
             raise ServiceError(StatusCodes.BadApplicationSignatureInvalid) from None
-        if typeid == _ACTIVATE and isinstance(self.session, Session):
+        if need is Need.ACTIVATE and isinstance(self.session, Session):
             self._hold(self.session)
         return answer
+
+    async def _make_room(self) -> None:
+        try:
+            await make_room_for_session(self._source, self._server.sessions)
+        except ServiceError:
+            self._server.count("opcua_refused_connections")
+            tell("refused sessions", self._source, "all that it may have, or all there are, are in use")
+            raise
 
     def _hold(self, session: Session) -> None:
         session.holder, session.most_bytes = self, self._limits.max_message_size
@@ -282,10 +290,7 @@ class Processor(UaProcessor):
 
     async def _carry_out(self, route: Route, requesthdr: Any, seqhdr: Any, body: Buffer) -> bool:
         session = self.session
-        if not isinstance(session, Session):
-            raise ServiceError(StatusCodes.BadSessionIdInvalid)
-        if not session.is_activated():
-            raise ServiceError(StatusCodes.BadSessionNotActivated)
+        assert isinstance(session, Session), "checked"
         session.touch()
 
         def send(response: Any) -> None:
@@ -312,26 +317,34 @@ class Processor(UaProcessor):
 
     # what may pass
 
-    def _check(self, typeid: ua.NodeId, requesthdr: Any) -> None:
+    def _check(self, typeid: ua.NodeId, need: Need, requesthdr: Any) -> None:
         """Raises ServiceError for a request that has no business on this channel or in this session."""
         if typeid in REFUSED:
             raise ServiceError(REFUSED[typeid])
-        if typeid in _DISCOVERY:
+        if need is Need.USE and typeid not in ROUTES:
+            raise ServiceError(StatusCodes.BadServiceUnsupported)
+        if need is Need.DISCOVER:
             return
         if not self._is_secured() and not self._server.no_security:
+            tell("refused channels", self._source, "a session on one without security, which is not offered")
             raise ServiceError(StatusCodes.BadSecurityPolicyRejected)
+        state = self._state(requesthdr)
+        if state in (State.ENDED, State.MOVED):
+            self.session = None
+        if state in REFUSALS[need]:
+            raise ServiceError(REFUSALS[need][state])
+
+    def _state(self, requesthdr: Any) -> State:
         session = self.session
-        if isinstance(session, Session) and session.holder is not self:
-            # Activated on another connection; this one has lost it (Part 4 §5.7.3).
-            session = self.session = None
-        if session is None or session.state is SessionState.Closed:
-            if typeid == _CLOSE:
-                raise ServiceError(StatusCodes.BadSessionIdInvalid)
-            return
-        if typeid == _CREATE:
-            raise ServiceError(StatusCodes.BadTooManySessions)
+        if not isinstance(session, Session):
+            return State.NONE
+        if session.holder is not self:
+            return State.MOVED  # and this one has lost it (Part 4 §5.6.3)
+        if session.state is SessionState.Closed:
+            return State.ENDED
         if requesthdr.AuthenticationToken != session.auth_token:
-            raise ServiceError(StatusCodes.BadSessionIdInvalid)
+            return State.OTHER
+        return State.ACTIVATED if session.is_activated() else State.CREATED
 
     def _is_secured(self) -> bool:
         return self._connection.security_policy.Mode is not ua.MessageSecurityMode.None_
@@ -351,6 +364,9 @@ class Processor(UaProcessor):
         session = self.session or self._server.lookup_external_session(requesthdr.AuthenticationToken)
         if not isinstance(session, Session) or session.state is SessionState.Closed:
             raise ServiceError(StatusCodes.BadSessionIdInvalid)
+        if session.holder is not self and not session.is_activated():
+            # Part 4 §5.6.3: for the first time on the channel that it was created on.
+            raise ServiceError(StatusCodes.BadSecureChannelIdInvalid)
         if session.channel_certificate != self._channel_certificate():
             self._server.count("opcua_refused_connections")
             tell("refused sessions", self._source, "made with another certificate")
@@ -358,15 +374,17 @@ class Processor(UaProcessor):
         return session
 
     async def _login(self, session: Session, token: Any) -> Identity:
-        users = self._server.services.users
-        if isinstance(token, ua.UserNameIdentityToken):
-            key = self._server.private_key
-            password = read_password(token, session.nonce or b"", key, encrypted=self._is_secured())
-            return await users.login(get(token, "UserName") or "", password, session.address)
-        is_null = isinstance(token, ua.ExtensionObject) and token.TypeId == node_id(ObjectIds.Null)
-        if is_null or isinstance(token, ua.AnonymousIdentityToken):
-            return users.anonymous(session.address)
-        raise ServiceError(StatusCodes.BadIdentityTokenRejected)
+        """Raises ServiceError, also for another user than that of a session which comes from another channel
+        (Part 4 §5.6.3): whoever has its token and its certificate is not yet its user."""
+        users, key = self._server.services.users, self._server.private_key
+        how = token, session.nonce or b"", key, session.address
+        who = await users.identify(*how, encrypted=self._is_secured())
+        if session.holder is not self and session.is_activated() and not who.is_same(session.identity):
+            tell(
+                "refused sessions", self._source, f"that of {session.identity.user}, activated by {who.user}"
+            )
+            raise ServiceError(StatusCodes.BadIdentityChangeNotSupported)
+        return who
 
 
 def _request_handle(header: Buffer) -> int:

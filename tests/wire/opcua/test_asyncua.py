@@ -25,6 +25,7 @@ from tests.support.opcua_raw import ask
 from tests.support.opcua_site import OPEN, break_off, connected, serving
 
 OVERRIDDEN = {
+    "Channel": {"select_policy"},
     "Listener": {"_make_protocol", "start", "stop"},
     "Processor": {
         "_process_message",
@@ -36,7 +37,7 @@ OVERRIDDEN = {
         "send_response",
     },
     "Server": {"create_session", "get_endpoints", "stop"},
-    "Session": {"activate_session", "close_session", "create_session"},
+    "Session": {"_timeout_loop", "activate_session", "close_session", "create_session"},
     "_Outer": {"start"},
     "_Protocol": {"_process_one_msg", "connection_lost", "connection_made", "data_received"},
 }

@@ -3,62 +3,33 @@
 from __future__ import annotations
 
 import asyncio
-import shutil
+import socket
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 import pytest_asyncio
 from asyncua import Client, ua
-from asyncua.crypto import security_policies
-from asyncua.crypto.cert_gen import (
-    dump_private_key_as_pem,
-    generate_private_key,
-    generate_self_signed_app_certificate,
-)
-from asyncua.crypto.uacrypto import CertProperties
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
-from cryptography import x509
-from cryptography.hazmat.primitives.serialization import Encoding
-from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from bridge.config import OpcUaTable, UserTable
-from bridge.northbound.opcua.server import OpcUaServer
-from bridge.northbound.passwords import hash_password
-from tests.support.opcua_site import LocalView, break_off, connected, namespace, serving
+from tests.support.opcua_peers import (
+    PASSWORD,
+    POLICIES,
+    Peer,
+    Served,
+    channel_of,
+    logged_in,
+    make_peer,
+    make_users,
+    signed_in,
+)
+from tests.support.opcua_site import break_off, connected, namespace, serving
 from tests.support.quiet import quiet_log
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 Codes, Refused = ua.StatusCodes, ua.uaerrors.BadUserAccessDenied
-PASSWORD = "swordfish"
-POLICIES = [
-    security_policies.SecurityPolicyBasic256Sha256,
-    security_policies.SecurityPolicyAes256Sha256RsaPss,
-]
-
-
-@dataclass(frozen=True)
-class Peer:
-    """A client application with its own certificate."""
-
-    certificate: bytes
-    key: bytes
-
-    async def secure(
-        self, client: Client, policy: type = security_policies.SecurityPolicyBasic256Sha256
-    ) -> None:
-        await client.set_security(
-            policy, CertProperties(self.certificate, "der"), CertProperties(self.key, "pem")
-        )
-
-
-def make_peer(name: str) -> Peer:
-    key = generate_private_key()
-    names: list[x509.GeneralName] = [x509.UniformResourceIdentifier(f"urn:{name}"), x509.DNSName(name)]
-    made = generate_self_signed_app_certificate(key, name, {}, names, [ExtendedKeyUsageOID.CLIENT_AUTH])
-    return Peer(made.public_bytes(Encoding.DER), dump_private_key_as_pem(key))
 
 
 @pytest.fixture(scope="module")
@@ -73,14 +44,7 @@ def stranger() -> Peer:
 
 @pytest.fixture(scope="module")
 def users() -> list[UserTable]:
-    line = hash_password(PASSWORD)
-    return [
-        UserTable(name="anna", role="operator", password_hash=line),
-        UserTable(name="otto", role="observer", password_hash=line),
-    ]
-
-
-Served = tuple[OpcUaServer, LocalView]
+    return make_users()
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
@@ -97,20 +61,6 @@ async def open_(users: list[UserTable], tmp_path_factory: pytest.TempPathFactory
     settings = OpcUaTable(listen="127.0.0.1:0", no_security=True, anonymous="observer", user=users)
     async with serving(settings, tmp_path_factory.mktemp("open")) as found:
         yield found
-
-
-@asynccontextmanager
-async def logged_in(
-    served: Served, peer: Peer | None, user: str = "", password: str = "", policy: type = POLICIES[0]
-) -> AsyncIterator[Client]:
-    client = Client(served[0].endpoint_url, timeout=10)
-    if peer:
-        await peer.secure(client, policy)
-    if user:
-        client.set_user(user)
-        client.set_password(password)
-    async with client:
-        yield client
 
 
 async def control_word(client: Client) -> int:
@@ -244,18 +194,23 @@ class TestTrust:
         assert "refused certificates from 127.0.0.1: SHA-256 " in told[0]
         assert "made-up-0" in told[0]
 
-    async def test_the_own_certificate_stays_over_a_restart(
-        self, users: list[UserTable], scada: Peer, tmp_path: Path
+    async def test_the_server_s_identity_stays_over_a_restart_under_another_host_name(
+        self, users: list[UserTable], scada: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
+        """A container has another name each time: no client has to trust it anew."""
         settings = OpcUaTable(listen="127.0.0.1:0", user=users)
-        seen: list[bytes] = []
-        for _ in range(2):
-            async with serving(settings, tmp_path) as served:
-                client = Client(served[0].endpoint_url, timeout=10)
-                (endpoint, *_) = await client.connect_and_get_server_endpoints()
-                seen.append(endpoint.ServerCertificate)
+        seen: list[tuple[bytes, str, str]] = []
+        for name in ("hall-3", "9f31c2aa0b17"):
+            monkeypatch.setattr(socket, "gethostname", lambda name=name: name)
+            async with (
+                serving(settings, tmp_path) as served,
+                logged_in(served, scada, "anna", PASSWORD) as client,
+            ):
+                (endpoint, *_) = await client.get_endpoints()
+                uri = (await client.get_namespace_array())[1]
+                seen.append((endpoint.ServerCertificate, endpoint.Server.ApplicationUri, uri))
         assert seen[0] == seen[1]
-        shutil.rmtree(tmp_path)
+        assert seen[0][1:] == ("urn:hall-3:drivebridge",) * 2
 
 
 class TestRoles:
@@ -375,6 +330,21 @@ class TestSessions:
             finally:
                 break_off(thief)
             assert await control_word(owner) == Codes.Good
+
+    async def test_another_user_with_the_same_certificate_does_not_take_the_session(
+        self, strict: Served, scada: Peer
+    ) -> None:
+        """Part 4 §5.6.3: from another channel the user's token must be the same."""
+        async with logged_in(strict, scada, "anna", PASSWORD) as owner:
+            other = await channel_of(strict, scada, owner)
+            try:
+                with pytest.raises(ua.uaerrors.BadIdentityChangeNotSupported):
+                    await other.uaclient.activate_session(signed_in(other, "otto"))
+                assert await control_word(owner) == Codes.Good
+                await other.uaclient.activate_session(signed_in(other, "anna"))
+                assert await control_word(other) == Codes.Good
+            finally:
+                break_off(other)
 
     async def test_a_request_with_another_sessions_token_is_refused(self, open_: Served) -> None:
         async with connected(open_[0]) as first, connected(open_[0]) as second:

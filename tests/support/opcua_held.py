@@ -10,6 +10,7 @@ from asyncua.server.standard_address_space import standard_address_space
 from asyncua.ua.ua_binary import struct_to_binary
 
 from bridge.image import Image
+from bridge.northbound.opcua.address_space import is_empty
 from bridge.northbound.opcua.library import make, node_id, text
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableKind, VariableNode, layout
 from bridge.northbound.opcua.structures import (
@@ -64,30 +65,32 @@ class HeldTree:
         notifies = ua.DataValue(ua.Variant(1, ua.VariantType.Byte))
         space[server].attributes[ua.AttributeIds.EventNotifier] = AttributeValue(notifies)
         for tree in layout(image.points):
-            self._object(tree, ua.NodeId(Ids.ObjectsFolder), Ids.Organizes, server)
+            self._object(tree, ua.NodeId(Ids.ObjectsFolder), Ids.Organizes)
 
     def seen(self, where: ua.NodeId, space: AddressSpace | None = None) -> Seen:
-        """What clients see of a node here or in another ``space``, without times and values of points."""
+        """What clients see of a node here or in another ``space``, without times and values of points, and
+        without what asyncua leaves empty."""
         space = space or self.space
         node = space[where]
         kinds = [
-            kind for kind in node.attributes if kind != ua.AttributeIds.Value or where not in self.points
+            kind
+            for kind, held in node.attributes.items()
+            if (kind != ua.AttributeIds.Value or where not in self.points) and not is_empty(held)
         ]
         values = {int(kind): space.read_attribute_value(where, kind) for kind in kinds}
         references = [struct_to_binary(one) for one in node.references]
         return references, {kind: as_told(value) for kind, value in values.items()}
 
-    def _object(self, node: ObjectNode, parent: ua.NodeId, reference: int, notifier: ua.NodeId) -> None:
+    def _object(self, node: ObjectNode, parent: ua.NodeId, reference: int) -> None:
         attributes = make(ua.ObjectAttributes, EventNotifier=1 if node.notifier else 0)
         type_id = Ids.FolderType if node.folder else Ids.BaseObjectType
         where = self._add(node, ua.NodeClass.Object, attributes, type_id, parent, reference)
         if node.notifier:
-            self._refer(notifier, Ids.HasNotifier, where)
-            notifier = where
+            self._refer(ua.NodeId(Ids.Server), Ids.HasNotifier, where)
         for method in node.methods:
             self._method(method, where)
         for child in node.objects:
-            self._object(child, where, Ids.Organizes if node.folder else Ids.HasComponent, notifier)
+            self._object(child, where, Ids.Organizes if node.folder else Ids.HasComponent)
         for variable in node.variables:
             self._variable(variable, where)
 

@@ -20,6 +20,14 @@ Callbacks = dict[int, Callable[..., Any]]
 _WHOLE_POINT: Final = -1
 
 
+def is_empty(held: AttributeValue) -> bool:
+    """Good, and null: what nobody has given a value."""
+    value = held.value
+    if held.value_callback is not None or (value and value.StatusCode and value.StatusCode.is_bad()):
+        return False
+    return value is None or value.Value is None or value.Value.Value is None
+
+
 @dataclass(frozen=True, slots=True)
 class Watched:
     """A variable that is watched, or was once, and how to read it."""

@@ -21,7 +21,7 @@ from bridge.northbound.opcua.library import (
 from bridge.northbound.opcua.where import Where, field_name, where_clause
 
 _NO_FIELD: Final = variant(None, ua.VariantType.Null)
-_MOST_FIELDS: Final = 500
+MOST_FIELDS: Final = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ def event_filter(asked: object, types: EventTypes) -> EventFilter:
     if not isinstance(asked, ua.EventFilter):
         raise ServiceError(StatusCodes.BadMonitoredItemFilterUnsupported)
     selected: list[ua.SimpleAttributeOperand] = get(asked, "SelectClauses") or []
-    if not 0 < len(selected) <= _MOST_FIELDS:
+    if not 0 < len(selected) <= MOST_FIELDS:
         raise ServiceError(StatusCodes.BadEventFilterInvalid)
     codes = [types.fault(operand) for operand in selected]
     where, elements = where_clause(get(asked, "WhereClause"), types)

@@ -10,6 +10,7 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeManagementService
 
+from bridge.northbound.opcua.address_space import is_empty
 from bridge.northbound.opcua.hierarchy import related
 from bridge.northbound.opcua.library import (
     AttributeIds,
@@ -167,4 +168,6 @@ def _attributes(node_class: ua.NodeClass, wanted: ua.NodeAttributes) -> dict[Att
     refused = list(NodeManagementService(space).try_add_nodes([item], check=False))
     if refused:
         raise ValueError(f"OPC UA: no {node_class.name} can have {wanted}")
-    return space[_ANY].attributes
+    made = space[_ANY].attributes
+    # The values of points are where they are; of all else that is empty there is nothing.
+    return {kind: held for kind, held in made.items() if kind == AttributeIds.Value or not is_empty(held)}

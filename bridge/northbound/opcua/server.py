@@ -6,7 +6,6 @@ import asyncio
 import gc
 import logging
 import socket
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
@@ -20,19 +19,17 @@ from bridge.config import OpcUaTable
 from bridge.errors import OperationFailed
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua import decoding
-from bridge.northbound.opcua.browsing import MOST_CONTINUATION_POINTS
 from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
 from bridge.northbound.opcua.identity import ServerIdentity, server_identity
-from bridge.northbound.opcua.items import LEAST_SAMPLING_MS
-from bridge.northbound.opcua.library import ObjectIds, get, make, node_id, text, ua, variant
+from bridge.northbound.opcua.library import ObjectIds, get, make, node_id, text, ua
 from bridge.northbound.opcua.librarylog import quieten
 from bridge.northbound.opcua.listener import WINDOW, Listener
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.publisher import Publisher
-from bridge.northbound.opcua.routes import MOST_CALLS
 from bridge.northbound.opcua.security import CheckedPolicy, Users, security_policies
+from bridge.northbound.opcua.selfdescription import built_at, describe
 from bridge.northbound.opcua.session import Server, Services
 from bridge.northbound.opcua.tree import Tree
 from bridge.northbound.opcua.writes import Writer
@@ -43,19 +40,6 @@ NAMESPACE: Final = "urn:drivebridge:points"
 _PRODUCT: Final = "urn:drivebridge"
 _CHUNK: Final = 65535
 _MOST_CHUNKS: Final = 256
-
-_CAPABILITIES: Final = {
-    ObjectIds.Server_ServerCapabilities_OperationLimits_MaxNodesPerMethodCall: variant(
-        MOST_CALLS, ua.VariantType.UInt32
-    ),
-    ObjectIds.Server_ServerCapabilities_MaxBrowseContinuationPoints: variant(
-        MOST_CONTINUATION_POINTS, ua.VariantType.UInt16
-    ),
-    ObjectIds.Server_ServerCapabilities_MinSupportedSampleRate: variant(
-        LEAST_SAMPLING_MS, ua.VariantType.Double
-    ),
-}
-"""What the server says of itself, where asyncua does not know."""
 
 _log = logging.getLogger(__name__)
 
@@ -77,6 +61,7 @@ class _Outer(LibraryServer):
         await self._setup_server_nodes()
         policies = [CheckedPolicy(policy, self._trusted) for policy in self._policies]
         await self._inner.start()
+        describe(self._inner.aspace)
         self.bserver = Listener(self._inner, self._bound, self.limits, self._pulse)
         self.bserver.set_policies(policies)
         await self.bserver.start()
@@ -210,12 +195,10 @@ class OpcUaServer:
         await server.init()
         await server.set_application_uri(application_uri)
         version = bridge.__version__
-        now = datetime.now(UTC)
-        await server.set_build_info(_PRODUCT, "drivebridge", "drivebridge", version, version, now)
+        built = await asyncio.to_thread(built_at)
+        await server.set_build_info(_PRODUCT, "drivebridge", "drivebridge", version, version, built)
         server.set_security_policy(security_policies(self._settings))
         server.set_identity_tokens(users.tokens)
-        for capability, value in _CAPABILITIES.items():
-            await server.get_node(node_id(capability)).write_value(value)
 
     def _events(self, inner: Server, tree: Tree) -> EventSender:
         base = _event_type(inner, node_id(BASE_TYPE, tree.namespace), node_id(ObjectIds.BaseEventType))

@@ -47,7 +47,7 @@ class _TreeNode:
     @property
     def references(self) -> list[ua.ReferenceDescription]:
         if self._below is None:
-            self._below = list(self._downwards())
+            self._below = [below.refer(below.reference) for below in self._tree.below(self)]
         return [*self._upwards(), *self._below]
 
     @property
@@ -58,11 +58,6 @@ class _TreeNode:
     @property
     def is_notifier(self) -> bool:
         return isinstance(self.node, ObjectNode) and self.node.notifier
-
-    @property
-    def notified(self) -> _TreeNode | None:
-        """Who hears its events besides itself, None for the server."""
-        return self.above if self.above and self.above.is_notifier else None
 
     def refer(self, reference: ua.NodeId, *, forward: bool = True) -> ua.ReferenceDescription:
         """A reference of this type to it."""
@@ -75,14 +70,8 @@ class _TreeNode:
         yield self.above.refer(self.reference, forward=False) if self.above else self._tree.to_objects
         yield from self._kind.to_type
         if self.is_notifier:
-            notified = self.notified
-            yield notified.refer(_HAS_NOTIFIER, forward=False) if notified else self._tree.to_server
-
-    def _downwards(self) -> Iterator[ua.ReferenceDescription]:
-        for below in self._tree.below(self):
-            yield below.refer(below.reference)
-            if below.is_notifier and below.notified is self:
-                yield below.refer(_HAS_NOTIFIER)
+            # Of drives, too: below its node each stands once for who follows hierarchical references.
+            yield self._tree.to_server
 
     # what it has for itself of its attributes
 
@@ -157,7 +146,7 @@ class Tree:
         space[node_id(ObjectIds.ObjectsFolder)].references += [top.refer(_ORGANIZES) for top in tops]
         notifiers = [self._nodes[name] for name in self.notifiers]
         server = space[node_id(ObjectIds.Server)]
-        server.references += [one.refer(_HAS_NOTIFIER) for one in notifiers if one.notified is None]
+        server.references += [one.refer(_HAS_NOTIFIER) for one in notifiers]
         server.attributes[AttributeIds.EventNotifier] = constant(SUBSCRIBE_TO_EVENTS, ua.VariantType.Byte)
         # asyncua puts a mapping of its own there, too, for nodes that it loads when they are asked for.
         space._nodes = Nodes(get(space, "_nodes"), self._find)  # pyright: ignore[reportPrivateUsage]

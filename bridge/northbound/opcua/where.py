@@ -16,7 +16,7 @@ from bridge.northbound.opcua.library import AttributeIds, StatusCodes, get, make
 
 Operator = ua.FilterOperator
 _MOST_ELEMENTS: Final = 100
-_MOST_OPERANDS: Final = 500
+MOST_OPERANDS: Final = 500
 
 Fields = Mapping[str, ua.Variant]
 _Operand = Callable[[Fields, Sequence[Any]], Any]
@@ -76,7 +76,7 @@ _OPERATORS: Final[Mapping[ua.FilterOperator, tuple[int, int, Callable[..., bool 
     Operator.LessThanOrEqual: (2, 2, _AT_MOST),
     Operator.Not: (1, 1, _not),
     Operator.Between: (3, 3, _between),
-    Operator.InList: (2, _MOST_OPERANDS, _in_list),
+    Operator.InList: (2, MOST_OPERANDS, _in_list),
     Operator.And: (2, 2, _and),
     Operator.Or: (2, 2, _or),
 }
@@ -114,7 +114,7 @@ def where_clause(
     """The clause, None for one with a fault, and what is to be said of each of its elements."""
     asked_elements: list[ua.ContentFilterElement] = get(asked, "Elements") or []
     operand_count = sum(len(get(one, "FilterOperands") or []) for one in asked_elements)
-    if len(asked_elements) > _MOST_ELEMENTS or operand_count > _MOST_OPERANDS:
+    if len(asked_elements) > _MOST_ELEMENTS or operand_count > MOST_OPERANDS:
         return None, []
     elements: list[_Element] = []
     results: list[ua.ContentFilterElementResult] = []

@@ -22,8 +22,6 @@ KINDS = set(ua.AttributeIds) - {
     # Depend on who asks.
     ua.AttributeIds.UserAccessLevel,
     ua.AttributeIds.UserExecutable,
-    # None of our nodes has any; asyncua's client takes that for an empty list.
-    ua.AttributeIds.ArrayDimensions,
 }
 
 

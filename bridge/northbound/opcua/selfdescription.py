@@ -1,0 +1,110 @@
+"""What the server says of itself in namespace 0, where asyncua leaves it empty or says what is not so.
+
+Nothing is Good and null: what is not known is BadNotSupported as a value, and no other attribute is there
+without one (BadAttributeIdInvalid).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from asyncua.server.address_space import AddressSpace, AttributeValue
+
+import bridge
+from bridge.northbound.opcua.address_space import is_empty
+from bridge.northbound.opcua.browsing import MOST_CONTINUATION_POINTS
+from bridge.northbound.opcua.eventfilter import MOST_FIELDS
+from bridge.northbound.opcua.items import LEAST_SAMPLING_MS, VALUE_QUEUE
+from bridge.northbound.opcua.library import (
+    AttributeIds,
+    ObjectIds,
+    StatusCodes,
+    data_value,
+    get,
+    node_id,
+    status,
+    ua,
+    variant,
+)
+from bridge.northbound.opcua.routes import MOST_CALLS
+from bridge.northbound.opcua.shares import (
+    MOST_ITEMS,
+    MOST_ITEMS_OF_ADDRESS,
+    MOST_OF_SESSION,
+    MOST_SESSIONS,
+    MOST_SUBSCRIPTIONS,
+)
+from bridge.northbound.opcua.where import MOST_OPERANDS
+
+_Type = ua.VariantType
+_STATUS: Final = "Server_ServerStatus_"
+_CAN: Final = "Server_ServerCapabilities_"
+_AT_ONCE: Final = f"{_CAN}OperationLimits_"
+
+VALUES: Final[Mapping[str, ua.Variant]] = {
+    f"{_STATUS}SecondsTillShutdown": variant(0, _Type.UInt32),
+    f"{_STATUS}ShutdownReason": variant(ua.LocalizedText(), _Type.LocalizedText),
+    "Server_Auditing": variant(False, _Type.Boolean),
+    f"{_CAN}LocaleIdArray": variant(["en"], _Type.String),
+    f"{_CAN}MaxBrowseContinuationPoints": variant(MOST_CONTINUATION_POINTS, _Type.UInt16),
+    f"{_CAN}MaxQueryContinuationPoints": variant(0, _Type.UInt16),
+    f"{_CAN}MaxHistoryContinuationPoints": variant(0, _Type.UInt16),
+    f"{_CAN}MinSupportedSampleRate": variant(LEAST_SAMPLING_MS, _Type.Double),
+    f"{_CAN}MaxSessions": variant(MOST_SESSIONS, _Type.UInt32),
+    f"{_CAN}MaxSubscriptions": variant(MOST_SUBSCRIPTIONS, _Type.UInt32),
+    f"{_CAN}MaxSubscriptionsPerSession": variant(MOST_OF_SESSION, _Type.UInt32),
+    f"{_CAN}MaxMonitoredItems": variant(MOST_ITEMS, _Type.UInt32),
+    f"{_CAN}MaxMonitoredItemsPerSubscription": variant(MOST_ITEMS_OF_ADDRESS, _Type.UInt32),
+    f"{_CAN}MaxMonitoredItemsQueueSize": variant(VALUE_QUEUE, _Type.UInt32),
+    f"{_CAN}MaxSelectClauseParameters": variant(MOST_FIELDS, _Type.UInt32),
+    f"{_CAN}MaxWhereClauseParameters": variant(MOST_OPERANDS, _Type.UInt32),
+    f"{_AT_ONCE}MaxNodesPerMethodCall": variant(MOST_CALLS, _Type.UInt32),
+    "Server_ServerDiagnostics_EnabledFlag": variant(False, _Type.Boolean),
+    "Server_ServerRedundancy_RedundancySupport": variant(ua.RedundancySupport.None_, _Type.Int32),
+}
+"""By the names of the nodes."""
+
+NOT_DONE: Final = (
+    f"{_AT_ONCE}MaxNodesPerHistoryReadData",
+    f"{_AT_ONCE}MaxNodesPerHistoryReadEvents",
+    f"{_AT_ONCE}MaxNodesPerHistoryUpdateData",
+    f"{_AT_ONCE}MaxNodesPerHistoryUpdateEvents",
+    f"{_AT_ONCE}MaxNodesPerNodeManagement",
+)
+"""Limits that asyncua gives to services which are refused."""
+
+_NOTHING: Final = variant(None, _Type.Null)
+
+
+def built_at() -> datetime:
+    """When the newest of the program's files was written."""
+    files = Path(bridge.__file__).parent.rglob("*.py")
+    return datetime.fromtimestamp(max(file.stat().st_mtime for file in files), UTC)
+
+
+def describe(space: AddressSpace) -> None:
+    """Give the nodes of asyncua's in ``space`` the values that are true, and take away what is empty."""
+    now = datetime.now(UTC)
+    for name, value in VALUES.items():
+        attributes = space[node_id(get(ObjectIds, name))].attributes
+        attributes[AttributeIds.Value] = AttributeValue(data_value(value, None, now))
+    for name in NOT_DONE:
+        attributes = space[node_id(get(ObjectIds, name))].attributes
+        attributes[AttributeIds.Value].value = data_value(_NOTHING)
+    for node in get(space, "_nodes").values():
+        _settle(node.attributes)
+
+
+def _settle(attributes: dict[AttributeIds, AttributeValue]) -> None:
+    node_class = attributes[AttributeIds.NodeClass].value
+    assert node_class and node_class.Value
+    is_variable = node_class.Value.Value == ua.NodeClass.Variable
+    for attribute in [one for one, held in attributes.items() if is_empty(held)]:
+        if is_variable and attribute == AttributeIds.Value:
+            refused = data_value(_NOTHING, status(StatusCodes.BadNotSupported))
+            attributes[attribute].value = refused
+        else:
+            del attributes[attribute]

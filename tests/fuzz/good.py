@@ -85,7 +85,9 @@ async def opcua_value(node: Node) -> int:
 
 
 async def by_opcua(port: int) -> Exchange:
-    client = Client(f"opc.tcp://127.0.0.1:{port}", timeout=PATIENCE_S)
+    # asyncua's client gives itself up where the server says nothing for this long, by default for a second:
+    # every later call fails at once. A busy machine may take as long.
+    client = Client(f"opc.tcp://127.0.0.1:{port}", timeout=PATIENCE_S, watchdog_intervall=PATIENCE_S)
     client.set_user(GOOD)
     client.set_password(PASSWORD)
     await client.connect()

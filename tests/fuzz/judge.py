@@ -35,6 +35,14 @@ WARM_UP: Final = 0.4
 """Part of the time after which memory is to be flat."""
 SILENT_S: Final = 9.0
 """More than the good clients' own patience and the pause between two newcomers."""
+UNSERVED_S: Final = 20.0
+"""So long a good client may be told to try again and nothing else, also on a busy machine. Its drive's
+time-out is 30 s."""
+MOST_BUSY: Final = 0.5
+"""Part of a good client's exchanges that may be told to try again, however busy the machine is: of the others
+the run says too little."""
+PROTOCOLS: Final = ("modbus", "opcua", "zenoh")
+GOOD_CLIENTS: Final = (*PROTOCOLS, *(f"{name}, newly connected" for name in PROTOCOLS))
 LATE_MS: Final = 500.0
 MOST_LATE: Final = 0.02
 """Part of a good client's exchanges that may take longer, or be told to try again, while the machine was not
@@ -128,7 +136,8 @@ class Judge:
         self._waits = Waits([*self._pids, rig.good.popen.pid])
         self._busy_until = float("-inf")
         self._first_mb = {pid: restart_peak_mb(pid) for pid in self._pids}
-        self._heard: dict[str, float] = {}
+        self._heard = dict.fromkeys(GOOD_CLIENTS, self._began)
+        self._served = dict.fromkeys(GOOD_CLIENTS, self._began)
         self._enabling = {node: load_family(name).control_word.enabling for node, name in _FAMILIES.items()}
         # What went on while this was set up is no matter of ours.
         self._words.take()
@@ -146,13 +155,17 @@ class Judge:
     def conclude(self) -> list[str]:
         """What is wrong in the whole."""
         faults = self.look()
-        for name in ("modbus", "opcua", "zenoh"):
+        for name in PROTOCOLS:
             if not self.figures.answers_ms.get(name):
                 faults.append(f"the good client on {name} has had no answer at all")
         for pid, samples in self.figures.memory_mb.items():
             grown = growth_mb(samples)
             if grown > MOST_GROWTH_MB + self._of_names_mb(pid):
                 faults.append(f"memory of process {pid} is not flat: {grown:.1f} MB more after the warm-up")
+        for name, busy in self.figures.busy.items():
+            count = len(self.figures.answers_ms[name])
+            if busy > max(FEW_LATE, MOST_BUSY * count):
+                faults.append(f"good client on {name}: {busy} of {count} exchanges were told to try again")
         for name, late in self.figures.late.items():
             judged = self.figures.judged[name]
             if late > max(FEW_LATE, MOST_LATE * judged):
@@ -218,14 +231,20 @@ class Judge:
             self.figures.answers_ms.setdefault(name, []).append(float(took_ms))
             if verdict == "busy":
                 self.figures.busy[name] = self.figures.busy.get(name, 0) + 1
-            elif verdict != "ok":
+            elif verdict == "ok":
+                self._served[name] = now
+            else:
                 faults.append(f"good client on {name}: {verdict} after {took_ms} ms")
             if float(ended_at) - float(took_ms) / 1000 >= self._busy_until:
                 is_late = verdict == "busy" or float(took_ms) > LATE_MS
                 self.figures.judged[name] = self.figures.judged.get(name, 0) + 1
                 self.figures.late[name] = self.figures.late.get(name, 0) + is_late
-        silent = [name for name, heard in self._heard.items() if now - heard > SILENT_S]
-        return faults + [f"good client on {name}: no exchange for {SILENT_S:g} s" for name in silent]
+        for name in GOOD_CLIENTS:
+            if now - self._heard[name] > SILENT_S:
+                faults.append(f"good client on {name}: no exchange for {SILENT_S:g} s")
+            elif now - self._served[name] > UNSERVED_S:
+                faults.append(f"good client on {name}: told to try again for {UNSERVED_S:g} s")
+        return faults
 
     def _look_at_words(self) -> list[str]:
         faults: list[str] = []

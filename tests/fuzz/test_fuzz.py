@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
 import pytest
 
+from tests.fuzz.judge import Judge
 from tests.fuzz.rig import Rig, running_rig
 from tests.fuzz.run import fuzz
 
@@ -35,3 +39,20 @@ def test_what_is_thrown_at_it_is_borne(
         print(f"\n{report.told()}")
     assert not report.faults, report.told()
     assert report.thrown == cases
+
+
+@pytest.mark.timeout(LIMIT_S)
+def test_fronts_that_stand_still_for_two_seconds_lose_no_good_client(rig: Rig) -> None:
+    """As on a busy machine: a client whose library gives up after a second would be lost, and no log would
+    have a line of it."""
+    judge = Judge(rig)
+    fronts = rig.fronts()
+    for number in (signal.SIGSTOP, signal.SIGCONT):
+        for pid in fronts:
+            os.kill(pid, number)
+        time.sleep(2.0)
+    judge.look()  # values that were old by then are said to be
+    for _ in range(5):
+        time.sleep(1.0)
+        assert not judge.look()
+    assert judge.figures.answers_ms["opcua"]

@@ -43,11 +43,14 @@ while True:
     time.sleep(0.01)
 """
 GOOD = """
-import sys, time
+import pathlib, sys, time
+folder = pathlib.Path(sys.argv[1]).parent
 while True:
     with open(sys.argv[1], "a") as file:
-        for name in ("modbus", "opcua", "zenoh"):
-            file.write(f"{time.monotonic()};{name};1.5;ok\\n")
+        for protocol in ("modbus", "opcua", "zenoh"):
+            for name in (protocol, f"{protocol}, newly connected"):
+                verdict = "busy" if (folder / f"{protocol}-is-busy").exists() else "ok"
+                file.write(f"{time.monotonic()};{name};1.5;{verdict}\\n")
     time.sleep(0.05)
 """
 
@@ -137,11 +140,57 @@ def test_late_answers_are_a_fault_where_the_machine_was_not_busy(
     with faulty(tmp_path) as rig:
         judge = Judge(rig)
         with rig.exchanges.open("a", encoding="ascii") as notes:
-            notes.write(f"{time.monotonic()};opcua, newly connected;{exchange}\n" * 20)
+            for many, one in ((20, exchange), (60, "1.5;ok")):
+                notes.write(f"{time.monotonic()};opcua, once;{one}\n" * many)
         time.sleep(0.5)
         faults = judge.conclude()
-    assert [fault for fault in faults if "20 of 20 exchanges" in fault] == faults
+    assert [fault for fault in faults if "20 of 80 exchanges" in fault] == faults
     assert len(faults) == (not is_busy)
+
+
+BUSY_MACHINE = -1.0
+"""In place of ``STARVED``: it is busy all the time."""
+
+
+def test_a_good_client_that_is_told_to_try_again_for_long_is_seen_on_a_busy_machine_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(judges, "STARVED", BUSY_MACHINE)
+    monkeypatch.setattr(judges, "UNSERVED_S", 0.5)
+    with faulty(tmp_path) as rig:
+        judge = Judge(rig)
+        time.sleep(0.2)
+        assert not judge.look()
+        (tmp_path / "opcua-is-busy").touch()
+        assert "good client on opcua: told to try again for 0.5 s" in faults_of(judge)
+
+
+def test_a_run_in_which_most_were_told_to_try_again_is_no_success(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(judges, "STARVED", BUSY_MACHINE)
+    with faulty(tmp_path) as rig:
+        (tmp_path / "zenoh-is-busy").touch()
+        judge = Judge(rig)
+        time.sleep(0.5)
+        faults = judge.conclude()
+    assert [fault.partition(":")[0] for fault in faults] == [
+        "good client on zenoh",
+        "good client on zenoh, newly connected",
+    ]
+    assert all("exchanges were told to try again" in fault for fault in faults)
+
+
+def test_a_good_client_that_has_lost_its_connection_is_seen_on_a_busy_machine_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It fails at once, thousands of times: nobody may take that for a machine that is busy."""
+    monkeypatch.setattr(judges, "STARVED", BUSY_MACHINE)
+    with faulty(tmp_path) as rig:
+        judge = Judge(rig)
+        with rig.exchanges.open("a", encoding="ascii") as notes:
+            notes.write(f"{time.monotonic()};opcua;0.2;ConnectionError client is disconnected\n" * 10)
+        assert "good client on opcua: ConnectionError client is disconnected" in faults_of(judge)
 
 
 def test_who_waits_for_the_cpu_is_known() -> None:
@@ -170,6 +219,14 @@ def test_good_clients_that_fall_silent_are_seen(tmp_path: Path, monkeypatch: pyt
         assert not judge.look()
         rig.good.signal(19)
         assert "no exchange for 0.5 s" in faults_of(judge)
+
+
+def test_a_newcomer_that_never_comes_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(judges, "SILENT_S", 0.5)
+    monkeypatch.setattr(judges, "GOOD_CLIENTS", (*judges.GOOD_CLIENTS, "opcua, by a way that nobody takes"))
+    with faulty(tmp_path) as rig:
+        judge = Judge(rig)
+        assert "good client on opcua, by a way that nobody takes: no exchange" in faults_of(judge)
 
 
 class Thrower:

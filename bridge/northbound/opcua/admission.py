@@ -30,5 +30,6 @@ def limits() -> Limits:
         MOST_WAITING,
         deadlines={stage: Deadline(DEADLINE_S[stage], missing) for stage, missing in _MISSING.items()},
         held_bytes=MOST_HELD,
-        kept=FOR_RIGHTS,
+        # Beside the spare one, which has no session of its own.
+        kept=FOR_RIGHTS + _SPARE,
     )

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from asyncua import Client
+from asyncua import Client, ua
 from pymodbus.client import AsyncModbusTcpClient
 
 from tests.support import sites
@@ -19,6 +19,8 @@ BACK_S = 5.0
 NOISE_S = 5.0
 """A machine that is busy with other things."""
 KEEP_ALIVE, UNIT = 10, 1
+OPERATION_ENABLED, NO_VOLTAGE = 4, 0x0474
+"""A state as Modbus numbers it, and a control word of NORD's (BU 2500 §6.8)."""
 
 
 def children(pid: int) -> list[int]:
@@ -79,6 +81,38 @@ async def test_a_killed_front_is_back_and_the_drive_never_noticed(
         assert inputs[0] & 0x6F == 0x27, "still running"
         plc.close()
         assert "hung" not in bridge.output()
+
+
+async def test_after_good_nobody_reads_the_value_of_before(tmp_path: Path, ports: tuple[int, int]) -> None:
+    node = sites.node(sites.drive("fu1", "lease", 5000))
+    path = sites.write(tmp_path, sites.bus(node, more="deadman_ms = 500"), sites.opcua(ports[1]))
+    with drivebridge(tmp_path, "run", "run", str(path), notify=True) as bridge:
+        bridge.wait_ready()
+        bridge.wait_output("node operational")
+        wait_for_front(bridge)
+        async with Client(f"opc.tcp://127.0.0.1:{ports[1]}", timeout=10, watchdog_intervall=10) as client:
+            space = await client.get_namespace_index("urn:drivebridge:points")
+
+            async def shown(name: str) -> object:
+                return await client.get_node(f"ns={space};s=conveyor/fu1/{name}").read_value()
+
+            async def call(method: str, *arguments: ua.Variant) -> None:
+                drive = client.get_node(f"ns={space};s=conveyor/fu1")
+                await drive.call_method(f"{space}:{method}", *arguments)
+
+            await call("TakeControl", ua.Variant(600_000, ua.VariantType.UInt32))
+            assert await shown("supervision/owner") == "opcua:anonymous"
+            setpoint = client.get_node(f"ns={space};s=conveyor/fu1/command/setpoint_1")
+            for value in range(100):
+                await setpoint.write_value(ua.DataValue(ua.Variant(value, ua.VariantType.UInt16)))
+                assert await shown("command/setpoint_1") == value
+            for _ in range(3):
+                await call("Start", ua.Variant(0, ua.VariantType.Int32))
+                assert await shown("status/state") == OPERATION_ENABLED
+                await call("DisableVoltage")
+                assert await shown("supervision/sent_control_word") == NO_VOLTAGE
+            await call("ReleaseControl")
+            assert await shown("supervision/owner") == ""
 
 
 def test_a_front_does_not_outlive_the_bus_process(tmp_path: Path, ports: tuple[int, int]) -> None:

@@ -15,8 +15,9 @@ MOST_WAITING: Final = 25
 """Connections of one address that have no session yet."""
 MOST_HELD: Final = 64 * 1024 * 1024
 """Bytes of messages and answers, of all connections together."""
-FOR_RIGHTS: Final = 1
-"""Connections that only who may command can keep: a hundred that read must not keep out the one who stops."""
+KEPT: Final = 1 + _SPARE
+"""Connections that only who may command can keep: sessions that read must not keep out the one who stops, who
+needs one of them. The spare connection has no session of its own."""
 DEADLINE_S: Final = {Stage.CONNECTED: 5.0, Stage.GREETED: 10.0, Stage.CHANNEL: 30.0}
 """Seconds after connecting, or after the end of its last session."""
 _MISSING: Final = {Stage.CONNECTED: "hello", Stage.GREETED: "channel", Stage.CHANNEL: "session"}
@@ -30,6 +31,5 @@ def limits() -> Limits:
         MOST_WAITING,
         deadlines={stage: Deadline(DEADLINE_S[stage], missing) for stage, missing in _MISSING.items()},
         held_bytes=MOST_HELD,
-        # Beside the spare one, which has no session of its own.
-        kept=FOR_RIGHTS + _SPARE,
+        kept=KEPT,
     )

@@ -28,6 +28,7 @@ class Query:
     """A front's query; ``sent`` is what it is answered."""
 
     payload: bytes
+    key: str = protocol.key_of(protocol.REQUESTS, "opcua")
     sent: list[Message] = field(default_factory=list[Message])
     is_finished: bool = False
 

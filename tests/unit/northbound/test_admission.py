@@ -7,7 +7,7 @@ import pytest
 from bridge.northbound.admission import Admission, Limits, Stage, Visitor
 from bridge.northbound.opcua.admission import (
     DEADLINE_S,
-    FOR_RIGHTS,
+    KEPT,
     MOST_CONNECTIONS,
     MOST_HELD,
     MOST_OF_ADDRESS,
@@ -168,18 +168,18 @@ def test_when_all_are_taken_only_who_waits_makes_room(rig: Rig) -> None:
 def test_one_place_is_kept_for_who_has_rights(rig: Rig) -> None:
     readers = [rig.client(f"10.0.1.{number}", Stage.SESSION) for number in range(MOST_CONNECTIONS)]
     rig.admission.look(0.0)
-    assert rig.closed == readers[-FOR_RIGHTS:], "anybody may try the last place, none of them keeps it"
+    assert rig.closed == readers[-KEPT:], "anybody may try the last place, none of them keeps it"
     operator = rig.client("10.0.2.1", Stage.CHANNEL)
     assert operator.is_in
     operator.stage, operator.has_rights = Stage.SESSION, True
     rig.admission.look(1.0)
     assert operator not in rig.closed
-    assert not rig.client("10.0.2.2").is_in
+    assert rig.client("10.0.2.2").is_in, "to come back to a session on"
 
 
 def test_where_somebody_has_rights_others_may_have_the_rest(rig: Rig) -> None:
     rig.client("10.0.2.1", Stage.SESSION).has_rights = True
-    for number in range(MOST_CONNECTIONS - 1):
+    for number in range(MOST_CONNECTIONS - KEPT):
         rig.client(f"10.0.1.{number}", Stage.SESSION)
     rig.admission.look(0.0)
     assert rig.closed == []

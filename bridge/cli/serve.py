@@ -102,18 +102,26 @@ def demo(verbose: Verbose = False) -> None:
         until_stopped(_serve(project, ending, fronts=True, controller=True, ready=ready), ending)
 
 
-def simulate(site: SiteArgument, verbose: Verbose = False) -> None:
+def simulate(
+    site: SiteArgument,
+    habit: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NODE=HABIT", help="a habit, by its name or its file, that a node has"),
+    ] = None,
+    verbose: Verbose = False,
+) -> None:
     """Simulate every node of SITE on its buses, for a bridge that runs as another process."""
     from bridge.can import open_all
-    from bridge.cli.simulation import simulation
+    from bridge.cli.simulation import habits_of, simulation
     from bridge.project import load_project
     from bridge.service import make_bus
 
     logs.set_up(verbose=verbose)
     project = load_project(site)
+    habits = habits_of(habit or [], project.site)
 
     async def play() -> None:
-        simulations = [simulation(make_bus(table), table, project.path) for table in project.site.bus]
+        simulations = [simulation(make_bus(table), table, project.path, habits) for table in project.site.bus]
         try:
             open_all(one.open for one in simulations)
             async with asyncio.TaskGroup() as tasks:

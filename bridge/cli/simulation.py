@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+import typer
 
 from bridge.can import Bus
-from bridge.config import BusTable
+from bridge.config import BusTable, Site
 from bridge.derive import describe
 from bridge.eds import read_whole_device_file
 from bridge.mapping import Family
@@ -15,15 +19,20 @@ from bridge.mapping.loader import lineage, load_family, mapping_folders
 from bridge.mapping.site import described_file
 from bridge.sim.catalogue import SIMULATED, simulate_description, simulate_family, simulate_node
 from bridge.sim.device import SimulatedDevice
+from bridge.sim.habit import Rule, load_habit
 from bridge.sim.shell import Simulation
 
+Habits = Mapping[str, Sequence[Rule]]
+"""By the name of the node that has them."""
+NONE: Final[Habits] = MappingProxyType({})
 
-def simulation(bus: Bus, table: BusTable, site: Path) -> Simulation:
+
+def simulation(bus: Bus, table: BusTable, site: Path, habits: Habits = NONE) -> Simulation:
     """All nodes of one bus."""
-    return Simulation(bus, simulated_nodes(table, site))
+    return Simulation(bus, simulated_nodes(table, site, habits))
 
 
-def simulated_nodes(table: BusTable, site: Path) -> list[SimulatedDevice]:
+def simulated_nodes(table: BusTable, site: Path, habits: Habits = NONE) -> list[SimulatedDevice]:
     """The nodes of one bus, with the parameters that the site file gives their drives. A mapping of the
     site's own, under whatever name, is simulated as that file says."""
     nodes: list[SimulatedDevice] = []
@@ -38,7 +47,10 @@ def simulated_nodes(table: BusTable, site: Path) -> list[SimulatedDevice]:
             makers[node.mapping] = (
                 _maker(node.mapping, folders) if file is None else _described(file, folders)
             )
-        nodes.append(makers[node.mapping](node.id, parameters))
+        simulated = makers[node.mapping](node.id, parameters)
+        if node.name in habits:
+            simulated.adopt_habits(habits[node.name])
+        nodes.append(simulated)
     return nodes
 
 
@@ -64,3 +76,18 @@ def _described(file: Path, folders: Sequence[Path]) -> _Make:
 
 def _bases(family: Family, folders: Sequence[Path]) -> list[str]:
     return lineage(family.extends, folders) if family.extends else []
+
+
+def habits_of(words: Sequence[str], site: Site) -> Habits:
+    """What ``NODE=HABIT`` says. Raises ``BadParameter`` for a node that the site does not have,
+    ``FileFaults`` and ``OperationFailed`` for a habit that cannot be read."""
+    names = {node.name for bus in site.bus for node in bus.node}
+    found: dict[str, list[Rule]] = {}
+    for word in words:
+        node, _, habit = word.partition("=")
+        if not habit:
+            raise typer.BadParameter(f"--habit {word}: give NODE=HABIT")
+        if node not in names:
+            raise typer.BadParameter(f"--habit {word}: {node} is no node; {', '.join(sorted(names))}")
+        found.setdefault(node, []).extend(load_habit(habit).rule)
+    return found

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from bridge.canopen.frame import ERROR, EXTENDED, STANDARD_MASK, Frame
 from bridge.sim.canopen_slave import Application, CanopenSlave
 from bridge.sim.dictionary import Dictionary
+from bridge.sim.habit import Rule
+from bridge.sim.habit_player import HabitPlayer
 from bridge.sim.ticks import earliest
 
 
@@ -33,6 +35,7 @@ class SimulatedDevice(Application):
         """Nothing has changed since time was last passed: a frame of the same moment need not do it again."""
         self._slave_hears: frozenset[int] | None = None
         """What ``heard`` was made of."""
+        self._habits: HabitPlayer | None = None
 
     # To be defined by the device.
 
@@ -86,16 +89,18 @@ class SimulatedDevice(Application):
         if now > self._now or not self._is_steady or self._injected:
             self._advance(now)
         if self.powered:
-            self._receive(frame)
+            self._hear(frame)
             if self.slave.news.is_there or (self._due is not None and self._due <= self._now):
                 self._conclude()
         if self.slave.hears() is not self._slave_hears:
             self._listen()
+        self._pass_through_habits()
 
     def on_time(self, now: float) -> None:
         self._advance(now)
         if self.powered:
             self._conclude()
+        self._pass_through_habits()
 
     def next_deadline(self) -> float | None:
         """When ``on_time`` has to be called next, or None."""
@@ -103,11 +108,30 @@ class SimulatedDevice(Application):
             return self._now
         if not self.powered:
             return None
-        return earliest(self._due, *self._deadlines())
+        held = self._habits.next_deadline() if self._habits else None
+        return earliest(self._due, held, *self._deadlines())
 
     def take_frames(self) -> list[Frame]:
         """What the node has to send, oldest first."""
+        if self._habits is None:
+            return self._sent()
+        self._pass_through_habits()
+        return self._habits.due(self._now)
+
+    def _sent(self) -> list[Frame]:
+        """What the device itself has to send, oldest first."""
         return self.slave.take_frames()
+
+    def _hear(self, frame: Frame) -> None:
+        heard = self._habits.on_frame(frame, self._now) if self._habits else frame
+        if heard is not None:
+            self._receive(heard)
+
+    def _pass_through_habits(self) -> None:
+        """Not when the frames are fetched: until then nobody would know that some of them are held back."""
+        if self._habits is not None:
+            for frame in self._habits.put(self._sent(), self._now):
+                self._receive(frame)
 
     def _advance(self, now: float) -> None:
         self._now = max(self._now, now)  # stamps of frames may lie before the last timer
@@ -132,6 +156,10 @@ class SimulatedDevice(Application):
 
     # What a test or a demonstration does to any node.
 
+    def adopt_habits(self, rules: Sequence[Rule]) -> None:
+        """From now on its frames differ from the standard by these rules."""
+        self._habits = HabitPlayer(self.node_id, rules)
+
     def silence(self) -> None:
         """The node sends nothing more; it goes on receiving and working."""
         self.slave.silent = True
@@ -145,6 +173,8 @@ class SimulatedDevice(Application):
         def off() -> None:
             self.powered = False
             self.slave.power_off()
+            if self._habits is not None:
+                self._habits.clear()
 
         self._injected.append(off)
 

@@ -68,8 +68,8 @@ class LenzeMotec(SimulatedDevice):
         """What C00002/11 does, and who commissions it: the codes outlast the mains."""
         self._codes.save()
 
-    def take_frames(self) -> list[Frame]:
-        frames = self.slave.take_frames()
+    def _sent(self) -> list[Frame]:
+        frames = super()._sent()
         if not self.slave.silent:
             frames += self._own
         self._own = []

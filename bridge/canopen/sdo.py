@@ -47,6 +47,7 @@ class _Owed:
     sub: int
     until: float
     answers: int
+    asked_at: float
 
     def is_about(self, job: SdoJob) -> bool:
         return (self.index, self.sub) == (job.index, job.sub)
@@ -59,10 +60,18 @@ class SdoChannel:
     transfer that fails by time-out or by a damaged answer is repeated ``retries`` times. ``done`` of each
     transfer is called once, possibly before ``read`` or ``write`` returns. ``segment_s`` is the time to
     leave to each frame of a block, so that it does not fill the bus and the driver's queue.
+    ``why_no_block`` is what was learned of this server before: it is not asked for block transfer.
     """
 
     def __init__(
-        self, request_id: int, reply_id: int, timeout_s: float, *, retries: int = 0, segment_s: float = 0.001
+        self,
+        request_id: int,
+        reply_id: int,
+        timeout_s: float,
+        *,
+        retries: int = 0,
+        segment_s: float = 0.001,
+        why_no_block: str = "",
     ) -> None:
         self.request_id = request_id
         self.reply_id = reply_id
@@ -72,9 +81,12 @@ class SdoChannel:
         """Frames on the reply COB-ID that were no answer."""
         self.late = 0
         """Those of them that answered a request which we had given up."""
+        self.lateness_s = 0.0
+        """Time from its request to the last of these."""
         self._segment_s = segment_s
         self._queue = SdoQueue()
-        self._block = BlockUse()
+        self._block = BlockUse(why_no_block)
+        self._told_of_block = bool(why_no_block)
         self._job: SdoJob | None = None
         self._transfer: Transfer | None = None
         self._exchange: Exchange | None = None
@@ -83,6 +95,7 @@ class SdoChannel:
         self._unsent: deque[bytes] = deque()
         self._send_at: float | None = None
         self._owed: _Owed | None = None
+        self._asked_at = 0.0
         self._hold_until: float | None = None
 
     @property
@@ -150,9 +163,22 @@ class SdoChannel:
         self._clear()
         self._frames.clear()
         self._hold_until = None
-        self._block = BlockUse()
+        self._block = BlockUse(self._block.why_not)
         for job in jobs:
             job.done(SdoError(job.index, job.sub, abort.TIMED_OUT, by_server=False))
+
+    def take_learned(self) -> str:
+        """Why the server is not asked for block transfer any more, once, when that was found out; else
+        empty."""
+        if self._told_of_block or not self._block.why_not:
+            return ""
+        self._told_of_block = True
+        return self._block.why_not
+
+    def forget_block(self) -> None:
+        """Another device is there: it is asked for block transfer again."""
+        self._block = BlockUse()
+        self._told_of_block = False
 
     def _submit(self, job: SdoJob, now: float) -> SdoJob:
         refused = self._queue.add(job)
@@ -168,24 +194,29 @@ class SdoChannel:
         """A frame on the reply COB-ID."""
         data, exchange, job, transfer = frame.data, self._exchange, self._job, self._transfer
         if len(data) != 8 or job is None or transfer is None or exchange is None or exchange.reply is None:
-            self._pass_over(data)
+            self._pass_over(data, frame.time)
         elif data[0] == ABORT:
             if MUX.unpack_from(data, 1) == (job.index, job.sub):
                 code: int = U32.unpack_from(data, 4)[0]
                 error = SdoError(job.index, job.sub, code, by_server=True)
                 self._resume(transfer.throw, error, frame.time)
             else:
-                self._pass_over(data)
+                self._pass_over(data, frame.time)
         elif exchange.reply.fits(data, len(self._unsent)):
+            if exchange.reply.mux and self._owed and self._owed.is_about(job):
+                self._owed.asked_at = (
+                    self._asked_at
+                )  # it may have answered the request before: this one's is owed
             self._resume(transfer.send, data, frame.time)
         else:
-            self._pass_over(data)
+            self._pass_over(data, frame.time)
 
-    def _pass_over(self, data: bytes) -> None:
+    def _pass_over(self, data: bytes, now: float) -> None:
         self.unmatched += 1
         owed = self._owed
         if owed and len(data) == 8 and MUX.unpack_from(data, 1) == (owed.index, owed.sub):
             self.late += 1
+            self.lateness_s = now - owed.asked_at
             owed.answers -= 1
             self._owed = owed if owed.answers else None
 
@@ -198,7 +229,10 @@ class SdoChannel:
                 self._next(now)
         elif self._deadline is not None and now >= self._deadline:
             error = SdoError(job.index, job.sub, abort.TIMED_OUT, by_server=False)
+            awaited = self._exchange.reply if self._exchange else None
             self._resume(transfer.throw, error, now)
+            if self._transfer is transfer and awaited is not None and awaited.mux:
+                self._owe(job, now)  # it goes on another way, and that answer may still come
 
     def next_deadline(self) -> float | None:
         times = (self._send_at, self._hold_until, self._deadline)
@@ -254,6 +288,7 @@ class SdoChannel:
 
     def _send_some(self, now: float) -> None:
         """Send the next frames of the exchange; the time-out begins with the last one."""
+        self._asked_at = now
         most = SEGMENTS_AT_ONCE if self._segment_s else len(self._unsent)
         for _ in range(min(most, len(self._unsent))):
             self._frames.append(Frame(self.request_id, self._unsent.popleft()))
@@ -279,9 +314,10 @@ class SdoChannel:
         self._frames.append(Frame(self.request_id, abort_request(job.index, job.sub, code)))
 
     def _owe(self, job: SdoJob, now: float) -> None:
-        before = self._owed.answers if self._owed and self._owed.is_about(job) else 0
-        answers = min(before + 1, _MOST_OWED)
-        self._owed = _Owed(job.index, job.sub, now + job.timeout_s, answers)
+        owed = self._owed if self._owed and self._owed.is_about(job) and self._owed.answers else None
+        answers = min(owed.answers + 1, _MOST_OWED) if owed else 1
+        asked_at = owed.asked_at if owed else self._asked_at
+        self._owed = _Owed(job.index, job.sub, now + job.timeout_s, answers, asked_at)
 
     def _clear(self) -> None:
         self._job = self._transfer = self._exchange = self._deadline = self._send_at = None

@@ -25,8 +25,10 @@ from bridge.canopen.sdo_transfer import (
     check_length,
     download,
     initiate_upload,
+    upload,
     upload_segments,
 )
+from bridge.canopen.sdo_ways_back import Stage, WayBack, way_back
 
 BLOCK_FROM_BYTES: Final = 112
 """Sixteen segments: for fewer, opening and closing a block transfer costs more frames than it saves."""
@@ -52,10 +54,11 @@ def crc16(data: bytes | bytearray) -> int:
 
 @dataclass(slots=True)
 class BlockUse:
-    """What a channel has learned about its server: whether it supports block transfer, and how many segments
-    in a row arrive without loss."""
+    """What a channel has learned about its server: why it is not asked for block transfer, and how many
+    segments in a row arrive without loss."""
 
-    offered: bool = True
+    why_not: str = ""
+    """In a sentence; empty as long as the server is asked."""
     segments: int = MOST_SEGMENTS
 
     def on_block(self, whole: bool) -> None:
@@ -66,62 +69,81 @@ class BlockUse:
             self.segments = max(_LEAST_SEGMENTS, self.segments // 2)
 
 
+@dataclass(slots=True)
+class _Progress:
+    """How far the block transfer under way has come."""
+
+    stage: Stage = Stage.BEGIN
+
+
 def read_object(index: int, sub: int, block: BlockUse) -> Transfer:
-    """Read an object: by blocks if it is announced as long and the server supports that."""
+    """Read an object: by blocks if it is announced as long, and by segments where that breaks."""
     value, announced = yield from initiate_upload(index, sub)
     if value is not None:
         return value
-    if block.offered and announced is not None and announced >= BLOCK_FROM_BYTES:
-        value = yield from block_upload(index, sub, block)
-        if value is not None:
-            return value
-        value, announced = yield from initiate_upload(index, sub)
-        if value is not None:
-            return value
-    return (yield from upload_segments(index, sub, announced))
+    if block.why_not or announced is None or announced < BLOCK_FROM_BYTES:
+        return (yield from upload_segments(index, sub, announced))
+    progress = _Progress()
+    try:
+        return (yield from block_upload(index, sub, block, progress))
+    except SdoError as error:
+        failure, way = error, _way_back(progress, error)
+    value = yield from _by_segments(upload(index, sub), failure)
+    block.why_not = f"{way.says}: {failure}"
+    return value
 
 
 def write_object(index: int, sub: int, data: bytes, block: BlockUse) -> Transfer:
-    """Write an object: by blocks if it is long and the server supports that."""
-    if block.offered and len(data) >= BLOCK_FROM_BYTES:
-        done = yield from block_download(index, sub, data, block)
-        if done:
-            return b""
-    return (yield from download(index, sub, data))
-
-
-def _initiate(
-    requests: tuple[bytes, ...], reply: Reply | BlockStart, block: BlockUse
-) -> Generator[Exchange, bytes, bytes | None]:
-    """The server's answer, or None if it does not support block transfer. A server that does not answer may
-    not support it either: the next attempt does without."""
+    """Write an object: by blocks if it is long, and by segments where that breaks before the server can have
+    taken the value."""
+    if block.why_not or len(data) < BLOCK_FROM_BYTES:
+        return (yield from download(index, sub, data))
+    progress = _Progress()
     try:
-        return (yield Exchange(requests, reply))
+        yield from block_download(index, sub, data, progress)
+        return b""
     except SdoError as error:
-        if error.by_server and error.code == abort.UNKNOWN_COMMAND:
-            block.offered = False
-            return None
-        block.offered = error.by_server
+        failure, way = error, _way_back(progress, error)
+    yield from _by_segments(download(index, sub, data), failure)
+    block.why_not = f"{way.says}: {failure}"
+    return b""
+
+
+def _way_back(progress: _Progress, error: SdoError) -> WayBack:
+    """Raises ``error`` where there is none."""
+    way = way_back(progress.stage, error)
+    if way is None:
+        raise error
+    return way
+
+
+def _by_segments(transfer: Transfer, failure: SdoError) -> Transfer:
+    """``transfer`` after a block transfer that ended in ``failure``, which is the more telling error where
+    nothing is answered now. A server that has not aborted the block transfer itself is told first."""
+    if not failure.by_server:
+        yield Exchange((abort_request(failure.index, failure.sub, failure.code),), None)
+    try:
+        return (yield from transfer)
+    except SdoError as error:
+        if failure.was_answered and not error.was_answered:
+            raise failure from None
         raise
 
 
-def block_upload(index: int, sub: int, block: BlockUse) -> Generator[Exchange, bytes, bytes | None]:
-    """Read by blocks; None if the server does not support that. The segmented upload that was initiated is
-    aborted first."""
+def block_upload(index: int, sub: int, block: BlockUse, progress: _Progress) -> Transfer:
+    """Read by blocks. The segmented upload that was initiated is aborted first."""
     mux = MUX.pack(index, sub)
     give_up = abort_request(index, sub, abort.GENERAL)
     request = bytes((_UPLOAD,)) + mux + bytes((block.segments, 0, 0, 0))
-    reply = yield from _initiate((give_up, request), BlockStart(mux), block)
-    if reply is None:
-        return None
+    reply = yield Exchange((give_up, request), BlockStart(mux))
     if reply[0] & 0xE1 != 0xC0:
-        # An ordinary upload, which our request ruled out (pst = 0), or a repeated answer. Begin again.
-        block.offered = False
-        yield Exchange((give_up,), None)
-        return None
+        # An ordinary upload, which our request ruled out (pst = 0), or a repeated answer.
+        raise SdoError(index, sub, abort.GENERAL, by_server=False)
     with_crc = bool(reply[0] & _CRC)
     announced = announced_bytes(index, sub, reply) if reply[0] & 2 else None
+    progress.stage = Stage.BLOCKS
     data, last = yield from _upload_blocks(index, sub, announced, block)
+    progress.stage = Stage.END_UPLOAD
     ack = bytes((_UPLOAD_ACK, last[0] & 0x7F, block.segments)) + bytes(5)
     end = yield Exchange((ack,), Reply(0xE1, 0xC1, before=last))
     if unused := end[0] >> 2 & 7:
@@ -184,13 +206,14 @@ def _upload_block(request: bytes, size: int) -> Generator[Exchange, bytes, list[
             return frames
 
 
-def block_download(index: int, sub: int, data: bytes, block: BlockUse) -> Generator[Exchange, bytes, bool]:
-    """Write by blocks; False if the server does not support that."""
+def block_download(
+    index: int, sub: int, data: bytes, progress: _Progress
+) -> Generator[Exchange, bytes, None]:
+    """Write by blocks."""
     mux = MUX.pack(index, sub)
     request = bytes((_DOWNLOAD,)) + mux + U32.pack(len(data))
-    reply = yield from _initiate((request,), Reply(0xE3, 0xA0, mux), block)
-    if reply is None:
-        return False
+    reply = yield Exchange((request,), Reply(0xE3, 0xA0, mux))
+    progress.stage = Stage.BLOCKS
     segments = [data[start : start + SEGMENT] for start in range(0, len(data), SEGMENT)]
     with_crc = bool(reply[0] & _CRC)
     size, done, repeats = reply[4], 0, 0
@@ -207,8 +230,8 @@ def block_download(index: int, sub: int, data: bytes, block: BlockUse) -> Genera
     command = _DOWNLOAD_END | (SEGMENT - len(segments[-1])) << 2
     crc = crc16(data) if with_crc else 0
     end = bytes((command,)) + crc.to_bytes(2, "little") + bytes(5)
+    progress.stage = Stage.END_DOWNLOAD
     yield Exchange((end,), Reply(0xE3, 0xA1))
-    return True
 
 
 def _download_block(part: list[bytes], is_last: bool, with_crc: bool) -> Transfer:

@@ -10,9 +10,10 @@ from __future__ import annotations
 import struct
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 from bridge.canopen import abort
+from bridge.canopen.width import Unsized
 
 MUX: Final = struct.Struct("<HB")
 U32: Final = struct.Struct("<I")
@@ -28,6 +29,10 @@ _EXPEDITED: Final = 0x23
 _TOGGLE: Final = 0x10
 
 
+_UNANSWERED: Final = frozenset((abort.TIMED_OUT, abort.BUSY, abort.GENERAL))
+"""What ends a transfer on our side although no wrong answer has come."""
+
+
 class SdoError(Exception):
     """A transfer failed. ``code`` is the abort code, also for a time-out on our side."""
 
@@ -40,6 +45,11 @@ class SdoError(Exception):
         else:
             who = "no valid answer"
         super().__init__(f"{index:04X}h:{sub:02X}: {who}: {abort.text(code)} ({code:08X}h)")
+
+    @property
+    def was_answered(self) -> bool:
+        """The node has aborted, or has answered something else than the standard allows: it is there."""
+        return self.by_server or self.code not in _UNANSWERED
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +89,7 @@ class BlockStart:
 class BlockSegment:
     """A segment of a block with a sequence number from ``low`` to ``high``."""
 
+    mux: ClassVar[bytes] = b""
     low: int
     high: int
 
@@ -91,6 +102,7 @@ class BlockSegment:
 class BlockAck:
     """The acknowledge of a block of ``length`` segments: never of more than have been sent."""
 
+    mux: ClassVar[bytes] = b""
     length: int
 
     def fits(self, data: bytes, unsent: int) -> bool:
@@ -131,8 +143,8 @@ def check_length(index: int, sub: int, length: int, announced: int | None) -> No
 
 
 def expedited(data: bytes) -> bytes:
-    """The value in an expedited initiation; without a length all four bytes count."""
-    return data[4 : 8 - (data[0] >> 2 & 3) if data[0] & 1 else 8]
+    """The value in an expedited initiation; without a length all four bytes, as ``Unsized``."""
+    return data[4 : 8 - (data[0] >> 2 & 3)] if data[0] & 1 else Unsized(data[4:8])
 
 
 def segment(data: bytes) -> bytes:
@@ -147,6 +159,12 @@ def initiate_upload(index: int, sub: int) -> Generator[Exchange, bytes, tuple[by
     if reply[0] & 2:
         return expedited(reply), None
     return None, announced_bytes(index, sub, reply) if reply[0] & 1 else None
+
+
+def upload(index: int, sub: int) -> Transfer:
+    """Read an object: expedited or by segments, as the server answers."""
+    value, announced = yield from initiate_upload(index, sub)
+    return value if value is not None else (yield from upload_segments(index, sub, announced))
 
 
 def upload_segments(index: int, sub: int, announced: int | None) -> Transfer:

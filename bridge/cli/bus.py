@@ -77,6 +77,8 @@ class Line:
     families: dict[str, Family]
     is_of_site: bool
     states_bitrate: bool = True
+    state_dir: Path | None = None
+    """Of the site."""
 
     def sdo_policy(self, node_id: int) -> tuple[float, int]:
         """How long to wait for an answer of this node in seconds, and how often to ask again: as the site
@@ -140,7 +142,8 @@ def choose_line(site: Path | None, which: BusChoice) -> Line:
         bus = next(iter(tables))
     if bus not in tables:
         raise typer.BadParameter(f"which bus? Give --bus, one of {', '.join(tables)}")
-    return Line(not_virtual(tables[bus]), project.families, is_of_site=True)
+    state_dir = Path(project.site.site.state_dir)
+    return Line(not_virtual(tables[bus]), project.families, is_of_site=True, state_dir=state_dir)
 
 
 def not_virtual(table: BusTable) -> BusTable:

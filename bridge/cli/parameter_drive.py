@@ -11,6 +11,7 @@ import typer
 
 from bridge import clock
 from bridge.cli.bus import Line, carry_out, not_virtual, tell
+from bridge.cli.known_servers import KnownServers
 from bridge.cli.terminal import Show, progress
 from bridge.command.output_words import OutputWords
 from bridge.config import BusTable, NodeTable
@@ -118,16 +119,19 @@ class Target:
         not_virtual(self.line.table)
         if writes:
             self.count()
+        servers = KnownServers(self.line)
+        known = servers.known()
         try:
             with progress(self.name) as show:
                 errand = carry_out(
                     self.line,
-                    lambda now: ParameterErrand(self.node, self.family, self.slot, make, now),
+                    lambda now: ParameterErrand(self.node, self.family, self.slot, make, now, known),
                     lambda _: watch(show),
                 )
         finally:
             if writes:
                 self.count()
+        servers.learn(errand.take_learned())
         if not errand.is_done:
             raise OperationFailed("interrupted")
         return errand.result  # pyright: ignore[reportReturnType]  # None is what some procedures return
@@ -170,4 +174,5 @@ def find(site: Path, drive: str) -> Target:
     access = DriveParameters(
         name, node.name, family, Names(family), ledger, on_first=family.is_on_first(slot)
     )
-    return Target(Line(bus, project.families, is_of_site=True), node, family, slot, access, ledger, file)
+    line = Line(bus, project.families, is_of_site=True, state_dir=Path(project.site.site.state_dir))
+    return Target(line, node, family, slot, access, ledger, file)

@@ -10,11 +10,12 @@ from typing import Annotated, Literal
 
 import typer
 
-from bridge.canopen import datatypes
+from bridge.canopen import datatypes, width
 from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, Plain, TypeName
 from bridge.canopen.decode_sdo import shown
 from bridge.canopen.sdo import SdoError
-from bridge.cli.bus import AsJson, BusChoice, Line, carry_out, choose_line, split_site, takes_bus
+from bridge.cli.bus import AsJson, BusChoice, Line, carry_out, choose_line, split_site, takes_bus, tell
+from bridge.cli.known_servers import KnownServers
 from bridge.cli.terminal import printable, progress
 from bridge.errands.single import SdoErrand
 from bridge.errors import OperationFailed
@@ -64,6 +65,8 @@ def read(
         value = None if kind is None else decode(kind, data)
     except ValueError as error:
         raise OperationFailed(f"{index:04X}h:{sub:02X}: {error}") from None
+    if kind is not None and (said := surplus(kind, data)):
+        tell(f"warning: {index:04X}h:{sub:02X}: {said}")
     if as_json:
         facts = {"node": line.node_id(node), "index": f"{index:04X}", "sub": sub, "data": data.hex()}
         print(json.dumps({"ok": True} | facts | {"type": kind, "value": value}))
@@ -149,12 +152,24 @@ def _typed(name: str, text: str) -> Plain:
 
 
 def decode(kind: ValueType, data: bytes) -> Plain:
-    """The value of these bytes. Raises ValueError where the node has sent another length."""
+    """The value of these bytes; those beyond the type do not count. Raises ValueError where some are
+    missing."""
     name = _ALSO.get(kind, kind)
     size = NUMBERS[name].size if name in NUMBERS else len(data)
-    if len(data) != size:
+    if len(data) < size:
         raise ValueError(f"{kind} has {size} bytes, the node sent {len(data)}: {data.hex(' ').upper()}")
     return datatypes.decode(name, data)
+
+
+def surplus(kind: ValueType, data: bytes) -> str:
+    """What is to be said of bytes beyond the type that are not its padding; empty where there are none."""
+    name = _ALSO.get(kind, kind)
+    if name not in NUMBERS:
+        return ""
+    size = NUMBERS[name].size
+    if not width.surplus(data, size, signed=name in INTEGERS and INTEGERS[name].signed):
+        return ""
+    return f"{kind} has {size} bytes, the node sent {len(data)}: {data.hex(' ').upper()}"
 
 
 def for_people(value: int | float | str | bool | None, data: bytes) -> str:
@@ -183,11 +198,12 @@ def _way(line: Line, node_id: int, sdo_channel: int, timeout_ms: int | None, ret
 
 def _transfer(line: Line, way: _Way, index: int, sub: int, data: bytes | None, *, as_json: bool) -> bytes:
     """Run the transfer. Raises ``OperationFailed`` with the abort text if the node refuses or is silent."""
-    node_id = way.node_id
+    node_id, servers = way.node_id, KnownServers(line)
+    known = servers.known()
 
     def make(now: float) -> SdoErrand:
         return SdoErrand(
-            node_id, index, sub, data, now, way.timeout_s, retries=way.retries, server=way.server
+            node_id, index, sub, data, now, way.timeout_s, retries=way.retries, server=way.server, known=known
         )
 
     with progress(f"{index:04X}h:{sub:02X} of node {node_id}") as show:
@@ -197,6 +213,7 @@ def _transfer(line: Line, way: _Way, index: int, sub: int, data: bytes | None, *
             show(done, total, f"{done} bytes" if total is None else f"{done} of {total} bytes")
 
         errand = carry_out(line, make, watch)
+    servers.learn(errand.take_learned())
     if isinstance(errand.result, bytes):
         return errand.result
     if errand.result is None:

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import Final
 
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoChannel
+
+NOTHING_KNOWN: Final[Mapping[int, str]] = MappingProxyType({})
 
 
 class Errand(ABC):
@@ -40,6 +44,12 @@ class SdoErrands(Errand):
         super().__init__()
         self._now = now
         self._channels = {channel.reply_id: channel for channel in channels}
+
+    def take_learned(self) -> dict[int, str]:
+        """Why servers are not asked for block transfer any more, by the COB-ID of their requests: once for
+        each, when that was found out."""
+        learned = {channel.request_id: channel.take_learned() for channel in self._channels.values()}
+        return {request_id: why for request_id, why in learned.items() if why}
 
     def on_frame(self, frame: Frame) -> None:
         self._now = max(self._now, frame.time)

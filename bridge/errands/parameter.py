@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Generic, TypeVar
 
 from bridge.canopen import cobid
 from bridge.canopen.sdo import SdoChannel
 from bridge.config import NodeTable
-from bridge.errands.errand import SdoErrands
+from bridge.errands.errand import NOTHING_KNOWN, SdoErrands
 from bridge.mapping.model import Family, Slot
 from bridge.node.parameters.run import Procedure, run
 from bridge.parameter import ParameterError, Transfer
@@ -17,8 +17,8 @@ T = TypeVar("T")
 
 
 class ParameterErrand(SdoErrands, Generic[T]):
-    """A node that is no drive has no slot. ``make`` gives the procedure, of now. ``result`` is None until it
-    has ended."""
+    """A node that is no drive has no slot. ``make`` gives the procedure, of now. ``known`` says by the COB-ID
+    of its requests why a server is not asked for block transfer. ``result`` is None until it has ended."""
 
     def __init__(
         self,
@@ -27,13 +27,18 @@ class ParameterErrand(SdoErrands, Generic[T]):
         slot: Slot | None,
         make: Callable[[float], Procedure[T]],
         now: float,
+        known: Mapping[int, str] = NOTHING_KNOWN,
     ) -> None:
         self.result: T | ParameterError | None = None
         self.is_done = False
 
         def channel(request: int, reply: int) -> SdoChannel:
             return SdoChannel(
-                request + node.id, reply + node.id, node.sdo_timeout_ms / 1000, retries=node.sdo_retries
+                request + node.id,
+                reply + node.id,
+                node.sdo_timeout_ms / 1000,
+                retries=node.sdo_retries,
+                why_no_block=known.get(request + node.id, ""),
             )
 
         self._first = self._of_drive = channel(cobid.SDO_REQUEST, cobid.SDO_REPLY)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 from bridge.canopen import cobid, nmt
@@ -9,7 +10,7 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.canopen.sdo import Result, SdoChannel
 from bridge.canopen.sdo_transfer import MUX, SEGMENT, U32
-from bridge.errands.errand import Errand, SdoErrands
+from bridge.errands.errand import NOTHING_KNOWN, Errand, SdoErrands
 from bridge.mapping.model import SdoServer
 
 _SDO_BYTES: Final = 8
@@ -26,7 +27,8 @@ _EXPECTED: Final = {
 class SdoErrand(SdoErrands):
     """One transfer with an SDO server of a node; ``result`` is None until it has ended.
 
-    ``data`` None reads, bytes are written. ``server`` None is the first. Times are monotonic seconds.
+    ``data`` None reads, bytes are written. ``server`` None is the first. ``known`` says by the COB-ID of its
+    requests why a server is not asked for block transfer. Times are monotonic seconds.
     """
 
     def __init__(
@@ -40,6 +42,7 @@ class SdoErrand(SdoErrands):
         *,
         retries: int = 0,
         server: SdoServer | None = None,
+        known: Mapping[int, str] = NOTHING_KNOWN,
     ) -> None:
         self.result: Result | None = None
         self.done_bytes = 0
@@ -49,7 +52,13 @@ class SdoErrand(SdoErrands):
         self._mux = MUX.pack(index, sub)
         self._writes = data is not None
         request, reply = (server.request, server.reply) if server else (cobid.SDO_REQUEST, cobid.SDO_REPLY)
-        channel = SdoChannel(request + node_id, reply + node_id, timeout_s, retries=retries)
+        channel = SdoChannel(
+            request + node_id,
+            reply + node_id,
+            timeout_s,
+            retries=retries,
+            why_no_block=known.get(request + node_id, ""),
+        )
         super().__init__([channel], now)
         if data is None:
             channel.read(index, sub, now, self._done)

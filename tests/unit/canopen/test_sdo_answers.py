@@ -87,16 +87,17 @@ def test_an_answer_to_something_else_does_not_start_blocks(foreign: str) -> None
     assert asker.sent() == ["A3 00 00 00 00 00 00 00"]
 
 
-def test_blocks_that_the_server_refuses_for_another_reason_are_not_tried_by_segments() -> None:
+def test_an_object_that_the_server_refuses_by_segments_too_says_nothing_of_its_blocks() -> None:
     """It knows the command and refuses the object; the next long object is asked for by blocks again."""
     asker = start_of_blocks()
     asker.say("80 20 1F 00 01 00 01 06")
-    assert asker.sent() == []
+    assert asker.sent() == ["40 20 1F 00 00 00 00 00"]
+    asker.say("80 20 1F 00 01 00 01 06")
     assert asker.sentence == "1F20h:00: the node aborted: attempt to read a write-only object (06010001h)"
     asker.channel.write(0x1F20, 0, bytes(140), 0.0, asker.results.append)
     assert asker.sent() == ["C6 20 1F 00 8C 00 00 00"]
-    asker.say("80 20 1F 00 02 00 01 06")
-    assert asker.sent() == []
+    asker.say("80 20 1F 00 02 00 01 06", "80 20 1F 00 02 00 01 06")
+    assert asker.sent() == ["21 20 1F 00 8C 00 00 00"]
     assert isinstance(asker.results[1], SdoError)
 
 

@@ -17,6 +17,7 @@ from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_line, print_tabl
 from bridge.cli.terminal import printable
 from bridge.errands.decode import Decoder, Kind, Meaning
 from bridge.errands.errand import Errand
+from bridge.errands.habit_watch import HabitWatch
 from bridge.errands.statistics import Statistics
 from bridge.errors import OperationFailed
 from bridge.lint import family_dictionaries
@@ -30,6 +31,7 @@ class _Listener(Errand):
     def __init__(
         self,
         decoder: Decoder,
+        habits: HabitWatch,
         wanted: Callable[[Meaning], bool],
         show: Callable[[Frame, Meaning, float], None],
         now: float,
@@ -40,6 +42,7 @@ class _Listener(Errand):
         self.started = now
         self.last = now
         self._decoder = decoder
+        self._habits = habits
         self._wanted = wanted
         self._show = show
         self._left = count
@@ -52,6 +55,7 @@ class _Listener(Errand):
     def on_frame(self, frame: Frame) -> None:
         # Also what is not shown is decoded: an answer needs the request before it.
         meaning = self._decoder.decode(frame)
+        self._habits.on_frame(frame, meaning.node)
         if self._left == 0 or not self._wanted(meaning):
             return
         self._show(frame, meaning, frame.time - self.started)
@@ -81,6 +85,7 @@ def monitor(
     devices = [name for name, family in line.families.items() if family.is_device]
     decoder = Decoder(line.table.node, line.families, line.own_id, family_dictionaries(devices, site))
     tally = Statistics(line.table.bitrate)
+    habits = HabitWatch(lambda node_id: line.sdo_policy(node_id)[0], decoder.tpdo_bytes)
 
     def wanted(meaning: Meaning) -> bool:
         return (not ids or meaning.node in ids) and (not kinds or meaning.kind in kinds)
@@ -97,10 +102,14 @@ def monitor(
 
     with Record(log) if log else nullcontext() as record:
         try:
-            listener = carry_out(line, lambda now: _Listener(decoder, wanted, show, now, count, seconds))
+            listener = carry_out(
+                line, lambda now: _Listener(decoder, habits, wanted, show, now, count, seconds)
+            )
         except BrokenPipeError:
             sys.stderr.close()  # whoever read us has had enough, as `head` does
             return
+    for node_id, said in habits.habits().items():
+        tell(f"{decoder.name(node_id)}: {'; '.join(said)}")
     if statistics:
         _print_statistics(tally, listener.last - listener.started, as_json=as_json)
 

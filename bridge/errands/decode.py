@@ -111,6 +111,11 @@ class Decoder:
             return _lss(cob_id, frame.data)
         return self._of_node(cob_id & ~0x7F, cob_id & 0x7F, frame.data)
 
+    def tpdo_bytes(self, cob_id: int) -> int | None:
+        """Length of a TPDO by the mapping file; None for what is none of the site's."""
+        view = self._pdos.get(cob_id)
+        return view.codec.length if view is not None and view.label.startswith("TPDO") else None
+
     def name(self, node_id: int) -> str:
         """The node as the site calls it, or its address."""
         return self._names.get(node_id, f"node {node_id}")

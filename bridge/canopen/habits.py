@@ -1,0 +1,124 @@
+"""Habits of devices that the standard does not allow, by what is heard of them: a table and its counters.
+
+A device with such a habit seems to be silent, for its frames do not count. What counts is said from the
+table: one row for each kind of frame. A device that plays a habit is a file in ``bridge/sim/habits``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from types import MappingProxyType
+from typing import Final
+
+_NAMED_FROM: Final = 3
+"""Fewer such frames may be a disturbance, or another device."""
+_AGAIN_AFTER: Final = 10
+"""A habit is news once more when it has shown this many times as often."""
+
+
+class Odd(Enum):
+    """What is odd about a frame."""
+
+    SDO_LENGTH = "an SDO answer of another length"
+    HEARTBEAT_LENGTH = "an error control message of another length"
+    EMCY_LENGTH = "an emergency message of another length"
+    TPDO_LENGTH = "a TPDO that is longer or shorter than its mapping"
+    TPDO_LENGTH_BY_FILE = "the same where only the mapping file tells the mapping"
+    SDO_LATE = "an SDO answer after the time-out"
+
+
+@dataclass(frozen=True, slots=True)
+class Habit:
+    """What is said of one kind of odd frame: of ``one`` or of ``many``, and what is right.
+
+    ``count`` is their number; the last of them ``has`` so many bytes or ms where ``due`` are right.
+    """
+
+    one: str
+    many: str
+    right: str
+
+    def said(self, count: int, has: int, due: int) -> str:
+        template = f"{self.one if count == 1 else self.many}: {self.right}"
+        return template.format(count=count, has=has, due=due)
+
+
+HABITS: Final[Mapping[Odd, Habit]] = MappingProxyType(
+    {
+        Odd.SDO_LENGTH: Habit(
+            "{count} SDO answer of {has} bytes",
+            "{count} SDO answers of {has} bytes",
+            "not CiA 301 §7.2.4.3, an SDO has {due}",
+        ),
+        Odd.HEARTBEAT_LENGTH: Habit(
+            "{count} heartbeat of {has} bytes",
+            "{count} heartbeats of {has} bytes",
+            "not CiA 301 §7.2.8.3, a heartbeat has {due}",
+        ),
+        Odd.EMCY_LENGTH: Habit(
+            "{count} emergency message of {has} bytes",
+            "{count} emergency messages of {has} bytes",
+            "not CiA 301 §7.2.7, an emergency message has {due}",
+        ),
+        Odd.TPDO_LENGTH: Habit(
+            "{count} TPDO of {has} bytes",
+            "{count} TPDOs of {has} bytes",
+            "not CiA 301 §7.2.2, the mapping has {due}",
+        ),
+        Odd.TPDO_LENGTH_BY_FILE: Habit(
+            "{count} TPDO of {has} bytes",
+            "{count} TPDOs of {has} bytes",
+            "the mapping file has {due}",
+        ),
+        Odd.SDO_LATE: Habit(
+            "{count} SDO answer {has} ms after the request",
+            "{count} SDO answers {has} ms after the request",
+            "sdo_timeout_ms is {due}",
+        ),
+    }
+)
+
+
+@dataclass(slots=True)
+class _Count:
+    count: int = 0
+    has: int = 0
+    due: int = 0
+    news_from: int = _NAMED_FROM
+
+
+class HabitCounter:
+    """Odd frames of one node, counted since the first."""
+
+    def __init__(self) -> None:
+        self._counts: dict[Odd, _Count] = {}
+
+    def note(self, odd: Odd, has: int, due: int) -> None:
+        """A frame that ``has`` so many bytes, or came after so many milliseconds, where ``due`` are right."""
+        counted = self._counts.setdefault(odd, _Count())
+        counted.count += 1
+        counted.has, counted.due = has, due
+
+    def said(self, least: int = 1) -> list[str]:
+        """A sentence for each habit that has shown at least ``least`` times."""
+        return [_said(odd, one) for odd, one in self._counts.items() if one.count >= least]
+
+    def habits(self) -> list[str]:
+        """As ``said``, for those that are too frequent for a disturbance."""
+        return self.said(_NAMED_FROM)
+
+    def take_news(self) -> list[str]:
+        """As ``habits``, for those that have become habits since the last call, or ten times as frequent."""
+        news: list[str] = []
+        for odd, one in self._counts.items():
+            if one.count >= one.news_from:
+                news.append(_said(odd, one))
+                while one.news_from <= one.count:
+                    one.news_from *= _AGAIN_AFTER
+        return news
+
+
+def _said(odd: Odd, counted: _Count) -> str:
+    return HABITS[odd].said(counted.count, counted.has, counted.due)

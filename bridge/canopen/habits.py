@@ -94,12 +94,15 @@ class HabitCounter:
 
     def __init__(self) -> None:
         self._counts: dict[Odd, _Count] = {}
+        self.has_news = False
+        """``take_news`` has something to tell."""
 
     def note(self, odd: Odd, has: int, due: int) -> None:
         """A frame that ``has`` so many bytes, or came after so many milliseconds, where ``due`` are right."""
         counted = self._counts.setdefault(odd, _Count())
         counted.count += 1
         counted.has, counted.due = has, due
+        self.has_news |= counted.count >= counted.news_from
 
     def said(self, least: int = 1) -> list[str]:
         """A sentence for each habit that has shown at least ``least`` times."""
@@ -111,6 +114,7 @@ class HabitCounter:
 
     def take_news(self) -> list[str]:
         """As ``habits``, for those that have become habits since the last call, or ten times as frequent."""
+        self.has_news = False
         news: list[str] = []
         for odd, one in self._counts.items():
             if one.count >= one.news_from:

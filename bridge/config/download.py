@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.canopen.sdo import COMMANDS
@@ -17,13 +17,14 @@ class Download:
     """One object and its bytes as they go over the wire.
 
     With ``read_back`` it is compared first, written where it differs and read back; without, it is written
-    blindly, as a command is.
+    blindly, as a command is. ``kind`` is the data type, empty where that is not known.
     """
 
     index: int
     sub: int
     data: bytes
     read_back: bool = True
+    kind: str = field(default="", compare=False)
 
     @property
     def is_command(self) -> bool:

@@ -223,7 +223,9 @@ class ConfigureTable(Table):
     @property
     def download(self) -> Download:
         index, sub = self.object.split(":")
-        return Download(int(index, 16), int(sub, 16), encode(self.type, self.value), self.read_back)
+        return Download(
+            int(index, 16), int(sub, 16), encode(self.type, self.value), self.read_back, self.type
+        )
 
 
 class NodeTable(Table):

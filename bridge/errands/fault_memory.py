@@ -8,6 +8,7 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.canopen import width
 from bridge.drive import Explained, FaultWords
 from bridge.mapping.model import Family, ObjectRef
 from bridge.parameter import DriveParameters, Entry, ParameterError, Transfer, TransferFailed, Why
@@ -62,9 +63,9 @@ def _history(words: FaultWords) -> Asks:
     found: list[Remembered] = []
     try:
         data, _ = yield Transfer(ObjectRef(_HISTORY, 0), of_node=True)
-        for sub in range(1, min(_number(data), _MOST) + 1):
+        for sub in range(1, min(_number(data, 1), _MOST) + 1):
             data, _ = yield Transfer(ObjectRef(_HISTORY, sub), of_node=True)
-            number = _number(data)
+            number = _number(data, 4)
             if number & _WORD:
                 found.append(
                     Remembered(f"1003:{sub:02X}", words.of_code(number & _WORD), number >> 16 & _WORD)
@@ -75,5 +76,5 @@ def _history(words: FaultWords) -> Asks:
     return found
 
 
-def _number(data: bytes) -> int:
-    return int.from_bytes(data[:4], "little")
+def _number(data: bytes, size: int) -> int:
+    return width.unsigned(data, size)

@@ -12,7 +12,7 @@ from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Final
 
-from bridge.canopen import cobid, nmt
+from bridge.canopen import cobid, nmt, width
 from bridge.canopen.datatypes import text
 from bridge.canopen.dialogue import Dialogue, Read, ask, attempt
 from bridge.canopen.frame import REMOTE, Frame
@@ -70,11 +70,11 @@ class FoundNode:
 
 
 def _is_silence(answer: Result) -> bool:
-    return isinstance(answer, SdoError) and not answer.by_server
+    return isinstance(answer, SdoError) and not answer.was_answered
 
 
-def _number(answer: Result) -> int | None:
-    return int.from_bytes(answer, "little") if isinstance(answer, bytes) and answer else None
+def _number(answer: Result, size: int = 4) -> int | None:
+    return width.unsigned(answer, size) if isinstance(answer, bytes) and answer else None
 
 
 def _interview(node: FoundNode) -> Interview:
@@ -108,7 +108,7 @@ def _interview(node: FoundNode) -> Interview:
     guard_time = yield from attempt(0x100C)
     node.has_guarding = isinstance(guard_time, bytes)
     # The first remote frame would start the node's life guarding, and we send no second one.
-    guarded = (_number(guard_time) or 0) * (_number((yield from attempt(0x100D))) or 0)
+    guarded = (_number(guard_time, 2) or 0) * (_number((yield from attempt(0x100D)), 1) or 0)
     if not node.is_heard and not guarded:
         yield Guard()
 

@@ -112,7 +112,7 @@ class StartWrite(Table):
     def download(self, sync_period_ms: int) -> Download:
         """Raises ValueError where the period of SYNC does not fit the type."""
         data = encode(self.type, self.value_with(sync_period_ms))
-        return Download(self.object.index, self.object.sub, data, self.read_back)
+        return Download(self.object.index, self.object.sub, data, self.read_back, self.type)
 
 
 Pdos = Annotated[

@@ -400,5 +400,7 @@ class Network:
         self._plant.set(f"{top}/passive", self.charge.is_left, now)
         for node in self.nodes:
             node.wire.refresh(now)
+            if node.wire.habits.has_news:
+                node.tell_habits(now)
             # Whoever has asked it for something meanwhile: its deadlines are looked at.
             self._schedule.plan(node)

@@ -79,7 +79,9 @@ class Booting:
         if self._awaited and now >= self._awaited.deadline:
             awaited, self._awaited = self._awaited, None
             if awaited.state is None:
-                error = boot.BootError(self._step.letter, f"nothing was heard while {self._step.text}")
+                error = boot.BootError(
+                    self._step.letter, f"nothing was heard while {self._step.text}{_needed(self._step)}"
+                )
             else:
                 wants, stays = awaited.state.words, state.words
                 error = boot.BootError("J", f"the node stays {stays}, expected {wants}", absent=False)
@@ -121,12 +123,17 @@ class Booting:
     def _end(self, result: boot.BootResult | boot.BootError | SdoError, now: float) -> None:
         self._dialogue = None
         if isinstance(result, SdoError):
-            result = _failure(result, self._step.letter)
+            result = _failure(result, self._step)
         self._node.boot_ended(result, now)
 
 
-def _failure(error: SdoError, letter: str) -> boot.BootError:
+def _failure(error: SdoError, step: boot.Step) -> boot.BootError:
     """What the boot-up ends with. Silence says nothing about what was asked for."""
-    if error.by_server or letter == "B":
-        return boot.BootError(letter, str(error), absent=not error.by_server)
-    return boot.BootError(letter, f"the node does not answer: {error}", absent=True)
+    needed = _needed(step)
+    if error.was_answered or step.letter == "B":
+        return boot.BootError(step.letter, f"{error}{needed}", absent=not error.was_answered)
+    return boot.BootError(step.letter, f"the node does not answer: {error}{needed}", absent=True)
+
+
+def _needed(step: boot.Step) -> str:
+    return f"; needed by {step.needed_by}" if step.needed_by else ""

@@ -239,10 +239,10 @@ class NodeCore:
 
     def carry_out(self, action: boot.Action, now: float) -> None:
         match action:
-            case boot.Step(text):
+            case boot.Step():
                 # Looking for a node that was never there is nothing to report every ten seconds.
                 if self.state is not NodeState.ABSENT:
-                    self.say(text, now)
+                    self.say(str(action), now)
             case boot.Signal.FOUND:
                 self.set_state(NodeState.BOOTING, now)
             case boot.DeviceErrors():
@@ -260,7 +260,8 @@ class NodeCore:
         if isinstance(result, boot.BootError):
             self._fail_boot(result, now)
             return
-        self._view.identified(result.identification, now)
+        if self._view.identified(result.identification, now):
+            self.wire.sdo.forget_block()
         self.wire.connect(result, now)
         problems = [f"J: {name}" for name, plan in result.drives.items() if plan.problem]
         self._enter_operation("; ".join([", ".join(problems) or "ok", *result.notes]), now)
@@ -283,6 +284,9 @@ class NodeCore:
 
     def _fail_boot(self, error: boot.BootError, now: float) -> None:
         self.error_control.stop(now)
+        habits = "; ".join(self.wire.habits.said())
+        if habits and error.absent:
+            error = boot.BootError(error.letter, error.detail, absent=True, hint=habits)
         self._view.failed(error, now)
         if self.state is NodeState.BOOTING:
             self.set_state(NodeState.LOST if error.absent else NodeState.CONFIG_ERROR, now)
@@ -304,6 +308,11 @@ class NodeCore:
     def enforce(self, action: Action, why: str, now: float) -> None:
         """Because somebody ignores a stop whose words have been on the bus for long."""
         self.carry_out_command(action, why, now, at_once=self.leaving.has_told(now))
+
+    def tell_habits(self, now: float) -> None:
+        """Tell what its frames have that the standard does not allow, where there are news of that."""
+        if self.is_operational and (news := self.wire.habits.take_news()):
+            self._view.shows_habits(news, self.wire.habits.habits(), now)
 
     # states
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 from functools import partial
 from typing import Final
 
-from bridge.canopen import abort
+from bridge.canopen import abort, width
 from bridge.canopen.sdo import Result, SdoError
 from bridge.command.output_following import Answer, Question, StoppedOutput
 from bridge.command.outputs import Outputs
 from bridge.node.sdo_channels import FIRST, SdoChannels
 
 _EXPEDITED: Final = 4
-"""An expedited answer without a size always has so many bytes (CiA 301 §7.2.4.3.3)."""
+"""Some servers answer every read of a number with so many bytes. Any other length is another object."""
 
 
 class ReadBack:
@@ -48,9 +48,9 @@ def _answer(output: StoppedOutput, result: Result) -> Answer:
             return Answer(None, f"the node does not let {output.place} be read: {why}")
         return Answer(None, f"{output.place} cannot be read: no valid answer", was_silent=True)
     size = -(-output.size // 8)
-    data = result[:size] if len(result) == _EXPEDITED and not any(result[size:]) else result
-    raw = int.from_bytes(data, "little")
-    if len(data) != size or (output.size > 1 and raw >> output.size):
+    raw = width.unsigned(result, size)
+    is_of_length = len(result) == size or len(result) == _EXPEDITED > size
+    if not is_of_length or width.surplus(result, size) or (output.size > 1 and raw >> output.size):
         return Answer(
             None, f"{output.place} cannot be read: {len(result)} bytes where {output.size} bits belong"
         )

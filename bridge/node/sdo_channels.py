@@ -90,6 +90,15 @@ class SdoChannels:
         """Frames on the reply COB-IDs that were no answer."""
         return sum(channel.unmatched for channel in self._all)
 
+    def take_learned(self) -> list[str]:
+        """Why block transfer is not used any more on a channel, once for each."""
+        return [why for channel in self._all if (why := channel.take_learned())]
+
+    def forget_block(self) -> None:
+        """Another device is there: what was learned of the one before does not count."""
+        for channel in self._all:
+            channel.forget_block()
+
     def take_frames(self) -> list[Frame]:
         return [frame for channel in self._all for frame in channel.take_frames()]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from bridge.canopen.nmt import NmtState
 from bridge.command import Event, Identification, Kind, Plant
 from bridge.command.link import NodeState
@@ -16,7 +18,8 @@ class NodeView:
         self._node = node
         self._plant = plant
         self._top = f"{node.name}/node"
-        self._failure = ""
+        self._failure: tuple[str, str] | None = None
+        self._success = ""
         self._errors = ""
         self._identification: Identification | None = None
 
@@ -32,14 +35,15 @@ class NodeView:
         self._plant.set(f"{self._top}/supervision_state", text, now)
 
     def succeeded(self, text: str, now: float) -> None:
-        self._failure = ""
+        self._failure, self._success = None, text
         self.say(text, now)
 
     def failed(self, error: BootError, now: float) -> None:
         """The boot-up has failed; each way of failing is an event once until it succeeds."""
         self.say(str(error), now)
-        if self._failure != str(error):
-            self._failure = str(error)
+        failure = error.letter, error.detail
+        if self._failure != failure:
+            self._failure = failure
             self._tell(Kind.CONFIGURATION, 600, f"boot-up failed: {error}", now)
 
     def errors(self, text: str, now: float) -> None:
@@ -49,11 +53,18 @@ class NodeView:
             self._tell(Kind.EMERGENCY, 300, f"the node says: {text}", now)
         self._errors = text
 
-    def identified(self, found: Identification, now: float) -> None:
-        """Who the node is, by a boot-up that has succeeded; an event where that is somebody else."""
+    def shows_habits(self, news: Sequence[str], habits: Sequence[str], now: float) -> None:
+        """``news`` are habits of the node in operation that are to be told, ``habits`` all of them."""
+        for text in news:
+            self._tell(Kind.CONFIGURATION, 300, text, now)
+        self.say("; ".join([self._success, *habits]), now)
+
+    def identified(self, found: Identification, now: float) -> bool:
+        """Who the node is, by a boot-up that has succeeded. True where that is somebody else than before,
+        which is an event."""
         before, self._identification = self._identification, found
         if before is None:
-            return
+            return False
         told = [
             f"{name} {getattr(found, name):08X}h, was {getattr(before, name):08X}h"
             for name in ("vendor", "product", "revision")
@@ -64,6 +75,7 @@ class NodeView:
         if told:
             text = f"another device than before: {', '.join(told)}. Its settings may be others"
             self._tell(Kind.CONFIGURATION, 600, text, now)
+        return bool(told)
 
     def resets(self, why: str, now: float) -> None:
         self._tell(Kind.CONFIGURATION, 500, f"reset communication by the bridge, once: {why}", now)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Final
 
 from bridge.canopen import cobid, nmt
 from bridge.canopen.frame import Frame
+from bridge.canopen.habits import HabitCounter, Odd
 from bridge.canopen.nmt import NmtCommand
 from bridge.canopen.sdo import SdoChannel
 from bridge.command import Drive, Event, Kind, Plant
@@ -29,6 +31,8 @@ from bridge.node.read_back import ReadBack
 from bridge.node.sdo_channels import SdoChannels
 
 Handler = Callable[[Frame], None]
+_SDO_BYTES: Final = 8
+_EMCY_BYTES: Final = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +60,9 @@ class NodeWire:
         self._listener = listener
         self.sdo = SdoChannels(node)
         self.rejected = 0
+        self.habits = HabitCounter()
+        self._mapped_bytes: dict[int, int] = {}
+        """Length of each TPDO, by its COB-ID."""
         self.faults = FaultReading(node, self.sdo)
         self.meanings = MeaningWatch(node, self.sdo)
         outputs = node.device.outputs if node.device else None
@@ -147,8 +154,14 @@ class NodeWire:
         if self._read_back:
             self._read_back.now = frame.time
         channel.on_frame(frame)
+        if len(frame.data) != _SDO_BYTES:
+            self.habits.note(Odd.SDO_LENGTH, len(frame.data), _SDO_BYTES)
         if channel.late == late:
             self.error_control.on_reply(frame, matched=channel.unmatched == unmatched)
+        else:
+            late_ms, timeout_ms = round(1000 * channel.lateness_s), round(1000 * channel.timeout_s)
+            self.habits.note(Odd.SDO_LATE, late_ms, timeout_ms)
+        self._tell_learned(frame.time)
         self._listener.touch()
 
     def _on_emcy(self, frame: Frame) -> None:
@@ -158,6 +171,7 @@ class NodeWire:
     def _on_error_control(self, frame: Frame) -> None:
         sign = self.error_control.on_frame(frame)
         if sign is Sign.MALFORMED:
+            self.habits.note(Odd.HEARTBEAT_LENGTH, len(frame.data), 1)
             self.reject(frame, "an error control message has 1 byte")
         else:
             self._listener.on_sign(sign, frame.time)
@@ -165,6 +179,11 @@ class NodeWire:
     def reject(self, frame: Frame, why: str) -> None:
         """A frame that does not fit: counted, told at most once a minute, nothing changed."""
         self.rejected += 1
+        due = self._mapped_bytes.get(frame.can_id, len(frame.data))
+        if due != len(frame.data):
+            self.habits.note(Odd.TPDO_LENGTH, len(frame.data), due)
+        elif frame.can_id == self._emcy_id and len(frame.data) != _EMCY_BYTES:
+            self.habits.note(Odd.EMCY_LENGTH, len(frame.data), _EMCY_BYTES)
         message = f"{frame!r} does not fit: {why}"
         self._plant.report(Event(frame.time, Kind.CONFIGURATION, self._node.name, 300, message))
 
@@ -178,6 +197,12 @@ class NodeWire:
             self._read_back.on_time(now)
         self.sdo.on_time(now)
         self.send_put_off(now)
+
+    def _tell_learned(self, now: float) -> None:
+        """Something is learned when a transfer ends well, which an answer brings about."""
+        for why in self.sdo.take_learned():
+            message = f"block transfer is not used any more: {why}"
+            self._plant.report(Event(now, Kind.CONFIGURATION, self._node.name, 300, message))
 
     def send_put_off(self, now: float) -> None:
         """The NMT command that waits, if its time has come."""
@@ -220,6 +245,7 @@ class NodeWire:
         self._plant.set(f"{self._node.name}/node/software_version", result.software_version, now)
         self.drives = connect(self._node, result, self.reject, self._listener.is_taken, now)
         self._left_out = {name: plan.problem for name, plan in result.drives.items()}
+        self._mapped_bytes = {pdo.cob_id: pdo.codec.length for pdo in _tpdos(result)}
         self.routes = self._basic_routes()
         for pdos in self.drives.values():
             self.routes |= pdos.handlers
@@ -246,3 +272,13 @@ class NodeWire:
     def refresh(self, now: float) -> None:
         self._plant.set(f"{self._node.name}/node/rejected_frames", self.rejected + self.sdo.unmatched, now)
         self._emergencies.refresh(now)
+
+
+def _tpdos(result: boot.BootResult) -> Iterator[boot.PdoPlan]:
+    """All that the node sends and the bridge takes."""
+    for plan in result.drives.values():
+        yield from plan.tpdos
+    for of_node in result.node_tpdos:
+        yield of_node.pdo
+    if result.inputs:
+        yield from result.inputs.pdos

@@ -10,9 +10,10 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.canopen import width
 from bridge.image import Value
 from bridge.mapping.model import Family, ObjectRef
-from bridge.parameter.codec import decode, encode_value, matches, shown
+from bridge.parameter.codec import decode, encode_value, forms, matches, shown
 from bridge.parameter.definition import Entry
 from bridge.parameter.error import ParameterError, TransferFailed, Why
 from bridge.parameter.ledger import Key, Ledger
@@ -164,7 +165,7 @@ class DriveParameters:
         self._cache.pop(entry.address, None)
         lost: TransferFailed | None = None
         try:
-            _, now = yield self._transfer(entry, data, gate, of_node=_is_of_node(entry))
+            now = yield from self._put(entry, data, before, gate)
         except TransferFailed as failure:
             if failure.by_drive or blind:
                 raise self._error(entry, failure) from None
@@ -184,6 +185,22 @@ class DriveParameters:
             raise ParameterError(Why.NOT_TAKEN, f"{entry.name}: the drive took the value and holds {found}")
         was = None if before is None else decode(entry, before)
         return Written(Reading(entry, _held(entry, held, value), now), was, True, warning)
+
+    def _put(
+        self, entry: Entry, data: bytes, before: bytes | None, gate: Gate
+    ) -> Generator[Transfer, tuple[bytes, float], float]:
+        """Write ``data`` in the width in which the drive takes it; when that was, in monotonic seconds."""
+        refused: TransferFailed | None = None
+        for form in forms(entry, data, before):
+            try:
+                _, now = yield self._transfer(entry, form, gate, of_node=_is_of_node(entry))
+            except TransferFailed as failure:
+                refused = failure
+                if not failure.by_drive or not width.may_mean_width(failure.abort_code):
+                    raise
+            else:
+                return now
+        raise refused or AssertionError("there is one form at least")
 
     def check_writable(self, entry: Entry) -> None:
         """Raises ``ParameterError`` for what nobody writes by this way."""

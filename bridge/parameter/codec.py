@@ -7,9 +7,10 @@ text where it sends another length.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Final
 
-from bridge.canopen import datatypes
+from bridge.canopen import datatypes, width
 from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, Integer
 from bridge.image import Value
 from bridge.image.limits import shown_range
@@ -18,7 +19,6 @@ from bridge.parameter.error import ParameterError, Why
 from bridge.parameter.number_text import NumberError, command_line_number
 
 _RAW_SIZES: Final = (1, 2, 4, 8)
-_SIGN: Final = 0x80
 _DIGITS: Final = 9
 """Behind the point: what a factor such as 0.01 makes of a whole number is that number of hundredths."""
 
@@ -79,12 +79,21 @@ def matches(entry: Entry, held: bytes, wanted: bytes) -> bool:
     """Whether the drive holds what was to be written."""
     if entry.definition and entry.definition.data_type == "string":
         return datatypes.text(held) == datatypes.text(wanted)
+    # Longer than any number: zeros behind it are no other value.
+    padded = len(held) > width.LONGEST and held == wanted.ljust(len(held), b"\0")
+    return padded or width.holds(held, wanted, signed=_is_signed(entry))
+
+
+def forms(entry: Entry, data: bytes, held: bytes | None) -> Iterator[bytes]:
+    """The bytes in which the drive may take a value, the likeliest first; ``held`` is its last answer."""
+    if held is None or (entry.definition and entry.definition.data_type not in NUMBERS):
+        return iter((data,))
+    return width.forms(data, held, signed=_is_signed(entry))
+
+
+def _is_signed(entry: Entry) -> bool:
     kind = entry.definition.data_type if entry.definition else ""
-    beyond = held[len(wanted) :]
-    # Some servers answer every read with four bytes, and a negative number with its sign.
-    is_negative = kind in INTEGERS and INTEGERS[kind].signed and bool(wanted) and wanted[-1] >= _SIGN
-    extended = not any(beyond) or (is_negative and set(beyond) == {0xFF})
-    return held[: len(wanted)] == wanted and extended
+    return kind in INTEGERS and INTEGERS[kind].signed
 
 
 def parse(entry: Entry, text: str) -> Value:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
 
+from bridge.canopen import width
 from bridge.canopen.dialogue import Read, Write
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.canopen.sdo import SdoError
@@ -21,10 +22,18 @@ from bridge.node.boot.status import BootError
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What the boot-up is doing now, for ``boot_status``; ``letter`` is the error status if it fails."""
+    """What the boot-up is doing now, for ``boot_status``; ``letter`` is the error status if it fails.
+
+    ``needed_by`` is the key in the site file, or in ``mapping``, that asks for it; empty: nothing does, and
+    a node that answers it wrongly or not at all is used all the same.
+    """
 
     text: str
     letter: str
+    needed_by: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.text} (needed by {self.needed_by})" if self.needed_by else self.text
 
 
 class Signal(Enum):
@@ -146,6 +155,8 @@ class BootResult:
     """Longest time in ms from the bridge's hang to outputs that the node itself has made safe; 0 with the
     reason where there is none."""
     notes: list[str] = field(default_factory=list[str])
+    silences: int = 0
+    """Objects that nothing needs and that were not answered."""
     emcy_id: int | None = None
     """Where emergency messages come; None where the node sends none."""
     heartbeat_ms: int = 0
@@ -162,30 +173,87 @@ Do = Generator[Action, bytes | None, None]
 
 @contextmanager
 def told_as(error: Callable[[SdoError], Exception]) -> Generator[None]:
-    """Around steps that the node must not refuse: raises ``error`` where it does. Silence remains silence."""
+    """Around steps that the node must not refuse, nor answer wrongly: raises ``error`` where it does. Silence
+    remains silence."""
     try:
         yield
     except SdoError as refusal:
-        if not refusal.by_server:
+        if not refusal.was_answered:
             raise
         raise error(refusal) from None
 
 
-_LONGEST_NUMBER: Final = 8
+U8: Final = 1
+U16: Final = 2
+U32: Final = 4
+"""Bytes of UNSIGNED8, UNSIGNED16 and UNSIGNED32."""
+_MOST_SILENCES: Final = 2
+"""Objects that nothing needs may remain without an answer: a node that has no segmented transfer may be
+silent about its texts, 1008h and 100Ah. One that leaves more unanswered is gone."""
 
 
-def number(data: bytes | None, default: int = 0) -> int:
-    """The number in an answer. Raises BootError where it is longer than any number of CANopen."""
+def number(data: bytes | None, default: int = 0, *, size: int = U32) -> int:
+    """The number of ``size`` bytes in an answer. Raises BootError where that is longer than any number of
+    CANopen."""
     if data is None:
         return default
-    if len(data) > _LONGEST_NUMBER:
+    if len(data) > width.LONGEST:
         raise BootError("J", f"the node answers with {len(data)} bytes where a number belongs")
-    return int.from_bytes(data, "little")
+    return width.unsigned(data, size)
 
 
 def same(have: bytes | None, want: bytes) -> bool:
-    """Whether the node's bytes are ours. An expedited answer without a size always has four."""
-    if have is None:
-        return False
-    padded = len(have) == 4 > len(want) and not any(have[len(want) :])
-    return have == want or (padded and have[: len(want)] == want)
+    """Whether what the node has answered is what it is to hold."""
+    return have is not None and width.holds(have, want)
+
+
+def wish(
+    result: BootResult, index: int, sub: int = 0, channel: int = 1, *, may_be_silent: bool = True
+) -> Generator[Read, bytes | None, bytes | None]:
+    """An object that nothing needs: None where the node has none, and, with a note, where it answers wrongly
+    or not at all. Raises SdoError where it is silent too often to be there, or, without ``may_be_silent``,
+    at all."""
+    try:
+        return (yield Read(index, sub, channel))
+    except SdoError as error:
+        if not (error.was_answered or may_be_silent):
+            raise
+        if not error.by_server:
+            go_on_without(error, result)
+        return None
+
+
+def go_on_without(error: SdoError, result: BootResult) -> None:
+    """Note an object that nothing needs and that cannot be read. Raises ``error`` where the node is silent
+    too often to be there."""
+    if not error.was_answered:
+        result.silences += 1
+        if result.silences > _MOST_SILENCES:
+            raise error
+    result.notes.append(f"cannot be read, and is not needed: {error}")
+
+
+def write_number(
+    index: int,
+    sub: int,
+    data: bytes,
+    have: bytes | None,
+    *,
+    is_number: bool = True,
+    signed: bool = False,
+    channel: int = 1,
+) -> Do:
+    """Write ``data`` in the width in which the node takes it; ``have`` is its last answer, None where it is
+    not known. Raises SdoError where it takes it in none."""
+    refused: SdoError | None = None
+    for form in width.forms(data, have, signed=signed, is_number=is_number):
+        try:
+            yield Write(index, sub, form, channel)
+        except SdoError as error:
+            refused = error
+            if not error.by_server or not width.may_mean_width(error.code):
+                raise
+        else:
+            return
+    if refused is not None:
+        raise refused

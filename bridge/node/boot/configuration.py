@@ -11,10 +11,12 @@ import zlib
 from collections.abc import Generator, Sequence
 from typing import Final
 
+from bridge.canopen.datatypes import INTEGERS, NUMBERS
 from bridge.canopen.dialogue import Read, Write, optional
 from bridge.canopen.sdo import SdoError
+from bridge.canopen.width import holds
 from bridge.config.download import Download
-from bridge.node.boot.actions import Action, BootResult, Do, Step, number, same, told_as
+from bridge.node.boot.actions import Action, BootResult, Do, Step, number, told_as, write_number
 from bridge.node.boot.memory import NOT_AGAIN, BootMemory
 from bridge.node.boot.pdo_downloads import download_pdo, is_pdo, pdo_parameter
 from bridge.node.boot.status import BootError
@@ -53,7 +55,7 @@ def configure(downloads: Sequence[Download], *, store: bool, result: BootResult)
     wanted = [download for download in downloads if download.index != _VERIFY]
     if not wanted:
         return
-    yield Step("comparing the configuration", "J")
+    yield Step("comparing the configuration", "J", needed_by="configure")
     stamp = configuration_stamp(downloads)
     days = yield from optional(_VERIFY, 1)
     has_stamp = days is not None
@@ -64,7 +66,7 @@ def configure(downloads: Sequence[Download], *, store: bool, result: BootResult)
     written = 0
     parts = _parts(wanted)
     for place, part in enumerate(parts, 1):
-        yield Step(f"downloading the configuration, {place} of {len(parts)}", "J")
+        yield Step(f"downloading the configuration, {place} of {len(parts)}", "J", needed_by="configure")
         if is_pdo(part[0].index):
             written += yield from download_pdo(part, memory)
         else:
@@ -84,7 +86,7 @@ def _store(memory: BootMemory, *, has_stamp: bool) -> Do:
 
     A node that takes "save" without an answer may have stored all the same: it is not asked for ever.
     """
-    yield Step("storing the configuration", "J")
+    yield Step("storing the configuration", "J", needed_by="configuration_store")
     if memory.unanswered_stores >= _UNANSWERED_STORES:
         raise BootError("J", f"1010h:01 was not answered {_UNANSWERED_STORES} times; {NOT_AGAIN}")
     memory.unsaved = True
@@ -128,14 +130,14 @@ def download(one: Download, memory: BootMemory) -> Generator[Action, bytes | Non
             memory.unsaved = True
         return 1
     have = yield from optional(one.index, one.sub)
-    if same(have, one.data):
+    if have is not None and holds(have, one.data, signed=_is_signed(one)):
         return 0
     if memory.was_not_kept(*what):
         raise _not_kept(one, have)
     memory.unsaved = True
-    yield from _write(one)
+    yield from _write(one, have)
     read = yield from _read_back(one, memory)
-    if not same(read, one.data):
+    if read is None or not holds(read, one.data, signed=_is_signed(one)):
         memory.note_not_kept(*what)
         raise _not_kept(one, read)
     return 1
@@ -156,9 +158,25 @@ def _read_back(download: Download, memory: BootMemory) -> Generator[Action, byte
         return (yield Read(download.index, download.sub))
 
 
-def _write(download: Download) -> Do:
+def _is_signed(download: Download) -> bool:
+    return download.kind in INTEGERS and INTEGERS[download.kind].signed
+
+
+def _write(download: Download, have: bytes | None = None) -> Do:
+    """``have`` is what was read before; a command is written as it is."""
     with told_as(lambda error: BootError("J", f"{error}; it was to become {_shown(download.data)}")):
-        yield Write(download.index, download.sub, download.data)
+        if have is None:
+            yield Write(download.index, download.sub, download.data)
+        else:
+            is_number = download.kind in NUMBERS
+            yield from write_number(
+                download.index,
+                download.sub,
+                download.data,
+                have,
+                is_number=is_number,
+                signed=_is_signed(download),
+            )
 
 
 def _shown(data: bytes | None) -> str:

@@ -9,10 +9,20 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.canopen.dialogue import optional
+from bridge.canopen import width
 from bridge.command.plant import Node
 from bridge.mapping import emcy_codes
-from bridge.node.boot.actions import BootResult, DeviceErrors, Do, Pause, ResetCommunication, Step
+from bridge.node.boot.actions import (
+    U8,
+    U32,
+    BootResult,
+    DeviceErrors,
+    Do,
+    Pause,
+    ResetCommunication,
+    Step,
+    wish,
+)
 from bridge.node.boot.status import BootError
 
 _REGISTER: Final = 0x1001
@@ -27,15 +37,15 @@ _RESTARTS_S: Final = 2.0
 def read_errors(node: Node, result: BootResult) -> Do:
     """Note and show the error register, and the newest errors where there is one."""
     yield Step("reading its errors", "J")
-    register = _number((yield from optional(_REGISTER))) & 0xFF
+    register = _number((yield from wish(result, _REGISTER)), U8)
     codes: list[int] = []
-    count = _number((yield from optional(_HISTORY))) if register else 0
+    count = _number((yield from wish(result, _HISTORY)), U8) if register else 0
     for sub in range(1, min(count, _MOST) + 1):
-        error = yield from optional(_HISTORY, sub)
+        error = yield from wish(result, _HISTORY, sub)
         if error is None:
             break
         # The low word is the code, the high one the manufacturer's.
-        codes.append(_number(error) & 0xFFFF)
+        codes.append(_number(error, U32) & 0xFFFF)
     result.errors = DeviceErrors(register, tuple(codes), _text(node, register, codes))
     yield result.errors
 
@@ -49,16 +59,16 @@ def reset_once(node: Node, result: BootResult) -> Do:
     if not memory.may_reset_for(errors.cause):
         return
     memory.note_reset(errors.cause)
-    yield Step("resetting its communication", "J")
+    yield Step("resetting its communication", "J", needed_by="on_failed_start")
     yield ResetCommunication(f"the node did not start: {errors.text}")
     # Its boot-up message ends this boot-up, and begins the next one.
     yield Pause(_RESTARTS_S)
     raise BootError("J", f"no boot-up message after reset communication; {errors.text}", absent=False)
 
 
-def _number(data: bytes | None) -> int:
+def _number(data: bytes | None, size: int) -> int:
     """What the node says of its errors is shown and nothing more: an odd answer is none."""
-    return int.from_bytes(data, "little") if data and len(data) <= _LONGEST else 0
+    return width.unsigned(data, size) if data and len(data) <= _LONGEST else 0
 
 
 def _text(node: Node, register: int, codes: list[int]) -> str:

@@ -7,12 +7,22 @@ from types import MappingProxyType
 from typing import Final
 
 from bridge.canopen import cobid
-from bridge.canopen.dialogue import optional
 from bridge.canopen.pdo import MappingError, PdoCodec
 from bridge.command.plant import Node
 from bridge.mapping.device import Signal
 from bridge.mapping.fields import ObjectRef
-from bridge.node.boot.actions import Action, BootResult, Do, PdoPlan, SignalPlan, Step, number
+from bridge.node.boot.actions import (
+    U8,
+    U16,
+    Action,
+    BootResult,
+    Do,
+    PdoPlan,
+    SignalPlan,
+    Step,
+    number,
+    wish,
+)
 from bridge.node.boot.pdos import read_entries
 
 _BASES: Final = {"TPDO": (0x1800, 0x1A00), "RPDO": (0x1400, 0x1600)}
@@ -49,7 +59,7 @@ def _plan(
         if absent >= _ABSENT_IN_A_ROW:
             break
         parameter, mapping = (base + place for base in _BASES[kind])
-        has_object = yield from optional(parameter, 1)
+        has_object = yield from wish(result, parameter, 1)
         if has_object is None:
             absent += 1
             continue
@@ -57,7 +67,8 @@ def _plan(
         cob_id = number(has_object, cobid.PDO_DISABLED)
         name = f"{kind}{place + 1}"
         try:
-            entries = yield from read_entries(mapping, number((yield from optional(mapping, 0))))
+            count = number((yield from wish(result, mapping)), size=U8)
+            entries = yield from read_entries(mapping, count)
             codec = PdoCodec(entries, signed)
         except MappingError as error:
             result.notes.append(f"{name} is not used: {error}")
@@ -76,10 +87,10 @@ def _plan(
         if kind == "RPDO" and len(objects) < len(mapped):
             others = ", ".join(str(ref) for ref in mapped if ref not in wanted)
             result.notes.append(f"{name} carries {others}, too, which get 0")
-        transmission = number((yield from optional(parameter, 2)), 255)
+        transmission = number((yield from wish(result, parameter, 2)), 255, size=U8)
         event_ms = 0
         if kind == "TPDO" and transmission >= 254:
-            event_ms = number((yield from optional(parameter, 5)))
+            event_ms = number((yield from wish(result, parameter, 5)), size=U16)
         places = (None,) * len(entries)
         plan.pdos.append(
             PdoPlan(cob_id & cobid.COB_ID_MASK, transmission, event_ms, codec, places, name=name)

@@ -40,7 +40,8 @@ def judge_outputs(
     if words.all_hold:
         result.bridge_stop = 0, "all of its outputs hold their values"
         return
-    yield Step("reading the node's own supervision", "J")
+    needed_by = "enforce" if node.table.enforce else ""
+    yield Step("reading the node's own supervision", "J", needed_by=needed_by)
     raws = yield from bring_node(node, result)
     own = judge(node.family, raws, node.bus, node.table)
     why = "" if own.verdict is OwnVerdict.STOPS else own.reason

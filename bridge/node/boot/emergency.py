@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from bridge.canopen import cobid
-from bridge.canopen.dialogue import optional
-from bridge.node.boot.actions import BootResult, Do, Step, number
+from bridge.node.boot.actions import BootResult, Do, Step, number, wish
 
 
 def read_emcy_id(node_id: int, result: BootResult) -> Do:
@@ -13,7 +12,7 @@ def read_emcy_id(node_id: int, result: BootResult) -> Do:
     default = cobid.EMCY + node_id
     result.emcy_id = default
     yield Step("reading the identifier of emergency messages", "J")
-    value = number((yield from optional(0x1014)), default)
+    value = number((yield from wish(result, 0x1014)), default)
     cob_id = value & cobid.COB_ID_MASK
     if value & cobid.PDO_DISABLED:  # bit 31 means the same here
         result.emcy_id = None

@@ -5,9 +5,8 @@ from __future__ import annotations
 import struct
 from typing import Final
 
-from bridge.canopen.dialogue import Write, optional
 from bridge.config import NodeTable
-from bridge.node.boot.actions import BootResult, Do, Step, number, same, told_as
+from bridge.node.boot.actions import BootResult, Do, Step, number, same, told_as, wish, write_number
 from bridge.node.boot.memory import NOT_AGAIN
 from bridge.node.boot.status import BootError
 
@@ -24,7 +23,7 @@ def set_error_control(table: NodeTable, result: BootResult) -> Do:
 
     A heartbeat period that the node rounds is adopted.
     """
-    yield Step("setting error control", "J")
+    yield Step("setting error control", "J", needed_by="supervision")
     heartbeat_ms = heartbeat_period_ms(table.supervision_ms) if table.supervision == "heartbeat" else 0
     guard = (table.supervision_ms, table.life_time_factor) if table.supervision == "guarding" else (0, 0)
     wanted = [
@@ -36,27 +35,29 @@ def set_error_control(table: NodeTable, result: BootResult) -> Do:
     wanted.sort(key=lambda item: any(item[1]))
     result.heartbeat_ms = heartbeat_ms
     for index, data in wanted:
-        have = yield from optional(index)
+        have = yield from wish(result, index)
         if same(have, data) or (have is None and not any(data)):
             continue
         if index == _PERIOD and heartbeat_ms:
             yield from _set_period(table, data, have, result)
             continue
-        yield from _write(table, index, data)
-        result.notes.append(f"{index:04X}h was {number(have)}, is {number(data)} now")
+        yield from _write(table, index, data, have)
+        was = number(have, size=len(data))
+        result.notes.append(f"{index:04X}h was {was}, is {number(data)} now")
 
 
 def _set_period(table: NodeTable, data: bytes, have: bytes | None, result: BootResult) -> Do:
     """1017h, which some nodes round: Lenze keeps multiples of 5 ms (C00381)."""
-    want_ms, kept_ms = number(data), number(have)
+    want_ms, was_ms = number(data), number(have, size=len(data))
+    kept_ms = was_ms
     if not result.memory.was_not_kept(_PERIOD, 0, data):
-        yield from _write(table, _PERIOD, data)
-        kept_ms = number((yield from optional(_PERIOD)), want_ms)
+        yield from _write(table, _PERIOD, data, have)
+        kept_ms = number((yield from wish(result, _PERIOD)), want_ms, size=len(data))
         written = ""
         if kept_ms != want_ms:
             result.memory.note_not_kept(_PERIOD, 0, data)
             written = f" ({want_ms} was written)"
-        result.notes.append(f"1017h was {number(have)}, is {kept_ms} now{written}")
+        result.notes.append(f"1017h was {was_ms}, is {kept_ms} now{written}")
     least_ms, most_ms = (want_ms + 1) // 2, table.supervision_ms // 2
     if not least_ms <= kept_ms <= most_ms:
         raise BootError(
@@ -65,6 +66,6 @@ def _set_period(table: NodeTable, data: bytes, have: bytes | None, result: BootR
     result.heartbeat_ms = kept_ms
 
 
-def _write(table: NodeTable, index: int, data: bytes) -> Do:
+def _write(table: NodeTable, index: int, data: bytes, have: bytes | None) -> Do:
     with told_as(lambda error: BootError("J", f"{table.supervision} is not possible: {error}")):
-        yield Write(index, 0, data)
+        yield from write_number(index, 0, data, have)

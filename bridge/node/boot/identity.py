@@ -11,7 +11,7 @@ from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Identification
 from bridge.command.plant import Node
-from bridge.node.boot.actions import Action, BootResult, Do, Signal, Step, number
+from bridge.node.boot.actions import Action, BootResult, Do, Signal, Step, number, wish
 from bridge.node.boot.status import BootError
 
 _ALL = 0xFFFF_FFFF
@@ -20,8 +20,10 @@ _LONGEST_TEXT = 64
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """``read & mask`` must be ``expected & mask``; a rule without a value compares nothing."""
+    """``read & mask`` must be ``expected & mask``; a rule without a value compares nothing. ``key`` is where
+    it stands."""
 
+    key: str
     letter: str
     index: int
     sub: int
@@ -39,7 +41,7 @@ class Rule:
         raise BootError(self.letter, f"{found}, expected {self.expected:08X}h{masked} {where}")
 
 
-def _rules(expected: object, where: str) -> list[tuple[Rule, str]]:
+def _rules(expected: object, where: str, table: str) -> list[tuple[Rule, str]]:
     """The rules of an identity table; the mapping's has fewer keys than the site file's."""
     rules: list[tuple[Rule, str]] = []
     for letter, index, sub, name in (
@@ -51,53 +53,67 @@ def _rules(expected: object, where: str) -> list[tuple[Rule, str]]:
     ):
         value = getattr(expected, name, None)
         mask = getattr(expected, f"{name}_mask", None)
-        rules.append((Rule(letter, index, sub, value, mask), where))
+        rules.append((Rule(f"{table}.{name}", letter, index, sub, value, mask), where))
     return rules
 
 
-def identify(node: Node, device_type: int, result: BootResult) -> Do:
-    """Read who the node is and compare. Raises BootError C, D, M, N or O.
+def identify(node: Node, device_type: int | None, result: BootResult) -> Do:
+    """Read who the node is and compare. Raises BootError C, D, M, N or O. What no rule asks for may be
+    missing.
 
     The mapping's device name is a hint for ``scan``; the site file's is a rule.
     """
-    rules = _rules(node.table.identity, "by the site file")
+    rules = _rules(node.table.identity, "by the site file", "identity")
     # What the site file says of a field stands in place of what the mapping says.
     given = {rule.letter for rule, _ in rules if rule.expected is not None}
     rules += [
         (rule, where)
-        for rule, where in _rules(node.family.identity, "by the mapping")
+        for rule, where in _rules(node.family.identity, "by the mapping", "mapping.identity")
         if rule.letter not in given
     ]
     read: dict[tuple[int, int], int | None] = {(0x1000, 0): device_type}
     for sub, letter in ((1, "D"), (2, "M"), (3, "N"), (4, "O")):
-        yield Step("reading the identity", letter)
-        data = yield from optional(0x1018, sub)
+        key = next((rule.key for rule, _ in rules if rule.letter == letter and rule.expected is not None), "")
+        yield Step("reading the identity", letter, needed_by=key)
+        data = yield from (optional(0x1018, sub) if key else wish(result, 0x1018, sub))
         read[0x1018, sub] = None if data is None else number(data)
     for rule, where in rules:
         rule.check(read[rule.index, rule.sub], where)
     wanted = node.table.identity
-    name = yield from _text("M", 0x1008, wanted.device_name)
-    result.software_version = yield from _text("N", 0x100A, wanted.software_version)
+    name = yield from _text("M", 0x1008, wanted.device_name, "identity.device_name", result)
+    version = yield from _text("N", 0x100A, wanted.software_version, "identity.software_version", result)
+    result.software_version = version
     vendor, product, revision, serial = (read[0x1018, sub] or 0 for sub in (1, 2, 3, 4))
     result.identification = Identification(vendor, product, revision, serial, name)
 
 
-def look_for() -> Generator[Action, bytes | None, int]:
-    """Device type of the node; SdoError where nobody answers, and a second time after it was woken."""
+def look_for() -> Generator[Action, bytes | None, int | None]:
+    """Device type of the node, None where it is there and does not say it; SdoError where nobody answers, and
+    a second time after it was woken."""
     yield Step("looking for the node", "B")
+    try:
+        return (yield from _device_type())
+    except SdoError:
+        yield Signal.WAKE
+    return (yield from _device_type())
+
+
+def _device_type() -> Generator[Read, bytes | None, int | None]:
+    """Raises SdoError where there is no answer at all."""
     try:
         return number((yield Read(0x1000)))
     except SdoError as error:
-        if error.by_server:
+        if not error.was_answered:
             raise
-    yield Signal.WAKE
-    return number((yield Read(0x1000)))
+        return None
 
 
-def _text(letter: str, index: int, wanted: str | None) -> Generator[Action, bytes | None, str]:
-    """A text of the node, in which the regular expression ``wanted`` has to be found."""
-    yield Step("reading name and version", letter)
-    data = yield from optional(index)
+def _text(
+    letter: str, index: int, wanted: str | None, key: str, result: BootResult
+) -> Generator[Action, bytes | None, str]:
+    """A text of the node, in which the regular expression ``wanted``, if there is one, has to be found."""
+    yield Step("reading name and version", letter, needed_by="" if wanted is None else key)
+    data = yield from (wish(result, index) if wanted is None else optional(index))
     text = datatypes.text((data or b"")[:_LONGEST_TEXT]).strip()
     if wanted is not None and not re.search(wanted, text, re.IGNORECASE):
         found = f"the node has no {index:04X}h" if data is None else f"{index:04X}h is {text!r}"

@@ -7,12 +7,11 @@ from contextlib import suppress
 from typing import Final
 
 from bridge.canopen import cobid
-from bridge.canopen.dialogue import optional
 from bridge.canopen.pdo import MappingError, PdoCodec, PdoEntry
 from bridge.command import Drive
 from bridge.command.plant import Node
 from bridge.mapping.model import Family, Pdo, Slot
-from bridge.node.boot.actions import Action, BootResult, Do, PdoPlan, Step, number
+from bridge.node.boot.actions import U8, Action, BootResult, Do, PdoPlan, Step, number, wish
 from bridge.node.boot.layout import factory_entries, layouts, match_words
 from bridge.node.boot.pdos import RPDO, read_entries
 
@@ -20,27 +19,29 @@ _FACTORY_TYPE: Final = 255
 
 
 def find_rpdos(node: Node, result: BootResult) -> Do:
-    """Note where the node listens for each drive's words, so that a stop reaches it there."""
-    yield Step("reading where it listens", "J")
+    """Note where the node listens for each drive's words, so that a stop reaches it there. While a drive may
+    be running nothing waits for a node that is silent: SdoError at once."""
+    yield Step("reading where it listens", "J", needed_by="drive")
     for drive in node.drives:
         for pdo in drive.slot.rpdo:
-            plan = yield from _rpdo(drive, pdo)
+            plan = yield from _rpdo(drive, pdo, result)
             if plan is not None:
                 result.memory.note_rpdo(drive.name, pdo.number, plan)
 
 
-def _rpdo(drive: Drive, pdo: Pdo) -> Generator[Action, bytes | None, PdoPlan | None]:
+def _rpdo(drive: Drive, pdo: Pdo, result: BootResult) -> Generator[Action, bytes | None, PdoPlan | None]:
     """One RPDO as the node has it; None where it is off, or not known to the node."""
     parameter, mapping = (base + pdo.number - 1 for base in RPDO)
-    cob_id = number((yield from optional(parameter, 1)), cobid.PDO_DISABLED)
+    cob_id = number((yield from wish(result, parameter, 1, may_be_silent=False)), cobid.PDO_DISABLED)
     identifier = cob_id & cobid.COB_ID_MASK
     if cob_id & (cobid.PDO_DISABLED | cobid.PDO_EXTENDED) or not cobid.is_for_pdos(identifier):
         return None
-    kind = number((yield from optional(parameter, 2)), _FACTORY_TYPE)
+    kind = number((yield from wish(result, parameter, 2, may_be_silent=False)), _FACTORY_TYPE, size=U8)
     entries: tuple[PdoEntry, ...] = ()
     if not pdo.static:
         with suppress(MappingError):
-            entries = yield from read_entries(mapping, number((yield from optional(mapping, 0))))
+            count = number((yield from wish(result, mapping, may_be_silent=False)), size=U8)
+            entries = yield from read_entries(mapping, count)
     return rpdo_plan(drive.family, drive.slot, pdo, identifier, entries, kind)
 
 

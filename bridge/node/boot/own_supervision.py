@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+from functools import partial
 
-from bridge.canopen.dialogue import Read, Write, optional
+from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
 from bridge.command.plant import Node
@@ -12,7 +13,7 @@ from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_supervision import judge
 from bridge.mapping.model import Family
 from bridge.mapping.own_places import OwnPlace, OwnWant, places, wanted
-from bridge.node.boot.actions import Action, BootResult, Do, Step, told_as
+from bridge.node.boot.actions import Action, BootResult, Do, Step, told_as, wish, write_number
 from bridge.node.boot.memory import NOT_AGAIN
 from bridge.node.boot.status import BootError
 from bridge.node.sdo_channels import FIRST, channel_of
@@ -31,10 +32,11 @@ def set_own_supervision(node: Node, result: BootResult) -> Do:
         for drive in node.drives:
             result.own[drive.name] = OwnJudgement(accepted=drive.table.accepts.runs_on or "")
         return
-    yield Step("reading the drives' own supervision", "J")
+    needed_by = "enforce" if node.table.enforce else ""
+    yield Step("reading the drives' own supervision", "J", needed_by=needed_by)
     of_node = yield from bring_node(node, result)
     for drive in node.drives:
-        of_drive = yield from read_places(node, drive)
+        of_drive = yield from read_places(node, drive, read=_reader(node, result))
         channel = channel_of(node, drive.slot)
         for want in wanted(node.family, node.bus, node.table):
             if want.place.per_drive and want.place.key in of_drive and channel is not None:
@@ -47,15 +49,24 @@ def set_own_supervision(node: Node, result: BootResult) -> Do:
 
 def bring_node(node: Node, result: BootResult) -> Generator[Action, bytes | None, Raws]:
     """The node's own objects, brought to what is wanted. Raises BootError J."""
-    of_node = yield from read_places(node, None)
+    of_node = yield from read_places(node, None, read=_reader(node, result))
     for want in wanted(node.family, node.bus, node.table):
         if not want.place.per_drive:
             yield from _bring(node, want, of_node, FIRST, node.name, result)
     return of_node
 
 
+Reader = Callable[[int, int, int], Generator[Read, bytes | None, bytes | None]]
+"""Reads an object: index, sub-index, SDO channel."""
+
+
+def _reader(node: Node, result: BootResult) -> Reader:
+    """What is only judged, and not enforced, is not needed."""
+    return optional if node.table.enforce else partial(wish, result)
+
+
 def read_places(
-    node: Node, drive: Drive | None, *, link: bool = False
+    node: Node, drive: Drive | None, *, link: bool = False, read: Reader = optional
 ) -> Generator[Read, bytes | None, Raws]:
     """The node's own objects, or those that each drive has for itself. What cannot be read is left out."""
     raw: Raws = {}
@@ -66,8 +77,10 @@ def read_places(
         if place.per_drive is not (drive is not None):
             continue
         try:
-            data = yield from optional(place.ref.index, place.ref.sub, channel)
-        except SdoError:
+            data = yield from read(place.ref.index, place.ref.sub, channel)
+        except SdoError as error:
+            if error.was_answered:
+                continue
             if channel == FIRST:
                 raise
             return raw  # the drive behind the channel may be away while the node itself is there
@@ -107,7 +120,7 @@ def _bring(node: Node, want: OwnWant, raw: Raws, channel: int, owner: str, resul
         return BootError("J", f"{owner}: {place.name} was to become {want.value}: {error}")
 
     with told_as(refused):
-        yield Write(place.ref.index, place.ref.sub, data, channel)
+        yield from write_number(place.ref.index, place.ref.sub, data, None, channel=channel)
     read = yield from optional(place.ref.index, place.ref.sub, channel)
     kept = None if read is None else place.number.decode(read)
     if kept != want.value:

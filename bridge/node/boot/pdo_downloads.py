@@ -12,7 +12,7 @@ from typing import Final
 from bridge.canopen.dialogue import optional
 from bridge.canopen.pdo import MappingError
 from bridge.config.download import Download
-from bridge.node.boot.actions import Action, number, same
+from bridge.node.boot.actions import U8, Action, number, same
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.pdo_settings import FIXED_BITS, Change, PdoObjects, write_pdo
 from bridge.node.boot.status import BootError
@@ -54,7 +54,7 @@ def download_pdo(downloads: Sequence[Download], memory: BootMemory) -> Generator
     mapped = [change for change in wanted.values() if change.index == objects.mapping]
     # Sub-index 0 of a communication object says how many there are: nothing to be set.
     changes = [change for change in wanted.values() if change.index == parameter and change.sub]
-    entries = number((yield from optional(objects.mapping, 0))) if count is None else count.value
+    entries = number((yield from optional(objects.mapping, 0)), size=U8) if count is None else count.value
     if count is not None and not mapped:
         mapped = [count]
     memory.unsaved = True

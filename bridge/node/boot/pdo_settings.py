@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.canopen import cobid
-from bridge.canopen.dialogue import Write, optional
+from bridge.canopen.dialogue import optional
 from bridge.canopen.pdo import MappingError, PdoEntry
 from bridge.config import PdoTable
 from bridge.mapping.model import Pdo
-from bridge.node.boot.actions import Action, BootResult, Do, number, told_as
+from bridge.node.boot.actions import U8, Action, BootResult, Do, number, told_as, write_number
 from bridge.node.boot.memory import NOT_AGAIN, BootMemory
 
 FIXED_BITS: Final = 0x6000_0000
@@ -73,7 +73,10 @@ def set_pdo(objects: PdoObjects, wanted: PdoTable, result: BootResult) -> Do:
         (3, 2, None if wanted.inhibit_ms is None else round(wanted.inhibit_ms * 10)),
         (5, 2, wanted.event_ms),
     ):
-        if value is not None and number((yield from optional(objects.parameter, sub)), -1) != value:
+        if (
+            value is not None
+            and number((yield from optional(objects.parameter, sub)), -1, size=size) != value
+        ):
             changes.append(Change(objects.parameter, sub, size, value))
     entries = wanted.mapping
     maps = False
@@ -107,7 +110,7 @@ def _cob_id(objects: PdoObjects, wanted: PdoTable, have: int) -> int:
 
 def _mapping(index: int) -> Generator[Action, bytes | None, list[int]]:
     """The mapping as the node has it, without places that are not used; empty where it has none."""
-    count = number((yield from optional(index)))
+    count = number((yield from optional(index)), size=U8)
     words = [0] * min(count, MOST_ENTRIES)
     for place in range(len(words)):
         words[place] = number((yield from optional(index, place + 1)))
@@ -149,12 +152,12 @@ def write_pdo(
 
 def _write_one(change: Change) -> Do:
     with told_as(lambda error: MappingError(f"J: {error}; it was to become {change.value:X}h")):
-        yield Write(change.index, change.sub, change.data)
+        yield from write_number(change.index, change.sub, change.data, None)
 
 
 def _verify(change: Change, memory: BootMemory) -> Do:
     """Raises MappingError where the node holds something else, and remembers that."""
-    read = number((yield from optional(change.index, change.sub)), -1)
+    read = number((yield from optional(change.index, change.sub)), -1, size=change.size)
     # Some nodes fix bits 30 and 29 of a COB-ID.
     ignored = FIXED_BITS if change.index & 0x0200 == 0 and change.sub == 1 else 0
     if (read ^ change.value) & ~ignored:

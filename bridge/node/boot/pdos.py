@@ -14,6 +14,7 @@ from typing import Final
 from bridge.canopen import cobid
 from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.pdo import MappingError, PdoCodec, PdoEntry
+from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
 from bridge.command.plant import Node
 from bridge.config import PdoTable
@@ -21,6 +22,8 @@ from bridge.config.model import pdo_table
 from bridge.image import DataType
 from bridge.mapping.model import Pdo
 from bridge.node.boot.actions import (
+    U8,
+    U16,
     Action,
     BootResult,
     Do,
@@ -30,6 +33,7 @@ from bridge.node.boot.actions import (
     Step,
     number,
     told_as,
+    wish,
 )
 from bridge.node.boot.layout import Layouts, differences, factory_entries, layouts, match_words, missing_parts
 from bridge.node.boot.pdo_settings import MOST_ENTRIES, PdoObjects, set_pdo, table_for
@@ -71,7 +75,9 @@ def plan_drive(node: Node, drive: Drive, result: BootResult) -> Generator[Action
     process = family.process
     receives = [family.rpdo_words(pdo) for pdo in slot.rpdo]
     sends = [family.tpdo_words(pdo) for pdo in slot.tpdo]
-    yield Step(f"setting and reading the process data mapping of {slot.name}", "J")
+    yield Step(
+        f"setting and reading the process data mapping of {slot.name}", "J", needed_by=f"drive.{slot.name}"
+    )
     try:
         yield from write_start(drive, result)
         for direction, found in (
@@ -92,7 +98,9 @@ def plan_drive(node: Node, drive: Drive, result: BootResult) -> Generator[Action
         ):  # fmt: skip
             yield from _plan(node, drive, direction, found, plan, result)
         _require_followed(drive, plan)
-    except MappingError as error:
+    except (MappingError, SdoError) as error:
+        if isinstance(error, SdoError) and not error.was_answered:
+            raise
         plan.leave_out(str(error))
         result.notes.append(f"{slot.name}: {error}")
     return plan
@@ -197,17 +205,17 @@ def _pdo(
         raise _Off(f"{parameter:04X}h:01: the PDO is switched off in the node")
     if cob_id & cobid.PDO_EXTENDED or not cobid.is_for_pdos(cob_id & cobid.COB_ID_MASK):
         raise MappingError(f"{parameter:04X}h:01 is {cob_id:08X}h: no identifier for a PDO")
-    kind = number((yield from optional(parameter, 2)), 255)
+    kind = number((yield from optional(parameter, 2)), 255, size=U8)
     event_ms = 0
     if direction.bases is _TPDO and kind >= 254:
-        event_ms = number((yield from optional(parameter, 5)))
+        event_ms = number((yield from optional(parameter, 5)), size=U16)
     entries = expected
     if not pdo.static:
         count = yield from optional(mapping, 0)
         if count is None:
             result.notes.append(f"the node has no {mapping:04X}h: taken as the mapping file has it")
         else:
-            entries = yield from read_entries(mapping, number(count))
+            entries = yield from read_entries(mapping, number(count, size=U8))
     places = match_words(entries, direction.known)
     told = differences(entries, expected, places)
     result.notes += [f"{drive.slot.name}: {name}: {difference}" for difference in told]
@@ -235,8 +243,8 @@ def plan_node_tpdos(node: Node, result: BootResult) -> Generator[Action, bytes |
     signed = {at for at, poll in polls.items() if poll.data_type in (DataType.INT16, DataType.INT32)}
     for tpdo in node.family.node_tpdo:
         parameter, mapping = (base + tpdo.number - 1 for base in _TPDO)
-        cob_id = number((yield from optional(parameter, 1)), cobid.PDO_DISABLED)
-        count = number((yield from optional(mapping, 0)))
+        cob_id = number((yield from wish(result, parameter, 1)), cobid.PDO_DISABLED)
+        count = number((yield from wish(result, mapping)), size=U8)
         if cob_id & cobid.PDO_DISABLED or not count:
             continue
         try:
@@ -247,15 +255,15 @@ def plan_node_tpdos(node: Node, result: BootResult) -> Generator[Action, bytes |
             continue
         found = [polls.get((entry.index, entry.sub)) for entry in entries]
         if any(found):
-            kind = number((yield from optional(parameter, 2)), 255)
-            event_ms = number((yield from optional(parameter, 5)))
+            kind = number((yield from wish(result, parameter, 2)), 255, size=U8)
+            event_ms = number((yield from wish(result, parameter, 5)), size=U16)
             plan = PdoPlan(cob_id & cobid.COB_ID_MASK, kind, event_ms, codec, (None,) * len(entries))
             names = tuple(poll.name if poll else "" for poll in found)
             result.node_tpdos.append(NodePdoPlan(plan, names))
 
 
 def read_entries(mapping: int, count: int) -> Generator[Action, bytes | None, tuple[PdoEntry, ...]]:
-    """The mapping as the node has it. Raises MappingError where it cannot be one."""
+    """The mapping as the node has it. Raises MappingError where it cannot be one, or cannot be read."""
     if count > MOST_ENTRIES:
         raise MappingError(f"{mapping:04X}h:00 is {count}, at most {MOST_ENTRIES} objects can be mapped")
     entries: tuple[PdoEntry, ...] = ()

@@ -89,7 +89,7 @@ def _start(table: NodeTable, result: BootResult) -> Do:
     """Error control first, then NMT start; the node's own messages confirm both. Raises BootError if they do
     not come."""
     not_heard = "F" if table.supervision == "guarding" else "K"
-    yield Step(f"waiting for {table.supervision}", not_heard)
+    yield Step(f"waiting for {table.supervision}", not_heard, needed_by="supervision")
     yield Signal.START_SUPERVISION
     # It says its state when it is asked, or every so often.
     limit_s = max(_GOES_OPERATIONAL_S, 3 * table.supervision_ms / 1000)

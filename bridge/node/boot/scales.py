@@ -12,7 +12,7 @@ from bridge.command import Drive
 from bridge.command.plant import Node
 from bridge.drive import Codes, deciding, is_scale, no_scale
 from bridge.mapping.model import Family, Meaning, ObjectRef, Parameter
-from bridge.node.boot.actions import Action, BootResult, WordFacts
+from bridge.node.boot.actions import Action, BootResult, WordFacts, go_on_without
 from bridge.node.sdo_channels import FIRST, channel_of
 
 
@@ -59,8 +59,12 @@ def read_words(node: Node, drive: Drive, result: BootResult) -> Generator[Action
         return found
     try:
         for one, in_set, ref in asked:
-            data = yield from optional(ref.index, ref.sub, channel)
-            found.codes[one.leaf][in_set - 1] = code_of(drive.family, one, data)
+            try:
+                data = yield from optional(ref.index, ref.sub, channel)
+            except SdoError as error:
+                _go_on_without(error, channel, result)
+            else:
+                found.codes[one.leaf][in_set - 1] = code_of(drive.family, one, data)
         yield from _read_parameters(node, drive, channel, found, result)
     except SdoError:
         if channel == FIRST:
@@ -71,14 +75,24 @@ def read_words(node: Node, drive: Drive, result: BootResult) -> Generator[Action
     return found
 
 
+def _go_on_without(error: SdoError, channel: int, result: BootResult) -> None:
+    """What a word means is not known then. Raises ``error`` where nobody is behind the channel."""
+    if channel != FIRST and not error.was_answered:
+        raise error
+    go_on_without(error, result)
+
+
 def _read_parameters(
     node: Node, drive: Drive, channel: int, found: WordFacts, result: BootResult
 ) -> Generator[Action, bytes | None]:
     scaling = {name for value in drive.family.value for name in value.scaled_by}
     for parameter, in_set, ref in deciding_of(drive, found.codes):
-        data = yield from optional(ref.index, ref.sub, channel)
         try:
+            data = yield from optional(ref.index, ref.sub, channel)
             value = None if data is None else parameter_value(parameter, data)
+        except SdoError as error:
+            _go_on_without(error, channel, result)
+            value = math.nan
         except ValueError as error:
             result.notes.append(f"{drive.slot.name}: {error}")
             value = math.nan

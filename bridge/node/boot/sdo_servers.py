@@ -28,7 +28,7 @@ def open_sdo_servers(node: Node, result: BootResult) -> Do:
     must_stop = False
     for server in opened_servers(node):
         name = f"SDO channel {server.number}"
-        yield Step(f"opening {name}", "J")
+        yield Step(f"opening {name}", "J", needed_by="sdo_channels")
         with told_as(lambda error, name=name: BootError("J", f"{name} cannot be opened: {error}")):
             changed = yield from _open(server, node.table.id, result)
         must_stop = must_stop or (changed and server.after_stop)

@@ -48,12 +48,14 @@ ABSENT: Final = frozenset("BEFK")
 class BootError(Exception):
     """The boot-up ended. ``letter`` is the error status, ``detail`` names object, expected and read.
 
-    ``absent`` is true where the node did not answer, whatever the step was.
+    ``absent`` is true where the node did not answer, whatever the step was. ``hint`` stands in place of what
+    usually helps.
     """
 
-    def __init__(self, letter: str, detail: str, *, absent: bool | None = None) -> None:
+    def __init__(self, letter: str, detail: str, *, absent: bool | None = None, hint: str = "") -> None:
         self.letter = letter
         self.detail = detail
         self.absent = letter in ABSENT if absent is None else absent
-        hint = SILENT if self.absent and letter not in ABSENT else HINTS.get(letter, "")
+        usual = SILENT if self.absent and letter not in ABSENT else HINTS.get(letter, "")
+        hint = hint or usual
         super().__init__(f"{letter}: {detail}: {hint}" if hint else f"{letter}: {detail}")

@@ -77,12 +77,14 @@ def test_a_name_that_the_node_does_not_have_is_said_so(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("sub", [1, 2, 3, 4])
 def test_a_silence_is_not_blamed_on_the_identity(tmp_path: Path, sub: int) -> None:
-    quick = Quick(quick_site(tmp_path, 1))
+    key = ("vendor_id", "product_code", "revision", "serial")[sub - 1]
+    quick = Quick(quick_site(tmp_path, [f"[bus.node.identity]\n{key} = 1"]))
     quick.lose = lambda frame: frame.can_id == 0x581 and frame.data[1:4] == bytes((0x18, 0x10, sub))
     quick.run(2.6)  # reset after the first attempt, it is asked a second time at once
     status = quick.status(1)
     assert status.startswith(f"{'DMNO'[sub - 1]}: the node does not answer: 1018h:0{sub}: no valid answer")
     assert HINTS["DMNO"[sub - 1]] not in status
+    assert f"needed by identity.{key}" in status
     assert "did the node restart" in status
     assert quick.core(1).state is NodeState.LOST
 

@@ -10,6 +10,8 @@ from typing import Final
 import pytest
 
 from bridge.canopen import abort
+from bridge.canopen.habits import HABITS
+from bridge.canopen.sdo_ways_back import WAYS_BACK
 from bridge.command.link import NodeState
 from bridge.command.request import Action, Code
 from bridge.drive import DriveState
@@ -214,3 +216,11 @@ def test_german_is_german() -> None:
 )
 def test_texts_are_put_together_from_phrases(said: str, german: str) -> None:
     assert BOOK.said(said) == german
+
+
+@pytest.mark.parametrize("count", [1, 32])
+def test_each_habit_of_a_device_has_its_german_phrase(count: int) -> None:
+    for habit in HABITS.values():
+        assert lacking(habit.said(count, 8, 1)) == []
+    for way in WAYS_BACK:
+        assert lacking(f"block transfer is not used any more: {way.says}") == []

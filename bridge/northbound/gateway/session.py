@@ -128,8 +128,6 @@ class Session:
         try:
             sequence, rest = split_sequence(line)
             found = parse(rest)
-            if found is None:
-                return
             match found.command:
                 case Set():
                     self._check_net(found.net)

@@ -114,16 +114,14 @@ def split_sequence(text: str) -> tuple[int, str]:
     return int(match[1]), text[match.end() :]
 
 
-def parse(text: str) -> Line | None:
-    """The command in what follows the sequence number; None where there is none. Raises ``Refused``."""
+def parse(text: str) -> Line:
+    """The command in what follows the sequence number. Raises ``Refused``, also where there is none."""
     words = _words(text)
     places: list[int] = []
     while words and len(places) < 2 and _NUMBER.fullmatch(words[0]):
         places.append(_number(words.pop(0)))
     if not words:
-        if places:
-            raise Refused(ErrorCode.SYNTAX)
-        return None
+        raise Refused(ErrorCode.SYNTAX)
     command = _command(words)
     if isinstance(command, Set) and places:
         if len(places) > 1:

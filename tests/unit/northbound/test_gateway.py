@@ -99,7 +99,6 @@ def test_any_bytes_are_a_value_or_a_bad_one(kind: str, data: bytes) -> None:
 def test_a_visible_string_survives_the_line(text: str) -> None:
     data = text.encode("latin-1")
     line = parse(f"5 w 0x2000 0 vs {decode('vs', data)}")
-    assert line is not None
     assert line.command.data.decode("latin-1").isprintable()  # type: ignore[union-attr]
 
 
@@ -135,6 +134,13 @@ def test_where_a_stream_is_cut_changes_nothing(stream: bytes, place: int) -> Non
 
 
 # SDO
+
+
+@pytest.mark.parametrize("line", ["[7]", "[7] ", "[7] # only a comment", "[7] 5", "[7] 1 5 # nothing"])
+def test_a_line_without_a_command_is_answered(client: Client, line: str) -> None:
+    """CiA 309-3: every line with a sequence number has its answer, or its sender would wait for ever."""
+    client.session.receive(f"{line}\n".encode(), 0.0)
+    assert client.session.take_lines() == b"[7] ERROR:101\r\n"
 
 
 def test_a_read_is_a_request_for_the_bytes(client: Client) -> None:
@@ -233,8 +239,8 @@ def test_what_needs_no_node_is_answered_at_once(client: Client, line: str, answe
     assert client.requests == []
 
 
-def test_comments_and_empty_lines_have_no_answer(client: Client) -> None:
-    assert client.say("# a comment") == client.say("") == client.say("[1] # nothing") == ""
+def test_comments_and_empty_lines_without_a_sequence_have_no_answer(client: Client) -> None:
+    assert client.say("# a comment") == client.say("") == ""
 
 
 def test_the_default_node_is_taken_where_none_is_named(client: Client) -> None:

@@ -28,8 +28,8 @@ _STALLED_AMONG_OTHERS_US: Final = 100_000
 
 _WAIT: Final = "transport/link/tx/queue/congestion_control/block/wait_before_close"
 _MOST_BATCHES: Final = 16
-"""Buffers for what waits to be sent, allocated when needed. With zenoh's default of two, an answer would be
-dropped whenever the machine is busy for a moment."""
+"""Buffers for what waits to be sent, allocated when needed. With zenoh's default of two, an answer or
+a value would be dropped whenever the machine is busy for a moment."""
 
 
 def zenoh_config(
@@ -73,6 +73,7 @@ def zenoh_config(
         "transport/unicast/accept_pending": _MOST_PENDING,
         _WAIT: _STALLED_US,
         "transport/shared_memory/enabled": False,
+        "transport/link/tx/queue/size/data": _MOST_BATCHES,
     }
     if access:
         settings["access_control"] = access
@@ -81,7 +82,6 @@ def zenoh_config(
         settings[_WAIT] = _STALLED_AMONG_OTHERS_US
         settings["transport/link/tx/queue/size/interactive_high"] = _MOST_BATCHES
         settings["transport/link/tx/queue/size/background"] = _MOST_BATCHES
-        settings["transport/link/tx/queue/size/data"] = _MOST_BATCHES
     if longest:
         # Both ends take the smaller of their sizes of a batch, and end a connection that brings a larger one;
         # what needs several batches is put together up to the second of these.

@@ -235,7 +235,8 @@ def become_front(parent: int, role: str) -> None:
 def limit_memory(most_mb: int) -> None:
     """Called by a front about itself: memory far beyond ``most_mb`` is refused to it, and that is its end."""
     with contextlib.suppress(OSError, ValueError):
-        resource.setrlimit(resource.RLIMIT_DATA, (_BEYOND * most_mb * _MB,) * 2)
+        most = _BEYOND * most_mb * _MB
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
 
 
 async def _kill(process: asyncio.subprocess.Process, ended: asyncio.Task[int]) -> None:

@@ -34,6 +34,10 @@ class RateLimit:
         self._tokens -= 1
         return True
 
+    def charge(self, count: int) -> None:
+        """Take so many tokens for what was reported anyway; those that come next pay for it."""
+        self._tokens -= count
+
 
 class PerSecond:
     """At most ``most`` within a second, which begins with the first of them."""

@@ -44,7 +44,7 @@ for and whatever it calls itself; for what it has done with one drive or node in
 REFUSED_EVERY_S: Final = 3.0
 DONE_EVERY_S: Final = 1.0
 _MOST_SHARES: Final = 1000
-_MOST_SUMS: Final = 10
+_MOST_SUMS: Final = 4
 """Pairs of user and target that a summary of one client, action and code tells apart."""
 _OTHERS: Final = "others"
 _CARRIED_OUT: Final = (Code.OK, Code.TIMED_OUT, Code.CANCELLED, Code.REFUSED_BY_DRIVE, IGNORED)
@@ -169,8 +169,10 @@ class _Share:
         return False
 
     def sum_up(self, now: float) -> list[AuditEntry]:
-        """Those that were left out, one for each user and target, with what is true of all that it counts."""
+        """Those that were left out, one for each user and target, with what is true of all that it counts.
+        But for the first they take from what may be written next."""
         sums = [replace(one, time=now, old={}, new={}) for one in self.left_out.values()]
+        self.limit.charge(max(0, len(sums) - 1))
         self.is_used, self.left_out = False, {}
         return sums
 

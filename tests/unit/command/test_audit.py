@@ -297,7 +297,7 @@ class TestBusyControllers:
         hall.told()
         hall.plant.audit.sum_up(hall.now)
         *named, rest = hall.entries
-        assert len(named) == 10
+        assert len(named) == 4
         assert {entry.count for entry in named} == {1}
         assert (rest.identity.user, rest.identity.address, rest.target) == ("", "10.0.0.9", "")
         assert (rest.action, rest.ending.code, rest.count) == ("stop", Code.UNKNOWN_TARGET, 500 - 20 - 10)

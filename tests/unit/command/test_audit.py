@@ -300,7 +300,7 @@ class TestBusyControllers:
         assert len(named) == 4
         assert {entry.count for entry in named} == {1}
         assert (rest.identity.user, rest.identity.address, rest.target) == ("", "10.0.0.9", "")
-        assert (rest.action, rest.ending.code, rest.count) == ("stop", Code.UNKNOWN_TARGET, 500 - 20 - 10)
+        assert (rest.action, rest.ending.code, rest.count) == ("stop", Code.UNKNOWN_TARGET, 500 - 20 - 4)
 
     @given(
         st.lists(

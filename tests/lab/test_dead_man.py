@@ -209,7 +209,10 @@ def test_a_killed_front_changes_nothing_on_the_bus(tmp_path: Path) -> None:
         bridge.wait_output("node operational")
         bridge.wait_output("OPC UA on")
         [front] = subprocess.run(
-            ["pgrep", "-P", str(bridge.pid)], capture_output=True, text=True, check=True
+            ["pgrep", "-P", str(bridge.pid), "-f", "--", "--role opcua"],
+            capture_output=True,
+            text=True,
+            check=True,
         ).stdout.split()
         begin = time.time()
         subprocess.run(["kill", "-9", front], check=True)

@@ -24,6 +24,8 @@ def connected(port: int) -> zenoh.Session:
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{port}"]))
     config.insert_json5("scouting/multicast/enabled", "false")
+    # The front that serves zenoh may still be starting.
+    config.insert_json5("connect/timeout_ms", "30000")
     while True:
         try:
             return zenoh.open(config)

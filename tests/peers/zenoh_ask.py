@@ -14,6 +14,8 @@ config = zenoh.Config()
 config.insert_json5("mode", '"client"')
 config.insert_json5("connect/endpoints", json.dumps([endpoint]))
 config.insert_json5("scouting/multicast/enabled", "false")
+# The front that serves zenoh may still be starting.
+config.insert_json5("connect/timeout_ms", "30000")
 with zenoh.open(config) as session:
     for question in questions:
         if question.startswith("@"):

@@ -19,6 +19,8 @@ config = zenoh.Config()
 config.insert_json5("mode", '"client"')
 config.insert_json5("connect/endpoints", json.dumps([endpoint]))
 config.insert_json5("scouting/multicast/enabled", "false")
+# The front that serves zenoh may still be starting.
+config.insert_json5("connect/timeout_ms", "30000")
 WHO = json.dumps({"controller": "plc"}).encode()
 
 

@@ -26,6 +26,8 @@ _REASON: Final = b"!"
 """On the pipe of signs: what follows is why the front ends."""
 _LONGEST_REASON: Final = 1000
 _STOP_S: Final = 3.0
+FRONTS: Final = ("opcua", "page", "zenoh")
+"""Roles of all fronts of the service."""
 _NICE: Final = 5
 _PROMPT: Final = ("zenoh",)
 """Roles whose clients command drives over and over, and wait for each answer: as important as the bus process

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import AsyncExitStack, suppress
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from bridge.command import Plant, PlantView
 from bridge.config import BusTable
 from bridge.errors import BridgeError, OperationFailed, Unavailable
 from bridge.eventlog import log_event
-from bridge.front_process import Front
+from bridge.front_process import FRONTS, Front
 from bridge.lint import Severity, lint
 from bridge.master.ending import Ending
 from bridge.master.master import Master
@@ -63,8 +63,8 @@ def make_bus(table: BusTable) -> Bus:
 class Service:
     """The bus process of one site.
 
-    ``make_bus`` gives the buses; without ``fronts`` this process serves Modbus alone, and whoever started it
-    looks after the fronts. ``alarm`` is the master's.
+    ``make_bus`` gives the buses. Of what the site serves by fronts, ``fronts`` are started: without any, this
+    process serves Modbus alone. ``alarm`` is the master's.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class Service:
         project: Project,
         make_bus: MakeBus = make_bus,
         *,
-        fronts: bool = True,
+        fronts: Collection[str] = FRONTS,
         alarm: Alarm | None = None,
     ) -> None:
         self.project = project
@@ -121,11 +121,11 @@ class Service:
         self.fronts: list[Front] = []
         self._ports: dict[str, Port] = {}
         """Of the fronts: a front that dies leaves its port to the next."""
-        if fronts and site.opcua:
+        if "opcua" in fronts and site.opcua:
             self._add_front("opcua", Port(site.opcua.listen, "opcua.listen"))
-        if fronts and site.page:
+        if "page" in fronts and site.page:
             self._add_front("page", Port(site.page.listen, "page.listen"))
-        self._zenoh = site.zenoh if fronts else None
+        self._zenoh = site.zenoh if "zenoh" in fronts else None
         if self._zenoh:
             self._add_front("zenoh")
 

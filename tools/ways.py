@@ -251,7 +251,7 @@ async def running(folder: Path) -> AsyncIterator[Bridge]:
     path.write_text(_SITE.format(folder=folder, **ports), encoding="utf-8")
     wire = VirtualWire()
     project = load_project(path)
-    service = Service(project, lambda table: wire.end(table.name), fronts=False)
+    service = Service(project, lambda table: wire.end(table.name), fronts=())
     booted = asyncio.Event()
     service.plant.on_event(lambda event: booted.set() if event.kind is Kind.NODE_BACK else None)
     async with AsyncExitStack() as stack:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import logging
 import tempfile
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Collection, Coroutine
+from enum import StrEnum
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,13 +19,24 @@ from bridge.cli.signals import ending_signals
 from bridge.cli.stopping import Ending, until_stopped
 from bridge.config import BusTable, Site, ZenohTable, load_site
 from bridge.errors import BridgeError, OperationFailed
-from bridge.front_process import Front, become_front, give_reason, limit_memory
+from bridge.front_process import FRONTS, Front, become_front, give_reason, limit_memory
 
 # The service is not imported for a front: after one has ended, its clients wait for the next.
 if TYPE_CHECKING:
     from bridge.can import Bus
     from bridge.project import Project
     from bridge.sim.shell import Simulation
+
+
+class Role(StrEnum):
+    """What ``run --role`` takes."""
+
+    ALL = "all"
+    BUS = "bus"
+    OPCUA = "opcua"
+    PAGE = "page"
+    ZENOH = "zenoh"
+
 
 SiteArgument = Annotated[Path, typer.Argument(metavar="SITE", help="the site file")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="log more")]
@@ -41,9 +53,9 @@ _DEMO_MOVES = (
 def run(
     site: SiteArgument,
     role: Annotated[
-        Literal["all", "bus", "opcua", "page", "zenoh"],
-        typer.Option(help="run one process alone: bus, opcua, page or zenoh"),
-    ] = "all",
+        list[Role] | None,
+        typer.Option(help="run one process alone: bus, opcua, page or zenoh; or bus with some of the others"),
+    ] = None,
     parent: Annotated[int, typer.Option(hidden=True)] = 0,
     signs: Annotated[int | None, typer.Option(hidden=True)] = None,
     listening: Annotated[int | None, typer.Option(hidden=True)] = None,
@@ -51,10 +63,14 @@ def run(
 ) -> None:
     """Run the bridge for SITE. Nodes of a virtual bus are simulated in the same process."""
     logs.set_up(verbose=verbose)
-    if role in ("opcua", "page", "zenoh"):
-        _become_front(parent, role)
+    roles = role or [Role.ALL]
+    front = next((one for one in roles if one in FRONTS), None)
+    if front is not None and Role.BUS not in roles:
+        if len(roles) > 1:
+            raise BridgeError("a process has one role; with bus, those of the fronts that it is to start")
+        _become_front(parent, front)
         try:
-            until_stopped(_front_of(role, site, signs, listening))
+            until_stopped(_front_of(front, site, signs, listening))
         except BridgeError as error:
             if signs is not None:
                 give_reason(signs, str(error))
@@ -63,7 +79,8 @@ def run(
     from bridge.project import load_project
 
     ending = Ending()
-    until_stopped(_serve(load_project(site), ending, fronts=role == "all"), ending)
+    fronts = FRONTS if Role.ALL in roles else tuple(one for one in roles if one in FRONTS)
+    until_stopped(_serve(load_project(site), ending, fronts=fronts), ending)
 
 
 def _front_of(role: str, site: Path, signs: int | None, listening: int | None) -> Coroutine[None, None, None]:
@@ -99,7 +116,7 @@ def demo(verbose: Verbose = False) -> None:
         project = load_project(_demo_site(Path(folder)))
         ending = Ending()
         ready = partial(_print_demo, project)
-        until_stopped(_serve(project, ending, fronts=True, controller=True, ready=ready), ending)
+        until_stopped(_serve(project, ending, controller=True, ready=ready), ending)
 
 
 def simulate(
@@ -155,7 +172,7 @@ async def _serve(
     project: Project,
     ending: Ending,
     *,
-    fronts: bool,
+    fronts: Collection[str] = FRONTS,
     controller: bool = False,
     ready: Callable[[], None] = lambda: None,
 ) -> None:

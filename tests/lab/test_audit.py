@@ -74,7 +74,7 @@ def test_audit_reads_what_the_drives_would_do_before_and_beside_the_bridge(comma
     assert before["pump/drive"]["reason"].startswith("C00593/1 is 0 (no reaction)")
     assert (before["fan/drive"]["ok"], before["pump/drive"]["ok"]) == (True, False)
     folder, site = commands.folder, str(commands.site)
-    with drivebridge(folder, "run", "run", site, "--role", "bus", notify=True) as bridge:
+    with drivebridge(folder, "run", "run", site, "--role", "bus", "--role", "zenoh", notify=True) as bridge:
         bridge.wait_ready()
         for node in ("conveyor", "pump", "lift", "fan"):
             bridge.wait_output(f"{node}: node operational")
@@ -123,7 +123,7 @@ def test_drop_test_of_a_drive_that_runs_on_fails(commands: Commands) -> None:
 def test_drop_test_is_refused_without_consent_and_beside_a_bridge(commands: Commands) -> None:
     assert commands.call("drop-test", "pump").returncode == 2
     folder, site = commands.folder, str(commands.site)
-    with drivebridge(folder, "run", "run", site, "--role", "bus", notify=True) as bridge:
+    with drivebridge(folder, "run", "run", site, "--role", "bus", "--role", "zenoh", notify=True) as bridge:
         bridge.wait_ready()
         done = commands.call("drop-test", "pump", "--yes-i-am-at-the-machine")
     assert done.returncode == 1

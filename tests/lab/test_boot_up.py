@@ -25,7 +25,7 @@ def bridge_on(folder: Path, node: str, *, slave: bool) -> Iterator[tuple[Sniffer
         if slave:
             stack.enter_context(peer(folder, "foreign_slave", "vcan0", "5")).wait_output("is there")
         bridge = stack.enter_context(
-            drivebridge(folder, "run", "run", str(site), "--role", "bus", notify=True)
+            drivebridge(folder, "run", "run", str(site), "--role", "bus", "--role", "zenoh", notify=True)
         )
         bridge.wait_ready()
         yield bus, bridge

@@ -60,7 +60,9 @@ def test_scan_with_a_site_knows_its_names(simulation: LabSite) -> None:
 
 
 def test_scan_works_while_a_bridge_is_running(simulation: LabSite, tmp_path: Path) -> None:
-    with drivebridge(tmp_path, "run", "run", str(simulation.path), "--role", "bus", notify=True) as bridge:
+    with drivebridge(
+        tmp_path, "run", "run", str(simulation.path), "--role", "bus", "--role", "zenoh", notify=True
+    ) as bridge:
         bridge.wait_ready()
         bridge.wait_output("node operational")
         [node] = answer("scan", str(simulation.path))

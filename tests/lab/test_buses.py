@@ -51,7 +51,7 @@ def lab(tmp_path: Path) -> Iterator[Lab]:
         simulation = stack.enter_context(drivebridge(tmp_path, "simulate", "simulate", str(path)))
         simulation.wait_output("simulating")
         bridge = stack.enter_context(
-            drivebridge(tmp_path, "run", "run", str(path), "--role", "bus", notify=True)
+            drivebridge(tmp_path, "run", "run", str(path), "--role", "bus", "--role", "zenoh", notify=True)
         )
         bridge.wait_ready()
         until(lambda: bridge.output().count("node operational") == 2, 30.0, "both nodes operational")

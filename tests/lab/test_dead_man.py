@@ -43,7 +43,7 @@ class Lab:
         self.bridge = self.run_bridge("run")
 
     def run_bridge(self, name: str) -> Process:
-        arguments = ("run", str(self.site.path), "--role", "bus")
+        arguments = ("run", str(self.site.path), "--role", "bus", "--role", "zenoh")
         bridge = self.stack.enter_context(drivebridge(self.folder, name, *arguments, notify=True))
         bridge.wait_ready()
         bridge.wait_output("node operational")

@@ -44,7 +44,7 @@ class Lab:
         self.bus: Sniffer = stack.enter_context(sniffing())
         simulation = stack.enter_context(drivebridge(folder, "simulate", "simulate", str(site)))
         simulation.wait_output("simulating conveyor, pump, lift, fan")
-        arguments = ("run", str(site), "--role", "bus")
+        arguments = ("run", str(site), "--role", "bus", "--role", "zenoh")
         self.bridge: Process = stack.enter_context(drivebridge(folder, "run", *arguments, notify=True))
         self.bridge.wait_ready()
         until(lambda: self.bridge.output().count("node operational") == 4, 30.0, "all nodes operational")

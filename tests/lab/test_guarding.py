@@ -31,7 +31,7 @@ def test_both_sides_watch_each_other(tmp_path: Path) -> None:
         bus = stack.enter_context(sniffing())
         simulation = stack.enter_context(drivebridge(tmp_path, "simulate", "simulate", str(site.path)))
         simulation.wait_output("simulating")
-        run = ("run", str(site.path), "--role", "bus")
+        run = ("run", str(site.path), "--role", "bus", "--role", "zenoh")
         bridge = stack.enter_context(drivebridge(tmp_path, "run", *run, notify=True))
         bridge.wait_ready()
         bridge.wait_output(STARTED)

@@ -57,7 +57,7 @@ class Lab:
         )
 
     def run_bridge(self, name: str, site: LabSite) -> Process:
-        arguments = ("run", str(site.path), "--role", "bus")
+        arguments = ("run", str(site.path), "--role", "bus", "--role", "zenoh")
         bridge = self.stack.enter_context(drivebridge(self.folder, name, *arguments, notify=True))
         bridge.wait_ready()
         return bridge

@@ -65,7 +65,7 @@ class Lab:
         self.bus: Sniffer = stack.enter_context(sniffing())
         simulation = stack.enter_context(drivebridge(folder, "simulate", "simulate", str(path)))
         simulation.wait_output("simulating")
-        arguments = ("run", str(path), "--role", "bus")
+        arguments = ("run", str(path), "--role", "bus", "--role", "zenoh")
         self.bridge: Process = stack.enter_context(drivebridge(folder, "run", *arguments, notify=True))
         self.bridge.wait_ready()
         self.bridge.wait_output("node operational")
@@ -166,7 +166,9 @@ def test_a_bridge_that_cannot_boot_it_again_stops_the_drive(make_lab, tmp_path: 
     stranger = "[bus.node.identity]\nvendor_id = 0x123"
     path.write_text(_SITE.format(folder=tmp_path, modbus=lab.port, configure=stranger), encoding="utf-8")
     begun = time.time()
-    with drivebridge(tmp_path, "again", "run", str(path), "--role", "bus", notify=True) as again:
+    with drivebridge(
+        tmp_path, "again", "run", str(path), "--role", "bus", "--role", "zenoh", notify=True
+    ) as again:
         again.wait_output("expected 00000123h", 10.0)
         until(lambda: lab.bus.of(0x2B3, begun), 2.0, "a stopped word where the drive listens")
         stopped_at = lab.bus.of(0x2B3, begun)[0].time

@@ -84,7 +84,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
 
 
 def run(folder: Path, site: LabSite, name: str) -> AbstractContextManager[Process]:
-    return drivebridge(folder, name, "run", str(site.path), "--role", "bus", notify=True)
+    return drivebridge(folder, name, "run", str(site.path), "--role", "bus", "--role", "zenoh", notify=True)
 
 
 def first(frames: list[Seen], data: bytes) -> float:

@@ -63,7 +63,7 @@ class Block:
         self.bus: Sniffer = stack.enter_context(sniffing())
         slave = stack.enter_context(peer(folder, "output_slave", "vcan0", str(NODE), *how))
         slave.wait_output("is there")
-        arguments = ("run", str(site), "--role", "bus")
+        arguments = ("run", str(site), "--role", "bus", "--role", "zenoh")
         self.bridge: Process = stack.enter_context(drivebridge(folder, "run", *arguments, notify=True))
         self.bridge.wait_ready()
         self.bridge.wait_output("node operational")

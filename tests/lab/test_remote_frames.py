@@ -29,7 +29,7 @@ def test_a_tpdo_of_type_253_is_asked_for_and_read_and_stale_where_no_answer_come
         bus = stack.enter_context(sniffing())
         slave = stack.enter_context(peer(tmp_path, "foreign_slave", "vcan0", "5", "asked"))
         slave.wait_output("is there")
-        arguments = ("run", str(site.path), "--role", "bus")
+        arguments = ("run", str(site.path), "--role", "bus", "--role", "zenoh")
         bridge = stack.enter_context(drivebridge(tmp_path, "run", *arguments, notify=True))
         bridge.wait_ready()
         bridge.wait_output("node operational")

@@ -37,7 +37,7 @@ def test_the_mandatory_node_comes_first_and_its_loss_stops_all(tmp_path: Path) -
         bus = stack.enter_context(sniffing())
         one = stack.enter_context(drivebridge(tmp_path, "conveyor", "simulate", str(conveyor_only)))
         one.wait_output("simulating conveyor")
-        run = ("run", str(site), "--role", "bus")
+        run = ("run", str(site), "--role", "bus", "--role", "zenoh")
         bridge = stack.enter_context(drivebridge(tmp_path, "run", *run, notify=True))
         bridge.wait_ready()
 

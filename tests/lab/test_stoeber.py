@@ -88,7 +88,7 @@ class Lab:
         self.bus: Sniffer = stack.enter_context(sniffing())
         self.drive: Process = stack.enter_context(peer(folder, "stoeber_slave", "vcan0", str(NODE), "250000"))
         self.drive.wait_output("is there")
-        arguments = ("run", str(site), "--role", "bus")
+        arguments = ("run", str(site), "--role", "bus", "--role", "zenoh")
         self.bridge: Process = stack.enter_context(drivebridge(folder, "run", *arguments, notify=True))
         self.bridge.wait_ready()
         self.bridge.wait_output("node operational")

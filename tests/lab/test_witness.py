@@ -40,7 +40,7 @@ class Watched:
     def start(self) -> Process:
         simulation = drivebridge(self.folder, "simulate", "simulate", str(self.site.path))
         self.stack.enter_context(simulation).wait_output("simulating")
-        arguments = ("run", str(self.site.path), "--role", "bus")
+        arguments = ("run", str(self.site.path), "--role", "bus", "--role", "zenoh")
         bridge = self.stack.enter_context(drivebridge(self.folder, "run", *arguments, notify=True))
         bridge.wait_ready()
         bridge.wait_output("node operational")

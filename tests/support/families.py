@@ -111,7 +111,7 @@ class FamilyBridge:
     async def _serve(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._work = asyncio.current_task()
-        self.service = Service(self._project, self._open_bus, fronts=True)
+        self.service = Service(self._project, self._open_bus)
         assert self._simulation
         playing = asyncio.create_task(self._simulation.run())
         try:

@@ -21,7 +21,7 @@ async def test_what_it_says_when_it_ends(
     node = sites.node(sites.drive("fu1", "modbus", 20_000))
     path = sites.write(tmp_path, sites.bus(node), sites.modbus())
     wire = VirtualWire()
-    service = Service(load_project(path), lambda table: wire.end(table.name), fronts=False)
+    service = Service(load_project(path), lambda table: wire.end(table.name), fronts=())
     [network] = service._networks
     monkeypatch.setattr(type(network.charge), "is_left", property(lambda charge: is_left))
     with caplog.at_level(logging.INFO):

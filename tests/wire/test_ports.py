@@ -13,6 +13,7 @@ import pytest
 from bridge.can.virtual import VirtualWire
 from bridge.command import Event, Kind
 from bridge.errors import Unavailable
+from bridge.front_process import FRONTS
 from bridge.parts import Ports
 from bridge.project import load_project
 from bridge.service import Service
@@ -34,7 +35,7 @@ async def serving(
     """The bus process on a bus of its own."""
     path = sites.write(folder, sites.bus(sites.node(sites.drive("fu1", "modbus", 1000)), more=more), *tables)
     wire = VirtualWire()
-    service = Service(load_project(path), lambda table: wire.end(table.name), fronts=fronts)
+    service = Service(load_project(path), lambda table: wire.end(table.name), fronts=FRONTS if fronts else ())
     events: list[Event] = []
     service.plant.on_event(events.append)
     is_open = asyncio.Event()

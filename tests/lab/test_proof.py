@@ -47,7 +47,7 @@ def _bridges_said(out: Path) -> str:
     return "".join(f"\n-- {log.name}\n{log.read_text(encoding='utf-8', errors='replace')}" for log in logs)
 
 
-@pytest.mark.timeout(480)
+@pytest.mark.timeout(700)
 def test_no_fault_keeps_a_drive_running_longer_than_published(tmp_path: Path) -> None:
     names = [fault.name for fault in FAULTS if fault.possible() and not fault.new_process][today() % 4 :: 4]
     faults = ("--cycles", "1", "--hold", _HOLD_S, "--faults", ",".join(names))
@@ -55,7 +55,7 @@ def test_no_fault_keeps_a_drive_running_longer_than_published(tmp_path: Path) ->
     assert {sample["fault"] for sample in found["samples"]} == set(names)
 
 
-@pytest.mark.timeout(480)
+@pytest.mark.timeout(700)
 def test_the_proof_finds_a_seeded_fault(tmp_path: Path) -> None:
     names = [mutant.name for mutant in load_mutants()]
     chosen = names[today() % len(names)]

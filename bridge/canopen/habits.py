@@ -19,7 +19,7 @@ _AGAIN_AFTER: Final = 10
 
 
 class Odd(Enum):
-    """What is odd about a frame."""
+    """Oddity of a frame."""
 
     SDO_LENGTH = "an SDO answer of another length"
     HEARTBEAT_LENGTH = "an error control message of another length"
@@ -31,7 +31,7 @@ class Odd(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Habit:
-    """What is said of one kind of odd frame: of ``one`` or of ``many``, and what is right.
+    """Sentences about one kind of odd frame: of ``one`` or of ``many``, and what is right.
 
     ``count`` is their number; the last of them ``has`` so many bytes or ms where ``due`` are right.
     """

@@ -54,7 +54,7 @@ def crc16(data: bytes | bytearray) -> int:
 
 @dataclass(slots=True)
 class BlockUse:
-    """What a channel has learned about its server: why it is not asked for block transfer, and how many
+    """Lessons of a channel about its server: why it is not asked for block transfer, and how many
     segments in a row arrive without loss."""
 
     why_not: str = ""
@@ -71,7 +71,7 @@ class BlockUse:
 
 @dataclass(slots=True)
 class _Progress:
-    """How far the block transfer under way has come."""
+    """Stage of the block transfer under way."""
 
     stage: Stage = Stage.BEGIN
 

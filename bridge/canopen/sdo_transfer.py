@@ -30,7 +30,7 @@ _TOGGLE: Final = 0x10
 
 
 _UNANSWERED: Final = frozenset((abort.TIMED_OUT, abort.BUSY, abort.GENERAL))
-"""What ends a transfer on our side although no wrong answer has come."""
+"""Abort codes that end a transfer on our side although no wrong answer has come."""
 
 
 class SdoError(Exception):

@@ -17,7 +17,7 @@ from bridge.canopen.sdo_transfer import SdoError
 
 
 class Stage(Enum):
-    """How far a block transfer has come (CiA 301 §7.2.4.3.9–15)."""
+    """Stage of a block transfer (CiA 301 §7.2.4.3.9–15)."""
 
     BEGIN = "A4h or C6h has been sent"
     BLOCKS = "segments are on their way"
@@ -53,7 +53,7 @@ _OF_THE_PROTOCOL: Final = (
     )
     | abort.LENGTHS
 )
-"""What a server refuses at the end of a download without having looked at the value."""
+"""Abort codes by which a server refuses the end of a download without having looked at the value."""
 
 WAYS_BACK: Final = (
     WayBack(Stage.BEGIN, True, _ANY, "the node refuses it"),

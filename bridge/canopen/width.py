@@ -39,7 +39,7 @@ def unsigned(data: bytes, size: int) -> int:
 
 
 def holds(held: bytes, wanted: bytes, *, signed: bool = False) -> bool:
-    """Whether an answer, ``held``, is the number that ``wanted`` has the bytes of.
+    """True where an answer, ``held``, is the number that ``wanted`` has the bytes of.
 
     Bytes beyond the shorter one must be its padding, with zeros or with the sign. In an answer without a
     length they say nothing.
@@ -82,7 +82,7 @@ def forms(
 
 
 def may_mean_width(code: int) -> bool:
-    """Whether a node that refuses a number with this abort code may take it in another width."""
+    """True where a node that refuses a number with this abort code may take it in another width."""
     return code in _OTHER_WIDTH
 
 

@@ -78,7 +78,7 @@ class Line:
     is_of_site: bool
     states_bitrate: bool = True
     state_dir: Path | None = None
-    """Of the site."""
+    """State folder of the site."""
 
     def sdo_policy(self, node_id: int) -> tuple[float, int]:
         """How long to wait for an answer of this node in seconds, and how often to ask again: as the site

@@ -1,4 +1,4 @@
-"""What was learned of SDO servers, from one command to the next: ``sdo-servers.json``.
+"""Lessons about SDO servers, from one command to the next: ``sdo-servers.json``.
 
 In the site's ``state_dir``; without a site in the user's own state folder (XDG). What is a month old counts
 no more: the device may have another program by then.

@@ -162,7 +162,7 @@ def decode(kind: ValueType, data: bytes) -> Plain:
 
 
 def surplus(kind: ValueType, data: bytes) -> str:
-    """What is to be said of bytes beyond the type that are not its padding; empty where there are none."""
+    """Remark about bytes beyond the type that are not its padding; empty where there are none."""
     name = _ALSO.get(kind, kind)
     if name not in NUMBERS:
         return ""

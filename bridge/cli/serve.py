@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class Role(StrEnum):
-    """What ``run --role`` takes."""
+    """Processes of the service, as ``run --role`` names them."""
 
     ALL = "all"
     BUS = "bus"

@@ -19,7 +19,7 @@ _TERMINATIONS: Final = 2
 
 @dataclass(frozen=True, slots=True)
 class Manual:
-    """What a maker's manual says. ``lengths`` are (bit/s, m) of the whole bus; ``wires`` (m, mm²): up to this
+    """Limits of a maker's manual. ``lengths`` are (bit/s, m) of the whole bus; ``wires`` (m, mm²): up to this
     length at least this cross-section, ``segments`` (nodes, m) by cross-section in mm²: up to so many nodes
     a segment without a repeater may be so long. ``line`` is the section by which nodes are in a line."""
 

@@ -19,7 +19,7 @@ from bridge.image import Point, Quality, Value
 SNAPSHOT: Final = "mirror/snapshot"
 DELTA: Final = "mirror/delta"
 PROMPT: Final = "mirror/prompt"
-"""Of who cannot wait for the next delta; that one has the same readings again."""
+"""Key of readings for who cannot wait for the next delta; that one has the same again."""
 EVENT: Final = "mirror/event"
 REQUESTS: Final = "mirror/request/*"
 REJECTED: Final = "mirror/rejected"
@@ -65,7 +65,7 @@ class Delta(msgspec.Struct, array_like=True, frozen=True):
 
 
 class Prompt(msgspec.Struct, array_like=True, frozen=True):
-    """What has changed just now."""
+    """Readings that have changed just now."""
 
     instance: int
     readings: tuple[Changed, ...]

@@ -1,4 +1,4 @@
-"""Which connections a server has, and for how long without being of use. Sans-IO.
+"""Connections that a server has, and for how long without being of use. Sans-IO.
 
 One rule for all that listen. Silent sockets must not keep anybody out: a connection that has come no further
 has little time, makes room for later ones, and each address has a limited share. One place is kept for who
@@ -20,7 +20,7 @@ Tell = Callable[[str, str, str], object]
 
 
 class Stage(IntEnum):
-    """How far a connection has come. Each protocol says what its own steps are; in a session it has been let
+    """Stage of a connection. Each protocol says what its own steps are; in a session it has been let
     in, and makes room for nobody."""
 
     CONNECTED = 0

@@ -20,6 +20,9 @@ import zenoh
 
 _log = logging.getLogger(__name__)
 
+_CONNECTS_MS: Final = 30_000
+"""After which it is said that nobody answers."""
+
 _TTL_MS: Final = 3000
 _ANSWER_S: Final = 5.0
 """A start may take three seconds."""
@@ -162,7 +165,8 @@ def run_controller(endpoint: str, moves: Sequence[Move]) -> None:
 def _connect(endpoint: str) -> zenoh.Session:
     settings = {
         "mode": "client",
-        "connect": {"endpoints": [endpoint]},
+        # The front that serves zenoh starts beside this controller: zenoh tries again by itself.
+        "connect": {"endpoints": [endpoint], "timeout_ms": _CONNECTS_MS},
         "scouting": {"multicast": {"enabled": False}},
     }
     config = zenoh.Config.from_json5(json.dumps(settings))

@@ -92,6 +92,11 @@ def zenoh_config(
         settings["transport/auth/usrpwd/user"] = user
         settings["transport/auth/usrpwd/password"] = password
         settings["transport/auth/usrpwd/dictionary_file"] = file
+    return _config_of(settings)
+
+
+def _config_of(settings: Mapping[str, object]) -> zenoh.Config:
+    """Raises Unavailable for a setting that zenoh does not take."""
     config = zenoh.Config()
     for key, value in settings.items():
         try:

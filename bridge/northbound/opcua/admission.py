@@ -1,4 +1,4 @@
-"""Which connections OPC UA has, and how long each step to a session may take."""
+"""Connections that OPC UA has, and how long each step to a session may take."""
 
 from __future__ import annotations
 

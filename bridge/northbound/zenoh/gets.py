@@ -38,7 +38,7 @@ class Gets(Generic[Get]):
         return tuple(one.get for one in self._answered)
 
     def has_room(self, asker: str, now: float) -> bool:
-        """Whether one more of ``asker`` may be added."""
+        """True where one more of ``asker`` may be added."""
         return len(self._answered) < AT_ONCE or self._ending(asker, now) is not None
 
     def add(self, get: Get, asker: str, now: float) -> Get | None:

@@ -1,4 +1,4 @@
-"""What the zenoh server needs of the site file and the machine, looked at before a bus is opened."""
+"""Needs of the zenoh server in the site file and on the machine, looked at before a bus is opened."""
 
 from __future__ import annotations
 

@@ -130,13 +130,13 @@ fuzz: compiled ## throw changed messages at the bridge, 10 minutes for each prot
 bench: compiled packages ## measure everything in half an hour, write docs/explanation/performance.md (ARGS='--rounds 1')
 	@$(ON_VCAN) $(IN) -m tests.bench $(if $(filter 0,$(LAB)),--no-lab) --json build/bench.json --plots docs/images docs/explanation/performance.md $(ARGS)
 
-# Half of the cycles on each of two machines. PROOF=n: how many times each fault is injected.
+# Half of the drives on each of two machines. PROOF=n: how many times each fault is injected.
 PROOF ?= 12
 
-proof: compiled packages ## inject every fault 12 times, write docs/explanation/proof.md (30 minutes)
+proof: compiled packages ## inject every fault 12 times, write docs/explanation/proof.md (an hour)
 	@$(ON_VCAN) tests/proof/run-proof -j $(FEW_JOBS) -n $(PROOF) -o build/proof.json docs/explanation/proof.md
 
-proof-mutants: compiled packages ## seed faults in the chain, which the proof has to find (15 minutes)
+proof-mutants: compiled packages ## seed faults in the chain, which the proof has to find (20 minutes)
 	@$(ON_VCAN) tests/proof/run-proof -m -j $(FEW_JOBS) -o build/mutants.json docs/explanation/proof.md
 
 mutants: compiled ## change the code and see whether unit tests notice: hours, or ARGS='bridge/canopen/sdo.py'

@@ -88,9 +88,14 @@ def test_a_bus_that_goes_down_leaves_the_other_untouched(lab: Lab) -> None:
 def test_sync_counts_and_time_is_told_on_both(lab: Lab) -> None:
     time.sleep(1.5)
     for wire in lab.wires:
-        numbers = [frame.data[0] for frame in wire.of(0x080)]
-        assert set(numbers) == set(range(1, 9))
-        assert all(after == before % 8 + 1 for before, after in pairwise(numbers))
+        syncs = wire.of(0x080)
+        assert {sync.data[0] for sync in syncs} == set(range(1, 9))
+        for before, after in pairwise(syncs):
+            following = {before.data[0] % 8 + 1}
+            # A bridge that a slow machine kept waiting has been silent, and begins anew.
+            if after.time - before.time > 3 * CYCLE_S:
+                following.add(1)
+            assert after.data[0] in following
         stamps = wire.of(0x100)
         assert stamps
         days = (time.time() - 441_763_200) // 86_400

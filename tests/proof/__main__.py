@@ -3,13 +3,14 @@
     python -m tests.proof run --cycles N --out RESULT.json [--faults NAME,NAME]
     python -m tests.proof report --least N --page PAGE.md --out RESULT.json PART.json ...
     python -m tests.proof hunt --share FOLDER --out RESULT.json [--mutants NAME,NAME]
+    python -m tests.proof survivors PART.json ...
     python -m tests.proof kills --page PAGE.md --out RESULT.json PART.json ...
 
-``hunt`` and ``kills`` are those of ``make proof-mutants``. ``run`` and ``hunt`` are for a machine with vcan0,
-vcan1 and a mount namespace of its own (``tests/lab/vcan-run -n 2 -- unshare --mount ...``); the lab has short
-ones (``tests/lab/test_proof.py``). ``run`` and what makes the pages end with 1 where something has failed: a
-bound is exceeded by more than the machine was in the way. Where it is not more, the measurement is void: it
-is shown, and its fault is injected once more.
+``hunt``, ``survivors`` and ``kills`` are those of ``make proof-mutants``. ``run`` and ``hunt`` are for a
+machine with vcan0, vcan1 and a mount namespace of its own (``tests/lab/vcan-run -n 2 -- unshare --mount
+...``); the lab has short ones (``tests/lab/test_proof.py``). ``run`` and what makes the pages end with 1
+where something has failed: a bound is exceeded by more than the machine was in the way. Where it is not more,
+the measurement is void: it is shown, and its fault is injected once more.
 """
 
 from __future__ import annotations
@@ -225,14 +226,19 @@ def main() -> int:
     third.add_argument("--mutants", default="", help="left out: all")
     third.add_argument("--noise", type=float, default=0.0, help="ms allowed on a machine that is busy")
     fourth = commands.add_parser("kills")
+    fifth = commands.add_parser("survivors")
     for command in (other, fourth):
         command.add_argument("--page", type=Path, required=True)
+    for command in (other, fourth, fifth):
         command.add_argument("parts", type=Path, nargs="+")
     for command in (one, other, third, fourth):
         command.add_argument("--out", type=Path, required=True)
     asked = parser.parse_args()
     if asked.command == "hunt":
         return hunt_mutants(asked)
+    if asked.command == "survivors":
+        print(",".join(kill_table.survivors(kill_table.merge([report.load(part) for part in asked.parts]))))
+        return 0
     if asked.command == "kills":
         found = kill_table.merge([report.load(part) for part in asked.parts])
         asked.out.write_text(json.dumps(found, indent=1), encoding="utf-8")

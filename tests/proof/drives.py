@@ -1,5 +1,5 @@
-"""The plant of the proof: every family on one bus, each commanded through each protocol, with every reaction,
-RPDOs that go by SYNC, and a drive with two of them."""
+"""The plants of the proof. Together they have every family, each commanded through each protocol, with every
+reaction, RPDOs that go by SYNC, and a drive with two of them."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def _single(place: int, family: Family, protocol: str, name: str, node_id: int) 
     )
 
 
-def _drives() -> tuple[Drive, ...]:
+def _all() -> tuple[Drive, ...]:
     # The fourth drive of the NORD node is Modbus's, too.
     drives = [
         Drive(n, NORD, protocol, "conveyor", f"fu{n + 1}", 5, 0x205 + 0x100 * n, 0x185 + 0x100 * n, None, how)
@@ -188,11 +188,15 @@ def _drives() -> tuple[Drive, ...]:
             _single(len(drives) + n, family, protocol, name, first_id + n)
             for n, protocol in enumerate(PROTOCOLS)
         ]
-    chosen = [drive for drive in drives if not PLANT.nodes or drive.node in PLANT.nodes]
-    return tuple(replace(drive, place=place) for place, drive in enumerate(chosen))
+    return tuple(drives)
 
 
-DRIVES: Final = _drives()
+ALL: Final = _all()
+DRIVES: Final = tuple(
+    replace(drive, place=place)
+    for place, drive in enumerate(drive for drive in ALL if drive.node in PLANT.nodes)
+)
+"""Those of this run's plant."""
 
 
 def drives_of(protocol: str) -> list[Drive]:

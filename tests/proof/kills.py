@@ -10,14 +10,18 @@ END: Final = "<!-- end of what `make proof-mutants` makes -->"
 
 
 def merge(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The results of several machines as one, in the order of the table of mutants."""
+    """The results of several machines as one, in the order of the table of mutants. One that lived on one
+    plant and was found on another is found."""
     merged = dict(parts[0])
     merged["false_alarms"] = [text for part in parts for text in part["false_alarms"]]
     place = {name: number for number, name in enumerate(merged["mutants"])}
-    kills = [kill for part in parts for kill in part["kills"]]
-    merged["kills"] = sorted(kills, key=lambda kill: place[kill["mutant"]])
+    kills: dict[str, dict[str, Any]] = {}
+    for kill in (kill for part in parts for kill in part["kills"]):
+        if not kills.get(kill["mutant"], {}).get("judgement"):
+            kills[kill["mutant"]] = kill
+    merged["kills"] = sorted(kills.values(), key=lambda kill: place[kill["mutant"]])
     merged["seconds"] = max(part["seconds"] for part in parts)
-    merged["machines"] = len(parts)
+    merged["machines"] = len([part for part in parts if len(part["mutants"]) == len(place)])
     return merged
 
 
@@ -45,10 +49,13 @@ def markdown(result: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def survivors(result: dict[str, Any]) -> list[str]:
+    return [kill["mutant"] for kill in result["kills"] if not kill["judgement"]]
+
+
 def failures(result: dict[str, Any]) -> list[str]:
     """Why the hunt has not succeeded: one sentence each."""
     found = [f"false alarm: {text}" for text in result["false_alarms"]]
     tried = {kill["mutant"] for kill in result["kills"]}
     found += [f"not tried: {name}" for name in result["mutants"] if name not in tried]
-    found += [f"survived: {kill['mutant']}" for kill in result["kills"] if not kill["judgement"]]
-    return found
+    return found + [f"survived: {name}" for name in survivors(result)]

@@ -225,13 +225,19 @@ def _was_starved(rig: Rig, drive: Drive, since: float) -> bool:
 
 def _wait_handed_on(rig: Rig, fault: Fault, since: float, say: Callable[[str], None]) -> None:
     """Every drive moves by a telegram that its owner sent after ``since``. One that is stopped meanwhile,
-    be it by a slow machine, gets none: that is told, and it is brought back."""
+    be it by a slow machine, gets none: that is told, and it is brought back. So is one that has tripped and
+    is to hold: it moves on, and not by its owner."""
     for _ in range(_LOOKS):
         _all_go_on(rig, DRIVES, fault, "whose owners were there", since)
         _all_move(rig, say)
         with suppress(Stuck):
             rig.wait(lambda: all(_was_handed_on(rig, drive, since) for drive in DRIVES), _LOOK_S, "telegrams")
             return
+        held = [one for one in DRIVES if one.reaction == "hold" and not _was_handed_on(rig, one, since)]
+        if held:
+            say(f"on hold by themselves: {', '.join(drive.path for drive in held)}")
+            rig.by_themselves += len(held)
+            rig.run_all(anew=held)
     lacking = ", ".join(
         f"{one.path} ({one.protocol})" for one in DRIVES if not _was_handed_on(rig, one, since)
     )

@@ -11,9 +11,11 @@ from typing import get_args
 import pytest
 
 from bridge.config import Reaction
-from tests.proof.drives import DRIVES
+from tests.proof.drives import ALL, PROTOCOLS
+from tests.proof.families import CIA402
 from tests.proof.fault import Fault
 from tests.proof.faults import FAULTS
+from tests.proof.settings import FIRST, SECOND
 from tests.support.process import REPOSITORY
 
 _PROOF = Path(REPOSITORY) / "tests" / "proof"
@@ -47,9 +49,20 @@ def test_a_fault_is_judged_by_a_bound_or_by_yes_or_no(fault: Fault) -> None:
 
 
 def test_every_reaction_and_every_kind_of_rpdo_is_there() -> None:
-    assert {drive.reaction for drive in DRIVES} == set(get_args(Reaction))
-    assert any(drive.is_synchronous for drive in DRIVES)
-    assert any(drive.setpoint_rpdo for drive in DRIVES)
+    assert {drive.reaction for drive in ALL} == set(get_args(Reaction))
+    assert any(drive.is_synchronous for drive in ALL)
+    assert any(drive.setpoint_rpdo for drive in ALL)
+
+
+def test_each_half_has_every_protocol_and_both_have_every_drive() -> None:
+    assert set(FIRST.nodes) | set(SECOND.nodes) == {drive.node for drive in ALL}
+    assert not set(FIRST.nodes) & set(SECOND.nodes)
+    for plant in (FIRST, SECOND):
+        here = [drive for drive in ALL if drive.node in plant.nodes]
+        assert {drive.protocol for drive in here} == set(PROTOCOLS)
+        assert sum(drive.protocol == "modbus" for drive in here) > 1
+        # One that can be made deaf: its RPDO waits for SYNC.
+        assert next(drive for drive in here if drive.family is CIA402).is_synchronous
 
 
 def test_who_judges_imports_nothing_of_what_is_judged() -> None:

@@ -11,7 +11,7 @@ import pytest
 from tests.proof import hunt
 from tests.proof.faults import FAULTS
 from tests.proof.hunt import Share, order
-from tests.proof.kills import BEGIN, END, failures, markdown, merge
+from tests.proof.kills import BEGIN, END, failures, markdown, merge, survivors
 from tests.proof.measure import Sample
 from tests.proof.rig import NotStopped, Rig, Stuck
 
@@ -57,6 +57,15 @@ def test_a_survivor_and_one_that_nobody_tried_fail_it() -> None:
     found = result(kill("one", ""))
     assert failures(found) == ["not tried: two", "survived: one"]
     assert "| one | much | **survived** |" in markdown(found)
+
+
+def test_what_lives_on_one_plant_may_be_found_on_the_other() -> None:
+    first = result(kill("one", ""), kill("two"))
+    assert survivors(first) == ["one"]
+    both = merge([first, result(kill("one"), mutants=["one"])])
+    assert failures(both) == []
+    assert "1 at a time" in markdown(both)
+    assert survivors(merge([first, result(kill("one", ""), mutants=["one"])])) == ["one"]
 
 
 def test_a_fault_that_is_found_in_the_program_as_it_is_fails_it() -> None:

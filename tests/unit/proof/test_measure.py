@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 
-from tests.proof.drives import DRIVES, Drive
+from tests.proof.drives import ALL, Drive
 from tests.proof.families import NORD
 from tests.proof.measure import (
     Sample,
@@ -25,8 +25,8 @@ from tests.proof.measure import (
 from tests.proof.rig import Rig
 from tests.proof.witness import Run
 
-FU1 = next(drive for drive in DRIVES if drive.path == "conveyor/fu1")
-PUMP = next(drive for drive in DRIVES if drive.path == "pump_modbus/drive")
+FU1 = next(drive for drive in ALL if drive.path == "conveyor/fu1")
+PUMP = next(drive for drive in ALL if drive.path == "pump_modbus/drive")
 ENABLE, STOP = bytes.fromhex("7f04002000000000"), bytes.fromhex("7e04000000000000")
 RUNNING, READY = bytes.fromhex("3704002000000000"), bytes.fromhex("3104000000000000")
 BRAKING = bytes.fromhex("3704001000000000")
@@ -143,7 +143,7 @@ def test_an_enabling_word_or_a_turn_after_the_stop_is_a_restart() -> None:
     assert was_enabled(scene(told=told, said=turns), FU1, 10.45, 10.3)
 
 
-FAN = next(drive for drive in DRIVES if drive.setpoint_rpdo)
+FAN = next(drive for drive in ALL if drive.setpoint_rpdo)
 RUN, QUICK_STOP = bytes.fromhex("7f00"), bytes.fromhex("0300")
 
 

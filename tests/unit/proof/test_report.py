@@ -34,7 +34,7 @@ def result(*samples: dict[str, Any], **change: Any) -> dict[str, Any]:
         "date": "2026-11-21",
         "machine": "a machine",
         "machines": 1,
-        "plant": "all",
+        "plant": "first",
         "faults": ["owner killed", "bus-off"],
         "faults_missing": [],
         "cells": [["owner killed", "NORD SK TU4-CAO", "modbus", 1]],

@@ -17,6 +17,7 @@ from typing import Any, Final
 import can
 
 from bridge.can.interface import ControllerState
+from bridge.can.ownframes import OwnFrames
 from bridge.can.softbus import SoftBus
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.errors import Unavailable
@@ -26,6 +27,8 @@ _MOST_TO_SEND: Final = 256
 _POLL_S: Final = 0.2
 _REOPEN_S: Final = (0.2, 5.0)
 _ERROR_BYTES: Final = 8
+_ECHOES: Final = frozenset({"udp_multicast"})
+"""Interfaces that give a process what it has sent itself, without a mark (``Message.is_rx``)."""
 _FAILURES: Final = (can.CanError, OSError, ValueError, ImportError, TypeError, AttributeError)
 
 
@@ -39,6 +42,8 @@ class PythonCanBus(SoftBus):
         self._to_send: queue.Queue[tuple[Frame, float] | None] = queue.Queue(_MOST_TO_SEND)
         self._foreign: deque[Frame] = deque(maxlen=_MOST_WAITING)
         self._bus: can.BusABC | None = None
+        self._own = OwnFrames() if interface in _ECHOES else None
+        self._own_lock = threading.Lock()
         self._stopping = threading.Event()
         self._threads: list[threading.Thread] = []
 
@@ -88,16 +93,32 @@ class PythonCanBus(SoftBus):
                 self._status.note_error((message.arbitration_id, data))
             return
         if message.is_fd:
+            self._status.note_error(
+                f"CAN FD frame {message.arbitration_id:03X}h: not read, this bus is classical CAN"
+            )
             return
         flags = (EXTENDED if message.is_extended_id else 0) | (REMOTE if message.is_remote_frame else 0)
         frame = Frame(message.arbitration_id | flags, bytes(message.data), time.monotonic())
+        if not message.is_rx or self._is_own(frame):
+            return
         self._passes(frame)
         if frame.can_id in self._ours:
-            # python-can gives no bus its own frames.
             self._foreign.append(frame)
             self._rouse()
         if self._accepted is None or frame.can_id in self._accepted:
             self._give(frame, frame.time)
+
+    def _is_own(self, frame: Frame) -> bool:
+        if self._own is None:
+            return False
+        with self._own_lock:
+            return self._own.is_own(frame.can_id, frame.data, frame.time)
+
+    def _note_own(self, frame: Frame) -> None:
+        """Before it is sent: it may come back at once."""
+        if self._own is not None:
+            with self._own_lock:
+                self._own.sent(frame, time.monotonic())
 
     def _give(self, frame: Frame, now: float) -> None:
         del now
@@ -144,6 +165,7 @@ class PythonCanBus(SoftBus):
                 data=b"" if remote else frame.data,
                 dlc=len(frame.data) or int(remote),
             )
+            self._note_own(frame)
             try:
                 bus.send(message, timeout=max(0.0, deadline - time.monotonic()))
                 self._passes(frame._replace(time=time.monotonic()))

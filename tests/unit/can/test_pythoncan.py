@@ -89,8 +89,8 @@ async def adapter(monkeypatch: pytest.MonkeyPatch) -> Adapter:
 
 
 @contextmanager
-def opened(adapter: Adapter) -> Generator[PythonCanBus]:
-    bus = PythonCanBus("can0", "pcan", "PCAN_USBBUS1", 250_000)
+def opened(adapter: Adapter, interface: str = "pcan") -> Generator[PythonCanBus]:
+    bus = PythonCanBus("can0", interface, "channel", 250_000)
     bus.open(adapter.happened)
     try:
         yield bus
@@ -130,3 +130,64 @@ async def test_error_frames_are_counted_and_put_into_words(adapter: Adapter) -> 
         await adapter.until(lambda: bus.status.error_frames == 1)
         await adapter.until(lambda: bus.status.last_error.startswith("no acknowledge"))
         assert not bus.drain(time.monotonic())
+
+
+HEARTBEAT = 0x77F
+"""Of the bridge: nobody else sends it."""
+
+
+def message(data: bytes, *, is_rx: bool = True, is_fd: bool = False) -> can.Message:
+    return can.Message(
+        arbitration_id=HEARTBEAT, data=data, is_extended_id=False, is_rx=is_rx, is_fd=is_fd, check=True
+    )
+
+
+async def heard(
+    adapter: Adapter, bus: PythonCanBus, *messages: can.Message
+) -> tuple[list[bytes], list[bytes]]:
+    """What the bus makes of these, after it has sent its own heartbeat: frames of others on what is ours
+    alone, and received ones."""
+    bus.watch(frozenset({HEARTBEAT}))
+    now = time.monotonic()
+    bus.send(Frame(HEARTBEAT, b"\x05"), now, now + 60)
+    await adapter.until(lambda: bool(adapter.sent))
+    for one in messages:
+        adapter.comes(one)
+    adapter.comes(can.Message(arbitration_id=0x701, data=b"\x7f", is_extended_id=False))
+    frames: list[Frame] = []
+
+    def all_came() -> bool:
+        frames.extend(bus.drain(time.monotonic()))
+        return any(frame.can_id == 0x701 for frame in frames)
+
+    await adapter.until(all_came)
+    foreign = bus.take_foreign(time.monotonic())
+    return [frame.data for frame in foreign], [frame.data for frame in frames if frame.can_id == HEARTBEAT]
+
+
+@pytest.mark.parametrize("interface", ["pcan", "gs_usb", "udp_multicast"])
+async def test_what_the_adapter_says_is_our_own_is_nobody_elses(adapter: Adapter, interface: str) -> None:
+    with opened(adapter, interface) as bus:
+        assert await heard(adapter, bus, message(b"\x05", is_rx=False)) == ([], [])
+
+
+async def test_own_frames_without_a_mark_are_told_by_what_was_sent(adapter: Adapter) -> None:
+    with opened(adapter, "udp_multicast") as bus:
+        assert await heard(adapter, bus, message(b"\x05"), message(b"\x7f")) == ([b"\x7f"], [b"\x7f"])
+
+
+async def test_more_of_them_than_were_sent_are_a_strangers(adapter: Adapter) -> None:
+    with opened(adapter, "udp_multicast") as bus:
+        foreign, _ = await heard(adapter, bus, *[message(b"\x05")] * 100)
+        assert 1 <= len(foreign) < 100
+
+
+async def test_an_adapter_without_echo_gives_what_a_second_bridge_sends(adapter: Adapter) -> None:
+    with opened(adapter) as bus:
+        assert await heard(adapter, bus, message(b"\x05")) == ([b"\x05"], [b"\x05"])
+
+
+async def test_frames_of_can_fd_are_named_and_not_read(adapter: Adapter) -> None:
+    with opened(adapter) as bus:
+        assert await heard(adapter, bus, message(b"\x05", is_fd=True)) == ([], [])
+        assert bus.status.last_error == "CAN FD frame 77Fh: not read, this bus is classical CAN"

@@ -13,6 +13,7 @@ from bridge.lint.cable import check_cable
 from bridge.lint.contradictions import check_contradictions
 from bridge.lint.decisions import check_decisions
 from bridge.lint.identifiers import check_identifiers
+from bridge.lint.interface import check_interface
 from bridge.lint.intruder import Exposure, exposure
 from bridge.lint.load import BusLoad, check_load
 from bridge.lint.moving import check_moving
@@ -82,6 +83,7 @@ def lint(
     exposures: list[Exposure] = []
     for b, table in enumerate(site.bus):
         bus = view_bus(table, ("bus", b), families, known, downloads)
+        check_interface(bus, report)
         check_identifiers(bus, report)
         check_pdos(bus, report)
         check_words(bus, report)

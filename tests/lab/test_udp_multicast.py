@@ -40,7 +40,9 @@ def bridge(tmp_path: Path, multicast: None) -> Iterator[tuple[Process, ModbusTcp
     with ExitStack() as stack:
         simulation = stack.enter_context(drivebridge(tmp_path, "simulate", "simulate", str(path)))
         simulation.wait_output("simulating")
-        run = stack.enter_context(drivebridge(tmp_path, "run", "run", str(path), "--role", "bus", notify=True))
+        run = stack.enter_context(
+            drivebridge(tmp_path, "run", "run", str(path), "--role", "bus", notify=True)
+        )
         run.wait_ready()
         run.wait_output("node operational")
         client = ModbusTcpClient("127.0.0.1", port=port, timeout=10)

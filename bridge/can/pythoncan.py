@@ -97,8 +97,7 @@ class PythonCanBus(SoftBus):
                 f"CAN FD frame {message.arbitration_id:03X}h: not read, this bus is classical CAN"
             )
             return
-        flags = (EXTENDED if message.is_extended_id else 0) | (REMOTE if message.is_remote_frame else 0)
-        frame = Frame(message.arbitration_id | flags, bytes(message.data), time.monotonic())
+        frame = frame_of(message, time.monotonic())
         if not message.is_rx or self._is_own(frame):
             return
         self._passes(frame)
@@ -206,6 +205,12 @@ class PythonCanBus(SoftBus):
         if self._bus:
             _shut_down(self._bus)
             self._bus = None
+
+
+def frame_of(message: can.Message, at: float) -> Frame:
+    """The frame in a message of classical CAN, received at ``at``."""
+    flags = (EXTENDED if message.is_extended_id else 0) | (REMOTE if message.is_remote_frame else 0)
+    return Frame(message.arbitration_id | flags, bytes(message.data), at)
 
 
 def _shut_down(bus: can.BusABC) -> None:

@@ -6,7 +6,7 @@ import asyncio
 import inspect
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -123,17 +123,22 @@ class Line:
         return node_id
 
 
-def choose_line(site: Path | None, which: BusChoice) -> Line:
-    """The bus that the options name. Raises ``BadParameter`` if they name none or two."""
+def choose_line(site: Path | None, which: BusChoice, *, is_recorded: bool = False) -> Line:
+    """The bus that the options name; one that was recorded has no interface. Raises ``BadParameter`` if they
+    name none or two."""
     bus = which.bus
     if site is None:
         if bus is not None:
             raise typer.BadParameter("--bus names a bus of SITE, and there is no SITE")
+        if is_recorded:
+            which = replace(which, interface="virtual", channel="")
         if which.interface is None or which.channel is None:
             raise typer.BadParameter("which bus? Give SITE, or --interface and --channel")
         content = {"name": "bus", "interface": which.interface, "channel": which.channel}
         table = BusTable.model_validate(content | ({"bitrate": which.bitrate} if which.bitrate else {}))
-        return Line(not_virtual(table), {}, is_of_site=False, states_bitrate=which.bitrate is not None)
+        if not is_recorded:
+            not_virtual(table)
+        return Line(table, {}, is_of_site=False, states_bitrate=which.bitrate is not None)
     if which != BusChoice(bus):
         raise typer.BadParameter("SITE says interface, channel and bit rate: leave the options out")
     project = load_project(site)
@@ -143,7 +148,8 @@ def choose_line(site: Path | None, which: BusChoice) -> Line:
     if bus not in tables:
         raise typer.BadParameter(f"which bus? Give --bus, one of {', '.join(tables)}")
     state_dir = Path(project.site.site.state_dir)
-    return Line(not_virtual(tables[bus]), project.families, is_of_site=True, state_dir=state_dir)
+    table = tables[bus] if is_recorded else not_virtual(tables[bus])
+    return Line(table, project.families, is_of_site=True, state_dir=state_dir)
 
 
 def not_virtual(table: BusTable) -> BusTable:

@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -15,9 +16,11 @@ from bridge import clock
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_line, print_table, takes_bus, tell
 from bridge.cli.terminal import printable
+from bridge.cli.trace import SUFFIXES, Trace
 from bridge.errands.decode import Decoder, Kind, Meaning
 from bridge.errands.errand import Errand
 from bridge.errands.habit_watch import HabitWatch
+from bridge.errands.silence_watch import SilenceWatch, bounds
 from bridge.errands.statistics import Statistics
 from bridge.errors import OperationFailed
 from bridge.lint import family_dictionaries
@@ -69,7 +72,12 @@ class _Listener(Errand):
 @takes_bus
 def monitor(
     which: BusChoice,
-    site: Annotated[Path | None, typer.Argument(metavar="[SITE]", help="the site file")] = None,
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="[SITE] [TRACE]", help=f"the site file; a recorded trace: {', '.join(SUFFIXES)}"
+        ),
+    ] = None,
     node: Annotated[list[str] | None, typer.Option(help="only this node; may be repeated")] = None,
     kind: Annotated[list[Kind] | None, typer.Option(help="only this kind; may be repeated")] = None,
     count: Annotated[int | None, typer.Option(min=1, help="end after this many frames")] = None,
@@ -78,8 +86,9 @@ def monitor(
     log: Annotated[Path | None, typer.Option(help="write the frames to a file as candump -L does")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Decode the frames on a bus until Ctrl-C, --count or --seconds."""
-    line = choose_line(site, which)
+    """Decode the frames on a bus until Ctrl-C, --count or --seconds, or those of a recorded trace."""
+    site, path = _site_and_trace(files or [])
+    line = choose_line(site, replace(which, channel=None) if path else which, is_recorded=path is not None)
     ids = {line.node_id(text) for text in node or []}
     kinds = set(kind or [])
     devices = [name for name, family in line.families.items() if family.is_device]
@@ -92,7 +101,7 @@ def monitor(
 
     def show(frame: Frame, meaning: Meaning, at: float) -> None:
         if record:
-            record.write(line.table.channel or "", frame)
+            record.write(line.table.channel or "can0", frame)
         if statistics:
             tally.on_frame(frame, meaning.label)
         elif as_json:
@@ -100,18 +109,51 @@ def monitor(
         else:
             print(for_people(frame, meaning, at), flush=True)
 
-    with Record(log) if log else nullcontext() as record:
+    def listen(now: float) -> _Listener:
+        return _Listener(decoder, habits, wanted, show, now, count, seconds)
+
+    trace = Trace(path, which.channel, line.table.channel) if path else None
+    silences = SilenceWatch(bounds(line.table, decoder.rpdos()) if site and trace else {})
+    with Record(log, is_recorded=trace is not None) if log else nullcontext() as record:
         try:
-            listener = carry_out(
-                line, lambda now: _Listener(decoder, habits, wanted, show, now, count, seconds)
-            )
+            listener = _play(trace, listen, silences) if trace else carry_out(line, listen)
         except BrokenPipeError:
             sys.stderr.close()  # whoever read us has had enough, as `head` does
             return
-    for node_id, said in habits.habits().items():
-        tell(f"{decoder.name(node_id)}: {'; '.join(said)}")
     if statistics:
         _print_statistics(tally, listener.last - listener.started, as_json=as_json)
+    for node_id, odd in habits.habits().items():
+        tell(f"{decoder.name(node_id)}: {'; '.join(odd)}")
+    silent = silences.said(listener.started, listener.last)
+    for sentence in silent:
+        tell(sentence)
+    if silent:
+        raise typer.Exit(1)
+
+
+def _site_and_trace(files: Sequence[Path]) -> tuple[Path | None, Path | None]:
+    """Each is known by its suffix. Raises ``BadParameter`` where there are two of a kind."""
+    traces = [path for path in files if path.suffix.lower() in SUFFIXES]
+    sites = [path for path in files if path not in traces]
+    if len(traces) > 1 or len(sites) > 1:
+        raise typer.BadParameter(f"one SITE and one TRACE at most; a trace is {', '.join(SUFFIXES)}")
+    return (sites[0] if sites else None), (traces[0] if traces else None)
+
+
+def _play(trace: Trace, listen: Callable[[float], _Listener], silences: SilenceWatch) -> _Listener:
+    """Everything that was recorded, as if it came now. Raises ``OperationFailed``."""
+    listener: _Listener | None = None
+    for frame in trace.frames():
+        if listener is None:
+            listener = listen(frame.time)
+        if listener.is_finished(frame.time):
+            break
+        silences.on_frame(frame)
+        listener.on_frame(frame)
+    assert listener
+    if trace.left_out:
+        tell(f"left out: {trace.left_out}")
+    return listener
 
 
 def _cob_id(frame: Frame) -> str:
@@ -141,10 +183,12 @@ def _for_scripts(frame: Frame, meaning: Meaning, at: float) -> dict[str, object]
 
 
 class Record:
-    """A file of frames as ``candump -L`` writes it. All its methods raise ``OperationFailed``."""
+    """A file of frames as ``candump -L`` writes it. All its methods raise ``OperationFailed``. Recorded ones
+    keep their times."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, is_recorded: bool = False) -> None:
         self._path = path
+        self._is_recorded = is_recorded
         with self._failing():
             self._file = path.open("w", encoding="ascii")
 
@@ -152,8 +196,9 @@ class Record:
         """One line: time since 1970, interface, frame."""
         remote = bool(frame.can_id & REMOTE)
         data = f"R{len(frame.data) or ''}" if remote else frame.data.hex().upper()
+        at = frame.time if self._is_recorded else clock.epoch_ns(frame.time) / 1e9
         with self._failing():
-            self._file.write(f"({clock.epoch_ns(frame.time) / 1e9:.6f}) {channel} {_cob_id(frame)}#{data}\n")
+            self._file.write(f"({at:.6f}) {channel} {_cob_id(frame)}#{data}\n")
 
     def __enter__(self) -> Record:
         return self

@@ -39,6 +39,15 @@ _PDOS: Final = {
 }
 
 
+_OTHERS: Final = (
+    (0x001, 0x001, "global fail-safe command", "CiA 304"),
+    (0x071, 0x076, "flying master", "CiA 302-2"),
+    (0x101, 0x180, "SRDO", "CiA 304"),
+    (0x6E0, 0x6E0, "SDO manager", "CiA 302-5"),
+)
+"""First and last COB-ID of services that the bridge has no part in, by CiA 301 §7.3.5 and these."""
+
+
 class Kind(StrEnum):
     NMT = "nmt"
     SYNC = "sync"
@@ -116,6 +125,10 @@ class Decoder:
         view = self._pdos.get(cob_id)
         return view.codec.length if view is not None and view.label.startswith("TPDO") else None
 
+    def rpdos(self) -> dict[int, str]:
+        """What stands for each RPDO of the site's drives, by COB-ID."""
+        return {can_id: view.label for can_id, view in self._pdos.items() if view.label.startswith("RPDO")}
+
     def name(self, node_id: int) -> str:
         """The node as the site calls it, or its address."""
         return self._names.get(node_id, f"node {node_id}")
@@ -133,6 +146,10 @@ class Decoder:
         raw = data.hex(" ").upper()
         if node_id and base in _PDOS:
             return Meaning(Kind.PDO, node_id, f"{_PDOS[base]} {self.name(node_id)}", raw)
+        for first, last, label, document in _OTHERS:
+            if first <= base + node_id <= last:
+                text = f"{raw} ({document}: the bridge has no part in it)".lstrip()
+                return Meaning(Kind.OTHER, 0, label, text)
         return Meaning(Kind.OTHER, 0, "unknown", raw)
 
     def _remote(self, cob_id: int) -> Meaning:

@@ -22,6 +22,11 @@ FIXED_BITS: Final = 0x6000_0000
 """Bits 30 and 29 of a COB-ID: what the node has there stays."""
 MOST_ENTRIES: Final = 64
 """Objects in one PDO, at most (CiA 301 §7.5.2.36)."""
+MPDO_KINDS: Final = {
+    0xFE: "a multiplexed PDO of many sources (SAM-MPDO)",
+    0xFF: "a multiplexed PDO of many destinations (DAM-MPDO)",
+}
+"""By sub-index 0 of the mapping (CiA 301 §7.5.2.36, §7.5.2.38)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,7 +36,7 @@ from bridge.node.boot.actions import (
     wish,
 )
 from bridge.node.boot.layout import Layouts, differences, factory_entries, layouts, match_words, missing_parts
-from bridge.node.boot.pdo_settings import MOST_ENTRIES, PdoObjects, set_pdo, table_for
+from bridge.node.boot.pdo_settings import MOST_ENTRIES, MPDO_KINDS, PdoObjects, set_pdo, table_for
 from bridge.node.boot.start import write_start
 
 RPDO: Final = (0x1400, 0x1600)
@@ -264,6 +264,8 @@ def plan_node_tpdos(node: Node, result: BootResult) -> Generator[Action, bytes |
 
 def read_entries(mapping: int, count: int) -> Generator[Action, bytes | None, tuple[PdoEntry, ...]]:
     """The mapping as the node has it. Raises MappingError where it cannot be one, or cannot be read."""
+    if count in MPDO_KINDS:
+        raise MappingError(f"{mapping:04X}h:00 is {count:02X}h: {MPDO_KINDS[count]}, which is not supported")
     if count > MOST_ENTRIES:
         raise MappingError(f"{mapping:04X}h:00 is {count}, at most {MOST_ENTRIES} objects can be mapped")
     entries: tuple[PdoEntry, ...] = ()

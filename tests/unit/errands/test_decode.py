@@ -125,7 +125,14 @@ def test_without_a_site_a_pdo_is_its_bytes() -> None:
         (0x705, "FF", Kind.HEARTBEAT, "heartbeat conveyor", "pre operational, toggle bit 1"),
         (0x705 | REMOTE, "00", Kind.HEARTBEAT, "guarding conveyor", "asked for its NMT state"),
         (0x7E5, "0401000000000000", Kind.LSS, "LSS master", "switch state global: configuration"),
-        (0x6E0, "01", Kind.OTHER, "unknown", "01"),
+        (0x6F0, "01", Kind.OTHER, "unknown", "01"),
+        (0x001, "", Kind.OTHER, "global fail-safe command", "(CiA 304: the bridge has no part in it)"),
+        (0x071, "00", Kind.OTHER, "flying master", "00 (CiA 302-2: the bridge has no part in it)"),
+        (0x076, "00", Kind.OTHER, "flying master", "00 (CiA 302-2: the bridge has no part in it)"),
+        (0x077, "00", Kind.OTHER, "unknown", "00"),
+        (0x101, "01", Kind.OTHER, "SRDO", "01 (CiA 304: the bridge has no part in it)"),
+        (0x180, "01", Kind.OTHER, "SRDO", "01 (CiA 304: the bridge has no part in it)"),
+        (0x6E0, "01", Kind.OTHER, "SDO manager", "01 (CiA 302-5: the bridge has no part in it)"),
     ],
 )
 def test_everything_has_a_name(can_id: int, data: str, kind: Kind, label: str, text: str) -> None:

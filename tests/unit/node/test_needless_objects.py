@@ -120,3 +120,15 @@ def test_a_node_that_is_gone_is_not_asked_for_all_that_nothing_needs(tmp_path: P
     assert "the node does not answer" in status(bench)
     reads = {frame.data[1:4] for frame in bench.sent(REQUEST) if frame.data[0] == 0x40}
     assert len(reads) <= 4
+
+
+@pytest.mark.parametrize(("count", "kind"), [("FE", "SAM-MPDO"), ("FF", "DAM-MPDO")])
+def test_a_multiplexed_pdo_is_named_and_not_taken_for_a_mapping(
+    tmp_path: Path, count: str, kind: str
+) -> None:
+    bench = Bench(write_site(tmp_path), present=False)
+    bench.node.adopt_habits([Rule(frames="answer", like="4F 00 1A 00", data=f"4F 00 1A 00 {count} 00 00 00")])
+    bench.power_on()
+    bench.run(3.0)
+    assert f"1A00h:00 is {count}h: a multiplexed PDO" in status(bench), status(bench)
+    assert kind in status(bench)

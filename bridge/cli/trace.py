@@ -1,0 +1,93 @@
+"""Recorded traces: what candump, CANalyzer and PCAN-View have written, as python-can reads it."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import can
+
+from bridge.can.pythoncan import frame_of
+from bridge.canopen.frame import Frame
+from bridge.errors import OperationFailed
+
+SUFFIXES: Final = (".log", ".asc", ".blf", ".trc")
+_UNREADABLE: Final = (
+    can.CanError,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    NotImplementedError,
+    EOFError,
+    struct.error,
+    zlib.error,
+)
+"""What python-can's readers raise for files that are not what their names say."""
+
+
+class Trace:
+    """The classical CAN frames of one channel of a file, with its own times in seconds.
+
+    ``channel`` is the one that was asked for. Without it the first frame's is taken; that others follow is
+    an error then, unless it is the ``expected`` one.
+    """
+
+    def __init__(self, path: Path, channel: str | None, expected: str | None) -> None:
+        self._path = path
+        self._channel = channel
+        self._is_sure = channel is not None
+        self._expected = expected
+        self._left_out: Counter[str] = Counter()
+
+    def frames(self) -> Iterator[Frame]:
+        """Raises ``OperationFailed`` where the file cannot be read, or it has several channels."""
+        is_empty = True
+        for message in self._messages():
+            if not self._is_meant(str(message.channel)):
+                self._left_out["frames of other channels"] += 1
+            elif message.is_error_frame:
+                self._left_out["error frames"] += 1
+            elif message.is_fd:
+                self._left_out["CAN FD frames"] += 1
+            else:
+                is_empty = False
+                yield frame_of(message, message.timestamp)
+        if is_empty:
+            of = f" of channel {self._channel}" if self._channel else ""
+            raise OperationFailed(f"{self._path} has no CAN frame{of}; {self.left_out or 'it is empty'}")
+
+    def _is_meant(self, channel: str) -> bool:
+        if self._channel is None:
+            self._channel, self._is_sure = channel, channel == self._expected
+        if channel == self._channel:
+            return True
+        if not self._is_sure:
+            raise OperationFailed(
+                f"{self._path} has frames of several channels, of {self._channel} and {channel}: "
+                "say which by --channel"
+            )
+        return False
+
+    @property
+    def left_out(self) -> str:
+        """What has not been shown, in words; empty where that is nothing."""
+        return ", ".join(f"{count} {what}" for what, count in sorted(self._left_out.items()))
+
+    def _messages(self) -> Iterator[can.Message]:
+        count = 0
+        try:
+            with can.LogReader(self._path) as reader:
+                for message in reader:
+                    yield message
+                    count += 1
+        except OSError as error:
+            raise OperationFailed(f"{self._path} cannot be read: {error.strerror or error}") from None
+        except _UNREADABLE as error:
+            after = f"after {count} frames" if count else "from the start"
+            raise OperationFailed(f"{self._path} is no {self._path.suffix} trace {after}: {error}") from None

@@ -51,7 +51,8 @@ def write_site(
             if file is not None:
                 try:
                     derived = derive_family(read_whole_device_file(file.path), file.path.name)
-                    mapping, why = _name(path, file, derived), ""
+                    mapping = _name(path, file, derived)
+                    why = f"only read: {derived.read_only}" if derived.read_only else ""
                     if mapping not in known and mapping.startswith(DESCRIBED):
                         known[mapping] = describe(file.path)
                     elif mapping not in known:

@@ -26,11 +26,11 @@ _ERROR_OBJECTS: Final = {
 _DUMMIES: Final = range(0x0001, 0x0008)
 
 
-def device_lines(description: Description, source: str) -> Iterator[str]:
-    """The mapping, line by line."""
+def device_lines(description: Description, source: str, read_only: str = "") -> Iterator[str]:
+    """The mapping, line by line; ``read_only`` is why nothing is written into the device."""
     device = description.device
     inputs = dict(_signals(description, receives=False))
-    outputs = dict(_signals(description, receives=True))
+    outputs = {} if read_only else dict(_signals(description, receives=True))
     yield f"# Made of {one_line(source)} by `drivebridge family new`. A key behind a # is what the file does"
     yield "# not say: fill it in from the manual, and compare the rest with the device."
     yield f"extends = {string(GENERIC)}"
@@ -41,6 +41,8 @@ def device_lines(description: Description, source: str) -> Iterator[str]:
     yield f"source = {string(source)}"
     profile = _profile(description)
     yield f"profile = {profile}" if profile else "# profile = "
+    if read_only:
+        yield f"read_only = {string(read_only)}"
     yield ""
     yield from identity_lines(description)
     for name, (entry, kind, title) in inputs.items():

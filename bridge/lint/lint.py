@@ -16,7 +16,7 @@ from bridge.lint.identifiers import check_identifiers
 from bridge.lint.intruder import Exposure, exposure
 from bridge.lint.load import BusLoad, check_load
 from bridge.lint.moving import check_moving
-from bridge.lint.outputs import check_outputs, output_cases
+from bridge.lint.outputs import check_outputs, check_read_only, output_cases
 from bridge.lint.own import WorstCase, check_own_supervision, worst_cases
 from bridge.lint.pdos import check_pdos
 from bridge.lint.report import LintFinding, LintReport, Severity
@@ -89,6 +89,7 @@ def lint(
         check_own_supervision(bus, report)
         check_contradictions(bus, report)
         check_outputs(bus, report)
+        check_read_only(bus, report)
         check_moving(bus, report)
         check_cable(bus, report)
         cases += [*worst_cases(bus), *output_cases(bus)]
